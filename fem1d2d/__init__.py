@@ -1,0 +1,37 @@
+"""Elastic bodies on meshes: P1 elements on intervals and triangles, plane strain, condensed onto an interface.
+
+A small core in which every matrix is exact for its mesh.  It knows nothing of contact or of any theorem.
+"""
+
+from fem1d2d.assembly import body_load, gram, side_load, stiffness
+from fem1d2d.condense import Condensation
+from fem1d2d.material import Material, bar, plane_strain
+from fem1d2d.mesh import Mesh, MeshError, from_file, interval, rectangle
+from fem1d2d.pencil import Eigenvalue, largest, largest_sparse
+from fem1d2d.supports import Supports, rigid_motions, supports
+from fem1d2d.trace import nodes_between, surface, trapezoid
+
+__all__ = [
+    "Condensation",
+    "Eigenvalue",
+    "Material",
+    "Mesh",
+    "MeshError",
+    "Supports",
+    "bar",
+    "body_load",
+    "from_file",
+    "gram",
+    "interval",
+    "largest",
+    "largest_sparse",
+    "nodes_between",
+    "plane_strain",
+    "rectangle",
+    "rigid_motions",
+    "side_load",
+    "stiffness",
+    "supports",
+    "surface",
+    "trapezoid",
+]

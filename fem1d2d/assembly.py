@@ -1,0 +1,69 @@
+"""Stiffness matrix, H1 Gram matrix and load vectors.  Unknown d * node + p is component p at a node."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from fem1d2d import element
+from fem1d2d.material import Material
+from fem1d2d.mesh import Floats, Ints, Mesh, measures
+
+
+def _assemble(nodes: Ints, entries: NDArray[np.float64], size: int) -> sp.csc_array:
+    """Sum element matrices, shape (c, k, k), of the unknowns ``nodes``, shape (c, k)."""
+    rows = np.repeat(nodes, nodes.shape[1], axis=1).ravel()
+    columns = np.tile(nodes, nodes.shape[1]).ravel()
+    return sp.coo_array((entries.ravel(), (rows, columns)), shape=(size, size)).tocsc()
+
+
+def stiffness(mesh: Mesh, material: Material) -> sp.csc_array:
+    """``a(u, v)`` of (4.1), shape (d n, d n), unit stress x length^(d - 2)."""
+    d = mesh.dimension
+    unknowns = (d * mesh.cells[:, :, None] + np.arange(d)).reshape(len(mesh.cells), -1)
+    local = element.stiffness(mesh, material).reshape(len(mesh.cells), unknowns.shape[1], unknowns.shape[1])
+    return _assemble(unknowns, local.astype(float), d * len(mesh.points))
+
+
+def gram(mesh: Mesh, length: float = 1.0) -> sp.csc_array:
+    """The norm ``int |v|^2 / L^2 + |grad v|^2`` of H1, shape (d n, d n), unit length^(d - 2).
+
+    Parameters
+    ----------
+    length : float
+        L > 0; the paper is L = 1 in the file's unit of length.
+
+    Raises
+    ------
+    ValueError
+        Unless L > 0.
+    """
+    if not length > 0:
+        raise ValueError(f"length {length}: a positive number is needed")
+    local = element.laplace(mesh) + element.mass(mesh) / length**2
+    scalar = _assemble(mesh.cells, local.astype(float), len(mesh.points))
+    return sp.kron(scalar, sp.eye_array(mesh.dimension), format="csc")
+
+
+def body_load(mesh: Mesh, force: Sequence[float]) -> Floats:
+    """``int f . v`` of a constant force per volume, shape (n, d)."""
+    share = np.repeat(measures(mesh.points, mesh.cells).astype(float) / mesh.cells.shape[1], mesh.cells.shape[1])
+    weights = np.bincount(mesh.cells.ravel(), share, minlength=len(mesh.points))
+    return np.asarray(weights[:, None] * np.asarray(force, dtype=float))
+
+
+def side_load(mesh: Mesh, facets: Ints, traction: Sequence[float]) -> Floats:
+    """``int t . v`` over facets of a constant force per area, shape (n, d)."""
+    weights = facet_weights(mesh, facets)
+    return np.asarray(weights[:, None] * np.asarray(traction, dtype=float))
+
+
+def facet_weights(mesh: Mesh, facets: Ints) -> Floats:
+    """``int v`` over facets for every hat function v, shape (n,); in 1D a facet is a point of measure 1."""
+    p = mesh.points[facets].astype(float)
+    sizes = np.ones(len(facets)) if mesh.dimension == 1 else np.linalg.norm(p[:, 1] - p[:, 0], axis=1)
+    share = np.repeat(sizes / facets.shape[1], facets.shape[1])
+    return np.asarray(np.bincount(facets.ravel(), share, minlength=len(mesh.points)), dtype=float)

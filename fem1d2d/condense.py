@@ -1,0 +1,76 @@
+"""Factor once, then everything on the interface: Schur complement, lift, condensed loads, solves."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+from scipy.sparse.linalg import SuperLU, splu
+
+from fem1d2d.mesh import Floats, Ints
+
+
+class Condensation:
+    """A symmetric positive definite matrix seen from some of its unknowns, the interface B; I is the rest.
+
+    ``lift = -A_II^-1 A_IB`` extends interface values with least energy, ``schur = A_BB + A_BI lift`` is that energy:
+    ``phi' schur phi = min { v' A v : v_B = phi }``.
+
+    Parameters
+    ----------
+    matrix : sparse array, shape (n, n)
+    interface : int array, shape (b,)
+        Positions of B, in the order wanted on the interface.
+    """
+
+    def __init__(self, matrix: sp.csc_array, interface: Ints) -> None:
+        self.matrix = matrix
+        self.interface = interface
+        inside = np.ones(matrix.shape[0], dtype=bool)
+        inside[interface] = False
+        self.inside: Ints = np.flatnonzero(inside)
+        columns = matrix[:, interface]
+        self._coupling: Floats = columns[self.inside].toarray()
+        self._factor: SuperLU | None = None
+        self.lift: Floats = -self._solve_inside(self._coupling)
+        schur = columns[interface].toarray() + self._coupling.T @ self.lift
+        self.schur: Floats = (schur + schur.T) / 2
+        for array in (self.lift, self.schur):
+            array.setflags(write=False)
+
+    def _solve_inside(self, right: Floats) -> Floats:
+        if len(self.inside) == 0:
+            return right
+        if self._factor is None:
+            block = self.matrix[self.inside][:, self.inside].tocsc()
+            self._factor = splu(
+                block, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+            )
+        return np.asarray(self._factor.solve(right))
+
+    @cached_property
+    def schur_factor(self) -> tuple[NDArray[Any], bool]:
+        """Cholesky factor of the Schur complement, as scipy.linalg.cho_solve takes it."""
+        factor: tuple[NDArray[Any], bool] = cho_factor(self.schur)
+        return factor
+
+    def condense(self, load: Floats) -> Floats:
+        """The load as the interface feels it: ``load_B + lift' load_I``, shape (b,)."""
+        return np.asarray(load[self.interface] + self.lift.T @ load[self.inside])
+
+    def extend(self, trace: Floats, load: Floats | None = None) -> Floats:
+        """Values on all unknowns with the given interface values, in equilibrium with ``load`` inside, shape (n,)."""
+        full = np.empty(self.matrix.shape[0])
+        full[self.interface] = trace
+        full[self.inside] = self.lift @ trace
+        if load is not None:
+            full[self.inside] += self._solve_inside(load[self.inside])
+        return full
+
+    def solve(self, load: Floats) -> Floats:
+        """``A^-1 load`` by block elimination, shape (n,)."""
+        return self.extend(cho_solve(self.schur_factor, self.condense(load), check_finite=False), load)

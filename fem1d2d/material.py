@@ -1,0 +1,51 @@
+"""Hooke's law: the Lame parameters of a bar and of plane strain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True, kw_only=True)
+class Material:
+    """Lame parameters in the file's unit of stress: ``sigma = lame_lambda tr(eps) I + 2 lame_mu eps``."""
+
+    lame_lambda: Any
+    lame_mu: Any
+
+
+def plane_strain(young: Any, poisson: Any) -> Material:
+    """Isotropic plane strain, as in Section 6.1 of the paper.
+
+    ``lame_lambda = E nu / ((1 - 2 nu)(1 + nu))``, ``lame_mu = E / (2 (1 + nu))``; any scalar.
+
+    Raises
+    ------
+    ValueError
+        Unless E > 0 and -1 < nu < 1/2.
+
+    Examples
+    --------
+    >>> plane_strain(2.5, 0.25)
+    Material(lame_lambda=1.0, lame_mu=1.0)
+    """
+    if not young > 0:
+        raise ValueError(f"Young modulus {young}: a positive number is needed")
+    if not -1 < poisson < 0.5:
+        raise ValueError(f"Poisson ratio {poisson}: a number with -1 < nu < 0.5 is needed")
+    return Material(
+        lame_lambda=young * poisson / ((1 - 2 * poisson) * (1 + poisson)), lame_mu=young / (2 * (1 + poisson))
+    )
+
+
+def bar(young: Any) -> Material:
+    """A bar of unit cross-section: ``sigma = E eps``, that is lame_lambda = E and lame_mu = 0 in one dimension.
+
+    Raises
+    ------
+    ValueError
+        Unless E > 0.
+    """
+    if not young > 0:
+        raise ValueError(f"Young modulus {young}: a positive number is needed")
+    return Material(lame_lambda=young, lame_mu=young * 0)

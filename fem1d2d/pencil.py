@@ -1,0 +1,70 @@
+"""Extremal eigenvalues of symmetric pencils, with residuals that bound their error."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.linalg import cho_factor, cho_solve, eigh
+from scipy.sparse.linalg import LinearOperator, eigsh
+
+from fem1d2d.mesh import Floats
+
+#: Below this size a pencil is solved densely.
+DENSE = 40
+
+
+@dataclass(frozen=True, kw_only=True)
+class Eigenvalue:
+    """An eigenvalue of ``A x = value B x`` with its error bound.
+
+    Attributes
+    ----------
+    value : float
+    vector : array, shape (n,)
+        With ``x' B x = 1``.
+    residual : float
+        ``|A x - value B x|`` in the norm of ``B^-1``: some eigenvalue lies within it of ``value``, and the error
+        of an isolated one is of the order of its square.
+    """
+
+    value: float
+    vector: Floats
+    residual: float
+
+
+def _certify(
+    A: Floats | sp.csc_array, B: Floats | sp.csc_array, x: Floats, solve_B: Callable[[Floats], Floats]
+) -> Eigenvalue:
+    x = x / np.sqrt(x @ (B @ x))
+    value = float(x @ (A @ x))
+    r = A @ x - value * (B @ x)
+    x.setflags(write=False)
+    return Eigenvalue(value=value, vector=x, residual=float(np.sqrt(max(r @ solve_B(r), 0.0))))
+
+
+def largest(A: Floats, B: Floats) -> Eigenvalue:
+    """Largest eigenvalue of a dense pencil, A symmetric, B symmetric positive definite, both of shape (n, n)."""
+    n = len(A)
+    factor = cho_factor(B)
+    _, vectors = eigh(A, B, subset_by_index=[n - 1, n - 1], driver="gvx")
+    return _certify(A, B, vectors[:, 0], lambda r: np.asarray(cho_solve(factor, r)))
+
+
+def largest_sparse(A: sp.csc_array, B: sp.csc_array, solve_B: Callable[[Floats], Floats]) -> Eigenvalue:
+    """Largest eigenvalue of a large pencil by Lanczos, from a fixed start, so that it repeats to the digit.
+
+    Parameters
+    ----------
+    solve_B : callable
+        ``r -> B^-1 r``.
+    """
+    n = A.shape[0]
+    if n <= DENSE:
+        return largest(A.toarray(), B.toarray())
+    inverse = LinearOperator((n, n), matvec=solve_B, dtype=float)
+    start = np.random.default_rng(0).standard_normal(n)
+    _, vectors = eigsh(A, k=1, M=B, Minv=inverse, which="LA", v0=start, tol=1e-10, ncv=min(n - 1, 32))
+    return _certify(A, B, vectors[:, 0], solve_B)

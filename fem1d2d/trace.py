@@ -1,0 +1,64 @@
+"""The interface: its nodes in order, and the trapezoid rule on them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fem1d2d.mesh import Floats, Ints, Mesh, MeshError
+
+#: Two coordinates are the same within this fraction of the body's extent.
+SAME = 1e-9
+
+
+def extent(mesh: Mesh) -> float:
+    """Largest extent of a mesh along an axis, unit of length."""
+    return float(np.ptp(mesh.points.astype(float), axis=0).max())
+
+
+def surface(mesh: Mesh, *, upper: bool) -> Ints:
+    """Nodes of the flat top (or bottom) of a mesh, from left to right.
+
+    That is the boundary at the largest (smallest) last coordinate.
+
+    Parameters
+    ----------
+    upper : bool
+        True for the top of a lower body, False for the bottom of an upper one.  In 1D: the right or the left end.
+
+    Raises
+    ------
+    MeshError
+        The extreme node stands alone: no boundary edge lies flat there (2D).
+    """
+    points = mesh.points.astype(float)
+    height = points[:, -1]
+    level = height.max() if upper else height.min()
+    flat = np.abs(height - level) <= SAME * extent(mesh)
+    if mesh.dimension == 1:
+        return np.flatnonzero(flat)
+    edges = mesh.boundary
+    nodes = np.unique(edges[flat[edges].all(axis=1)])
+    if len(nodes) == 0:
+        raise MeshError(f"no flat {'top' if upper else 'bottom'}: no boundary edge lies at y = {level:g}")
+    return np.asarray(nodes[np.argsort(points[nodes, 0], kind="stable")])
+
+
+def nodes_between(mesh: Mesh, nodes: Ints, ends: tuple[float, float]) -> Ints:
+    """Those of ``nodes`` with ``ends[0] <= x <= ends[1]``, ends included up to rounding (2D)."""
+    x = mesh.points[nodes, 0].astype(float)
+    slack = SAME * extent(mesh)
+    return np.asarray(nodes[(x >= ends[0] - slack) & (x <= ends[1] + slack)])
+
+
+def trapezoid(x: Floats) -> Floats:
+    """Weights w_j of the trapezoid rule on ordered points, shape (n,), unit of length; one point has weight 1.
+
+    Examples
+    --------
+    >>> trapezoid(np.array([0.0, 1.0, 3.0]))
+    array([0.5, 1.5, 1. ])
+    """
+    if len(x) == 1:
+        return np.ones(1)
+    steps = np.diff(x) / 2
+    return np.asarray(np.concatenate([steps, [0.0]]) + np.concatenate([[0.0], steps]))

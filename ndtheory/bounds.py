@@ -1,0 +1,287 @@
+"""C_0, .., C_6, G, h_1, h_2 and the contraction interval (Section 5), printed and repaired.
+
+Every formula is written over any scalar (float, Decimal, sympy symbol) and free of the cancellation
+that the printed form suffers; docstrings give the equation, ``tests/ndtheory`` a second derivation.
+
+The two editions are one set of formulas.  The paper's bracket ``M C_R + C_K + sqrt(C_K m) + 1`` in (5.30)
+adds a stress to the number 1: from (5.11), (5.13), (5.19) and (5.23) it is a *stress* ``u = m`` that stands there, and
+an overall factor 1/u with it.  The printed edition is ``u = 1`` with ``m~ = min(m, 1)`` for m; the repaired one is
+``u = m`` with m itself.  They agree in the unit of stress in which m = 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from decimal import Decimal
+from typing import Any, Literal
+
+from ndtheory.constants import Constants, relaxation_factor
+from ndtheory.number import Number, decimal, sqrt, working_precision
+
+Verdict = Literal["contraction", "no conclusion"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Edition:
+    """How an edition of the theorem reads m and the stress u of (5.30).
+
+    Attributes
+    ----------
+    name : str
+    coercivity : callable
+        m -> the m that enters the formulas: ``min(m, 1)`` by (5.34), or m.
+    unit : callable
+        m -> u: 1 as printed, m as repaired.
+    proved : callable
+        m -> whether the proof holds: everywhere when repaired; for m >= 1 as printed.
+    """
+
+    name: Literal["printed", "repaired"]
+    coercivity: Callable[[Any], Any]
+    unit: Callable[[Any], Any]
+    proved: Callable[[Any], bool]
+
+
+PRINTED = Edition(name="printed", coercivity=lambda m: min(m, 1), unit=lambda m: 1, proved=lambda m: m >= 1)
+REPAIRED = Edition(name="repaired", coercivity=lambda m: m, unit=lambda m: m, proved=lambda m: True)
+EDITIONS = (PRINTED, REPAIRED)
+
+
+# The formulas.  Here m is m~ in the printed edition, A = M C_R, x = C_K.
+
+
+def lipschitz(m: Any, M: Any, C_R: Any, x: Any) -> Any:
+    """C_T (5.16); with m~ for m it is C~_T (5.35).
+
+    Examples
+    --------
+    >>> lipschitz(1.0, 2.0, 1.5, 0.0)
+    9.0
+    """
+    A = M * C_R
+    return A / m**2 * (A + x + sqrt(x * m))
+
+
+def C0(m: Any, M: Any, C_R: Any) -> Any:
+    """C_0 (5.37): from here on the coefficient of |||T psi - T psi~||| squared is non-negative."""
+    return 2 * m**2 / ((M * C_R) ** 2 + 2 * m**2)
+
+
+def G(x: Any, m: Any, M: Any, C_R: Any, u: Any) -> Any:
+    """G (5.42): ``M^2 (x^2 + sqrt(m) x^(3/2) + (M C_R + u) x) / u``."""
+    return M**2 / u * x * (x + sqrt(m * x) + M * C_R + u)
+
+
+def inverse_G(y: Any, m: Any, M: Any, C_R: Any, u: Any) -> Any:
+    """The x >= 0 with G(x) = y, for y > 0.
+
+    In t = sqrt(x) this is ``t^4 + sqrt(m) t^3 + (M C_R + u) t^2 = Y``: increasing and convex, so Newton's method
+    falls monotonically from any start above the root.  The smaller of the roots of the first and of the last
+    term alone is such a start (the middle term never dominates, as M C_R + u >= m).
+    """
+    Y = y * u / M**2
+    root_m, B = sqrt(m), M * C_R + u
+    t = min(sqrt(sqrt(Y)), sqrt(Y / B))
+    while True:
+        residual = t**2 * (t * (t + root_m) + B) - Y
+        lower = t - residual / (t * (t * (4 * t + 3 * root_m) + 2 * B))
+        if not lower < t:  # rounding has stopped the descent
+            return t**2
+        t = lower
+
+
+def P(x: Any, m: Any, M: Any, C_R: Any, u: Any) -> Any:
+    """``G(C_K)/m^3``, the friction term of (5.36) with ``2 theta (1 - theta)`` taken out."""
+    return G(x, m, M, C_R, u) / m**3
+
+
+def D(x: Any, m: Any, M: Any, C_R: Any, u: Any) -> Any:
+    """``C_T^2/C_R^2 - P >= 0``: what the proof of a >= 1, b <= -2 after (5.39) needs, without subtracting.
+
+    With ``A = M C_R``, ``s = sqrt(m x)`` and ``r = m/u <= 1`` the term m x of the square cancels that of P.
+    """
+    A, s, r = M * C_R, sqrt(m * x), m / u
+    return M**2 / m**4 * (A**2 + 2 * A * s + (2 - r) * (A + s) * x + (1 - r) * x**2)
+
+
+def Q(x: Any, m: Any, M: Any, C_R: Any) -> Any:
+    """``C_T^2 M^2/m^2``: the Lipschitz constant squared of T in the norm (5.21), by (5.22), (5.16), (5.23)."""
+    return (lipschitz(m, M, C_R, x) * M / m) ** 2
+
+
+def C1(D: Any, Q: Any) -> Any:
+    """C_1 = -b/a (5.40) with a = 1 + 2D + Q and b = -2(1 + D)."""
+    return 2 * (1 + D) / (1 + 2 * D + Q)
+
+
+def C6(P: Any) -> Any:
+    """C_6 = 1 + 1/a' with a' = 1 - 2P (5.46); counts only when a' < -1, that is P > 1."""
+    return 2 * (1 - P) / (1 - 2 * P)
+
+
+def one_minus_h1(theta: Any, D: Any, Q: Any) -> Any:
+    """1 - h_1(theta) = -theta (a theta + b), h_1 of (5.39)."""
+    return theta * (2 * (1 + D) - theta * (1 + 2 * D + Q))
+
+
+def one_minus_h2(theta: Any, P: Any) -> Any:
+    """1 - h_2(theta) = -theta (a' theta + b'), h_2 of (5.45), a' = 1 - 2P, b' = -1 - a'."""
+    return theta * ((2 - theta) - 2 * P * (1 - theta))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bounds:
+    """What one edition of the theorem says.
+
+    Attributes
+    ----------
+    edition : Edition
+    C_K, C_T, C_T_tilde : Number
+        Friction constant (stress) and the Lipschitz constants (5.16), (5.35).
+    C0, C1 : Number
+        Section 5's ends of the interval of theta, dimensionless.
+    C2, C3, C4, C5 : Number or None
+        Thresholds of Proposition 5.6, on k where C_s and C_tr are known, else on C_K.
+        None: C_s C_tr = 0, any k is below.
+    C6 : Number or None
+        None unless a' < -1.
+    interval : tuple of float or None
+        Contraction for lo < theta < hi, the four cases of Proposition 5.6 in one; None when k is at or above C2.
+    theta : float or None
+    factor, one_minus_factor : Number or None
+        K(theta) < 1 in the norm (5.21), and 1 - K computed without cancellation.
+        None outside the interval: nothing is bounded there.
+    verdict : {'contraction', 'no conclusion'} or None
+    proved : bool
+        Whether the proof behind this edition holds for these constants.
+    """
+
+    edition: Edition
+    C_K: Number
+    C_T: Number
+    C_T_tilde: Number
+    C0: Number
+    C1: Number
+    C2: Number | None
+    C3: Number | None
+    C4: Number | None
+    C5: Number | None
+    C6: Number | None
+    interval: tuple[float, float] | None
+    theta: float | None
+    factor: Number | None
+    one_minus_factor: Number | None
+    verdict: Verdict | None
+    proved: bool
+    threshold_on: Literal["k", "C_K"]
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object ``editions.<name>`` of ``ndtheory.bounds/1``; what is null has a reason beside it."""
+        names = ["C_K", "C_T", "C_T_tilde", "C0", "C1", "C2", "C3", "C4", "C5", "C6", "factor", "one_minus_factor"]
+        numbers: dict[str, Number | None] = {name: getattr(self, name) for name in names}
+        reasons: dict[str, str] = {}
+        if self.C2 is None:
+            reasons |= dict.fromkeys(["C2", "C3", "C4", "C5"], "C_s C_tr = 0: every friction coefficient is below")
+        if self.C6 is None:
+            reasons["C6"] = "a' >= -1: no lower end but 0"
+        if self.interval is None:
+            reasons["interval"] = "friction at or above C2"
+        if self.factor is None:
+            reasons["factor"] = "no theta given" if self.theta is None else "theta outside the interval: no conclusion"
+        return {
+            **{name: None if number is None else number.to_dict() for name, number in numbers.items()},
+            "interval": None if self.interval is None else list(self.interval),
+            "theta": self.theta,
+            "verdict": self.verdict,
+            "proved": self.proved,
+            "threshold_on": self.threshold_on,
+            "reason": reasons,
+        }
+
+
+def evaluate(edition: Edition, constants: Constants, theta: Any = None) -> Bounds:
+    """Evaluate an edition of Proposition 5.6.
+
+    The four cases are one: C5 = C2 identically, h1 = h2 at C0, and the end points C3, C4 hold too, so T_theta contracts
+    for ``max(0, C6) < theta < C1`` as long as ``k < C2``, with ``K^2 = max(h1, h2)``.
+
+    Parameters
+    ----------
+    edition : Edition
+        ``PRINTED`` or ``REPAIRED``.
+    constants : Constants
+    theta : number, optional
+        Relaxation factor, 0 < theta < 1, read exactly.
+
+    Returns
+    -------
+    Bounds
+        Right to the last place of a double: evaluated with 60 decimal digits, comparisons included.
+
+    Raises
+    ------
+    HypothesisError
+        theta outside (0, 1).
+
+    Examples
+    --------
+    >>> b = evaluate(REPAIRED, Constants(m=1, M=2, C_R=1, C_K=0), theta="1/3")
+    >>> b.C0.value, b.verdict, round(b.factor.value, 6)
+    (0.3333333333333333, 'contraction', 0.666667)
+    """
+    chosen = None if theta is None else relaxation_factor(theta)
+    with working_precision():
+        m, M, C_R, x = (decimal(v) for v in (constants.m, constants.M, constants.C_R, constants.C_K))
+        read, u = Decimal(edition.coercivity(m)), Decimal(edition.unit(m))
+        shared = (read, M, C_R)
+        c0 = C0(*shared)
+        p, d, q = P(x, *shared, u), D(x, *shared, u), Q(x, *shared)
+        c1 = C1(d, q)
+        c6 = C6(p) if p > 1 else None
+        # right-hand sides of (5.43), Case 2-1, Case 2-2 and Case 2-3
+        right = (read**5 / (M * C_R) ** 2 + read**3, read**3 / 2, read**3, (2 - c0) / (1 - c0) * read**3 / 2)
+        thresholds = [inverse_G(y, *shared, u) for y in right]
+        below = x < thresholds[0]  # C1 - C0 can be 1e-22 relative: never compare those two instead
+        interval = (max(Decimal(0), c6 or Decimal(0)), c1) if below else None
+
+        one_minus_square = None
+        if chosen is not None and interval is not None:
+            t = decimal(chosen)
+            gain = min(one_minus_h1(t, d, q), one_minus_h2(t, p))
+            one_minus_square = gain if gain > 0 else None
+        verdict: Verdict | None = None
+        factor = one_minus_factor = None
+        if chosen is not None:
+            verdict = "no conclusion" if one_minus_square is None else "contraction"
+        if one_minus_square is not None:
+            root = sqrt(1 - one_minus_square)
+            factor, one_minus_factor = Number.of_float(root), Number.of_float(one_minus_square / (1 + root))
+
+        scale = constants.friction_scale
+        on_k = scale is not None
+        ends: list[Number | None]
+        if scale == 0:
+            ends = [None] * 4
+        else:
+            ends = [Number.of_float(y / decimal(scale) if scale else y) for y in thresholds]
+        return Bounds(
+            edition=edition,
+            C_K=Number.of_float(x),
+            C_T=Number.of_float(lipschitz(m, M, C_R, x)),
+            C_T_tilde=Number.of_float(lipschitz(min(m, Decimal(1)), M, C_R, x)),
+            C0=Number.of_float(c0),
+            C1=Number.of_float(c1),
+            C2=ends[0],
+            C3=ends[1],
+            C4=ends[2],
+            C5=ends[3],
+            C6=None if c6 is None else Number.of_float(c6),
+            interval=None if interval is None else (float(interval[0]), float(interval[1])),
+            theta=None if chosen is None else float(chosen),
+            factor=factor,
+            one_minus_factor=one_minus_factor,
+            verdict=verdict,
+            proved=edition.proved(m),
+            threshold_on="k" if on_k else "C_K",
+        )

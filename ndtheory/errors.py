@@ -1,0 +1,25 @@
+"""Errors of the theory: a hypothesis that does not hold."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+class HypothesisError(ValueError):
+    """A hypothesis of the theorem fails.
+
+    Parameters
+    ----------
+    key : str
+        The constant concerned, in the paper's notation (``"C_R"``).
+    value : object
+        The value received.
+    needed : str
+        The hypothesis, stated positively.
+    """
+
+    def __init__(self, key: str, value: Any, needed: str) -> None:
+        super().__init__(f"{key} = {value}: needed {needed}")
+        self.key = key
+        self.value = value
+        self.needed = needed

@@ -1,0 +1,73 @@
+"""The theorem held against the finite elements: problem files, constants, the iteration, verdicts.
+
+Everything is imported when first asked for: ``ndtheory bounds`` starts without numpy.
+
+>>> import verification as vf
+>>> bars = vf.Problem.from_dict({
+...     "dimension": 1,
+...     "body1": {"shape": "interval", "x": [0, 1], "cells": 4, "young": 1, "fixed": ["left"]},
+...     "body2": {"shape": "interval", "x": [1, 2], "cells": 4, "young": 2, "prescribed": {"right": -0.1}},
+... })
+>>> vf.run(bars, theta="2/3").iterations
+1
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+#: Must equal ndtheory.__version__; the command checks it, as another distribution installs a package of this name.
+__version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from verification.contact import ContactError
+    from verification.iteration import State, iterate
+    from verification.measured import Measured, measure
+    from verification.problem import Problem, load
+    from verification.reader import ProblemError
+    from verification.runs import Run, run
+    from verification.verdicts import Comparison, compare
+
+#: Where each public name lives.  No module here bears the name of a public function: it would hide it.
+_HOME = {
+    "Comparison": "verdicts",
+    "ContactError": "contact",
+    "Measured": "measured",
+    "Problem": "problem",
+    "ProblemError": "reader",
+    "Run": "runs",
+    "State": "iteration",
+    "compare": "verdicts",
+    "iterate": "iteration",
+    "load": "problem",
+    "measure": "measured",
+    "run": "runs",
+}
+
+__all__ = [
+    "Comparison",
+    "ContactError",
+    "Measured",
+    "Problem",
+    "ProblemError",
+    "Run",
+    "State",
+    "compare",
+    "iterate",
+    "load",
+    "measure",
+    "run",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'verification' has no attribute {name!r}")
+    value = getattr(importlib.import_module(f"verification.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,73 @@
+"""Step II as a convex program: cvxpy's model, Clarabel's solution."""
+
+from __future__ import annotations
+
+import warnings
+
+import cvxpy as cp
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cholesky
+
+from fem1d2d.mesh import Floats
+
+#: Clarabel's defaults leave errors of 1e-4 in the energy; asking for more than this may end "almost solved" far off.
+TOLERANCE = 1e-10
+
+
+class ContactModel:
+    """The program, compiled once; only q and the bound change from step to step (DPP).
+
+    Everything is scaled by the stiffness so that the solver sees numbers near one in any unit.
+
+    Parameters
+    ----------
+    S : array, shape (t + n, t + n)
+    free : bool array, shape (t + n,)
+        Held components are not variables: their v is a datum.
+    tangential : int
+        t.
+    """
+
+    def __init__(self, S: Floats, free: NDArray[np.bool_], tangential: int) -> None:
+        rows = np.flatnonzero(free)
+        self._rows = rows
+        self._stiffness = float(np.diag(S).max())
+        factor = cholesky(S[np.ix_(rows, rows)] / self._stiffness)
+        slides, presses = np.flatnonzero(rows < tangential), np.flatnonzero(rows >= tangential)
+        self._v = cp.Variable(len(rows))
+        self._q = cp.Parameter(len(rows))
+        self._slides = rows[slides]
+        energy = 0.5 * cp.sum_squares(factor @ self._v) - self._q @ self._v
+        if len(slides):
+            self._bound = cp.Parameter(len(slides), nonneg=True)
+            energy += self._bound @ cp.abs(self._v[slides])
+        self._problem = cp.Problem(cp.Minimize(energy), [self._v[presses] <= 0])
+
+    def solve(self, q: Floats, bound: Floats) -> Floats | None:
+        """Approximate v on all components (0 where held), or None where the solver gives none.
+
+        Parameters
+        ----------
+        q : array, shape (t + n,)
+        bound : array, shape (t,)
+        """
+        forces = float(np.abs(q[self._rows]).max(initial=0.0))
+        v = np.zeros_like(q)
+        if forces == 0.0:
+            return v
+        self._q.value = q[self._rows] / forces
+        if len(self._slides):
+            self._bound.value = bound[self._slides] / forces
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # "may be inaccurate": the KKT certificate decides
+            try:
+                self._problem.solve(
+                    solver=cp.CLARABEL, tol_gap_abs=TOLERANCE, tol_gap_rel=TOLERANCE, tol_feas=TOLERANCE, max_iter=200
+                )
+            except cp.SolverError:
+                return None
+        if self._v.value is None:
+            return None
+        v[self._rows] = self._v.value * (forces / self._stiffness)
+        return v

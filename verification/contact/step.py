@@ -1,0 +1,113 @@
+"""Step II solved: the exact active set, the convex program behind it, one certificate for both."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem1d2d.mesh import Floats
+from verification.contact.active_set import ActiveSet, Pattern
+from verification.contact.kkt import KKT, TOLERANCE, certify
+
+if TYPE_CHECKING:
+    from verification.contact.model import ContactModel
+
+Solver = Literal["auto", "cvxpy", "active-set"]
+
+
+class ContactError(RuntimeError):
+    """No solver reached the KKT certificate; the message gives the residual that was reached."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ContactSolution:
+    """A certified solution of step II.
+
+    Attributes
+    ----------
+    v : array, shape (t + n,)
+        Tangential slip and normal penetration (<= 0: minus the gap), unit of length.
+    force : array, shape (t + n,)
+        Nodal forces on the other body.
+    pattern : Pattern
+    kkt : KKT
+    solver : {'cvxpy', 'active-set'}
+        Who found the active set.
+    """
+
+    v: Floats
+    force: Floats
+    pattern: Pattern
+    kkt: KKT
+    solver: Literal["cvxpy", "active-set"]
+
+
+class ContactStep:
+    """Step II for one contact body.
+
+    Parameters
+    ----------
+    S : array, shape (t + n, t + n)
+        Stiffness of the contact body, zero rows and columns where it is held.
+    free : bool array, shape (t + n,)
+    tangential : int
+        t: n in two dimensions, 0 in one.
+    solver : {'auto', 'cvxpy', 'active-set'}
+        ``cvxpy``: every step by the convex program; ``active-set``: never; ``auto``: the first step, and each on
+        which the active set does not close with its certificate.
+    """
+
+    def __init__(self, S: Floats, free: NDArray[np.bool_], tangential: int, solver: Solver = "auto") -> None:
+        self._S, self._free, self._t, self._solver = S, free, tangential, solver
+        self._active = ActiveSet(S, free, tangential)
+        self._model: ContactModel | None = None
+        self._pattern = Pattern.sticking(len(S) - tangential, tangential)
+        self._first = True
+
+    def solve(self, q: Floats, bound: Floats) -> ContactSolution:
+        """Solve and certify.
+
+        The program's answer names the active set; the linear system of that set gives the digits Clarabel leaves out.
+
+        Raises
+        ------
+        ContactError
+        """
+        ask_program = self._solver == "cvxpy" or (self._solver == "auto" and self._first)
+        self._first = False
+        found = None if ask_program else self._by_active_set(q, bound, self._pattern, "active-set")
+        if found is None and self._solver != "active-set":
+            found = self._by_program(q, bound)
+        if found is None:
+            n = len(self._S) - self._t
+            found = self._by_active_set(q, bound, Pattern.sticking(n, self._t), "active-set")
+        if found is None:
+            raise ContactError(f"the contact step did not reach a KKT residual of {TOLERANCE:g}")
+        self._pattern = found.pattern
+        return found
+
+    def _by_active_set(
+        self, q: Floats, bound: Floats, start: Pattern, solver: Literal["cvxpy", "active-set"]
+    ) -> ContactSolution | None:
+        closed = self._active.solve(q, bound, start)
+        if closed is None:
+            return None
+        v, force, pattern = closed
+        kkt = certify(self._S, q, bound, v, force, self._free)
+        if not kkt.residual <= TOLERANCE:
+            return None
+        return ContactSolution(v=v, force=force, pattern=pattern, kkt=kkt, solver=solver)
+
+    def _by_program(self, q: Floats, bound: Floats) -> ContactSolution | None:
+        if self._model is None:
+            from verification.contact.model import ContactModel
+
+            self._model = ContactModel(self._S, self._free, self._t)
+        v = self._model.solve(q, bound)
+        if v is None:
+            return None
+        start = Pattern.of(v, q - self._S @ v, bound, float(np.diag(self._S).max()))
+        return self._by_active_set(q, bound, start, "cvxpy")

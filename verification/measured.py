@@ -1,0 +1,220 @@
+"""The paper's constants, measured on the mesh as extremal generalised eigenvalues."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from fem1d2d import largest, largest_sparse
+from fem1d2d.mesh import Floats
+from ndtheory import Constants, Number
+from verification.bodies import Body, Pair, build
+from verification.problem import Problem
+
+
+@dataclass(frozen=True, kw_only=True)
+class BodyConstants:
+    """Coercivity m^a and continuity M^a of one body (4.1), unit stress, with the residuals of the eigenvalues.
+
+    ``residual_m``, ``residual_M`` are relative; the error of the eigenvalue is of the order of their square.
+    """
+
+    m: Number
+    M: Number
+    nodes: int
+    residual_m: float
+    residual_M: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object ``body1`` of ``ndtheory.constants/1``."""
+        return {"m": self.m.to_dict(), "M": self.M.to_dict(), "nodes": self.nodes}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measured:
+    """The constants of a problem on its mesh; on this mesh they are exact up to rounding.
+
+    On a mesh m is above and M below its continuous value: for the continuous theorem both err on the unsafe side.
+
+    Attributes
+    ----------
+    body1, body2 : BodyConstants
+    m, M : Number
+        Smallest m^a, sum of the M^a (4.2); stress.
+    C_R : Number or None
+        Lift constant, the safe maximum over both bodies' H^1/2 norms; dimensionless.
+    C_s, C_tr : Number or None
+        Into L2(Gamma_c), as (5.13) uses them.
+    C_tr_half : Number or None
+        The tangential trace into H^1/2(Gamma_c), as (5.8) prints it.
+    C_K : Number or None
+        ``k C_s C_tr``; stress.
+    rho_max, rho_min : Number or None
+        Extremal eigenvalues of (S of the contact body, S of the Neumann body).
+    rho_normal : Number or None
+        The largest with the tangential components condensed out.
+    friction : float
+        k.
+    interface_nodes : int
+    reason : mapping
+        Why a value is None.
+    """
+
+    body1: BodyConstants
+    body2: BodyConstants
+    m: Number
+    M: Number
+    C_R: Number | None
+    C_s: Number | None
+    C_tr: Number | None
+    C_tr_half: Number | None
+    C_K: Number | None
+    rho_max: Number | None
+    rho_min: Number | None
+    rho_normal: Number | None
+    friction: float
+    interface_nodes: int
+    reason: dict[str, str]
+
+    def constants(self) -> Constants | None:
+        """What enters the theorem; None where C_R or C_K does not exist."""
+        if self.C_R is None or self.C_K is None or self.C_s is None or self.C_tr is None:
+            return None
+        return Constants(
+            m=self.m.value,
+            M=self.M.value,
+            C_R=max(self.C_R.value, 1.0),  # C_R >= 1 by definition; two identical bodies reach it up to rounding
+            C_s=self.C_s.value,
+            C_tr=self.C_tr.value,
+            k=self.friction,
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The constants of ``ndtheory.constants/1``."""
+        names = ["m", "M", "C_R", "C_s", "C_tr", "C_tr_half", "C_K", "rho_max", "rho_min", "rho_normal"]
+        numbers = {name: getattr(self, name) for name in names}
+        return {
+            "body1": self.body1.to_dict(),
+            "body2": self.body2.to_dict(),
+            **{name: None if number is None else number.to_dict() for name, number in numbers.items()},
+            "interface_nodes": self.interface_nodes,
+            "reason": self.reason,
+        }
+
+
+def measure(problem: Problem | Pair) -> Measured:
+    """Measure the constants of a problem.
+
+    Raises
+    ------
+    ProblemError
+        A problem that has no bodies facing each other.
+
+    Examples
+    --------
+    >>> bars = {"dimension": 1,
+    ...     "body1": {"shape": "interval", "x": [0, 1], "cells": 8, "young": 3, "fixed": ["left"]},
+    ...     "body2": {"shape": "interval", "x": [1, 2], "cells": 8, "young": 2, "fixed": ["right"]}}
+    >>> round(measure(Problem.from_dict(bars)).rho_max.value, 12)
+    1.5
+    """
+    pair = build(problem) if isinstance(problem, Problem) else problem
+    friction = float(pair.problem.contact.friction)
+    body1, body2 = _body(pair.body1), _body(pair.body2)
+    m, M = min(body1.m.value, body2.m.value), body1.M.value + body2.M.value
+    values: dict[str, float | None] = dict.fromkeys(
+        ["C_R", "C_s", "C_tr", "C_tr_half", "C_K", "rho_max", "rho_min", "rho_normal"]
+    )
+    reason: dict[str, str] = {}
+    common = pair.body1.unknown
+    if not np.array_equal(common, pair.body2.unknown):
+        reason = dict.fromkeys(
+            values, "the bodies hold different tangential components of Gamma_c: their traces differ"
+        )
+    else:
+        tangential = np.zeros(len(common), dtype=bool)
+        tangential[pair.tangential] = True
+        values |= _interface(pair, tangential[common])
+        if values["C_s"] is None:
+            reason["C_s"] = reason["C_K"] = "the non-local law has no radius"
+    if values["C_s"] is not None and values["C_tr"] is not None:
+        values["C_K"] = friction * values["C_s"] * values["C_tr"]
+    numbers = {name: None if v is None else Number.of_float(v) for name, v in values.items()}
+    return Measured(
+        body1=body1,
+        body2=body2,
+        m=Number.of_float(m),
+        M=Number.of_float(M),
+        friction=friction,
+        interface_nodes=pair.n,
+        reason=reason,
+        **numbers,
+    )
+
+
+def _body(body: Body) -> BodyConstants:
+    A, H = body.elastic, body.gram
+    smallest = largest_sparse(H.matrix, A.matrix, A.solve)  # 1/m, so that products with A^-1 find it
+    biggest = largest_sparse(A.matrix, H.matrix, H.solve)
+    return BodyConstants(
+        m=Number.of_float(1 / smallest.value),
+        M=Number.of_float(biggest.value),
+        nodes=len(body.mesh.points),
+        residual_m=smallest.residual / smallest.value,
+        residual_M=biggest.residual / biggest.value,
+    )
+
+
+def lift_gram(body: Body) -> Floats:
+    """``N_a = R_a' H_a R_a``: the H1 norm squared of the elastic lift (4.5), on the interface."""
+    elastic, gram = body.elastic, body.gram
+    size = gram.matrix.shape[0]
+    lift = np.zeros((size, len(elastic.interface)))
+    lift[elastic.interface, np.arange(len(elastic.interface))] = 1.0
+    lift[elastic.inside] = elastic.lift
+    product = lift.T @ (gram.matrix @ lift)
+    return np.asarray((product + product.T) / 2)
+
+
+def _interface(pair: Pair, tangential: Any) -> dict[str, float | None]:
+    """Constants that live on the interface; all matrices on the components that both bodies leave free."""
+    bodies = (pair.body1, pair.body2)
+    E = [body.gram.schur for body in bodies]
+    S = [body.elastic.schur for body in bodies]
+    N = [lift_gram(body) for body in bodies]
+    top = lambda A, B: largest(A, B).value
+    values: dict[str, float | None] = {"C_R": float(np.sqrt(max(top(n, e) for n in N for e in E)))}
+    normal = ~tangential
+    if tangential.any():
+        columns = np.flatnonzero(pair.body1.unknown[pair.tangential])
+        weights = np.zeros(len(tangential))
+        weights[tangential] = pair.weights[columns]
+        B_T = np.diag(weights)
+        kept = [np.where(np.outer(tangential, tangential), e, 0.0) for e in E]
+        values["C_tr"] = float(np.sqrt(max(top(B_T, e) for e in E)))
+        values["C_tr_half"] = float(np.sqrt(max(min(top(k, e) for k in kept) for e in E)))
+        if pair.regularisation is not None:
+            Z = [pair.regularisation @ s[normal] for s in S]
+            squares = [z.T @ (pair.weights[:, None] * z) for z in Z]
+            values["C_s"] = float(np.sqrt(max(top((z + z.T) / 2, e) for z, e in zip(squares, E, strict=True))))
+    else:
+        values |= {"C_tr": 0.0, "C_tr_half": 0.0, "C_s": 0.0}
+    contact, neumann = (S[0], S[1]) if pair.problem.iteration.neumann_body == 2 else (S[1], S[0])
+    values["rho_max"] = top(contact, neumann)
+    values["rho_min"] = 1 / top(neumann, contact)
+    values["rho_normal"] = top(_condense_tangential(contact, normal), _condense_tangential(neumann, normal))
+    return values
+
+
+def _condense_tangential(S: Floats, normal: Any) -> Floats:
+    """Schur complement of S on the normal components."""
+    slide = ~normal
+    if not slide.any():
+        return S
+    cross = S[np.ix_(slide, normal)]
+    inner = cho_solve(cho_factor(S[np.ix_(slide, slide)]), cross)
+    result = S[np.ix_(normal, normal)] - cross.T @ inner
+    return np.asarray((result + result.T) / 2)

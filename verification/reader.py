@@ -1,0 +1,208 @@
+"""Typed reading of tables: every key once, each error one line with file, key, value and what is needed."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Iterable, Mapping
+from decimal import Decimal
+from fractions import Fraction
+from typing import Any, TypeVar
+
+from ndtheory import exact
+
+V = TypeVar("V")
+_MISSING: Any = object()
+
+
+class ProblemError(ValueError):
+    """A problem that cannot be used.
+
+    Parameters
+    ----------
+    file : str
+        The problem file, or ``<dict>``.
+    key : str
+        Dotted path of the key, empty where the file as a whole is meant.
+    value : object
+        The value received; None where there is none.
+    needed : str
+        What was needed, stated positively.
+    """
+
+    def __init__(self, file: str, key: str, value: Any, needed: str) -> None:
+        received = "" if value is None else f" = {show(value)}"
+        super().__init__(": ".join(part for part in (file, f"{key}{received}", needed) if part))
+        self.file = file
+        self.key = key
+        self.value = value
+        self.needed = needed
+
+
+class Unfit(Exception):
+    """A value that a reading function refuses; carries what is needed."""
+
+
+def show(value: Any) -> str:
+    """A value on one short line, as a problem file writes it."""
+    if isinstance(value, bool):
+        text = str(value).lower()
+    elif isinstance(value, str):
+        text = repr(value).replace("'", '"')
+    elif isinstance(value, (Decimal, Fraction)):
+        text = str(value)
+    elif isinstance(value, Mapping):
+        text = "{" + ", ".join(f"{key} = {show(v)}" for key, v in value.items()) + "}"
+    elif isinstance(value, (list, tuple)):
+        text = "[" + ", ".join(map(show, value)) + "]"
+    else:
+        text = str(value)
+    text = " ".join(text.split())
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def number(needed: str = "a number", holds: Callable[[Fraction], bool] = lambda v: True) -> Callable[[Any], Fraction]:
+    """Read an exact number: 0.4, 4e-1 or "2/5"; never true, NaN or infinity."""
+
+    def read(value: Any) -> Fraction:
+        if isinstance(value, bool) or not isinstance(value, (int, float, str, Decimal, Fraction)):
+            raise Unfit(f"needed {needed}")
+        try:
+            result = exact(value)
+        except ValueError:
+            raise Unfit(f"needed {needed}") from None
+        if not holds(result):
+            raise Unfit(f"needed {needed}")
+        return result
+
+    return read
+
+
+positive = number("a number > 0", lambda v: v > 0)
+non_negative = number("a number >= 0", lambda v: v >= 0)
+
+
+def integer(needed: str, least: int) -> Callable[[Any], int]:
+    """Read a whole number, not 12.0 and not true."""
+
+    def read(value: Any) -> int:
+        if isinstance(value, bool) or not isinstance(value, int) or value < least:
+            raise Unfit(f"needed {needed}")
+        return value
+
+    return read
+
+
+def text(value: Any) -> str:
+    """Read a string."""
+    if not isinstance(value, str):
+        raise Unfit("needed a text in quotes")
+    return value
+
+
+def choice(*allowed: Any) -> Callable[[Any], Any]:
+    """Read one of a few values."""
+
+    def read(value: Any) -> Any:
+        if type(value) not in {type(v) for v in allowed} or value not in allowed:  # 1 is not true and not 1.0
+            raise Unfit("needed one of " + ", ".join(show(v) for v in allowed))
+        return value
+
+    return read
+
+
+def several(read: Callable[[Any], V], count: int, needed: str) -> Callable[[Any], tuple[V, ...]]:
+    """Read a list of exactly ``count`` values."""
+
+    def read_all(value: Any) -> tuple[V, ...]:
+        if not isinstance(value, (list, tuple)) or len(value) != count:
+            raise Unfit(f"needed {needed}")
+        return tuple(read(v) for v in value)
+
+    return read_all
+
+
+def ends(value: Any) -> tuple[Fraction, Fraction]:
+    """Read ``[a, b]`` with a < b."""
+    needed = "two numbers [a, b] with a < b"
+    a, b = several(number(needed), 2, needed)(value)
+    if not a < b:
+        raise Unfit(f"needed {needed}")
+    return a, b
+
+
+class Table:
+    """A table of which every key is taken once; what is left over is an error.
+
+    Parameters
+    ----------
+    data : mapping
+    file : str
+    path : str
+        Dotted path of the table, empty at the top.
+    """
+
+    def __init__(self, data: Mapping[str, Any], file: str, path: str = "") -> None:
+        self._data = dict(data)
+        self._file = file
+        self._path = path
+        self._known: list[str] = []
+
+    def key(self, name: str) -> str:
+        """Dotted path of a key in this table."""
+        return f"{self._path}.{name}" if self._path else name
+
+    def refuse(self, name: str, value: Any, needed: str) -> ProblemError:
+        """The error for a key of this table."""
+        return ProblemError(self._file, self.key(name), value, needed)
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._data
+
+    def take(self, name: str, read: Callable[[Any], V], default: Any = _MISSING) -> V:
+        """Read a key; a missing one takes its default or is an error.
+
+        Raises
+        ------
+        ProblemError
+        """
+        self._known.append(name)
+        value = self._data.pop(name, _MISSING)
+        if value is _MISSING:
+            if default is _MISSING:
+                raise self.refuse(name, None, "this key is missing")
+            result: V = default
+            return result
+        try:
+            return read(value)
+        except Unfit as error:
+            raise self.refuse(name, value, str(error)) from None
+
+    def table(self, name: str, *, required: bool = False) -> Table:
+        """Read a sub-table; a missing one is empty unless required."""
+
+        def read(value: Any) -> Table:
+            if not isinstance(value, Mapping):
+                raise Unfit("needed a table")
+            return Table(value, self._file, self.key(name))
+
+        if required:
+            return self.take(name, read)
+        return self.take(name, read, Table({}, self._file, self.key(name)))
+
+    def names(self) -> Iterable[str]:
+        """Keys not taken yet."""
+        return list(self._data)
+
+    def close(self) -> None:
+        """Refuse what nobody took.
+
+        Raises
+        ------
+        ProblemError
+            Naming the unknown key and the nearest known one.
+        """
+        for name, value in self._data.items():
+            near = difflib.get_close_matches(str(name), self._known, n=1)
+            known = f"did you mean {near[0]!r}?" if near else "known here: " + ", ".join(self._known)
+            what = "table" if isinstance(value, Mapping) else "key"
+            raise self.refuse(str(name), None, f"unknown {what}; {known}")

@@ -1,0 +1,237 @@
+"""A run of the algorithm from g = 0 to its outcome."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from ndtheory import relaxation_factor
+from verification.bodies import Pair, build
+from verification.contact import Solver
+from verification.document import Document
+from verification.iteration import State, iterate
+from verification.problem import Problem
+from verification.rates import ObservedRate, observed_rate
+
+Outcome = Literal["converged", "stalled", "limit", "diverged", "interrupted"]
+
+#: A run without a new least residual over so many steps has stalled.
+PATIENCE = 50
+
+#: A residual grown by this factor over the first one has diverged.
+RUNAWAY = 1e8
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Contact:
+    """What happens along Gamma_c, node by node from left to right.
+
+    Attributes
+    ----------
+    x : array, shape (n,)
+        Position before deformation, unit of length.
+    pressure : array
+        ``-sigma_N >= 0``: nodal force over w_j, unit of stress.
+    shear : array
+        Tangential force on body 2 over w_j, unit of stress; 0 in 1D.
+    gap : array
+        Distance of the bodies, >= 0, unit of length.
+    slip : array
+        ``u1_T - u2_T``, unit of length; 0 in 1D.
+    state : list of {'stick', 'slip', 'open'}
+    """
+
+    x: np.ndarray[Any, Any]
+    pressure: np.ndarray[Any, Any]
+    shear: np.ndarray[Any, Any]
+    gap: np.ndarray[Any, Any]
+    slip: np.ndarray[Any, Any]
+    state: list[str]
+
+    @classmethod
+    def of(cls, pair: Pair, state: State) -> Contact:
+        """Read it off a state, turned into the frame of the paper (n^1 up, slip of body 1 against body 2)."""
+        v, force, pattern = state.contact.v, state.image, state.contact.pattern
+        t, zero = pair.tangential, np.zeros(pair.n)
+        plane = t.stop > 0
+        slides = pattern.sliding != 0 if plane else np.zeros(pair.n, dtype=bool)
+        names = np.where(pattern.touching, np.where(slides, "slip", "stick"), "open")
+        return cls(
+            x=pair.x,
+            pressure=force[pair.normal] / pair.weights,
+            shear=pair.upward * force[t] / pair.weights if plane else zero,
+            gap=-v[pair.normal] + 0.0,
+            slip=pair.upward * v[t] if plane else zero,
+            state=[str(name) for name in names],
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object ``contact``: lists along Gamma_c."""
+        arrays = {name: getattr(self, name).tolist() for name in ("x", "pressure", "shear", "gap", "slip")}
+        return {**arrays, "state": self.state}
+
+    @property
+    def pattern(self) -> dict[str, int]:
+        """How many nodes stick, slip and are open."""
+        return {name: self.state.count(name) for name in ("stick", "slip", "open")}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Run(Document):
+    """A finished run.
+
+    Attributes
+    ----------
+    pair : Pair
+    theta : Fraction
+    states : tuple of State
+        At least one.
+    outcome : {'converged', 'stalled', 'limit', 'diverged', 'interrupted'}
+    """
+
+    schema: ClassVar[str] = "ndtheory.run/1"
+
+    pair: Pair
+    theta: Fraction
+    states: tuple[State, ...]
+    outcome: Outcome
+
+    @property
+    def converged(self) -> bool:
+        """Whether ``|||T g - g||| <= tolerance |||T g|||``."""
+        return self.outcome == "converged"
+
+    @property
+    def last(self) -> State:
+        """The last state."""
+        return self.states[-1]
+
+    @property
+    def iterations(self) -> int:
+        """Relaxations (III) done until the last evaluation of T."""
+        return self.last.iteration
+
+    @property
+    def evaluations(self) -> int:
+        """Evaluations of T."""
+        return len(self.states)
+
+    @cached_property
+    def observed_rate(self) -> ObservedRate | None:
+        """The asymptotic rate, None where too few steps stand clear of the noise."""
+        return observed_rate(self.pair, self.states)
+
+    @cached_property
+    def contact(self) -> Contact:
+        """Gamma_c at the last state."""
+        return Contact.of(self.pair, self.last)
+
+    @property
+    def force(self) -> dict[str, float]:
+        """Total normal (compressive) and tangential (on body 2) force per unit thickness."""
+        w = self.pair.weights
+        return {"normal": float(self.contact.pressure @ w), "tangential": float(self.contact.shear @ w)}
+
+    @property
+    def history(self) -> list[float]:
+        """Relative unrelaxed residual of every evaluation."""
+        return [s.relative_residual for s in self.states]
+
+    @property
+    def units(self) -> Mapping[str, str | None]:
+        return self.pair.problem.units
+
+    def content(self) -> dict[str, Any]:
+        rate = self.observed_rate
+        solvers = [s.contact.solver for s in self.states]
+        reason = {"linearised_rate": "not computed by this version", "linearised_norm": "not computed by this version"}
+        if rate is None:
+            reason["observed_rate"] = "fewer than two step ratios stand clear of rounding"
+        return {
+            "title": self.pair.problem.title,
+            "theta": float(self.theta),
+            "relaxation": "constant",
+            "neumann_body": self.pair.problem.iteration.neumann_body,
+            "iterations": self.iterations,
+            "evaluations": self.evaluations,
+            "outcome": self.outcome,
+            "converged": self.converged,
+            "observed_rate": None if rate is None else rate.value,
+            "observed_rate_interval": None if rate is None else [rate.lo, rate.hi],
+            "linearised_rate": None,
+            "linearised_norm": None,
+            "unrelaxed_residual": _finite(self.last.relative_residual),
+            "kkt_residual": self.last.contact.kkt.residual,
+            "solves": {"cvxpy": solvers.count("cvxpy"), "active_set": solvers.count("active-set")},
+            "pattern": self.contact.pattern,
+            "contact": self.contact.to_dict(),
+            "force": self.force,
+            "history": [_finite(r) for r in self.history],
+            "outside_theorem": self.pair.outside,
+            "warnings": self.pair.warnings,
+            "reason": reason,
+        }
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None
+
+
+def run(
+    problem: Problem | Pair,
+    *,
+    theta: Any = None,
+    solver: Solver = "auto",
+    watch: Callable[[State], None] = lambda state: None,
+) -> Run:
+    """Run the algorithm from g = 0 until it converges, stalls, runs away, reaches its limit or Ctrl-C.
+
+    Parameters
+    ----------
+    problem : Problem or Pair
+    theta : number, optional
+        Relaxation factor, 0 < theta < 1; the problem's by default.
+    solver : {'auto', 'cvxpy', 'active-set'}
+        Who solves step II.
+    watch : callable
+        Called with each state, for live progress.
+
+    Raises
+    ------
+    ProblemError, HypothesisError
+        Bad input.
+    ContactError
+        Step II did not reach its KKT certificate.
+    KeyboardInterrupt
+        Before the first state; later it ends the run with what was computed.
+    """
+    pair = build(problem) if isinstance(problem, Problem) else problem
+    settings = pair.problem.iteration
+    chosen = settings.theta if theta is None else relaxation_factor(theta)
+    states: list[State] = []
+    least, since = float("inf"), 0
+    outcome: Outcome = "limit"
+    try:
+        for state in iterate(pair, theta=chosen, solver=solver):
+            states.append(state)
+            watch(state)
+            least, since = (state.residual, 0) if state.residual < least else (least, since + 1)
+            if state.residual <= settings.tolerance * state.size:
+                outcome = "converged"
+            elif not state.residual <= RUNAWAY * states[0].residual:
+                outcome = "diverged"
+            elif since >= PATIENCE:
+                outcome = "stalled"
+            elif state.iteration < settings.max_iterations:
+                continue
+            break
+    except KeyboardInterrupt:
+        if not states:
+            raise
+        outcome = "interrupted"
+    return Run(pair=pair, theta=chosen, states=tuple(states), outcome=outcome)
