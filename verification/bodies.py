@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -124,7 +125,7 @@ class Side:
 
     def dual_norm(self, force: Floats) -> float:
         """The norm (5.21), ``sqrt(force' S_a^-1 force)``, when this is the Neumann body."""
-        return float(np.sqrt(max(force @ self.flexibility(force), 0.0)))
+        return math.sqrt(max(float(force @ self.flexibility(force)), 0.0))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

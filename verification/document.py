@@ -16,10 +16,8 @@ class Document(ABC):
 
     schema: ClassVar[str]
 
-    @property
-    @abstractmethod
-    def units(self) -> Mapping[str, str | None]:
-        """Labels ``length`` and ``stress``."""
+    #: Labels ``length`` and ``stress``.
+    units: Mapping[str, str]
 
     @abstractmethod
     def content(self) -> dict[str, Any]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -12,6 +13,7 @@ from fem1d2d import largest, largest_sparse
 from fem1d2d.mesh import Floats
 from ndtheory import Constants, Number
 from verification.bodies import Body, Pair, build
+from verification.document import Document
 from verification.problem import Problem
 
 
@@ -29,12 +31,12 @@ class BodyConstants:
     residual_M: float
 
     def to_dict(self) -> dict[str, Any]:
-        """The object ``body1`` of ``ndtheory.constants/1``."""
+        """The objects ``body1``, ``body2`` of the document."""
         return {"m": self.m.to_dict(), "M": self.M.to_dict(), "nodes": self.nodes}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Measured:
+class Measured(Document):
     """The constants of a problem on its mesh; on this mesh they are exact up to rounding.
 
     On a mesh m is above and M below its continuous value: for the continuous theorem both err on the unsafe side.
@@ -61,7 +63,13 @@ class Measured:
     interface_nodes : int
     reason : mapping
         Why a value is None.
+    units : mapping
+        Labels ``length`` and ``stress``.
+    levels : tuple of Measured
+        The same on meshes halved 0, 1, .. times, where that was asked for.
     """
+
+    schema: ClassVar[str] = "ndtheory.constants/1"
 
     body1: BodyConstants
     body2: BodyConstants
@@ -77,23 +85,21 @@ class Measured:
     rho_normal: Number | None
     friction: float
     interface_nodes: int
-    reason: dict[str, str]
+    reason: Mapping[str, str]
+    units: Mapping[str, str]
+    levels: tuple[Measured, ...] = ()
 
     def constants(self) -> Constants | None:
         """What enters the theorem; None where C_R or C_K does not exist."""
-        if self.C_R is None or self.C_K is None or self.C_s is None or self.C_tr is None:
+        if self.C_R is None or self.C_K is None:
             return None
-        return Constants(
-            m=self.m.value,
-            M=self.M.value,
-            C_R=max(self.C_R.value, 1.0),  # C_R >= 1 by definition; two identical bodies reach it up to rounding
-            C_s=self.C_s.value,
-            C_tr=self.C_tr.value,
-            k=self.friction,
-        )
+        friction: dict[str, float] = {"C_K": 0.0}  # without a law of friction
+        if self.C_s is not None and self.C_tr is not None:
+            friction = {"C_s": self.C_s.value, "C_tr": self.C_tr.value, "k": self.friction}
+        C_R = max(self.C_R.value, 1.0)  # C_R >= 1 by definition; two identical bodies reach it up to rounding
+        return Constants(m=self.m.value, M=self.M.value, C_R=C_R, **friction)
 
-    def to_dict(self) -> dict[str, Any]:
-        """The constants of ``ndtheory.constants/1``."""
+    def content(self) -> dict[str, Any]:
         names = ["m", "M", "C_R", "C_s", "C_tr", "C_tr_half", "C_K", "rho_max", "rho_min", "rho_normal"]
         numbers = {name: getattr(self, name) for name in names}
         return {
@@ -101,12 +107,19 @@ class Measured:
             "body2": self.body2.to_dict(),
             **{name: None if number is None else number.to_dict() for name, number in numbers.items()},
             "interface_nodes": self.interface_nodes,
-            "reason": self.reason,
+            "reason": dict(self.reason),
+            **({"levels": [level.content() for level in self.levels]} if self.levels else {}),
         }
 
 
-def measure(problem: Problem | Pair) -> Measured:
+def measure(problem: Problem | Pair, *, refine: int = 0) -> Measured:
     """Measure the constants of a problem.
+
+    Parameters
+    ----------
+    problem : Problem or Pair
+    refine : int
+        With N > 0 the result lists the constants on meshes halved 0 to N times.
 
     Raises
     ------
@@ -122,6 +135,14 @@ def measure(problem: Problem | Pair) -> Measured:
     1.5
     """
     pair = build(problem) if isinstance(problem, Problem) else problem
+    result = _measure(pair)
+    if refine:
+        finer = [_measure(build(pair.problem.refined(level))) for level in range(1, refine + 1)]
+        result = replace(result, levels=(result, *finer))
+    return result
+
+
+def _measure(pair: Pair) -> Measured:
     friction = float(pair.problem.contact.friction)
     body1, body2 = _body(pair.body1), _body(pair.body2)
     m, M = min(body1.m.value, body2.m.value), body1.M.value + body2.M.value
@@ -139,10 +160,11 @@ def measure(problem: Problem | Pair) -> Measured:
         tangential[pair.tangential] = True
         values |= _interface(pair, tangential[common])
         if values["C_s"] is None:
-            reason["C_s"] = reason["C_K"] = "the non-local law has no radius"
+            reason["C_s"] = "no friction and no radius: S is not defined"
+            values["C_K"] = 0.0
     if values["C_s"] is not None and values["C_tr"] is not None:
         values["C_K"] = friction * values["C_s"] * values["C_tr"]
-    numbers = {name: None if v is None else Number.of_float(v) for name, v in values.items()}
+    numbers: dict[str, Any] = {name: None if v is None else Number.of_float(v) for name, v in values.items()}
     return Measured(
         body1=body1,
         body2=body2,
@@ -151,6 +173,7 @@ def measure(problem: Problem | Pair) -> Measured:
         friction=friction,
         interface_nodes=pair.n,
         reason=reason,
+        units=pair.problem.units,
         **numbers,
     )
 

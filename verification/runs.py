@@ -59,7 +59,7 @@ class Contact:
         v, force, pattern = state.contact.v, state.image, state.contact.pattern
         t, zero = pair.tangential, np.zeros(pair.n)
         plane = t.stop > 0
-        slides = pattern.sliding != 0 if plane else np.zeros(pair.n, dtype=bool)
+        slides = pattern.sliding != 0 if plane else np.ones(pair.n, dtype=bool)  # a zero bound counts as slip
         names = np.where(pattern.touching, np.where(slides, "slip", "stick"), "open")
         return cls(
             x=pair.x,
@@ -143,7 +143,7 @@ class Run(Document):
         return [s.relative_residual for s in self.states]
 
     @property
-    def units(self) -> Mapping[str, str | None]:
+    def units(self) -> Mapping[str, str]:  # type: ignore[override]
         return self.pair.problem.units
 
     def content(self) -> dict[str, Any]:

@@ -52,7 +52,7 @@ class Comparison(Document):
     verdicts: Mapping[str, Judgement]
 
     @property
-    def units(self) -> Mapping[str, str | None]:
+    def units(self) -> Mapping[str, str]:  # type: ignore[override]
         return self.run.units
 
     @property
@@ -69,11 +69,11 @@ class Comparison(Document):
         editions: dict[str, Any] = {name: bounds.to_dict() for name, bounds in self.bounds.items()}
         return {
             "title": self.run.pair.problem.title,
-            "constants": self.measured.to_dict(),
+            "constants": self.measured.content(),
             "bounds": {"editions": {**editions, "sharp": None}},
             "sharp": None,
             "lmi": None,
-            "run": self.run.to_dict(),
+            "run": self.run.content(),
             "step_ratio": None
             if self.step_ratio is None
             else {"value": self.step_ratio.value, "interval": [self.step_ratio.lo, self.step_ratio.hi]},
@@ -127,7 +127,7 @@ def compare(
     bounds: dict[str, Bounds] = {} if constants is None else {e.name: evaluate(e, constants, chosen) for e in EDITIONS}
     finished = run(pair, theta=chosen, solver=solver, watch=watch)
     seen = largest_step_ratio(pair, finished.states)
-    outside = "; ".join(pair.outside) or next(iter(measured.reason.values()), "")
+    outside = "; ".join(pair.outside)
     verdicts: dict[str, Judgement] = {}
     for edition in EDITIONS:
         b = bounds.get(edition.name)

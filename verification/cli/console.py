@@ -1,0 +1,102 @@
+"""One console for all output and progress: results to stdout, everything else to stderr."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ndtheory import Number
+
+if TYPE_CHECKING:
+    from verification.iteration import State
+
+WIDTH = 80
+
+
+def say(text: str = "") -> None:
+    """A line of the result."""
+    click.echo(text)
+
+
+def complain(text: str) -> None:
+    """A line about the result: errors, warnings, notes."""
+    click.echo(text, err=True)
+
+
+def heading(question: str) -> None:
+    """The question that the lines below answer."""
+    say()
+    say(click.style(question, bold=True))
+
+
+def table(rows: Sequence[Sequence[str]], *, right: Sequence[int] = ()) -> None:
+    """Columns two spaces apart, the first row a head; ``right`` names columns aligned to the right."""
+    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    for row in rows:
+        cells = [
+            cell.rjust(width) if i in right else cell.ljust(width)
+            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ]
+        say(("  " + "  ".join(cells)).rstrip())
+
+
+def figures(value: float | Number | None, digits: int = 3) -> str:
+    """A number in a few significant figures; a dash where there is none.
+
+    >>> figures(0.26725), figures(1.7e-7), figures(None)
+    ('0.267', '1.70e-07', '-')
+    """
+    number = value.value if isinstance(value, Number) else value
+    if number is None:
+        return "-"
+    if number == 0:
+        return "0"
+    if not 1e-3 <= abs(number) < 1e5:
+        return f"{number:.{digits - 1}e}"
+    return f"{number:#.{digits}g}".rstrip(".")
+
+
+def near_one(value: float) -> str:
+    """A rate; near 1 as its distance from 1.
+
+    >>> near_one(0.30709), near_one(1 - 1.5e-5)
+    ('0.3071', '1 - 1.5e-05')
+    """
+    return f"1 - {1 - value:.2g}" if 0 < 1 - value < 1e-3 else f"{value:.4g}"
+
+
+def factor(value: Number | None, one_minus: Number | None) -> str:
+    """A contraction factor; near 1 as its distance from 1.
+
+    >>> factor(Number.of_float(1 - 2e-11), Number.of_float(2e-11))
+    '1 - 2.0e-11'
+    """
+    if value is None or one_minus is None:
+        return "-"
+    return f"1 - {one_minus.value:.1e}" if one_minus.value < 1e-3 else figures(value)
+
+
+@contextmanager
+def progress(title: str, tolerance: float) -> Iterator[Callable[[State], None]]:
+    """A live line on a terminal's stderr: how far the residual has fallen towards its tolerance."""
+    if not sys.stderr.isatty():
+        yield lambda state: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn
+
+    columns: list[Any] = [TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[note]}")]
+    with Progress(*columns, console=Console(stderr=True), transient=True) as live:
+        task = live.add_task(title, total=-math.log10(tolerance), note="")
+
+        def watch(state: State) -> None:
+            residual = state.relative_residual
+            fallen = -math.log10(residual) if 0 < residual < 1 else 0.0
+            live.update(task, completed=fallen, note=f"step {state.iteration}, residual {residual:.2e}")
+
+        yield watch

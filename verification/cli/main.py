@@ -1,0 +1,94 @@
+"""The command group, and what every error becomes: one line and an exit status."""
+
+from __future__ import annotations
+
+import sys
+import traceback
+from collections.abc import Sequence
+
+import click
+
+import ndtheory
+import verification
+from ndtheory import HypothesisError
+from verification.cli import calculator, problems
+from verification.cli.console import complain
+
+#: Exit statuses of the interface.  A crash is none of them.
+DONE, NOT_MET, BAD_INPUT, INCONCLUSIVE, INTERRUPTED, CRASH = 0, 1, 2, 3, 130, 70
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 80})
+@click.version_option(ndtheory.__version__, prog_name="ndtheory", message="%(prog)s %(version)s")
+def cli() -> None:
+    """The convergence theorem of Bayada, Sabil and Sassi for Neumann-Dirichlet contact iterations.
+
+    Bounds, measured constants, the iteration itself, and one verdict for each bound.
+
+    \b
+    ndtheory demo                     the Section 6 model, end to end
+    ndtheory example section6 > my.toml
+    ndtheory compare my.toml          the same for a problem of your own
+    """
+
+
+for command in (calculator.bounds, problems.example, problems.demo, problems.constants, problems.run, problems.compare):
+    cli.add_command(command)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns its exit status.
+
+    2 bad input (one line), 1 a run that did not converge or a proved claim violated, 3 inconclusive, 130 Ctrl-C.
+    """
+    found = getattr(verification, "__version__", "unknown")
+    if found != ndtheory.__version__:
+        complain(
+            f"ndtheory {ndtheory.__version__} found a package `verification` of version {found}: another distribution"
+            " has overwritten it; reinstall ndtheory"
+        )
+        return BAD_INPUT
+    try:
+        status = cli.main(
+            args=None if arguments is None else list(arguments), prog_name="ndtheory", standalone_mode=False
+        )
+        sys.stdout.flush()
+    except click.exceptions.NoArgsIsHelpError as error:
+        complain(error.ctx.get_help() if error.ctx else str(error))
+        return BAD_INPUT
+    except click.UsageError as error:
+        where = error.ctx.command_path if error.ctx else "ndtheory"
+        complain(f"{where}: {' '.join(error.format_message().split())}")
+        return BAD_INPUT
+    except (click.Abort, KeyboardInterrupt):
+        complain("interrupted before anything was computed")
+        return INTERRUPTED
+    except BrokenPipeError:
+        sys.stderr.close()  # the reader went away; nothing more to say
+        return DONE
+    except Exception as error:
+        return _explain(error)
+    return status if isinstance(status, int) else DONE
+
+
+def _explain(error: Exception) -> int:
+    """Bad input in one line; anything else is a bug and says so."""
+    from verification.reader import ProblemError
+
+    if isinstance(error, (ProblemError, HypothesisError, click.ClickException)):
+        complain(f"ndtheory: {error}")
+        return BAD_INPUT
+    if isinstance(error, OSError) and error.filename is not None:
+        complain(f"ndtheory: {error.filename}: {error.strerror}")
+        return BAD_INPUT
+    if isinstance(error, MemoryError):
+        complain("ndtheory: the problem does not fit into memory; needed fewer cells")
+        return BAD_INPUT
+    from verification.contact import ContactError  # numpy: only now
+
+    if isinstance(error, ContactError):
+        complain(f"ndtheory: {error}")
+        return NOT_MET
+    traceback.print_exc()
+    complain("ndtheory: this is a bug; please report it with the lines above")
+    return CRASH

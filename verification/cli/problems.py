@@ -1,0 +1,262 @@
+"""Commands that read a problem file: example, demo, constants, run, compare."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from verification.cli.console import complain, progress, say
+
+if TYPE_CHECKING:
+    from verification.problem import Problem
+    from verification.runs import Run
+    from verification.verdicts import Comparison
+
+FILE = click.argument("file", type=click.Path(path_type=Path))
+JSON = click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout.")
+THETA = click.option("--theta", metavar="NUMBER", help="Relaxation factor, 0 < theta < 1, over the file's.")
+SWAP = click.option("--swap-roles", is_flag=True, help="Give the Neumann problem to the other body.")
+SOLVER = click.option(
+    "--solver",
+    type=click.Choice(["auto", "cvxpy", "active-set"]),
+    default="auto",
+    show_default=True,
+    help="Who solves step II.",
+)
+FOLDER = click.option("-o", "--output", "folder", type=click.Path(path_type=Path), help="Folder for JSON and figures.")
+
+
+def examples() -> dict[str, str]:
+    """The built-in problem files by name."""
+    files = resources.files("verification") / "data"
+    return {
+        entry.name.removesuffix(".toml"): entry.read_text("utf-8")
+        for entry in sorted(files.iterdir(), key=lambda entry: entry.name)
+        if entry.name.endswith(".toml")
+    }
+
+
+@click.command()
+@click.argument("name", required=False)
+@JSON
+def example(name: str | None, as_json: bool) -> None:
+    """List the built-in problem files, or print one to redirect and edit.
+
+    \b
+    Example:
+      ndtheory example section6 > my.toml
+    """
+    from verification.document import Document
+
+    available = examples()
+    if name is not None and name not in available:
+        context = click.get_current_context()
+        raise click.UsageError(f"no example {name!r}; there are {', '.join(available)}", context)
+    titles = {key: _title(text) for key, text in available.items()}
+    if as_json:
+
+        class Examples(Document):
+            schema = "ndtheory.examples/1"
+            units = {"length": "see each file", "stress": "see each file"}
+
+            def content(self) -> dict[str, Any]:
+                return {"examples": titles} if name is None else {"name": name, "toml": available[name]}
+
+        say(Examples().to_json())
+    elif name is None:
+        for key, title in titles.items():
+            say(f"  {key:12}  {title}")
+        say()
+        say("Next: ndtheory example section6 > my.toml; ndtheory compare my.toml")
+    else:
+        say(available[name].rstrip())
+
+
+def _title(text: str) -> str:
+    import tomllib
+
+    return str(tomllib.loads(text)["title"])
+
+
+def _load(file: Path, theta: str | None, swap: bool) -> Problem:
+    from verification.problem import load
+
+    problem = load(file)
+    if theta is not None:
+        problem = problem.with_theta(theta)
+    return problem.swapped() if swap else problem
+
+
+@click.command()
+@FILE
+@click.option("--refine", type=click.IntRange(0, 8), default=0, metavar="N", help="Also on meshes halved 1 to N times.")
+@JSON
+def constants(file: Path, refine: int, as_json: bool) -> None:
+    """Measure m, M, C_R, C_s, C_tr, C_K and rho on the mesh of FILE.
+
+    m, M and C_K come in the file's unit of stress.
+
+    \b
+    Example:
+      ndtheory constants my.toml --refine 2
+    """
+    from verification.cli import screens
+    from verification.measured import measure
+
+    problem = _load(file, None, False)
+    measured = measure(problem, refine=refine)
+    if as_json:
+        say(measured.to_json())
+    else:
+        screens.constants(problem, measured)
+
+
+@click.command()
+@FILE
+@THETA
+@SOLVER
+@SWAP
+@FOLDER
+@JSON
+def run(file: Path, theta: str | None, solver: Any, swap_roles: bool, folder: Path | None, as_json: bool) -> int:
+    """Run the Neumann-Dirichlet iteration on FILE.
+
+    Exit 0 where it converged, 1 where it did not, 130 after Ctrl-C (what was computed is shown and written).
+
+    \b
+    Example:
+      ndtheory run my.toml --theta 0.6 -o results
+    """
+    from verification import runs
+    from verification.bodies import build
+    from verification.cli import screens
+    from verification.output import Folder
+
+    problem = _load(file, theta, swap_roles)
+    target = None if folder is None else Folder(folder)
+    pair = build(problem)
+    _warn(pair.warnings)
+    with progress("iterating", problem.iteration.tolerance) as watch:
+        finished = runs.run(pair, solver=solver, watch=watch)
+    if target is not None:
+        target.write_run(finished)
+    if as_json:
+        say(finished.to_json())
+    else:
+        screens.run(finished, file)
+    return _status_of_run(finished)
+
+
+@click.command()
+@FILE
+@THETA
+@SOLVER
+@SWAP
+@FOLDER
+@JSON
+def compare(file: Path, theta: str | None, solver: Any, swap_roles: bool, folder: Path | None, as_json: bool) -> int:
+    """Constants, bounds, a run, and one verdict for each bound.
+
+    Exit 1 where a proved bound is violated or the run stalls or diverges, 3 where rounding hides the answer.  Reaching
+    max_iterations is no failure here: the verdicts judge single steps.
+
+    \b
+    Example:
+      ndtheory compare my.toml -o results
+    """
+    problem = _load(file, theta, swap_roles)
+    return _compare(problem, file, folder, solver, as_json)
+
+
+@click.command()
+@click.option(
+    "-o",
+    "--output",
+    "folder",
+    type=click.Path(path_type=Path),
+    default=Path("ndtheory-demo"),
+    show_default=True,
+    help="Folder to write.",
+)
+@JSON
+def demo(folder: Path, as_json: bool) -> int:
+    """Compare on the built-in model of Section 6, and leave problem, report, figures and JSON in a folder.
+
+    \b
+    Example:
+      ndtheory demo -o section6
+    """
+    from verification.output import Folder
+    from verification.problem import load
+
+    written = Folder(folder).write_problem(examples()["section6"])
+    return _compare(load(written), written, folder, "auto", as_json)
+
+
+def _compare(problem: Problem, file: Path, folder: Path | None, solver: Any, as_json: bool) -> int:
+    from verification import verdicts
+    from verification.bodies import build
+    from verification.cli import screens
+    from verification.output import Folder
+
+    target = None if folder is None else Folder(folder)
+    pair = build(problem)
+    _warn(pair.warnings)
+    with progress("iterating", problem.iteration.tolerance) as watch:
+        comparison = verdicts.compare(pair, solver=solver, watch=watch)
+    if target is not None:
+        target.write_comparison(comparison)
+    if as_json:
+        say(comparison.to_json())
+    else:
+        screens.comparison(comparison, file, folder)
+    return _status_of_comparison(comparison)
+
+
+def _warn(warnings: list[str]) -> None:
+    for warning in warnings:
+        complain(f"warning: {warning}")
+
+
+def _status_of_run(finished: Run) -> int:
+    if finished.outcome == "interrupted":
+        complain(f"interrupted after {finished.evaluations} evaluations of T: what was computed is kept")
+        return 130
+    if not finished.converged:
+        complain(remedy(finished))
+    return 0 if finished.converged else 1
+
+
+def remedy(finished: Run) -> str:
+    """What could be done about a run that did not converge, in one sentence."""
+    from verification.measured import measure
+
+    pair, theta = finished.pair, float(finished.theta)
+    if finished.outcome == "limit":
+        return "not converged: max_iterations was reached while the residual still fell; raise it, or change theta"
+    rho = measure(pair)
+    here = f"{finished.outcome}: theta = {theta:g} does not contract here"
+    if rho.rho_max is None or rho.rho_min is None:
+        return f"{here}; try a smaller theta or --swap-roles"
+    good, swapped = 2 / (2 + rho.rho_max.value), 2 / (2 + 1 / rho.rho_min.value)
+    advice: Callable[[float], str] = lambda value: f"{value:.2g}"
+    if theta <= good:
+        return f"{here}; try a smaller theta"
+    better = f", or --swap-roles with --theta {advice(swapped)}" if swapped > good else ""
+    return f"{here}; try --theta {advice(good)} (2/(2 + rho), rho = {rho.rho_max.value:.3g}){better}"
+
+
+def _status_of_comparison(comparison: Comparison) -> int:
+    outcome = comparison.run.outcome
+    if outcome == "interrupted":
+        return _status_of_run(comparison.run)
+    if comparison.proved_violated:
+        complain("a proved bound is violated: a bug in this program or an error in the proof; please report it")
+        return 1
+    if outcome in ("stalled", "diverged"):
+        return _status_of_run(comparison.run)
+    return 3 if comparison.inconclusive else 0

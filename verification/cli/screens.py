@@ -1,0 +1,122 @@
+"""What the commands show: one screen, 80 columns, a heading for each question."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from verification.cli.calculator import edition_rows
+from verification.cli.console import figures, heading, near_one, say, table
+from verification.measured import Measured
+from verification.problem import Problem
+from verification.runs import Run
+from verification.verdicts import Comparison
+
+
+def _setting(problem: Problem, nodes: int | None = None, interface: int | None = None) -> None:
+    """Two lines that say what is computed."""
+    units, contact = problem.units, problem.contact
+    counts = "" if nodes is None else f" | {nodes} nodes, {interface} on Gamma_c"
+    moduli = " / ".join(figures(float(body.young)) for body in (problem.body1, problem.body2))
+    say(f"{problem.title}{counts} | E {moduli} {units['stress']}")
+    body = {1: "body 1 (lower)", 2: "body 2 (upper)"}[problem.iteration.neumann_body]
+    law = {"nonlocal": "non-local", "local": "local law"}[contact.law]
+    friction = "no friction" if not contact.friction else f"k = {figures(float(contact.friction), 2)}, {law}"
+    if contact.friction and contact.radius is not None and contact.law == "nonlocal":
+        friction += f", r = {float(contact.radius):g} {units['length']}"
+    say(f"Neumann body: {body} | {friction} | theta = {float(problem.iteration.theta):g}")
+
+
+def constants(problem: Problem, measured: Measured) -> None:
+    """The screen of ``constants``."""
+    levels = measured.levels or (measured,)
+    stress = problem.units["stress"]
+    _setting(problem, measured.body1.nodes + measured.body2.nodes, measured.interface_nodes)
+    heading("WHAT DOES THE THEOREM NEED TO KNOW?")
+    units = {"m": stress, "M": stress, "C_K": stress}
+    names = ["m", "M", "C_R", "C_s", "C_tr", "C_tr_half", "C_K", "rho_max", "rho_min", "rho_normal"]
+    rows = [["nodes", *(str(level.body1.nodes + level.body2.nodes) for level in levels), "unit"]]
+    for name in names:
+        rows.append([name, *(figures(getattr(level, name), 6) for level in levels), units.get(name, "")])
+    table(rows, right=range(1, len(levels) + 1))
+    for name, reason in measured.reason.items():
+        say(f"  {name}: {reason}")
+    say()
+    say("Exact for this mesh, up to rounding.  On a mesh m is above and M below its")
+    say("continuous value: for the continuous theorem both err on the unsafe side.")
+    if problem.source != "<dict>":
+        say(f"Next: ndtheory compare {problem.source}")
+
+
+def _happened(run: Run) -> None:
+    problem = run.pair.problem
+    heading("WHAT HAPPENED")
+    rate = run.observed_rate
+    rows = [["", "rate", "steps", ""]]
+    shown = "-" if rate is None else f"{near_one(rate.value)} in [{near_one(rate.lo)}, {near_one(rate.hi)}]"
+    rows.append(["observed", shown, str(run.iterations), run.outcome])
+    table(rows)
+    units = problem.units
+    force = units["stress"] + (f" {units['length']} (per unit thickness)" if problem.dimension == 2 else "")
+    say()
+    say("  nodes               " + ", ".join(f"{count} {name}" for name, count in run.contact.pattern.items()))
+    say(f"  normal force        {figures(run.force['normal'], 6)} {force}")
+    if problem.dimension == 2:
+        largest = max(abs(run.force["normal"]), abs(run.force["tangential"]))
+        tangential = run.force["tangential"] if abs(run.force["tangential"]) > 1e-12 * largest else 0.0
+        say(f"  tangential force    {figures(tangential)} {force}")
+        say(f"  largest pressure    {figures(float(run.contact.pressure.max()), 4)} {units['stress']}")
+    say(f"  contact step solved to a KKT residual of {run.last.contact.kkt.residual:.1e}")
+
+
+def _limits(run: Run) -> None:
+    say()
+    for reason in run.pair.outside:
+        say(f"Outside the theorem: {reason}.")
+    say("Not claimed: anything about the continuum, or the local Coulomb law.")
+
+
+def run(finished: Run, file: Path) -> None:
+    """The screen of ``run``."""
+    bodies = (finished.pair.body1, finished.pair.body2)
+    _setting(_at(finished), sum(len(body.mesh.points) for body in bodies), finished.pair.n)
+    _happened(finished)
+    _limits(finished)
+    say(f"Next: ndtheory compare {file}")
+
+
+def _at(run: Run) -> Problem:
+    return run.pair.problem.with_theta(run.theta)
+
+
+def comparison(result: Comparison, file: Path, folder: Path | None) -> None:
+    """The screen of ``compare`` and ``demo``."""
+    finished, measured = result.run, result.measured
+    _setting(_at(finished), measured.body1.nodes + measured.body2.nodes, measured.interface_nodes)
+    heading("HOW LARGE ARE THE CONSTANTS?")
+    stress = finished.units["stress"]
+    m, M, C_R, C_s, C_tr, C_K, rho = (
+        figures(getattr(measured, name), 4) for name in ("m", "M", "C_R", "C_s", "C_tr", "C_K", "rho_max")
+    )
+    say(f"  m = {m} {stress}, M = {M} {stress}, C_R = {C_R}")
+    say(f"  C_s = {C_s}, C_tr = {C_tr}, C_K = {C_K} {stress}, rho = {rho}")
+    heading("DOES ONE STEP CONTRACT?")
+    if result.bounds:
+        table(edition_rows(result.bounds))
+    else:
+        say("  no edition applies: " + next(iter(measured.reason.values()), ""))
+    _happened(finished)
+    heading("DOES THE RUN AGREE WITH THE BOUND?")
+    table([["edition", "verdict", "why"], *([n, j.verdict, j.reason] for n, j in result.verdicts.items())])
+    _limits(finished)
+    if folder is not None:
+        say(f"Written: {folder / 'report.html'}, compare.json, bodies and residuals (svg, png)")
+    say(f"Next: ndtheory run {file} --theta {_next_theta(result)}")
+
+
+def _next_theta(result: Comparison) -> str:
+    """A theta worth trying: 2/(2 + rho), rounded."""
+    rho = result.measured.rho_max
+    if rho is None or not math.isfinite(rho.value):
+        return "0.5"
+    return f"{2 / (2 + rho.value):.2g}"

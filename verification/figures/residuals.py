@@ -1,0 +1,53 @@
+"""The residual history with the rates drawn beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from ndtheory import Bounds
+from verification.figures.style import EDITIONS, PRESSURE, new_figure, styled
+from verification.rates import noise
+from verification.runs import Run
+
+
+def draw_residuals(run: Run, bounds: Mapping[str, Bounds] | None = None) -> Figure:
+    """Unrelaxed residual over evaluations of T, the observed rate, the proved factors and the noise floor.
+
+    Parameters
+    ----------
+    run : Run
+    bounds : mapping from edition to Bounds, optional
+        Those with a factor are drawn.
+    """
+    history = np.array(run.history)
+    steps = np.arange(len(history))
+    shown = np.isfinite(history) & (history > 0)
+    with styled():
+        figure = new_figure(7.2, 3.4)
+        ax = figure.subplots()
+        ax.semilogy(steps[shown], history[shown], "o-", color=PRESSURE, markersize=3, label=f"residual ({run.outcome})")
+        rate = run.observed_rate
+        if rate is not None and shown.any():
+            last = int(steps[shown][-1])
+            begin = max(0, last - rate.steps)
+            middle = (begin + last) // 2
+            line = history[middle] * rate.value ** (steps - middle)
+            ax.semilogy(steps, line, "--", color="#D55E00", label=f"observed rate {rate.value:.4g}")
+        for name, edition in (bounds or {}).items():
+            if edition.factor is not None and shown.any():
+                line = history[shown][0] * edition.factor.value**steps
+                ax.semilogy(steps, line, "-.", color=EDITIONS[name], label=f"{name} bound")
+        if run.last.size > 0:
+            floor = noise(run.pair, run.last) / run.last.size
+            ax.axhline(floor, color="0.7", linewidth=0.8, linestyle=":", label="rounding")
+        ax.axhline(run.pair.problem.iteration.tolerance, color="0.4", linewidth=0.8, linestyle=":", label="tolerance")
+        ax.set_xlabel("evaluations of T")
+        ax.set_ylabel("|||T g - g||| / |||T g|||")
+        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+        ax.set_title(f"{run.pair.problem.title}: theta = {float(run.theta):g}")
+        ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure

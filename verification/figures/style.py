@@ -1,0 +1,47 @@
+"""One look for all figures: readable for the colour-blind and in grey print."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+#: Blue, vermilion and their kin from the palette of Okabe and Ito; they differ in lightness too.
+BODY1, BODY2 = "#0072B2", "#D55E00"
+PRESSURE, SHEAR = "#000000", "#CC79A7"
+STATES = {"stick": "#009E73", "slip": "#E69F00", "open": "#999999"}
+EDITIONS = {"printed": "#999999", "repaired": "#56B4E9"}
+
+_PARAMETERS: Any = {
+    "font.size": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.titlesize": 9,
+    "axes.titlelocation": "left",
+    "legend.frameon": False,
+    "svg.hashsalt": "ndtheory",  # the same figure gives the same file
+    "svg.fonttype": "none",
+}
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure of the given size in inches, free of any window system."""
+    with mpl.rc_context(_PARAMETERS):
+        figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def styled() -> Any:
+    """A context in which axes and artists take the house's parameters."""
+    return mpl.rc_context(_PARAMETERS)
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write a figure; the ending of the path chooses SVG or PNG."""
+    metadata = {"Creator": "ndtheory", "Date": None} if path.suffix == ".svg" else {"Software": "ndtheory"}
+    with mpl.rc_context(_PARAMETERS):
+        figure.savefig(path, dpi=160, metadata=metadata)

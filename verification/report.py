@@ -1,0 +1,38 @@
+"""The written report: one HTML file that asks no other file and no other host."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from ndtheory import Number, __version__
+from verification.verdicts import Comparison
+
+
+def _shown(value: float | Number | None) -> str:
+    number = value.value if isinstance(value, Number) else value
+    return "-" if number is None else f"{number:.6g}"
+
+
+def report(comparison: Comparison, figures: Mapping[str, str]) -> str:
+    """Render a comparison.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    figures : mapping from ``bodies``, ``residuals`` to SVG text
+    """
+    environment = Environment(
+        loader=PackageLoader("verification", "data"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+    )
+    environment.filters["shown"] = _shown
+    return environment.get_template("report.html.j2").render(
+        comparison=comparison,
+        run=comparison.run,
+        problem=comparison.run.pair.problem,
+        measured=comparison.measured,
+        figures={name: re.sub(r"^.*?(?=<svg)", "", text, flags=re.S) for name, text in figures.items()},
+        version=__version__,
+    )
