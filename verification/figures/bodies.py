@@ -61,7 +61,8 @@ def _round_down(value: float) -> float:
 def _draw_meshes(ax: Axes, run: Run, displacements: tuple[Floats, Floats], scale: float) -> None:
     pair = run.pair
     length = pair.problem.units["length"]
-    lift = [0.0, pair.gap if pair.problem.contact.gap and _touching(run) else 0.0]
+    drawn = float(pair.body2.mesh.points[pair.body2.nodes[0], -1] - pair.body1.mesh.points[pair.body1.nodes[0], -1])
+    lift = [0.0, scale * pair.gap - drawn]  # the gap grows with the displacements, so that touching bodies touch
     for body, u, colour, shift in zip((pair.body1, pair.body2), displacements, (BODY1, BODY2), lift, strict=True):
         moved = body.mesh.points + scale * u
         name = "body 1" if body is pair.body1 else "body 2"
@@ -84,14 +85,7 @@ def _draw_meshes(ax: Axes, run: Run, displacements: tuple[Floats, Floats], scale
         ax.set_yticks([])
         ax.set_xlabel(f"x [{length}]")
     ax.set_title(f"{pair.problem.title}: deformed, displacements x {scale:g}")
-    ax.legend(loc="upper right", ncols=2, bbox_to_anchor=(1, 1.02))
-
-
-def _touching(run: Run) -> bool:
-    """Whether the file draws the bodies touching although a gap separates them."""
-    pair = run.pair
-    levels = [float(body.mesh.points[body.nodes[0], -1]) for body in (pair.body1, pair.body2)]
-    return abs(levels[1] - levels[0]) < pair.gap / 2
+    ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
 def _draw_stresses(ax: Axes, run: Run) -> None:
