@@ -1,0 +1,40 @@
+"""The README shows what the program prints."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from verification.cli import main
+
+README = (Path(__file__).parents[1] / "README.md").read_text("utf-8")
+
+
+def test_the_first_screen_is_the_output_of_demo(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shown = re.search(r"```text\n(.*?)```", README, re.S)
+    assert shown is not None
+    monkeypatch.chdir(tmp_path)
+    assert main(["demo"]) == 0
+    printed = capsys.readouterr().out
+    # the KKT residual is rounding itself and may differ from machine to machine
+    steady = lambda text: re.sub(r"KKT residual of \S+", "KKT residual", text).split("\n")
+    assert steady(shown[1].rstrip()) == steady(printed.rstrip())
+
+
+def test_the_python_example_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from verification.cli.problems import examples
+
+    code = re.search(r"```python\n(.*?)```", README, re.S)
+    assert code is not None
+    monkeypatch.chdir(tmp_path)
+    Path("my.toml").write_text(examples()["section6"], "utf-8")
+    exec(compile(code[1], "README.md", "exec"), {})
+
+
+def test_every_command_shown_exists(capsys: pytest.CaptureFixture[str]) -> None:
+    for name in sorted(set(re.findall(r"^    ndtheory (\w+)", README, re.M))):
+        assert main([name, "--help"]) == 0
