@@ -25,6 +25,7 @@ lint: $(VENV)/.test
 
 docs: $(VENV)/.docs
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
+	$(BIN)/python tests/docs/test_site.py docs/_build/html
 	@echo "the site: docs/_build/html/index.html"
 
 nightly: $(VENV)/.test

@@ -11,15 +11,20 @@ an overall factor 1/u with it.  The printed edition is ``u = 1`` with ``m~ = min
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any, Literal
 
 from ndtheory.constants import Constants, relaxation_factor
-from ndtheory.number import Number, decimal, sqrt, working_precision
+from ndtheory.errors import HypothesisError
+from ndtheory.number import DIGITS, Number, decimal, sqrt, working_precision
 
 Verdict = Literal["contraction", "no conclusion"]
+
+#: The ends of the open intervals count as outside, decided with a margin far above the rounding of the evaluation.
+MARGIN = Decimal(10) ** -(DIGITS // 2)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,7 +39,7 @@ class Edition:
     unit : callable
         m -> u: 1 as printed, m as repaired.
     proved : callable
-        m -> whether the proof holds: everywhere when repaired; for m >= 1 as printed.
+        m -> whether the proof holds: everywhere when repaired, for m >= 1 as printed.
     """
 
     name: Literal["printed", "repaired"]
@@ -43,7 +48,9 @@ class Edition:
     proved: Callable[[Any], bool]
 
 
-PRINTED = Edition(name="printed", coercivity=lambda m: min(m, 1), unit=lambda m: 1, proved=lambda m: m >= 1)
+PRINTED = Edition(
+    name="printed", coercivity=lambda m: min(m, m / m), unit=lambda m: m / m, proved=lambda m, x: m >= 1 or x == 0
+)
 REPAIRED = Edition(name="repaired", coercivity=lambda m: m, unit=lambda m: m, proved=lambda m: True)
 EDITIONS = (PRINTED, REPAIRED)
 
@@ -188,7 +195,10 @@ class Bounds:
         if self.interval is None:
             reasons["interval"] = "friction at or above C2"
         if self.factor is None:
-            reasons["factor"] = "no theta given" if self.theta is None else "theta outside the interval: no conclusion"
+            why = "no theta given" if self.theta is None else "theta outside the interval: no conclusion"
+            reasons |= dict.fromkeys(["factor", "one_minus_factor"], why)
+        if self.theta is None:
+            reasons |= dict.fromkeys(["theta", "verdict"], "no theta given")
         return {
             **{name: None if number is None else number.to_dict() for name, number in numbers.items()},
             "interval": None if self.interval is None else list(self.interval),
@@ -217,12 +227,12 @@ def evaluate(edition: Edition, constants: Constants, theta: Any = None) -> Bound
     Returns
     -------
     Bounds
-        Right to the last place of a double: evaluated with 60 decimal digits, comparisons included.
+        Right to the last place of a double: evaluated with 200 decimal digits, comparisons included.
 
     Raises
     ------
     HypothesisError
-        theta outside (0, 1).
+        theta outside (0, 1), or constants so far apart that a bound overflows a double.
 
     Examples
     --------
@@ -233,7 +243,7 @@ def evaluate(edition: Edition, constants: Constants, theta: Any = None) -> Bound
     chosen = None if theta is None else relaxation_factor(theta)
     with working_precision():
         m, M, C_R, x = (decimal(v) for v in (constants.m, constants.M, constants.C_R, constants.C_K))
-        read, u = Decimal(edition.coercivity(m)), Decimal(edition.unit(m))
+        read, u = edition.coercivity(m), edition.unit(m)
         shared = (read, M, C_R)
         c0 = C0(*shared)
         p, d, q = P(x, *shared, u), D(x, *shared, u), Q(x, *shared)
@@ -242,14 +252,15 @@ def evaluate(edition: Edition, constants: Constants, theta: Any = None) -> Bound
         # right-hand sides of (5.43), Case 2-1, Case 2-2 and Case 2-3
         right = (read**5 / (M * C_R) ** 2 + read**3, read**3 / 2, read**3, (2 - c0) / (1 - c0) * read**3 / 2)
         thresholds = [inverse_G(y, *shared, u) for y in right]
-        below = x < thresholds[0]  # C1 - C0 can be 1e-22 relative: never compare those two instead
+        # C1 - C0 can be 1e-22 relative: never compare those two instead.
+        below = x < thresholds[0] * (1 - MARGIN)
         interval = (max(Decimal(0), c6 or Decimal(0)), c1) if below else None
 
         one_minus_square = None
         if chosen is not None and interval is not None:
             t = decimal(chosen)
-            gain = min(one_minus_h1(t, d, q), one_minus_h2(t, p))
-            one_minus_square = gain if gain > 0 else None
+            if interval[0] * (1 + MARGIN) < t < interval[1] * (1 - MARGIN):
+                one_minus_square = min(one_minus_h1(t, d, q), one_minus_h2(t, p))
         verdict: Verdict | None = None
         factor = one_minus_factor = None
         if chosen is not None:
@@ -258,6 +269,8 @@ def evaluate(edition: Edition, constants: Constants, theta: Any = None) -> Bound
             root = sqrt(1 - one_minus_square)
             factor, one_minus_factor = Number.of_float(root), Number.of_float(one_minus_square / (1 + root))
 
+        if not (math.isfinite(float(q)) and math.isfinite(float(lipschitz(read, M, C_R, x)))):
+            raise HypothesisError("M C_R / m", f"{M * C_R / m:.3g}", "constants whose bounds fit into a double")
         scale = constants.friction_scale
         on_k = scale is not None
         ends: list[Number | None]
@@ -269,7 +282,7 @@ def evaluate(edition: Edition, constants: Constants, theta: Any = None) -> Bound
             edition=edition,
             C_K=Number.of_float(x),
             C_T=Number.of_float(lipschitz(m, M, C_R, x)),
-            C_T_tilde=Number.of_float(lipschitz(min(m, Decimal(1)), M, C_R, x)),
+            C_T_tilde=Number.of_float(lipschitz(read, M, C_R, x)),
             C0=Number.of_float(c0),
             C1=Number.of_float(c1),
             C2=ends[0],

@@ -51,10 +51,10 @@ class Constants:
     C_K : stress
         ``max|k| C_s C_tr`` (after (5.8)).  Hypothesis: C_K >= 0.
     k : dimensionless, optional
-    C_s : stress, optional
-        Continuity constant of ``w -> S(sigma_N(w))`` (in the file's stress unit times the norm's scaling).
-    C_tr : optional
-        Continuity constant of the tangential trace.
+    C_s : stress / sqrt(length), optional
+        Continuity constant of ``w -> S(sigma_N(w))`` into L2(Gamma_c).
+    C_tr : sqrt(length), optional
+        Continuity constant of the tangential trace into L2(Gamma_c).
         With all of ``k, C_s, C_tr`` given, C_K may be omitted and thresholds are on k; else they are on C_K.
 
     Raises
@@ -108,5 +108,5 @@ class Constants:
 
     @property
     def friction_scale(self) -> Fraction | None:
-        """``C_s C_tr``: what divides a threshold on C_K to give one on k; None where only C_K is known."""
+        """The product C_s C_tr, which turns a threshold on C_K into one on k; None where only C_K is known."""
         return None if self.C_s is None or self.C_tr is None else self.C_s * self.C_tr

@@ -19,7 +19,9 @@ class HypothesisError(ValueError):
     """
 
     def __init__(self, key: str, value: Any, needed: str) -> None:
-        super().__init__(f"{key} = {value}: needed {needed}")
+        large = isinstance(value, int) and value.bit_length() > 1000
+        shown = f"an integer of {value.bit_length()} bits" if large else value
+        super().__init__(f"{key} = {shown}: needed {needed}")
         self.key = key
         self.value = value
         self.needed = needed

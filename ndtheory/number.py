@@ -12,12 +12,13 @@ from typing import Any, Literal
 
 Level = Literal["exact", "verified", "guaranteed", "float"]
 
-#: Decimal digits carried while a bound is evaluated.  The worst cancellation met inside the hypotheses
-#: (C1 against C0) costs 22 digits, so the double that comes out is right in its last place.
-DIGITS = 60
+#: Decimal digits carried while a bound is evaluated.  With constants spread over 1e-12..1e12 the worst cancellation
+#: (C6 just below C1) costs some 75 digits, so the double that comes out is right in its last place.
+DIGITS = 200
 
-#: Largest decimal exponent accepted from a user; beyond it a double has long overflowed.
+#: Sizes accepted from a user; beyond them a double overflows.
 LARGEST_EXPONENT = 300
+LARGEST, SMALLEST = Fraction(10**LARGEST_EXPONENT), Fraction(1, 10**LARGEST_EXPONENT)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,7 +77,11 @@ def exact(value: Any) -> Fraction:
         raise ValueError(f"{value} is a truth value, not a number")
     if isinstance(value, Fraction):
         return value
+    if isinstance(value, int) and value.bit_length() > 1000:
+        raise ValueError(f"an integer of {value.bit_length()} bits is not of ordinary size")
     text = str(value).strip()
+    if "_" in text or not text.isascii():
+        raise ValueError(f"{text!r} is not a number")
     numerator, slash, denominator = text.partition("/")
     try:
         parts = [Decimal(numerator), Decimal(denominator)] if slash else [Decimal(text)]
@@ -86,7 +91,10 @@ def exact(value: Any) -> Fraction:
         raise ValueError(f"{text!r} is not a finite number of ordinary size")
     if slash and parts[1] == 0:
         raise ValueError(f"{text!r} divides by zero")
-    return Fraction(parts[0]) / Fraction(parts[1]) if slash else Fraction(parts[0])
+    result = Fraction(parts[0]) / Fraction(parts[1]) if slash else Fraction(parts[0])
+    if result and not SMALLEST <= abs(result) <= LARGEST:
+        raise ValueError(f"{text!r} is not of ordinary size")
+    return result
 
 
 @contextmanager
@@ -116,6 +124,8 @@ def sqrt(x: Any) -> Any:
     >>> sqrt(2.25), sqrt(Fraction(9, 4)), sqrt(Decimal("2.25"))
     (1.5, Fraction(3, 2), Decimal('1.5'))
     """
+    if isinstance(x, (int, float, Decimal, Fraction)) and x < 0:
+        raise ValueError(f"sqrt({x}): a number >= 0 is needed")
     if isinstance(x, Decimal):
         return x.sqrt()
     if isinstance(x, Fraction):

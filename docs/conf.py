@@ -1,0 +1,54 @@
+"""Sphinx configuration: ``make docs`` builds the site into docs/_build/html, with warnings as errors."""
+
+from importlib.metadata import distribution
+
+from ndtheory import __version__
+
+project = "ndtheory"
+author = "The ndtheory maintainers"
+copyright = author
+version = release = __version__
+
+extensions = [
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.mathjax",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.viewcode",
+    "sphinx_copybutton",
+    "sphinx_proof",
+    "sphinxcontrib.bibtex",
+]
+exclude_patterns = ["_build"]
+
+# Pages with code cells run at every build; a cell that fails fails the build.
+nb_execution_mode = "force"
+nb_execution_raise_on_error = True
+myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
+
+bibtex_bibfiles = ["references.bib"]
+
+napoleon_google_docstring = False
+napoleon_use_ivar = True
+autodoc_typehints = "description"
+autodoc_typehints_description_target = "documented"
+autodoc_member_order = "bysource"
+
+# Viewed offline the site asks no other host: no web fonts, no intersphinx, and its own copy of the one MathJax file.
+MATHJAX = "tex-svg-full.js"
+html_theme = "furo"
+html_title = "ndtheory"
+html_static_path = [
+    "site.css",
+    str(distribution("sphinx-mathjax-offline").locate_file(f"sphinx-mathjax-offline/static/mathjax/{MATHJAX}")),
+]
+html_css_files = ["site.css"]
+mathjax_path = MATHJAX
+mathjax3_config = {
+    "tex": {
+        "macros": {
+            "norm": [r"\lVert #1 \rVert", 1],
+            "tnorm": [r"\lvert\mkern-1.5mu\lVert #1 \rVert\mkern-1.5mu\rvert", 1],
+        }
+    }
+}

@@ -1,0 +1,162 @@
+"""The site asks no other host, and its notation page names code that exists.
+
+Run on a built site: ``python tests/docs/test_site.py docs/_build/html`` prints what it would fetch elsewhere, exit 1.
+"""
+
+import importlib
+import re
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+DOCS = Path(__file__).parents[2] / "docs"
+SITE = DOCS / "_build" / "html"
+
+#: Packages whose names on the notation page must exist.
+NAMED = ("fem1d2d", "ndtheory", "verification")
+
+OTHER_HOST = re.compile(r"\s*(?:https?:)?//[^/\s]", re.IGNORECASE)
+CSS_REFERENCE = re.compile(r"""(?:url\(|@import)\s*["']?([^"')\s;]+)""", re.IGNORECASE)
+JS_REFERENCE = re.compile(
+    r"""(?:\bimport\s*\(?|\bfrom|\bimportScripts\s*\(|\bfetch\s*\(|\.src\s*=)\s*["'`]([^"'`\s]+)""", re.IGNORECASE
+)
+
+
+class References(HTMLParser):
+    """What a browser fetches by itself to show a page; ``<a href>`` waits for a click."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: list[str] = []
+        self._inside: str | None = None
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self._inside = tag if tag in ("script", "style") else None
+        given = {name: value for name, value in attrs if value}
+        fetched = ["src", "poster", "data", "xlink:href", *(["href"] if tag in ("link", "image", "use") else [])]
+        self.found += [given[name] for name in fetched if name in given]
+        self.found += [part.split()[0] for part in given.get("srcset", "").split(",") if part.strip()]
+        self.found += CSS_REFERENCE.findall(given.get("style", ""))
+
+    def handle_endtag(self, tag: str) -> None:
+        self._inside = None
+
+    def handle_data(self, data: str) -> None:
+        if self._inside == "style":
+            self.found += CSS_REFERENCE.findall(data)
+        elif self._inside == "script":
+            self.found += JS_REFERENCE.findall(data)
+
+
+def references(path: Path) -> list[str]:
+    text = path.read_text(encoding="utf-8", errors="replace")
+    if path.suffix == ".css":
+        return CSS_REFERENCE.findall(text)
+    if path.suffix in (".js", ".mjs"):
+        return JS_REFERENCE.findall(text)
+    page = References()
+    page.feed(text)
+    page.close()
+    return page.found
+
+
+def external_requests(html_dir: Path) -> list[str]:
+    """Lines ``file: reference`` for all that the built site would fetch from another host."""
+    files = [p for p in sorted(html_dir.rglob("*")) if p.suffix in (".html", ".svg", ".css", ".js", ".mjs")]
+    return [
+        f"{path.relative_to(html_dir)}: {reference}"
+        for path in files
+        for reference in references(path)
+        if OTHER_HOST.match(reference)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("page.html", '<script async src="https://cdn.example.org/mathjax.js"></script>'),
+        ("page.html", '<link rel="stylesheet" href="//fonts.example.org/css?family=Inter">'),
+        ("page.html", '<img alt="" src="http://img.example.org/badge.svg">'),
+        ("page.html", '<img alt="" srcset="a.png 1x, https://img.example.org/b.png 2x">'),
+        ("page.html", "<style>@import 'https://fonts.example.org/a.css';</style>"),
+        ("page.html", '<p style="background: url(https://img.example.org/a.png)">'),
+        ("page.html", '<script type="module">import x from "https://cdn.example.org/x.js";</script>'),
+        ("style.css", '@font-face { src: url("https://fonts.example.org/a.woff2"); }'),
+        ("style.css", '@import "//fonts.example.org/a.css";'),
+        ("code.js", 'const x = await import("https://cdn.example.org/x.js");'),
+        ("code.js", 'script.src = "https://cdn.example.org/x.js";'),
+    ],
+)
+def test_a_planted_request_to_another_host_is_found(tmp_path, name, text):
+    (tmp_path / "deep").mkdir()
+    (tmp_path / "deep" / name).write_text(text)
+    found = external_requests(tmp_path)
+    assert len(found) == 1
+    assert found[0].startswith(f"deep/{name}: ")
+    assert "example.org" in found[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("page.html", '<a href="https://doi.org/10.1051/m2an:2008003">the paper</a>'),
+        ("page.html", '<link href="_static/site.css"><img src="../a.png"><script src="/x.js"></script>'),
+        ("page.html", '<p>url(https://example.org)</p><svg xmlns="http://www.w3.org/2000/svg"></svg>'),
+        ("page.html", '<img src="data:image/svg+xml;base64,PHN2Zz4=">'),
+        ("style.css", "a { background: url(data:image/svg+xml;utf8,<svg/>) }"),
+        ("code.js", 'const ns = "http://www.w3.org/2000/svg"; // see https://example.org'),
+    ],
+)
+def test_links_namespaces_and_local_files_are_no_requests(tmp_path, name, text):
+    (tmp_path / name).write_text(text)
+    assert external_requests(tmp_path) == []
+
+
+def test_the_built_site_asks_no_other_host():
+    if not (SITE / "index.html").exists():
+        pytest.skip("the site is not built: run `make docs`")
+    assert external_requests(SITE) == []
+
+
+def code_names(page: str) -> list[str]:
+    """Dotted names in the second column of the tables of a Markdown page."""
+    rows = [line.split("|") for line in page.splitlines() if line.startswith("|")]
+    return [name for row in rows for name in re.findall(r"`(\w+(?:\.\w+)+)`", row[2])]
+
+
+def resolve(name: str) -> None:
+    """Import a dotted name; a field of a dataclass counts.  AttributeError where there is none."""
+    head, *rest = name.split(".")
+    here = importlib.import_module(head)
+    while rest:
+        part = rest.pop(0)
+        if part in getattr(here, "__dataclass_fields__", {}) and not rest:
+            return
+        if not hasattr(here, part) and hasattr(here, "__path__"):
+            importlib.import_module(f"{here.__name__}.{part}")
+        here = getattr(here, part)
+
+
+def test_a_code_name_that_does_not_exist_is_noticed():
+    resolve("ndtheory.Constants.C_R")
+    for name in ("ndtheory.Constants.C_X", "ndtheory.bounds.C9", "ndtheory.bounds.Bounds.C2.more"):
+        with pytest.raises(AttributeError):
+            resolve(name)
+
+
+def test_every_code_name_on_the_notation_page_exists():
+    names = code_names((DOCS / "notation.md").read_text(encoding="utf-8"))
+    ours = [name for name in names if name.split(".")[0] in NAMED]
+    assert {"ndtheory.Constants.C_K", "ndtheory.bounds.C0", "ndtheory.bounds.G"} <= set(ours)
+    for name in ours:
+        resolve(name)
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 2 or not (Path(sys.argv[1]) / "index.html").exists():
+        sys.exit("usage: python tests/docs/test_site.py DIRECTORY, the directory of a built site")
+    requests = external_requests(Path(sys.argv[1]))
+    print("\n".join(requests) or "the site asks no other host")
+    sys.exit(bool(requests))

@@ -1,0 +1,362 @@
+"""Hypothesis strategies that draw valid cases by construction."""
+
+from fractions import Fraction
+
+import numpy as np
+import oracle
+from hypothesis import settings
+from hypothesis import strategies as st
+
+from fem1d2d import Material, Mesh, plane_strain, rectangle, supports
+
+# --- the theory: constants m, M, C_R, C_K and the relaxation factor, all rational ------------------------------------
+
+
+#: Relative width of the layer between C4 and C5 below which no case is drawn; 1e-12..1e12 gives 1e-60 at the least.
+THINNEST = Fraction(1, 10**70)
+
+
+def log_uniform(low: float, high: float, digits: int = 7) -> st.SearchStrategy[Fraction]:
+    """Rationals of a few digits between 10^low and 10^high, even in the exponent."""
+    return st.floats(low, high).map(lambda exponent: Fraction(f"{10**exponent:.{digits - 1}e}"))
+
+
+#: Stresses, whatever the unit.
+ANY_STRESS = log_uniform(-12, 12)
+
+
+def offsets(smallest: int = 20) -> st.SearchStrategy[Fraction]:
+    """Relative distances: 0.3 to 10^-smallest, of either sign."""
+    return st.builds(lambda sign, j: sign * Fraction(3, 10**j), st.sampled_from([-1, 1]), st.integers(1, smallest))
+
+
+@st.composite
+def bodies(draw, m=ANY_STRESS):
+    """m, M, C_R with 0 < m <= M <= 1e6 m and C_R >= 1."""
+    m = draw(m)
+    return {"m": m, "M": m * draw(log_uniform(0, 6)), "C_R": draw(log_uniform(0, 12))}
+
+
+def layer(paper: oracle.Paper) -> tuple[Fraction, Fraction]:
+    """C4 and C5 on C_K: between them a' < -1 and T_theta still contracts for C6 < theta < C1."""
+    return oracle.rational(paper.threshold("C4"), 90), oracle.rational(paper.threshold("C5"), 90)
+
+
+@st.composite
+def frictions(draw, body, editions=tuple(oracle.EDITIONS), thinnest=THINNEST):
+    """C_K >= 0 beside given m, M, C_R: zero, any, next to a threshold, or between C4 and C5.
+
+    The last needs (C5 - C4)/C4 >= `thinnest`, about (m~/(M C_R))^2.
+    """
+    paper = oracle.EDITIONS[draw(st.sampled_from(editions))](**body, C_K=0)
+    kinds = ["any", "near", "zero"]
+    if (paper.m / (paper.M * paper.C_R)) ** 2 >= thinnest:
+        kinds.append("layer")
+    kind = draw(st.sampled_from(kinds))
+    if kind == "zero":
+        return Fraction(0)
+    if kind == "any":
+        return draw(log_uniform(-12, 12))
+    if kind == "near":
+        threshold = paper.threshold(draw(st.sampled_from(["C2", "C3", "C4"])))
+        return oracle.rational(threshold, 90) * (1 + draw(offsets()))
+    low, high = layer(paper)
+    return low + Fraction(draw(st.integers(1, 99)), 100) * (high - low)
+
+
+@st.composite
+def constants(draw, m=ANY_STRESS, editions=tuple(oracle.EDITIONS), thinnest=THINNEST):
+    """Admissible m, M, C_R, C_K: keywords of `ndtheory.Constants` and of the oracle."""
+    body = draw(bodies(m))
+    return {**body, "C_K": draw(frictions(body, editions, thinnest))}
+
+
+@st.composite
+def square_constants(draw, edition: str = "repaired"):
+    """Admissible constants with m and C_K squares of rationals: every root in Section 5 is then rational."""
+    root_m = draw(log_uniform(-6, 6))
+    body = draw(bodies(st.just(root_m**2)))
+    return {**body, "C_K": oracle.rational(oracle.square_root(draw(frictions(body, (edition,)))), 60) ** 2}
+
+
+def thetas() -> st.SearchStrategy[Fraction]:
+    """0 < theta < 1, also next to 0 and 1."""
+    small = log_uniform(-12, -0.01)
+    return st.one_of(st.integers(1, 99).map(lambda n: Fraction(n, 100)), small, small.map(lambda t: 1 - t))
+
+
+@st.composite
+def thetas_near_ends(draw, paper: oracle.Paper):
+    """0 < theta < 1 next to C0, C1 or C6 of one edition at one set of constants, but not at it."""
+    ends = [end for end in (paper.C0, paper.C1, paper.C6) if end is not None and end > 0]
+    end = oracle.rational(draw(st.sampled_from(ends)), 90)
+    theta = end * (1 + draw(offsets()))
+    return theta if theta < 1 else 2 * end - theta
+
+
+@st.composite
+def theory_cases(draw, edition: str, m=ANY_STRESS, thinnest=THINNEST):
+    """Constants, and 0 < theta < 1 anywhere or near an end of the interval of `edition`."""
+    given = draw(constants(m, (edition,), thinnest))
+    return given, draw(st.one_of(thetas_near_ends(oracle.EDITIONS[edition](**given)), thetas()))
+
+
+# --- problems: dictionaries for `verification.Problem.from_dict`, all inside the theorem unless asked otherwise --------
+
+THICKNESS = ["1/50", "1/20", "1/6", "1/3", "1", "2"]
+
+
+def decimals(low: float, high: float) -> st.SearchStrategy[Fraction]:
+    """Rationals of three digits between 10^low and 10^high, even in the exponent."""
+    return log_uniform(low, high, digits=3)
+
+
+def strains(largest: str = "1/20") -> st.SearchStrategy[Fraction]:
+    """Small numbers of either sign, often zero."""
+    return st.one_of(st.just(Fraction(0)), st.integers(-20, 20).map(lambda i: Fraction(i, 20) * Fraction(largest)))
+
+
+def youngs() -> st.SearchStrategy[tuple[Fraction, Fraction]]:
+    """E1, E2 between 1e-2 and 1e10, ratio within 1/50 to 50; equal moduli are common."""
+    ratio = st.one_of(st.just(Fraction(1)), st.sampled_from([Fraction(1, 50), Fraction(50)]), decimals(-1.69, 1.69))
+    return st.tuples(decimals(-0.3, 8.3), ratio).map(lambda pair: (pair[0], pair[0] * pair[1]))
+
+
+@st.composite
+def supports_and_loads(draw, far: str, clear: list[str], young: Fraction, height: Fraction, length: Fraction):
+    """Gamma_u and the loads of a rectangle: `far` lies opposite Gamma_c, the sides `clear` do not touch it.
+
+    Every choice leaves no rigid motion: a whole side held, or rollers on two.
+    """
+    kinds = ["clamped", "clamped", "moved"]
+    if clear:
+        kinds += ["side", "corner", "rollers"]
+    if len(clear) == 2:
+        kinds.append("both sides")
+    kind = draw(st.sampled_from(kinds))
+    side = draw(st.sampled_from(clear)) if clear else None
+    slip, push = draw(strains()) * height, draw(strains()) * height
+    fixed, prescribed = [], {}
+    if kind == "clamped":
+        fixed = [far]
+    elif kind == "moved":
+        prescribed = {far: [slip, push]}
+    elif kind == "side":
+        fixed = [side]
+    elif kind == "corner":
+        fixed = [side, far]
+    elif kind == "both sides":
+        fixed = ["left", "right"]
+    else:
+        prescribed = {far: ["free", push], side: [slip, "free"]}
+    held = dict.fromkeys(fixed, (True, True))
+    held |= {name: tuple(v != "free" for v in values) for name, values in prescribed.items()}
+    traction = {}
+    for name in draw(st.lists(st.sampled_from(["left", "right", "bottom", "top"]), max_size=2, unique=True)):
+        force = [Fraction(0) if h else young * draw(strains()) for h in held.get(name, (False, False))]
+        traction[name] = force
+    body_force = [young / length * draw(strains()) for _ in range(2)]
+    return {"fixed": fixed, "prescribed": prescribed, "traction": traction, "body_force": body_force}
+
+
+@st.composite
+def plane_problems(draw, friction=None, law="nonlocal", theta=None, most_cells: int = 6):
+    """Two rectangles whose grids match; body 1 wider, equal or narrower, offset by whole cells.
+
+    Parameters
+    ----------
+    friction : strategy of rationals, optional
+        By default 0 to 1.
+    """
+    h = draw(st.sampled_from([Fraction(1, 20), Fraction(1, 4), Fraction(1), Fraction(30)]))
+    n1, n2 = draw(st.integers(1, most_cells)), draw(st.integers(1, most_cells))
+    shift = draw(st.one_of(st.just(0), st.integers(1 - n2, n1 - 1)))  # left end of body 2, in cells of body 1
+    low, high = max(0, shift), min(n1, shift + n2)
+    begin = draw(st.integers(low, high - 1))
+    end = draw(st.integers(begin + 1, high))
+    if draw(st.booleans()):
+        begin, end = low, high
+    origin = draw(st.sampled_from([Fraction(0), Fraction(-3, 7)]))
+    x = lambda i: origin + h * i
+    young = draw(youngs())
+    bodies = []
+    for first, cells, far, E in ((0, n1, "bottom", young[0]), (shift, n2, "top", young[1])):
+        clear = [s for s, apart in (("left", begin > first), ("right", end < first + cells)) if apart]
+        length = h * cells
+        height = length * Fraction(draw(st.sampled_from(THICKNESS)))
+        bodies.append(
+            {
+                "shape": "rectangle",
+                "x": [x(first), x(first + cells)],
+                "y": [-height, 0] if far == "bottom" else [0, height],
+                "cells": [cells, draw(st.integers(1, 3))],
+                "young": E,
+                "poisson": Fraction(draw(st.sampled_from(["-0.5", "0", "0.3", "0.3", "0.45"]))),
+                **draw(supports_and_loads(far, clear, E, height, length)),
+            }
+        )
+    span = h * (end - begin)
+    return {
+        "dimension": 2,
+        "body1": bodies[0],
+        "body2": bodies[1],
+        "contact": {
+            "interval": [x(begin), x(end)],
+            "friction": draw(st.integers(0, 10).map(lambda i: Fraction(i, 10)) if friction is None else friction),
+            "law": law,
+            "radius": draw(st.sampled_from([h / 2, h * Fraction(3, 2), span])),
+            "gap": draw(st.sampled_from([Fraction(0), h / 1000, h / 30])),
+        },
+        "iteration": {
+            "neumann_body": draw(st.sampled_from([1, 2])),
+            "theta": draw(thetas() if theta is None else theta),
+        },
+        "norm": {"length": h * draw(st.sampled_from([Fraction(1, 2), Fraction(4), Fraction(100)]))},
+    }
+
+
+@st.composite
+def bar_problems(draw, theta=None):
+    """Two bars that meet at a point, both ends held, with body forces."""
+    a, b = draw(decimals(-1.5, 1)), draw(decimals(-1.5, 1))
+    origin = draw(st.sampled_from([Fraction(0), Fraction(-5, 3)]))
+    young = draw(youngs())
+    bodies = []
+    for ends, side, E in (([origin - a, origin], "left", young[0]), ([origin, origin + b], "right", young[1])):
+        length = ends[1] - ends[0]
+        body = {"shape": "interval", "x": ends, "cells": draw(st.integers(1, 5)), "young": E}
+        body |= draw(st.sampled_from([{"fixed": [side]}, {"prescribed": {side: length * draw(strains("1/5"))}}]))
+        bodies.append(body | {"body_force": E / length * draw(strains("1/5"))})
+    return {
+        "dimension": 1,
+        "body1": bodies[0],
+        "body2": bodies[1],
+        "contact": {"gap": draw(st.sampled_from([Fraction(0), a / 100]))},
+        "iteration": {
+            "neumann_body": draw(st.sampled_from([1, 2])),
+            "theta": draw(thetas() if theta is None else theta),
+        },
+        "norm": {"length": draw(decimals(-1, 2))},
+    }
+
+
+def contact_problems(**plane) -> st.SearchStrategy[dict]:
+    """Mostly in two dimensions."""
+    return st.integers(0, 5).flatmap(lambda i: bar_problems() if i == 5 else plane_problems(**plane))
+
+
+# --- end of problems --------------------------------------------------------------------------------------------------
+
+
+# --- elastic bodies: triangles, meshes, materials and supports, all with rational data --------------------------------
+
+
+def numbers(low, high, denominator: int = 16) -> st.SearchStrategy[Fraction]:
+    """Multiples of 1/denominator from low to high; with a power of two they are exact in floats."""
+    ends = int(low * denominator), int(high * denominator)
+    return st.integers(*ends).map(lambda n: Fraction(n, denominator))
+
+
+def vectors(low=-4, high=4, denominator: int = 16, size: int = 2) -> st.SearchStrategy[np.ndarray]:
+    """Vectors of rationals."""
+    return st.tuples(*[numbers(low, high, denominator)] * size).map(lambda x: np.array(x, dtype=object))
+
+
+def powers_of_two(low: int = -3, high: int = 3) -> st.SearchStrategy[Fraction]:
+    """2^low to 2^high."""
+    return st.integers(low, high).map(lambda k: Fraction(2) ** k)
+
+
+@st.composite
+def maps(draw, unimodular: bool = False):
+    """Matrices of positive determinant, shape (2, 2); unimodular: up to a factor 2^k shears and quarter turns."""
+    quarter = np.array([[Fraction(0), Fraction(-1)], [Fraction(1), Fraction(0)]], dtype=object)
+    b, c = draw(numbers(-1, 1, 4)), draw(numbers(-1, 1, 4))
+    sizes = powers_of_two() if unimodular else numbers(Fraction(1, 4), 2)
+    stretch = np.array([[draw(sizes), Fraction(0)], [Fraction(0), draw(sizes)]], dtype=object)
+    shear = np.array([[1, b], [0, 1]], dtype=object) @ np.array([[1, 0], [c, 1]], dtype=object)
+    for _ in range(draw(st.integers(0, 3))):
+        shear = quarter @ shear
+    return shear @ stretch
+
+
+@st.composite
+def triangles(draw, denominator: int = 12):
+    """One positively oriented triangle: p, p + u, p + s u + t Qu with t > 0 and Q the quarter turn."""
+    any_sign, positive = numbers(-2, 2, denominator), numbers(Fraction(1, 4), 2, denominator)
+    p, a, b, s, t = (draw(x) for x in (vectors(denominator=denominator), positive, any_sign, any_sign, positive))
+    u, Qu = np.array([a, b], dtype=object), np.array([-b, a], dtype=object)
+    points, first = np.array([p, p + u, p + s * u + t * Qu], dtype=object), draw(st.integers(0, 2))
+    return Mesh(points=np.roll(points, first, axis=0), cells=np.array([[0, 1, 2]]), sides={})
+
+
+@st.composite
+def lines(draw, most: int = 5, denominator: int = 12):
+    """A line in one to `most` unequal cells, nodes in order."""
+    steps = draw(st.lists(numbers(Fraction(1, 4), 2, denominator), min_size=1, max_size=most))
+    points = draw(numbers(-4, 4, denominator)) + np.cumsum([Fraction(0), *steps])
+    nodes = np.arange(len(points))
+    sides = {"left": nodes[:1, None], "right": nodes[-1:, None]}
+    return Mesh(points=points[:, None], cells=np.column_stack([nodes[:-1], nodes[1:]]), sides=sides)
+
+
+def renumbered(mesh: Mesh, order) -> Mesh:
+    """The same mesh with node order[i] called i."""
+    name = np.argsort(order)
+    sides = {side: name[facets] for side, facets in mesh.sides.items()}
+    return Mesh(points=mesh.points[order], cells=name[mesh.cells], sides=sides)
+
+
+def in_floats(mesh: Mesh) -> Mesh:
+    """The same mesh with its coordinates in floats."""
+    return Mesh(points=mesh.points.astype(float), cells=mesh.cells, sides=mesh.sides)
+
+
+@st.composite
+def plane_meshes(draw, most: int = 2, least: int = 1, exact: bool = False):
+    """Grids of `least` to `most` cells a side, each node moved by up to 1/8 cell, mapped linearly, nodes in any order.
+
+    Twice the area of a triangle is at least 1/4 of a cell's.  `exact`: no node is moved, areas are powers of two.
+    """
+    nx, ny = draw(st.integers(least, most)), draw(st.integers(least, most))
+    grid = rectangle((Fraction(0), Fraction(nx)), (Fraction(0), Fraction(ny)), (nx, ny))
+    random = np.random.default_rng(draw(st.integers(0, 2**16)))
+    moves = 0 if exact else random.integers(-2, 3, grid.points.shape) * Fraction(1, 16)
+    points = draw(vectors()) + (grid.points + moves) @ draw(maps(unimodular=exact)).T
+    moved = Mesh(points=points, cells=grid.cells, sides=grid.sides)
+    return renumbered(moved, random.permutation(len(points)))
+
+
+def meshes(most: int = 2) -> st.SearchStrategy[Mesh]:
+    """Lines and plane meshes."""
+    return st.one_of(lines(denominator=16), plane_meshes(most))
+
+
+@st.composite
+def materials(draw, binary: bool = False):
+    """Lame parameters with lame_mu > 0 and 3 lame_lambda + 2 lame_mu > 0; `binary`: exact in floats."""
+    if not binary:
+        return plane_strain(draw(numbers(Fraction(1, 2), 50, 6)), draw(numbers(Fraction(-9, 10), Fraction(9, 20), 20)))
+    mu = draw(numbers(Fraction(1, 4), 8, 8))
+    return Material(lame_lambda=mu * draw(numbers(Fraction(-5, 8), 8, 8)), lame_mu=mu)
+
+
+@st.composite
+def held_bodies(draw, most: int = 4):
+    """A plane mesh and a material in floats, and the unknowns left free by one to three held sides.
+
+    The top keeps a free node: two cells a side at least.
+    """
+    mesh, material = in_floats(draw(plane_meshes(most, least=2))), draw(materials())
+    sides = draw(st.lists(st.sampled_from(["left", "right", "bottom"]), min_size=1, max_size=3, unique=True))
+    known = supports(mesh, {side: [0.0, 0.0] for side in sides}).known
+    floats = Material(lame_lambda=float(material.lame_lambda), lame_mu=float(material.lame_mu))
+    return mesh, floats, np.flatnonzero(~known.ravel())
+
+
+def fewer(share: int) -> settings:
+    """The profile's number of examples, divided: for examples that cost a dense factorisation or two."""
+    return settings(max_examples=max(1, settings.default.max_examples // share))
+
+
+# --- end of elastic bodies --------------------------------------------------------------------------------------------

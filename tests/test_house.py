@@ -1,0 +1,150 @@
+"""The house: which room may know which, read from every import statement, wherever it is indented."""
+
+import ast
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+ROOMS = ("fem1d2d", "ndtheory", "verification")
+
+#: module: the modules and packages that alone may import it
+DOORS = {
+    "cvxpy": ("verification.contact.model", "verification.lmi"),
+    "matplotlib": ("verification.figures",),
+    "click": ("verification.cli",),
+    "rich": ("verification.cli",),
+}
+#: what the theory may know beside the standard library and itself
+THEORY = {"ndtheory.symbolic": {"sympy"}}
+COMPUTED = "a name computed at run time"
+
+
+def within(module: str, *owners: str) -> bool:
+    return any(module == owner or module.startswith(owner + ".") for owner in owners)
+
+
+def written_name(call: ast.Call) -> str:
+    """The module a call of `import_module` names; of an f-string the packages before its first brace."""
+    name = call.args[0] if call.args else None
+    if isinstance(name, ast.JoinedStr) and "." in (text := getattr(name.values[0], "value", "")):
+        return text
+    return name.value if isinstance(name, ast.Constant) else COMPUTED
+
+
+def imports(module: str, source: str, is_package: bool = False) -> Iterator[tuple[int, str]]:
+    """Line and absolute name of all that `source` imports: `from a import b` counts as a.b."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            parents = module.split(".")[: None if is_package else -1]
+            start = parents[: len(parents) - node.level + 1] if node.level else []
+            base = [*start, *([node.module] if node.module else [])]
+            yield from ((node.lineno, ".".join([*base, alias.name])) for alias in node.names)
+        elif isinstance(node, ast.Call) and ast.unparse(node.func).split(".")[-1] in ("import_module", "__import__"):
+            yield node.lineno, written_name(node)
+
+
+def forbidden(module: str, imported: str) -> bool:
+    """Whether `module` may not import `imported`."""
+    room, top = module.partition(".")[0], imported.partition(".")[0]
+    if imported == COMPUTED:
+        return True
+    if room != "verification" and top in ROOMS and top != room:
+        return True
+    if room == "ndtheory":
+        return top not in {"ndtheory", *sys.stdlib_module_names, *THEORY.get(module, ())}
+    return top in DOORS and not within(module, *DOORS[top])
+
+
+def violations(module: str, source: str, is_package: bool = False) -> list[str]:
+    """Each broken rule of the house, as `module:line: what`."""
+    found = [
+        f"{module}:{line}: imports {name}"
+        for line, name in imports(module, source, is_package)
+        if forbidden(module, name)
+    ]
+    if not within(module, "verification.cli"):
+        found += [
+            f"{module}:{node.lineno}: print"
+            for node in ast.walk(ast.parse(source))
+            if isinstance(node, ast.Name) and node.id == "print"
+        ]
+    return found
+
+
+FILES = [path.relative_to(ROOT) for room in ROOMS for path in sorted((ROOT / room).rglob("*.py"))]
+
+
+@pytest.mark.parametrize("path", FILES, ids=str)
+def test_no_edge_leaves_the_plan_of_the_house(path):
+    is_package = path.name == "__init__.py"
+    parts = path.parent.parts if is_package else path.with_suffix("").parts
+    assert violations(".".join(parts), (ROOT / path).read_text(encoding="utf-8"), is_package) == []
+
+
+def test_every_room_has_been_read():
+    assert {path.parts[0] for path in FILES} == set(ROOMS)
+
+
+@pytest.mark.parametrize(
+    ("module", "source"),
+    [
+        ("fem1d2d.mesh", "import ndtheory"),
+        ("fem1d2d.mesh", "def f():\n    if True:\n        from verification.problem import Problem"),
+        ("fem1d2d.mesh", "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import ndtheory.bounds as b"),
+        ("fem1d2d.mesh", "from .. import ndtheory"),
+        ("ndtheory.bounds", "import fem1d2d.mesh"),
+        ("ndtheory.bounds", "import os, verification"),
+        ("ndtheory.bounds", "try:\n    import numpy\nexcept ImportError:\n    pass"),
+        ("ndtheory.bounds", "import sympy"),
+        ("ndtheory.symbolic", "import numpy"),
+        ("ndtheory.symbolic.deep", "import sympy"),
+        ("ndtheory.bounds", "import importlib\nimportlib.import_module('scipy')"),
+        ("ndtheory.bounds", "numpy = __import__('numpy')"),
+        ("verification.sweep", "from importlib import import_module\nimport_module(name)"),
+        ("verification.sweep", "import_module(f'cv{x}')"),
+        ("fem1d2d.mesh", "import_module(f'verification.{x}')"),
+        ("verification.iteration", "import cvxpy as cp"),
+        ("verification.contact.kkt", "from cvxpy.constraints import Zero"),
+        ("verification.report", "import matplotlib.pyplot as plt"),
+        ("fem1d2d.mesh", "def plot(self):\n    from matplotlib import pyplot"),
+        ("verification.report", "from rich.table import Table"),
+        ("verification.client", "import click"),
+        ("verification.iteration", "print('done')"),
+        ("ndtheory.bounds", "def f(say=print):\n    say(1)"),
+    ],
+)
+def test_a_forbidden_edge_is_found(module, source):
+    assert len(violations(module, source)) == 1
+
+
+@pytest.mark.parametrize(
+    ("module", "source"),
+    [
+        ("fem1d2d.mesh", "import numpy\nfrom scipy import sparse\nfrom fem1d2d import element\nfrom . import material"),
+        ("ndtheory.bounds", "from decimal import Decimal\nfrom ndtheory.number import sqrt\nfrom .errors import X"),
+        ("ndtheory.symbolic", "import sympy"),
+        ("verification", "importlib.import_module(f'verification.{home}')"),
+        ("verification.compare", "import ndtheory, fem1d2d, numpy"),
+        ("verification.contact.model", "import cvxpy"),
+        ("verification.lmi", "def f():\n    import cvxpy"),
+        ("verification.figures.region", "import matplotlib"),
+        ("verification.figures", "import matplotlib"),
+        ("verification.cli.run", "import click\nfrom rich import print\nprint('done')"),
+        ("verification.iteration", "# print('done')\nlog.info('print')"),
+    ],
+)
+def test_an_edge_of_the_plan_is_let_through(module, source):
+    assert violations(module, source) == []
+
+
+def test_relative_imports_are_resolved_from_packages_and_from_modules():
+    assert [name for _, name in imports("a.b", "from .c import d\nfrom .. import e", is_package=True)] == [
+        "a.b.c.d",
+        "a.e",
+    ]
+    assert [name for _, name in imports("a.b", "from .c import d\nfrom . import e")] == ["a.c.d", "a.e"]
