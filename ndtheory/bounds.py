@@ -48,9 +48,7 @@ class Edition:
     proved: Callable[[Any], bool]
 
 
-PRINTED = Edition(
-    name="printed", coercivity=lambda m: min(m, m / m), unit=lambda m: m / m, proved=lambda m, x: m >= 1 or x == 0
-)
+PRINTED = Edition(name="printed", coercivity=lambda m: min(m, m / m), unit=lambda m: m / m, proved=lambda m: m >= 1)
 REPAIRED = Edition(name="repaired", coercivity=lambda m: m, unit=lambda m: m, proved=lambda m: True)
 EDITIONS = (PRINTED, REPAIRED)
 
