@@ -37,6 +37,7 @@ from fem1d2d.trace import SAME, extent
 from verification.friction import friction_operator
 from verification.problem import BodySpec, Problem
 from verification.reader import ProblemError
+from verification.threads import one_thread
 
 Name = Literal["body1", "body2"]
 
@@ -234,7 +235,8 @@ def build(problem: Problem) -> Pair:
     """
     mesh1, mesh2 = _mesh(problem, "body1"), _mesh(problem, "body2")
     nodes1, nodes2 = _interface(problem, mesh1, mesh2)
-    body1, body2 = _body(problem, "body1", mesh1, nodes1), _body(problem, "body2", mesh2, nodes2)
+    with one_thread():
+        body1, body2 = _body(problem, "body1", mesh1, nodes1), _body(problem, "body2", mesh2, nodes2)
     x = mesh1.points[nodes1, 0].astype(float)
     weights = trapezoid(x)
     contact = problem.contact

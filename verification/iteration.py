@@ -13,6 +13,7 @@ from ndtheory import relaxation_factor
 from verification.bodies import Pair, build
 from verification.contact import ContactSolution, ContactStep, Solver
 from verification.problem import Problem
+from verification.threads import one_thread
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -141,17 +142,12 @@ def _states(T: FixedPointMap, theta: float, start: Floats | None) -> Iterator[St
     g = np.zeros(len(neumann.load)) if start is None else np.array(start, dtype=float)
     iteration = 0
     while True:
-        u, solution = T(g)
-        image = solution.force
+        with one_thread():
+            u, solution = T(g)
+            image = solution.force
+            residual, size = neumann.dual_norm(image - g), neumann.dual_norm(image)
         for array in (g, u, image, solution.v):
             array.setflags(write=False)
-        yield State(
-            iteration=iteration,
-            g=g,
-            displacement=u,
-            contact=solution,
-            residual=neumann.dual_norm(image - g),
-            size=neumann.dual_norm(image),
-        )
+        yield State(iteration=iteration, g=g, displacement=u, contact=solution, residual=residual, size=size)
         g = theta * image + (1 - theta) * g  # (III)
         iteration += 1

@@ -15,6 +15,7 @@ from ndtheory import Constants, Number
 from verification.bodies import Body, Pair, build
 from verification.document import Document
 from verification.problem import Problem
+from verification.threads import one_thread
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,10 +136,11 @@ def measure(problem: Problem | Pair, *, refine: int = 0) -> Measured:
     1.5
     """
     pair = build(problem) if isinstance(problem, Problem) else problem
-    result = _measure(pair)
-    if refine:
-        finer = [_measure(build(pair.problem.refined(level))) for level in range(1, refine + 1)]
-        result = replace(result, levels=(result, *finer))
+    with one_thread():
+        result = _measure(pair)
+        if refine:
+            finer = [_measure(build(pair.problem.refined(level))) for level in range(1, refine + 1)]
+            result = replace(result, levels=(result, *finer))
     return result
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import traceback
 from collections.abc import Sequence
@@ -49,8 +48,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
             " has overwritten it; reinstall ndtheory"
         )
         return BAD_INPUT
-    # Interface matrices are small: one thread is faster than many, and digits repeat whatever else the machine does.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         status = cli.main(
             args=None if arguments is None else list(arguments), prog_name="ndtheory", standalone_mode=False
