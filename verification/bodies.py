@@ -2,21 +2,11 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Literal
-
 import numpy as np
-from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 from fem1d2d import (
-    Condensation,
-    Material,
     Mesh,
     MeshError,
-    Supports,
     bar,
     body_load,
     from_file,
@@ -32,200 +22,16 @@ from fem1d2d import (
     surface,
     trapezoid,
 )
-from fem1d2d.mesh import Floats, Ints
+from fem1d2d.mesh import Ints
 from fem1d2d.trace import SAME, extent
 from verification.friction import friction_operator
+from verification.pair import Body, Name, Pair
 from verification.problem import BodySpec, Problem
 from verification.reader import ProblemError
-from verification.threads import one_thread
-
-Name = Literal["body1", "body2"]
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Body:
-    """An elastic body condensed onto its contact nodes.
-
-    Interface vectors list all tangential components from left to right, then all normal ones (along y; along x in 1D).
-
-    Attributes
-    ----------
-    name : {'body1', 'body2'}
-    mesh : Mesh
-    material : Material
-    known : Supports
-        Displacements known on Gamma_u.
-    nodes : int array, shape (n,)
-        Contact nodes from left to right.
-    free : int array
-        Positions of the unknowns among all d * node + p.
-    unknown : bool array, shape (2 n,) or (n,) in 1D
-        Interface components that Gamma_u leaves free; a False one is held tangentially.
-    elastic, gram : Condensation
-        The stiffness matrix and the H1 Gram matrix of the unknowns, condensed onto the interface.
-    load : array
-        Loads on the unknowns: body force, tractions, prescribed displacements.
-    """
-
-    name: Name
-    mesh: Mesh
-    material: Material
-    known: Supports
-    nodes: Ints
-    free: Ints
-    unknown: NDArray[np.bool_]
-    elastic: Condensation
-    gram: Condensation
-    load: Floats
-
-    @property
-    def known_trace(self) -> Floats:
-        """Interface displacements that Gamma_u prescribes, 0 where it does not."""
-        return np.concatenate([self.known.values[self.nodes, p] for p in range(self.mesh.dimension)])
-
-    def displacement(self, trace: Floats) -> Floats:
-        """Displacement of all nodes for given interface values, shape (nodes, d), unit of length."""
-        full = self.known.values.ravel().copy()
-        full[self.free] = self.elastic.extend(trace[self.unknown], self.load)
-        return full.reshape(self.mesh.points.shape)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Side:
-    """A body as the algorithm sees it: its interface matrices with the normal along n of the contact body.
-
-    Held components have zero rows and columns.
-
-    Attributes
-    ----------
-    body : Body
-    stiffness : array, shape (2 n, 2 n)
-        S_a, stress (times length in 1D per unit thickness).
-    load : array, shape (2 n,)
-        l_a: loads condensed onto the interface.
-    known : array, shape (2 n,)
-        Known trace of held components.
-    """
-
-    body: Body
-    stiffness: Floats
-    load: Floats
-    known: Floats
-
-    @cached_property
-    def _factor(self) -> tuple[NDArray[np.float64], bool]:
-        rows = self.body.unknown
-        factor: tuple[NDArray[np.float64], bool] = cho_factor(self.stiffness[np.ix_(rows, rows)])
-        return factor
-
-    def flexibility(self, force: Floats) -> Floats:
-        """``S_a^-1 force`` on the free components, 0 on held ones, shape (2 n,)."""
-        result = np.zeros_like(force)
-        result[self.body.unknown] = cho_solve(self._factor, force[self.body.unknown], check_finite=False)
-        return result
-
-    def dual_norm(self, force: Floats) -> float:
-        """The norm (5.21), ``sqrt(force' S_a^-1 force)``, when this is the Neumann body."""
-        return math.sqrt(max(float(force @ self.flexibility(force)), 0.0))
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Pair:
-    """Two bodies facing each other, with their roles.
-
-    Attributes
-    ----------
-    problem : Problem
-    body1, body2 : Body
-    x : array, shape (n,)
-        Positions of the contact nodes; in 1D the one point.
-    weights : array, shape (n,)
-        w_j of the trapezoid rule (length; 1 in 1D).
-    gap : float
-        Initial distance.
-    regularisation : array, shape (n, n) or None
-        The operator S on normal nodal forces; None without a law of friction.
-    """
-
-    problem: Problem
-    body1: Body
-    body2: Body
-    x: Floats
-    weights: Floats
-    gap: float
-    regularisation: Floats | None
-
-    @property
-    def n(self) -> int:
-        """Number of contact nodes."""
-        return len(self.x)
-
-    @property
-    def tangential(self) -> slice:
-        """Tangential components of an interface vector; empty in 1D."""
-        return slice(0, self.n * (self.problem.dimension - 1))
-
-    @property
-    def normal(self) -> slice:
-        """Normal components of an interface vector."""
-        start = self.n * (self.problem.dimension - 1)
-        return slice(start, start + self.n)
-
-    @property
-    def upward(self) -> float:
-        """+1 where the outward normal of the contact body points up (body 1), -1 where it points down (body 2)."""
-        return 1.0 if self.problem.iteration.neumann_body == 2 else -1.0
-
-    def orient(self, interface: Floats) -> Floats:
-        """Turn the normal components of interface vectors between y and n of the contact body (its own inverse)."""
-        turned = interface.copy()
-        turned[self.normal] *= self.upward
-        return turned
-
-    def _side(self, body: Body) -> Side:
-        size = len(body.unknown)
-        rows = np.flatnonzero(body.unknown)
-        matrix = np.zeros((size, size))
-        matrix[np.ix_(rows, rows)] = body.elastic.schur
-        load = np.zeros(size)
-        load[rows] = body.elastic.condense(body.load)
-        matrix = self.orient(self.orient(matrix).T)
-        return Side(body=body, stiffness=matrix, load=self.orient(load), known=self.orient(body.known_trace))
-
-    @cached_property
-    def neumann(self) -> Side:
-        """The body of step I."""
-        return self._side(self.body2 if self.problem.iteration.neumann_body == 2 else self.body1)
-
-    @cached_property
-    def contact(self) -> Side:
-        """The body of step II."""
-        return self._side(self.body1 if self.problem.iteration.neumann_body == 2 else self.body2)
-
-    @property
-    def outside(self) -> list[str]:
-        """Why the theorem does not speak of this problem; empty where it does."""
-        reasons = []
-        if self.problem.contact.law == "local" and self.problem.contact.friction:
-            reasons.append("the local Coulomb law: S must map into L2(Gamma_c)")
-        if not (self.body1.unknown.all() and self.body2.unknown.all()):
-            reasons.append("a contact node is held tangentially: Gamma_u and Gamma_c must not meet")
-        return reasons
-
-    @property
-    def warnings(self) -> list[str]:
-        """What a user should know before trusting the numbers."""
-        radius = self.problem.contact.radius
-        if radius is None or self.problem.contact.law == "local" or self.n < 2:
-            return []
-        r, width = float(radius), float(np.diff(self.x).max())
-        if r >= width:
-            return []
-        return [f"contact.radius = {r:g} is below the mesh width {width:g}: the kernel sees single nodes"]
 
 
 def build(problem: Problem) -> Pair:
-    """Mesh, assemble and condense both bodies.
+    """Mesh and assemble both bodies; they are condensed when first asked.
 
     Raises
     ------
@@ -235,8 +41,7 @@ def build(problem: Problem) -> Pair:
     """
     mesh1, mesh2 = _mesh(problem, "body1"), _mesh(problem, "body2")
     nodes1, nodes2 = _interface(problem, mesh1, mesh2)
-    with one_thread():
-        body1, body2 = _body(problem, "body1", mesh1, nodes1), _body(problem, "body2", mesh2, nodes2)
+    body1, body2 = _body(problem, "body1", mesh1, nodes1), _body(problem, "body2", mesh2, nodes2)
     x = mesh1.points[nodes1, 0].astype(float)
     weights = trapezoid(x)
     contact = problem.contact
@@ -379,7 +184,6 @@ def _body(problem: Problem, name: Name, mesh: Mesh, nodes: Ints) -> Body:
     position[free] = np.arange(len(free))
     interface = np.concatenate([position[d * nodes + p] for p in range(d)])
     unknown = interface >= 0
-    inner = interface[unknown]
     return Body(
         name=name,
         mesh=mesh,
@@ -388,7 +192,8 @@ def _body(problem: Problem, name: Name, mesh: Mesh, nodes: Ints) -> Body:
         nodes=nodes,
         free=free,
         unknown=unknown,
-        elastic=Condensation(matrix[free][:, free].tocsc(), inner),
-        gram=Condensation(gram(mesh, float(problem.length))[free][:, free].tocsc(), inner),
+        interface=interface[unknown],
+        stiffness=matrix[free][:, free].tocsc(),
+        gram_matrix=gram(mesh, float(problem.length))[free][:, free].tocsc(),
         load=right,
     )

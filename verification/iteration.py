@@ -10,8 +10,9 @@ import numpy as np
 
 from fem1d2d.mesh import Floats
 from ndtheory import relaxation_factor
-from verification.bodies import Pair, build
+from verification.bodies import build
 from verification.contact import ContactSolution, ContactStep, Solver
+from verification.pair import Pair
 from verification.problem import Problem
 from verification.threads import one_thread
 

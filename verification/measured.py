@@ -12,8 +12,9 @@ from scipy.linalg import cho_factor, cho_solve
 from fem1d2d import largest, largest_sparse
 from fem1d2d.mesh import Floats
 from ndtheory import Constants, Number
-from verification.bodies import Body, Pair, build
+from verification.bodies import build
 from verification.document import Document
+from verification.pair import Body, Pair
 from verification.problem import Problem
 from verification.threads import one_thread
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from verification.bodies import Pair
 from verification.iteration import State
+from verification.pair import Pair
 
 #: Residuals below this multiple of the noise are not used.
 CLEAR_OF_NOISE = 100.0

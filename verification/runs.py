@@ -11,10 +11,11 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from ndtheory import relaxation_factor
-from verification.bodies import Pair, build
+from verification.bodies import build
 from verification.contact import Solver
 from verification.document import Document
 from verification.iteration import State, iterate
+from verification.pair import Pair
 from verification.problem import Problem
 from verification.rates import ObservedRate, observed_rate
 

@@ -8,11 +8,12 @@ from fractions import Fraction
 from typing import Any, ClassVar, Literal
 
 from ndtheory import EDITIONS, Bounds, evaluate, relaxation_factor
-from verification.bodies import Pair, build
+from verification.bodies import build
 from verification.contact import Solver
 from verification.document import Document
 from verification.iteration import State
 from verification.measured import Measured, measure
+from verification.pair import Pair
 from verification.problem import Problem
 from verification.rates import StepRatio, largest_step_ratio
 from verification.runs import Run, run
