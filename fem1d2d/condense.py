@@ -1,13 +1,12 @@
-"""Factor once, then everything on the interface: Schur complement, lift, condensed loads, solves."""
+"""Factor once, then everything on the interface: Schur complement, lift, condensed loads."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.linalg import SuperLU, splu
+from scipy.sparse.linalg import splu
 
 from fem1d2d.mesh import Floats, Ints
 
@@ -35,23 +34,13 @@ class Condensation:
         inside[interface] = False
         self.inside: Ints = np.flatnonzero(inside)
         columns = matrix[:, interface]
-        self._coupling: Floats = columns[self.inside].toarray()
-        self._factor: SuperLU | None = None
-        self.lift: Floats = -self._solve_inside(self._coupling)
-        schur = columns[interface].toarray() + self._coupling.T @ self.lift
+        coupling = columns[self.inside].toarray()
+        self._solve_inside = solver(matrix[self.inside][:, self.inside])
+        self.lift: Floats = -self._solve_inside(coupling)
+        schur = columns[interface].toarray() + coupling.T @ self.lift
         self.schur: Floats = (schur + schur.T) / 2
         for array in (self.lift, self.schur):
             array.setflags(write=False)
-
-    def _solve_inside(self, right: Floats) -> Floats:
-        if len(self.inside) == 0:
-            return right
-        if self._factor is None:
-            self._factor = factorise(self.matrix[self.inside][:, self.inside])
-        if right.ndim == 1:
-            return np.asarray(self._factor.solve(right))
-        blocks = range(0, right.shape[1], BLOCK)
-        return np.concatenate([self._factor.solve(right[:, i : i + BLOCK]) for i in blocks], axis=1)
 
     def condense(self, load: Floats) -> Floats:
         """The load as the interface feels it: ``load_B + lift' load_I``, shape (b,)."""
@@ -66,14 +55,24 @@ class Condensation:
             full[self.inside] += self._solve_inside(load[self.inside])
         return full
 
-    @cached_property
-    def solve(self) -> Callable[[Floats], Floats]:
-        """``load -> A^-1 load`` on all unknowns, from a factorisation of its own: cheaper than the dense lift."""
-        solve: Callable[[Floats], Floats] = factorise(self.matrix).solve
-        return solve
 
+def solver(matrix: sp.csc_array) -> Callable[[Floats], Floats]:
+    """Factorise a symmetric positive definite matrix once.
 
-def factorise(matrix: sp.csc_array) -> SuperLU:
-    """Sparse factorisation of a symmetric positive definite matrix, ordered for symmetric patterns."""
+    Returns
+    -------
+    callable
+        ``b -> matrix^-1 b`` for one column, shape (n,), or several, shape (n, k).
+    """
+    if matrix.shape[0] == 0:
+        return lambda right: right
     options = {"SymmetricMode": True}
-    return splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+    factor = splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+
+    def solve(right: Floats) -> Floats:
+        if right.ndim == 1:
+            return np.asarray(factor.solve(right))
+        blocks = range(0, right.shape[1], BLOCK)
+        return np.concatenate([factor.solve(right[:, i : i + BLOCK]) for i in blocks], axis=1)
+
+    return solve

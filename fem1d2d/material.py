@@ -13,6 +13,19 @@ class Material:
     lame_lambda: Any
     lame_mu: Any
 
+    def continuity(self, dimension: int) -> Any:
+        """An upper bound of M^a (4.1) for any body of this material, unit stress.
+
+        ``lame_lambda tr(eps)^2 + 2 lame_mu |eps|^2 <= max(2 lame_mu, d lame_lambda + 2 lame_mu) |eps|^2`` because
+        ``tr(eps)^2 <= d |eps|^2``, and ``|eps| <= |grad v|``.
+
+        Examples
+        --------
+        >>> Material(lame_lambda=1.0, lame_mu=1.0).continuity(2)
+        4.0
+        """
+        return max(2 * self.lame_mu, dimension * self.lame_lambda + 2 * self.lame_mu)
+
 
 def plane_strain(young: Any, poisson: Any) -> Material:
     """Isotropic plane strain, as in Section 6.1 of the paper.

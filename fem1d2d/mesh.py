@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,7 +37,7 @@ class Mesh:
     Raises
     ------
     MeshError
-        Indices out of range, a cell of zero or negative measure, a node that no cell uses.
+        Indices of cells or sides out of range, a cell of zero or negative measure, a node that no cell uses.
     """
 
     points: NDArray[Any]
@@ -43,24 +45,27 @@ class Mesh:
     sides: Mapping[str, Ints]
 
     def __post_init__(self) -> None:
-        points, cells = np.asarray(self.points), np.asarray(self.cells, dtype=np.int64)
+        points, cells = np.array(self.points), np.array(self.cells, dtype=np.int64)
         if points.ndim != 2 or points.shape[1] not in (1, 2):
             raise MeshError(f"points of shape {points.shape}: (n, 1) or (n, 2) is needed")
         if cells.ndim != 2 or cells.shape[1] != points.shape[1] + 1 or len(cells) == 0:
             raise MeshError(f"cells of shape {cells.shape}: (c, {points.shape[1] + 1}) with c >= 1 is needed")
-        if cells.min() < 0 or cells.max() >= len(points):
-            raise MeshError(f"cells name node {cells.max()}, the mesh has {len(points)} nodes")
+        sides = {name: np.array(facets, dtype=np.int64) for name, facets in self.sides.items()}
+        for what, named in (("cells", cells), *((f"side {name!r}", facets) for name, facets in sides.items())):
+            outside = named[(named < 0) | (named >= len(points))]
+            if len(outside):
+                raise MeshError(f"{what} name node {outside[0]}, the mesh has {len(points)} nodes")
         if points.dtype != object and not np.isfinite(points).all():
             raise MeshError("a coordinate is not finite")
         if not (measures(points, cells) > 0).all():
             raise MeshError(f"cell {int(np.argmin(measures(points, cells) > 0))} has no positive measure")
         if len(np.unique(cells)) != len(points):
             raise MeshError(f"{len(points) - len(np.unique(cells))} nodes belong to no cell")
-        for array in (points, cells):
+        for array in (points, cells, *sides.values()):
             array.setflags(write=False)
         object.__setattr__(self, "points", points)
         object.__setattr__(self, "cells", cells)
-        object.__setattr__(self, "sides", MappingProxyType(dict(self.sides)))
+        object.__setattr__(self, "sides", MappingProxyType(sides))
 
     @property
     def dimension(self) -> int:
@@ -69,9 +74,10 @@ class Mesh:
 
     @property
     def boundary(self) -> Ints:
-        """Facets that belong to one cell only, shape (b, d)."""
-        d = self.dimension
-        facets = np.concatenate([np.delete(self.cells, i, axis=1) for i in range(d + 1)])
+        """Facets that belong to one cell only, shape (b, d); in 2D the body lies to the left of each."""
+        corners = self.cells.shape[1]
+        opposite = [[(i + j) % corners for j in range(1, corners)] for i in range(corners)]
+        facets = np.concatenate([self.cells[:, facet] for facet in opposite])
         _, first, count = np.unique(np.sort(facets, axis=1), axis=0, return_index=True, return_counts=True)
         return np.asarray(facets[first[count == 1]], dtype=np.int64)
 
@@ -168,7 +174,7 @@ def from_file(path: Path | str) -> Mesh:
     Raises
     ------
     MeshError
-        Unreadable, no triangles, not plane, no named lines, or a node that no triangle uses after cleaning.
+        Unreadable, no triangles or other cells too, not plane, no named lines, a side that no triangle touches.
     """
     import meshio
 
@@ -176,7 +182,8 @@ def from_file(path: Path | str) -> Mesh:
     if not path.is_file():
         raise MeshError(f"{path}: no such mesh file")
     try:
-        read = meshio.read(path)
+        with contextlib.redirect_stdout(sys.stderr):  # some of its readers print
+            read = meshio.read(path)
     except (
         Exception,
         SystemExit,
@@ -185,6 +192,9 @@ def from_file(path: Path | str) -> Mesh:
     triangles = read.cells_dict.get("triangle")
     if triangles is None or len(triangles) == 0:
         raise MeshError(f"{path}: no triangles in it, only {', '.join(read.cells_dict) or 'nothing'}")
+    others = sorted(set(read.cells_dict) - {"triangle", "line", "vertex"})
+    if others:
+        raise MeshError(f"{path}: needed triangles alone, it has {', '.join(others)} too")
     points = np.asarray(read.points, dtype=float)
     if points.shape[1] == 3 and np.ptp(points[:, 2]) > 0:
         raise MeshError(f"{path}: the points do not lie in a plane z = constant")

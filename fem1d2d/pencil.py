@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from scipy.linalg import cho_factor, cho_solve, eigh
 from scipy.sparse.linalg import LinearOperator, eigsh
 
+from fem1d2d.condense import solver
 from fem1d2d.mesh import Floats
 
 #: Below this size a pencil is solved densely.
@@ -50,21 +51,33 @@ def largest(A: Floats, B: Floats) -> Eigenvalue:
     n = len(A)
     factor = cho_factor(B)
     _, vectors = eigh(A, B, subset_by_index=[n - 1, n - 1], driver="gvx")
-    return _certify(A, B, vectors[:, 0], lambda r: np.asarray(cho_solve(factor, r)))
+    if vectors.shape[1] == 0:  # LAPACK's subsets miss an eigenvalue of high multiplicity
+        _, vectors = eigh(A, B, driver="gvd")
+    return _certify(A, B, vectors[:, -1], lambda r: np.asarray(cho_solve(factor, r)))
 
 
-def largest_sparse(A: sp.csc_array, B: sp.csc_array, solve_B: Callable[[Floats], Floats]) -> Eigenvalue:
+def largest_sparse(
+    A: sp.csc_array, B: sp.csc_array, solve_B: Callable[[Floats], Floats], *, above: float | None = None
+) -> Eigenvalue:
     """Largest eigenvalue of a large pencil by Lanczos, from a fixed start, so that it repeats to the digit.
 
     Parameters
     ----------
     solve_B : callable
         ``r -> B^-1 r``.
+    above : float, optional
+        An upper bound of the spectrum: eigenvalues that crowd below it are told apart by their distance to it.
     """
     n = A.shape[0]
     if n <= DENSE:
         return largest(A.toarray(), B.toarray())
     inverse = LinearOperator((n, n), matvec=solve_B, dtype=float)
     start = np.random.default_rng(0).standard_normal(n)
-    _, vectors = eigsh(A, k=1, M=B, Minv=inverse, which="LA", v0=start, tol=1e-10, ncv=min(n - 1, 32))
+    options = {"k": 1, "M": B, "v0": start, "tol": 1e-10, "ncv": min(n - 1, 32)}
+    if above is None:
+        _, vectors = eigsh(A, Minv=inverse, which="LA", **options)
+    else:
+        nearest = solver(above * B - A)
+        distance = LinearOperator((n, n), matvec=lambda r: -nearest(r), dtype=float)
+        _, vectors = eigsh(A, sigma=above, OPinv=distance, which="LM", **options)
     return _certify(A, B, vectors[:, 0], solve_B)

@@ -68,8 +68,10 @@ def supports(mesh: Mesh, sides: Mapping[str, Sequence[float | None]]) -> Support
     return Supports(known=known, values=values)
 
 
-def rigid_motions(mesh: Mesh, known: NDArray[np.bool_]) -> int:
-    """How many independent rigid motions the supports leave to the freest connected piece of the mesh.
+def rigid_motions(mesh: Mesh, known: NDArray[np.bool_]) -> Floats:
+    """The rigid motions that supports leave: a basis of the kernel of the stiffness matrix of the free unknowns.
+
+    Cells that share a facet move as one piece; pieces that share a node only, hinge on it.
 
     Parameters
     ----------
@@ -77,27 +79,50 @@ def rigid_motions(mesh: Mesh, known: NDArray[np.bool_]) -> int:
 
     Returns
     -------
-    int
-        0 where the stiffness matrix of the free unknowns is positive definite; 3 for an unsupported plane body.
+    array, shape (n, d, k)
+        k orthonormal motions, 0 where the supports hold; k = 3 for an unsupported plane body.
     """
     n, d = mesh.points.shape
+    piece = _pieces(mesh)
+    pieces = int(piece.max()) + 1
     points = mesh.points.astype(float)
-    links = sp.coo_array(
-        (np.ones(mesh.cells.size - len(mesh.cells)), (np.repeat(mesh.cells[:, 0], d), mesh.cells[:, 1:].ravel())),
-        shape=(n, n),
-    )
-    pieces, piece = connected_components(links, directed=False)
-    free = 0
-    for k in range(pieces):
-        nodes = np.flatnonzero(piece == k)
-        centred = points[nodes] - points[nodes].mean(axis=0)
+    centred = points - points.mean(axis=0)
+    modes = np.zeros((n, d, 1 if d == 1 else 3))  # of one piece, evaluated at every node
+    for p in range(d):
+        modes[:, p, p] = 1
+    if d == 2:
         size = np.abs(centred).max()
-        modes = np.zeros((len(nodes), d, 1 if d == 1 else 3))
-        for p in range(d):
-            modes[:, p, p] = 1
-        if d == 2:
-            modes[:, 0, 2], modes[:, 1, 2] = -centred[:, 1] / size, centred[:, 0] / size
-        held = modes[known[nodes]]
-        rank = int(np.linalg.matrix_rank(held, tol=1e-9 * np.sqrt(len(nodes)))) if len(held) else 0
-        free = max(free, modes.shape[2] - rank)
-    return free
+        modes[:, 0, 2], modes[:, 1, 2] = -centred[:, 1] / size, centred[:, 0] / size
+    per_piece = modes.shape[2]
+    pairs = np.unique(np.column_stack([mesh.cells.ravel(), np.repeat(piece, d + 1)]), axis=0)
+    home = np.full(n, -1)  # one piece of each node; the others must agree with it there
+    home[pairs[::-1, 0]] = pairs[::-1, 1]
+    conditions = []
+    for node, other in pairs[pairs[:, 1] != home[pairs[:, 0]]]:
+        row = np.zeros((d, pieces, per_piece))
+        row[:, home[node]], row[:, other] = modes[node], -modes[node]
+        conditions.append(row)
+    for node, p in np.argwhere(known):
+        row = np.zeros((1, pieces, per_piece))
+        row[0, home[node]] = modes[node, p]
+        conditions.append(row)
+    unknowns = pieces * per_piece
+    kernel = np.eye(unknowns)
+    if conditions:
+        matrix = np.concatenate(conditions).reshape(-1, unknowns)
+        _, values, right = np.linalg.svd(matrix)
+        rank = int((values > 1e-9 * np.sqrt(n)).sum())
+        kernel = right[rank:].T
+    motions = np.einsum("npm,nmk->npk", modes, kernel.reshape(pieces, per_piece, kernel.shape[1])[home])
+    orthonormal, _ = np.linalg.qr(motions.reshape(n * d, kernel.shape[1]))
+    return np.asarray(orthonormal.reshape(n, d, kernel.shape[1]))
+
+
+def _pieces(mesh: Mesh) -> NDArray[np.int64]:
+    """The piece of each cell, shape (c,): cells that share a facet lie in the same one."""
+    c, corners = mesh.cells.shape
+    facets = np.concatenate([np.delete(mesh.cells, i, axis=1) for i in range(corners)])
+    _, facet = np.unique(np.sort(facets, axis=1), axis=0, return_inverse=True)
+    touches = sp.coo_array((np.ones(c * corners), (np.tile(np.arange(c), corners), facet.ravel())))
+    _, piece = connected_components(touches @ touches.T, directed=False)
+    return np.asarray(piece, dtype=np.int64)

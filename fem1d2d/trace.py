@@ -43,6 +43,37 @@ def surface(mesh: Mesh, *, upper: bool) -> Ints:
     return np.asarray(nodes[np.argsort(points[nodes, 0], kind="stable")])
 
 
+def facing(mesh: Mesh, *, upper: bool, ends: tuple[float, float]) -> Ints:
+    """Nodes of the boundary that faces up (or down) between two positions, from left to right (2D).
+
+    The surface may be curved, as that of a cylinder on a plane.
+
+    Parameters
+    ----------
+    upper : bool
+        True for what faces up.
+    ends : pair of float
+        Part of the x axis.
+
+    Raises
+    ------
+    MeshError
+        Two points of it lie above each other.
+    """
+    edges = mesh.boundary
+    x = mesh.points[:, 0].astype(float)
+    rightwards = x[edges[:, 1]] - x[edges[:, 0]]  # the body lies to the left of an edge: below one that runs leftwards
+    slack = SAME * extent(mesh)
+    nodes = np.unique(edges[rightwards < -slack if upper else rightwards > slack])
+    nodes = nodes_between(mesh, nodes[np.argsort(x[nodes], kind="stable")], ends)
+    double = np.flatnonzero(np.diff(x[nodes]) <= slack)
+    if len(double):
+        raise MeshError(
+            f"two points of the surface that faces {'up' if upper else 'down'} lie at x = {x[nodes[double[0]]]:g}"
+        )
+    return nodes
+
+
 def nodes_between(mesh: Mesh, nodes: Ints, ends: tuple[float, float]) -> Ints:
     """Those of ``nodes`` with ``ends[0] <= x <= ends[1]``, ends included up to rounding (2D)."""
     x = mesh.points[nodes, 0].astype(float)
@@ -58,7 +89,7 @@ def trapezoid(x: Floats) -> Floats:
     >>> trapezoid(np.array([0.0, 1.0, 3.0]))
     array([0.5, 1.5, 1. ])
     """
-    if len(x) == 1:
-        return np.ones(1)
+    if len(x) <= 1:
+        return np.ones(len(x))
     steps = np.diff(x) / 2
     return np.asarray(np.concatenate([steps, [0.0]]) + np.concatenate([[0.0], steps]))

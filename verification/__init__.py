@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from verification.contact import ContactError
     from verification.iteration import State, iterate
     from verification.measured import Measured, measure
+    from verification.monolithic import Solution, SolveError, solve
     from verification.problem import Problem, load
     from verification.reader import ProblemError
     from verification.runs import Run, run
@@ -37,12 +38,15 @@ _HOME = {
     "Problem": "problem",
     "ProblemError": "reader",
     "Run": "runs",
+    "Solution": "monolithic",
+    "SolveError": "monolithic",
     "State": "iteration",
     "compare": "verdicts",
     "iterate": "iteration",
     "load": "problem",
     "measure": "measured",
     "run": "runs",
+    "solve": "monolithic",
 }
 
 __all__ = [
@@ -52,12 +56,15 @@ __all__ = [
     "Problem",
     "ProblemError",
     "Run",
+    "Solution",
+    "SolveError",
     "State",
     "compare",
     "iterate",
     "load",
     "measure",
     "run",
+    "solve",
 ]
 
 

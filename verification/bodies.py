@@ -9,6 +9,7 @@ from fem1d2d import (
     MeshError,
     bar,
     body_load,
+    facing,
     from_file,
     gram,
     interval,
@@ -22,42 +23,73 @@ from fem1d2d import (
     surface,
     trapezoid,
 )
-from fem1d2d.mesh import Ints
+from fem1d2d.mesh import Floats, Ints
 from fem1d2d.trace import SAME, extent
 from verification.friction import friction_operator
-from verification.pair import Body, Name, Pair
+from verification.pair import Body, Facing, Name, Pair
 from verification.problem import BodySpec, Problem
 from verification.reader import ProblemError
 
 
 def build(problem: Problem) -> Pair:
-    """Mesh and assemble both bodies; they are condensed when first asked.
+    """Two elastic bodies with roles, as the iteration and its constants need them.
 
     Raises
     ------
     ProblemError
-        A body that can move rigidly, bodies that do not meet, grids that do not match, an interval outside the overlap,
-        Gamma_u holding the normal component of a contact node, an unreadable mesh.
+        As :func:`face`, and where a body is rigid or can move rigidly.
     """
-    mesh1, mesh2 = _mesh(problem, "body1"), _mesh(problem, "body2")
-    nodes1, nodes2 = _interface(problem, mesh1, mesh2)
-    body1, body2 = _body(problem, "body1", mesh1, nodes1), _body(problem, "body2", mesh2, nodes2)
-    x = mesh1.points[nodes1, 0].astype(float)
+    for name in ("body1", "body2"):
+        if getattr(problem, name).rigid:
+            role = "Neumann" if problem.iteration.neumann_body == int(name[-1]) else "contact"
+            raise ProblemError(
+                problem.source,
+                f"{name}.shape",
+                "rigid",
+                f"needed an elastic body: it has the {role} problem of the iteration; `ndtheory solve` takes obstacles",
+            )
+    facing = face(problem)
+    for body in facing.elastic:
+        k = body.motions.shape[1]
+        if k:
+            raise ProblemError(
+                problem.source,
+                body.name,
+                None,
+                f"{body.name} can move rigidly ({k} free motion{'s' if k > 1 else ''}): "
+                "fix or prescribe more of its sides",
+            )
+    return Pair(**vars(facing))
+
+
+def face(problem: Problem) -> Facing:
+    """Mesh and assemble the bodies and find Gamma_c; they are condensed when first asked.
+
+    Raises
+    ------
+    ProblemError
+        A body held by nothing but contact, bodies that do not meet, grids that do not match, an interval outside the
+        overlap, Gamma_u holding the normal component of a contact node, an unreadable mesh.
+    """
+    meshes = [None if spec.rigid else _mesh(problem, name) for name, spec in _specs(problem)]
+    nodes, x, gap = _interface(problem, meshes)
+    body1, body2 = (
+        None if mesh is None else _body(problem, name, mesh, own)
+        for (name, _), mesh, own in zip(_specs(problem), meshes, nodes, strict=True)
+    )
     weights = trapezoid(x)
     contact = problem.contact
     radius = None if contact.radius is None else float(contact.radius)
     regularisation = None
     if problem.dimension == 2 and (contact.law == "local" or radius is not None):
         regularisation = friction_operator(x, weights, law=contact.law, radius=radius)
-    return Pair(
-        problem=problem,
-        body1=body1,
-        body2=body2,
-        x=x,
-        weights=weights,
-        gap=float(contact.gap),
-        regularisation=regularisation,
+    return Facing(
+        problem=problem, body1=body1, body2=body2, x=x, weights=weights, gap=gap, regularisation=regularisation
     )
+
+
+def _specs(problem: Problem) -> list[tuple[Name, BodySpec]]:
+    return [("body1", problem.body1), ("body2", problem.body2)]
 
 
 def _mesh(problem: Problem, name: Name) -> Mesh:
@@ -86,60 +118,105 @@ def _mesh(problem: Problem, name: Name) -> Mesh:
     return rectangle(x, (float(spec.y[0]), float(spec.y[1])), (spec.cells[0], spec.cells[1]))
 
 
-def _interface(problem: Problem, mesh1: Mesh, mesh2: Mesh) -> tuple[Ints, Ints]:
-    """Contact nodes of both bodies, facing each other one by one."""
+def _interface(problem: Problem, meshes: list[Mesh | None]) -> tuple[list[Ints], Floats, Floats]:
+    """Contact nodes of both bodies facing each other one by one (none on a rigid body), their x, and their distance."""
     refuse = lambda key, value, needed: ProblemError(problem.source, key, value, needed)
-    try:
-        nodes1, nodes2 = surface(mesh1, upper=True), surface(mesh2, upper=False)
-    except MeshError as error:
-        raise refuse("contact", None, str(error)) from None
-    size = max(extent(mesh1), extent(mesh2))
-    level1, level2 = (float(mesh.points[nodes[0], -1]) for mesh, nodes in ((mesh1, nodes1), (mesh2, nodes2)))
-    distance, gap = level2 - level1, float(problem.contact.gap)
-    if min(abs(distance), abs(distance - gap)) > SAME * size:
-        axis = "x" if problem.dimension == 1 else "y"
+    axis = "x" if problem.dimension == 1 else "y"
+    size = max(extent(mesh) for mesh in meshes if mesh is not None)
+    chosen = problem.contact.interval
+    ends = None if chosen is None else (float(chosen[0]), float(chosen[1]))
+    nodes: list[Ints] = []
+    for mesh, upper in zip(meshes, (True, False), strict=True):
+        try:
+            if mesh is None:
+                nodes.append(np.empty(0, dtype=np.int64))
+            elif mesh.dimension == 1 or ends is None:
+                nodes.append(surface(mesh, upper=upper))
+            else:
+                nodes.append(facing(mesh, upper=upper, ends=ends))
+        except MeshError as error:
+            raise refuse("contact.interval", None, f"{error}; needed the part of the x axis where they meet") from None
+
+    if problem.dimension == 2:
+        reach = _reach(problem, meshes, nodes)
+        overlap = (max(low for low, _ in reach), min(high for _, high in reach))
+        if not overlap[1] - overlap[0] > SAME * size:
+            covers = ", ".join(f"body {i} covers x = {low:g} to {high:g}" for i, (low, high) in enumerate(reach, 1))
+            raise refuse("body2.x", None, f"the bodies do not meet: {covers}")
+        if ends is None:
+            ends = overlap
+        elif ends[0] < overlap[0] - SAME * size or ends[1] > overlap[1] + SAME * size:
+            needed = f"needed an interval inside the overlap [{overlap[0]:g}, {overlap[1]:g}]"
+            raise refuse("contact.interval", list(chosen or ()), needed)
+        nodes = [
+            own if mesh is None else nodes_between(mesh, own, ends) for mesh, own in zip(meshes, nodes, strict=True)
+        ]
+        _check_matching(problem, meshes, nodes, ends, size)
+
+    points = [None if mesh is None else mesh.points[own].astype(float) for mesh, own in zip(meshes, nodes, strict=True)]
+    x = next(p[:, 0] for p in points if p is not None)
+    levels = [
+        _obstacle_level(spec, name, points) if p is None else p[:, -1]
+        for (name, spec), p in zip(_specs(problem), points, strict=True)
+    ]
+    distance = np.broadcast_to(levels[1] - levels[0], x.shape)
+    nearest, gap = float(distance.min()), float(problem.contact.gap)
+    if min(abs(nearest), abs(nearest - gap)) > SAME * size:
+        low, high = float(np.max(levels[0])), float(np.min(levels[1]))
         raise refuse(
             f"body2.{axis}",
             None,
-            f"the bodies do not meet: body 1 ends at {axis} = {level1:g}, body 2 begins at {axis} = {level2:g}"
+            f"the bodies do not meet: body 1 ends at {axis} = {low:g}, body 2 begins at {axis} = {high:g}"
             " (draw them touching; contact.gap sets the initial distance)",
         )
-    if problem.dimension == 1:
-        return nodes1, nodes2
-    x1, x2 = mesh1.points[nodes1, 0].astype(float), mesh2.points[nodes2, 0].astype(float)
-    overlap = (max(x1[0], x2[0]), min(x1[-1], x2[-1]))
-    if overlap[1] - overlap[0] <= SAME * size:
-        raise refuse(
-            "body2.x",
-            None,
-            f"the bodies do not meet: body 1 covers x = {x1[0]:g} to {x1[-1]:g}, body 2 x = {x2[0]:g} to {x2[-1]:g}",
-        )
-    ends = overlap
-    if problem.contact.interval is not None:
-        ends = (float(problem.contact.interval[0]), float(problem.contact.interval[1]))
-        if ends[0] < overlap[0] - SAME * size or ends[1] > overlap[1] + SAME * size:
+    # A distance within rounding of the nearest one is that one: flat bodies have one gap.
+    return nodes, x, np.where(distance - nearest <= SAME * size, 0.0, distance - nearest) + gap
+
+
+def _reach(problem: Problem, meshes: list[Mesh | None], nodes: list[Ints]) -> list[tuple[float, float]]:
+    """How far each body reaches along x; an obstacle without x is endless."""
+    reach = []
+    for (_, spec), mesh, own in zip(_specs(problem), meshes, nodes, strict=True):
+        if mesh is not None:
+            x = mesh.points[own if problem.contact.interval is None else slice(None), 0].astype(float)
+            reach.append((float(x.min()), float(x.max())))
+        else:
+            reach.append((-np.inf, np.inf) if spec.x is None else (float(spec.x[0]), float(spec.x[1])))
+    return reach
+
+
+def _obstacle_level(spec: BodySpec, name: Name, points: list[Floats | None]) -> Floats:
+    """Where the face of an obstacle lies; without coordinates it touches the other body."""
+    ends = spec.x if points[0 if points[0] is not None else 1].shape[1] == 1 else spec.y  # type: ignore[union-attr]
+    if ends is not None:
+        return np.array(float(ends[1] if name == "body1" else ends[0]))
+    other = next(p[:, -1] for p in points if p is not None)
+    return np.array(other.min() if name == "body1" else other.max())
+
+
+def _check_matching(
+    problem: Problem, meshes: list[Mesh | None], nodes: list[Ints], ends: tuple[float, float], size: float
+) -> None:
+    """The grids must match, and Gamma_c must begin and end at nodes."""
+    refuse = lambda key, value, needed: ProblemError(problem.source, key, value, needed)
+    positions = [mesh.points[own, 0].astype(float) for mesh, own in zip(meshes, nodes, strict=True) if mesh is not None]
+    if len(positions) == 2:
+        x1, x2 = positions
+        if len(x1) != len(x2) or not np.allclose(x1, x2, rtol=0, atol=SAME * size):
             raise refuse(
-                "contact.interval",
-                list(problem.contact.interval),
-                f"needed an interval inside the overlap [{overlap[0]:g}, {overlap[1]:g}]",
+                "body2.cells",
+                None,
+                f"non-matching grids are not supported yet: on [{ends[0]:g}, {ends[1]:g}] body 1 has {len(x1)} nodes"
+                f" and body 2 has {len(x2)}, which must lie at the same x",
             )
-    nodes1, nodes2 = nodes_between(mesh1, nodes1, ends), nodes_between(mesh2, nodes2, ends)
-    x1, x2 = mesh1.points[nodes1, 0].astype(float), mesh2.points[nodes2, 0].astype(float)
-    if len(x1) != len(x2) or not np.allclose(x1, x2, rtol=0, atol=SAME * size):
-        raise refuse(
-            "body2.cells",
-            None,
-            f"non-matching grids are not supported yet: on [{ends[0]:g}, {ends[1]:g}] body 1 has {len(x1)} nodes"
-            f" and body 2 has {len(x2)}, which must lie at the same x",
-        )
-    if len(x1) < 2 or max(x1[0] - ends[0], ends[1] - x1[-1]) > SAME * size:
-        near = f"from {x1[0]:g} to {x1[-1]:g}" if len(x1) else "nowhere"
+    x = positions[0]
+    if len(x) < 2 or max(x[0] - ends[0], ends[1] - x[-1]) > SAME * size:
+        near = f"from {x[0]:g} to {x[-1]:g}" if len(x) else "nowhere"
         raise refuse(
             "contact.interval",
             None if problem.contact.interval is None else list(problem.contact.interval),
             f"Gamma_c must begin and end at nodes of both bodies; inside [{ends[0]:g}, {ends[1]:g}] they lie {near}",
         )
-    return nodes1, nodes2
 
 
 def _body(problem: Problem, name: Name, mesh: Mesh, nodes: Ints) -> Body:
@@ -162,13 +239,9 @@ def _body(problem: Problem, name: Name, mesh: Mesh, nodes: Ints) -> Body:
             f"({', '.join(f'{c:g}' for c in where)})",
         )
     motions = rigid_motions(mesh, known.known)
-    if motions:
+    if motions.shape[2] and not known.known.any():
         raise ProblemError(
-            problem.source,
-            name,
-            None,
-            f"{name} can move rigidly ({motions} free motion{'s' if motions > 1 else ''}): "
-            "fix or prescribe more of its sides",
+            problem.source, name, None, f"{name} is held by nothing but contact: fix or prescribe some of its sides"
         )
     material = plane_strain(float(spec.young), float(spec.poisson)) if d == 2 else bar(float(spec.young))
     matrix = stiffness(mesh, material)
@@ -196,4 +269,5 @@ def _body(problem: Problem, name: Name, mesh: Mesh, nodes: Ints) -> Body:
         stiffness=matrix[free][:, free].tocsc(),
         gram_matrix=gram(mesh, float(problem.length))[free][:, free].tocsc(),
         load=right,
+        motions=motions.reshape(known.known.size, motions.shape[2])[free],
     )

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from fem1d2d import largest, largest_sparse
+from fem1d2d import largest, largest_sparse, solver
 from fem1d2d.mesh import Floats
 from ndtheory import Constants, Number
 from verification.bodies import build
@@ -182,9 +182,9 @@ def _measure(pair: Pair) -> Measured:
 
 
 def _body(body: Body) -> BodyConstants:
-    A, H = body.elastic, body.gram
-    smallest = largest_sparse(H.matrix, A.matrix, A.solve)  # 1/m, so that products with A^-1 find it
-    biggest = largest_sparse(A.matrix, H.matrix, H.solve)
+    A, H = body.stiffness, body.gram_matrix
+    smallest = largest_sparse(H, A, body.solve)  # 1/m, so that products with A^-1 find it
+    biggest = largest_sparse(A, H, solver(H), above=body.material.continuity(body.mesh.dimension))
     return BodyConstants(
         m=Number.of_float(1 / smallest.value),
         M=Number.of_float(biggest.value),

@@ -1,8 +1,9 @@
-"""Two condensed bodies facing each other along Gamma_c, and their roles."""
+"""Two bodies facing each other along Gamma_c, and their roles."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -10,9 +11,9 @@ from typing import Literal
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cho_factor, cho_solve, qr
 
-from fem1d2d import Condensation, Material, Mesh, Supports
+from fem1d2d import Condensation, Material, Mesh, Supports, solver
 from fem1d2d.mesh import Floats, Ints
 from verification.problem import Problem
 from verification.threads import one_thread
@@ -45,6 +46,8 @@ class Body:
         The stiffness matrix and the H1 Gram matrix of the unknowns.
     load : array
         Loads on the unknowns: body force, tractions, prescribed displacements.
+    motions : array, shape (unknowns, k)
+        Rigid motions that only contact can hold; k = 0 in the iteration.
     """
 
     name: Name
@@ -58,6 +61,28 @@ class Body:
     stiffness: sp.csc_array
     gram_matrix: sp.csc_array
     load: Floats
+    motions: Floats
+
+    @cached_property
+    def solve(self) -> Callable[[Floats], Floats]:
+        """``load -> A^-1 load`` on the unknowns, for one load or columns of loads.
+
+        Where rigid motions are left, as many unknowns are pinned: exact, up to a motion, for loads in equilibrium.
+        """
+        with one_thread():
+            k = self.motions.shape[1]
+            if k == 0:
+                return solver(self.stiffness)
+            _, _, order = qr(self.motions.T, pivoting=True, mode="economic")
+            rest = np.sort(order[k:])
+            pinned = solver(self.stiffness[rest][:, rest])
+
+        def solve(load: Floats) -> Floats:
+            result = np.zeros_like(load)
+            result[rest] = pinned(load[rest])
+            return result
+
+        return solve
 
     @cached_property
     def elastic(self) -> Condensation:
@@ -123,29 +148,30 @@ class Side:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Pair:
-    """Two bodies facing each other, with their roles.
+class Facing:
+    """Two bodies facing each other along Gamma_c; one of them may be rigid.
 
     Attributes
     ----------
     problem : Problem
-    body1, body2 : Body
+    body1, body2 : Body or None
+        None where rigid.
     x : array, shape (n,)
         Positions of the contact nodes; in 1D the one point.
     weights : array, shape (n,)
         w_j of the trapezoid rule (length; 1 in 1D).
-    gap : float
+    gap : array, shape (n,)
         Initial distance.
     regularisation : array, shape (n, n) or None
         The operator S on normal nodal forces; None without a law of friction.
     """
 
     problem: Problem
-    body1: Body
-    body2: Body
+    body1: Body | None
+    body2: Body | None
     x: Floats
     weights: Floats
-    gap: float
+    gap: Floats
     regularisation: Floats | None
 
     @property
@@ -163,6 +189,40 @@ class Pair:
         """Normal components of an interface vector."""
         start = self.n * (self.problem.dimension - 1)
         return slice(start, start + self.n)
+
+    @property
+    def elastic(self) -> list[Body]:
+        """The bodies that are not rigid."""
+        return [body for body in (self.body1, self.body2) if body is not None]
+
+    @property
+    def outside(self) -> list[str]:
+        """Why the theorem does not speak of this problem; empty where it does."""
+        reasons = []
+        if self.problem.contact.law == "local" and self.problem.contact.friction:
+            reasons.append("the local Coulomb law: S must map into L2(Gamma_c)")
+        if not all(body.unknown.all() for body in self.elastic):
+            reasons.append("a contact node is held tangentially: Gamma_u and Gamma_c must not meet")
+        return reasons
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a user should know before trusting the numbers."""
+        radius = self.problem.contact.radius
+        if radius is None or self.problem.contact.law == "local" or self.n < 2:
+            return []
+        r, width = float(radius), float(np.diff(self.x).max())
+        if r >= width:
+            return []
+        return [f"contact.radius = {r:g} is below the mesh width {width:g}: the kernel sees single nodes"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Pair(Facing):
+    """Two elastic bodies facing each other, with the roles of the algorithm."""
+
+    body1: Body
+    body2: Body
 
     @property
     def upward(self) -> float:
@@ -194,24 +254,3 @@ class Pair:
     def contact(self) -> Side:
         """The body of step II."""
         return self._side(self.body1 if self.problem.iteration.neumann_body == 2 else self.body2)
-
-    @property
-    def outside(self) -> list[str]:
-        """Why the theorem does not speak of this problem; empty where it does."""
-        reasons = []
-        if self.problem.contact.law == "local" and self.problem.contact.friction:
-            reasons.append("the local Coulomb law: S must map into L2(Gamma_c)")
-        if not (self.body1.unknown.all() and self.body2.unknown.all()):
-            reasons.append("a contact node is held tangentially: Gamma_u and Gamma_c must not meet")
-        return reasons
-
-    @property
-    def warnings(self) -> list[str]:
-        """What a user should know before trusting the numbers."""
-        radius = self.problem.contact.radius
-        if radius is None or self.problem.contact.law == "local" or self.n < 2:
-            return []
-        r, width = float(radius), float(np.diff(self.x).max())
-        if r >= width:
-            return []
-        return [f"contact.radius = {r:g} is below the mesh width {width:g}: the kernel sees single nodes"]

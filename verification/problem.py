@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
@@ -39,16 +39,17 @@ MOST_CELLS = 4_000_000
 
 @dataclass(frozen=True, kw_only=True)
 class BodySpec:
-    """An elastic body as the problem file describes it; lengths and stresses in the file's units.
+    """A body as the problem file describes it; lengths and stresses in the file's units.
 
     Attributes
     ----------
-    shape : {'rectangle', 'interval', 'mesh'}
+    shape : {'rectangle', 'interval', 'mesh', 'rigid'}
+        A rigid body is an obstacle: of the rest it has x and y at most.
     x, y : pair of Fraction or None
     cells : tuple of int or None
     mesh : Path or None
     young, poisson : Fraction
-        E in stress; Poisson's ratio is 0 for a bar.
+        E in stress; Poisson's ratio is 0 for a bar.  Both 0 where rigid.
     fixed : tuple of str
     prescribed, traction : mapping from side to components
         Displacement (length; None: free) and force per area (stress).
@@ -56,17 +57,22 @@ class BodySpec:
         Force per volume.
     """
 
-    shape: Literal["rectangle", "interval", "mesh"]
+    shape: Literal["rectangle", "interval", "mesh", "rigid"]
     x: tuple[Fraction, Fraction] | None = None
     y: tuple[Fraction, Fraction] | None = None
     cells: tuple[int, ...] | None = None
     mesh: Path | None = None
-    young: Fraction
-    poisson: Fraction
-    fixed: tuple[str, ...]
-    prescribed: Mapping[str, Components]
-    traction: Mapping[str, tuple[Fraction, ...]]
-    body_force: tuple[Fraction, ...]
+    young: Fraction = Fraction(0)
+    poisson: Fraction = Fraction(0)
+    fixed: tuple[str, ...] = ()
+    prescribed: Mapping[str, Components] = field(default_factory=dict)
+    traction: Mapping[str, tuple[Fraction, ...]] = field(default_factory=dict)
+    body_force: tuple[Fraction, ...] = ()
+
+    @property
+    def rigid(self) -> bool:
+        """Whether the body is an obstacle."""
+        return self.shape == "rigid"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -187,6 +193,8 @@ class Problem:
         def halved(name: str, body: BodySpec) -> BodySpec:
             if not halvings:
                 return body
+            if body.rigid:
+                return body
             if body.cells is None:
                 raise ProblemError(self.source, f"{name}.mesh", body.mesh, "a mesh file cannot be halved")
             return replace(body, cells=tuple(n * 2**halvings for n in body.cells))
@@ -233,6 +241,8 @@ def _read_problem(top: Table, source: str) -> Problem:
     units.close()
     body1 = _read_body(top.table("body1", required=True), dimension, source)
     body2 = _read_body(top.table("body2", required=True), dimension, source)
+    if body1.rigid and body2.rigid:
+        raise top.refuse("body2.shape", "rigid", "needed at least one elastic body")
     contact = _read_contact(top.table("contact"), dimension)
     iteration = _read_iteration(top.table("iteration"))
     norm = top.table("norm")
@@ -267,7 +277,10 @@ def _read_shape(table: Table, dimension: int, source: str) -> dict[str, Any]:
     natural = "interval" if dimension == 1 else "rectangle"
     shape = table.take("shape", choice(natural, "rigid"))
     if shape == "rigid":
-        raise table.refuse("shape", shape, "rigid bodies are not supported yet")
+        read_rigid = {"x": table.take("x", ends, None)}
+        if dimension == 2:
+            read_rigid["y"] = table.take("y", ends, None)
+        return {"shape": shape, **read_rigid}
     if dimension == 1:
         read: dict[str, Any] = {"x": table.take("x", ends), "cells": (table.take("cells", count),)}
     else:
@@ -313,6 +326,9 @@ def _by_side(table: Table, sides: tuple[str, ...] | None, read: Any) -> Mapping[
 
 def _read_body(table: Table, dimension: int, source: str) -> BodySpec:
     shape = _read_shape(table, dimension, source)
+    if shape["shape"] == "rigid":
+        table.close()
+        return BodySpec(**shape)
     sides = {"rectangle": RECTANGLE_SIDES, "interval": INTERVAL_SIDES, "mesh": None}[shape["shape"]]
 
     def side_list(value: Any) -> tuple[str, ...]:

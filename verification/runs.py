@@ -13,6 +13,7 @@ import numpy as np
 from ndtheory import relaxation_factor
 from verification.bodies import build
 from verification.contact import Solver
+from verification.contact_state import ContactState
 from verification.document import Document
 from verification.iteration import State, iterate
 from verification.pair import Pair
@@ -26,60 +27,6 @@ PATIENCE = 50
 
 #: A residual grown by this factor over the first one has diverged.
 RUNAWAY = 1e8
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Contact:
-    """What happens along Gamma_c, node by node from left to right.
-
-    Attributes
-    ----------
-    x : array, shape (n,)
-        Position before deformation, unit of length.
-    pressure : array
-        ``-sigma_N >= 0``: nodal force over w_j, unit of stress.
-    shear : array
-        Tangential force on body 2 over w_j, unit of stress; 0 in 1D.
-    gap : array
-        Distance of the bodies, >= 0, unit of length.
-    slip : array
-        ``u1_T - u2_T``, unit of length; 0 in 1D.
-    state : list of {'stick', 'slip', 'open'}
-    """
-
-    x: np.ndarray[Any, Any]
-    pressure: np.ndarray[Any, Any]
-    shear: np.ndarray[Any, Any]
-    gap: np.ndarray[Any, Any]
-    slip: np.ndarray[Any, Any]
-    state: list[str]
-
-    @classmethod
-    def of(cls, pair: Pair, state: State) -> Contact:
-        """Read it off a state, turned into the frame of the paper (n^1 up, slip of body 1 against body 2)."""
-        v, force, pattern = state.contact.v, state.image, state.contact.pattern
-        t, zero = pair.tangential, np.zeros(pair.n)
-        plane = t.stop > 0
-        slides = pattern.sliding != 0 if plane else np.ones(pair.n, dtype=bool)  # a zero bound counts as slip
-        names = np.where(pattern.touching, np.where(slides, "slip", "stick"), "open")
-        return cls(
-            x=pair.x,
-            pressure=force[pair.normal] / pair.weights,
-            shear=pair.upward * force[t] / pair.weights if plane else zero,
-            gap=-v[pair.normal] + 0.0,
-            slip=pair.upward * v[t] if plane else zero,
-            state=[str(name) for name in names],
-        )
-
-    def to_dict(self) -> dict[str, Any]:
-        """The object ``contact``: lists along Gamma_c."""
-        arrays = {name: getattr(self, name).tolist() for name in ("x", "pressure", "shear", "gap", "slip")}
-        return {**arrays, "state": self.state}
-
-    @property
-    def pattern(self) -> dict[str, int]:
-        """How many nodes stick, slip and are open."""
-        return {name: self.state.count(name) for name in ("stick", "slip", "open")}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -128,15 +75,19 @@ class Run(Document):
         return observed_rate(self.pair, self.states)
 
     @cached_property
-    def contact(self) -> Contact:
+    def contact(self) -> ContactState:
         """Gamma_c at the last state."""
-        return Contact.of(self.pair, self.last)
-
-    @property
-    def force(self) -> dict[str, float]:
-        """Total normal (compressive) and tangential (on body 2) force per unit thickness."""
-        w = self.pair.weights
-        return {"normal": float(self.contact.pressure @ w), "tangential": float(self.contact.shear @ w)}
+        pair, solved = self.pair, self.last.contact
+        turned = np.ones(len(solved.v))
+        turned[pair.tangential] = pair.upward  # from contact body against Neumann body to body 1 against body 2
+        pattern = solved.pattern
+        return ContactState.of(
+            pair,
+            force=turned * solved.force,
+            jump=turned * solved.v,
+            touching=pattern.touching,
+            sliding=pattern.sliding,
+        )
 
     @property
     def history(self) -> list[float]:
@@ -169,9 +120,7 @@ class Run(Document):
             "unrelaxed_residual": _finite(self.last.relative_residual),
             "kkt_residual": self.last.contact.kkt.residual,
             "solves": {"cvxpy": solvers.count("cvxpy"), "active_set": solvers.count("active-set")},
-            "pattern": self.contact.pattern,
-            "contact": self.contact.to_dict(),
-            "force": self.force,
+            **self.contact.to_dict(),
             "history": [_finite(r) for r in self.history],
             "outside_theorem": self.pair.outside,
             "warnings": self.pair.warnings,

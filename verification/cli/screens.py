@@ -60,10 +60,10 @@ def _happened(run: Run) -> None:
     force = units["stress"] + (f" {units['length']} (per unit thickness)" if problem.dimension == 2 else "")
     say()
     say("  nodes               " + ", ".join(f"{count} {name}" for name, count in run.contact.pattern.items()))
-    say(f"  normal force        {figures(run.force['normal'], 6)} {force}")
+    say(f"  normal force        {figures(run.contact.force['normal'], 6)} {force}")
     if problem.dimension == 2:
-        largest = max(abs(run.force["normal"]), abs(run.force["tangential"]))
-        tangential = run.force["tangential"] if abs(run.force["tangential"]) > 1e-12 * largest else 0.0
+        largest = max(abs(run.contact.force["normal"]), abs(run.contact.force["tangential"]))
+        tangential = run.contact.force["tangential"] if abs(run.contact.force["tangential"]) > 1e-12 * largest else 0.0
         say(f"  tangential force    {figures(tangential)} {force}")
         say(f"  largest pressure    {figures(float(run.contact.pressure.max()), 4)} {units['stress']}")
     say(f"  contact step solved to a KKT residual of {run.last.contact.kkt.residual:.1e}")

@@ -62,7 +62,7 @@ def _draw_meshes(ax: Axes, run: Run, displacements: tuple[Floats, Floats], scale
     pair = run.pair
     length = pair.problem.units["length"]
     drawn = float(pair.body2.mesh.points[pair.body2.nodes[0], -1] - pair.body1.mesh.points[pair.body1.nodes[0], -1])
-    lift = [0.0, scale * pair.gap - drawn]  # the gap grows with the displacements, so that touching bodies touch
+    lift = [0.0, scale * float(pair.gap[0]) - drawn]  # the gap grows with the displacements: touching bodies touch
     for body, u, colour, shift in zip((pair.body1, pair.body2), displacements, (BODY1, BODY2), lift, strict=True):
         moved = body.mesh.points + scale * u
         name = "body 1" if body is pair.body1 else "body 2"

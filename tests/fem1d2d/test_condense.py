@@ -1,0 +1,238 @@
+"""Schur complements, lifts and solves against elimination in rationals.
+
+A matrix in floats is a rational matrix: its exact Schur complement exists, and only the factorisation's rounding, of
+the size n eps |A| (1 + |lift|^2), separates the computed one from it.
+"""
+
+from fractions import Fraction
+
+import fem_oracle
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from hypothesis import given
+from hypothesis import strategies as st
+from strategies import fewer, held_bodies, numbers, powers_of_two
+
+from fem1d2d import Condensation, bar, gram, interval, solver, stiffness
+
+EPS = np.finfo(float).eps
+
+
+def norm(A):
+    return float(np.linalg.norm(np.asarray(A, dtype=float), 2)) if A.size else 0.0
+
+
+@st.composite
+def definite(draw, most=6):
+    """Integer matrices G'G + I, as rationals and as floats, and an ordered interface."""
+    n = draw(st.integers(1, most))
+    random = np.random.default_rng(draw(st.integers(0, 2**16)))
+    G = np.where(random.random((n, n)) < 0.6, random.integers(-4, 5, (n, n)), 0)
+    A = G.T @ G + np.eye(n, dtype=int)
+    interface = random.permutation(n)[: draw(st.integers(1, n))]
+    return fem_oracle.exactly(A), sp.csc_array(A.astype(float)), interface
+
+
+@st.composite
+def condensed_bodies(draw, most=3):
+    """The stiffness or Gram matrix of a held body, and an ordered interface of one to all unknowns."""
+    mesh, material, free = draw(held_bodies(most))
+    matrix = draw(st.sampled_from([stiffness(mesh, material), gram(mesh)]))
+    random = np.random.default_rng(draw(st.integers(0, 2**16)))
+    return matrix[free][:, free].tocsc(), random.permutation(len(free))[: draw(st.integers(1, len(free)))]
+
+
+def rounding(A, lift):
+    """n eps |A| (1 + |lift|^2)."""
+    return len(A) * EPS * norm(A) * (1 + norm(lift) ** 2)
+
+
+# --- against elimination in rationals ---------------------------------------------------------------------------------
+
+
+@given(definite())
+def test_the_schur_complement_and_the_lift_are_those_of_elimination_in_rationals(case):
+    A, floats, interface = case
+    found = Condensation(floats, interface)
+    lift, schur = fem_oracle.lift(A, interface), fem_oracle.schur(A, interface)
+    assert found.schur.shape == (len(interface),) * 2
+    assert found.lift.shape == (len(A) - len(interface), len(interface))
+    assert norm(fem_oracle.exactly(found.schur) - schur) <= rounding(A, lift)
+    inside = fem_oracle.inner(len(A), interface)
+    residual = A[np.ix_(inside, inside)] @ (fem_oracle.exactly(found.lift) - lift)
+    assert norm(residual) <= len(A) * EPS * norm(A) * (1 + norm(lift))
+
+
+@fewer(10)
+@given(held_bodies(most=2), st.integers(1, 3), st.integers(0, 2**16))
+def test_a_small_elastic_body_is_condensed_as_in_rationals(body, b, seed):
+    mesh, material, free = body
+    matrix = stiffness(mesh, material)[free][:, free].tocsc()
+    interface = np.random.default_rng(seed).permutation(len(free))[:b]
+    A = fem_oracle.exactly(matrix.toarray())
+    A = (A + A.T) / 2
+    found = Condensation(matrix, interface)
+    lift = fem_oracle.lift(A, interface)
+    assert norm(fem_oracle.exactly(found.schur) - fem_oracle.schur(A, interface)) <= rounding(A, lift)
+
+
+@given(definite())
+def test_the_lift_solves_the_inner_equations_and_its_energy_is_the_schur_complement(case):
+    A, floats, interface = case
+    found = Condensation(floats, interface)
+    basis = np.array([found.extend(row) for row in np.eye(len(interface))]).T  # columns: extended unit vectors
+    assert np.array_equal(basis[interface], np.eye(len(interface)))
+    assert np.array_equal(basis[found.inside], found.lift)
+    R = fem_oracle.exactly(basis)
+    assert norm(R.T @ A @ R - fem_oracle.schur(A, interface)) <= rounding(A, found.lift)
+
+
+@given(definite(), st.integers(0, 2**16))
+def test_no_extension_of_interface_values_has_less_energy_than_their_schur_form(case, seed):
+    A, floats, interface = case
+    random = np.random.default_rng(seed)
+    v = fem_oracle.exactly(random.integers(-9, 10, len(A)))
+    phi = v[interface]
+    assert v @ A @ v >= phi @ fem_oracle.schur(A, interface) @ phi
+    schur = Condensation(floats, interface).schur
+    slack = rounding(A, fem_oracle.lift(A, interface)) * float(phi @ phi)
+    assert v @ A @ v >= phi.astype(float) @ schur @ phi.astype(float) - slack
+
+
+@given(definite(), st.integers(0, 2**16))
+def test_condensed_loads_extensions_and_solves_are_those_of_the_whole_system(case, seed):
+    A, floats, interface = case
+    n, found = len(A), Condensation(floats, interface)
+    random = np.random.default_rng(seed)
+    load, phi = random.integers(-9, 10, n), random.integers(-9, 10, len(interface))
+    inside, lift = fem_oracle.inner(n, interface), fem_oracle.lift(A, interface)
+    scale = n * EPS * (1 + norm(lift)) * (1 + norm(A))
+    condensed = load[interface] + lift.T @ load[inside]
+    assert norm(fem_oracle.exactly(found.condense(load.astype(float))) - condensed) <= scale * (1 + norm(load))
+    exact = fem_oracle.zeros(n)
+    exact[interface] = phi
+    coupling = A[np.ix_(inside, interface)] @ phi
+    exact[inside] = fem_oracle.solve(A[np.ix_(inside, inside)], (load[inside] - coupling)[:, None])[:, 0]
+    extended = found.extend(phi.astype(float), load.astype(float))
+    assert extended[interface].tolist() == phi.tolist()
+    A_II = A[np.ix_(inside, inside)]
+    assert norm(A_II @ (fem_oracle.exactly(extended) - exact)[inside]) <= scale * (1 + norm(load) + norm(phi))
+    solution = fem_oracle.exactly(solver(found.matrix)(load.astype(float)))
+    assert norm(A @ solution - load) <= 4 * n * EPS * norm(A) * (1 + norm(solution))
+
+
+# --- on elastic bodies, against dense linear algebra ------------------------------------------------------------------
+
+
+def dense_lift(A, interface):
+    inside = fem_oracle.inner(len(A), interface)
+    return (
+        -np.linalg.solve(A[np.ix_(inside, inside)], A[np.ix_(inside, interface)])
+        if len(inside)
+        else np.empty((0, len(A)))
+    )
+
+
+@given(condensed_bodies())
+def test_a_condensed_body_is_its_dense_schur_complement(case):
+    matrix, interface = case
+    A, found = matrix.toarray(), Condensation(matrix, interface)
+    inside, lift = fem_oracle.inner(len(A), interface), dense_lift(A, interface)
+    assert found.inside.tolist() == inside.tolist()
+    schur = A[np.ix_(interface, interface)] + A[np.ix_(interface, inside)] @ lift
+    assert norm(found.schur - schur) <= rounding(A, lift)
+    assert np.array_equal(found.schur, found.schur.T)
+    assert np.linalg.eigvalsh(found.schur).min() > 0
+
+
+@given(condensed_bodies(), st.integers(0, 2**16))
+def test_a_solve_leaves_no_residual(case, seed):
+    matrix, interface = case
+    load = np.random.default_rng(seed).standard_normal(matrix.shape[0])
+    found = Condensation(matrix, interface)
+    x = solver(found.matrix)(load)
+    n, size = len(load), norm(matrix.toarray())
+    assert norm(matrix @ x - load) <= n * EPS * (size * norm(x) + norm(load))
+    trace = x[interface]
+    assert norm(found.extend(trace, load) - x) <= n * EPS * np.linalg.cond(matrix.toarray()) * norm(x)
+    assert norm(found.schur @ trace - found.condense(load)) <= n * EPS * (1 + norm(found.lift)) ** 2 * (
+        size * norm(x) + norm(load)
+    )
+
+
+@given(condensed_bodies(), st.integers(0, 2**16))
+def test_the_order_of_the_interface_is_the_order_of_the_schur_complement(case, seed):
+    matrix, interface = case
+    order = np.random.default_rng(seed).permutation(len(interface))
+    one, other = Condensation(matrix, interface), Condensation(matrix, interface[order])
+    slack = rounding(matrix.toarray(), one.lift)
+    assert norm(other.schur - one.schur[np.ix_(order, order)]) <= slack
+    assert norm(other.lift - one.lift[:, order]) <= slack
+    phi = np.arange(1.0, len(interface) + 1)
+    assert other.extend(phi[order])[interface].tolist() == phi.tolist()
+
+
+@given(condensed_bodies(), st.integers(0, 2**16))
+def test_condensing_in_two_steps_is_condensing_at_once(case, seed):
+    matrix, interface = case
+    some = np.random.default_rng(seed).permutation(len(interface))[: (len(interface) + 1) // 2]
+    first = Condensation(matrix, interface)
+    second, once = Condensation(sp.csc_array(first.schur), some), Condensation(matrix, interface[some])
+    slack = rounding(matrix.toarray(), once.lift) + rounding(first.schur, second.lift)
+    assert norm(second.schur - once.schur) <= (1 + norm(first.lift)) ** 2 * slack
+
+
+@given(condensed_bodies())
+def test_an_interface_of_all_unknowns_leaves_the_matrix_as_it_is(case):
+    matrix, interface = case
+    everything = np.concatenate([interface, fem_oracle.inner(matrix.shape[0], interface)])
+    found, A = Condensation(matrix, everything), matrix.toarray()
+    assert found.lift.shape == (0, len(everything))
+    permuted = A[np.ix_(everything, everything)]
+    assert np.array_equal(found.schur, (permuted + permuted.T) / 2)
+    load = np.arange(1.0, len(A) + 1)
+    assert found.condense(load).tolist() == load[everything].tolist()
+    assert norm(A @ solver(found.matrix)(load) - load) <= len(A) * EPS * norm(A) * (1 + norm(solver(found.matrix)(load)))
+
+
+@given(condensed_bodies(), powers_of_two(-20, 20))
+def test_scaling_the_matrix_scales_the_energy_and_keeps_the_lift(case, c):
+    matrix, interface = case
+    one, other = Condensation(matrix, interface), Condensation((matrix * float(c)).tocsc(), interface)
+    assert np.array_equal(other.lift, one.lift)
+    assert np.array_equal(other.schur, one.schur * float(c))
+
+
+@pytest.mark.parametrize("name", ["lift", "schur"])
+def test_the_lift_and_the_schur_complement_are_read_only(name):
+    found = Condensation(sp.csc_array(np.array([[2.0, 1.0], [1.0, 2.0]])), np.array([0]))
+    with pytest.raises(ValueError, match="read-only"):
+        getattr(found, name)[0] = 0
+
+
+# --- a bar ------------------------------------------------------------------------------------------------------------
+
+
+@given(numbers(Fraction(1, 4), 5, 12), numbers(Fraction(1, 4), 9, 12), st.integers(1, 30))
+def test_the_schur_complement_of_a_bar_is_young_over_length(length, young, n):
+    mesh, law = interval((Fraction(0), length), n), bar(young)
+    A = fem_oracle.stiffness(mesh, law)[1:, 1:] if n <= 8 else None
+    end = np.array([n - 1])
+    if A is not None:
+        assert fem_oracle.schur(A, end).tolist() == [[young / length]]
+    found = Condensation(stiffness(mesh, law)[1:][:, 1:].tocsc(), end)
+    rounding = n**2 * EPS  # the condition of the matrix
+    assert abs(found.schur[0, 0] - young / length) <= rounding * float(young / length)
+    expected = np.arange(1, n) / n  # the lift is linear
+    assert np.abs(found.lift[:, 0] - expected).max(initial=0) <= rounding
+
+
+@given(st.integers(1, 40), powers_of_two(-6, 6))
+def test_a_bar_pulled_at_its_end_stretches_linearly(n, young):
+    """Up to n^2 eps, the condition of the matrix."""
+    matrix = stiffness(interval((0.0, 1.0), n), bar(float(young)))[1:][:, 1:].tocsc()
+    found = Condensation(matrix, np.array([n - 1]))
+    load = np.zeros(n)
+    load[-1] = 1.0
+    np.testing.assert_allclose(solver(found.matrix)(load), np.arange(1, n + 1) / n / float(young), rtol=n**2 * EPS)

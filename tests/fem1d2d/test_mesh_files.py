@@ -1,0 +1,300 @@
+"""Mesh files: what is read, what is cleaned, what is refused and in which words."""
+
+import tempfile
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from strategies import fewer, in_floats, plane_meshes
+
+from fem1d2d import MeshError, from_file, gram, rectangle, surface
+from fem1d2d.mesh import measures
+
+SQUARE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])
+TRIANGLES = np.array([[0, 1, 2], [0, 2, 3]])
+
+
+def write(path, points, triangles, sides=None, *, more=(), binary=False):
+    """A gmsh 2.2 file: named sides as blocks of lines, one physical number each."""
+    sides = sides or {}
+    blocks = [*[("line", np.array(facets)) for facets in sides.values()], ("triangle", np.array(triangles)), *more]
+    blocks = [(kind, cells) for kind, cells in blocks if len(cells)]
+    tags = [np.full(len(cells), i + 1) for i, (_, cells) in enumerate(blocks)]
+    names = {name: np.array([i + 1, 1]) for i, name in enumerate(sides)}
+    mesh = meshio.Mesh(points, blocks, field_data=names, cell_data={"gmsh:physical": tags, "gmsh:geometrical": tags})
+    meshio.write(path, mesh, file_format="gmsh22", binary=binary)
+    return path
+
+
+def lines_of(mesh):
+    """Sides as sets of pairs of coordinates."""
+    point = lambda node: tuple(mesh.points[node].tolist())
+    return {side: {frozenset(map(point, f)) for f in facets.tolist()} for side, facets in mesh.sides.items()}
+
+
+# --- read -------------------------------------------------------------------------------------------------------------
+
+
+@fewer(2)
+@given(plane_meshes(most=3), st.booleans(), st.floats(-5, 5), st.integers(0, 3), st.randoms(use_true_random=False))
+def test_a_mesh_comes_back_with_triangles_turned_and_unused_points_left_out(mesh, binary, z, extra, random):
+    mesh = in_floats(mesh)
+    flipped = [cell[::-1] if random.random() < 0.5 else cell for cell in mesh.cells]
+    points = np.concatenate([np.full((extra, 2), 77.0), mesh.points])
+    points = np.column_stack([points, np.full(len(points), z)])
+    with tempfile.TemporaryDirectory() as folder:
+        sides = {side: facets + extra for side, facets in mesh.sides.items()}
+        path = write(Path(folder) / "body.msh", points, np.array(flipped) + extra, sides, binary=binary)
+        found = from_file(path)
+    assert np.array_equal(found.points, mesh.points)
+    assert [set(cell) for cell in found.cells.tolist()] == [set(cell) for cell in mesh.cells.tolist()]
+    assert (measures(found.points, found.cells) == measures(mesh.points, mesh.cells)).all()
+    assert {side: facets.tolist() for side, facets in found.sides.items()} == {
+        side: facets.tolist() for side, facets in mesh.sides.items()
+    }
+
+
+@pytest.mark.parametrize("convert", [str, Path])
+def test_a_path_may_be_a_string(tmp_path, convert):
+    path = write(tmp_path / "body.msh", SQUARE, TRIANGLES, {"bottom": [[0, 1]]})
+    assert lines_of(from_file(convert(path))) == {"bottom": {frozenset([(0.0, 0.0), (1.0, 0.0)])}}
+
+
+def test_a_rectangle_read_from_a_file_has_the_matrices_of_a_rectangle(tmp_path):
+    mesh = rectangle((0.0, 2.0), (0.0, 1.0), (3, 2))
+    path = write(tmp_path / "body.msh", np.pad(mesh.points, ((0, 0), (0, 1))), mesh.cells, mesh.sides)
+    found = from_file(path)
+    assert np.array_equal(gram(found).toarray(), gram(mesh).toarray())
+    assert surface(found, upper=True).tolist() == surface(mesh, upper=True).tolist()
+
+
+#: A unit square in gmsh's own format 4.1: node tags with holes, a centre of a circle that no element uses, one block
+#: of elements for each curve, two curves in one group, a curve in two groups, a curve in none.
+GMSH41 = """$MeshFormat
+4.1 0 8
+$EndMeshFormat
+$PhysicalNames
+4
+1 7 "base"
+1 8 "flank"
+1 9 "all"
+2 3 "body"
+$EndPhysicalNames
+$Entities
+1 4 1 0
+1 0.5 0.5 0 0
+1 0 0 0 1 0 0 2 7 9 0
+2 1 0 0 1 1 0 2 8 9 0
+3 0 1 0 1 1 0 1 9 0
+4 0 0 0 0 1 0 2 8 9 0
+1 0 0 0 1 1 0 1 3 0
+$EndEntities
+$Nodes
+2 5 2 20
+0 1 0 1
+20
+0.25 9 0
+2 1 0 4
+2
+4
+9
+11
+0 0 0
+1 0 0
+1 1 0
+0 1 0
+$EndNodes
+$Elements
+5 6 1 6
+1 1 1 1
+1 2 4
+1 2 1 1
+2 4 9
+1 3 1 1
+3 9 11
+1 4 1 1
+4 11 2
+2 1 2 2
+5 2 4 9
+6 2 11 9
+$EndElements
+"""
+
+
+def test_gmsh_s_own_format_gives_sides_by_their_physical_names(tmp_path):
+    path = tmp_path / "square.msh"
+    path.write_text(GMSH41)
+    mesh = from_file(path)
+    assert mesh.points.tolist() == [[0, 0], [1, 0], [1, 1], [0, 1]]
+    assert measures(mesh.points, mesh.cells).tolist() == [0.5, 0.5]
+    edge = lambda a, b: frozenset([tuple(SQUARE[a, :2].tolist()), tuple(SQUARE[b, :2].tolist())])
+    around = [edge(0, 1), edge(1, 2), edge(2, 3), edge(3, 0)]
+    assert lines_of(mesh) == {"base": {around[0]}, "flank": {around[1], around[3]}, "all": set(around)}
+
+
+@pytest.mark.parametrize("name", ["body.msh", "body.inp", "rubbish.msh", "rubbish.vtu"])
+def test_reading_a_mesh_writes_nothing_to_standard_output(tmp_path, capsys, name):
+    path = tmp_path / name
+    if name.startswith("rubbish"):
+        path.write_text("hello\nworld\n")
+        with pytest.raises(MeshError, match="meshio cannot read it"):
+            from_file(path)
+    else:
+        meshio.write(path, square_with_sets()) if name.endswith("inp") else path.write_text(GMSH41)
+        from_file(path)
+    assert capsys.readouterr().out == ""
+
+
+def square_with_sets():
+    """Two triangles and two blocks of lines, each a named set."""
+    none = np.array([], dtype=int)
+    cells = [("line", np.array([[0, 1]])), ("line", np.array([[2, 3]])), ("triangle", TRIANGLES)]
+    return meshio.Mesh(
+        SQUARE, cells, cell_sets={"bottom": [np.array([0]), none, none], "top": [none, np.array([0]), none]}
+    )
+
+
+def test_named_sets_of_lines_of_another_format_are_sides(tmp_path):
+    path = tmp_path / "body.inp"
+    meshio.write(path, square_with_sets())
+    assert {side: facets.tolist() for side, facets in from_file(path).sides.items()} == {
+        "bottom": [[0, 1]],
+        "top": [[2, 3]],
+    }
+
+
+def test_points_of_two_coordinates_are_read(tmp_path):
+    path = tmp_path / "body.su2"
+    path.write_text(
+        "NDIME= 2\nNELEM= 1\n5 0 1 2\nNPOIN= 3\n0 0\n1 0\n0 1\nNMARK= 1\nMARKER_TAG= base\nMARKER_ELEMS= 1\n3 0 1\n"
+    )
+    assert meshio.read(path).points.shape == (3, 2)
+    with pytest.raises(MeshError, match="no named lines"):
+        from_file(path)
+
+
+# --- refused ----------------------------------------------------------------------------------------------------------
+
+
+def refused(path, message):
+    with pytest.raises(MeshError, match=message) as caught:
+        from_file(path)
+    text = str(caught.value)
+    assert text.startswith(f"{path}: ")
+    assert "\n" not in text
+    assert caught.value.__cause__ is None
+
+
+def test_a_missing_file_is_refused(tmp_path):
+    refused(tmp_path / "absent.msh", "no such mesh file")
+
+
+def test_a_folder_is_refused(tmp_path):
+    (tmp_path / "folder.msh").mkdir()
+    refused(tmp_path / "folder.msh", "no such mesh file")
+
+
+RUBBISH = [b"", b"\x00\xff\x13\x80" * 64, b"hello\nworld\n", b"$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 1 1"]
+
+
+@pytest.mark.parametrize("content", RUBBISH, ids=["empty", "binary", "words", "cut short"])
+@pytest.mark.parametrize("ending", [".msh", ".vtu", ".vtk", ".inp", ".mesh", ".xyz", ""])
+def test_rubbish_is_refused_whatever_it_is_called(tmp_path, content, ending):
+    path = tmp_path / f"rubbish{ending}"
+    path.write_bytes(content)
+    with pytest.raises(MeshError, match=r"meshio cannot read it|no triangles in it"):
+        from_file(path)
+
+
+def test_a_file_cut_anywhere_is_refused_or_read_but_nothing_else_escapes(tmp_path):
+    path = tmp_path / "cut.msh"
+    whole = write(tmp_path / "whole.msh", SQUARE, TRIANGLES, {"bottom": [[0, 1]]}, binary=True).read_bytes()
+    outcomes = set()
+    for length in range(0, len(whole), 7):
+        path.write_bytes(whole[:length])
+        try:
+            outcomes.add(len(from_file(path).cells))
+        except MeshError:
+            outcomes.add("refused")
+    assert outcomes == {"refused", 2}  # 2 where nothing but the closing mark is missing: never a part of the body
+
+
+def test_the_refusal_of_an_unreadable_file_names_its_cause(tmp_path):
+    path = tmp_path / "rubbish.mesh"
+    path.write_bytes(RUBBISH[1])
+    refused(path, r"meshio cannot read it \(UnicodeDecodeError: ")
+
+
+def test_an_unknown_ending_is_refused(tmp_path):
+    path = tmp_path / "body.xyz"
+    path.write_text("0 0\n")
+    refused(path, r"meshio cannot read it \(ReadError: Could not deduce file format")
+
+
+def test_a_file_without_triangles_is_refused_by_what_it_has(tmp_path):
+    more = [("quad", np.array([[0, 1, 2, 3]]))]
+    refused(
+        write(tmp_path / "body.msh", SQUARE, [], {"bottom": [[0, 1]]}, more=more), "no triangles in it, only line, quad"
+    )
+
+
+def test_curved_triangles_are_no_triangles(tmp_path):
+    points = np.concatenate([SQUARE[:3], (SQUARE[:3] + np.roll(SQUARE[:3], -1, axis=0)) / 2])
+    more = [("triangle6", np.array([[0, 1, 2, 3, 4, 5]]))]
+    refused(write(tmp_path / "body.msh", points, [], more=more), "no triangles in it, only triangle6")
+
+
+def test_points_off_the_plane_are_refused(tmp_path):
+    points = SQUARE.copy()
+    points[2, 2] = 0.1
+    path = write(tmp_path / "body.msh", points, TRIANGLES, {"bottom": [[0, 1]]})
+    refused(path, "the points do not lie in a plane z = constant")
+
+
+@pytest.mark.parametrize("lines", [[], [("line", np.array([[0, 1], [1, 2]]))]])
+@pytest.mark.parametrize("ending", [".vtu", ".vtk"])
+def test_a_format_without_names_is_refused(tmp_path, lines, ending):
+    path = tmp_path / f"body{ending}"
+    meshio.write(path, meshio.Mesh(SQUARE, [*lines, ("triangle", TRIANGLES)]))
+    refused(path, "no named lines; give the sides physical names")
+
+
+def test_lines_without_physical_names_are_refused(tmp_path):
+    more = [("line", np.array([[0, 1]]))]
+    refused(write(tmp_path / "body.msh", SQUARE, TRIANGLES, more=more), "no named lines")
+
+
+def test_a_name_of_a_surface_is_no_side(tmp_path):
+    tags = [np.array([1, 1])]
+    mesh = meshio.Mesh(
+        SQUARE,
+        [("triangle", TRIANGLES)],
+        field_data={"body": np.array([1, 2])},
+        cell_data={"gmsh:physical": tags, "gmsh:geometrical": tags},
+    )
+    meshio.write(tmp_path / "body.msh", mesh, file_format="gmsh22", binary=False)
+    refused(tmp_path / "body.msh", "no named lines")
+
+
+def test_a_side_with_a_node_of_no_triangle_is_refused_by_its_name(tmp_path):
+    points = np.concatenate([SQUARE, [[2.0, 0.0, 0.0]]])
+    path = write(tmp_path / "body.msh", points, TRIANGLES, {"bottom": [[0, 1]], "loose": [[1, 4]]})
+    refused(path, "side 'loose' has a node that no triangle uses")
+
+
+def test_a_flat_triangle_is_refused(tmp_path):
+    points = np.concatenate([SQUARE, [[0.5, 0.0, 0.0]]])
+    path = write(tmp_path / "body.msh", points, [*TRIANGLES, [0, 4, 1]], {"bottom": [[0, 1]]})
+    with pytest.raises(MeshError, match="cell 2 has no positive measure"):
+        from_file(path)
+
+
+def test_a_body_partly_of_quadrangles_is_refused_and_not_cut_down_to_its_triangles(tmp_path):
+    points = np.concatenate([SQUARE, [[2.0, 0.0, 0.0], [2.0, 1.0, 0.0]]])
+    more = [("quad", np.array([[1, 4, 5, 2]]))]
+    path = write(tmp_path / "body.msh", points, TRIANGLES, {"bottom": [[0, 1]]}, more=more)
+    with pytest.raises(MeshError):
+        from_file(path)

@@ -1,0 +1,213 @@
+"""Extremal eigenvalues against spectra known by construction and against a dense solver; residuals as error bounds."""
+
+import numpy as np
+import pytest
+import scipy.linalg
+import scipy.sparse as sp
+from hypothesis import given
+from hypothesis import strategies as st
+from strategies import fewer, held_bodies, in_floats, plane_meshes, powers_of_two
+
+from fem1d2d import (
+    Condensation,
+    bar,
+    gram,
+    interval,
+    largest,
+    largest_sparse,
+    plane_strain,
+    rectangle,
+    solver,
+    stiffness,
+    supports,
+    surface,
+)
+from fem1d2d.pencil import DENSE, _certify
+
+EPS = np.finfo(float).eps
+
+
+@st.composite
+def pencils(draw, least=1, most=70):
+    """A = L D L', B = L L' with integers D and |L_ij| <= 1/2 beside a unit diagonal: the eigenvalues are D, exactly.
+
+    Columns of X with L'X = I are the eigenvectors.
+    """
+    n = draw(st.integers(least, most))
+    random = np.random.default_rng(draw(st.integers(0, 2**16)))
+    D = random.integers(-20, 21, n).astype(float)
+    D[0] = 1.0  # not all zero
+    L = np.eye(n) + np.diag(random.integers(-2, 3, n - 1) / 4, -1)
+    order = random.permutation(n)
+    A, B = (M[np.ix_(order, order)] for M in (L * D @ L.T, L @ L.T))
+    return A, B, D, np.linalg.inv(L.T)[order]
+
+
+def sparse(A, B):
+    return sp.csc_array(A), sp.csc_array(B), sp.linalg.splu(sp.csc_array(B)).solve
+
+
+# --- values -----------------------------------------------------------------------------------------------------------
+
+
+@given(pencils())
+def test_the_largest_eigenvalue_is_the_largest_entry_of_the_diagonal_it_was_made_of(pencil):
+    A, B, D, _ = pencil
+    for found in (largest(A, B), largest_sparse(*sparse(A, B))):
+        assert found.value == pytest.approx(D.max(), abs=1e-13 * np.abs(D).max())
+        assert found.residual <= 1e-9 * np.abs(D).max()
+
+
+@given(pencils())
+def test_the_eigenvector_has_norm_one_and_its_residual_is_the_one_reported(pencil):
+    A, B, _, _ = pencil
+    for found in (largest(A, B), largest_sparse(*sparse(A, B))):
+        x = found.vector
+        assert x @ B @ x == pytest.approx(1, rel=len(A) * EPS)
+        r = A @ x - found.value * (B @ x)
+        assert np.sqrt(r @ np.linalg.solve(B, r)) == pytest.approx(found.residual, rel=1e-6, abs=len(A) * 40 * EPS)
+        assert found.value == pytest.approx(x @ A @ x, abs=len(A) * 40 * EPS)
+
+
+@fewer(2)
+@given(held_bodies(most=5))
+def test_m_and_M_of_an_elastic_body_are_those_of_a_dense_solver(body):
+    mesh, material, free = body
+    A, H = (matrix[free][:, free].tocsc() for matrix in (stiffness(mesh, material), gram(mesh)))
+    spectrum = scipy.linalg.eigh(A.toarray(), H.toarray(), eigvals_only=True)
+    end = np.arange(2)
+    low = largest_sparse(H, A, solver(A))
+    high = largest_sparse(A, H, solver(H))
+    assert 1 / low.value == pytest.approx(spectrum[0], rel=1e-11)
+    assert high.value == pytest.approx(spectrum[-1], rel=1e-11)
+    dense = largest(H.toarray(), A.toarray()), largest(A.toarray(), H.toarray())
+    assert [low.value, high.value] == pytest.approx([dense[0].value, dense[1].value], rel=1e-11)
+
+
+@fewer(2)
+@given(held_bodies(most=4), powers_of_two(-20, 20))
+def test_scaling_the_modulus_scales_the_eigenvalue_and_scaling_the_norm_divides_it(body, c):
+    mesh, material, free = body
+    A, H = (matrix[free][:, free].toarray() for matrix in (stiffness(mesh, material), gram(mesh)))
+    c = float(c)
+    once = largest(A, H).value
+    assert largest(c * A, H).value == pytest.approx(c * once, rel=1e-13)
+    assert largest(A, c * H).value == pytest.approx(once / c, rel=1e-13)
+
+
+@given(pencils(), st.integers(-8, 8))
+def test_shifting_the_pencil_shifts_the_eigenvalue(pencil, shift):
+    A, B, D, _ = pencil
+    assert largest(A + shift * B, B).value == pytest.approx(D.max() + shift, abs=30 * len(A) * EPS)
+
+
+@pytest.mark.parametrize("n", [1, 2, DENSE - 1, DENSE, DENSE + 1, 2 * DENSE])
+def test_a_pencil_of_multiples_has_one_eigenvalue_at_every_size(n):
+    B = np.diag(np.full(n, 4.0)) + np.diag(np.ones(n - 1), 1) + np.diag(np.ones(n - 1), -1)
+    assert largest(3 * B, B).value == pytest.approx(3, rel=n * EPS)
+    assert largest_sparse(*sparse(3 * B, B)).value == pytest.approx(3, rel=n * EPS)
+
+
+@pytest.mark.parametrize("nx", [2, 4, 6, 8, 10, 12, 14, 16])
+def test_of_two_equal_bodies_the_stiffer_is_so_on_every_trace_by_the_quotient_of_the_moduli(nx):
+    mesh = rectangle((0.0, 2.0), (0.0, 0.3), (nx, 4))
+    free = np.flatnonzero(~supports(mesh, {"bottom": [0.0, 0.0]}).known.ravel())
+    top = surface(mesh, upper=True)
+    trace = np.searchsorted(free, np.concatenate([2 * top, 2 * top + 1]))
+    S1, S2 = (
+        Condensation(stiffness(mesh, plane_strain(young, 0.3))[free][:, free].tocsc(), trace).schur
+        for young in (7e4, 2e4)
+    )
+    assert largest(S1, S2).value == pytest.approx(7 / 2, rel=1e-12)
+    assert largest(S2, S1).value == pytest.approx(2 / 7, rel=1e-12)
+
+
+@pytest.mark.parametrize("n", [DENSE, DENSE + 1])
+def test_the_dense_and_the_sparse_solver_agree_on_both_sides_of_the_size_that_divides_them(n):
+    mesh = interval((0.0, 1.0), n)
+    A, H = (matrix[1:][:, 1:].tocsc() for matrix in (stiffness(mesh, bar(2.0)), gram(mesh)))
+    found = largest_sparse(A, H, sp.linalg.splu(H).solve)
+    assert found.value == pytest.approx(largest(A.toarray(), H.toarray()).value, rel=1e-13)
+
+
+def test_the_largest_eigenvalue_is_not_the_largest_in_size():
+    A = np.diag([-5.0, 2.0])
+    assert largest(A, np.eye(2)).value == pytest.approx(2, rel=4 * EPS)
+    wide = np.diag(np.linspace(-100, 1, 50))
+    assert largest_sparse(*sparse(wide, np.eye(50))).value == pytest.approx(1, rel=1e-12)
+
+
+# --- it repeats -------------------------------------------------------------------------------------------------------
+
+
+@fewer(5)
+@given(held_bodies(most=5), st.integers(0, 2**16))
+def test_an_eigenvalue_repeats_to_the_digit_whatever_the_global_random_state(body, seed):
+    mesh, material, free = body
+    A, H = (matrix[free][:, free].tocsc() for matrix in (stiffness(mesh, material), gram(mesh)))
+    solve = solver(H)
+    one = largest_sparse(A, H, solve)
+    np.random.default_rng(seed).standard_normal(7)
+    other = largest_sparse(A, H, solve)
+    assert one.value == other.value
+    assert one.residual == other.residual
+    assert np.array_equal(one.vector, other.vector)
+
+
+def test_an_eigenvector_is_read_only():
+    found = largest(np.eye(2), np.eye(2))
+    with pytest.raises(ValueError, match="read-only"):
+        found.vector[0] = 0
+
+
+# --- residuals bound errors -------------------------------------------------------------------------------------------
+
+
+def certified(A, B, x):
+    return _certify(A, B, x, lambda r: np.linalg.solve(B, r))
+
+
+@given(pencils(), st.integers(0, 2**16))
+def test_some_eigenvalue_lies_within_the_residual_of_any_vector_s_rayleigh_quotient(pencil, seed):
+    A, B, D, _ = pencil
+    found = certified(A, B, np.random.default_rng(seed).standard_normal(len(A)))
+    assert np.abs(D - found.value).min() <= found.residual + 1e-13 * np.abs(D).max()
+
+
+@given(pencils(least=2), st.data())
+def test_the_residual_is_exactly_the_distance_for_the_mean_of_two_eigenvectors(pencil, data):
+    A, B, D, X = pencil
+    i, j = data.draw(st.permutations(range(len(A))))[:2]
+    found = certified(A, B, X[:, i] + X[:, j])
+    assert found.value == pytest.approx((D[i] + D[j]) / 2, abs=1e-12)
+    assert found.residual == pytest.approx(abs(D[i] - D[j]) / 2, abs=1e-6 if D[i] == D[j] else 1e-12)
+
+
+@given(pencils(least=2), st.integers(0, 2**16), st.integers(1, 5))
+def test_near_an_isolated_eigenvalue_the_error_is_below_the_square_of_the_residual_over_the_gap(pencil, seed, digits):
+    A, B, D, X = pencil
+    top = D.argmax()
+    rest = np.delete(D, top)
+    noise = np.random.default_rng(seed).standard_normal(len(A))
+    found = certified(A, B, X[:, top] + 10.0**-digits * X @ noise / np.linalg.norm(noise))
+    gap = found.value - rest.max()
+    error = D[top] - found.value
+    assert error >= -1e-12
+    assert error * gap <= found.residual**2 + 1e-12
+    if D[top] > rest.max():
+        assert error <= 40 * 100.0**-digits + 1e-12
+
+
+@given(pencils())
+def test_the_residual_of_what_is_returned_bounds_its_distance_to_the_spectrum(pencil):
+    A, B, D, _ = pencil
+    for found in (largest(A, B), largest_sparse(*sparse(A, B))):
+        assert np.abs(D - found.value).min() <= found.residual + 1e-13 * np.abs(D).max()
+
+
+@given(plane_meshes(3), st.sampled_from([-0.9, -0.3, 0.0, 0.3, 0.45]))
+def test_no_body_exceeds_the_continuity_of_its_material(mesh, poisson):
+    """M^a <= max(2 mu, 2 mu + 2 lambda), attained nowhere but approached; for positive and negative Poisson ratios."""
+    law = plane_strain(1.0, poisson)
+    A, H = stiffness(in_floats(mesh), law).toarray(), gram(in_floats(mesh)).toarray()
+    assert largest(A, H).value < law.continuity(2)

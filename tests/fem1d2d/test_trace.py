@@ -1,0 +1,150 @@
+"""The interface: flat tops and bottoms, parts of them, the trapezoid rule."""
+
+from fractions import Fraction
+
+import fem_oracle
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from strategies import in_floats, lines, numbers, powers_of_two, renumbered, vectors
+
+from fem1d2d import Mesh, MeshError, interval, nodes_between, rectangle, surface, trapezoid
+from fem1d2d.assembly import facet_weights
+
+counts = st.integers(1, 4)
+
+
+@st.composite
+def flat_bodies(draw):
+    """A rectangle in floats whose nodes have any order, and its width and height."""
+    width, height = draw(powers_of_two()), draw(powers_of_two())
+    mesh = rectangle((0.0, float(width)), (0.0, float(height)), (draw(counts), draw(counts)))
+    order = draw(st.permutations(range(len(mesh.points))))
+    return renumbered(mesh, order), float(width), float(height)
+
+
+@given(flat_bodies(), st.booleans())
+def test_the_surface_of_a_rectangle_is_its_top_or_bottom_from_left_to_right(body, upper):
+    mesh, _, height = body
+    nodes = surface(mesh, upper=upper)
+    assert set(nodes.tolist()) == set(mesh.sides["top" if upper else "bottom"].ravel().tolist())
+    assert (mesh.points[nodes, 1] == (height if upper else 0)).all()
+    assert (np.diff(mesh.points[nodes, 0]) > 0).all()
+
+
+@given(lines(), st.booleans(), st.randoms(use_true_random=False))
+def test_the_surface_of_a_line_is_one_end(mesh, upper, random):
+    again = renumbered(mesh, random.sample(range(len(mesh.points)), len(mesh.points)))
+    (node,) = surface(again, upper=upper)
+    assert again.points[node, 0] == mesh.points[-1 if upper else 0, 0]
+
+
+def test_the_surface_ignores_flat_edges_below_the_top_and_joins_two_towers():
+    mesh = rectangle((0.0, 3.0), (0.0, 2.0), (3, 2))
+    centres = mesh.points[mesh.cells].mean(axis=1)
+    cells = mesh.cells[~((centres[:, 0] > 1) & (centres[:, 0] < 2) & (centres[:, 1] > 1))]
+    towers = Mesh(points=mesh.points, cells=cells, sides={})
+    assert towers.points[surface(towers, upper=True)].tolist() == [[0, 2], [1, 2], [2, 2], [3, 2]]
+    assert len(surface(towers, upper=False)) == 4
+
+
+def test_a_single_peak_at_the_height_of_a_flat_top_is_not_part_of_the_surface():
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [2.0, 0.0], [2.5, 1.0], [3.0, 0.0]])
+    mesh = Mesh(points=points, cells=np.array([[0, 1, 2], [0, 2, 3], [4, 6, 5], [1, 4, 2]]), sides={})
+    assert surface(mesh, upper=True).tolist() == [3, 2]
+
+
+@pytest.mark.parametrize(("upper", "word", "level"), [(True, "top", "1"), (False, "bottom", "-1")])
+def test_a_body_that_ends_in_a_peak_has_no_surface(upper, word, level):
+    points = np.array([[-1.0, 0.0], [0.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
+    mesh = Mesh(points=points, cells=np.array([[0, 1, 2], [0, 2, 3]]), sides={})
+    with pytest.raises(MeshError, match=f"no flat {word}: no boundary edge lies at y = {level}"):
+        surface(mesh, upper=upper)
+
+
+@pytest.mark.parametrize("turn", [0.01, 0.5, 2.0])
+def test_a_rotated_rectangle_has_no_surface(turn):
+    mesh = rectangle((0.0, 1.0), (0.0, 1.0), (2, 2))
+    c, s = np.cos(turn), np.sin(turn)
+    turned = Mesh(points=mesh.points @ np.array([[c, s], [-s, c]]), cells=mesh.cells, sides={})
+    for upper in (True, False):
+        with pytest.raises(MeshError, match="no flat"):
+            surface(turned, upper=upper)
+
+
+@pytest.mark.parametrize(("uneven", "kept"), [(0.9e-9, 3), (-0.9e-9, 3), (1.1e-9, 0), (-1.1e-9, 2)])
+@pytest.mark.parametrize("extent", [1e-3, 1.0, 1e3])
+def test_the_top_is_flat_up_to_a_billionth_of_the_extent(uneven, kept, extent):
+    mesh = rectangle((0.0, extent), (0.0, extent), (2, 1))
+    points = mesh.points.copy()
+    points[5, 1] += uneven * extent
+    uneven_mesh = Mesh(points=points, cells=mesh.cells, sides={})
+    if kept:
+        assert len(surface(uneven_mesh, upper=True)) == kept
+    else:
+        with pytest.raises(MeshError, match="no flat top"):
+            surface(uneven_mesh, upper=True)
+
+
+# --- parts of a surface -----------------------------------------------------------------------------------------------
+
+
+@given(flat_bodies(), st.integers(0, 4), st.integers(0, 4))
+def test_a_part_of_a_surface_is_its_nodes_between_the_ends_in_the_same_order(body, a, b):
+    mesh, width, _ = body
+    top = surface(mesh, upper=True)
+    ends = width * min(a, b) / 4, width * max(a, b) / 4
+    part = nodes_between(mesh, top, ends)
+    assert part.tolist() == [node for node in top if ends[0] <= mesh.points[node, 0] <= ends[1]]
+    assert nodes_between(mesh, top[::-1], ends).tolist() == part[::-1].tolist()
+
+
+@pytest.mark.parametrize("extent", [1e-3, 1.0, 1e3])
+def test_the_ends_of_a_part_reach_a_billionth_of_the_extent_further(extent):
+    mesh = rectangle((0.0, extent), (0.0, extent / 2), (4, 1))
+    top = surface(mesh, upper=True)
+    ends = lambda slack: ((0.25 - slack) * extent, (0.75 + slack) * extent)
+    assert len(nodes_between(mesh, top, ends(-0.9e-9))) == 3
+    assert len(nodes_between(mesh, top, ends(-1.1e-9))) == 1
+
+
+# --- the trapezoid rule -----------------------------------------------------------------------------------------------
+
+
+@given(lines(most=8, denominator=16), vectors(size=2))
+def test_the_trapezoid_rule_integrates_linear_functions_exactly(mesh, v):
+    x = mesh.points[:, 0]
+    weights = fem_oracle.exactly(trapezoid(x.astype(float)))
+    integral = (x[-1] - x[0]) * (v[0] + v[1] * (x[0] + x[-1]) / 2)
+    assert weights @ (v[0] + v[1] * x) == integral
+
+
+@given(lines(most=8, denominator=16))
+def test_the_trapezoid_rule_overestimates_a_convex_function_by_its_second_differences(mesh):
+    x = mesh.points[:, 0]
+    error = fem_oracle.exactly(trapezoid(x.astype(float))) @ x**2 - (x[-1] ** 3 - x[0] ** 3) / 3
+    assert error == (np.diff(x) ** 3).sum() / 6
+
+
+@given(flat_bodies())
+def test_the_trapezoid_rule_on_a_top_is_the_integral_of_its_hat_functions(body):
+    mesh, _, _ = body
+    top = surface(mesh, upper=True)
+    assert trapezoid(mesh.points[top, 0]).tolist() == facet_weights(mesh, mesh.sides["top"])[top].tolist()
+
+
+def test_one_point_has_weight_one():
+    bar = interval((0.0, 2.0), 2)
+    assert trapezoid(bar.points[surface(bar, upper=True), 0]).tolist() == [1.0]
+
+
+def test_no_points_have_no_weights():
+    assert trapezoid(np.empty(0)).shape == (0,)
+
+
+@given(lines(denominator=16), numbers(-4, 4), powers_of_two())
+def test_weights_are_lengths_they_do_not_see_the_origin_and_scale_with_the_unit(mesh, shift, scale):
+    x = in_floats(mesh).points[:, 0]
+    assert np.array_equal(trapezoid((x + float(shift)) * float(scale)), trapezoid(x) * float(scale))
+    assert Fraction(trapezoid(x).sum()) == mesh.points[-1, 0] - mesh.points[0, 0]

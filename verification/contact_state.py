@@ -1,0 +1,86 @@
+"""What happens along Gamma_c, node by node, in the frame of the paper."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem1d2d.mesh import Floats
+from verification.pair import Facing
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ContactState:
+    """Stresses and motions along Gamma_c from left to right.
+
+    Attributes
+    ----------
+    x : array, shape (n,)
+        Position before deformation, unit of length.
+    weights : array, shape (n,)
+        w_j, unit of length; 1 in 1D.
+    pressure : array
+        ``-sigma_N >= 0``: nodal force over w_j, unit of stress.
+    shear : array
+        Tangential force on body 2 over w_j, unit of stress; 0 in 1D.
+    gap : array
+        Distance of the bodies, >= 0, unit of length.
+    slip : array
+        ``u1_T - u2_T``, unit of length; 0 in 1D.
+    state : list of {'stick', 'slip', 'open'}
+        A node that touches and whose friction bound is zero slips.
+    """
+
+    x: Floats
+    weights: Floats
+    pressure: Floats
+    shear: Floats
+    gap: Floats
+    slip: Floats
+    state: list[str]
+
+    @classmethod
+    def of(
+        cls, facing: Facing, *, force: Floats, jump: Floats, touching: NDArray[np.bool_], sliding: NDArray[Any]
+    ) -> ContactState:
+        """From interface vectors, tangential components first.
+
+        Parameters
+        ----------
+        force : array
+            Nodal forces: tangential on body 2, normal compressive.
+        jump : array
+            ``u1_T - u2_T`` and ``[u_N] - gap <= 0``.
+        touching, sliding : array, shapes (n,) and (n,) or (0,)
+        """
+        t, zero = facing.tangential, np.zeros(facing.n)
+        plane = t.stop > 0
+        slides = sliding != 0 if plane else np.ones(facing.n, dtype=bool)
+        names = np.where(touching, np.where(slides, "slip", "stick"), "open")
+        return cls(
+            x=facing.x,
+            weights=facing.weights,
+            pressure=force[facing.normal] / facing.weights,
+            shear=force[t] / facing.weights if plane else zero,
+            gap=-jump[facing.normal] + 0.0,
+            slip=jump[t] if plane else zero,
+            state=[str(name) for name in names],
+        )
+
+    @property
+    def pattern(self) -> dict[str, int]:
+        """How many nodes stick, slip and are open."""
+        return {name: self.state.count(name) for name in ("stick", "slip", "open")}
+
+    @property
+    def force(self) -> dict[str, float]:
+        """Total normal (compressive) and tangential (on body 2) force per unit thickness."""
+        return {"normal": float(self.pressure @ self.weights), "tangential": float(self.shear @ self.weights)}
+
+    def to_dict(self) -> dict[str, Any]:
+        """The objects ``force``, ``pattern`` and ``contact`` that runs and solutions share."""
+        arrays = {name: getattr(self, name).tolist() for name in ("x", "pressure", "shear", "gap", "slip")}
+        return {"force": self.force, "pattern": self.pattern, "contact": {**arrays, "state": self.state}}
