@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from verification.reader import ProblemError
 
 if TYPE_CHECKING:
+    from verification.monolithic import Solution
     from verification.runs import Run
     from verification.verdicts import Comparison
 
@@ -76,6 +77,14 @@ class Folder:
         for ending in ("svg", "png"):
             self._put(f"bodies.{ending}", lambda path: save(draw_bodies(run), path))
             self._put(f"residuals.{ending}", lambda path: save(draw_residuals(run), path))
+
+    def write_solution(self, solution: Solution) -> None:
+        """Write ``solve.json`` and the figure."""
+        from verification.figures import draw_bodies, save
+
+        self._put("solve.json", lambda path: _write(path, solution.to_json()))
+        for ending in ("svg", "png"):
+            self._put(f"bodies.{ending}", lambda path: save(draw_bodies(solution), path))
 
     def write_comparison(self, comparison: Comparison) -> None:
         """Write ``compare.json``, the figures and ``report.html``."""

@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
+from fem1d2d.mesh import Floats
 from ndtheory import relaxation_factor
 from verification.bodies import build
 from verification.contact import Solver
@@ -88,6 +89,21 @@ class Run(Document):
             touching=pattern.touching,
             sliding=pattern.sliding,
         )
+
+    @property
+    def facing(self) -> Pair:
+        """The bodies."""
+        return self.pair
+
+    @cached_property
+    def displacements(self) -> tuple[Floats, Floats]:
+        """Displacement of all nodes of body 1 and body 2 at the last state, shape (nodes, d), unit of length."""
+        pair, state = self.pair, self.last
+        moved = state.displacement + state.contact.v
+        moved[pair.normal] += pair.gap
+        neumann, contact = pair.orient(state.displacement), pair.orient(moved)
+        first, second = (contact, neumann) if pair.problem.iteration.neumann_body == 2 else (neumann, contact)
+        return pair.body1.displacement(first), pair.body2.displacement(second)
 
     @property
     def history(self) -> list[float]:

@@ -32,7 +32,15 @@ def cli() -> None:
     """
 
 
-for command in (calculator.bounds, problems.example, problems.demo, problems.constants, problems.run, problems.compare):
+for command in (
+    calculator.bounds,
+    problems.example,
+    problems.demo,
+    problems.constants,
+    problems.run,
+    problems.solve,
+    problems.compare,
+):
     cli.add_command(command)
 
 
@@ -85,8 +93,9 @@ def _explain(error: Exception) -> int:
         complain("ndtheory: the problem does not fit into memory; needed fewer cells")
         return BAD_INPUT
     from verification.contact import ContactError  # numpy: only now
+    from verification.monolithic import SolveError
 
-    if isinstance(error, ContactError):
+    if isinstance(error, (ContactError, SolveError)):
         complain(f"ndtheory: {error}")
         return NOT_MET
     traceback.print_exc()

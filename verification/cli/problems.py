@@ -1,4 +1,4 @@
-"""Commands that read a problem file: example, demo, constants, run, compare."""
+"""Commands that read a problem file: example, demo, constants, run, solve, compare."""
 
 from __future__ import annotations
 
@@ -149,6 +149,39 @@ def run(file: Path, theta: str | None, solver: Any, swap_roles: bool, folder: Pa
     else:
         screens.run(finished, file)
     return _status_of_run(finished)
+
+
+@click.command()
+@FILE
+@FOLDER
+@JSON
+def solve(file: Path, folder: Path | None, as_json: bool) -> int:
+    """Solve both bodies of FILE at once, without decomposition.
+
+    The global method: it shares nothing with the iteration but the matrices.  One body may be rigid (shape = "rigid"),
+    and contact may be all that holds a body in one direction.  Exit 1 where no certified solution was found.
+
+    \b
+    Example:
+      ndtheory solve my.toml -o results
+    """
+    from verification import monolithic
+    from verification.bodies import face
+    from verification.cli import screens
+    from verification.output import Folder
+
+    problem = _load(file, None, False)
+    target = None if folder is None else Folder(folder)
+    facing = face(problem)
+    _warn(facing.warnings)
+    solution = monolithic.solve(facing)
+    if target is not None:
+        target.write_solution(solution)
+    if as_json:
+        say(solution.to_json())
+    else:
+        screens.solution(solution, file)
+    return 0
 
 
 @click.command()

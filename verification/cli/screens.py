@@ -7,7 +7,10 @@ from pathlib import Path
 
 from verification.cli.calculator import edition_rows
 from verification.cli.console import figures, heading, near_one, say, table
+from verification.contact_state import ContactState
 from verification.measured import Measured
+from verification.monolithic import Solution
+from verification.pair import Facing
 from verification.problem import Problem
 from verification.runs import Run
 from verification.verdicts import Comparison
@@ -17,14 +20,18 @@ def _setting(problem: Problem, nodes: int | None = None, interface: int | None =
     """Two lines that say what is computed."""
     units, contact = problem.units, problem.contact
     counts = "" if nodes is None else f" | {nodes} nodes, {interface} on Gamma_c"
-    moduli = " / ".join(figures(float(body.young)) for body in (problem.body1, problem.body2))
+    bodies = (problem.body1, problem.body2)
+    moduli = " / ".join("rigid" if body.rigid else figures(float(body.young)) for body in bodies)
     say(f"{problem.title}{counts} | E {moduli} {units['stress']}")
     body = {1: "body 1 (lower)", 2: "body 2 (upper)"}[problem.iteration.neumann_body]
     law = {"nonlocal": "non-local", "local": "local law"}[contact.law]
     friction = "no friction" if not contact.friction else f"k = {figures(float(contact.friction), 2)}, {law}"
     if contact.friction and contact.radius is not None and contact.law == "nonlocal":
         friction += f", r = {float(contact.radius):g} {units['length']}"
-    say(f"Neumann body: {body} | {friction} | theta = {float(problem.iteration.theta):g}")
+    if any(body.rigid for body in bodies):
+        say(f"Obstacle: body {1 if problem.body1.rigid else 2} | {friction}")
+    else:
+        say(f"Neumann body: {body} | {friction} | theta = {float(problem.iteration.theta):g}")
 
 
 def constants(problem: Problem, measured: Measured) -> None:
@@ -56,22 +63,27 @@ def _happened(run: Run) -> None:
     shown = "-" if rate is None else f"{near_one(rate.value)} in [{near_one(rate.lo)}, {near_one(rate.hi)}]"
     rows.append(["observed", shown, str(run.iterations), run.outcome])
     table(rows)
-    units = problem.units
-    force = units["stress"] + (f" {units['length']} (per unit thickness)" if problem.dimension == 2 else "")
     say()
-    say("  nodes               " + ", ".join(f"{count} {name}" for name, count in run.contact.pattern.items()))
-    say(f"  normal force        {figures(run.contact.force['normal'], 6)} {force}")
-    if problem.dimension == 2:
-        largest = max(abs(run.contact.force["normal"]), abs(run.contact.force["tangential"]))
-        tangential = run.contact.force["tangential"] if abs(run.contact.force["tangential"]) > 1e-12 * largest else 0.0
-        say(f"  tangential force    {figures(tangential)} {force}")
-        say(f"  largest pressure    {figures(float(run.contact.pressure.max()), 4)} {units['stress']}")
+    _contact(problem, run.contact)
     say(f"  contact step solved to a KKT residual of {run.last.contact.kkt.residual:.1e}")
 
 
-def _limits(run: Run) -> None:
+def _contact(problem: Problem, contact: ContactState) -> None:
+    """What happens along Gamma_c, in totals."""
+    units, total = problem.units, contact.force
+    force = units["stress"] + (f" {units['length']} (per unit thickness)" if problem.dimension == 2 else "")
+    say("  nodes               " + ", ".join(f"{count} {name}" for name, count in contact.pattern.items()))
+    say(f"  normal force        {figures(total['normal'], 6)} {force}")
+    if problem.dimension == 2:
+        rounding = 1e-12 * max(abs(total["normal"]), abs(total["tangential"]))
+        tangential = total["tangential"] if abs(total["tangential"]) > rounding else 0.0
+        say(f"  tangential force    {figures(tangential)} {force}")
+        say(f"  largest pressure    {figures(float(contact.pressure.max()), 4)} {units['stress']}")
+
+
+def _limits(facing: Facing) -> None:
     say()
-    for reason in run.pair.outside:
+    for reason in facing.outside:
         say(f"Outside the theorem: {reason}.")
     say("Not claimed: anything about the continuum, or the local Coulomb law.")
 
@@ -81,8 +93,20 @@ def run(finished: Run, file: Path) -> None:
     bodies = (finished.pair.body1, finished.pair.body2)
     _setting(_at(finished), sum(len(body.mesh.points) for body in bodies), finished.pair.n)
     _happened(finished)
-    _limits(finished)
+    _limits(finished.pair)
     say(f"Next: ndtheory compare {file}")
+
+
+def solution(found: Solution, file: Path) -> None:
+    """The screen of ``solve``."""
+    facing = found.facing
+    _setting(facing.problem, sum(len(body.mesh.points) for body in facing.elastic), facing.n)
+    heading("WHAT IS THE SOLUTION?")
+    _contact(facing.problem, found.contact)
+    say(f"  KKT residual {found.kkt_residual:.1e} after {found.linear_solves} linear systems on Gamma_c")
+    _limits(facing)
+    iterates = len(facing.elastic) == 2
+    say(f"Next: ndtheory {'run' if iterates else 'solve'} {file}{'' if iterates else ' -o results'}")
 
 
 def _at(run: Run) -> Problem:
@@ -108,7 +132,7 @@ def comparison(result: Comparison, file: Path, folder: Path | None) -> None:
     _happened(finished)
     heading("DOES THE RUN AGREE WITH THE BOUND?")
     table([["edition", "verdict", "why"], *([n, j.verdict, j.reason] for n, j in result.verdicts.items())])
-    _limits(finished)
+    _limits(finished.pair)
     if folder is not None:
         say(f"Written: {folder / 'report.html'}, compare.json, bodies and residuals (svg, png)")
     say(f"Next: ndtheory run {file} --theta {_next_theta(result)}")
