@@ -241,7 +241,10 @@ def _body(problem: Problem, name: Name, mesh: Mesh, nodes: Ints) -> Body:
     motions = rigid_motions(mesh, known.known)
     if motions.shape[2] and not known.known.any():
         raise ProblemError(
-            problem.source, name, None, f"{name} is held by nothing but contact: fix or prescribe some of its sides"
+            problem.source,
+            name,
+            None,
+            f"{name} can move rigidly, held by nothing but contact: fix or prescribe some of its sides",
         )
     material = plane_strain(float(spec.young), float(spec.poisson)) if d == 2 else bar(float(spec.young))
     matrix = stiffness(mesh, material)

@@ -37,6 +37,8 @@ class State:
         ``|||T g - g|||`` in the norm (5.21): judged before relaxation, so that a small theta does not flatter.
     size : float
         ``|||T g|||``.
+    scale : float
+        The largest size so far, which the residual is compared with: T g itself may vanish where the bodies part.
     """
 
     iteration: int
@@ -45,6 +47,7 @@ class State:
     contact: ContactSolution
     residual: float
     size: float
+    scale: float
 
     @property
     def image(self) -> Floats:
@@ -53,8 +56,8 @@ class State:
 
     @property
     def relative_residual(self) -> float:
-        """``|||T g - g||| / |||T g|||``; 0 where both vanish."""
-        return self.residual / self.size if self.size > 0 else (0.0 if self.residual == 0 else float("inf"))
+        """The residual over the scale; 0 where both vanish."""
+        return self.residual / self.scale if self.scale > 0 else (0.0 if self.residual == 0 else float("inf"))
 
 
 class FixedPointMap:
@@ -141,14 +144,17 @@ def iterate(
 def _states(T: FixedPointMap, theta: float, start: Floats | None) -> Iterator[State]:
     neumann = T.pair.neumann
     g = np.zeros(len(neumann.load)) if start is None else np.array(start, dtype=float)
-    iteration = 0
+    iteration, scale = 0, 0.0
     while True:
         with one_thread():
             u, solution = T(g)
             image = solution.force
             residual, size = neumann.dual_norm(image - g), neumann.dual_norm(image)
+            scale = max(scale, size)
         for array in (g, u, image, solution.v):
             array.setflags(write=False)
-        yield State(iteration=iteration, g=g, displacement=u, contact=solution, residual=residual, size=size)
+        yield State(
+            iteration=iteration, g=g, displacement=u, contact=solution, residual=residual, size=size, scale=scale
+        )
         g = theta * image + (1 - theta) * g  # (III)
         iteration += 1

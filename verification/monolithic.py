@@ -142,23 +142,26 @@ class ContactSystem:
         SolveError
             The certificate was not reached.
         """
-        n, k = len(self.d0) - self.t, self.M.shape[1]
-        touching = self.d0[self.t :] > 0 if k == 0 else np.ones(n, dtype=bool)
-        signs = np.ones(self.t, dtype=np.int8)
-        found = self._newton(Branches(touching=touching, sliding=0 * signs, threshold=signs))
-        force, count = np.zeros(n + self.t), SWEEPS
+        found = self.newton(self.start())
+        force, count = np.zeros(len(self.d0)), SWEEPS
         for _ in range(RESTARTS):
             if found is not None:
                 return found
             force = self._sweep(force, count)
-            found = self._newton(self._branches(force))
+            found = self.newton(self._branches(force))
             count *= 2
         if found is None:
-            why = "" if k == 0 else "; contact alone holds a body, and the loads may pull or slide it off"
+            why = "" if self.M.shape[1] == 0 else "; contact alone holds a body, and the loads may pull or slide it off"
             raise SolveError(f"the global method did not reach a KKT residual of {TOLERANCE:g}{why}")
         return found
 
-    def _newton(self, branches: Branches) -> Equilibrium | None:
+    def start(self) -> Branches:
+        """What the bodies would do without contact forces, and sticking; all touch where contact has to hold a body."""
+        touching = self.d0[self.t :] > 0 if self.M.shape[1] == 0 else np.ones(len(self.d0) - self.t, dtype=bool)
+        signs = np.ones(self.t, dtype=np.int8)
+        return Branches(touching=touching, sliding=0 * signs, threshold=signs)
+
+    def newton(self, branches: Branches) -> Equilibrium | None:
         """Solve for the branches, mend them by the signs found, until they agree; None where they repeat."""
         seen: set[bytes] = set()
         for _ in range(LIMIT):

@@ -109,7 +109,7 @@ class IterationSpec:
         Who gets the linear problem of step I: 2 as in Section 3, 1 as in Section 6.
     theta : Fraction
     tolerance : float
-        The run ends when ``|||T g - g||| <= tolerance |||T g|||``, (5.21).
+        The run ends when ``|||T g - g||| <= tolerance |||T g|||`` in the norm (5.21), with the largest T g so far.
     max_iterations : int
     """
 

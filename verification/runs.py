@@ -52,7 +52,7 @@ class Run(Document):
 
     @property
     def converged(self) -> bool:
-        """Whether ``|||T g - g||| <= tolerance |||T g|||``."""
+        """Whether the residual fell to the tolerance, relative to the largest ``|||T g|||`` seen."""
         return self.outcome == "converged"
 
     @property
@@ -187,7 +187,7 @@ def run(
             states.append(state)
             watch(state)
             least, since = (state.residual, 0) if state.residual < least else (least, since + 1)
-            if state.residual <= settings.tolerance * state.size:
+            if state.residual <= settings.tolerance * state.scale:
                 outcome = "converged"
             elif not state.residual <= RUNAWAY * states[0].residual:
                 outcome = "diverged"

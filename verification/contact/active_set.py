@@ -92,7 +92,11 @@ class ActiveSet:
             right = q.copy()
             right[: self._t] -= bound * pattern.sliding
             v[rows] = cho_solve(factor, right[rows], check_finite=False)
-        return v, q - self._S @ v
+        force = q - self._S @ v
+        force[self._t :][~pattern.touching] = 0.0  # what the pattern says holds exactly; the certificate sees the rest
+        slides = pattern.sliding != 0
+        force[: self._t][slides] = (bound * pattern.sliding)[slides]
+        return v, force
 
     def solve(self, q: Floats, bound: Floats, start: Pattern) -> tuple[Floats, Floats, Pattern] | None:
         """Mend the pattern until every sign agrees.

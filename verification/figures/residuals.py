@@ -41,8 +41,8 @@ def draw_residuals(run: Run, bounds: Mapping[str, Bounds] | None = None) -> Figu
             if edition.factor is not None and shown.any():
                 line = history[shown][0] * edition.factor.value**steps
                 ax.semilogy(steps, line, "-.", color=EDITIONS[name], label=f"{name} bound")
-        if run.last.size > 0:
-            floor = noise(run.pair, run.last) / run.last.size
+        if run.last.scale > 0:
+            floor = noise(run.pair, run.last) / run.last.scale
             ax.axhline(floor, color="0.7", linewidth=0.8, linestyle=":", label="rounding")
         ax.axhline(run.pair.problem.iteration.tolerance, color="0.4", linewidth=0.8, linestyle=":", label="tolerance")
         ax.set_xlabel("evaluations of T")
