@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -33,14 +34,29 @@ class Condensation:
         inside = np.ones(matrix.shape[0], dtype=bool)
         inside[interface] = False
         self.inside: Ints = np.flatnonzero(inside)
-        columns = matrix[:, interface]
-        coupling = columns[self.inside].toarray()
+        self._columns = matrix[:, interface]
         self._solve_inside = solver(matrix[self.inside][:, self.inside])
-        self.lift: Floats = -self._solve_inside(coupling)
-        schur = columns[interface].toarray() + coupling.T @ self.lift
-        self.schur: Floats = (schur + schur.T) / 2
-        for array in (self.lift, self.schur):
-            array.setflags(write=False)
+
+    @cached_property
+    def lift(self) -> Floats:
+        """``-A_II^-1 A_IB``, shape (n - b, b): dense, and large where the body is."""
+        lift: Floats = -self._solve_inside(self._columns[self.inside].toarray())
+        lift.setflags(write=False)
+        return lift
+
+    @cached_property
+    def schur(self) -> Floats:
+        """``A_BB + A_BI lift``, shape (b, b), a few columns at a time where the lift itself was not asked for."""
+        schur: Floats = self._columns[self.interface].toarray()
+        coupling = self._columns[self.inside]
+        if "lift" in self.__dict__:
+            schur += coupling.T @ self.lift
+        else:
+            for i in range(0, schur.shape[1], BLOCK):
+                schur[:, i : i + BLOCK] -= coupling.T @ self._solve_inside(coupling[:, i : i + BLOCK].toarray())
+        schur = (schur + schur.T) / 2
+        schur.setflags(write=False)
+        return schur
 
     def condense(self, load: Floats) -> Floats:
         """The load as the interface feels it: ``load_B + lift' load_I``, shape (b,)."""
@@ -72,6 +88,8 @@ def solver(matrix: sp.csc_array) -> Callable[[Floats], Floats]:
     def solve(right: Floats) -> Floats:
         if right.ndim == 1:
             return np.asarray(factor.solve(right))
+        if right.shape[1] == 0:
+            return right
         blocks = range(0, right.shape[1], BLOCK)
         return np.concatenate([factor.solve(right[:, i : i + BLOCK]) for i in blocks], axis=1)
 

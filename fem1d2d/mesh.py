@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import contextlib
-import sys
+import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -65,7 +64,7 @@ class Mesh:
             array.setflags(write=False)
         object.__setattr__(self, "points", points)
         object.__setattr__(self, "cells", cells)
-        object.__setattr__(self, "sides", MappingProxyType(sides))
+        object.__setattr__(self, "sides", sides)
 
     @property
     def dimension(self) -> int:
@@ -181,14 +180,13 @@ def from_file(path: Path | str) -> Mesh:
     path = Path(path)
     if not path.is_file():
         raise MeshError(f"{path}: no such mesh file")
+    words = io.StringIO()  # its readers print, and exit the interpreter on what they cannot read
     try:
-        with contextlib.redirect_stdout(sys.stderr):  # some of its readers print
+        with contextlib.redirect_stdout(words), contextlib.redirect_stderr(words):
             read = meshio.read(path)
-    except (
-        Exception,
-        SystemExit,
-    ) as error:  # meshio's readers raise whatever their parsers do, and exit on unknown endings
-        raise MeshError(f"{path}: meshio cannot read it ({type(error).__name__}: {error})") from None
+    except (Exception, SystemExit) as error:
+        why = " ".join(words.getvalue().split()) or f"{type(error).__name__}: {error}"
+        raise MeshError(f"{path}: meshio cannot read it ({why})") from None
     triangles = read.cells_dict.get("triangle")
     if triangles is None or len(triangles) == 0:
         raise MeshError(f"{path}: no triangles in it, only {', '.join(read.cells_dict) or 'nothing'}")

@@ -30,6 +30,9 @@ from verification.pair import Body, Facing, Name, Pair
 from verification.problem import BodySpec, Problem
 from verification.reader import ProblemError
 
+#: Interface matrices are dense; more contact nodes would fill the memory.
+MOST_NODES = 2000
+
 
 def build(problem: Problem) -> Pair:
     """Two elastic bodies with roles, as the iteration and its constants need them.
@@ -112,10 +115,13 @@ def _mesh(problem: Problem, name: Name) -> Mesh:
     assert spec.x is not None
     assert spec.cells is not None
     x = (float(spec.x[0]), float(spec.x[1]))
-    if problem.dimension == 1:
-        return interval(x, spec.cells[0])
-    assert spec.y is not None
-    return rectangle(x, (float(spec.y[0]), float(spec.y[1])), (spec.cells[0], spec.cells[1]))
+    try:
+        if problem.dimension == 1:
+            return interval(x, spec.cells[0])
+        assert spec.y is not None
+        return rectangle(x, (float(spec.y[0]), float(spec.y[1])), (spec.cells[0], spec.cells[1]))
+    except MeshError as error:  # coordinates that no longer differ in doubles
+        raise ProblemError(problem.source, f"{name}.cells", list(spec.cells), str(error)) from None
 
 
 def _interface(problem: Problem, meshes: list[Mesh | None]) -> tuple[list[Ints], Floats, Floats]:
@@ -210,6 +216,8 @@ def _check_matching(
                 f" and body 2 has {len(x2)}, which must lie at the same x",
             )
     x = positions[0]
+    if len(x) > MOST_NODES:
+        raise refuse("contact", None, f"needed at most {MOST_NODES} contact nodes, these are {len(x)}")
     if len(x) < 2 or max(x[0] - ends[0], ends[1] - x[-1]) > SAME * size:
         near = f"from {x[0]:g} to {x[-1]:g}" if len(x) else "nowhere"
         raise refuse(
@@ -230,11 +238,13 @@ def _body(problem: Problem, name: Name, mesh: Mesh, nodes: Ints) -> Body:
     except MeshError as error:
         raise ProblemError(problem.source, f"{name}.prescribed", None, str(error)) from None
     if known.known[nodes, d - 1].any():
-        where = mesh.points[nodes[np.argmax(known.known[nodes, d - 1])]].astype(float)
+        node = nodes[np.argmax(known.known[nodes, d - 1])]
+        where = mesh.points[node].astype(float)
+        holds = next(side for side, values in sides.items() if values[d - 1] is not None and node in mesh.sides[side])
         raise ProblemError(
             problem.source,
-            f"{name}.fixed" if spec.fixed else f"{name}.prescribed",
-            list(spec.fixed) if spec.fixed else list(spec.prescribed),
+            f"{name}.fixed" if holds in spec.fixed else f"{name}.prescribed.{holds}",
+            list(spec.fixed) if holds in spec.fixed else None,
             "Gamma_u must leave the normal component of every contact node free; it holds the one at "
             f"({', '.join(f'{c:g}' for c in where)})",
         )
@@ -253,6 +263,13 @@ def _body(problem: Problem, name: Name, mesh: Mesh, nodes: Ints) -> Body:
     contact_edges = {tuple(edge) for edge in np.sort(mesh.boundary[interface_edges], axis=1)}
     for side, force in spec.traction.items():
         outside = [tuple(sorted(edge)) not in contact_edges for edge in mesh.sides[side]]
+        if any(force) and not any(outside):
+            raise ProblemError(
+                problem.source,
+                f"{name}.traction.{side}",
+                list(force),
+                "Gamma_c covers this side: a force there is lost",
+            )
         load += side_load(mesh, mesh.sides[side][np.array(outside, dtype=bool)], plain(force))
     free = np.flatnonzero(~known.known.ravel())
     right = load.ravel()[free] - matrix[free] @ known.values.ravel()

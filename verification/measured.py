@@ -138,10 +138,10 @@ def measure(problem: Problem | Pair, *, refine: int = 0) -> Measured:
     """
     pair = build(problem) if isinstance(problem, Problem) else problem
     with one_thread():
+        finer = [pair.problem.refined(level) for level in range(1, refine + 1)]  # refused before any is measured
         result = _measure(pair)
         if refine:
-            finer = [_measure(build(pair.problem.refined(level))) for level in range(1, refine + 1)]
-            result = replace(result, levels=(result, *finer))
+            result = replace(result, levels=(result, *(_measure(build(problem)) for problem in finer)))
     return result
 
 
@@ -196,12 +196,10 @@ def _body(body: Body) -> BodyConstants:
 
 def lift_gram(body: Body) -> Floats:
     """``N_a = R_a' H_a R_a``: the H1 norm squared of the elastic lift (4.5), on the interface."""
-    elastic, gram = body.elastic, body.gram
-    size = gram.matrix.shape[0]
-    lift = np.zeros((size, len(elastic.interface)))
-    lift[elastic.interface, np.arange(len(elastic.interface))] = 1.0
-    lift[elastic.inside] = elastic.lift
-    product = lift.T @ (gram.matrix @ lift)
+    elastic, H = body.elastic, body.gram_matrix
+    inside, interface, lift = elastic.inside, elastic.interface, elastic.lift
+    cross = H[interface][:, inside] @ lift
+    product = H[interface][:, interface].toarray() + cross + cross.T + lift.T @ (H[inside][:, inside] @ lift)
     return np.asarray((product + product.T) / 2)
 
 

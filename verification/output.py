@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from verification.reader import ProblemError
 
@@ -15,8 +16,24 @@ if TYPE_CHECKING:
     from verification.runs import Run
     from verification.verdicts import Comparison
 
-#: Everything written here carries this word near its beginning; a file without it is somebody else's.
-MARK = b"ndtheory"
+Kind = Literal["run", "solve", "compare"]
+
+_PICTURES = ("bodies.svg", "bodies.png", "residuals.svg", "residuals.png")
+
+#: What each command writes.
+FILES: dict[Kind, tuple[str, ...]] = {
+    "run": ("run.json", *_PICTURES),
+    "solve": ("solve.json", *_PICTURES[:2]),
+    "compare": ("compare.json", *_PICTURES, "report.html"),
+}
+
+#: How a file of ours is told from somebody else's.
+MARKS = {
+    ".json": b'"schema": "ndtheory.',
+    ".svg": b"<dc:title>ndtheory</dc:title>",
+    ".png": b"Software\x00ndtheory",
+    ".html": b'name="generator" content="ndtheory ',
+}
 
 
 class Folder:
@@ -25,34 +42,41 @@ class Folder:
     Parameters
     ----------
     path : Path
+    kind : {'run', 'solve', 'compare'}
+        What will be written: none of those files may be somebody else's.
 
     Raises
     ------
     ProblemError
-        Not a folder, or not writable.
+        Not a folder, not writable, or it holds a file of that name that is not ours.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, kind: Kind) -> None:
         self.path = path
         try:
             path.mkdir(parents=True, exist_ok=True)
             tempfile.TemporaryFile(dir=path).close()
-        except OSError as error:
-            raise ProblemError(str(path), "", None, f"needed a folder to write to: {error.strerror}") from None
+        except (OSError, ValueError) as error:
+            why = getattr(error, "strerror", None) or error
+            raise ProblemError(str(path), "", None, f"needed a folder to write to: {why}") from None
+        for name in FILES[kind]:
+            target = path / name
+            if target.is_dir() or (target.exists() and MARKS[target.suffix] not in target.read_bytes()):
+                raise ProblemError(str(target), "", None, "not written by this program; needed another folder (-o)")
 
-    def _put(self, name: str, write: Callable[[Path], None]) -> Path:
+    def _put(self, name: str, write: Callable[[Path], object]) -> None:
         target = self.path / name
-        if target.exists() and (target.is_dir() or MARK not in target.read_bytes()[:4096]):
-            raise ProblemError(str(target), "", None, "not written by this program; needed another folder (-o)")
-        handle, temporary = tempfile.mkstemp(dir=self.path, suffix=target.suffix)
-        os.close(handle)
         try:
-            write(Path(temporary))
-            os.chmod(temporary, 0o644)
-            os.replace(temporary, target)
-        finally:
-            Path(temporary).unlink(missing_ok=True)
-        return target
+            handle, temporary = tempfile.mkstemp(dir=self.path, suffix=target.suffix)
+            os.close(handle)
+            try:
+                write(Path(temporary))
+                os.chmod(temporary, 0o644)
+                os.replace(temporary, target)
+            finally:
+                Path(temporary).unlink(missing_ok=True)
+        except OSError as error:
+            raise ProblemError(str(target), "", None, f"cannot be written: {error.strerror}") from None
 
     def write_problem(self, text: str) -> Path:
         """Write ``problem.toml``.
@@ -66,39 +90,38 @@ class Folder:
         if target.exists() and (target.is_dir() or target.read_bytes() != text.encode()):
             needed = "differs from the built-in problem: needed another folder (-o), or run compare on this file"
             raise ProblemError(str(target), "", None, needed)
-        target.write_text(text, encoding="utf-8")
+        self._put(target.name, lambda path: path.write_text(text, encoding="utf-8"))
         return target
 
     def write_run(self, run: Run) -> None:
         """Write ``run.json`` and the figures."""
-        from verification.figures import draw_bodies, draw_residuals, save
-
-        self._put("run.json", lambda path: _write(path, run.to_json()))
-        for ending in ("svg", "png"):
-            self._put(f"bodies.{ending}", lambda path: save(draw_bodies(run), path))
-            self._put(f"residuals.{ending}", lambda path: save(draw_residuals(run), path))
+        self._text("run.json", run.to_json())
+        self._pictures(run)
 
     def write_solution(self, solution: Solution) -> None:
-        """Write ``solve.json`` and the figure."""
-        from verification.figures import draw_bodies, save
-
-        self._put("solve.json", lambda path: _write(path, solution.to_json()))
-        for ending in ("svg", "png"):
-            self._put(f"bodies.{ending}", lambda path: save(draw_bodies(solution), path))
+        """Write ``solve.json`` and the figure of the bodies."""
+        self._text("solve.json", solution.to_json())
+        self._pictures(solution)
 
     def write_comparison(self, comparison: Comparison) -> None:
         """Write ``compare.json``, the figures and ``report.html``."""
-        from verification.figures import draw_bodies, draw_residuals, save
         from verification.report import report
 
-        self._put("compare.json", lambda path: _write(path, comparison.to_json()))
-        run = comparison.run
-        for ending in ("svg", "png"):
-            self._put(f"bodies.{ending}", lambda path: save(draw_bodies(run), path))
-            self._put(f"residuals.{ending}", lambda path: save(draw_residuals(run, comparison.bounds), path))
+        self._text("compare.json", comparison.to_json())
+        self._pictures(comparison.run, comparison)
         figures = {name: (self.path / f"{name}.svg").read_text("utf-8") for name in ("bodies", "residuals")}
-        self._put("report.html", lambda path: _write(path, report(comparison, figures)))
+        self._text("report.html", report(comparison, figures))
 
+    def _text(self, name: str, text: str) -> None:
+        self._put(name, lambda path: path.write_text(text + "\n", encoding="utf-8"))
 
-def _write(path: Path, text: str) -> None:
-    path.write_text(text + "\n", encoding="utf-8")
+    def _pictures(self, result: Run | Solution, comparison: Comparison | None = None) -> None:
+        from verification import figures
+        from verification.runs import Run
+
+        drawn = {"bodies": figures.draw_bodies(result)}
+        if isinstance(result, Run):
+            drawn["residuals"] = figures.draw_residuals(result, None if comparison is None else comparison.bounds)
+        for name, figure in drawn.items():
+            for ending in ("svg", "png"):
+                self._put(f"{name}.{ending}", partial(figures.save, figure))

@@ -88,7 +88,9 @@ class Body:
     def elastic(self) -> Condensation:
         """The stiffness matrix condensed onto the interface."""
         with one_thread():
-            return Condensation(self.stiffness, self.interface)
+            condensed = Condensation(self.stiffness, self.interface)
+            condensed.lift  # noqa: B018  loads need it too: once for both
+            return condensed
 
     @cached_property
     def gram(self) -> Condensation:
@@ -212,7 +214,7 @@ class Facing:
         if radius is None or self.problem.contact.law == "local" or self.n < 2:
             return []
         r, width = float(radius), float(np.diff(self.x).max())
-        if r >= width:
+        if r >= width * (1 - 1e-9):
             return []
         return [f"contact.radius = {r:g} is below the mesh width {width:g}: the kernel sees single nodes"]
 

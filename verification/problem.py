@@ -9,7 +9,6 @@ from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, Literal
 
 from ndtheory import HypothesisError, relaxation_factor
@@ -34,7 +33,7 @@ RECTANGLE_SIDES = ("left", "right", "bottom", "top")
 INTERVAL_SIDES = ("left", "right")
 
 #: Largest number of cells of a body; a typing error should not fill the memory.
-MOST_CELLS = 4_000_000
+MOST_CELLS = 250_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -196,9 +195,17 @@ class Problem:
             if body.rigid:
                 return body
             if body.cells is None:
-                raise ProblemError(self.source, f"{name}.mesh", body.mesh, "a mesh file cannot be halved")
-            return replace(body, cells=tuple(n * 2**halvings for n in body.cells))
+                raise ProblemError(
+                    self.source, f"{name}.mesh", body.mesh.name if body.mesh else None, "a mesh file cannot be halved"
+                )
+            cells = tuple(n * 2**halvings for n in body.cells)
+            if math.prod(cells) > MOST_CELLS:
+                needed = f"needed at most {MOST_CELLS} cells after {halvings} halvings"
+                raise ProblemError(self.source, f"{name}.cells", list(cells), needed)
+            return replace(body, cells=cells)
 
+        if not isinstance(halvings, int) or halvings < 0:
+            raise ValueError(f"{halvings} halvings: a whole number >= 0 is needed")
         return replace(self, body1=halved("body1", self.body1), body2=halved("body2", self.body2))
 
 
@@ -223,7 +230,7 @@ def load(path: Path | str) -> Problem:
     if not content.strip():
         raise ProblemError(name, "", None, "the file is empty; `ndtheory example` prints one to start from")
     try:
-        data = tomllib.loads(content.decode("utf-8"), parse_float=Decimal)
+        data = tomllib.loads(content.decode("utf-8-sig"), parse_float=Decimal)
     except UnicodeDecodeError:
         raise ProblemError(name, "", None, "a TOML text file is needed, this is not UTF-8 text") from None
     except (tomllib.TOMLDecodeError, RecursionError, ArithmeticError, ValueError) as error:
@@ -252,7 +259,7 @@ def _read_problem(top: Table, source: str) -> Problem:
     return Problem(
         title=title,
         dimension=dimension,
-        units=MappingProxyType(labels),
+        units=labels,
         body1=body1,
         body2=body2,
         contact=contact,
@@ -321,7 +328,7 @@ def _by_side(table: Table, sides: tuple[str, ...] | None, read: Any) -> Mapping[
         if sides is not None and name not in sides:
             raise table.refuse(name, None, "unknown side; known here: " + ", ".join(sides))
         result[name] = table.take(name, read)
-    return MappingProxyType(result)
+    return result
 
 
 def _read_body(table: Table, dimension: int, source: str) -> BodySpec:
@@ -332,7 +339,7 @@ def _read_body(table: Table, dimension: int, source: str) -> BodySpec:
     sides = {"rectangle": RECTANGLE_SIDES, "interval": INTERVAL_SIDES, "mesh": None}[shape["shape"]]
 
     def side_list(value: Any) -> tuple[str, ...]:
-        if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
+        if not isinstance(value, (list, tuple)) or not all(isinstance(name, str) for name in value):
             raise Unfit('needed a list of side names, as ["bottom"]')
         for name in value:
             if sides is not None and name not in sides:

@@ -13,6 +13,9 @@ from ndtheory import exact
 V = TypeVar("V")
 _MISSING: Any = object()
 
+#: Numbers of a problem file lie between these sizes or are 0; beyond them products of a few overflow a double.
+SMALLEST, LARGEST = Fraction(1, 10**30), Fraction(10**30)
+
 
 class ProblemError(ValueError):
     """A problem that cannot be used.
@@ -31,7 +34,8 @@ class ProblemError(ValueError):
 
     def __init__(self, file: str, key: str, value: Any, needed: str) -> None:
         received = "" if value is None else f" = {show(value)}"
-        super().__init__(": ".join(part for part in (file, f"{key}{received}", needed) if part))
+        message = ": ".join(part for part in (file, f"{key}{received}", needed) if part)
+        super().__init__("".join(c if c.isprintable() else " " for c in message))  # one line, whatever was received
         self.file = file
         self.key = key
         self.value = value
@@ -46,6 +50,8 @@ def show(value: Any) -> str:
     """A value on one short line, as a problem file writes it."""
     if isinstance(value, bool):
         text = str(value).lower()
+    elif isinstance(value, int) and value.bit_length() > 1000:
+        text = f"an integer of {value.bit_length()} bits"
     elif isinstance(value, str):
         text = repr(value).replace("'", '"')
     elif isinstance(value, (Decimal, Fraction)):
@@ -61,7 +67,10 @@ def show(value: Any) -> str:
 
 
 def number(needed: str = "a number", holds: Callable[[Fraction], bool] = lambda v: True) -> Callable[[Any], Fraction]:
-    """Read an exact number: 0.4, 4e-1 or "2/5"; never true, NaN or infinity."""
+    """Read an exact number: 0.4, 4e-1 or "2/5"; never true, NaN or infinity.
+
+    The condition must hold of the number and of the double it becomes.
+    """
 
     def read(value: Any) -> Fraction:
         if isinstance(value, bool) or not isinstance(value, (int, float, str, Decimal, Fraction)):
@@ -70,7 +79,9 @@ def number(needed: str = "a number", holds: Callable[[Fraction], bool] = lambda 
             result = exact(value)
         except ValueError:
             raise Unfit(f"needed {needed}") from None
-        if not holds(result):
+        if result and not SMALLEST <= abs(result) <= LARGEST:
+            raise Unfit(f"needed {needed}, of a size between {float(SMALLEST):g} and {float(LARGEST):g}")
+        if not (holds(result) and holds(Fraction(float(result)))):
             raise Unfit(f"needed {needed}")
         return result
 
@@ -125,7 +136,7 @@ def ends(value: Any) -> tuple[Fraction, Fraction]:
     """Read ``[a, b]`` with a < b."""
     needed = "two numbers [a, b] with a < b"
     a, b = several(number(needed), 2, needed)(value)
-    if not a < b:
+    if not float(a) < float(b):
         raise Unfit(f"needed {needed}")
     return a, b
 

@@ -16,6 +16,14 @@ def _shown(value: float | Number | None) -> str:
     return "-" if number is None else f"{number:.6g}"
 
 
+def _inline(name: str, svg: str) -> str:
+    """An SVG without its prologue and with ids of its own, so that two can stand in one page."""
+    svg = re.sub(r"^.*?(?=<svg)", "", svg, flags=re.DOTALL)
+    for reference in ('id="', 'href="#', "url(#"):
+        svg = svg.replace(reference, f"{reference}{name}-")
+    return svg
+
+
 def report(comparison: Comparison, figures: Mapping[str, str]) -> str:
     """Render a comparison.
 
@@ -32,7 +40,8 @@ def report(comparison: Comparison, figures: Mapping[str, str]) -> str:
         comparison=comparison,
         run=comparison.run,
         problem=comparison.run.pair.problem,
+        title="".join(c if c.isprintable() else " " for c in comparison.run.pair.problem.title),
         measured=comparison.measured,
-        figures={name: re.sub(r"^.*?(?=<svg)", "", text, flags=re.S) for name, text in figures.items()},
+        figures={name: _inline(name, text) for name, text in figures.items()},
         version=__version__,
     )

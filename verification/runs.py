@@ -119,7 +119,8 @@ class Run(Document):
         solvers = [s.contact.solver for s in self.states]
         reason = {"linearised_rate": "not computed by this version", "linearised_norm": "not computed by this version"}
         if rate is None:
-            reason["observed_rate"] = "fewer than two step ratios stand clear of rounding"
+            few = "fewer than two step ratios stand clear of rounding"
+            reason |= {"observed_rate": few, "observed_rate_interval": few}
         return {
             "title": self.pair.problem.title,
             "theta": float(self.theta),

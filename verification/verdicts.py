@@ -58,8 +58,8 @@ class Comparison(Document):
 
     @property
     def proved_violated(self) -> bool:
-        """Whether a proved claim failed: a bug, or an error in a proof."""
-        return any(self.verdicts[name].verdict == "VIOLATED" and self.bounds[name].proved for name in self.bounds)
+        """Whether a proved claim failed: a bug, or an error in a proof.  A violated printed claim is a finding."""
+        return any(j.verdict == "VIOLATED" for name, j in self.verdicts.items() if name != "printed")
 
     @property
     def inconclusive(self) -> bool:
@@ -67,11 +67,16 @@ class Comparison(Document):
         return any(judgement.verdict == "INCONCLUSIVE" for judgement in self.verdicts.values())
 
     def content(self) -> dict[str, Any]:
-        editions: dict[str, Any] = {name: bounds.to_dict() for name, bounds in self.bounds.items()}
+        editions: dict[str, Any] = {e.name: None for e in EDITIONS}
+        editions |= {name: bounds.to_dict() for name, bounds in self.bounds.items()}
+        reason = dict.fromkeys(("sharp", "lmi"), "not computed by this version")
+        if self.step_ratio is None:
+            reason["step_ratio"] = "no step stands clear of rounding"
+        no_bounds = {} if self.bounds else {e.name: next(iter(self.measured.reason.values()), "") for e in EDITIONS}
         return {
             "title": self.run.pair.problem.title,
             "constants": self.measured.content(),
-            "bounds": {"editions": {**editions, "sharp": None}},
+            "bounds": {"editions": {**editions, "sharp": None}, "reason": {**no_bounds, "sharp": reason["sharp"]}},
             "sharp": None,
             "lmi": None,
             "run": self.run.content(),
@@ -80,7 +85,7 @@ class Comparison(Document):
             else {"value": self.step_ratio.value, "interval": [self.step_ratio.lo, self.step_ratio.hi]},
             "verdicts": {name: judgement.verdict for name, judgement in self.verdicts.items()},
             "reasons": {name: judgement.reason for name, judgement in self.verdicts.items()},
-            "reason": dict.fromkeys(("sharp", "lmi"), "not computed by this version"),
+            "reason": reason,
         }
 
 
@@ -102,7 +107,7 @@ def judge(bound: float | None, seen: StepRatio | None, why_none: str) -> Judgeme
         return Judgement(verdict="HYPOTHESES_NOT_MET", reason=why_none)
     if seen is None:
         return Judgement(verdict="INCONCLUSIVE", reason="no step stands clear of rounding")
-    says = f"largest step ratio {seen.value:.6g} in {seen.steps} steps, bound {bound:.6g}"
+    says = f"ratios <= {seen.value:.6g} in {seen.steps} steps, bound {bound:.6g}"
     if seen.hi <= bound:
         return Judgement(verdict="CONSISTENT", reason=says)
     if seen.lo > bound:

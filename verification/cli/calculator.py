@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import click
 
-from ndtheory import EDITIONS, Bounds, Constants, evaluate
+from ndtheory import EDITIONS, Bounds, Constants, evaluate, relaxation_factor
 from verification.cli.console import factor, figures, heading, say, table
 from verification.document import Document
 
@@ -29,21 +29,28 @@ class BoundsDocument(Document):
                 **{name: bounds.to_dict() for name, bounds in self.editions.items()},
                 "sharp": None,
             },
-            "reason": {"sharp": "not computed by this version"},
+            "reason": {
+                **{e.name: "not asked for" for e in EDITIONS if e.name not in self.editions},
+                "sharp": "not computed by this version",
+            },
         }
 
 
 @click.command()
-@click.option("--m", "m", metavar="NUMBER", help="Coercivity: the smaller of the m^a (stress).")
-@click.option("--M", "M", metavar="NUMBER", help="Continuity: the sum of the M^a (stress), at least m.")
+@click.option("--m", "m", metavar="NUMBER", help="Smaller coercivity m^a of the bodies (stress).")
+@click.option("--M", "M", metavar="NUMBER", help="Sum of the continuity constants M^a (stress), at least m.")
 @click.option("--CR", "C_R", metavar="NUMBER", help="Lift constant, at least 1.")
 @click.option("--Cs", "C_s", metavar="NUMBER", help="Constant of w -> S(sigma_N(w)) into L2.")
 @click.option("--Ctr", "C_tr", metavar="NUMBER", help="Constant of the tangential trace into L2.")
 @click.option("--k", "k", metavar="NUMBER", help="Coefficient of friction.")
-@click.option("--CK", "C_K", metavar="NUMBER", help="k Cs Ctr (stress), instead of those three.")
+@click.option("--CK", "C_K", metavar="NUMBER", help="Product k Cs Ctr (stress), instead of those three.")
 @click.option("--theta", "theta", metavar="NUMBER", help="Relaxation factor, 0 < theta < 1.")
 @click.option(
-    "--edition", type=click.Choice(["printed", "repaired", "both"]), default="both", show_default=True, help="Which."
+    "--edition",
+    type=click.Choice(["printed", "repaired", "both"]),
+    default="both",
+    show_default=True,
+    help="Edition of the theorem.",
 )
 @click.option("--rho", metavar="NUMBER", help="For the sharp edition (not supported yet).")
 @click.option("--kappa1", metavar="NUMBER", help="For the sharp edition (not supported yet).")
@@ -75,8 +82,10 @@ def bounds(
     constants = Constants(**given)
     chosen: dict[str, Bounds] = {e.name: evaluate(e, constants, theta) for e in EDITIONS if edition in (e.name, "both")}
     if as_json:
-        inputs = {key: None if value is None else float(getattr(constants, key)) for key, value in given.items()}
-        inputs["theta"] = next(iter(chosen.values())).theta
+        inputs: dict[str, Any] = {key: getattr(constants, key) for key in given}
+        inputs["theta"] = None if theta is None else relaxation_factor(theta)
+        absent = dict.fromkeys((key for key, value in inputs.items() if value is None), "not given")
+        inputs = {key: None if value is None else float(value) for key, value in inputs.items()} | {"reason": absent}
         say(BoundsDocument(inputs, chosen).to_json())
     else:
         _screen(constants, chosen)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -18,14 +18,41 @@ if TYPE_CHECKING:
 WIDTH = 80
 
 
+class ReaderGone(Exception):
+    """Nobody reads stdout any more."""
+
+
+class Interrupted(Exception):
+    """Ctrl-C after the result was shown."""
+
+
 def say(text: str = "") -> None:
-    """A line of the result."""
-    click.echo(text)
+    """A line of the result.
+
+    Raises
+    ------
+    ReaderGone
+        The other end of a pipe was closed.
+    """
+    try:
+        click.echo(text)
+    except BrokenPipeError:
+        raise ReaderGone from None
+
+
+def printable(text: str) -> str:
+    """A text from outside on one line, without what could steer a terminal.
+
+    >>> printable("a" + chr(27) + "b" + chr(10) + "c")
+    'a b c'
+    """
+    return "".join(c if c.isprintable() else " " for c in text)
 
 
 def complain(text: str) -> None:
     """A line about the result: errors, warnings, notes."""
-    click.echo(text, err=True)
+    with contextlib.suppress(OSError):  # nowhere to complain to
+        click.echo(text, err=True)
 
 
 def heading(question: str) -> None:
@@ -81,10 +108,10 @@ def factor(value: Number | None, one_minus: Number | None) -> str:
     return f"1 - {one_minus.value:.1e}" if one_minus.value < 1e-3 else figures(value)
 
 
-@contextmanager
+@contextlib.contextmanager
 def progress(title: str, tolerance: float) -> Iterator[Callable[[State], None]]:
     """A live line on a terminal's stderr: how far the residual has fallen towards its tolerance."""
-    if not sys.stderr.isatty():
+    if sys.stderr is None or not sys.stderr.isatty():
         yield lambda state: None
         return
     from rich.console import Console

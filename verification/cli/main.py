@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import os
 import sys
 import traceback
 from collections.abc import Sequence
@@ -12,7 +14,7 @@ import ndtheory
 import verification
 from ndtheory import HypothesisError
 from verification.cli import calculator, problems
-from verification.cli.console import complain
+from verification.cli.console import Interrupted, ReaderGone, complain
 
 #: Exit statuses of the interface.  A crash is none of them.
 DONE, NOT_MET, BAD_INPUT, INCONCLUSIVE, INTERRUPTED, CRASH = 0, 1, 2, 3, 130, 70
@@ -56,11 +58,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
             " has overwritten it; reinstall ndtheory"
         )
         return BAD_INPUT
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # a title beyond the terminal's encoding
     try:
         status = cli.main(
             args=None if arguments is None else list(arguments), prog_name="ndtheory", standalone_mode=False
         )
-        sys.stdout.flush()
+        if sys.stdout is not None:
+            sys.stdout.flush()
     except click.exceptions.NoArgsIsHelpError as error:
         complain(error.ctx.get_help() if error.ctx else str(error))
         return BAD_INPUT
@@ -71,9 +77,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (click.Abort, KeyboardInterrupt):
         complain("interrupted before anything was computed")
         return INTERRUPTED
-    except BrokenPipeError:
-        sys.stderr.close()  # the reader went away; nothing more to say
+    except Interrupted:
+        return INTERRUPTED
+    except (ReaderGone, BrokenPipeError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is still buffered has nowhere to go
         return DONE
+    except SystemExit as error:  # click meets a closed pipe with an exit of its own
+        return error.code if isinstance(error.code, int) and error.code != NOT_MET else DONE
     except Exception as error:
         return _explain(error)
     return status if isinstance(status, int) else DONE
@@ -86,8 +96,8 @@ def _explain(error: Exception) -> int:
     if isinstance(error, (ProblemError, HypothesisError, click.ClickException)):
         complain(f"ndtheory: {error}")
         return BAD_INPUT
-    if isinstance(error, OSError) and error.filename is not None:
-        complain(f"ndtheory: {error.filename}: {error.strerror}")
+    if isinstance(error, OSError):
+        complain(f"ndtheory: {error.filename or 'output'}: {error.strerror}")
         return BAD_INPUT
     if isinstance(error, MemoryError):
         complain("ndtheory: the problem does not fit into memory; needed fewer cells")

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from verification.cli.console import complain, progress, say
+from verification.cli.console import Interrupted, complain, progress, say
 
 if TYPE_CHECKING:
+    from verification.document import Document
     from verification.problem import Problem
     from verification.runs import Run
     from verification.verdicts import Comparison
@@ -27,7 +28,15 @@ SOLVER = click.option(
     show_default=True,
     help="Who solves step II.",
 )
-FOLDER = click.option("-o", "--output", "folder", type=click.Path(path_type=Path), help="Folder for JSON and figures.")
+
+
+def _folder(context: click.Context, parameter: click.Parameter, value: str | None) -> Path | None:
+    if value == "":
+        raise click.BadParameter("'': needed the name of a folder", context, parameter)
+    return None if value is None else Path(value)
+
+
+FOLDER = click.option("-o", "--output", "folder", callback=_folder, metavar="DIR", help="Folder for JSON and figures.")
 
 
 def examples() -> dict[str, str]:
@@ -137,18 +146,14 @@ def run(file: Path, theta: str | None, solver: Any, swap_roles: bool, folder: Pa
     from verification.output import Folder
 
     problem = _load(file, theta, swap_roles)
-    target = None if folder is None else Folder(folder)
+    target = None if folder is None else Folder(folder, "run")
     pair = build(problem)
     _warn(pair.warnings)
     with progress("iterating", problem.iteration.tolerance) as watch:
         finished = runs.run(pair, solver=solver, watch=watch)
-    if target is not None:
-        target.write_run(finished)
-    if as_json:
-        say(finished.to_json())
-    else:
-        screens.run(finished, file)
-    return _status_of_run(finished)
+    write = None if target is None else lambda: target.write_run(finished)
+    _deliver(finished, lambda: screens.run(finished, file), write, folder, as_json)
+    return _status_of_run(finished, swap_roles)
 
 
 @click.command()
@@ -171,16 +176,12 @@ def solve(file: Path, folder: Path | None, as_json: bool) -> int:
     from verification.output import Folder
 
     problem = _load(file, None, False)
-    target = None if folder is None else Folder(folder)
+    target = None if folder is None else Folder(folder, "solve")
     facing = face(problem)
     _warn(facing.warnings)
     solution = monolithic.solve(facing)
-    if target is not None:
-        target.write_solution(solution)
-    if as_json:
-        say(solution.to_json())
-    else:
-        screens.solution(solution, file)
+    write = None if target is None else lambda: target.write_solution(solution)
+    _deliver(solution, lambda: screens.solution(solution, file), write, folder, as_json)
     return 0
 
 
@@ -202,7 +203,7 @@ def compare(file: Path, theta: str | None, solver: Any, swap_roles: bool, folder
       ndtheory compare my.toml -o results
     """
     problem = _load(file, theta, swap_roles)
-    return _compare(problem, file, folder, solver, as_json)
+    return _compare(problem, file, folder, solver, as_json, swap_roles)
 
 
 @click.command()
@@ -210,8 +211,9 @@ def compare(file: Path, theta: str | None, solver: Any, swap_roles: bool, folder
     "-o",
     "--output",
     "folder",
-    type=click.Path(path_type=Path),
-    default=Path("ndtheory-demo"),
+    callback=_folder,
+    metavar="DIR",
+    default="ndtheory-demo",
     show_default=True,
     help="Folder to write.",
 )
@@ -226,28 +228,43 @@ def demo(folder: Path, as_json: bool) -> int:
     from verification.output import Folder
     from verification.problem import load
 
-    written = Folder(folder).write_problem(examples()["section6"])
-    return _compare(load(written), written, folder, "auto", as_json)
+    written = Folder(folder, "compare").write_problem(examples()["section6"])
+    return _compare(load(written), written, folder, "auto", as_json, False)
 
 
-def _compare(problem: Problem, file: Path, folder: Path | None, solver: Any, as_json: bool) -> int:
+def _compare(problem: Problem, file: Path, folder: Path | None, solver: Any, as_json: bool, swapped: bool) -> int:
     from verification import verdicts
     from verification.bodies import build
     from verification.cli import screens
     from verification.output import Folder
 
-    target = None if folder is None else Folder(folder)
+    target = None if folder is None else Folder(folder, "compare")
     pair = build(problem)
     _warn(pair.warnings)
     with progress("iterating", problem.iteration.tolerance) as watch:
         comparison = verdicts.compare(pair, solver=solver, watch=watch)
-    if target is not None:
-        target.write_comparison(comparison)
+    write = None if target is None else lambda: target.write_comparison(comparison)
+    _deliver(comparison, lambda: screens.comparison(comparison, file), write, folder, as_json)
+    return _status_of_comparison(comparison, swapped)
+
+
+def _deliver(
+    document: Document, screen: Callable[[], None], write: Callable[[], None] | None, folder: Path | None, as_json: bool
+) -> None:
+    """Show first, then write: what goes wrong while writing costs no result."""
     if as_json:
-        say(comparison.to_json())
+        say(document.to_json())
     else:
-        screens.comparison(comparison, file, folder)
-    return _status_of_comparison(comparison)
+        screen()
+    if write is None:
+        return
+    try:
+        write()
+    except KeyboardInterrupt:
+        complain(f"interrupted while {folder} was written; the result is shown above")
+        raise Interrupted from None
+    if not as_json:
+        complain(f"written: {folder}")
 
 
 def _warn(warnings: list[str]) -> None:
@@ -255,41 +272,59 @@ def _warn(warnings: list[str]) -> None:
         complain(f"warning: {warning}")
 
 
-def _status_of_run(finished: Run) -> int:
+def _status_of_run(finished: Run, swapped: bool) -> int:
     if finished.outcome == "interrupted":
         complain(f"interrupted after {finished.evaluations} evaluations of T: what was computed is kept")
         return 130
     if not finished.converged:
-        complain(remedy(finished))
+        complain(remedy(finished, swapped))
     return 0 if finished.converged else 1
 
 
-def remedy(finished: Run) -> str:
-    """What could be done about a run that did not converge, in one sentence."""
-    from verification.measured import measure
+def remedy(finished: Run, swapped: bool) -> str:
+    """What could be done about a run that did not converge, in one sentence.
 
-    pair, theta = finished.pair, float(finished.theta)
+    Parameters
+    ----------
+    finished : Run
+    swapped : bool
+        Whether its roles are those of --swap-roles.
+    """
+    from verification.measured import measure
+    from verification.rates import noise
+
+    pair, theta, last = finished.pair, float(finished.theta), finished.last
     if finished.outcome == "limit":
         return "not converged: max_iterations was reached while the residual still fell; raise it, or change theta"
+    if last.residual <= 100 * noise(pair, last):
+        reached = f"{last.relative_residual:.1e}"
+        return f"{finished.outcome}: the residual fell to rounding, {reached}; the tolerance must be larger than that"
+    if theta < 1e-9:
+        return f"{finished.outcome}: a step of theta = {theta:g} is lost in rounding; try a larger theta"
     rho = measure(pair)
     here = f"{finished.outcome}: theta = {theta:g} does not contract here"
+    roles = "without --swap-roles" if swapped else "--swap-roles"
     if rho.rho_max is None or rho.rho_min is None:
-        return f"{here}; try a smaller theta or --swap-roles"
-    good, swapped = 2 / (2 + rho.rho_max.value), 2 / (2 + 1 / rho.rho_min.value)
-    advice: Callable[[float], str] = lambda value: f"{value:.2g}"
+        return f"{here}; try a smaller theta, or {roles}"
+    good, other = worth_trying(rho.rho_max.value), worth_trying(1 / rho.rho_min.value)
+    better = f", or {roles} with --theta {other:.2g}" if other > good else ""
     if theta <= good:
-        return f"{here}; try a smaller theta"
-    better = f", or --swap-roles with --theta {advice(swapped)}" if swapped > good else ""
-    return f"{here}; try --theta {advice(good)} (2/(2 + rho), rho = {rho.rho_max.value:.3g}){better}"
+        return f"{here}; try --theta {theta / 2:.2g}{better}"
+    return f"{here}; try --theta {good:.2g} (2/(2 + rho), rho = {rho.rho_max.value:.3g}){better}"
 
 
-def _status_of_comparison(comparison: Comparison) -> int:
+def worth_trying(rho: float) -> float:
+    """2/(2 + rho), and below 1 when it is written with two figures."""
+    return min(2 / (2 + rho), 0.99)
+
+
+def _status_of_comparison(comparison: Comparison, swapped: bool) -> int:
     outcome = comparison.run.outcome
     if outcome == "interrupted":
-        return _status_of_run(comparison.run)
+        return _status_of_run(comparison.run, swapped)
     if comparison.proved_violated:
         complain("a proved bound is violated: a bug in this program or an error in the proof; please report it")
         return 1
     if outcome in ("stalled", "diverged"):
-        return _status_of_run(comparison.run)
+        return _status_of_run(comparison.run, swapped)
     return 3 if comparison.inconclusive else 0

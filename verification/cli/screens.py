@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
+from shlex import quote
 
 from verification.cli.calculator import edition_rows
-from verification.cli.console import figures, heading, near_one, say, table
+from verification.cli.console import figures, heading, near_one, printable, say, table
+from verification.cli.problems import worth_trying
 from verification.contact_state import ContactState
 from verification.measured import Measured
 from verification.monolithic import Solution
@@ -21,15 +22,15 @@ def _setting(problem: Problem, nodes: int | None = None, interface: int | None =
     units, contact = problem.units, problem.contact
     counts = "" if nodes is None else f" | {nodes} nodes, {interface} on Gamma_c"
     bodies = (problem.body1, problem.body2)
-    moduli = " / ".join("rigid" if body.rigid else figures(float(body.young)) for body in bodies)
-    say(f"{problem.title}{counts} | E {moduli} {units['stress']}")
-    body = {1: "body 1 (lower)", 2: "body 2 (upper)"}[problem.iteration.neumann_body]
+    moduli = " / ".join("rigid" if body.rigid else f"{float(body.young):g}" for body in bodies)
+    say(f"{printable(problem.title)}{counts} | E {moduli} {units['stress']}")
+    body = {1: "lower", 2: "upper"}[problem.iteration.neumann_body]
     law = {"nonlocal": "non-local", "local": "local law"}[contact.law]
     friction = "no friction" if not contact.friction else f"k = {figures(float(contact.friction), 2)}, {law}"
     if contact.friction and contact.radius is not None and contact.law == "nonlocal":
         friction += f", r = {float(contact.radius):g} {units['length']}"
     if any(body.rigid for body in bodies):
-        say(f"Obstacle: body {1 if problem.body1.rigid else 2} | {friction}")
+        say(f"Obstacle: {'lower' if problem.body1.rigid else 'upper'} body | {friction}")
     else:
         say(f"Neumann body: {body} | {friction} | theta = {float(problem.iteration.theta):g}")
 
@@ -52,7 +53,7 @@ def constants(problem: Problem, measured: Measured) -> None:
     say("Exact for this mesh, up to rounding.  On a mesh m is above and M below its")
     say("continuous value: for the continuous theorem both err on the unsafe side.")
     if problem.source != "<dict>":
-        say(f"Next: ndtheory compare {problem.source}")
+        say(f"Next: ndtheory compare {quote(problem.source)}")
 
 
 def _happened(run: Run) -> None:
@@ -94,7 +95,7 @@ def run(finished: Run, file: Path) -> None:
     _setting(_at(finished), sum(len(body.mesh.points) for body in bodies), finished.pair.n)
     _happened(finished)
     _limits(finished.pair)
-    say(f"Next: ndtheory compare {file}")
+    say(f"Next: ndtheory compare {quote(str(file))}")
 
 
 def solution(found: Solution, file: Path) -> None:
@@ -106,14 +107,14 @@ def solution(found: Solution, file: Path) -> None:
     say(f"  KKT residual {found.kkt_residual:.1e} after {found.linear_solves} linear systems on Gamma_c")
     _limits(facing)
     iterates = len(facing.elastic) == 2
-    say(f"Next: ndtheory {'run' if iterates else 'solve'} {file}{'' if iterates else ' -o results'}")
+    say(f"Next: ndtheory {'run' if iterates else 'solve'} {quote(str(file))}{'' if iterates else ' -o results'}")
 
 
 def _at(run: Run) -> Problem:
     return run.pair.problem.with_theta(run.theta)
 
 
-def comparison(result: Comparison, file: Path, folder: Path | None) -> None:
+def comparison(result: Comparison, file: Path) -> None:
     """The screen of ``compare`` and ``demo``."""
     finished, measured = result.run, result.measured
     _setting(_at(finished), measured.body1.nodes + measured.body2.nodes, measured.interface_nodes)
@@ -133,14 +134,10 @@ def comparison(result: Comparison, file: Path, folder: Path | None) -> None:
     heading("DOES THE RUN AGREE WITH THE BOUND?")
     table([["edition", "verdict", "why"], *([n, j.verdict, j.reason] for n, j in result.verdicts.items())])
     _limits(finished.pair)
-    if folder is not None:
-        say(f"Written: {folder / 'report.html'}, compare.json, bodies and residuals (svg, png)")
-    say(f"Next: ndtheory run {file} --theta {_next_theta(result)}")
+    say(f"Next: ndtheory run {quote(str(file))} --theta {_next_theta(result)}")
 
 
 def _next_theta(result: Comparison) -> str:
-    """A theta worth trying: 2/(2 + rho), rounded."""
+    """A theta worth trying, of two figures."""
     rho = result.measured.rho_max
-    if rho is None or not math.isfinite(rho.value):
-        return "0.5"
-    return f"{2 / (2 + rho.value):.2g}"
+    return "0.5" if rho is None else f"{worth_trying(rho.value):.2g}"

@@ -19,7 +19,7 @@ Solver = Literal["auto", "cvxpy", "active-set"]
 
 
 class ContactError(RuntimeError):
-    """No solver reached the KKT certificate; the message gives the residual that was reached."""
+    """No solver reached the KKT certificate."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -61,6 +61,8 @@ class ContactStep:
     """
 
     def __init__(self, S: Floats, free: NDArray[np.bool_], tangential: int, solver: Solver = "auto") -> None:
+        if solver not in ("auto", "cvxpy", "active-set"):
+            raise ValueError(f"solver {solver!r}: needed 'auto', 'cvxpy' or 'active-set'")
         self._S, self._free, self._t, self._solver = S, free, tangential, solver
         self._active = ActiveSet(S, free, tangential)
         self._model: ContactModel | None = None

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from fem1d2d.mesh import Floats
 from verification.contact_state import ContactState
-from verification.figures.style import BODY1, BODY2, PRESSURE, SHEAR, STATES, new_figure, styled
+from verification.figures.style import BODY1, BODY2, PRESSURE, SHEAR, STATES, new_figure, plain, styled
 from verification.monolithic import Solution
 from verification.pair import Facing
 from verification.runs import Run
@@ -78,12 +78,12 @@ def _draw_meshes(ax: Axes, facing: Facing, displacements: tuple[Floats | None, F
     ax.autoscale_view()
     if facing.problem.dimension == 2:
         ax.set_aspect("equal")
-        ax.set_ylabel(f"y [{length}]")
+        ax.set_ylabel(f"y [{plain(length)}]")
     else:
         ax.set_ylim(-0.4, 0.8)
         ax.set_yticks([])
-        ax.set_xlabel(f"x [{length}]")
-    ax.set_title(f"{facing.problem.title}: deformed, displacements x {scale:g}")
+        ax.set_xlabel(f"x [{plain(length)}]")
+    ax.set_title(f"{plain(facing.problem.title)}: deformed, displacements x {scale:g}")
     ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
@@ -105,6 +105,6 @@ def _draw_stresses(ax: Axes, contact: ContactState, units: Mapping[str, str]) ->
             ax.plot(
                 contact.x[here], contact.shear[here], marker, color=STATES[name], markersize=4, label=name, linestyle=""
             )
-    ax.set_xlabel(f"x along $\\Gamma_c$ [{units['length']}]")
-    ax.set_ylabel(f"stress [{units['stress']}]")
+    ax.set_xlabel(f"x along $\\Gamma_c$ [{plain(units['length'])}]")
+    ax.set_ylabel(f"stress [{plain(units['stress'])}]")
     ax.legend(ncols=1, loc="center left", bbox_to_anchor=(1.0, 0.5))

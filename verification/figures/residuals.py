@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from ndtheory import Bounds
-from verification.figures.style import EDITIONS, PRESSURE, new_figure, styled
+from verification.figures.style import EDITIONS, PRESSURE, new_figure, plain, styled
 from verification.rates import noise
 from verification.runs import Run
 
@@ -48,6 +48,6 @@ def draw_residuals(run: Run, bounds: Mapping[str, Bounds] | None = None) -> Figu
         ax.set_xlabel("evaluations of T")
         ax.set_ylabel("|||T g - g||| / |||T g|||")
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
-        ax.set_title(f"{run.pair.problem.title}: theta = {float(run.theta):g}")
+        ax.set_title(f"{plain(run.pair.problem.title)}: theta = {float(run.theta):g}")
         ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -29,19 +32,29 @@ _PARAMETERS: Any = {
 
 def new_figure(width: float, height: float) -> Figure:
     """An empty figure of the given size in inches, free of any window system."""
-    with mpl.rc_context(_PARAMETERS):
+    with styled():
         figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
 
-def styled() -> Any:
-    """A context in which axes and artists take the house's parameters."""
-    return mpl.rc_context(_PARAMETERS)
+@contextmanager
+def styled() -> Iterator[None]:
+    """A context in which axes and artists take the house's parameters, whatever the user's configuration says."""
+    with mpl.rc_context(), warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # a character that no installed font has
+        mpl.rcdefaults()
+        mpl.rcParams.update(_PARAMETERS)
+        yield
+
+
+def plain(text: str) -> str:
+    """A text from outside as it is: no mathematics between dollar signs, no control characters."""
+    return "".join(c if c.isprintable() else " " for c in text).replace("$", r"\$")
 
 
 def save(figure: Figure, path: Path) -> None:
     """Write a figure; the ending of the path chooses SVG or PNG."""
     metadata = {"Creator": "ndtheory", "Date": None} if path.suffix == ".svg" else {"Software": "ndtheory"}
-    with mpl.rc_context(_PARAMETERS):
+    with styled():
         figure.savefig(path, dpi=160, metadata=metadata)

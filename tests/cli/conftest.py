@@ -1,0 +1,167 @@
+"""The command in process: what a user types, and what comes back."""
+
+import json
+import re
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import pytest
+
+from verification import figures
+from verification.cli import main, problems
+
+SMALL = """\
+title = "Small"
+dimension = 2
+
+[units]
+length = "mm"
+stress = "MPa"
+
+[body1]
+shape = "rectangle"
+x = [0.0, 2.0]
+y = [-0.3, 0.0]
+cells = [10, 2]
+young = 7.0e4
+poisson = 0.3
+fixed = ["bottom"]
+body_force = [0.0, 0.0]
+
+[body2]
+shape = "rectangle"
+x = [0.4, 1.6]
+y = [0.0, 0.3]
+cells = [6, 2]
+young = 2.0e4
+poisson = 0.3
+prescribed = { top = [0.0, -0.015] }
+
+[contact]
+friction = 0.2
+law = "nonlocal"
+radius = 0.3
+
+[iteration]
+neumann_body = 1
+theta = 0.7
+tolerance = 1e-9
+max_iterations = 500
+
+[norm]
+length = 1.0
+"""
+
+#: Edits that open the file's gap so far that the bodies never meet, that load nothing, that end inside the theorem.
+EDITS = {
+    "apart": {"contact.gap": "0.1"},
+    "unloaded": {"body2.prescribed": "{ top = [0.0, 0.0] }"},
+    "inside the theorem": {"contact.friction": "1e-8", "iteration.theta": "1e-4", "iteration.max_iterations": "9"},
+    "inside, unloaded": {
+        "contact.friction": "1e-8",
+        "iteration.theta": "1e-4",
+        "body2.prescribed": "{ top = [0.0, 0.0] }",
+    },
+    "without friction": {"contact.friction": "0", "contact.radius": None},
+    "held tangentially": {"body2.prescribed": '{ top = [0.0, -0.015], left = [0.0, "free"] }'},
+    "local law": {"contact.law": '"local"', "contact.radius": None},
+    "wrong roles": {"iteration.neumann_body": "2"},
+    "soft upper body": {"body2.young": "100"},
+    "stiff upper body": {"body2.young": "2e10"},
+    "below rounding": {"iteration.tolerance": "1e-20"},
+}
+
+
+def put(text: str, key: str, value: str | None) -> str:
+    """A problem file with one key set, added or, for None, taken out; a dotless key stands at the top."""
+    table, _, name = key.rpartition(".")
+    parts = re.split(r"^(?=\[)", text, flags=re.M)
+    index = next((i for i, part in enumerate(parts) if part.startswith(f"[{table}]")), 0 if not table else len(parts))
+    if index == len(parts):
+        parts.append(f"[{table}]\n")
+    lines = [line for line in parts[index].splitlines() if line.partition("=")[0].strip() != name]
+    if value is not None:
+        lines.insert(1 if table else 0, f"{name} = {value}")
+    parts[index] = "\n".join(lines) + "\n"
+    return "".join(parts)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a call leaves behind."""
+
+    status: int
+    out: str
+    err: str
+
+    @property
+    def document(self) -> dict:
+        """The one JSON document on stdout; every number in it is finite."""
+
+        def refuse(name: str) -> None:
+            raise AssertionError(f"{name} in a JSON document")
+
+        assert self.out.startswith("{"), self
+        document, end = json.JSONDecoder(parse_constant=refuse).raw_decode(self.out)
+        assert self.out[end:] == "\n"
+        return document
+
+    @property
+    def complaint(self) -> str:
+        """The one line of a refusal: status 2, nothing on stdout."""
+        assert (self.status, self.out) == (2, ""), self
+        assert self.err.count("\n") == 1, self.err
+        assert self.err.endswith("\n")
+        return self.err[:-1]
+
+
+@pytest.fixture
+def call(capsys):
+    """``call("run", file, "--json")`` as ``ndtheory run file --json``."""
+
+    def answer(*arguments: object) -> Answer:
+        capsys.readouterr()
+        status = main([str(argument) for argument in arguments])
+        return Answer(status, *capsys.readouterr())
+
+    return answer
+
+
+@pytest.fixture
+def write(tmp_path):
+    """Write a problem, the small one, with keys changed by name of `EDITS` or as a dictionary; returns its path."""
+
+    def write(edits: str | dict[str, str | None] | None = None, name: str = "problem.toml", text: str = SMALL):
+        for key, value in (EDITS[edits] if isinstance(edits, str) else edits or {}).items():
+            text = put(text, key, value)
+        path = tmp_path / name
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return write
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """Figures that cost nothing, where only their files matter."""
+    monkeypatch.setattr(figures, "draw_bodies", lambda result: "bodies")
+    monkeypatch.setattr(figures, "draw_residuals", lambda run, bounds=None: "residuals")
+    monkeypatch.setattr(
+        figures,
+        "save",
+        lambda figure, path: path.write_bytes(b"<svg><dc:title>ndtheory</dc:title>Software\x00ndtheory</svg>"),
+    )
+
+
+@pytest.fixture
+def after(monkeypatch):
+    """``after(n, action)``: act once the iteration has shown n states."""
+
+    def arrange(states: int, action) -> None:
+        @contextmanager
+        def progress(title, tolerance):
+            yield lambda state: action() if state.iteration + 1 == states else None
+
+        monkeypatch.setattr(problems, "progress", progress)
+
+    return arrange

@@ -1,0 +1,342 @@
+"""Every command: its screen, its help, its options, and the line that says what to type next."""
+
+import re
+import shlex
+import tomllib
+
+import pytest
+
+import ndtheory
+from verification.cli.problems import examples
+
+COMMANDS = ["example", "demo", "bounds", "constants", "run", "solve", "compare"]
+CONSTANTS = ["--m", "3084", "--M", "153229", "--CR", "1.70", "--CK", "1e-8"]
+LATER = ["advise", "region", "sweep", "reproduce", "verify", "explore"]
+
+#: Exit status of (run, compare) on each built-in problem; `inside` ends at its limit, which compare does not mind.
+BUILT_IN = {"inside": (1, 0), "section6": (0, 0), "signorini": (0, 0), "two-bars": (0, 0)}
+
+HEADINGS = {
+    "constants": ["WHAT DOES THE THEOREM NEED TO KNOW?"],
+    "run": ["WHAT HAPPENED"],
+    "solve": ["WHAT IS THE SOLUTION?"],
+    "compare": [
+        "HOW LARGE ARE THE CONSTANTS?",
+        "DOES ONE STEP CONTRACT?",
+        "WHAT HAPPENED",
+        "DOES THE RUN AGREE WITH THE BOUND?",
+    ],
+    "bounds": ["DOES ONE STEP CONTRACT?", "THE CONSTANTS OF SECTION 5"],
+}
+
+
+@pytest.fixture
+def built_in(tmp_path):
+    def write(name):
+        path = tmp_path / f"{name}.toml"
+        path.write_text(examples()[name], encoding="utf-8")
+        return path
+
+    return write
+
+
+# --- help ---
+
+
+def test_the_command_alone_shows_its_help_and_asks_for_a_command(call):
+    answer = call()
+    assert (answer.status, answer.out) == (2, "")
+    assert all(f"\n  {name} " in answer.err for name in COMMANDS)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_help_has_an_example_and_fits_the_screen(call, command):
+    answer = call(command, "--help")
+    assert (answer.status, answer.err) == (0, "")
+    assert f"  ndtheory {command} " in answer.out.partition("Example")[2]
+    assert max(map(len, answer.out.splitlines())) <= 80
+    assert call(command, "-h") == answer
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_option_is_explained(call, command):
+    options = call(command, "--help").out.partition("Options:\n")[2]
+    entries = re.split(r"^  (?=-)", options, flags=re.M)[1:]
+    assert entries
+    assert [entry for entry in entries if not re.search(r"(?m)(^ {20,}|  )[A-Z]\w* .*\w", entry)] == []
+
+
+def test_the_version_is_that_of_the_theory(call):
+    assert call("--version").out == f"ndtheory {ndtheory.__version__}\n"
+
+
+@pytest.mark.parametrize("command", LATER)
+def test_what_is_not_there_yet_is_refused_by_name(call, command):
+    answer = call(command, "--help")
+    assert answer.status == 0 or command in answer.complaint
+
+
+# --- example ---
+
+
+def test_the_list_of_examples_gives_each_a_title(call):
+    screen = call("example").out
+    for name, text in examples().items():
+        assert f"  {name} " in screen
+        assert tomllib.loads(text)["title"] in screen
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_an_example_is_printed_ready_to_redirect(call, name):
+    answer = call("example", name)
+    assert (answer.status, answer.out, answer.err) == (0, examples()[name].rstrip() + "\n", "")
+
+
+def test_every_built_in_problem_has_its_expected_status():
+    assert set(BUILT_IN) == set(examples())
+
+
+# --- screens ---
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+@pytest.mark.parametrize("command", ["constants", "run", "solve", "compare"])
+def test_a_built_in_problem_ends_as_expected_on_one_screen(call, built_in, monkeypatch, tmp_path, command, name):
+    monkeypatch.chdir(tmp_path)
+    built_in(name)
+    answer = call(command, f"{name}.toml")
+    assert answer.status == dict(zip(("run", "compare"), BUILT_IN[name], strict=True)).get(command, 0)
+    lines = answer.out.splitlines()
+    assert lines[0].startswith(tomllib.loads(examples()[name])["title"])
+    assert [line for line in lines if line in HEADINGS[command]] == HEADINGS[command]
+    assert lines[-1].startswith("Next: ndtheory ")
+    assert len(lines) <= 40
+    assert [line for line in lines if len(line) > 80] == []
+
+
+def test_the_calculator_answers_on_one_screen(call):
+    answer = call("bounds", *CONSTANTS, "--theta", "1e-4")
+    lines = answer.out.splitlines()
+    assert (answer.status, answer.err) == (0, "")
+    assert [line for line in lines if line in HEADINGS["bounds"]] == HEADINGS["bounds"]
+    assert lines[-1].startswith("Next: ndtheory ")
+    assert max(map(len, lines)) <= 80
+
+
+def test_no_conclusion_is_no_error_and_a_factor_near_one_shows_its_distance_from_one(call):
+    printed, repaired = (
+        line
+        for line in call("bounds", *CONSTANTS, "--theta", "1e-4").out.splitlines()
+        if line.startswith(("  printed ", "  repaired "))
+    )
+    assert printed.endswith("no conclusion")
+    assert "1 - 1.0e-04" in repaired
+    assert repaired.endswith("contracts")
+
+
+@pytest.mark.parametrize("stress", ["MPa", "Pa", "ksi"])
+def test_stresses_carry_the_unit_of_the_file(call, write, stress):
+    file = write({"units.stress": f'"{stress}"', "units.length": '"in"'})
+    screen = call("compare", file).out
+    assert f"E 70000 / 20000 {stress}" in screen
+    assert f"{stress} in (per unit thickness)" in screen
+    assert "r = 0.3 in" in screen
+
+
+@pytest.mark.parametrize("edits", [None, "soft upper body", "stiff upper body", "inside the theorem", "local law"])
+@pytest.mark.parametrize("command", ["constants", "run", "solve", "compare"])
+def test_what_to_type_next_is_accepted(call, write, command, edits):
+    following = call(command, write(edits)).out.splitlines()[-1].removeprefix("Next: ndtheory ")
+    assert call(*shlex.split(following)).status != 2
+
+
+def test_what_to_type_next_can_be_pasted_where_the_file_name_has_a_space(call, write):
+    file = write(name="my problem.toml")
+    following = call("constants", file).out.splitlines()[-1].removeprefix("Next: ndtheory ")
+    assert shlex.split(following) == ["compare", str(file)]
+
+
+@pytest.mark.parametrize("columns", ["1", "20", "500", "x"])
+def test_the_width_of_the_terminal_does_not_change_a_result(call, write, monkeypatch, columns):
+    file = write()
+    expected = call("compare", file)
+    monkeypatch.setenv("COLUMNS", columns)
+    assert call("compare", file) == expected
+
+
+@pytest.mark.parametrize("cells", [("[20, 4]", "[12, 4]"), ("[40, 5]", "[24, 5]"), ("[30, 4]", "[18, 4]")])
+def test_the_constants_of_an_ordinary_mesh_are_measured(call, write, cells):
+    file = write(dict(zip(("body1.cells", "body2.cells"), cells, strict=True)))
+    assert call("constants", file).status == 0
+
+
+@pytest.mark.parametrize("title", ["a\\u001b[2Jb", "a\\u0007b", "a\\nNext: b", "a\\rb"])
+def test_a_title_cannot_take_over_the_screen(call, write, title):
+    lines = call("run", write({"title": f'"{title}"'})).out.split("\n")
+    assert lines[0].endswith("| E 70000 / 20000 MPa")
+    assert all(line.isprintable() for line in lines)
+
+
+# --- options ---
+
+
+def test_m_and_M_are_two_options(call):
+    inputs = call("bounds", "--M", "4", "--m", "2", "--CR", "1", "--CK", "0", "--json").document["inputs"]
+    assert (inputs["m"], inputs["M"]) == (2, 4)
+
+
+@pytest.mark.parametrize(
+    ("exact", "value"), [("1/4", 0.25), ("25e-2", 0.25), ("0.25", 0.25), (" 1/4 ", 0.25), ("1/3", 1 / 3)]
+)
+def test_rationals_are_accepted_wherever_a_number_is(call, write, exact, value):
+    given = ["--M", "4", "--CR", "5/4", "--Cs", "1/2", "--Ctr", "3/7", "--k", "1/1000", "--json"]
+    bounds = call("bounds", "--m", exact, "--theta", exact, *given).document
+    assert bounds["inputs"]["m"] == bounds["inputs"]["theta"] == value
+    assert call("run", write(), "--theta", exact, "--json").document["theta"] == value
+
+
+def test_thresholds_are_on_k_where_C_s_and_C_tr_are_known_and_on_C_K_otherwise(call):
+    given = ["bounds", "--m", "1", "--M", "2", "--CR", "1", "--json"]
+    on_k = call(*given, "--k", "1/100", "--Cs", "1/2", "--Ctr", "1/4").document["editions"]["repaired"]
+    on_C_K = call(*given, "--CK", "1/800").document["editions"]["repaired"]
+    assert (on_k["threshold_on"], on_C_K["threshold_on"]) == ("k", "C_K")
+    assert on_k["C2"]["value"] == pytest.approx(8 * on_C_K["C2"]["value"], rel=1e-15)
+    assert on_k["C_T"] == on_C_K["C_T"]
+
+
+@pytest.mark.parametrize(
+    ("given", "status"),
+    [
+        ("--m 3084 --M 153229 --CR 1.7 --CK 1e-8 --theta 1e-4", 0),
+        ("--m 3084 --M 153229 --CR 1.7 --CK 1e-8 --theta 1e-4 --edition repaired", 0),
+        ("--m 3084 --M 153229 --CR 1.7 --CK 1e-8 --theta 1e-4 --edition printed", 1),  # C_K above C2
+        ("--m 3084 --M 153229 --CR 1.7 --CK 1e-8 --theta 1/2", 1),  # theta above C1
+        ("--m 1/2 --M 1 --CR 1 --CK 0 --theta 1/100 --edition printed", 1),  # the printed proof needs m >= 1
+        ("--m 1 --M 1 --CR 1 --CK 0 --theta 1/100 --edition printed", 0),
+    ],
+)
+def test_check_asks_for_a_proved_contraction(call, given, status):
+    assert call("bounds", *given.split()).status == 0
+    assert call("bounds", *given.split(), "--check").status == status
+    assert call("bounds", *given.split(), "--check", "--json").status == status
+
+
+@pytest.mark.parametrize("edition", ["printed", "repaired", "both"])
+def test_an_edition_is_shown_alone(call, edition):
+    shown = [
+        line.split()[0]
+        for line in call("bounds", *CONSTANTS, "--edition", edition).out.splitlines()
+        if line.startswith(("  printed ", "  repaired "))
+    ]
+    assert shown == (["printed", "repaired"] if edition == "both" else [edition])
+
+
+@pytest.mark.parametrize("neumann_body", [1, 2])
+def test_swapped_roles_are_those_of_a_file_with_the_other_neumann_body(call, write, neumann_body):
+    file = write({"iteration.neumann_body": str(neumann_body), "iteration.max_iterations": "5"}, "a.toml")
+    other = write({"iteration.neumann_body": str(3 - neumann_body), "iteration.max_iterations": "5"}, "b.toml")
+    for command in ("run", "compare"):
+        swapped = call(command, file, "--swap-roles", "--json").document
+        assert (swapped if command == "run" else swapped["run"])["neumann_body"] == 3 - neumann_body
+        assert swapped == call(command, other, "--json").document
+
+
+def test_theta_on_the_command_line_stands_over_that_of_the_file(call, write):
+    from_file = call("run", write({"iteration.theta": "0.55"}, "a.toml"), "--json").document
+    assert call("run", write(name="b.toml"), "--theta", "0.55", "--json").document == from_file
+
+
+@pytest.mark.parametrize("edits", [None, "local law", "without friction", "wrong roles"])
+def test_every_solver_finds_the_same_pressure(call, write, edits):
+    file = write(edits)
+    documents = {
+        solver: call("run", file, "--theta", "0.1", "--solver", solver, "--json").document
+        for solver in ("auto", "cvxpy", "active-set")
+    }
+    expected = documents["auto"]["contact"]["pressure"]
+    for document in documents.values():
+        assert document["contact"]["pressure"] == pytest.approx(expected, rel=1e-9, abs=1e-9 * max(expected))
+        assert document["contact"]["state"] == documents["auto"]["contact"]["state"]
+        assert sum(document["solves"].values()) == document["evaluations"]
+        assert document["kkt_residual"] < 1e-11
+    assert documents["active-set"]["solves"]["cvxpy"] == 0
+    assert documents["cvxpy"]["solves"]["active_set"] == 0
+
+
+@pytest.mark.parametrize("levels", [1, 2])
+def test_refine_adds_one_column_for_each_halving(call, write, levels):
+    file = write()
+    document = call("constants", file, "--refine", levels, "--json").document
+    nodes = [level["body1"]["nodes"] for level in document["levels"]]
+    assert nodes == [(10 * 2**i + 1) * (2 * 2**i + 1) for i in range(levels + 1)]
+    row = next(line for line in call("constants", file, "--refine", levels).out.splitlines() if "C_R" in line)
+    assert len(row.split()) == levels + 2
+
+
+def test_refine_shows_that_m_falls_and_M_rises_towards_the_continuum(call, write):
+    coarse, fine = call("constants", write(), "--refine", 1, "--json").document["levels"]
+    assert fine["m"]["value"] < coarse["m"]["value"]
+    assert fine["M"]["value"] > coarse["M"]["value"]
+
+
+# --- what goes where ---
+
+
+@pytest.mark.parametrize("command", ["run", "solve", "compare"])
+def test_warnings_go_to_stderr_and_leave_the_document_alone(call, write, command):
+    answer = call(command, write({"contact.radius": "0.1"}), "--json")
+    assert "contact.radius = 0.1 is below the mesh width 0.2" in answer.err
+    assert answer.document
+
+
+@pytest.mark.parametrize(("radius", "cells"), [("0.2", "[10, 2]|[6, 2]"), ("0.1", "[20, 2]|[12, 2]")])
+def test_a_radius_of_one_cell_is_not_below_the_mesh_width(call, write, radius, cells):
+    lower, upper = cells.split("|")
+    file = write({"contact.radius": radius, "body1.cells": lower, "body2.cells": upper})
+    assert call("run", file).err == ""
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["example", "--json"],
+        ["example", "two-bars", "--json"],
+        ["bounds", *CONSTANTS, "--json"],
+        ["constants", "FILE", "--json"],
+        ["run", "FILE", "--json"],
+        ["solve", "FILE", "--json"],
+        ["compare", "FILE", "--json"],
+        ["demo", "-o", "FOLDER", "--json"],
+    ],
+    ids=lambda a: " ".join(a[:1]),
+)
+def test_json_puts_one_document_on_stdout_and_nothing_on_stderr(call, quick, write, tmp_path, arguments):
+    places = {"FILE": write(), "FOLDER": tmp_path / "demo"}
+    answer = call(*(places.get(argument, argument) for argument in arguments))
+    assert (answer.status, answer.err) == (0, "")
+    assert {"schema", "version", "units"} <= set(answer.document)
+
+
+def test_the_demo_compares_section_6_and_leaves_problem_report_figures_and_json(call, quick, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    answer = call("demo")
+    folder = tmp_path / "ndtheory-demo"
+    assert answer.status == 0
+    assert answer.err == "written: ndtheory-demo\n"
+    assert {path.name for path in folder.iterdir()} == {
+        "problem.toml",
+        "report.html",
+        "compare.json",
+        *(f"{figure}.{ending}" for figure in ("bodies", "residuals") for ending in ("svg", "png")),
+    }
+    assert (folder / "problem.toml").read_text(encoding="utf-8") == examples()["section6"]
+    assert call("demo") == answer  # over its own files
+    (folder / "problem.toml").write_text("edited", encoding="utf-8")
+    assert "problem.toml" in call("demo").complaint
+    assert (folder / "problem.toml").read_text(encoding="utf-8") == "edited"
+
+
+@pytest.mark.parametrize("command", ["run", "solve", "compare"])
+def test_the_written_document_is_that_of_stdout(call, quick, write, tmp_path, command):
+    answer = call(command, write(), "-o", tmp_path / "results", "--json")
+    assert (tmp_path / "results" / f"{command}.json").read_text(encoding="utf-8") == answer.out

@@ -1,0 +1,281 @@
+"""How a command ends: exit statuses and which of them wins, Ctrl-C, and what a run that did not converge advises."""
+
+import errno
+import re
+import signal
+from dataclasses import replace
+
+import pytest
+
+import verification
+from verification import figures, verdicts
+from verification.cli.problems import examples
+from verification.contact import ContactError
+from verification.monolithic import SolveError
+from verification.verdicts import Judgement
+
+DONE, NOT_MET, BAD_INPUT, INCONCLUSIVE, INTERRUPTED, CRASH = 0, 1, 2, 3, 130, 70
+
+ENDS = [
+    ("run", None, DONE, "converged"),
+    ("compare", None, DONE, "converged"),
+    ("run", "inside the theorem", NOT_MET, "limit"),
+    ("compare", "inside the theorem", DONE, "limit"),  # it judges steps, not the end
+    ("run", "wrong roles", NOT_MET, "stalled"),
+    ("compare", "wrong roles", NOT_MET, "stalled"),
+    ("run", "stiff upper body", NOT_MET, "diverged"),
+    ("compare", "stiff upper body", NOT_MET, "diverged"),
+    ("run", "unloaded", DONE, "converged"),
+    ("compare", "inside, unloaded", INCONCLUSIVE, "converged"),  # no step to judge
+    ("run", "apart", DONE, "converged"),
+    ("compare", "apart", DONE, "converged"),
+]
+
+
+@pytest.mark.parametrize(("command", "edits", "status", "outcome"), ENDS)
+def test_a_command_ends_with_its_status_in_words_and_as_a_document(call, write, command, edits, status, outcome):
+    file = write(edits)
+    answer = call(command, file, "--json")
+    run = answer.document["run"] if command == "compare" else answer.document
+    assert (run["outcome"], answer.status) == (outcome, status)
+    screen = call(command, file)
+    assert screen.status == status
+    assert re.search(rf"^  observed .* {outcome}$", screen.out, flags=re.M)
+    assert answer.err == screen.err
+
+
+@pytest.mark.parametrize(
+    ("judged", "edits", "status"),
+    [
+        ({"printed": "CONSISTENT", "repaired": "CONSISTENT"}, None, DONE),
+        ({"printed": "HYPOTHESES_NOT_MET", "repaired": "INCONCLUSIVE"}, None, INCONCLUSIVE),
+        ({"printed": "CONSISTENT", "repaired": "VIOLATED"}, None, NOT_MET),
+        ({"printed": "INCONCLUSIVE", "repaired": "VIOLATED"}, None, NOT_MET),
+        ({"printed": "HYPOTHESES_NOT_MET", "repaired": "INCONCLUSIVE"}, "wrong roles", NOT_MET),
+        ({"printed": "VIOLATED", "repaired": "CONSISTENT"}, None, DONE),  # a finding
+        ({"printed": "VIOLATED", "repaired": "INCONCLUSIVE"}, None, INCONCLUSIVE),
+    ],
+    ids=lambda v: " ".join(v.values()) if isinstance(v, dict) else str(v),
+)
+def test_the_worst_verdict_decides(call, write, monkeypatch, judged, edits, status):
+    made = {name: Judgement(verdict=verdict, reason="made up") for name, verdict in judged.items()}
+    compare = verdicts.compare
+    monkeypatch.setattr(verdicts, "compare", lambda *args, **kw: replace(compare(*args, **kw), verdicts=made))
+    answer = call("compare", write(edits))
+    assert answer.status == status
+    for name, verdict in judged.items():
+        assert re.search(rf"^  {name} +{verdict} +made up$", answer.out, flags=re.M)
+
+
+def test_bad_input_wins_over_everything(call, write, monkeypatch):
+    monkeypatch.setattr(verdicts, "compare", None)
+    assert call("compare", write("wrong roles"), "--theta", "2").complaint
+
+
+@pytest.mark.parametrize(
+    "error", [RuntimeError("made up"), ValueError("made up"), AssertionError(), ZeroDivisionError()]
+)
+@pytest.mark.parametrize("command", ["run", "compare", "constants"])
+def test_a_crash_says_that_it_is_one_and_is_no_status_of_the_interface(call, write, monkeypatch, command, error):
+    def fail(problem):
+        raise error
+
+    monkeypatch.setattr("verification.bodies.build", fail)
+    monkeypatch.setattr("verification.measured.build", fail)
+    answer = call(command, write())
+    assert answer.status == CRASH
+    assert answer.out == ""
+    assert "Traceback" in answer.err
+    assert answer.err.endswith("this is a bug; please report it with the lines above\n")
+
+
+@pytest.mark.parametrize(
+    ("command", "solver", "error"),
+    [
+        ("run", "contact.step.ContactStep", ContactError("no certificate")),
+        ("compare", "contact.step.ContactStep", ContactError("no certificate")),
+        ("solve", "monolithic.ContactSystem", SolveError("no certificate")),
+    ],
+    ids=["run", "compare", "solve"],
+)
+def test_a_solver_that_fails_is_told_in_one_line(call, write, monkeypatch, command, solver, error):
+    def fail(*args, **kw):
+        raise error
+
+    monkeypatch.setattr(f"verification.{solver}.solve", fail)
+    answer = call(command, write())
+    assert (answer.status, answer.out) == (NOT_MET, "")
+    assert answer.err.endswith("no certificate\n")
+    assert answer.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("command", ["bounds", "run"])
+@pytest.mark.parametrize("version", ["0.0.0", None], ids=str)
+def test_another_package_named_verification_is_told_in_one_line(call, write, monkeypatch, command, version):
+    if version is None:
+        monkeypatch.delattr(verification, "__version__")
+    else:
+        monkeypatch.setattr(verification, "__version__", version)
+    line = call(command, write()).complaint
+    assert "`verification`" in line
+    assert str(version or "unknown") in line
+
+
+# --- Ctrl-C ---
+
+
+@pytest.fixture
+def endless(write):
+    """A problem that takes its time: theta is tiny."""
+    return write({"iteration.theta": "1e-4", "iteration.max_iterations": "100000"})
+
+
+@pytest.mark.parametrize("states", [1, 2, 40])
+@pytest.mark.parametrize("command", ["run", "compare"])
+def test_ctrl_c_keeps_what_was_computed_and_says_so(call, quick, endless, after, tmp_path, command, states):
+    after(states, lambda: signal.raise_signal(signal.SIGINT))
+    answer = call(command, endless, "-o", tmp_path / "results", "--json")
+    run = answer.document["run"] if command == "compare" else answer.document
+    assert (answer.status, run["outcome"], run["evaluations"]) == (INTERRUPTED, "interrupted", states)
+    assert answer.err == f"interrupted after {states} evaluations of T: what was computed is kept\n"
+    assert (tmp_path / "results" / f"{command}.json").read_text("utf-8") == answer.out
+
+
+@pytest.mark.parametrize("command", ["run", "compare"])
+def test_ctrl_c_leaves_a_screen(call, endless, after, command):
+    after(3, lambda: signal.raise_signal(signal.SIGINT))
+    answer = call(command, endless)
+    assert answer.status == INTERRUPTED
+    assert "  interrupted\n" in answer.out
+
+
+@pytest.mark.parametrize("judged", ["VIOLATED", "INCONCLUSIVE"])
+def test_ctrl_c_wins_over_a_verdict(call, endless, after, monkeypatch, judged):
+    monkeypatch.setattr(verdicts, "judge", lambda *args: Judgement(verdict=judged, reason="made up"))
+    after(3, lambda: signal.raise_signal(signal.SIGINT))
+    assert call("compare", endless).status == INTERRUPTED
+
+
+@pytest.mark.parametrize("command", ["run", "compare", "constants"])
+def test_ctrl_c_before_anything_was_computed_says_so(call, write, monkeypatch, command):
+    def interrupt(problem):
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr("verification.bodies.build", interrupt)
+    monkeypatch.setattr("verification.measured.build", interrupt)
+    answer = call(command, write())
+    assert (answer.status, answer.out) == (INTERRUPTED, "")
+    assert answer.err.strip() == "interrupted before anything was computed"
+
+
+@pytest.mark.parametrize("command", ["run", "compare"])
+def test_ctrl_c_while_files_are_written_still_shows_what_was_computed(
+    call, quick, write, tmp_path, monkeypatch, command
+):
+    monkeypatch.setattr(figures, "save", lambda figure, path: signal.raise_signal(signal.SIGINT))
+    answer = call(command, write(), "-o", tmp_path / "results")
+    assert answer.status == INTERRUPTED
+    assert "WHAT HAPPENED" in answer.out
+    assert "before anything was computed" not in answer.err
+    names = {path.name for path in (tmp_path / "results").iterdir()}
+    assert f"{command}.json" in names
+    assert not any(name.startswith("tmp") for name in names)
+
+
+@pytest.mark.parametrize("command", ["run", "compare"])
+def test_a_folder_with_a_file_of_somebody_else_costs_no_result(call, quick, write, tmp_path, command):
+    (tmp_path / "bodies.png").write_bytes(b"my own")
+    answer = call(command, write(), "-o", tmp_path)
+    assert answer.status == BAD_INPUT
+    assert answer.out == "" or "WHAT HAPPENED" in answer.out
+    assert {path.name for path in tmp_path.iterdir()} == {"problem.toml", "bodies.png"}
+
+
+@pytest.mark.parametrize("command", ["run", "compare"])
+def test_a_disk_that_fills_up_is_told_in_one_line_and_costs_no_result(
+    call, quick, write, tmp_path, monkeypatch, command
+):
+    def fill(figure, path):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(figures, "save", fill)
+    answer = call(command, write(), "-o", tmp_path / "results")
+    assert answer.status == BAD_INPUT
+    assert "Traceback" not in answer.err
+    assert "No space left on device" in answer.err
+    assert "WHAT HAPPENED" in answer.out
+
+
+# --- advice ---
+
+
+@pytest.fixture
+def bars(tmp_path):
+    file = tmp_path / "two-bars.toml"
+    file.write_text(examples()["two-bars"], encoding="utf-8")
+    return file
+
+
+def advised(line: str) -> list[list[str]]:
+    """Options that a sentence proposes: a theta for these roles, one for the other roles."""
+    swapped = re.search(r"--swap-roles with --theta ([\d.e-]+)", line)
+    own = re.search(r"try --theta ([\d.e-]+)", line)
+    return ([["--theta", own[1]]] if own else []) + ([["--swap-roles", "--theta", swapped[1]]] if swapped else [])
+
+
+def test_a_stalled_run_ends_early_and_the_theta_it_advises_converges(call, bars):
+    answer = call("run", bars, "--theta", "0.6", "--json")
+    assert (answer.status, answer.document["outcome"]) == (NOT_MET, "stalled")
+    assert answer.document["evaluations"] < 100
+    assert answer.err.count("\n") == 1
+    options = advised(answer.err)
+    assert len(options) == 2
+    for advice in options:
+        assert call("run", bars, *advice).status == DONE
+
+
+@pytest.mark.parametrize("edits", ["wrong roles", "stiff upper body"])
+@pytest.mark.parametrize("command", ["run", "compare"])
+def test_what_a_run_advises_is_accepted(call, write, command, edits):
+    file = write(edits)
+    answer = call(command, file)
+    assert answer.status == NOT_MET
+    assert advised(answer.err)
+    for advice in advised(answer.err):
+        assert call("run", file, *advice).status != BAD_INPUT
+
+
+def test_a_run_with_swapped_roles_advises_options_that_converge(call, write):
+    file = write()
+    answer = call("run", file, "--swap-roles", "--theta", "0.6")
+    assert answer.status == NOT_MET
+    if advised(answer.err):
+        assert DONE in [call("run", file, *advice).status for advice in advised(answer.err)]
+    assert "or --swap-roles" not in answer.err  # these roles are the swapped ones
+
+
+def test_a_run_that_reached_its_limit_advises_to_raise_it(call, write):
+    answer = call("run", write("inside the theorem"))
+    assert "max_iterations" in answer.err
+    assert answer.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("theta", ["0.6", "0.8"])
+def test_a_tolerance_below_rounding_is_not_blamed_on_theta(call, write, theta):
+    answer = call("run", write("below rounding"), "--theta", theta)
+    assert answer.status == NOT_MET
+    assert "tolerance" in answer.err
+    assert "does not contract" not in answer.err
+
+
+def test_a_theta_too_small_to_move_anything_is_not_advised_to_shrink(call, write):
+    answer = call("run", write(), "--theta", "1e-20")
+    assert answer.status == NOT_MET
+    assert "smaller theta" not in answer.err
+
+
+def test_bodies_that_never_meet_have_no_contact_force_and_a_converged_run(call, write):
+    found = call("run", write("apart"), "--json").document
+    assert found["pattern"] == {"stick": 0, "slip": 0, "open": 7}
+    assert found["converged"]
+    assert found["iterations"] < 10

@@ -1,0 +1,150 @@
+"""The command as a process of its own: what is imported, signals, pipes that close, streams that are not there."""
+
+import json
+import os
+import subprocess
+import sys
+import textwrap
+
+import pytest
+
+HEAVY = ["numpy", "scipy", "matplotlib", "cvxpy", "clarabel", "rich", "meshio", "jinja2", "sympy"]
+
+CALL = "import sys; from verification.cli import main; sys.exit(main())"
+BOUNDS = ["bounds", "--m", "3084", "--M", "153229", "--CR", "1.70", "--CK", "1e-8", "--theta", "1e-4"]
+
+
+def start(*arguments, code=CALL, **streams):
+    """The command in a fresh interpreter."""
+    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | streams
+    command = [sys.executable, "-c", code, *map(str, arguments)]
+    return subprocess.run(command, text=True, timeout=60, check=False, **streams)
+
+
+def imported_by(code, *arguments):
+    report = "import atexit; atexit.register(lambda: print(*sys.modules, file=sys.stderr)); "
+    return set(start(*arguments, code=f"import sys; {report}{code}").stderr.split())
+
+
+@pytest.mark.parametrize(
+    ("code", "arguments"),
+    [
+        ("import ndtheory", []),
+        ("import verification", []),
+        (CALL, BOUNDS),
+        (CALL, [*BOUNDS, "--json"]),
+        (CALL, ["--help"]),
+        (CALL, ["run", "--help"]),
+        (CALL, ["example"]),
+        (CALL, ["bogus"]),
+        (CALL, ["run", "missing.toml"]),
+    ],
+    ids=["ndtheory", "verification", "bounds", "bounds --json", "--help", "run --help", "example", "bogus", "missing"],
+)
+def test_what_needs_no_arrays_starts_without_them(code, arguments):
+    modules = imported_by(code, *arguments)
+    assert "ndtheory" in modules or "verification" in modules
+    light = [] if "missing.toml" not in arguments else ["numpy", "scipy"]  # a file may be missing after they came
+    assert [name for name in HEAVY if name in modules and name not in light] == []
+
+
+def test_a_run_without_a_folder_draws_nothing(write):
+    assert "matplotlib" not in imported_by(CALL, "run", write())
+
+
+def test_a_command_is_reached_by_its_entry_point(write):
+    found = start("run", write(), "--json")
+    assert (found.returncode, found.stderr) == (0, "")
+    assert json.loads(found.stdout)["converged"]
+
+
+@pytest.mark.parametrize("command", ["run", "compare"])
+def test_ctrl_c_ends_the_process_with_130_and_a_document(write, command):
+    file = write({"iteration.theta": "1e-4", "iteration.max_iterations": "100000"})
+    code = """
+        import os, signal, sys
+        from contextlib import contextmanager
+        from verification.cli import main, problems
+
+        @contextmanager
+        def progress(title, tolerance):
+            yield lambda state: os.kill(os.getpid(), signal.SIGINT) if state.iteration == 4 else None
+
+        problems.progress = progress
+        sys.exit(main())
+    """
+    found = start(command, file, "--json", code=textwrap.dedent(code))
+    assert found.returncode == 130
+    assert found.stderr == "interrupted after 5 evaluations of T: what was computed is kept\n"
+    document = json.loads(found.stdout)
+    assert (document if command == "run" else document["run"])["outcome"] == "interrupted"
+
+
+@pytest.mark.parametrize("arguments", [["--help"], BOUNDS, ["run", "FILE"], ["compare", "FILE", "--json"]])
+def test_a_reader_that_goes_away_is_neither_a_crash_nor_a_failed_run(write, arguments):
+    reader, writer = os.pipe()
+    os.close(reader)
+    file = write()
+    found = start(*(file if a == "FILE" else a for a in arguments), stdout=writer)
+    os.close(writer)
+    assert found.stderr == ""
+    assert found.returncode in (0, 141)  # 141: as if ended by SIGPIPE
+
+
+@pytest.mark.parametrize("stream", ["sys.stdout", "sys.stderr"])
+@pytest.mark.parametrize("arguments", [BOUNDS, ["compare", "FILE"]])
+def test_a_stream_that_is_closed_is_no_crash(write, arguments, stream):
+    file = write()
+    code = f"import sys; {stream} = None; from verification.cli import main; sys.exit(main())"
+    found = start(*(file if a == "FILE" else a for a in arguments), code=code)
+    assert "Traceback" not in found.stderr
+    assert found.returncode == 0
+
+
+@pytest.mark.parametrize("arguments", [["run", "missing.toml"], ["bogus"], ["bounds"], ["run", "FILE", "--theta", "2"]])
+def test_bad_input_has_its_status_even_where_nobody_reads_the_line(write, arguments):
+    reader, writer = os.pipe()
+    os.close(reader)
+    file = write()
+    found = start(*(file if a == "FILE" else a for a in arguments), stderr=writer)
+    os.close(writer)
+    assert (found.returncode, found.stdout) == (2, "")
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a device that is always full")
+def test_a_full_disk_behind_stdout_is_told_in_one_line(write):
+    with open("/dev/full", "w", encoding="utf-8") as full:
+        found = start(*BOUNDS, stdout=full)
+    assert found.returncode not in (0, 1)
+    assert found.stderr.count("\n") == 1
+    assert "No space left on device" in found.stderr
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
+@pytest.mark.parametrize("arguments", [["run", "FILE"], ["run", "FILE", "--json"]], ids=["screen", "json"])
+def test_a_title_beyond_the_encoding_of_the_terminal_is_no_crash(write, arguments, encoding):
+    file = write({"title": '"Kontakt \N{GREEK SMALL LETTER MU} \N{CJK UNIFIED IDEOGRAPH-63A5}"'})
+    environment = os.environ | {"PYTHONIOENCODING": encoding}
+    command = [sys.executable, "-c", CALL, *(str(file) if a == "FILE" else a for a in arguments)]
+    found = subprocess.run(command, capture_output=True, env=environment, timeout=60, check=False)
+    assert (found.returncode, found.stderr) == (0, b"")
+    assert b"Kontakt" in found.stdout
+
+
+def test_a_folder_that_was_removed_underneath_is_no_crash(write, tmp_path):
+    file = write()
+    remove = f"import os; os.chdir({str(tmp_path)!r}); os.mkdir('gone'); os.chdir('gone'); os.rmdir('../gone'); "
+    assert start("run", file, code=remove + CALL).returncode == 0
+    found = start("demo", code=remove + CALL)
+    assert found.returncode == 2
+    assert found.stderr.count("\n") == 1
+
+
+def test_two_comparisons_at_once_in_one_folder_leave_whole_files(write, tmp_path):
+    command = [sys.executable, "-c", CALL, "compare", str(write()), "-o", str(tmp_path / "results")]
+    started = [subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) for _ in range(2)]
+    written = f"written: {tmp_path / 'results'}\n".encode()
+    assert [(process.communicate(timeout=60)[1], process.returncode) for process in started] == [(written, 0)] * 2
+    assert json.loads((tmp_path / "results" / "compare.json").read_text("utf-8"))["run"]["converged"]
+    assert (tmp_path / "results" / "report.html").read_text("utf-8").rstrip().endswith("</html>")
+    assert len(list((tmp_path / "results").iterdir())) == 6

@@ -1,0 +1,116 @@
+"""Figures: the same file every time, axes with units, nothing taken from the user's settings."""
+
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.collections import PolyCollection
+
+import verification as vf
+from verification.cli.problems import examples
+from verification.figures import draw_bodies, draw_residuals, save
+
+
+@pytest.fixture(scope="module")
+def comparisons(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("problems")
+    results = {}
+    for name, text in examples().items():
+        (folder / f"{name}.toml").write_text(text, encoding="utf-8")
+        results[name] = vf.compare(vf.load(folder / f"{name}.toml"))
+    return results
+
+
+def drawings(comparison):
+    return {"bodies": draw_bodies(comparison.run), "residuals": draw_residuals(comparison.run, comparison.bounds)}
+
+
+@pytest.mark.parametrize(("name", "ending"), [("inside", "svg"), ("two-bars", "svg"), ("two-bars", "png")])
+def test_the_same_run_gives_the_same_file(comparisons, tmp_path, name, ending):
+    files = []
+    for attempt in range(2):
+        for figure, drawing in drawings(comparisons[name]).items():
+            save(drawing, tmp_path / f"{figure}{attempt}.{ending}")
+        files.append([(tmp_path / f"{figure}{attempt}.{ending}").read_bytes() for figure in ("bodies", "residuals")])
+    assert files[0] == files[1]
+
+
+@pytest.mark.parametrize("name", ["inside", "two-bars"])
+def test_the_settings_of_the_user_do_not_reach_a_figure(comparisons, tmp_path, name):
+    other = {"axes.linewidth": 9.0, "figure.facecolor": "black", "savefig.transparent": True, "lines.linewidth": 7.0}
+    for attempt, settings in (("a", {}), ("b", other)):
+        with mpl.rc_context(settings):
+            for figure, drawing in drawings(comparisons[name]).items():
+                save(drawing, tmp_path / f"{figure}{attempt}.svg")
+    for figure in ("bodies", "residuals"):
+        assert (tmp_path / f"{figure}a.svg").read_bytes() == (tmp_path / f"{figure}b.svg").read_bytes()
+
+
+@pytest.mark.parametrize("name", ["inside", "two-bars"])
+def test_drawing_leaves_the_settings_of_the_user_alone(comparisons, name):
+    before = dict(mpl.rcParams)
+    drawings(comparisons[name])
+    assert dict(mpl.rcParams) == before
+
+
+@pytest.mark.parametrize("name", examples())
+def test_lengths_and_stresses_are_drawn_with_their_units(comparisons, name):
+    run = comparisons[name].run
+    length, stress = (f"[{run.units[quantity]}]" for quantity in ("length", "stress"))
+    meshes, *stresses = draw_bodies(run).axes
+    if run.pair.problem.dimension == 1:
+        assert (meshes.get_xlabel(), stresses) == (f"x {length}", [])
+    else:
+        assert meshes.get_ylabel() == f"y {length}"
+        assert stresses[0].get_xlabel().endswith(length)
+        assert stresses[0].get_ylabel() == f"stress {stress}"
+
+
+@pytest.mark.parametrize("name", examples())
+def test_residuals_are_drawn_on_a_logarithmic_axis_that_says_what_it_shows(comparisons, name):
+    run = comparisons[name].run
+    (axes,) = draw_residuals(run).axes
+    assert axes.get_yscale() == "log"
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("evaluations of T", "|||T g - g||| / |||T g|||")
+    x, y = axes.lines[0].get_data()
+    shown = [(i, r) for i, r in enumerate(run.history) if r > 0]
+    assert list(zip(x, y, strict=True)) == shown
+
+
+def test_only_an_edition_with_a_factor_draws_its_bound(comparisons):
+    labels = lambda name: (
+        draw_residuals(comparisons[name].run, comparisons[name].bounds).axes[0].get_legend_handles_labels()[1]
+    )
+    assert [label for label in labels("inside") if label.endswith("bound")] == ["repaired bound"]
+    assert [label for label in labels("section6") if label.endswith("bound")] == []
+
+
+def test_pressure_shear_and_states_are_those_of_the_run(comparisons):
+    run = comparisons["section6"].run
+    lines = {line.get_label(): line for line in draw_bodies(run).axes[1].lines}
+    assert np.array_equal(lines["pressure $-\\sigma_N$"].get_ydata(), run.contact.pressure)
+    assert np.array_equal(lines["shear $\\sigma_T$ on body 2"].get_ydata(), run.contact.shear)
+    for state, count in run.contact.pattern.items():
+        assert (state in lines) == (count > 0)
+        assert count == 0 or len(lines[state].get_xdata()) == count
+
+
+def test_bodies_pressed_together_are_drawn_touching(comparisons):
+    meshes = draw_bodies(comparisons["section6"].run).axes[0]
+    lower, upper = (collection for collection in meshes.collections if isinstance(collection, PolyCollection))
+    edge = lambda body: np.unique(np.round(np.concatenate([path.vertices for path in body.get_paths()]), 9), axis=0)
+    shared = {tuple(point) for point in edge(lower)} & {tuple(point) for point in edge(upper)}
+    assert len(shared) >= comparisons["section6"].run.contact.pattern["stick"]
+
+
+@pytest.mark.parametrize("history", [1, 2])
+@pytest.mark.parametrize("name", ["inside", "two-bars"])
+def test_a_run_cut_short_can_be_drawn(comparisons, tmp_path, name, history):
+    comparison = comparisons[name]
+    short = replace(comparison.run, states=comparison.run.states[:history], outcome="interrupted")
+    save(draw_bodies(short), tmp_path / "bodies.svg")
+    save(draw_residuals(short, comparison.bounds), tmp_path / "residuals.svg")
+    for figure in ("bodies", "residuals"):
+        assert ElementTree.parse(tmp_path / f"{figure}.svg").getroot().tag.endswith("svg")

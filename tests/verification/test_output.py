@@ -1,0 +1,297 @@
+"""Results in a folder: only our own files, each whole or not at all; a report that asks nobody else."""
+
+import errno
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+import verification as vf
+from verification import figures
+from verification.output import Folder
+from verification.report import report
+
+SMALL = {
+    "title": "Small",
+    "dimension": 2,
+    "body1": {
+        "shape": "rectangle",
+        "x": [0, 2],
+        "y": ["-0.3", 0],
+        "cells": [10, 2],
+        "young": 70000,
+        "poisson": "0.3",
+        "fixed": ["bottom"],
+    },
+    "body2": {
+        "shape": "rectangle",
+        "x": ["0.4", "1.6"],
+        "y": [0, "0.3"],
+        "cells": [6, 2],
+        "young": 20000,
+        "poisson": "0.3",
+        "prescribed": {"top": [0, "-0.015"]},
+    },
+    "contact": {"friction": "0.2", "radius": "0.3"},
+    "iteration": {"neumann_body": 1, "theta": "0.7"},
+}
+ONE_STEP = {"theta": "0.7", "max_iterations": 1}
+FIGURES = {f"{figure}.{ending}" for figure in ("bodies", "residuals") for ending in ("svg", "png")}
+WRITTEN = {"run": FIGURES | {"run.json"}, "comparison": FIGURES | {"compare.json", "report.html"}}
+
+#: Titles that could leave their place in a file.
+TITLES = {
+    "markup": "</title><script>alert(1)</script><img src=http://example.org/x>",
+    "entities": "a < b & c > d \"quoted\" 'twice'",
+    "formula": r"modulus ratio $E_1/E_2 = \frac{7}{2}$",
+    "unknown formula": r"$\text{kN}$ and $\frac$",
+    "one dollar": "costs 5 $ and 3 $",
+    "template": "{{ 7 * 7 }} {% raw %}",
+    "control characters": "a\x1b[31mb\x07c\x00d",
+    "line break": "a\nb",
+    "another script": "\u63a5\u89e6 \u03bc",
+    "long": "long title " * 60,
+    "empty": "",
+}
+
+
+def problem(**changes):
+    return vf.Problem.from_dict(SMALL | changes)
+
+
+@pytest.fixture(scope="module")
+def comparison():
+    return vf.compare(problem())
+
+
+@pytest.fixture(scope="module")
+def written(comparison, tmp_path_factory):
+    """A folder with everything in it."""
+    folder = tmp_path_factory.mktemp("written")
+    Folder(folder, "compare").write_comparison(comparison)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def results(comparison):
+    return {"run": comparison.run, "comparison": comparison}
+
+
+def write(folder: Path, kind: str, result) -> None:
+    getattr(Folder(folder, "compare" if kind == "comparison" else "run"), f"write_{kind}")(result)
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+# --- the folder ---
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """Figures that cost nothing: only their files matter here."""
+    monkeypatch.setattr(figures, "draw_bodies", lambda result: "bodies")
+    monkeypatch.setattr(figures, "draw_residuals", lambda run, bounds=None: "residuals")
+    monkeypatch.setattr(
+        figures,
+        "save",
+        lambda figure, path: path.write_bytes(b"<svg><dc:title>ndtheory</dc:title>Software\x00ndtheory</svg>"),
+    )
+
+
+@pytest.mark.parametrize("kind", WRITTEN)
+def test_the_documented_files_are_written_and_the_same_again(quick, results, tmp_path, kind):
+    write(tmp_path / "a" / "b", kind, results[kind])
+    first = contents(tmp_path / "a" / "b")
+    assert set(first) == WRITTEN[kind]
+    write(tmp_path / "a" / "b", kind, results[kind])
+    assert contents(tmp_path / "a" / "b") == first
+
+
+@pytest.mark.parametrize("kind", WRITTEN)
+def test_a_written_document_is_the_result_as_json(quick, results, tmp_path, kind):
+    write(tmp_path, kind, results[kind])
+    text = (tmp_path / ("run.json" if kind == "run" else "compare.json")).read_text("utf-8")
+    assert json.loads(text) == json.loads(results[kind].to_json())
+
+
+def test_a_comparison_takes_the_place_of_the_run_before_it(quick, results, tmp_path):
+    write(tmp_path, "run", results["run"])
+    write(tmp_path, "comparison", results["comparison"])
+    assert set(contents(tmp_path)) == WRITTEN["run"] | WRITTEN["comparison"]
+
+
+@pytest.mark.parametrize(
+    ("name", "foreign"),
+    [
+        *((name, b"my own") for name in sorted(WRITTEN["comparison"])),
+        ("report.html", b""),
+        ("report.html", b"measured with ndtheory, by hand"),
+        ("compare.json", b'{"note": "beside ndtheory"}'),
+    ],
+)
+def test_a_file_of_somebody_else_is_kept_and_nothing_is_written_beside_it(quick, results, tmp_path, name, foreign):
+    (tmp_path / name).write_bytes(foreign)
+    with pytest.raises(vf.ProblemError) as error:
+        write(tmp_path, "comparison", results["comparison"])
+    assert name in str(error.value)
+    assert "another folder" in error.value.needed
+    assert contents(tmp_path) == {name: foreign}
+
+
+@pytest.mark.parametrize("name", sorted(WRITTEN["comparison"]))
+def test_a_folder_in_the_place_of_a_file_is_refused(quick, results, tmp_path, name):
+    (tmp_path / name).mkdir()
+    with pytest.raises(vf.ProblemError, match=re.escape(name)):
+        write(tmp_path, "comparison", results["comparison"])
+
+
+def test_other_files_of_the_folder_are_left_alone(quick, results, tmp_path):
+    (tmp_path / "notes.txt").write_text("mine")
+    (tmp_path / "own.svg").write_text("mine")
+    write(tmp_path, "comparison", results["comparison"])
+    assert (tmp_path / "notes.txt").read_text() == (tmp_path / "own.svg").read_text() == "mine"
+
+
+@pytest.mark.parametrize("failing", range(4))
+@pytest.mark.parametrize("error", [OSError(errno.ENOSPC, "No space left on device"), KeyboardInterrupt()], ids=repr)
+def test_a_file_is_whole_or_not_there_when_writing_fails(quick, results, tmp_path, monkeypatch, error, failing):
+    save, left = figures.save, iter(range(9))
+
+    def fail(figure, path):
+        if next(left) == failing:
+            path.write_bytes(b"half of a ndtheory figure")
+            raise error
+        save(figure, path)
+
+    write(tmp_path, "run", results["run"])
+    before = contents(tmp_path)
+    monkeypatch.setattr(figures, "save", fail)
+    with pytest.raises(type(error)):
+        write(tmp_path, "run", results["run"])
+    assert contents(tmp_path) == before
+
+
+@pytest.mark.parametrize("place", ["file", "file/folder", "loop"])
+def test_what_cannot_be_a_folder_is_refused_with_its_name(tmp_path, place):
+    (tmp_path / "file").write_text("a file")
+    (tmp_path / "loop").symlink_to("loop")
+    with pytest.raises(vf.ProblemError) as error:
+        Folder(tmp_path / place, "run")
+    assert str(tmp_path / place) in error.value.file
+    assert "folder" in error.value.needed
+
+
+def test_a_folder_that_cannot_be_written_to_is_refused_at_once(tmp_path, monkeypatch):
+    def refuse(dir):
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    monkeypatch.setattr("tempfile.TemporaryFile", refuse)
+    with pytest.raises(vf.ProblemError, match="Permission denied"):
+        Folder(tmp_path, "run")
+
+
+def test_an_edited_problem_is_not_overwritten(tmp_path):
+    folder = Folder(tmp_path, "compare")
+    assert folder.write_problem("a = 1\n") == tmp_path / "problem.toml"
+    folder.write_problem("a = 1\n")
+    (tmp_path / "problem.toml").write_text("a = 2\n")
+    with pytest.raises(vf.ProblemError, match=r"problem\.toml"):
+        folder.write_problem("a = 1\n")
+    assert (tmp_path / "problem.toml").read_text() == "a = 2\n"
+
+
+def test_the_figures_that_are_written_can_be_overwritten(comparison, written, tmp_path):
+    for path in written.iterdir():
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    write(tmp_path, "comparison", comparison)
+    assert contents(tmp_path) == contents(written)
+
+
+# --- the report ---
+
+
+class Reader(HTMLParser):
+    """Text, and every attribute by which a page could ask for something."""
+
+    def __init__(self):
+        super().__init__()
+        self.text, self.heading, self.asked, self.tags, self.styles = "", "", [], [], ""
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append(tag)
+        self.asked += [value for key, value in attributes if key in ("src", "href", "xlink:href", "srcset", "data")]
+        self.styles += "".join(value or "" for key, value in attributes if key in ("style", "clip-path", "fill"))
+
+    def handle_data(self, data):
+        if self.tags and self.tags[-1] == "style":
+            self.styles += data
+        if self.tags and self.tags[-1] == "h1" and not self.heading:
+            self.heading = data
+        self.text += data
+
+
+def read(folder: Path) -> Reader:
+    reader = Reader()
+    reader.feed((folder / "report.html").read_text("utf-8"))
+    return reader
+
+
+def test_the_report_asks_no_other_file_and_no_other_host(written):
+    page = read(written)
+    assert [asked for asked in page.asked if not asked.startswith("#")] == []
+    assert not {"script", "link", "iframe", "img", "object", "embed", "base"} & set(page.tags)
+    assert "@import" not in page.styles
+    assert [url for url in re.findall(r"url\(([^)]*)\)", page.styles) if not url.startswith("#")] == []
+
+
+def test_the_report_holds_both_figures_and_every_verdict_with_its_reason(comparison, written):
+    page = read(written)
+    assert page.tags.count("svg") == 2
+    for name, judgement in comparison.verdicts.items():
+        assert f"{name}\n" in page.text
+        assert judgement.verdict in page.text
+        assert judgement.reason in page.text
+    assert "Not claimed" in page.text
+    for unit in ("MPa", "mm"):
+        assert unit in page.text
+
+
+def test_every_name_in_the_report_is_given_once(written):
+    names = re.findall(r'\bid="([^"]*)"', (written / "report.html").read_text("utf-8"))
+    assert sorted(name for name in set(names) if names.count(name) > 1) == []
+
+
+def page_and_figures(folder: Path, comparison) -> str:
+    """The report and both figures, whose files must be well-formed; returns the report."""
+    for name, figure in (
+        ("bodies", figures.draw_bodies(comparison.run)),
+        ("residuals", figures.draw_residuals(comparison.run, comparison.bounds)),
+    ):
+        figures.save(figure, folder / f"{name}.svg")
+        ElementTree.parse(folder / f"{name}.svg")
+    texts = {name: (folder / f"{name}.svg").read_text("utf-8") for name in ("bodies", "residuals")}
+    return report(comparison, texts)
+
+
+@pytest.mark.parametrize("title", TITLES.values(), ids=TITLES)
+def test_a_title_stays_text_in_every_file(tmp_path, title):
+    text = page_and_figures(tmp_path, vf.compare(problem(title=title, iteration=ONE_STEP)))
+    page = Reader()
+    page.feed(text)
+    assert not {"script", "img"} & set(page.tags)
+    assert page.heading.strip() == (title.strip() if title.isprintable() else page.heading.strip())
+    assert all(character.isprintable() or character == "\n" for character in page.heading)
+
+
+@pytest.mark.parametrize("unit", ["$\\bad{$", "<b>m</b>", "\u00b5m", "in$^2$"])
+def test_a_unit_is_text_in_every_file(tmp_path, unit):
+    made = problem(units={"length": unit, "stress": unit}, iteration=ONE_STEP)
+    page = Reader()
+    page.feed(page_and_figures(tmp_path, vf.compare(made)))
+    assert "b" not in page.tags
+    assert page.text.count(unit) >= 4
