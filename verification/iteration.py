@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -108,7 +108,9 @@ class FixedPointMap:
         v[rows] = self.pair.contact.known[rows] - obstacle[rows]
         passes = self.pair.neumann.body.unknown[rows]
         force[rows] = np.where(passes, bound[rows] * np.sign(v[rows]), 0.0)
-        return ContactSolution(v=v, force=force, pattern=solution.pattern, kkt=solution.kkt, solver=solution.solver)
+        sliding = solution.pattern.sliding.copy()
+        sliding[rows] = np.where(passes, np.sign(v[rows]), 0)
+        return replace(solution, v=v, force=force, pattern=replace(solution.pattern, sliding=sliding))
 
 
 def iterate(

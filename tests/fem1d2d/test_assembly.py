@@ -7,7 +7,18 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from strategies import in_floats, lines, materials, meshes, numbers, plane_meshes, powers_of_two, renumbered, vectors
+from strategies import (
+    fewer,
+    in_floats,
+    lines,
+    materials,
+    meshes,
+    numbers,
+    plane_meshes,
+    powers_of_two,
+    renumbered,
+    vectors,
+)
 
 from fem1d2d import Material, Mesh, bar, body_load, element, gram, interval, rectangle, side_load, stiffness
 from fem1d2d.assembly import facet_weights
@@ -46,12 +57,14 @@ def test_the_stiffness_matrix_is_the_rational_one_up_to_summation(mesh, material
     assert fem_oracle.is_rounded(stiffness(mesh, material), exact, roundings=4)
 
 
+@fewer(2)
 @given(plane_meshes(exact=True), materials(binary=True))
 def test_the_stiffness_matrix_is_exact_to_the_bit_where_areas_are_powers_of_two(mesh, material):
     computed = stiffness(in_floats(mesh), floats_of(material)).toarray()
     assert np.array_equal(fem_oracle.exactly(computed), fem_oracle.stiffness(mesh, material))
 
 
+@fewer(2)
 @given(meshes(), powers_of_two())
 def test_the_gram_matrix_is_the_rational_one_up_to_summation(mesh, length):
     exact = fem_oracle.gram(mesh, length)
@@ -73,6 +86,7 @@ def test_a_norm_of_no_length_is_refused(length):
 # --- patch tests, in rationals ----------------------------------------------------------------------------------------
 
 
+@fewer(2)
 @given(plane_meshes(), materials(), vectors(), vectors(), vectors())
 def test_linear_displacements_have_their_exact_energy(mesh, material, row1, row2, shift):
     G = np.array([row1, row2])
@@ -93,6 +107,7 @@ def test_rigid_motions_cost_no_energy_and_meet_no_force(mesh, material, shift, t
     assert not (dense(mesh, element.stiffness(mesh, material)) @ linear(mesh, spin, shift)).any()
 
 
+@fewer(2)
 @given(plane_meshes(), materials(), vectors(), vectors())
 def test_a_constant_stress_meets_forces_only_on_the_boundary_where_they_are_its_tractions(mesh, material, row1, row2):
     G = np.array([row1, row2])
@@ -163,6 +178,7 @@ def test_stretching_the_unit_of_length_by_s_multiplies_both_matrices_by_s_to_the
     assert np.array_equal(scaled, factor * H)
 
 
+@fewer(2)
 @given(plane_meshes(exact=True), materials(binary=True), st.randoms(use_true_random=False))
 def test_renumbering_nodes_permutes_both_matrices(mesh, material, random):
     order = np.array(random.sample(range(len(mesh.points)), len(mesh.points)))
@@ -184,6 +200,7 @@ def test_the_order_of_the_cells_does_not_matter(mesh, random):
 TURNS = [np.array(q, dtype=object) / Fraction(r) for q, r in [([[3, -4], [4, 3]], 5), ([[5, 12], [-12, 5]], 13)]]
 
 
+@fewer(2)
 @given(plane_meshes(), materials(), st.sampled_from(TURNS), vectors(), st.booleans(), st.randoms(use_true_random=False))
 def test_energy_and_norm_do_not_change_when_body_and_displacement_turn_shift_or_reflect(
     mesh, material, Q, shift, mirror, random

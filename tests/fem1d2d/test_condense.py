@@ -14,7 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import fewer, held_bodies, numbers, powers_of_two
 
-from fem1d2d import Condensation, bar, gram, interval, solver, stiffness
+from fem1d2d import Condensation, bar, gram, interval, rectangle, solver, stiffness
+from fem1d2d.condense import BLOCK
 
 EPS = np.finfo(float).eps
 
@@ -146,6 +147,26 @@ def test_a_condensed_body_is_its_dense_schur_complement(case):
     assert np.linalg.eigvalsh(found.schur).min() > 0
 
 
+@given(condensed_bodies())
+def test_the_schur_complement_is_the_same_whether_or_not_the_lift_was_asked_for_first(case):
+    matrix, interface = case
+    one, other = Condensation(matrix, interface), Condensation(matrix, interface)
+    lift = other.lift
+    assert norm(one.schur - other.schur) <= rounding(matrix.toarray(), lift)
+    assert norm(one.lift - lift) <= rounding(matrix.toarray(), lift)
+
+
+def test_an_interface_longer_than_a_block_of_right_hand_sides_is_condensed_whole():
+    mesh = rectangle((0.0, 4.0), (0.0, 1.0), (2 * BLOCK, 2))
+    matrix = gram(mesh)[::2, ::2].tocsc()
+    interface = np.arange(0, len(mesh.points), 3)[::-1][: 2 * BLOCK + 1]
+    A, found = matrix.toarray(), Condensation(matrix, interface)
+    inside, lift = fem_oracle.inner(len(A), interface), dense_lift(A, interface)
+    schur = A[np.ix_(interface, interface)] + A[np.ix_(interface, inside)] @ lift
+    assert norm(found.schur - schur) <= rounding(A, lift)
+    assert norm(Condensation(matrix, interface).lift - lift) <= rounding(A, lift)
+
+
 @given(condensed_bodies(), st.integers(0, 2**16))
 def test_a_solve_leaves_no_residual(case, seed):
     matrix, interface = case
@@ -193,7 +214,9 @@ def test_an_interface_of_all_unknowns_leaves_the_matrix_as_it_is(case):
     assert np.array_equal(found.schur, (permuted + permuted.T) / 2)
     load = np.arange(1.0, len(A) + 1)
     assert found.condense(load).tolist() == load[everything].tolist()
-    assert norm(A @ solver(found.matrix)(load) - load) <= len(A) * EPS * norm(A) * (1 + norm(solver(found.matrix)(load)))
+    assert norm(A @ solver(found.matrix)(load) - load) <= len(A) * EPS * norm(A) * (
+        1 + norm(solver(found.matrix)(load))
+    )
 
 
 @given(condensed_bodies(), powers_of_two(-20, 20))
@@ -209,6 +232,27 @@ def test_the_lift_and_the_schur_complement_are_read_only(name):
     found = Condensation(sp.csc_array(np.array([[2.0, 1.0], [1.0, 2.0]])), np.array([0]))
     with pytest.raises(ValueError, match="read-only"):
         getattr(found, name)[0] = 0
+
+
+@pytest.mark.parametrize("columns", [0, 1, BLOCK - 1, BLOCK, BLOCK + 1, 3 * BLOCK])
+def test_many_right_hand_sides_are_solved_as_one_by_one(columns):
+    matrix = stiffness(interval((0.0, 1.0), 30), bar(2.0))[1:][:, 1:].tocsc()
+    solve, right = solver(matrix), np.random.default_rng(0).integers(-9, 10, (30, columns)).astype(float)
+    found = solve(right)
+    assert found.shape == (30, columns)
+    for b, x in zip(right.T, found.T, strict=True):
+        assert norm(x - solve(b)) <= 30**2 * EPS * norm(x)
+
+
+@pytest.mark.parametrize("shape", [(0,), (0, 0), (0, 3)])
+def test_no_equations_have_no_unknowns(shape):
+    assert solver(sp.csc_array((0, 0)))(np.empty(shape)).shape == shape
+
+
+def test_a_solver_does_not_change_the_right_hand_side():
+    right = np.ones((2, 3))
+    solver(sp.csc_array(np.array([[2.0, 1.0], [1.0, 2.0]])))(right)
+    assert (right == 1).all()
 
 
 # --- a bar ------------------------------------------------------------------------------------------------------------

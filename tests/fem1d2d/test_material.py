@@ -27,6 +27,21 @@ def test_lame_parameters_have_the_unit_of_stress(young, poisson):
     assert (thrice.lame_lambda, thrice.lame_mu) == (3 * once.lame_lambda, 3 * once.lame_mu)
 
 
+@given(youngs, poissons)
+def test_continuity_is_the_largest_eigenvalue_of_hooke_s_law_on_symmetric_strains(young, poisson):
+    """Pure shear costs 2 mu, a dilation in d dimensions 2 mu + d lambda; in one dimension there is no shear."""
+    material = plane_strain(young, poisson)
+    shear, dilation = 2 * material.lame_mu, 2 * material.lame_mu + 2 * material.lame_lambda
+    assert material.continuity(2) == max(shear, dilation)
+    hooke = material.lame_lambda * np.outer([1, 1, 0], [1, 1, 0]) + shear * np.eye(3, dtype=int)  # xx, yy, sqrt(2) xy
+    assert float(material.continuity(2)) == pytest.approx(np.linalg.eigvalsh(hooke.astype(float)).max(), rel=1e-14)
+
+
+@given(youngs)
+def test_the_continuity_of_a_bar_is_young(young):
+    assert bar(young).continuity(1) == young
+
+
 @given(youngs)
 def test_a_bar_carries_stress_young_times_strain(young):
     assert (bar(young).lame_lambda, bar(young).lame_mu) == (young, 0)

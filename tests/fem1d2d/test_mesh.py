@@ -106,6 +106,17 @@ def test_a_mesh_of_a_disc_is_conforming_and_obeys_euler(mesh):
     assert len(mesh.points) - len(count) + len(mesh.cells) == 1
 
 
+@given(plane_meshes(most=3))
+def test_the_body_lies_to_the_left_of_its_boundary(mesh):
+    start, end = (mesh.points[mesh.boundary[:, i]] for i in range(2))
+    assert sorted(mesh.boundary[:, 0].tolist()) == sorted(mesh.boundary[:, 1].tolist())  # closed
+    assert (start[:, 0] * end[:, 1] - end[:, 0] * start[:, 1]).sum() / 2 == measures(mesh.points, mesh.cells).sum()
+    cell = {edge: cell for cell in mesh.cells.tolist() for edge in pairwise([*cell, cell[0]])}
+    for edge in map(tuple, mesh.boundary.tolist()):
+        a, b, inner = *edge, (set(cell[edge]) - set(edge)).pop()
+        assert measures(mesh.points, np.array([[a, b, inner]]))[0] > 0
+
+
 @given(meshes(), st.randoms(use_true_random=False))
 def test_renumbering_nodes_renames_the_boundary(mesh, random):
     order = random.sample(range(len(mesh.points)), len(mesh.points))
@@ -168,6 +179,7 @@ def make(points, cells, **sides):
         (SQUARE, np.empty((0, 3)), r"cells of shape \(0, 3\): \(c, 3\) with c >= 1"),
         ([[0.0], [1.0]], [[0, 1, 1]], r"cells of shape \(1, 3\): \(c, 2\)"),
         (SQUARE, [[0, 1, 2], [0, 2, 4]], "cells name node 4, the mesh has 4 nodes"),
+        (SQUARE, [[0, 1, 2], [-2, -1, 0]], "cells name node -2, the mesh has 4 nodes"),
         (SQUARE, [[0, 1, 2], [0, 2, -1]], "cells name node -1, the mesh has 4 nodes"),
         ([[0.0, 0.0], [1.0, 0.0], [0.0, np.nan]], [[0, 1, 2]], "a coordinate is not finite"),
         ([[0.0], [np.inf]], [[0, 1]], "a coordinate is not finite"),
@@ -186,9 +198,9 @@ def test_a_mesh_that_cannot_be_used_is_refused_by_its_fault(points, cells, messa
         make(points, cells)
 
 
-@pytest.mark.parametrize("facets", [[[2, 4]], [[-1, 0]]])
-def test_a_side_that_names_no_node_of_the_mesh_is_refused(facets):
-    with pytest.raises(MeshError):
+@pytest.mark.parametrize(("facets", "node"), [([[2, 4]], 4), ([[-1, 0]], -1)])
+def test_a_side_that_names_no_node_of_the_mesh_is_refused(facets, node):
+    with pytest.raises(MeshError, match=f"side 'left' names? node {node}, the mesh has 4 nodes"):
         make(SQUARE, [[0, 1, 2], [0, 2, 3]], left=np.array(facets))
 
 

@@ -72,25 +72,27 @@ def test_a_rectangle_read_from_a_file_has_the_matrices_of_a_rectangle(tmp_path):
 
 
 #: A unit square in gmsh's own format 4.1: node tags with holes, a centre of a circle that no element uses, one block
-#: of elements for each curve, two curves in one group, a curve in two groups, a curve in none.
+#: of elements for each curve, two curves in one group, curves in two groups, a named point.
 GMSH41 = """$MeshFormat
 4.1 0 8
 $EndMeshFormat
 $PhysicalNames
-4
+5
+0 5 "corner"
 1 7 "base"
 1 8 "flank"
 1 9 "all"
 2 3 "body"
 $EndPhysicalNames
 $Entities
-1 4 1 0
+2 4 1 0
 1 0.5 0.5 0 0
-1 0 0 0 1 0 0 2 7 9 0
-2 1 0 0 1 1 0 2 8 9 0
-3 0 1 0 1 1 0 1 9 0
-4 0 0 0 0 1 0 2 8 9 0
-1 0 0 0 1 1 0 1 3 0
+2 0 0 0 1 5
+1 0 0 0 1 0 0 2 7 9 2 1 -2
+2 1 0 0 1 1 0 2 8 9 2 2 -3
+3 0 1 0 1 1 0 1 9 2 3 -4
+4 0 0 0 0 1 0 2 8 9 2 4 -1
+1 0 0 0 1 1 0 1 3 4 1 2 3 4
 $EndEntities
 $Nodes
 2 5 2 20
@@ -108,7 +110,9 @@ $Nodes
 0 1 0
 $EndNodes
 $Elements
-5 6 1 6
+6 7 1 7
+0 2 15 1
+7 2
 1 1 1 1
 1 2 4
 1 2 1 1
@@ -241,6 +245,12 @@ def test_a_file_without_triangles_is_refused_by_what_it_has(tmp_path):
     )
 
 
+def test_a_file_without_cells_is_refused(tmp_path):
+    path = tmp_path / "body.msh"
+    path.write_text("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n")
+    refused(path, "no triangles in it, only nothing")
+
+
 def test_curved_triangles_are_no_triangles(tmp_path):
     points = np.concatenate([SQUARE[:3], (SQUARE[:3] + np.roll(SQUARE[:3], -1, axis=0)) / 2])
     more = [("triangle6", np.array([[0, 1, 2, 3, 4, 5]]))]
@@ -296,5 +306,4 @@ def test_a_body_partly_of_quadrangles_is_refused_and_not_cut_down_to_its_triangl
     points = np.concatenate([SQUARE, [[2.0, 0.0, 0.0], [2.0, 1.0, 0.0]]])
     more = [("quad", np.array([[1, 4, 5, 2]]))]
     path = write(tmp_path / "body.msh", points, TRIANGLES, {"bottom": [[0, 1]]}, more=more)
-    with pytest.raises(MeshError):
-        from_file(path)
+    refused(path, "needed triangles alone, it has quad too")

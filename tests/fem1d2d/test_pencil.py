@@ -75,7 +75,6 @@ def test_m_and_M_of_an_elastic_body_are_those_of_a_dense_solver(body):
     mesh, material, free = body
     A, H = (matrix[free][:, free].tocsc() for matrix in (stiffness(mesh, material), gram(mesh)))
     spectrum = scipy.linalg.eigh(A.toarray(), H.toarray(), eigvals_only=True)
-    end = np.arange(2)
     low = largest_sparse(H, A, solver(A))
     high = largest_sparse(A, H, solver(H))
     assert 1 / low.value == pytest.approx(spectrum[0], rel=1e-11)
@@ -137,6 +136,40 @@ def test_the_largest_eigenvalue_is_not_the_largest_in_size():
     assert largest_sparse(*sparse(wide, np.eye(50))).value == pytest.approx(1, rel=1e-12)
 
 
+@given(pencils(least=DENSE + 1), st.sampled_from([0.25, 1.0, 1000.0]))
+def test_an_upper_bound_of_the_spectrum_does_not_change_the_eigenvalue(pencil, slack):
+    A, B, D, X = pencil
+    found = largest_sparse(*sparse(A, B), above=D.max() + slack)
+    assert found.value == pytest.approx(D.max(), abs=1e-12 * (np.abs(D).max() + slack))
+    assert np.abs(D - found.value).min() <= found.residual + 1e-13 * np.abs(D).max()
+    top = np.isclose(D, D.max(), rtol=0)
+    overlap = (B @ X[:, top]).T @ found.vector  # the vector lies in the eigenspace
+    assert np.linalg.norm(overlap) == pytest.approx(1, rel=1e-9)
+
+
+def test_an_upper_bound_tells_apart_what_crowds_below_it():
+    """A body without lateral contraction: the top of its spectrum crowds below 2 mu."""
+    mesh, law = rectangle((0.0, 2.0), (0.0, 0.3), (16, 4)), plane_strain(1.0, 0.0)
+    free = np.flatnonzero(~supports(mesh, {"bottom": [0.0, 0.0]}).known.ravel())
+    A, H = (matrix[free][:, free].tocsc() for matrix in (stiffness(mesh, law), gram(mesh)))
+    found = largest_sparse(A, H, solver(H), above=law.continuity(2))
+    assert found.value == pytest.approx(scipy.linalg.eigh(A.toarray(), H.toarray(), eigvals_only=True)[-1], rel=1e-13)
+    again = largest_sparse(A, H, solver(H), above=law.continuity(2))
+    assert (found.value, found.vector.tolist()) == (again.value, again.vector.tolist())
+
+
+@given(st.integers(1, 80), st.floats(0, 1), st.integers(0, 2**16))
+def test_a_largest_eigenvalue_of_high_multiplicity_is_found_also_when_rounding_splits_it(n, share, seed):
+    """As rho of two bodies that are alike, wholly or in part: of dense matrices, `share` of the spectrum lower."""
+    random = np.random.default_rng(seed)
+    G = random.standard_normal((n, n))
+    B = G @ G.T + n * np.eye(n)
+    L, Q = np.linalg.cholesky(B), np.linalg.qr(random.standard_normal((n, n)))[0]
+    D = np.where(np.arange(n) < share * (n - 1), random.choice([-1.0, 0.5, 1.25], n), 1.5)
+    A = L @ (Q * D) @ Q.T @ L.T
+    assert largest((A + A.T) / 2, B).value == pytest.approx(1.5, rel=n * 16 * EPS)
+
+
 # --- it repeats -------------------------------------------------------------------------------------------------------
 
 
@@ -147,7 +180,7 @@ def test_an_eigenvalue_repeats_to_the_digit_whatever_the_global_random_state(bod
     A, H = (matrix[free][:, free].tocsc() for matrix in (stiffness(mesh, material), gram(mesh)))
     solve = solver(H)
     one = largest_sparse(A, H, solve)
-    np.random.default_rng(seed).standard_normal(7)
+    np.random.seed(seed)  # noqa: NPY002
     other = largest_sparse(A, H, solve)
     assert one.value == other.value
     assert one.residual == other.residual

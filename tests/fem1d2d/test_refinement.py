@@ -108,8 +108,8 @@ def test_intervals_whose_cell_counts_do_not_divide_are_not_nested():
     assert not contains(fine, coarse, evaluation(coarse, fine))
 
 
-@pytest.mark.parametrize("factor", [1, 2, 3, 4])
-@pytest.mark.parametrize("cells", [(1, 1), (2, 1), (1, 2), (2, 2), (3, 2)])
+@pytest.mark.parametrize("factor", [2, 3, 4])
+@pytest.mark.parametrize("cells", [(1, 1), (2, 1), (1, 2), (2, 2)])
 def test_alternating_diagonals_are_nested_when_both_directions_are_divided_by_the_same_number(cells, factor):
     """The small cells along the diagonal of a cell all have one parity, and it gives them that diagonal's direction."""
     coarse = rectangle(UNIT, (Fraction(0), Fraction(2, 3)), cells)
@@ -135,6 +135,7 @@ def test_rectangles_whose_cell_counts_are_no_common_multiple_are_not_nested(coun
     assert not contains(fine, coarse, evaluation(coarse, fine))
 
 
+@fewer(2)
 @given(st.one_of(lines(most=3), plane_meshes()))
 def test_cutting_every_cell_at_the_middles_of_its_edges_is_nested(mesh):
     fine, evaluate = red(mesh)
@@ -154,7 +155,7 @@ def test_halving_in_floats_keeps_every_coarse_node_to_the_bit(a, width, nx, ny):
 # --- what follows -----------------------------------------------------------------------------------------------------
 
 
-@fewer(4)
+@fewer(10)
 @given(plane_meshes(), materials())
 def test_interpolation_into_a_nested_mesh_keeps_the_elastic_energy(mesh, material):
     fine, evaluate = red(mesh)

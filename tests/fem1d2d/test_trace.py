@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import in_floats, lines, numbers, powers_of_two, renumbered, vectors
 
-from fem1d2d import Mesh, MeshError, interval, nodes_between, rectangle, surface, trapezoid
+from fem1d2d import Mesh, MeshError, facing, interval, nodes_between, rectangle, surface, trapezoid
 from fem1d2d.assembly import facet_weights
 
 counts = st.integers(1, 4)
@@ -85,6 +85,78 @@ def test_the_top_is_flat_up_to_a_billionth_of_the_extent(uneven, kept, extent):
     else:
         with pytest.raises(MeshError, match="no flat top"):
             surface(uneven_mesh, upper=True)
+
+
+# --- surfaces that are not flat ---------------------------------------------------------------------------------------
+
+
+@given(flat_bodies(), st.booleans())
+def test_what_faces_up_or_down_on_a_rectangle_is_its_flat_surface(body, upper):
+    mesh, width, _ = body
+    assert facing(mesh, upper=upper, ends=(0.0, width)).tolist() == surface(mesh, upper=upper).tolist()
+
+
+@st.composite
+def hills(draw):
+    """Rectangles of height 1 under a top, and over a bottom, that rises and falls by less than half of it."""
+    nx, ny = draw(counts), draw(counts)
+    flat = rectangle((0.0, 1.0), (0.0, 1.0), (nx, ny))
+    random = np.random.default_rng(draw(st.integers(0, 2**16)))
+    low, high = random.integers(-3, 4, nx + 1) / 8, 1 + random.integers(-3, 4, nx + 1) / 8
+    column = np.repeat(np.arange(nx + 1), ny + 1)
+    y = low[column] + (high - low)[column] * flat.points[:, 1]
+    mesh = Mesh(points=np.column_stack([flat.points[:, 0], y]), cells=flat.cells, sides=flat.sides)
+    return renumbered(mesh, draw(st.permutations(range(len(y)))))
+
+
+@given(hills(), st.booleans(), st.integers(0, 4), st.integers(0, 4))
+def test_what_faces_up_on_a_hill_is_its_top_between_the_ends_from_left_to_right(mesh, upper, a, b):
+    ends = min(a, b) / 4, max(a, b) / 4
+    nodes = facing(mesh, upper=upper, ends=ends)
+    x = mesh.points[:, 0]
+    side = np.unique(mesh.sides["top" if upper else "bottom"])
+    assert set(nodes.tolist()) == {node for node in side.tolist() if ends[0] <= x[node] <= ends[1]}
+    assert (np.diff(x[nodes]) > 0).all()
+
+
+@given(hills(), st.booleans())
+def test_what_faces_up_on_a_body_faces_down_on_its_reflection(mesh, upper):
+    mirror = Mesh(points=mesh.points * [1, -1], cells=mesh.cells[:, ::-1], sides={})
+    ends = (0.0, 1.0)
+    assert facing(mesh, upper=upper, ends=ends).tolist() == facing(mirror, upper=not upper, ends=ends).tolist()
+
+
+def test_a_circle_faces_up_on_its_upper_half():
+    angle = np.arange(8) * np.pi / 4 + np.pi / 8
+    rim = np.column_stack([np.cos(angle), np.sin(angle)])
+    cells = np.array([[0, 1 + i, 1 + (i + 1) % 8] for i in range(8)])
+    circle = Mesh(points=np.concatenate([[[0.0, 0.0]], rim]), cells=cells, sides={})
+    assert facing(circle, upper=True, ends=(-1.0, 1.0)).tolist() == [4, 3, 2, 1]
+    assert facing(circle, upper=False, ends=(-1.0, 1.0)).tolist() == [5, 6, 7, 8]
+    assert facing(circle, upper=False, ends=(-0.5, 0.5)).tolist() == [6, 7]
+
+
+@pytest.mark.parametrize("extent", [1e-3, 1.0, 1e3])
+def test_a_flank_within_a_billionth_of_the_extent_of_upright_faces_neither_way(extent):
+    mesh = lambda lean: Mesh(
+        points=extent * np.array([[0.0, 0.0], [1.0, 0.0], [1.0 + lean, 1.0], [0.0, 1.0]]),
+        cells=np.array([[0, 1, 2], [0, 2, 3]]),
+        sides={},
+    )
+    ends = (-extent, 2 * extent)
+    assert facing(mesh(0.9e-9), upper=False, ends=ends).tolist() == [0, 1]
+    assert facing(mesh(0.1), upper=False, ends=ends).tolist() == [0, 1, 2]
+
+
+@pytest.mark.parametrize(("upper", "word"), [(True, "up"), (False, "down")])
+def test_a_body_with_two_surfaces_above_each_other_is_refused(upper, word):
+    mesh = rectangle((0.0, 2.0), (0.0, 3.0), (2, 3))
+    centres = mesh.points[mesh.cells].mean(axis=1)
+    notch = (centres[:, 0] > 1) & (centres[:, 1] > 1) & (centres[:, 1] < 2)
+    notched = Mesh(points=mesh.points, cells=mesh.cells[~notch], sides={})
+    with pytest.raises(MeshError, match=f"two points of the surface that faces {word} lie at x = 1"):
+        facing(notched, upper=upper, ends=(0.0, 2.0))
+    assert len(facing(notched, upper=upper, ends=(0.0, 0.9))) == 1
 
 
 # --- parts of a surface -----------------------------------------------------------------------------------------------
