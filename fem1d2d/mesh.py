@@ -7,6 +7,7 @@ import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -64,7 +65,7 @@ class Mesh:
             array.setflags(write=False)
         object.__setattr__(self, "points", points)
         object.__setattr__(self, "cells", cells)
-        object.__setattr__(self, "sides", sides)
+        object.__setattr__(self, "sides", MappingProxyType(sides))
 
     @property
     def dimension(self) -> int:
