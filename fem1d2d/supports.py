@@ -111,7 +111,7 @@ def rigid_motions(mesh: Mesh, known: NDArray[np.bool_]) -> Floats:
     if conditions:
         matrix = np.concatenate(conditions).reshape(-1, unknowns)
         if len(matrix) > unknowns:
-            matrix = np.linalg.qr(matrix, mode="r")  # the same kernel, without the size of a long support
+            matrix = np.asarray(np.linalg.qr(matrix, mode="r"))  # the same kernel, without the size of a long support
         _, values, right = np.linalg.svd(matrix)
         rank = int((values > 1e-9 * np.sqrt(n)).sum())
         kernel = right[rank:].T

@@ -152,7 +152,8 @@ def supports_and_loads(draw, far: str, clear: list[str], young: Fraction, height
     held = dict.fromkeys(fixed, (True, True))
     held |= {name: tuple(v != "free" for v in values) for name, values in prescribed.items()}
     traction = {}
-    for name in draw(st.lists(st.sampled_from(["left", "right", far]), max_size=2, unique=True)):
+    loaded = ["left", "right", *(["bottom", "top"] if clear else [far])]  # a side that is all Gamma_c takes no traction
+    for name in draw(st.lists(st.sampled_from(loaded), max_size=2, unique=True)):
         force = [Fraction(0) if h else young * draw(strains()) for h in held.get(name, (False, False))]
         traction[name] = force
     body_force = [young / length * draw(strains()) for _ in range(2)]
