@@ -290,6 +290,7 @@ def remedy(finished: Run, swapped: bool) -> str:
     swapped : bool
         Whether its roles are those of --swap-roles.
     """
+    from verification.cli.screens import worth_trying
     from verification.measured import measure
     from verification.rates import noise
 
@@ -311,11 +312,6 @@ def remedy(finished: Run, swapped: bool) -> str:
     if theta <= good:
         return f"{here}; try --theta {theta / 2:.2g}{better}"
     return f"{here}; try --theta {good:.2g} (2/(2 + rho), rho = {rho.rho_max.value:.3g}){better}"
-
-
-def worth_trying(rho: float) -> float:
-    """2/(2 + rho), and below 1 when it is written with two figures."""
-    return min(2 / (2 + rho), 0.99)
 
 
 def _status_of_comparison(comparison: Comparison, swapped: bool) -> int:

@@ -7,7 +7,6 @@ from shlex import quote
 
 from verification.cli.calculator import edition_rows
 from verification.cli.console import figures, heading, near_one, printable, say, table
-from verification.cli.problems import worth_trying
 from verification.contact_state import ContactState
 from verification.measured import Measured
 from verification.monolithic import Solution
@@ -141,3 +140,8 @@ def _next_theta(result: Comparison) -> str:
     """A theta worth trying, of two figures."""
     rho = result.measured.rho_max
     return "0.5" if rho is None else f"{worth_trying(rho.value):.2g}"
+
+
+def worth_trying(rho: float) -> float:
+    """2/(2 + rho), and below 1 when it is written with two figures."""
+    return min(2 / (2 + rho), 0.99)
