@@ -1,6 +1,6 @@
 """The convergence theorem of Bayada, Sabil and Sassi (2008), on paper.
 
-Constants in, contraction interval out: the theorem as printed and as repaired.  This package knows no
+Constants in, contraction interval out: the theorem as printed, as repaired, and in energy norms.  This package knows no
 finite elements and needs the standard library alone.
 
 >>> from ndtheory import Constants, REPAIRED, evaluate
@@ -13,6 +13,7 @@ from ndtheory.bounds import EDITIONS, PRINTED, REPAIRED, Bounds, Edition, evalua
 from ndtheory.constants import Constants, relaxation_factor
 from ndtheory.errors import HypothesisError
 from ndtheory.number import Number, exact
+from ndtheory.sharp import EnergyConstants, SharpBounds, evaluate_sharp
 
 __version__ = "0.1.0"
 
@@ -23,10 +24,13 @@ __all__ = [
     "Bounds",
     "Constants",
     "Edition",
+    "EnergyConstants",
     "HypothesisError",
     "Number",
+    "SharpBounds",
     "__version__",
     "evaluate",
+    "evaluate_sharp",
     "exact",
     "relaxation_factor",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -10,11 +11,21 @@ from ndtheory.errors import HypothesisError
 from ndtheory.number import exact
 
 
-def _number(key: str, value: Any, needed: str) -> Fraction:
+def take(key: str, value: Any, needed: str, holds: Callable[[Fraction], bool]) -> Fraction:
+    """Read a number exactly and hold it against its hypothesis.
+
+    Raises
+    ------
+    HypothesisError
+        Not a number, or the hypothesis fails; ``needed`` says what was asked.
+    """
     try:
-        return exact(value)
+        number = exact(value)
     except ValueError:
         raise HypothesisError(key, value, needed) from None
+    if not holds(number):
+        raise HypothesisError(key, value, needed)
+    return number
 
 
 def relaxation_factor(value: Any) -> Fraction:
@@ -29,11 +40,7 @@ def relaxation_factor(value: Any) -> Fraction:
     >>> relaxation_factor("1/3")
     Fraction(1, 3)
     """
-    needed = "a number with 0 < theta < 1"
-    theta = _number("theta", value, needed)
-    if not 0 < theta < 1:
-        raise HypothesisError("theta", value, needed)
-    return theta
+    return take("theta", value, "a number with 0 < theta < 1", lambda theta: 0 < theta < 1)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,9 +87,7 @@ class Constants:
         self, *, m: Any, M: Any, C_R: Any, C_K: Any = None, C_s: Any = None, C_tr: Any = None, k: Any = None
     ) -> None:
         def keep(key: str, value: Any, needed: str, holds: Any) -> Fraction:
-            number = _number(key, value, needed)
-            if not holds(number):
-                raise HypothesisError(key, value, needed)
+            number = take(key, value, needed, holds)
             object.__setattr__(self, key, number)
             return number
 

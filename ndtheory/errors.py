@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import Any
+
+from ndtheory.number import decimal
 
 
 class HypothesisError(ValueError):
@@ -19,8 +22,11 @@ class HypothesisError(ValueError):
     """
 
     def __init__(self, key: str, value: Any, needed: str) -> None:
-        large = isinstance(value, int) and value.bit_length() > 1000
-        shown = f"an integer of {value.bit_length()} bits" if large else value
+        shown = value
+        if isinstance(value, Fraction) and max(abs(value.numerator), value.denominator) > 10**17:
+            shown = decimal(value)
+        elif isinstance(value, int) and value.bit_length() > 1000:
+            shown = f"an integer of {value.bit_length()} bits"
         super().__init__(f"{key} = {shown}: needed {needed}")
         self.key = key
         self.value = value

@@ -50,7 +50,7 @@ def frictions(draw, body, editions=tuple(oracle.EDITIONS), thinnest=THINNEST):
     """
     paper = oracle.EDITIONS[draw(st.sampled_from(editions))](**body, C_K=0)
     kinds = ["any", "near", "zero"]
-    if (paper.m / (paper.M * paper.C_R)) ** 2 >= thinnest:
+    if (paper.m / (paper.M * paper.C_R)) ** 2 >= float(thinnest):
         kinds.append("layer")
     kind = draw(st.sampled_from(kinds))
     if kind == "zero":

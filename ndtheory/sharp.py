@@ -1,0 +1,375 @@
+"""The theorem in energy norms: the same proof as Section 5, with no constant larger than it must be.
+
+For two forces psi, psi~ let d_1, d_2 be the differences of the traces of the contact body and of the Neumann body, with
+``|d_a|^2 = a^a(R d_a, R d_a)``, and ``x = |d_1| / |d_2|``; ``|d_2|`` is the norm (5.21) of psi - psi~. Then
+
+* ``|||T psi - T psi~|||^2 <= rho x^2 |d_2|^2`` takes the place of (5.18), (5.22), (5.38),
+* ``x <= r``, with ``r^2 = (sqrt(rho) + kappa_1) r + kappa_2``, that of (5.11),
+* ``<T psi - T psi~, d_2> <= f(x) |d_2|^2``, with ``f(x) = kappa_2 + kappa_1 x - x^2``, that of (5.29) and (5.30).
+
+So by (5.24) ``q(theta)^2``, the largest ``(1-theta)^2 + 2 theta (1-theta) f(x) + theta^2 rho x^2`` over 0 <= x <= r,
+bounds the square of the Lipschitz constant of T_theta.  The proof, step by step, is in ``docs/sharp.md``.  Every
+formula is written over any scalar.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from decimal import Decimal
+from fractions import Fraction
+from typing import Any
+
+from ndtheory.bounds import MARGIN, Verdict
+from ndtheory.constants import relaxation_factor, take
+from ndtheory.number import Number, decimal, sqrt, working_precision
+
+#: Halvings of an interval inside (0, 1) until theta is known to far below a double.
+HALVINGS = 80
+
+#: Sizes whose squares and quotients fit into a double.
+SMALLEST, LARGEST = Fraction(1, 10**75), Fraction(10**75)
+
+
+def _friction(kappa: Fraction) -> bool:
+    return kappa == 0 or SMALLEST <= kappa <= LARGEST
+
+
+@dataclass(frozen=True, kw_only=True)
+class EnergyConstants:
+    """rho, kappa_1 and kappa_2: all that the theorem in energy norms knows of the two bodies and of friction.
+
+    Parameters
+    ----------
+    rho : dimensionless
+        Largest eigenvalue of ``S_1 phi = rho S_2 phi``, contact body over Neumann body.  Hypothesis: rho > 0.
+    kappa_1, kappa_2 : dimensionless, optional
+        ``k C_s C_t1`` and ``k C_s C_t2`` with ``C_s = sup |S sigma_N(w)|_L2 / |w|_a2`` and
+        ``C_ta = sup |v_T|_L2 / |v|_aa``; 0 by default.  Hypothesis: both >= 0.
+    rho_normal : dimensionless, optional
+        rho with the tangential components condensed out; takes the place of rho where kappa_1 = kappa_2 = 0.
+        Hypothesis: 0 < rho_normal <= rho.
+
+    Raises
+    ------
+    HypothesisError
+        Naming the constant, the value received and what was needed.
+
+    Examples
+    --------
+    >>> EnergyConstants(rho="3/2").at_work
+    Fraction(3, 2)
+    """
+
+    rho: Fraction
+    kappa_1: Fraction
+    kappa_2: Fraction
+    rho_normal: Fraction | None
+
+    def __init__(self, *, rho: Any, kappa_1: Any = 0, kappa_2: Any = 0, rho_normal: Any = None) -> None:
+        largest = take("rho", rho, "a number rho > 0 (1e-75 to 1e75)", lambda v: SMALLEST <= v <= LARGEST)
+        normal = None
+        if rho_normal is not None:
+            needed = f"a number 0 < rho_normal <= rho = {rho}"
+            normal = take("rho_normal", rho_normal, needed, lambda v: 0 < v <= largest)
+        values = {
+            "rho": largest,
+            "kappa_1": take("kappa_1", kappa_1, "a number kappa_1 >= 0 (0, or 1e-75 to 1e75)", _friction),
+            "kappa_2": take("kappa_2", kappa_2, "a number kappa_2 >= 0 (0, or 1e-75 to 1e75)", _friction),
+            "rho_normal": normal,
+        }
+        for key, value in values.items():
+            object.__setattr__(self, key, value)
+
+    @property
+    def frictionless(self) -> bool:
+        """Whether kappa_1 = kappa_2 = 0: no node sticks, and tangential components carry no force."""
+        return self.kappa_1 == 0 == self.kappa_2
+
+    @property
+    def at_work(self) -> Fraction:
+        """The rho that enters q: rho_normal without friction (where it is known), else rho."""
+        return self.rho_normal if self.frictionless and self.rho_normal is not None else self.rho
+
+
+# The formulas: rho > 0, kappa_1, kappa_2 >= 0, 0 < theta <= 1.
+
+
+def largest_ratio(rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
+    """r, the largest ``x = |d_1|/|d_2|``: the positive root of ``r^2 = (sqrt(rho) + kappa_1) r + kappa_2``.
+
+    Examples
+    --------
+    >>> largest_ratio(4.0, 0.0, 0.0)
+    2.0
+    """
+    s = sqrt(rho) + kappa_1
+    return (s + sqrt(s * s + 4 * kappa_2)) / 2
+
+
+def work(x: Any, kappa_1: Any, kappa_2: Any) -> Any:
+    """f(x): bounds ``<T psi - T psi~, d_2> / |d_2|^2``; ``f(r) = -sqrt(rho) r``."""
+    return kappa_2 + kappa_1 * x - x * x
+
+
+def square_at(x: Any, theta: Any, rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
+    """The right-hand side of (5.24) at one x, over ``|||psi - psi~|||^2``."""
+    return (1 - theta) ** 2 + 2 * theta * (1 - theta) * work(x, kappa_1, kappa_2) + theta**2 * rho * x * x
+
+
+def turning_theta(rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
+    """theta_s: from here on the worst x is r, below it lies in [0, r).
+
+    Examples
+    --------
+    >>> turning_theta(2.0, 0.0, 0.0)  # without friction 2/(2 + rho)
+    0.5
+    """
+    r = largest_ratio(rho, kappa_1, kappa_2)
+    return (2 * r - kappa_1) / ((2 + rho) * r - kappa_1)
+
+
+def worst_ratio(theta: Any, rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
+    """The x in [0, r] at which ``square_at`` is largest."""
+    if theta >= turning_theta(rho, kappa_1, kappa_2):
+        return largest_ratio(rho, kappa_1, kappa_2)
+    return (1 - theta) * kappa_1 / (2 - (2 + rho) * theta) if kappa_1 else 0 * theta
+
+
+def one_minus_end(theta: Any, rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
+    """1 - q^2 where the worst x is r: there ``q = |1 - theta (1 + sqrt(rho) r)|``."""
+    slope = 1 + sqrt(rho) * largest_ratio(rho, kappa_1, kappa_2)
+    return theta * slope * (2 - theta * slope)
+
+
+def one_minus_inside(theta: Any, rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
+    """1 - q^2 where the worst x lies inside: for theta below ``turning_theta``, at most 2/(2 + rho)."""
+    bend = (1 - theta) ** 2 * kappa_1**2 / (2 - (2 + rho) * theta) if kappa_1 else 0
+    return theta * (2 - theta - 2 * (1 - theta) * kappa_2 - bend)
+
+
+def one_minus_square(theta: Any, rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
+    """1 - q(theta)^2; negative where q > 1."""
+    branch = one_minus_end if theta >= turning_theta(rho, kappa_1, kappa_2) else one_minus_inside
+    return branch(theta, rho, kappa_1, kappa_2)
+
+
+def slope_inside(theta: Any, rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
+    """Derivative of ``one_minus_inside`` by theta."""
+    c = 2 + rho
+    bend = 2 * (1 - theta) * (1 - 3 * theta + c * theta**2) / (2 - c * theta) ** 2 if kappa_1 else 0
+    return 2 - 2 * theta - 2 * (1 - 2 * theta) * kappa_2 - kappa_1**2 * bend
+
+
+def friction_number(kappa_1: Any, kappa_2: Any) -> Any:
+    """``kappa_2 + kappa_1^2/4``, the largest f: every small theta contracts where it is below 1, none where above."""
+    return kappa_2 + kappa_1**2 / 4
+
+
+def friction_multiple(kappa_1: Any, kappa_2: Any) -> Any:
+    """The factor t by which friction may grow until ``friction_number(t kappa_1, t kappa_2) = 1``.
+
+    Examples
+    --------
+    >>> friction_multiple(0.0, 0.25), friction_multiple(1.0, 0.0)
+    (4.0, 2.0)
+    """
+    return 2 / (kappa_2 + sqrt(kappa_2**2 + kappa_1**2))
+
+
+def predicted_theta(rho: Any) -> Any:
+    """``2/(2 + rho)``: the best theta without friction, and a prediction with it."""
+    return 2 / (2 + rho)
+
+
+def predicted_rate(rho: Any) -> Any:
+    """``rho/(2 + rho)``: the factor at :func:`predicted_theta` without friction, and a prediction with it."""
+    return rho / (2 + rho)
+
+
+def contraction_interval(rho: Any, kappa_1: Any, kappa_2: Any, margin: Any = 0) -> tuple[Any, Any] | None:
+    """The thetas with q < 1, an open interval inside (0, 1), or None where there are none.
+
+    ``q < 1`` means ``2 (f - 1) + theta (1 - 2 f + rho x^2) < 0`` for every x in [0, r].  Each is linear in theta, so
+    their maximum h is convex, and ``h < 0`` on one interval.  Its ends are 0, 1, ``2/(1 + sqrt(rho) r)`` or roots of
+    the quadratic ``h (2 - (2 + rho) theta)`` below :func:`turning_theta`.  Scalars that round need a
+    ``margin`` well above their relative rounding, within which an end counts as met.
+    """
+    turn = turning_theta(rho, kappa_1, kappa_2)
+    end = 2 / (1 + sqrt(rho) * largest_ratio(rho, kappa_1, kappa_2))
+    spare = 1 - kappa_2
+    a = (1 - 2 * spare) * (2 + rho) + kappa_1**2
+    b = (8 + 2 * rho) * spare - 2 - 2 * kappa_1**2
+    c = kappa_1**2 - 4 * spare
+    inner = sorted(root for root in _roots(a, b, c, margin) if margin < root < turn * (1 - margin))
+    start = [0 * end] if c <= margin else []  # h <= 0 at 0
+    stop = [min(end, end / end)] if end >= turn * (1 - margin) else []  # and at the turning theta
+    ends = start + inner + stop
+    return (ends[0], ends[1]) if len(ends) == 2 else None
+
+
+def _roots(a: Any, b: Any, c: Any, margin: Any) -> list[Any]:
+    """Both real roots of ``a t^2 + b t + c`` where they differ, without cancellation."""
+    discriminant = b * b - 4 * a * c
+    if discriminant <= margin * b * b:
+        return []
+    q = -(b + sqrt(discriminant)) / 2 if b > 0 else -(b - sqrt(discriminant)) / 2
+    return [numerator / denominator for numerator, denominator in ((q, a), (c, q)) if denominator != 0]
+
+
+def best_theta(rho: Any, kappa_1: Any, kappa_2: Any, margin: Any = 0) -> Any | None:
+    """The theta of least q, or None where q >= 1 everywhere.
+
+    q grows above :func:`turning_theta`; below it, where q < 1, it has one minimum, since ``q <= c`` holds on one
+    interval for each c <= 1.
+    """
+    interval = contraction_interval(rho, kappa_1, kappa_2, margin)
+    if interval is None:
+        return None
+    low, high = interval[0], min(interval[1], turning_theta(rho, kappa_1, kappa_2))
+    return _last_where(lambda theta: slope_inside(theta, rho, kappa_1, kappa_2) > 0, low, high)
+
+
+def _last_where(holds: Callable[[Any], bool], low: Any, high: Any) -> Any:
+    """The end of an interval (low, ..) inside (low, high) on which a condition holds, by halving."""
+    if holds(high):
+        return high
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    return low
+
+
+@dataclass(frozen=True, kw_only=True)
+class SharpBounds:
+    """What the theorem in energy norms says.
+
+    Attributes
+    ----------
+    rho : Number
+        The one at work: rho_normal without friction, where it is known.
+    kappa_1, kappa_2 : Number
+    ratio : Number
+        r, the largest ``|d_1|/|d_2|``.
+    friction_multiple : Number or None
+        The factor by which friction may grow until no small theta is proved; None without friction.
+    interval : tuple of float or None
+        q < 1 for lo < theta < hi, capped at 1; None where q >= 1 everywhere.
+    theta_proved : float or None
+        The theta of least q.
+    factor_proved : Number or None
+        q there.
+    theta_max_proved : Number or None
+        The upper end of the interval.
+    theta_predicted, rate_predicted : float
+        ``2/(2 + rho)`` and ``rho/(2 + rho)``: proved without friction, a prediction with it.
+    theta : float or None
+    factor, one_minus_factor : Number or None
+        q(theta) < 1 and 1 - q; None outside the interval.
+    verdict : {'contraction', 'no conclusion'} or None
+    """
+
+    rho: Number
+    kappa_1: Number
+    kappa_2: Number
+    ratio: Number
+    friction_multiple: Number | None
+    interval: tuple[float, float] | None
+    theta_proved: float | None
+    factor_proved: Number | None
+    theta_max_proved: Number | None
+    theta_predicted: float
+    rate_predicted: float
+    theta: float | None
+    factor: Number | None
+    one_minus_factor: Number | None
+    verdict: Verdict | None
+
+    @property
+    def reason(self) -> dict[str, str]:
+        """Why a value is None."""
+        reasons: dict[str, str] = {}
+        if self.friction_multiple is None:
+            reasons["friction_multiple"] = "no friction"
+        if self.interval is None:
+            names = ("interval", "theta_proved", "factor_proved", "theta_max_proved")
+            reasons |= dict.fromkeys(names, "q >= 1 for every theta")
+        if self.theta is None:
+            reasons |= dict.fromkeys(("theta", "factor", "one_minus_factor", "verdict"), "no theta given")
+        elif self.factor is None:
+            reasons |= dict.fromkeys(("factor", "one_minus_factor"), "theta outside the interval: no conclusion")
+        return reasons
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object ``editions.sharp`` of ``ndtheory.bounds/1``; what is null has a reason beside it."""
+        result: dict[str, Any] = {}
+        for name in self.__dataclass_fields__:
+            value = getattr(self, name)
+            result[name] = value.to_dict() if isinstance(value, Number) else value
+        result["interval"] = None if self.interval is None else list(self.interval)
+        return {**result, "reason": self.reason}
+
+
+def evaluate_sharp(constants: EnergyConstants, theta: Any = None) -> SharpBounds:
+    """Evaluate the theorem in energy norms.
+
+    Parameters
+    ----------
+    constants : EnergyConstants
+    theta : number, optional
+        Relaxation factor, 0 < theta < 1, read exactly.
+
+    Raises
+    ------
+    HypothesisError
+        theta outside (0, 1).
+
+    Examples
+    --------
+    >>> s = evaluate_sharp(EnergyConstants(rho=2), theta="3/5")
+    >>> s.interval, s.theta_proved, s.factor_proved.value, round(s.factor.value, 12)
+    ((0.0, 0.6666666666666666), 0.5, 0.5, 0.8)
+    """
+    chosen = None if theta is None else relaxation_factor(theta)
+    with working_precision():
+        rho, kappa_1, kappa_2 = data = (
+            decimal(constants.at_work),
+            decimal(constants.kappa_1),
+            decimal(constants.kappa_2),
+        )
+        interval = contraction_interval(*data, MARGIN)
+        if interval is not None and float(interval[0]) == float(interval[1]):
+            interval = None  # no double lies inside
+        best = None if interval is None else best_theta(*data, MARGIN)
+        factor = one_minus = None
+        verdict: Verdict | None = None if chosen is None else "no conclusion"
+        if chosen is not None and interval is not None:
+            low, t, high = interval[0], decimal(chosen), interval[1]
+            if low * (1 + MARGIN) < t < high * (1 - MARGIN):
+                q, gain = _factor(t, data)
+                if gain > 0:
+                    factor, one_minus, verdict = Number.of_float(q), Number.of_float(gain), "contraction"
+        return SharpBounds(
+            rho=Number.of_float(rho),
+            kappa_1=Number.of_float(kappa_1),
+            kappa_2=Number.of_float(kappa_2),
+            ratio=Number.of_float(largest_ratio(*data)),
+            friction_multiple=None if constants.frictionless else Number.of_float(friction_multiple(kappa_1, kappa_2)),
+            interval=None if interval is None else (float(interval[0]), float(interval[1])),
+            theta_proved=None if best is None else float(best),
+            factor_proved=None if best is None else Number.of_float(_factor(best, data)[0]),
+            theta_max_proved=None if interval is None else Number.of_float(interval[1]),
+            theta_predicted=float(predicted_theta(rho)),
+            rate_predicted=float(predicted_rate(rho)),
+            theta=None if chosen is None else float(chosen),
+            factor=factor,
+            one_minus_factor=one_minus,
+            verdict=verdict,
+        )
+
+
+def _factor(theta: Decimal, data: tuple[Decimal, Decimal, Decimal]) -> tuple[Decimal, Decimal]:
+    """q and 1 - q."""
+    gain = one_minus_square(theta, *data)
+    q = sqrt(max(1 - gain, Decimal(0)))
+    return q, gain / (1 + q)
