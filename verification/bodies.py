@@ -59,8 +59,8 @@ def build(problem: Problem) -> Pair:
                 problem.source,
                 body.name,
                 None,
-                f"{body.name} can move rigidly ({k} free motion{'s' if k > 1 else ''}): "
-                "fix or prescribe more of its sides",
+                f"{body.name} can move rigidly ({k} free motion{'s' if k > 1 else ''}), so that its Neumann problem is"
+                " singular: fix or prescribe more of its sides",
             )
     return Pair(**vars(facing))
 

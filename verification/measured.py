@@ -11,12 +11,17 @@ from scipy.linalg import cho_factor, cho_solve
 
 from fem1d2d import largest, largest_sparse, solver
 from fem1d2d.mesh import Floats
-from ndtheory import Constants, Number
+from ndtheory import Constants, EnergyConstants, Number
+from ndtheory.sharp import friction_multiple
 from verification.bodies import build
 from verification.document import Document
 from verification.pair import Body, Pair
 from verification.problem import Problem
 from verification.threads import one_thread
+
+#: The constants of both bodies together, as documents and screens list them.
+NAMES = ("m", "M", "C_R", "C_s", "C_tr", "C_tr_half", "C_K", "rho_max", "rho_min", "rho_normal")
+ENERGY_NAMES = ("C_s_energy", "C_t1", "C_t2", "kappa_1", "kappa_2")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,6 +65,12 @@ class Measured(Document):
         Extremal eigenvalues of (S of the contact body, S of the Neumann body).
     rho_normal : Number or None
         The largest with the tangential components condensed out.
+    C_s_energy : Number or None
+        ``sup |S sigma_N(w)|_L2 / |w|_a2`` over a2-harmonic w, a2 that of the Neumann body; sqrt(stress/length).
+    C_t1, C_t2 : Number or None
+        ``sup |v_T|_L2 / |v|_aa`` of the contact body and of the Neumann body; sqrt(length/stress).
+    kappa_1, kappa_2 : Number or None
+        ``k C_s C_t1`` and ``k C_s C_t2`` of the theorem in energy norms; dimensionless.
     friction : float
         k.
     interface_nodes : int
@@ -85,6 +96,11 @@ class Measured(Document):
     rho_max: Number | None
     rho_min: Number | None
     rho_normal: Number | None
+    C_s_energy: Number | None
+    C_t1: Number | None
+    C_t2: Number | None
+    kappa_1: Number | None
+    kappa_2: Number | None
     friction: float
     interface_nodes: int
     reason: Mapping[str, str]
@@ -101,9 +117,50 @@ class Measured(Document):
         C_R = max(self.C_R.value, 1.0)  # C_R >= 1 by definition; two identical bodies reach it up to rounding
         return Constants(m=self.m.value, M=self.M.value, C_R=C_R, **friction)
 
+    def energy_constants(self) -> EnergyConstants | None:
+        """What enters the theorem in energy norms; None where rho or the kappas do not exist."""
+        if self.rho_max is None or self.rho_normal is None or self.kappa_1 is None or self.kappa_2 is None:
+            return None
+        return EnergyConstants(
+            rho=self.rho_max.value,
+            rho_normal=min(self.rho_normal.value, self.rho_max.value),  # equal up to rounding where nothing slides
+            kappa_1=self.kappa_1.value,
+            kappa_2=self.kappa_2.value,
+        )
+
+    @property
+    def of_friction(self) -> tuple[Number, ...]:
+        """C_s, C_t1, C_t2 of the theorem in energy norms; empty without a law of friction."""
+        values = [value for value in (self.C_s_energy, self.C_t1, self.C_t2) if value is not None and value.value > 0]
+        return tuple(values) if len(values) == 3 else ()
+
+    @property
+    def friction_threshold(self) -> Number | None:
+        """The friction below which every small theta is proved by the theorem in energy norms; None without a law."""
+        if not self.of_friction:
+            return None
+        C_s, C_t1, C_t2 = (value.value for value in self.of_friction)
+        return Number.of_float(friction_multiple(C_s * C_t1, C_s * C_t2))
+
+    def with_friction(self, k: float) -> Measured:
+        """The same bodies at another friction.
+
+        Raises
+        ------
+        ValueError
+            Friction without a law.
+        """
+        if k and not self.of_friction:
+            raise ValueError(f"friction {k}: needed a law of friction")
+        values: dict[str, Any] = {"C_K": Number.of_float(0.0)}
+        if self.of_friction and self.C_s is not None and self.C_tr is not None:
+            C_s, C_t1, C_t2 = (value.value for value in self.of_friction)
+            values["C_K"] = Number.of_float(k * self.C_s.value * self.C_tr.value)
+            values |= {"kappa_1": Number.of_float(k * C_s * C_t1), "kappa_2": Number.of_float(k * C_s * C_t2)}
+        return replace(self, friction=k, **values)
+
     def content(self) -> dict[str, Any]:
-        names = ["m", "M", "C_R", "C_s", "C_tr", "C_tr_half", "C_K", "rho_max", "rho_min", "rho_normal"]
-        numbers = {name: getattr(self, name) for name in names}
+        numbers = {name: getattr(self, name) for name in (*NAMES, *ENERGY_NAMES)}
         return {
             "body1": self.body1.to_dict(),
             "body2": self.body2.to_dict(),
@@ -149,9 +206,7 @@ def _measure(pair: Pair) -> Measured:
     friction = float(pair.problem.contact.friction)
     body1, body2 = _body(pair.body1), _body(pair.body2)
     m, M = min(body1.m.value, body2.m.value), body1.M.value + body2.M.value
-    values: dict[str, float | None] = dict.fromkeys(
-        ["C_R", "C_s", "C_tr", "C_tr_half", "C_K", "rho_max", "rho_min", "rho_normal"]
-    )
+    values: dict[str, float | None] = dict.fromkeys((*NAMES[2:], *ENERGY_NAMES))
     reason: dict[str, str] = {}
     common = pair.body1.unknown
     if not np.array_equal(common, pair.body2.unknown):
@@ -163,10 +218,13 @@ def _measure(pair: Pair) -> Measured:
         tangential[pair.tangential] = True
         values |= _interface(pair, tangential[common])
         if values["C_s"] is None:
-            reason["C_s"] = "no friction and no radius: S is not defined"
-            values["C_K"] = 0.0
-    if values["C_s"] is not None and values["C_tr"] is not None:
-        values["C_K"] = friction * values["C_s"] * values["C_tr"]
+            reason |= dict.fromkeys(("C_s", "C_s_energy"), "no friction and no radius: S is not defined")
+            values |= {"C_K": 0.0, "kappa_1": 0.0, "kappa_2": 0.0}
+    products = (("C_K", "C_s", "C_tr"), ("kappa_1", "C_s_energy", "C_t1"), ("kappa_2", "C_s_energy", "C_t2"))
+    for name, first, second in products:
+        a, b = values[first], values[second]
+        if a is not None and b is not None:
+            values[name] = friction * a * b
     numbers: dict[str, Any] = {name: None if v is None else Number.of_float(v) for name, v in values.items()}
     return Measured(
         body1=body1,
@@ -212,6 +270,7 @@ def _interface(pair: Pair, tangential: Any) -> dict[str, float | None]:
     top = lambda A, B: largest(A, B).value
     values: dict[str, float | None] = {"C_R": float(np.sqrt(max(top(n, e) for n in N for e in E)))}
     normal = ~tangential
+    contact, neumann = (S[0], S[1]) if pair.problem.iteration.neumann_body == 2 else (S[1], S[0])
     if tangential.any():
         columns = np.flatnonzero(pair.body1.unknown[pair.tangential])
         weights = np.zeros(len(tangential))
@@ -224,9 +283,13 @@ def _interface(pair: Pair, tangential: Any) -> dict[str, float | None]:
             Z = [pair.regularisation @ s[normal] for s in S]
             squares = [z.T @ (pair.weights[:, None] * z) for z in Z]
             values["C_s"] = float(np.sqrt(max(top((z + z.T) / 2, e) for z, e in zip(squares, E, strict=True))))
+            # sup |S g_N|^2 / g' S_2^-1 g over g = S_2 phi is the largest eigenvalue of S (S_2)_NN S' in the weights
+            root = np.sqrt(pair.weights)[:, None] * pair.regularisation
+            stress = root @ neumann[np.ix_(normal, normal)] @ root.T
+            values["C_s_energy"] = float(np.sqrt(np.linalg.eigvalsh((stress + stress.T) / 2)[-1]))
+        values["C_t1"], values["C_t2"] = (float(np.sqrt(top(B_T, s))) for s in (contact, neumann))
     else:
-        values |= {"C_tr": 0.0, "C_tr_half": 0.0, "C_s": 0.0}
-    contact, neumann = (S[0], S[1]) if pair.problem.iteration.neumann_body == 2 else (S[1], S[0])
+        values |= dict.fromkeys(("C_tr", "C_tr_half", "C_s", "C_s_energy", "C_t1", "C_t2"), 0.0)
     values["rho_max"] = top(contact, neumann)
     values["rho_min"] = 1 / top(neumann, contact)
     values["rho_normal"] = top(_condense_tangential(contact, normal), _condense_tangential(neumann, normal))

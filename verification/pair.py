@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, qr
+from scipy.linalg import cho_factor, cho_solve, cholesky, qr
 
 from fem1d2d import Condensation, Material, Mesh, Supports, solver
 from fem1d2d.mesh import Floats, Ints
@@ -142,6 +142,19 @@ class Side:
         """``S_a^-1 force`` on the free components, 0 on held ones, shape (2 n,)."""
         result = np.zeros_like(force)
         result[self.body.unknown] = cho_solve(self._factor, force[self.body.unknown], check_finite=False)
+        return result
+
+    @cached_property
+    def inverse(self) -> Floats:
+        """``S_a^-1`` as a matrix, 0 on held components, shape (2 n, 2 n)."""
+        return self.flexibility(np.eye(len(self.load)))
+
+    @cached_property
+    def root(self) -> Floats:
+        """L with ``S_a = L L'``, shape (2 n, free components): columns orthonormal in the norm (5.21)."""
+        rows = self.body.unknown
+        result = np.zeros((len(rows), int(rows.sum())))
+        result[rows] = cholesky(self.stiffness[np.ix_(rows, rows)], lower=True)
         return result
 
     def dual_norm(self, force: Floats) -> float:

@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from sample_problems import PROBLEMS, SECTION_6, SHEARED, bars, changed
 
 import verification as vf
+from verification.advice import Choice
 from verification.bodies import build
 from verification.contact import TOLERANCE, ContactError
 from verification.iteration import FixedPointMap, State
@@ -459,7 +460,9 @@ def few_steps(data: Mapping[str, Any], count: int = 4) -> list[Run]:
     except ContactError:  # the guess cycled: slower, but sure
         states = list(islice(vf.iterate(pair, solver="auto"), count))
     theta = pair.problem.iteration.theta
-    return [Run(pair=pair, theta=theta, states=(state,), outcome="limit") for state in states]
+    return [
+        Run(pair=pair, choice=Choice(theta=theta, source="given"), states=(state,), outcome="limit") for state in states
+    ]
 
 
 def magnitude(runs: list[Run]) -> tuple[float, float]:

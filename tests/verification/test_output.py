@@ -40,7 +40,8 @@ SMALL = {
 }
 ONE_STEP = {"theta": "0.7", "max_iterations": 1}
 FIGURES = {f"{figure}.{ending}" for figure in ("bodies", "residuals") for ending in ("svg", "png")}
-WRITTEN = {"run": FIGURES | {"run.json"}, "comparison": FIGURES | {"compare.json", "report.html"}}
+DRAWN = {"compare.json", "report.html", "waterfall.svg", "waterfall.png"}
+WRITTEN = {"run": FIGURES | {"run.json"}, "comparison": FIGURES | DRAWN}
 
 #: Titles that could leave their place in a file.
 TITLES = {
@@ -95,7 +96,8 @@ def contents(folder: Path) -> dict[str, bytes]:
 def quick(monkeypatch):
     """Figures that cost nothing: only their files matter here."""
     monkeypatch.setattr(figures, "draw_bodies", lambda result: "bodies")
-    monkeypatch.setattr(figures, "draw_residuals", lambda run, bounds=None: "residuals")
+    monkeypatch.setattr(figures, "draw_residuals", lambda run, editions=(): "residuals")
+    monkeypatch.setattr(figures, "draw_waterfall", lambda losses: "waterfall")
     monkeypatch.setattr(
         figures,
         "save",
@@ -249,9 +251,9 @@ def test_the_report_asks_no_other_file_and_no_other_host(written):
     assert [url for url in re.findall(r"url\(([^)]*)\)", page.styles) if not url.startswith("#")] == []
 
 
-def test_the_report_holds_both_figures_and_every_verdict_with_its_reason(comparison, written):
+def test_the_report_holds_its_figures_and_every_verdict_with_its_reason(comparison, written):
     page = read(written)
-    assert page.tags.count("svg") == 2
+    assert page.tags.count("svg") == 3
     for name, judgement in comparison.verdicts.items():
         assert f"{name}\n" in page.text
         assert judgement.verdict in page.text
@@ -270,7 +272,7 @@ def page_and_figures(folder: Path, comparison) -> str:
     """The report and both figures, whose files must be well-formed; returns the report."""
     for name, figure in (
         ("bodies", figures.draw_bodies(comparison.run)),
-        ("residuals", figures.draw_residuals(comparison.run, comparison.bounds)),
+        ("residuals", figures.draw_residuals(comparison.run, comparison.editions)),
     ):
         figures.save(figure, folder / f"{name}.svg")
         ElementTree.parse(folder / f"{name}.svg")

@@ -1,0 +1,125 @@
+"""Random problems with real loads, and problems whose loads bring about a contact pattern that was chosen."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+import verification as vf
+from verification.bodies import Pair, build
+from verification.contact import ContactError, ContactSolution
+from verification.contact.active_set import Pattern
+from verification.iteration import FixedPointMap
+from verification.measured import Measured, measure
+from verification.runs import Run, run
+
+#: Heights over lengths: a thin layer to a column.
+SHAPES = [Fraction(1, 20), Fraction(1, 6), Fraction(1, 3), Fraction(1), Fraction(2)]
+
+CELL = Fraction(1, 5)
+
+
+def three_digits(value: float) -> Fraction:
+    return Fraction(f"{value:.3g}")
+
+
+def problem(random: np.random.Generator, friction: Any = None, **iteration: Any) -> vf.Problem:
+    """Two rectangles whose grids match, 2 to 9 contact nodes; one body may jut out over the other on either side.
+
+    E1/E2 from 1/50 to 50, either role, friction 0, 0.1, .., 1.  The lower body is clamped at its bottom, the top of
+    the upper one is pushed and sheared, its sides carry tractions, and in one case of three there is a gap.
+    """
+    whole = lambda low, high: int(random.integers(low, high + 1))
+    count = whole(1, 8)
+    wider = whole(0, 1)  # which body juts out
+    left, right = whole(0, 2), whole(0, 2)
+    ends = {wider: (-left, count + right), 1 - wider: (0, count)}
+    young = {0: Fraction(1000), 1: 1000 * three_digits(50 ** random.uniform(-1, 1))}
+    bodies = []
+    for i in (0, 1):
+        x = [CELL * end for end in ends[i]]
+        height = (x[1] - x[0]) * SHAPES[random.integers(len(SHAPES))]
+        body = {"shape": "rectangle", "x": x, "y": [-height, 0] if i == 0 else [0, height], "young": young[i]}
+        body |= {"cells": [ends[i][1] - ends[i][0], whole(1, 3)], "poisson": ["0", "0.3", "0.45"][random.integers(3)]}
+        bodies.append(body)
+    bodies[0]["fixed"] = ["bottom"]
+    slip, push = Fraction(whole(-20, 20), 1000), -Fraction(whole(1, 50), 1000)
+    bodies[1]["prescribed"] = {"top": [slip * height, push * height]}
+    bodies[1]["traction"] = {side: [whole(-20, 20), whole(-20, 20)] for side in ("left", "right")}
+    drawn = Fraction(whole(0, 10), 10)
+    radius = CELL * Fraction(3, 4) * whole(1, 3)
+    gap = [0, 0, CELL / 100][random.integers(3)]
+    neumann_body = whole(1, 2)
+    return vf.Problem.from_dict(
+        {
+            "body1": bodies[0],
+            "body2": bodies[1],
+            "contact": {"friction": drawn if friction is None else friction, "radius": radius, "gap": gap},
+            "iteration": {"neumann_body": neumann_body, **iteration},
+        }
+    )
+
+
+def relaxation_factor(random: np.random.Generator, rho: float) -> float:
+    """Three digits between 0.3 and 1.1 times the predicted theta, at most 0.97."""
+    return float(three_digits(min(2 / (2 + rho) * random.uniform(0.3, 1.1), 0.97)))
+
+
+def case(seed: int, friction: Any = None, **iteration: Any) -> tuple[Pair, Measured, float, np.random.Generator]:
+    """The problem of a seed with its constants, a theta, and the generator that drew them."""
+    random = np.random.default_rng(seed)
+    pair = build(problem(random, friction, **iteration))
+    measured = measure(pair)
+    return pair, measured, relaxation_factor(random, measured.rho_max.value), random
+
+
+def run_of(pair: Pair, measured: Measured, theta: float) -> Run:
+    """A run, by the active set alone where that is enough."""
+    try:
+        return run(pair, theta=theta, measured=measured, solver="active-set")
+    except ContactError:
+        return run(pair, theta=theta, measured=measured)
+
+
+def step_II(pair: Pair, g: np.ndarray) -> ContactSolution:
+    """Step II for one force; its reaction is T g."""
+    try:
+        return FixedPointMap(pair, "active-set")(g)[1]
+    except ContactError:
+        return FixedPointMap(pair, "cvxpy")(g)[1]
+
+
+def with_loads(pair: Pair, g: np.ndarray, v: np.ndarray, force: np.ndarray) -> Pair:
+    """The same bodies, the contact body loaded so that step II answers g with the jump v and the reaction `force`.
+
+    ``l_1 = force + S_1 (u_2 + gap + v)``, applied as forces on the contact nodes: condensation leaves these alone.
+    """
+    neumann, contact, name = pair.neumann, pair.contact, pair.contact.body.name
+    u = neumann.known + neumann.flexibility(g + neumann.load) + v
+    u[pair.normal] += pair.gap
+    more = pair.orient(force + contact.stiffness @ u - contact.load)
+    body = contact.body
+    load = body.load.copy()
+    load[body.interface] += more[body.unknown]
+    return replace(pair, **{name: replace(body, load=load)})
+
+
+def state_of(pair: Pair, pattern: Pattern, g: np.ndarray, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """A jump and a reaction with a pattern at g, every inequality of step II strict: of size 1 in S_1 and R g_N.
+
+    Open nodes are apart by 0.5 to 1, touching ones press; sliding ones slide by 0.5 to 1, sticking ones carry less than
+    half of what friction could.
+    """
+    t, n = pair.tangential.stop, pair.n
+    contact = pair.contact.stiffness
+    bound = FixedPointMap(pair).bound(g)
+    large = lambda size: random.uniform(0.5, 1, size)
+    length = np.linalg.norm(g) / np.linalg.norm(contact, 2)
+    slide, gap = pattern.sliding * large(t) * length, -large(n) * length
+    shear = np.where(pattern.sliding != 0, pattern.sliding * bound, random.uniform(-0.5, 0.5, t) * bound)
+    pressure = large(n) * np.abs(g).max()
+    v = np.concatenate([slide, np.where(pattern.touching, 0.0, gap)])
+    return v, np.concatenate([shear, np.where(pattern.touching, pressure, 0.0)])

@@ -1,0 +1,496 @@
+"""One problem after another, from what a run shows to what the theorem proves: each number at most the next.
+
+Observed step ratio, spectral radius and norm of the Jacobian at the solution, largest norm over contact patterns,
+semidefinite edition, theorem in energy norms, repaired edition.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from itertools import product
+
+import numpy as np
+import pytest
+from chain_problems import case, run_of, state_of, step_II, with_loads
+from dense_oracle import DensePair
+from hypothesis import settings
+from scipy.linalg import block_diag, eigh
+
+from ndtheory import REPAIRED, bounds, evaluate, sharp
+from verification.bodies import Pair
+from verification.contact.active_set import Pattern
+from verification.jacobian import Piece
+from verification.lmi import SemidefiniteEdition
+from verification.measured import Measured
+from verification.rates import largest_step_ratio
+from verification.search import largest_factor, worst_piece
+from verification.threads import one_thread
+
+#: Random problems, the same ones each time, in batches.
+COUNT = max(200, settings.default.max_examples)
+BATCHES = 4
+
+#: Both sides are eigenvalues.
+RELATIVE = 1e-9
+
+#: A lower and an upper bound of one number have found it where they differ by less.
+TIGHT = 0.01
+
+
+Multipliers = tuple[np.ndarray, ...]
+
+
+def energy(measured: Measured) -> tuple[Fraction, Fraction, Fraction]:
+    """rho at work, kappa_1, kappa_2."""
+    constants = measured.energy_constants()
+    return constants.at_work, constants.kappa_1, constants.kappa_2
+
+
+def sharp_factor(measured: Measured, theta: float, **changes: float) -> float:
+    """q(theta), also where it is 1 or more; with other values of rho, kappa_1, kappa_2 where they are given."""
+    values = dict(zip(("rho", "kappa_1", "kappa_2"), energy(measured), strict=True)) | changes
+    return float(np.sqrt(1 - sharp.one_minus_square(theta, *(float(v) for v in values.values()))))
+
+
+def repaired_factor(measured: Measured, theta: float) -> float:
+    """K(theta), also where it is 1 or more."""
+    constants = measured.constants()
+    m, M, C_R, x = (float(v) for v in (constants.m, constants.M, constants.C_R, constants.C_K))
+    D, Q, P = bounds.D(x, m, M, C_R, m), bounds.Q(x, m, M, C_R), bounds.P(x, m, M, C_R, m)
+    return float(np.sqrt(1 - min(bounds.one_minus_h1(theta, D, Q), bounds.one_minus_h2(theta, P))))
+
+
+# --- pairs of forces --------------------------------------------------------------------------------------------------
+
+
+def quotient(pair: Pair, theta: float, g: np.ndarray, other: np.ndarray) -> float:
+    """``|||T_theta g - T_theta g~||| / |||g - g~|||``."""
+    d, p = g - other, step_II(pair, g).force - step_II(pair, other).force
+    norm = pair.neumann.dual_norm
+    return norm(theta * p + (1 - theta) * d) / norm(d)
+
+
+def largest_quotient(pair: Pair, theta: float, g: np.ndarray, random: np.random.Generator) -> float:
+    """Of random pairs around a force: a tenth of its size away, as far as it is large, and ten times as far."""
+    neumann = pair.neumann
+    size = neumann.dual_norm(g) or max(neumann.dual_norm(side.load) for side in (neumann, pair.contact)) or 1.0
+    forces = neumann.root @ random.standard_normal((neumann.root.shape[1], 6))
+    pairs = zip((0.1, 0.1, 1.0, 1.0, 10.0, 10.0), forces.T, strict=True)
+    a, b, c, d, e, f = (g + length * size * force / neumann.dual_norm(force) for length, force in pairs)
+    return max(quotient(pair, theta, *two) for two in ((a, b), (c, d), (e, f), (b, e)))
+
+
+def attained(piece: Piece, theta: float, random: np.random.Generator) -> float:
+    """The quotient of two forces inside a piece, in its worst direction, for loads that bring the piece about."""
+    pair, n, t = piece.pair, piece.pair.n, piece.pair.tangential.stop
+    g = np.concatenate([random.uniform(-1, 1, t), random.uniform(0.5, 1, n)])  # S sigma_N > 0: S has no entry < 0
+    pair = with_loads(pair, g, *state_of(pair, piece.pattern, g, random))
+    stress = lambda g: 1.0 if pair.regularisation is None else float((pair.regularisation @ g[t:]).min())
+    inside = lambda g: step_II(pair, g).pattern == piece.pattern and stress(g) > 0
+    assert inside(g)
+    step = pair.neumann.root @ np.linalg.svd(piece.relaxed(theta))[2][0] * pair.neumann.dual_norm(g)
+    while not (inside(g + step) and inside(g - step)):
+        step = step / 2
+    return quotient(pair, theta, g + step, g - step)
+
+
+# --- the chain --------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class Chain:
+    """The numbers of one problem; nan where there is none: a run without steps, a solution that is not smooth.
+
+    `search` is a lower bound of the least Lipschitz constant for all loads, found by a search over contact patterns,
+    and `attained` what two forces make of it.
+    """
+
+    step: float
+    quotient: float
+    excited: float
+    radius: float
+    norm: float
+    attained: float
+    search: float
+    lmi: float
+    sharp: float
+    repaired: float
+
+    @property
+    def links(self) -> dict[str, tuple[float, float]]:
+        """A number and its bound."""
+        names = [
+            ("excited", "radius"),
+            ("radius", "norm"),
+            ("norm", "lmi"),
+            ("step", "lmi"),
+            ("quotient", "lmi"),
+            ("attained", "lmi"),
+            ("search", "lmi"),
+            ("lmi", "sharp"),
+            ("sharp", "repaired"),
+        ]
+        return {f"{a} <= {b}": (getattr(self, a), getattr(self, b)) for a, b in names}
+
+    @property
+    def broken(self) -> dict[str, tuple[float, float]]:
+        """Links that do not hold."""
+        return {name: (a, b) for name, (a, b) in self.links.items() if a > b * (1 + RELATIVE)}
+
+    @property
+    def tight(self) -> bool:
+        """Whether the semidefinite edition has found the least Lipschitz constant."""
+        return self.lmi <= (1 + TIGHT) * self.search
+
+
+def chain_of(pair: Pair, measured: Measured, theta: float, random: np.random.Generator) -> Chain:
+    """All numbers of a problem at one theta."""
+    with one_thread():
+        done, found = run_of(pair, measured, theta), largest_factor(pair, theta, random=random)
+        ratio, linear = largest_step_ratio(pair, done.states), done.linearised
+        shown = largest_quotient(pair, theta, done.last.g, random), attained(found.piece, theta, random)
+    return Chain(
+        step=np.nan if ratio is None else ratio.lo,
+        quotient=shown[0],
+        excited=np.nan if linear is None or linear.excited is None else linear.excited,
+        radius=np.nan if linear is None else linear.radius,
+        norm=np.nan if linear is None else linear.norm,
+        attained=shown[1],
+        search=found.value,
+        lmi=SemidefiniteEdition(pair, measured).factor(theta).value,
+        sharp=sharp_factor(measured, theta),
+        repaired=repaired_factor(measured, theta),
+    )
+
+
+SETTINGS = {"tolerance": 1e-10, "max_iterations": 200}
+
+
+def allowed(seed: int) -> tuple[Pair, Measured, float, np.random.Generator]:
+    """A random problem with a friction and a theta for which the repaired edition proves a factor below 1."""
+    pair, measured, _, random = case(seed, **SETTINGS)
+    k = random.uniform(0, 0.99) * evaluate(REPAIRED, measured.constants()).C2.value
+    measured = measured.with_friction(k)
+    low, high = evaluate(REPAIRED, measured.constants()).interval
+    return rubbing(pair, k), measured, low + random.uniform(0.01, 0.99) * (high - low), random
+
+
+def rubbing(pair: Pair, k: float) -> Pair:
+    """The same bodies at another friction."""
+    contact = replace(pair.problem.contact, friction=Fraction(k))
+    return replace(pair, problem=replace(pair.problem, contact=contact))
+
+
+@pytest.mark.parametrize("batch", range(BATCHES))
+def test_each_number_is_at_most_the_next_and_the_semidefinite_edition_mostly_the_least_of_the_bounds(batch):
+    """The worst piece of the search is attained by two forces, so the least Lipschitz constant lies above it.
+
+    Of the first 300 problems the semidefinite edition lies within 1 % of it in 72 %; of the 150 for which it proves a
+    factor below 1, in 88 %.
+    """
+    chains = {seed: chain_of(*case(seed, **SETTINGS)) for seed in range(batch, COUNT, BATCHES)}
+    assert {seed: c.broken for seed, c in chains.items() if c.broken} == {}
+    assert {seed: c for seed, c in chains.items() if not abs(c.attained / c.search - 1) < 1e-6} == {}
+    assert np.mean([np.isfinite(c.radius) for c in chains.values()]) > 0.9  # T is smooth at most solutions
+    assert np.mean([np.isfinite(c.excited) for c in chains.values()]) > 0.4  # and reached
+    assert np.mean([c.tight for c in chains.values()]) > 0.65
+    assert np.mean([c.tight for c in chains.values() if c.lmi < 1]) > 0.7
+
+
+def test_where_the_repaired_edition_proves_a_factor_every_other_number_is_below_it():
+    """1 - K may be 1e-9: the last link is compared by what it leaves of 1."""
+    for seed in range(COUNT // 10):
+        pair, measured, theta, random = allowed(seed)
+        found = chain_of(pair, measured, theta, random)
+        left = evaluate(REPAIRED, measured.constants(), theta).one_minus_factor.value
+        assert 0 < left < 1
+        assert found.broken == {}
+        assert found.repaired == pytest.approx(1 - left, rel=1e-12)
+        assert 1 - found.sharp >= left * (1 - RELATIVE) - 1e-15
+
+
+#: Bounds that would be smaller.
+MUTANTS: dict[str, Callable[[Measured, float], float]] = {
+    "without friction": lambda m, theta: sharp_factor(m, theta, kappa_1=0, kappa_2=0),
+    "without kappa_1": lambda m, theta: sharp_factor(m, theta, kappa_1=0),
+    "without kappa_2": lambda m, theta: sharp_factor(m, theta, kappa_2=0),
+    "with rho_normal": lambda m, theta: sharp_factor(m, theta, rho=m.rho_normal.value),
+}
+
+
+def test_a_smaller_bound_is_found_out():
+    """By the search, in some of 60 problems; q itself never."""
+    above = dict.fromkeys(MUTANTS, 0)
+    for seed in range(60):
+        pair, measured, theta, random = case(seed)
+        found = largest_factor(pair, theta, random=random, starts=2).value
+        assert found <= sharp_factor(measured, theta) * (1 + RELATIVE)
+        for mutant, bound in MUTANTS.items():
+            above[mutant] += found > 1.001 * bound(measured, theta)
+    assert min(above.values()) > 0, above
+
+
+def every_piece(pair: Pair) -> Iterator[Piece]:
+    """Every contact pattern; the sign of S sigma_N only turns the direction of slip."""
+    n, t = pair.n, pair.tangential.stop
+    rubs = bool(pair.problem.contact.friction)
+    for choice in product(product((True, False), (0, 1, -1) if rubs else (1,)), repeat=n):
+        touching, sliding = (np.array(values) for values in zip(*choice, strict=True))
+        pattern = Pattern(touching=touching, sliding=sliding.astype(np.int8))
+        yield Piece(
+            pair=pair, pattern=pattern, sign=np.full(t, int(rubs), dtype=np.int8), still=np.zeros(n, dtype=bool)
+        )
+
+
+def test_the_search_finds_nearly_the_largest_norm_of_all_contact_patterns():
+    """All 6^n of them for up to three nodes: they decide the least Lipschitz constant, as T is continuous."""
+    ratios = []
+    for seed in range(80):
+        pair, measured, theta, random = case(seed)
+        if pair.n <= 3:
+            most = max(piece.factor(theta) for piece in every_piece(pair))
+            ratios.append(largest_factor(pair, theta, random=random).value / most)
+            assert most <= SemidefiniteEdition(pair, measured).factor(theta).value * (1 + RELATIVE)
+    assert len(ratios) > 10
+    assert max(ratios) < 1 + RELATIVE
+    assert min(ratios) > 0.95
+    assert np.mean(np.array(ratios) > 1 - RELATIVE) > 0.8
+
+
+# --- little friction --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("share", [0.4, 1.0, 1.3])
+def test_without_friction_q_is_attained_on_both_branches(share):
+    """While all nodes are open below ``2/(2 + rho_N)``, while all touch above: by two forces, for suitable loads."""
+    for seed in range(25):
+        pair, measured, _, random = case(seed, friction=0)
+        theta = min(share * 2 / (2 + measured.rho_normal.value), 0.97)
+        bound = sharp_factor(measured, theta)
+        *_, closed = (closed for closed in every_piece(pair) if closed.pattern.touching.all())
+        *_, apart = (piece for piece in every_piece(pair) if not piece.pattern.touching.any())
+        assert apart.factor(theta) == pytest.approx(1 - theta, rel=1e-9)
+        worst = apart if theta <= 2 / (2 + measured.rho_normal.value) else closed
+        assert attained(worst, theta, random) == pytest.approx(bound, rel=1e-8)
+        assert largest_factor(pair, theta, random=random).value == pytest.approx(bound, rel=RELATIVE)
+        # where both branches meet the block of d_1 in the optimal form is singular, which costs half the digits
+        assert SemidefiniteEdition(pair, measured).factor(theta).value == pytest.approx(bound, rel=1e-7)
+
+
+@pytest.mark.parametrize(("k", "within"), [("1/1000", 0.9), ("1/1000000", 1.0)])
+def test_with_little_friction_q_jumps_to_rho_and_is_nearly_attained(k, within):
+    """All nodes that stick give ``|1 - theta - theta rho|``, all open ones 1 - theta, for any k > 0.
+
+    q is within 2 % of the larger one as k goes to 0; at k = 0.001 kappa_1 may still be 0.2.
+    """
+    close = []
+    for seed in range(16):
+        for share in (0.4, 0.9, 1.2):
+            pair, measured, _, random = case(seed, friction=k)
+            rho = measured.rho_max.value
+            theta = min(share * 2 / (2 + rho), 0.97)
+            found = largest_factor(pair, theta, random=random, starts=2).value
+            assert found >= max(1 - theta, abs(1 - theta - theta * rho)) * (1 - RELATIVE)
+            close.append(sharp_factor(measured, theta) <= 1.02 * found)
+    assert np.mean(close) >= within
+
+
+# --- the certificate --------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class Forms:
+    """The quadratic forms of the semidefinite edition, from dense matrices of their own.
+
+    In the vectors (g, p) of a pair: ``p = -S_1 d_1``, ``d_2 = S_2^-1 g``.  Without friction p has no tangential part.
+    """
+
+    S_1: np.ndarray
+    S_2: np.ndarray
+    hat: np.ndarray
+    weight: np.ndarray  # w_j k
+    t: int
+
+    @classmethod
+    def of(cls, pair: Pair, weight: float = 1.0) -> Forms:
+        dense = DensePair.of(pair)
+        k = weight * dense.friction * dense.weights
+        return cls(S_1=dense.contact.S, S_2=dense.neumann.S, hat=dense.hat, weight=k, t=dense.t)
+
+    def terms(self, g: np.ndarray, p: np.ndarray, multipliers: Multipliers) -> float:
+        """Sigma for one pair, term by term."""
+        jump = -np.linalg.solve(self.S_1, p) - np.linalg.solve(self.S_2, g)
+        t = self.t
+        total = float(multipliers[0] @ (p[t:] * jump[t:]))
+        if len(multipliers) > 1:
+            _, tau, a, b = multipliers
+            zeta = self.hat @ g[t:]
+            total += float(tau @ (p[:t] * jump[:t]) + self.weight @ (a * zeta**2 + b * jump[:t] ** 2))
+        return total
+
+    def value(self, g: np.ndarray, p: np.ndarray, multipliers: Multipliers, q: float, theta: float) -> float:
+        """Phi_q for one pair."""
+        square = lambda force: float(force @ np.linalg.solve(self.S_2, force))
+        return q**2 * square(g) - square(theta * p + (1 - theta) * g) - self.terms(g, p, multipliers)
+
+    def matrix(self, multipliers: Multipliers, q: float, theta: float) -> np.ndarray:
+        """Phi_q in the columns of ``basis``."""
+        g, p = np.split(self.basis(multipliers), [len(self.S_2)])
+        flexible, t = np.linalg.inv(self.S_2), self.t
+        jump, step = -np.linalg.solve(self.S_1, p) - flexible @ g, theta * p + (1 - theta) * g
+        form = q**2 * g.T @ flexible @ g - step.T @ flexible @ step - p[t:].T @ np.diag(multipliers[0]) @ jump[t:]
+        if len(multipliers) > 1:
+            _, tau, a, b = multipliers
+            zeta = self.hat @ g[t:]
+            form -= p[:t].T @ np.diag(tau) @ jump[:t] + zeta.T @ np.diag(self.weight * a) @ zeta
+            form -= jump[:t].T @ np.diag(self.weight * b) @ jump[:t]
+        return (form + form.T) / 2
+
+    def basis(self, multipliers: Multipliers) -> np.ndarray:
+        """Pairs (g, p) as columns: ``|||g|||`` and ``|d_1|`` are Euclidean in them."""
+        flexible = np.linalg.inv(self.S_1)
+        carries = slice(0, None) if len(multipliers) > 1 else slice(self.t, None)
+        p = np.zeros((len(self.S_1), len(flexible[carries])))
+        p[carries] = np.linalg.inv(np.linalg.cholesky(flexible[carries, carries])).T
+        return block_diag(np.linalg.cholesky(self.S_2), p)
+
+    def least(self, multipliers: Multipliers, theta: float) -> float:
+        """The least q for which Phi_q is positive semidefinite."""
+        form, n = self.matrix(multipliers, 0.0, theta), len(self.S_2)
+        rest = form[:n, :n] - form[:n, n:] @ np.linalg.solve(form[n:, n:], form[n:, :n])
+        return float(np.sqrt(max(-np.linalg.eigvalsh(rest)[0], 0.0)))
+
+    def prove(self, multipliers: Multipliers, q: float, theta: float) -> bool:
+        """Whether multipliers prove a factor: those of the cone, for which the form is positive semidefinite."""
+        if any((m < 0).any() for m in multipliers):
+            return False
+        if len(multipliers) > 1:
+            _, tau, a, b = multipliers
+            if (4 * a * b < tau**2 * (1 - 1e-12)).any():
+                return False
+        try:
+            np.linalg.cholesky(self.matrix(multipliers, q, theta))
+        except np.linalg.LinAlgError:
+            return False
+        return True
+
+
+CERTIFIED = range(0, 36, 3)
+
+
+@pytest.mark.parametrize("nodewise", [True, False])
+@pytest.mark.parametrize("seed", CERTIFIED)
+def test_the_multipliers_prove_the_factor_and_no_smaller_one(seed, nodewise):
+    pair, measured, theta, random = case(seed)
+    found = SemidefiniteEdition(pair, measured, nodewise=nodewise).factor(theta)
+    forms, q = Forms.of(pair), found.value
+    assert forms.prove(found.multipliers, q * (1 + 1e-6), theta)
+    assert not forms.prove(found.multipliers, q * (1 - 1e-6), theta)
+    assert forms.least(found.multipliers, theta) == pytest.approx(q, rel=1e-7)
+    # term by term, in the directions in which the form is least and in random ones
+    form, basis = forms.matrix(found.multipliers, q, theta), forms.basis(found.multipliers)
+    for x in [*eigh(form)[1].T[:3], *random.standard_normal((20, len(form)))]:
+        g, p = np.split(basis @ x, [len(forms.S_2)])
+        value = forms.value(g, p, found.multipliers, q, theta)
+        assert value == pytest.approx(x @ form @ x, rel=1e-9, abs=1e-9 * np.abs(form).max() * (x @ x))
+        assert value >= -1e-9 * np.abs(form).max() * (x @ x)
+
+
+@pytest.mark.parametrize("seed", range(0, 40, 4))
+def test_the_form_of_the_edition_is_the_one_written_down(seed):
+    """For multipliers of any kind."""
+    pair, measured, theta, random = case(seed)
+    edition, forms = SemidefiniteEdition(pair, measured), Forms.of(pair)
+    count = 4 if measured.friction else 1
+    multipliers = tuple(random.standard_normal(pair.n) for _ in range(count))
+    basis, sizes = forms.basis(multipliers), edition.conditions(multipliers)
+    x = random.standard_normal((2, len(sizes)))
+    # in both coordinates |||g||| and |d_1| are Euclidean: the eigenvalues agree
+    for q in (0.0, 2.0):
+        step = theta * edition.p + (1 - theta) * edition.g
+        form = q**2 * edition.g.T @ edition.g - step.T @ step - sizes
+        expected = forms.matrix(multipliers, q, theta)
+        scale = np.abs(expected).max()
+        assert np.abs(np.linalg.eigvalsh(form) - np.linalg.eigvalsh(expected)).max() < 1e-9 * scale
+    assert basis.shape[1] == len(sizes) == x.shape[1]
+
+
+@pytest.mark.parametrize("seed", range(0, 40, 2))
+def test_two_forces_obey_the_conditions_of_step_II_node_by_node(seed):
+    """So that Sigma >= 0 for any multipliers of the cone, and the quotient is below the factor they prove."""
+    pair, _, _, random = case(seed)
+    forms, neumann, t = Forms.of(pair), pair.neumann, pair.tangential.stop
+    size = max(neumann.dual_norm(side.load) for side in (neumann, pair.contact)) or 1.0
+    for length in (0.1, 1.0, 10.0):
+        first, second = (neumann.root @ random.standard_normal((2, neumann.root.shape[1], 1)))[..., 0] * length * size
+        one, two = step_II(pair, first), step_II(pair, second)
+        g, p, jump = first - second, one.force - two.force, one.v - two.v
+        rounding = 1e-12 * np.abs(p).max() * np.abs(jump).max()
+        assert (p[t:] * jump[t:] >= -rounding).all()
+        reach = forms.weight * np.abs(forms.hat @ g[t:])
+        assert (p[:t] * jump[:t] + reach * np.abs(jump[:t]) >= -rounding).all()
+
+
+#: Multipliers and a form that claim more than is proved.
+CHEATS: dict[str, Callable[[Multipliers], Multipliers]] = {
+    "one lambda negative": lambda lam, *rest: (np.where(lam == lam.max(), -lam, lam), *rest),
+    "tau beyond 2 sqrt(a b)": lambda lam, tau, a, b: (lam, np.maximum(tau, 2.002 * np.sqrt(a * b)), a, b),
+    "no a": lambda lam, tau, a, b: (lam, tau, 0 * a, b),
+    "no b": lambda lam, tau, a, b: (lam, tau, a, 0 * b),
+}
+
+
+@pytest.mark.parametrize("cheat", CHEATS)
+def test_multipliers_outside_the_cone_are_refused(cheat):
+    for seed in (2, 12):
+        pair, measured, theta, _ = case(seed)
+        found, forms = SemidefiniteEdition(pair, measured).factor(theta), Forms.of(pair)
+        assert len(found.multipliers) == 4
+        assert forms.prove(found.multipliers, 1.01 * found.value, theta)
+        assert not forms.prove(CHEATS[cheat](*found.multipliers), 1.01 * found.value, theta)
+
+
+@pytest.mark.parametrize("weight", [0.0, 0.9])
+def test_a_form_with_less_weight_on_friction_is_refused(weight):
+    """It would prove less than two forces show, or less than its multipliers do."""
+    below = 0
+    for seed in range(0, 16, 2):
+        pair, measured, theta, random = case(seed)
+        if measured.friction:
+            found = SemidefiniteEdition(pair, measured).factor(theta)
+            claim = Forms.of(pair, weight).least(found.multipliers, theta)
+            if claim < found.value * (1 - 1e-3):
+                below += claim < largest_factor(pair, theta, random=random).value
+                assert not Forms.of(pair).prove(found.multipliers, claim * (1 + 1e-6), theta)
+    assert below > 3
+
+
+# --- all theta at once ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(0, 40, 4))
+def test_below_the_largest_theta_of_the_edition_its_multipliers_prove_every_theta(seed):
+    """Times theta, with q = 1; above it they do not."""
+    pair, measured, _, _ = case(seed)
+    found, forms = SemidefiniteEdition(pair, measured).largest_theta(), Forms.of(pair)
+    interval = sharp.contraction_interval(*(float(v) for v in energy(measured)), 1e-12)
+    assert found is not None or interval is None
+    if found is None:
+        return
+    assert found.value >= (0 if interval is None else interval[1]) * (1 - 1e-6)
+    proved = lambda theta: forms.prove(tuple(theta * m for m in found.multipliers), 1.0, theta)
+    assert all(proved(share * found.value) for share in (0.01, 0.3, 0.9, 1 - 1e-6))
+    assert found.value == 1 or not proved(found.value * (1 + 1e-6))
+
+
+@pytest.mark.parametrize("seed", range(0, 40, 4))
+def test_the_friction_number_bounds_the_work_of_every_piece_and_is_at_most_that_of_the_theorem(seed):
+    """``<g, p> <= c |||g|||^2``."""
+    pair, measured, _, random = case(seed)
+    c = SemidefiniteEdition(pair, measured).friction_number().value
+    work = lambda piece: np.linalg.eigvalsh((piece.relaxed(1.0) + piece.relaxed(1.0).T) / 2)[-1]
+    _, kappa_1, kappa_2 = (float(v) for v in energy(measured))
+    assert worst_piece(pair, lambda piece: float(work(piece)), random=random).value <= c + 1e-9
+    assert c <= sharp.friction_number(kappa_1, kappa_2) + 1e-9

@@ -1,0 +1,197 @@
+"""What each inequality of Section 5 gives away, in decades: where a threshold of 1e-21 comes from.
+
+An inequality ``left <= right`` loses ``log10(right/left)`` at the pair of forces that comes closest to equality.  Where
+both sides are linear in one unknown that pair is an eigenvector; where T is involved it is the best one of a search
+over contact patterns (:mod:`verification.search`), on each of which both sides are quadratic forms in psi - psi~.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from scipy.linalg import eigvalsh
+
+from fem1d2d.mesh import Floats
+from ndtheory import PRINTED, REPAIRED
+from ndtheory import bounds as formulas
+from verification.jacobian import Piece
+from verification.measured import Measured, lift_gram
+from verification.pair import Pair
+from verification.search import worst_piece
+from verification.threads import one_thread
+
+
+@dataclass(frozen=True, kw_only=True)
+class Loss:
+    """What one inequality gives away.
+
+    Attributes
+    ----------
+    label : str
+        The paper's.
+    decades : float
+        ``log10(right/left)`` at the worst pair, >= 0; of an inequality between squares it counts the squares.
+    searched : bool
+        Whether that pair was found by search (the loss may then be smaller), not as an eigenvector.
+    """
+
+    label: str
+    decades: float
+    searched: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class Losses:
+    """The losses link by link.
+
+    Attributes
+    ----------
+    links : tuple of Loss
+        Each inequality by itself.
+    friction : tuple of Loss
+        The steps from the largest friction term found to its bound (5.30); they add up.
+    lipschitz : tuple of Loss
+        The steps from the largest ``|||T psi - T psi~||| / |||psi - psi~|||`` found to its bound (5.38); they add up.
+    """
+
+    links: tuple[Loss, ...]
+    friction: tuple[Loss, ...]
+    lipschitz: tuple[Loss, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object ``losses`` of ``ndtheory.compare/1``."""
+        return {
+            name: [{"label": loss.label, "decades": loss.decades, "searched": loss.searched} for loss in losses]
+            for name, losses in (("links", self.links), ("friction", self.friction), ("lipschitz", self.lipschitz))
+        }
+
+
+class _Forms:
+    """The quadratic forms of Section 5 in ``y`` with ``psi - psi~ = L_2 y``, so that |y| is the norm (5.21)."""
+
+    def __init__(self, pair: Pair) -> None:
+        self.pair = pair
+        self.root, self.inverse = pair.neumann.root, pair.neumann.inverse
+        turned = lambda matrix: pair.orient(pair.orient(matrix).T)
+        of = lambda body: (turned(lift_gram(body)), turned(body.gram.schur))
+        self.N_1, _ = of(pair.contact.body)
+        self.N_2, self.E_2 = of(pair.neumann.body)
+        self.dual: Floats = np.asarray(np.linalg.inv(self.E_2))  # of the norm of V^2'
+        self.d_2 = self.inverse @ self.root
+
+    def force(self, piece: Piece) -> Floats:
+        return piece.force @ self.root
+
+    def d_1(self, piece: Piece) -> Floats:
+        return (self.inverse + piece.jump) @ self.root
+
+    def friction(self, piece: Piece) -> Floats:
+        """The friction term of (5.12): nodes that slide."""
+        t = self.pair.tangential.stop
+        jump = piece.pattern.sliding[:, None] * (piece.jump[:t] @ self.root)
+        form = -(piece.bound @ self.root).T @ jump
+        return np.asarray(form + form.T) / 2
+
+
+def _top(form: Floats, against: Floats | None = None) -> float:
+    return float(eigvalsh(form, against)[-1])
+
+
+def _square(rows: Floats, gram: Floats) -> Floats:
+    form = rows.T @ gram @ rows
+    return np.asarray(form + form.T) / 2
+
+
+def locate(pair: Pair, measured: Measured, *, seed: int = 0) -> Losses | None:
+    """Find what each inequality gives away at the problem's friction.
+
+    Parameters
+    ----------
+    pair : Pair
+    measured : Measured
+    seed : int
+        Of the search.
+
+    Returns
+    -------
+    Losses or None
+        None where a constant does not exist or a contact node is held.
+    """
+    constants = measured.constants()
+    if constants is None or not all(body.unknown.all() for body in pair.elastic):
+        return None
+    m, M, C_R, x = (float(v) for v in (constants.m, constants.M, constants.C_R, constants.C_K))
+    A = M * C_R
+    X = (A + x + math.sqrt(x * m)) / m  # (5.11)
+    with one_thread():
+        forms = _Forms(pair)
+        N_1, N_2, dual, d_2 = forms.N_1, forms.N_2, forms.dual, forms.d_2
+        S_1, size2 = pair.contact.stiffness, _square(d_2, N_2)
+        norm = _square(forms.root, dual)
+
+        def found(form: Callable[[Piece], Floats], against: Floats | None = None) -> float:
+            """The largest value of a quadratic form against another one, the norm (5.21) by default."""
+            random = np.random.default_rng(seed)
+            return worst_piece(pair, lambda piece: _top(form(piece), against), random=random, starts=2).value
+
+        # suprema against e = |||psi - psi~|||, squared
+        F = found(forms.friction)
+        t = found(lambda piece: _square(forms.force(piece), forms.inverse))
+        t_dual = found(lambda piece: _square(forms.force(piece), dual))
+        d1 = found(lambda piece: _square(forms.d_1(piece), N_1))
+        d2, psi_dual = _top(size2), _top(norm)
+        # and against other norms
+        ratio = found(lambda piece: _square(forms.d_1(piece), N_1), size2)
+        T_dual = found(lambda piece: _square(forms.force(piece), dual), norm)
+        reaction = _top(_square(S_1, dual), N_1)
+        energy = _top(_square(S_1, forms.inverse), S_1)
+        d2_dual, e_dual = _top(size2, norm), _top(np.eye(len(norm)), norm)
+
+    decades = lambda right, left: math.log10(right / left) if left > 0 else math.inf
+    half = lambda right, left: decades(right * right, left) / 2
+    P = lambda edition: formulas.P(x, edition.coercivity(m), M, C_R, edition.unit(m))
+    C_T = formulas.lipschitz(m, M, C_R, x)
+    links = [
+        Loss(label="(5.11)", decades=half(X, ratio), searched=True),
+        Loss(label="(5.16)", decades=half(C_T, T_dual), searched=True),
+        Loss(label="(5.18)", decades=half(A, reaction), searched=False),
+        Loss(label="(5.19)", decades=half(1 / m, d2_dual), searched=False),
+        Loss(label="(5.22)", decades=half(1 / math.sqrt(m), e_dual), searched=False),
+        Loss(label="(5.23)", decades=half(M / math.sqrt(m), psi_dual), searched=False),
+        Loss(label="(5.29)", decades=decades((A / m) ** 2, energy), searched=False),
+        Loss(label="(5.38)", decades=decades((C_T * M / m) ** 2, t), searched=True),
+    ]
+    lipschitz = _chain(
+        ("", math.sqrt(t)),
+        ("(5.22)", math.sqrt(t_dual / m)),
+        ("(5.18)", A * math.sqrt(d1 / m)),
+        ("(5.11)", A * X * math.sqrt(d2 / m)),
+        ("(5.19)", A * X / m * math.sqrt(psi_dual / m)),
+        ("(5.23)", A * X * M / m**2),
+    )
+    friction: tuple[Loss, ...] = ()
+    if x > 0 and F > 0:
+        links.insert(-1, Loss(label="(5.30)", decades=decades(P(REPAIRED), F), searched=True))
+        worst = math.sqrt(ratio)
+        friction = _chain(
+            ("", F),
+            ("(5.13)", x * (worst + 1) * d2),
+            ("(5.11)", x * (X + 1) * d2),
+            ("(5.19)", x * (X + 1) / m**2 * psi_dual),
+            ("(5.23)", P(REPAIRED)),
+            ("m~ and the lost 1/m", P(PRINTED)),
+        )
+    return Losses(links=tuple(links), friction=friction, lipschitz=lipschitz)
+
+
+def _chain(*bounds: tuple[str, float]) -> tuple[Loss, ...]:
+    """Successive bounds of one quantity, as the decades each adds."""
+    return tuple(
+        Loss(label=label, decades=math.log10(value / before), searched=label not in ("(5.19)", "(5.23)"))
+        for (_, before), (label, value) in pairwise(bounds)
+    )

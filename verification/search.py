@@ -1,0 +1,90 @@
+"""A search over contact patterns: the largest one-step factor that any loads can bring about.
+
+The constants of the theorem do not know the loads, so its bounds hold for all of them at once.  Every pattern, with
+every sign of S sigma_N, is that of some loads: choose v and the reaction with the pattern, a g with those signs (the
+matrix of S is regular), and the loads that equilibrium then asks for.  On that piece T is affine, and ``|J|`` is
+attained by two forces.  The largest ``|J|`` found is a lower bound of the Lipschitz constant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from verification.contact.active_set import Pattern
+from verification.jacobian import Piece
+from verification.pair import Pair
+from verification.threads import one_thread
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Found:
+    """The best piece of a search.
+
+    Attributes
+    ----------
+    value : float
+    piece : Piece
+    """
+
+    value: float
+    piece: Piece
+
+
+def worst_piece(
+    pair: Pair, measure: Callable[[Piece], float], *, random: np.random.Generator, starts: int = 4
+) -> Found:
+    """Search the affine pieces of T for the largest value of a function.
+
+    From each start the state of one node at a time is changed, as long as that helps.
+
+    Parameters
+    ----------
+    pair : Pair
+    measure : callable
+        Piece -> value.
+    random : Generator
+    starts : int
+        The starts are: all nodes stick, all are open and slide one way, and random patterns.
+    """
+    n, t = pair.n, pair.tangential.stop
+    rubs = bool(t and pair.problem.contact.friction and pair.regularisation is not None)
+    tangential = (0, 1, -1) if rubs else (1,)  # without friction every node slides
+    states = [(touching, slide) for touching in (True, False) for slide in tangential]
+    sign, still = np.full(t, int(rubs), dtype=np.int8), np.zeros(n, dtype=bool)
+
+    def piece(state: np.ndarray) -> Piece:
+        pattern = Pattern(
+            touching=np.array([states[i][0] for i in state], dtype=bool),
+            sliding=np.array([states[i][1] for i in state], dtype=np.int8)[:t],
+        )
+        return Piece(pair=pair, pattern=pattern, sign=sign, still=still)
+
+    def climb(state: np.ndarray) -> Found:
+        best = Found(value=measure(piece(state)), piece=piece(state))
+        improved = True
+        while improved:
+            improved = False
+            for j in random.permutation(n):
+                for other in range(len(states)):
+                    if other == state[j]:
+                        continue
+                    trial = state.copy()
+                    trial[j] = other
+                    candidate = piece(trial)
+                    value = measure(candidate)
+                    if value > best.value * (1 + 1e-12):
+                        best, state, improved = Found(value=value, piece=candidate), trial, True
+        return best
+
+    first = [np.zeros(n, dtype=int), np.full(n, len(states) - 1)]
+    others = [random.integers(len(states), size=n) for _ in range(max(starts - len(first), 0))]
+    with one_thread():
+        return max((climb(state) for state in [*first, *others][:starts]), key=lambda found: found.value)
+
+
+def largest_factor(pair: Pair, theta: float, *, random: np.random.Generator, starts: int = 4) -> Found:
+    """The largest ``|J|`` of T_theta over contact patterns, in the norm (5.21): attained by two forces."""
+    return worst_piece(pair, lambda piece: piece.factor(theta), random=random, starts=starts)

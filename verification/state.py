@@ -1,0 +1,51 @@
+"""What one evaluation of T shows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fem1d2d.mesh import Floats
+from verification.contact import ContactSolution
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class State:
+    """What one evaluation of T shows.
+
+    Interface vectors: tangential components, then normal ones along n of the contact body.
+
+    Attributes
+    ----------
+    iteration : int
+        How many relaxations led to g.
+    g : array
+        Nodal forces on the Neumann body before the step.
+    displacement : array
+        Interface displacement of the Neumann body, from step I.
+    contact : ContactSolution
+        Step II; its ``force`` is T g.
+    residual : float
+        ``|||T g - g|||`` in the norm (5.21): judged before relaxation, so that a small theta does not flatter.
+    size : float
+        ``|||T g|||``.
+    scale : float
+        The largest size so far, which the residual is compared with: T g itself may vanish where the bodies part.
+    """
+
+    iteration: int
+    g: Floats
+    displacement: Floats
+    contact: ContactSolution
+    residual: float
+    size: float
+    scale: float
+
+    @property
+    def image(self) -> Floats:
+        """T g."""
+        return self.contact.force
+
+    @property
+    def relative_residual(self) -> float:
+        """The residual over the scale; 0 where both vanish."""
+        return self.residual / self.scale if self.scale > 0 else (0.0 if self.residual == 0 else float("inf"))
