@@ -21,17 +21,20 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from verification.advice import Advice, advise
     from verification.contact import ContactError
-    from verification.iteration import State, iterate
+    from verification.iteration import iterate
     from verification.measured import Measured, measure
     from verification.monolithic import Solution, SolveError, solve
     from verification.problem import Problem, load
     from verification.reader import ProblemError
     from verification.runs import Run, run
+    from verification.state import State
     from verification.verdicts import Comparison, compare
 
 #: Where each public name lives.  No module here bears the name of a public function: it would hide it.
 _HOME = {
+    "Advice": "advice",
     "Comparison": "verdicts",
     "ContactError": "contact",
     "Measured": "measured",
@@ -40,7 +43,8 @@ _HOME = {
     "Run": "runs",
     "Solution": "monolithic",
     "SolveError": "monolithic",
-    "State": "iteration",
+    "State": "state",
+    "advise": "advice",
     "compare": "verdicts",
     "iterate": "iteration",
     "load": "problem",
@@ -50,6 +54,7 @@ _HOME = {
 }
 
 __all__ = [
+    "Advice",
     "Comparison",
     "ContactError",
     "Measured",
@@ -59,6 +64,7 @@ __all__ = [
     "Solution",
     "SolveError",
     "State",
+    "advise",
     "compare",
     "iterate",
     "load",

@@ -3,61 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from fem1d2d.mesh import Floats
-from ndtheory import relaxation_factor
+from verification.advice import choose
 from verification.bodies import build
 from verification.contact import ContactSolution, ContactStep, Solver
 from verification.pair import Pair
 from verification.problem import Problem
+from verification.relaxation import Rule, rule
+from verification.state import State
 from verification.threads import one_thread
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class State:
-    """What one evaluation of T shows.
-
-    Interface vectors: tangential components, then normal ones along n of the contact body.
-
-    Attributes
-    ----------
-    iteration : int
-        How many relaxations led to g.
-    g : array
-        Nodal forces on the Neumann body before the step.
-    displacement : array
-        Interface displacement of the Neumann body, from step I.
-    contact : ContactSolution
-        Step II; its ``force`` is T g.
-    residual : float
-        ``|||T g - g|||`` in the norm (5.21): judged before relaxation, so that a small theta does not flatter.
-    size : float
-        ``|||T g|||``.
-    scale : float
-        The largest size so far, which the residual is compared with: T g itself may vanish where the bodies part.
-    """
-
-    iteration: int
-    g: Floats
-    displacement: Floats
-    contact: ContactSolution
-    residual: float
-    size: float
-    scale: float
-
-    @property
-    def image(self) -> Floats:
-        """T g."""
-        return self.contact.force
-
-    @property
-    def relative_residual(self) -> float:
-        """The residual over the scale; 0 where both vanish."""
-        return self.residual / self.scale if self.scale > 0 else (0.0 if self.residual == 0 else float("inf"))
 
 
 class FixedPointMap:
@@ -121,7 +80,7 @@ def iterate(
     Parameters
     ----------
     problem : Problem or Pair
-    theta : number, optional
+    theta : number or 'auto', optional
         Relaxation factor, 0 < theta < 1; the problem's by default.
     solver : {'auto', 'cvxpy', 'active-set'}
     start : array, optional
@@ -139,24 +98,32 @@ def iterate(
         Step II did not reach its KKT certificate.
     """
     pair = build(problem) if isinstance(problem, Problem) else problem
-    chosen = pair.problem.iteration.theta if theta is None else relaxation_factor(theta)
-    return _states(FixedPointMap(pair, solver), float(chosen), start)
+    choice = choose(pair, theta)
+    relax = rule(pair, pair.problem.iteration.relaxation, float(choice.theta), choice.rho)
+    return states(FixedPointMap(pair, solver), relax, start)
 
 
-def _states(T: FixedPointMap, theta: float, start: Floats | None) -> Iterator[State]:
+def state_at(T: FixedPointMap, g: Floats, *, iteration: int = 0, scale: float = 0.0) -> State:
+    """Evaluate T at g."""
     neumann = T.pair.neumann
-    g = np.zeros(len(neumann.load)) if start is None else np.array(start, dtype=float)
+    with one_thread():
+        u, solution = T(g)
+        image = solution.force
+        residual, size = neumann.dual_norm(image - g), neumann.dual_norm(image)
+    for array in (g, u, image, solution.v):
+        array.setflags(write=False)
+    return State(
+        iteration=iteration, g=g, displacement=u, contact=solution, residual=residual, size=size, scale=max(scale, size)
+    )
+
+
+def states(T: FixedPointMap, relax: Rule, start: Floats | None = None) -> Iterator[State]:
+    """The states that a rule passes through, without end."""
+    g = np.zeros(len(T.pair.neumann.load)) if start is None else np.array(start, dtype=float)
     iteration, scale = 0, 0.0
     while True:
+        state = state_at(T, g, iteration=iteration, scale=scale)
+        yield state
         with one_thread():
-            u, solution = T(g)
-            image = solution.force
-            residual, size = neumann.dual_norm(image - g), neumann.dual_norm(image)
-            scale = max(scale, size)
-        for array in (g, u, image, solution.v):
-            array.setflags(write=False)
-        yield State(
-            iteration=iteration, g=g, displacement=u, contact=solution, residual=residual, size=size, scale=scale
-        )
-        g = theta * image + (1 - theta) * g  # (III)
-        iteration += 1
+            g = relax(state)  # (III)
+        iteration, scale = iteration + 1, state.scale

@@ -24,7 +24,7 @@ _PICTURES = ("bodies.svg", "bodies.png", "residuals.svg", "residuals.png")
 FILES: dict[Kind, tuple[str, ...]] = {
     "run": ("run.json", *_PICTURES),
     "solve": ("solve.json", *_PICTURES[:2]),
-    "compare": ("compare.json", *_PICTURES, "report.html"),
+    "compare": ("compare.json", *_PICTURES, "waterfall.svg", "waterfall.png", "report.html"),
 }
 
 #: How a file of ours is told from somebody else's.
@@ -34,6 +34,37 @@ MARKS = {
     ".png": b"Software\x00ndtheory",
     ".html": b'name="generator" content="ndtheory ',
 }
+
+
+def check_ours(target: Path) -> None:
+    """Refuse to overwrite what is not ours.
+
+    Raises
+    ------
+    ProblemError
+    """
+    if target.is_dir() or (target.exists() and MARKS[target.suffix] not in target.read_bytes()):
+        raise ProblemError(str(target), "", None, "not written by this program; needed another folder or name (-o)")
+
+
+def put(target: Path, write: Callable[[Path], object]) -> None:
+    """Write a file whole or not at all.
+
+    Raises
+    ------
+    ProblemError
+    """
+    try:
+        handle, temporary = tempfile.mkstemp(dir=target.parent, suffix=target.suffix)
+        os.close(handle)
+        try:
+            write(Path(temporary))
+            os.chmod(temporary, 0o644)
+            os.replace(temporary, target)
+        finally:
+            Path(temporary).unlink(missing_ok=True)
+    except OSError as error:
+        raise ProblemError(str(target), "", None, f"cannot be written: {error.strerror}") from None
 
 
 class Folder:
@@ -60,23 +91,10 @@ class Folder:
             why = getattr(error, "strerror", None) or error
             raise ProblemError(str(path), "", None, f"needed a folder to write to: {why}") from None
         for name in FILES[kind]:
-            target = path / name
-            if target.is_dir() or (target.exists() and MARKS[target.suffix] not in target.read_bytes()):
-                raise ProblemError(str(target), "", None, "not written by this program; needed another folder (-o)")
+            check_ours(path / name)
 
     def _put(self, name: str, write: Callable[[Path], object]) -> None:
-        target = self.path / name
-        try:
-            handle, temporary = tempfile.mkstemp(dir=self.path, suffix=target.suffix)
-            os.close(handle)
-            try:
-                write(Path(temporary))
-                os.chmod(temporary, 0o644)
-                os.replace(temporary, target)
-            finally:
-                Path(temporary).unlink(missing_ok=True)
-        except OSError as error:
-            raise ProblemError(str(target), "", None, f"cannot be written: {error.strerror}") from None
+        put(self.path / name, write)
 
     def write_problem(self, text: str) -> Path:
         """Write ``problem.toml``.
@@ -109,7 +127,8 @@ class Folder:
 
         self._text("compare.json", comparison.to_json())
         self._pictures(comparison.run, comparison)
-        figures = {name: (self.path / f"{name}.svg").read_text("utf-8") for name in ("bodies", "residuals")}
+        names = [name for name in ("bodies", "residuals", "waterfall") if name != "waterfall" or comparison.losses]
+        figures = {name: (self.path / f"{name}.svg").read_text("utf-8") for name in names}
         self._text("report.html", report(comparison, figures))
 
     def _text(self, name: str, text: str) -> None:
@@ -121,7 +140,12 @@ class Folder:
 
         drawn = {"bodies": figures.draw_bodies(result)}
         if isinstance(result, Run):
-            drawn["residuals"] = figures.draw_residuals(result, None if comparison is None else comparison.bounds)
+            drawn["residuals"] = figures.draw_residuals(result, [] if comparison is None else comparison.editions)
+        if comparison is not None and comparison.losses is not None:
+            drawn["waterfall"] = figures.draw_waterfall(comparison.losses)
+        elif comparison is not None:  # one of an earlier run would tell of another problem
+            for ending in ("svg", "png"):
+                (self.path / f"waterfall.{ending}").unlink(missing_ok=True)
         for name, figure in drawn.items():
             for ending in ("svg", "png"):
                 self._put(f"{name}.{ending}", partial(figures.save, figure))

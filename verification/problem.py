@@ -29,6 +29,12 @@ from verification.reader import (
 #: A displacement or a force by component; None leaves a displacement component free.
 Components = tuple[Fraction | None, ...]
 
+#: A relaxation factor, or the one that theory chooses.
+Theta = Fraction | Literal["auto"]
+
+Relaxation = Literal["constant", "aitken", "anderson", "newton", "momentum"]
+RELAXATIONS: tuple[Relaxation, ...] = ("constant", "aitken", "anderson", "newton", "momentum")
+
 RECTANGLE_SIDES = ("left", "right", "bottom", "top")
 INTERVAL_SIDES = ("left", "right")
 
@@ -106,14 +112,18 @@ class IterationSpec:
     ----------
     neumann_body : {1, 2}
         Who gets the linear problem of step I: 2 as in Section 3, 1 as in Section 6.
-    theta : Fraction
+    theta : Fraction or 'auto'
+        ``auto``: the proved theta, else the predicted one.
+    relaxation : {'constant', 'aitken', 'anderson', 'newton', 'momentum'}
+        Beside ``constant`` outside the theorem; see :mod:`verification.relaxation`.
     tolerance : float
         The run ends when ``|||T g - g||| <= tolerance |||T g|||`` in the norm (5.21), with the largest T g so far.
     max_iterations : int
     """
 
     neumann_body: Literal[1, 2]
-    theta: Fraction
+    theta: Theta
+    relaxation: Relaxation
     tolerance: float
     max_iterations: int
 
@@ -171,9 +181,9 @@ class Problem:
         Raises
         ------
         HypothesisError
-            Unless 0 < theta < 1.
+            Unless 0 < theta < 1 or "auto".
         """
-        return replace(self, iteration=replace(self.iteration, theta=relaxation_factor(theta)))
+        return replace(self, iteration=replace(self.iteration, theta=read_theta(theta)))
 
     def swapped(self) -> Problem:
         """The same problem with the Neumann problem given to the other body."""
@@ -207,6 +217,21 @@ class Problem:
         if not isinstance(halvings, int) or halvings < 0:
             raise ValueError(f"{halvings} halvings: a whole number >= 0 is needed")
         return replace(self, body1=halved("body1", self.body1), body2=halved("body2", self.body2))
+
+
+def read_theta(value: Any) -> Theta:
+    """A relaxation factor, or "auto".
+
+    Raises
+    ------
+    HypothesisError
+    """
+    if value == "auto":
+        return "auto"
+    try:
+        return relaxation_factor(value)
+    except HypothesisError as error:
+        raise HypothesisError(error.key, error.value, f'{error.needed}, or "auto"') from None
 
 
 def load(path: Path | str) -> Problem:
@@ -400,29 +425,20 @@ def _read_contact(table: Table, dimension: int) -> ContactSpec:
 
 
 def _read_iteration(table: Table) -> IterationSpec:
-    def theta(value: Any) -> Fraction:
-        if value == "auto":
-            raise Unfit("the automatic theta is not supported yet; needed a number with 0 < theta < 1")
-        if isinstance(value, bool):
-            raise Unfit("needed a number with 0 < theta < 1")
+    def theta(value: Any) -> Theta:
         try:
-            return relaxation_factor(value)
+            return read_theta(value)
         except HypothesisError as error:
             raise Unfit(f"needed {error.needed}") from None
-
-    def relaxation(value: Any) -> str:
-        if value in ("aitken", "anderson", "newton", "momentum"):
-            raise Unfit('this relaxation is not supported yet; needed "constant"')
-        return str(choice("constant")(value))
 
     spec = IterationSpec(
         neumann_body=table.take("neumann_body", choice(1, 2), 2),
         theta=table.take("theta", theta, Fraction(1, 2)),
+        relaxation=table.take("relaxation", choice(*RELAXATIONS), "constant"),
         tolerance=float(
             table.take("tolerance", number("a number with 0 < tolerance < 1", lambda v: 0 < v < 1), Fraction(1, 10**9))
         ),
         max_iterations=table.take("max_iterations", integer("a whole number >= 1", 1), 500),
     )
-    table.take("relaxation", relaxation, "constant")
     table.close()
     return spec

@@ -11,15 +11,21 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from fem1d2d.mesh import Floats
-from ndtheory import relaxation_factor
+from ndtheory import Number
+from verification.advice import Choice, choose
 from verification.bodies import build
-from verification.contact import Solver
+from verification.contact import ContactError, Solver
 from verification.contact_state import ContactState
 from verification.document import Document
-from verification.iteration import State, iterate
+from verification.iteration import FixedPointMap, state_at, states
+from verification.measured import Measured
+from verification.monolithic import SolveError, solve
 from verification.pair import Pair
-from verification.problem import Problem
-from verification.rates import ObservedRate, observed_rate
+from verification.problem import Problem, Relaxation
+from verification.rates import Linearisation, NotLinear, ObservedRate, linearise, observed_rate
+from verification.relaxation import momentum_rate, outside, rule
+from verification.state import State
+from verification.threads import one_thread
 
 Outcome = Literal["converged", "stalled", "limit", "diverged", "interrupted"]
 
@@ -37,7 +43,8 @@ class Run(Document):
     Attributes
     ----------
     pair : Pair
-    theta : Fraction
+    choice : Choice
+        theta and where it comes from.
     states : tuple of State
         At least one.
     outcome : {'converged', 'stalled', 'limit', 'diverged', 'interrupted'}
@@ -46,9 +53,32 @@ class Run(Document):
     schema: ClassVar[str] = "ndtheory.run/1"
 
     pair: Pair
-    theta: Fraction
+    choice: Choice
     states: tuple[State, ...]
     outcome: Outcome
+
+    @property
+    def theta(self) -> Fraction:
+        """The relaxation factor; the step length of the triple momentum method."""
+        return self.choice.theta
+
+    @property
+    def relaxation(self) -> Relaxation:
+        """The rule."""
+        return self.pair.problem.iteration.relaxation
+
+    @property
+    def outside(self) -> list[str]:
+        """Why the theorem does not speak of this run; empty where it does."""
+        rule = outside(self.relaxation, float(self.pair.problem.contact.friction))
+        return self.pair.outside + ([rule] if rule else [])
+
+    @property
+    def proved_rate(self) -> Number | None:
+        """The rate that is proved of the rule itself: momentum without friction has one; None otherwise."""
+        if self.relaxation != "momentum" or self.outside or self.choice.rho is None:
+            return None
+        return Number.of_float(momentum_rate(self.choice.rho))
 
     @property
     def converged(self) -> bool:
@@ -74,6 +104,39 @@ class Run(Document):
     def observed_rate(self) -> ObservedRate | None:
         """The asymptotic rate, None where too few steps stand clear of the noise."""
         return observed_rate(self.pair, self.states)
+
+    @cached_property
+    def linearised(self) -> Linearisation | None:
+        """The linearisation at the solution; None where ``why_not_linearised`` says why.
+
+        A run that did not arrive is linearised at the solution of the global method.
+        """
+        return self._linearised[0]
+
+    @property
+    def why_not_linearised(self) -> str:
+        """Why there is no linearisation; empty where there is."""
+        return self._linearised[1]
+
+    @cached_property
+    def _linearised(self) -> tuple[Linearisation | None, str]:
+        if self.relaxation != "constant":
+            return None, f"the {self.relaxation} relaxation is no constant theta"
+        try:
+            with one_thread():
+                if self.converged:
+                    return linearise(self.pair, self.last, float(self.theta), self.states), ""
+                return linearise(self.pair, self._solution(), float(self.theta)), ""
+        except (NotLinear, SolveError, ContactError) as error:
+            return None, str(error)
+
+    def _solution(self) -> State:
+        """T at the solution of the global method."""
+        pair = self.pair
+        found = solve(pair).contact
+        g = np.concatenate([pair.upward * found.shear[: pair.tangential.stop], found.pressure])
+        weights = np.tile(found.weights, pair.problem.dimension)
+        return state_at(FixedPointMap(pair), weights * g)
 
     @cached_property
     def contact(self) -> ContactState:
@@ -117,29 +180,46 @@ class Run(Document):
     def content(self) -> dict[str, Any]:
         rate = self.observed_rate
         solvers = [s.contact.solver for s in self.states]
-        reason = {"linearised_rate": "not computed by this version", "linearised_norm": "not computed by this version"}
+        linear = self.linearised
+        proved = self.proved_rate
+        reason: dict[str, str] = {}
+        if proved is None:
+            reason["proved_rate"] = "momentum without friction has one; for a constant theta see the editions"
+        if linear is None:
+            names = ("linearised_rate", "linearised_norm", "linearised_radius", "linearised_margin", "predicted_rate")
+            reason |= dict.fromkeys(names, self.why_not_linearised)
+        else:
+            if linear.predicted is None:
+                reason["predicted_rate"] = "the run did not end in a stretch of steps without a change of state"
+            if not np.isfinite(linear.margin):
+                reason["linearised_margin"] = "no change of g changes a state"
         if rate is None:
             few = "fewer than two step ratios stand clear of rounding"
             reason |= {"observed_rate": few, "observed_rate_interval": few}
         return {
             "title": self.pair.problem.title,
             "theta": float(self.theta),
-            "relaxation": "constant",
+            "theta_source": self.choice.source,
+            "relaxation": self.relaxation,
             "neumann_body": self.pair.problem.iteration.neumann_body,
             "iterations": self.iterations,
             "evaluations": self.evaluations,
             "outcome": self.outcome,
             "converged": self.converged,
+            "proved_rate": None if proved is None else proved.to_dict(),
             "observed_rate": None if rate is None else rate.value,
             "observed_rate_interval": None if rate is None else [rate.lo, rate.hi],
-            "linearised_rate": None,
-            "linearised_norm": None,
+            "linearised_rate": None if linear is None else linear.rate,
+            "linearised_norm": None if linear is None else linear.norm,
+            "linearised_radius": None if linear is None else linear.radius,
+            "linearised_margin": None if linear is None or not np.isfinite(linear.margin) else linear.margin,
+            "predicted_rate": None if linear is None else linear.predicted,
             "unrelaxed_residual": _finite(self.last.relative_residual),
             "kkt_residual": self.last.contact.kkt.residual,
             "solves": {"cvxpy": solvers.count("cvxpy"), "active_set": solvers.count("active-set")},
             **self.contact.to_dict(),
             "history": [_finite(r) for r in self.history],
-            "outside_theorem": self.pair.outside,
+            "outside_theorem": self.outside,
             "warnings": self.pair.warnings,
             "reason": reason,
         }
@@ -155,18 +235,21 @@ def run(
     theta: Any = None,
     solver: Solver = "auto",
     watch: Callable[[State], None] = lambda state: None,
+    measured: Measured | None = None,
 ) -> Run:
     """Run the algorithm from g = 0 until it converges, stalls, runs away, reaches its limit or Ctrl-C.
 
     Parameters
     ----------
     problem : Problem or Pair
-    theta : number, optional
+    theta : number or 'auto', optional
         Relaxation factor, 0 < theta < 1; the problem's by default.
     solver : {'auto', 'cvxpy', 'active-set'}
         Who solves step II.
     watch : callable
         Called with each state, for live progress.
+    measured : Measured, optional
+        The constants, where they are known already; an automatic theta and momentum need them.
 
     Raises
     ------
@@ -179,18 +262,19 @@ def run(
     """
     pair = build(problem) if isinstance(problem, Problem) else problem
     settings = pair.problem.iteration
-    chosen = settings.theta if theta is None else relaxation_factor(theta)
-    states: list[State] = []
+    choice = choose(pair, theta, measured)
+    relax = rule(pair, settings.relaxation, float(choice.theta), choice.rho)
+    seen: list[State] = []
     least, since = float("inf"), 0
     outcome: Outcome = "limit"
     try:
-        for state in iterate(pair, theta=chosen, solver=solver):
-            states.append(state)
+        for state in states(FixedPointMap(pair, solver), relax):
+            seen.append(state)
             watch(state)
             least, since = (state.residual, 0) if state.residual < least else (least, since + 1)
             if state.residual <= settings.tolerance * state.scale:
                 outcome = "converged"
-            elif not state.residual <= RUNAWAY * states[0].residual:
+            elif not state.residual <= RUNAWAY * seen[0].residual:
                 outcome = "diverged"
             elif since >= PATIENCE:
                 outcome = "stalled"
@@ -198,7 +282,7 @@ def run(
                 continue
             break
     except KeyboardInterrupt:
-        if not states:
+        if not seen:
             raise
         outcome = "interrupted"
-    return Run(pair=pair, theta=chosen, states=tuple(states), outcome=outcome)
+    return Run(pair=pair, choice=choice, states=tuple(seen), outcome=outcome)

@@ -5,18 +5,33 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
-from ndtheory import EDITIONS, Bounds, evaluate, relaxation_factor
+from ndtheory import EDITIONS, Bounds, Number, SharpBounds, evaluate
+from verification.advice import sharp_bounds
 from verification.bodies import build
 from verification.contact import Solver
 from verification.document import Document
-from verification.iteration import State
+from verification.editions import LARGEST, EditionRow, row_of
+from verification.losses import Losses, locate
 from verification.measured import Measured, measure
 from verification.pair import Pair
 from verification.problem import Problem
 from verification.rates import StepRatio, largest_step_ratio
 from verification.runs import Run, run
+from verification.state import State
+
+if TYPE_CHECKING:
+    from verification.lmi import Semidefinite
+
+#: The editions whose violation is a bug or an error in a proof.
+PROVED = ("repaired", "sharp", "lmi")
+
+#: A bound may be attained: a ratio above it by less than this share of 1 - bound is equal to it.
+TIGHT = 1e-6
+
+#: A rate observed and the one predicted for the same steps agree to this.
+AGREES = 1e-3
 
 Verdict = Literal["CONSISTENT", "VIOLATED", "INCONCLUSIVE", "HYPOTHESES_NOT_MET"]
 
@@ -37,29 +52,63 @@ class Comparison(Document):
     ----------
     measured : Measured
     bounds : mapping from edition to Bounds
-        Empty where a constant does not exist.
+        Printed and repaired; empty where a constant does not exist.
+    sharp : SharpBounds or None
+        The theorem in energy norms.
+    lmi : Semidefinite or None
+        The semidefinite edition.
+    losses : Losses or None
+        What each inequality of the proof gives away.
     run : Run
     step_ratio : StepRatio or None
         The largest Lipschitz quotient seen.
     verdicts : mapping from edition to Judgement
+        And of ``linearised``, a prediction.
+    reason : mapping
+        Why sharp, lmi, losses or step_ratio is None.
     """
 
     schema: ClassVar[str] = "ndtheory.compare/1"
 
     measured: Measured
     bounds: Mapping[str, Bounds]
+    sharp: SharpBounds | None
+    lmi: Semidefinite | None
+    losses: Losses | None
     run: Run
     step_ratio: StepRatio | None
     verdicts: Mapping[str, Judgement]
+    reason: Mapping[str, str]
 
     @property
     def units(self) -> Mapping[str, str]:  # type: ignore[override]
         return self.run.units
 
     @property
+    def editions(self) -> list[EditionRow]:
+        """Every edition there is, from the weakest to the strongest."""
+        rows = [row_of(name, b) for name, b in self.bounds.items()]
+        if self.sharp is not None:
+            rows.append(row_of("sharp", self.sharp, self.measured.friction_threshold))
+        if self.lmi is not None:
+            factor, highest = self.lmi.factor, self.lmi.theta_max
+            rows.append(
+                EditionRow(
+                    name="lmi",
+                    threshold=self.lmi.friction_threshold,
+                    threshold_on="k",
+                    interval=None if highest is None else (0.0, highest.value),
+                    theta=float(self.run.theta),
+                    factor=factor,
+                    one_minus_factor=None if factor is None else Number.of_float(1 - factor.value),
+                )
+            )
+        return rows
+
+    @property
     def proved_violated(self) -> bool:
         """Whether a proved claim failed: a bug, or an error in a proof.  A violated printed claim is a finding."""
-        return any(j.verdict == "VIOLATED" for name, j in self.verdicts.items() if name != "printed")
+        return any(judgement.verdict == "VIOLATED" for name, judgement in self.verdicts.items() if name in PROVED)
 
     @property
     def inconclusive(self) -> bool:
@@ -69,23 +118,41 @@ class Comparison(Document):
     def content(self) -> dict[str, Any]:
         editions: dict[str, Any] = {e.name: None for e in EDITIONS}
         editions |= {name: bounds.to_dict() for name, bounds in self.bounds.items()}
-        reason = dict.fromkeys(("sharp", "lmi"), "not computed by this version")
-        if self.step_ratio is None:
-            reason["step_ratio"] = "no step stands clear of rounding"
-        no_bounds = {} if self.bounds else {e.name: next(iter(self.measured.reason.values()), "") for e in EDITIONS}
+        editions["sharp"] = None if self.sharp is None else self.sharp.to_dict()
+        why = next(iter(self.measured.reason.values()), "")
         return {
             "title": self.run.pair.problem.title,
             "constants": self.measured.content(),
-            "bounds": {"editions": {**editions, "sharp": None}, "reason": {**no_bounds, "sharp": reason["sharp"]}},
-            "sharp": None,
-            "lmi": None,
+            "bounds": {
+                "editions": editions,
+                "reason": {name: why for name, value in editions.items() if value is None},
+            },
+            "sharp": self._sharp(),
+            "lmi": None if self.lmi is None else self.lmi.to_dict(),
+            "losses": None if self.losses is None else self.losses.to_dict(),
             "run": self.run.content(),
             "step_ratio": None
             if self.step_ratio is None
             else {"value": self.step_ratio.value, "interval": [self.step_ratio.lo, self.step_ratio.hi]},
             "verdicts": {name: judgement.verdict for name, judgement in self.verdicts.items()},
             "reasons": {name: judgement.reason for name, judgement in self.verdicts.items()},
-            "reason": reason,
+            "reason": dict(self.reason),
+        }
+
+    def _sharp(self) -> dict[str, Any] | None:
+        """The object ``sharp``: the edition's own document with both rho and the threshold on k."""
+        if self.sharp is None:
+            return None
+        measured, document = self.measured, self.sharp.to_dict()
+        threshold = measured.friction_threshold
+        if threshold is None:
+            document["reason"]["friction_threshold"] = "no law of friction"
+        number = lambda value: None if value is None else value.to_dict()
+        return document | {
+            "rho": number(measured.rho_max),
+            "rho_normal": number(measured.rho_normal),
+            "rho_at_work": document["rho"],
+            "friction_threshold": number(threshold),
         }
 
 
@@ -107,12 +174,30 @@ def judge(bound: float | None, seen: StepRatio | None, why_none: str) -> Judgeme
         return Judgement(verdict="HYPOTHESES_NOT_MET", reason=why_none)
     if seen is None:
         return Judgement(verdict="INCONCLUSIVE", reason="no step stands clear of rounding")
-    says = f"ratios <= {seen.value:.6g} in {seen.steps} steps, bound {bound:.6g}"
+    if seen.steps == 0:
+        return Judgement(verdict="CONSISTENT", reason="no step was taken")
+    digits = 4 if seen.hi <= bound else 6  # six where the bound is attained or violated
+    says = f"ratios <= {seen.value:.{digits}g} in {seen.steps} steps, bound {bound:.{digits}g}"
     if seen.hi <= bound:
         return Judgement(verdict="CONSISTENT", reason=says)
-    if seen.lo > bound:
+    slack = TIGHT * (1 - bound)
+    if seen.lo > bound + slack:
         return Judgement(verdict="VIOLATED", reason=says)
+    if seen.hi <= bound + slack:
+        return Judgement(verdict="CONSISTENT", reason=f"{says}: attained")
     return Judgement(verdict="INCONCLUSIVE", reason=f"{says}: closer than rounding")
+
+
+def judge_prediction(run: Run) -> Judgement:
+    """Hold the linearised rate against the observed one, over the same steps."""
+    linear, observed = run.linearised, run.observed_rate
+    if linear is None:
+        return Judgement(verdict="HYPOTHESES_NOT_MET", reason=run.why_not_linearised)
+    if observed is None or linear.predicted is None:
+        return Judgement(verdict="HYPOTHESES_NOT_MET", reason="the run shows no rate near the solution")
+    says = f"rate {observed.value:.5g}, predicted {linear.predicted:.5g}"
+    agrees = abs(observed.value - linear.predicted) <= AGREES
+    return Judgement(verdict="CONSISTENT" if agrees else "VIOLATED", reason=says)
 
 
 def compare(
@@ -127,23 +212,75 @@ def compare(
     Parameters and errors as for :func:`verification.run`.
     """
     pair = build(problem) if isinstance(problem, Problem) else problem
-    chosen: Fraction = pair.problem.iteration.theta if theta is None else relaxation_factor(theta)
     measured = measure(pair)
-    constants = measured.constants()
+    finished = run(pair, theta=theta, solver=solver, watch=watch, measured=measured)
+    chosen, constants = finished.theta, measured.constants()
     bounds: dict[str, Bounds] = {} if constants is None else {e.name: evaluate(e, constants, chosen) for e in EDITIONS}
-    finished = run(pair, theta=chosen, solver=solver, watch=watch)
+    sharp = sharp_bounds(measured, chosen)
+    reason: dict[str, str] = {}
+    lmi, losses = None, None
+    if pair.n > LARGEST:
+        reason |= dict.fromkeys(("lmi", "losses"), f"{pair.n} contact nodes: worked out up to {LARGEST}")
+    else:
+        losses = locate(pair, measured)
+        lmi, why = _semidefinite(pair, float(chosen), measured)
+        if lmi is None:
+            reason["lmi"] = why
+        if losses is None:
+            reason["losses"] = next(iter(measured.reason.values()), "a contact node is held")
+    if sharp is None:
+        reason["sharp"] = next(iter(measured.reason.values()), "")
     seen = largest_step_ratio(pair, finished.states)
-    outside = "; ".join(pair.outside)
+    if seen is None:
+        reason["step_ratio"] = "no step stands clear of rounding"
+
+    outside = "outside the theorem: " + "; ".join(finished.outside) if finished.outside else ""
+    if finished.relaxation != "constant" and not outside:
+        outside = f"the editions speak of a constant theta, not of {finished.relaxation}"
     verdicts: dict[str, Judgement] = {}
-    for edition in EDITIONS:
-        b = bounds.get(edition.name)
-        if b is None or outside:
-            verdicts[edition.name] = judge(None, seen, f"outside the theorem: {outside}")
-            continue
-        if b.interval is None:
-            scale = b.C2.value if b.C2 is not None else float("inf")
-            why = f"friction {measured.friction:g} is not below {scale:.2g}"
+
+    def hold(name: str, factor: Number | None, why: str) -> None:
+        verdicts[name] = judge(None if outside or factor is None else factor.value, seen, outside or why)
+
+    absent = next(iter(measured.reason.values()), "")
+    for name, b, threshold in (
+        *((e.name, bounds.get(e.name), bounds[e.name].C2 if bounds else None) for e in EDITIONS),
+        ("sharp", sharp, measured.friction_threshold),
+    ):
+        if b is None:
+            hold(name, None, absent)
         else:
-            why = f"theta = {float(chosen):g} is outside ({b.interval[0]:.2g}, {b.interval[1]:.2g})"
-        verdicts[edition.name] = judge(None if b.factor is None else b.factor.value, seen, why)
-    return Comparison(measured=measured, bounds=bounds, run=finished, step_ratio=seen, verdicts=verdicts)
+            hold(name, b.factor, _why_not(b.interval, threshold, measured.friction, chosen))
+    if lmi is None:
+        hold("lmi", None, reason["lmi"])
+    else:
+        hold("lmi", lmi.factor, f"Lipschitz constant {lmi.lipschitz.value:.3g} is not below 1")
+    verdicts["linearised"] = judge_prediction(finished)
+    return Comparison(
+        measured=measured,
+        bounds=bounds,
+        sharp=sharp,
+        lmi=lmi,
+        losses=losses,
+        run=finished,
+        step_ratio=seen,
+        verdicts=verdicts,
+        reason=reason,
+    )
+
+
+def _why_not(interval: tuple[float, float] | None, threshold: Number | None, friction: float, theta: Fraction) -> str:
+    """Why an edition draws no conclusion."""
+    if interval is not None:
+        return f"theta = {float(theta):g} is outside ({interval[0]:.2g}, {interval[1]:.2g})"
+    scale = threshold.value if threshold is not None else float("inf")
+    return f"friction {friction:g} is not below {scale:.2g}"
+
+
+def _semidefinite(pair: Pair, theta: float, measured: Measured) -> tuple[Semidefinite | None, str]:
+    from verification.lmi import LMIError, evaluate_lmi
+
+    try:
+        return evaluate_lmi(pair, measured, theta), ""
+    except (LMIError, ValueError) as error:
+        return None, str(error)

@@ -1,7 +1,9 @@
 """Every plot: functions from results to matplotlib figures, without global state."""
 
 from verification.figures.bodies import draw_bodies
+from verification.figures.region import draw_region
 from verification.figures.residuals import draw_residuals
 from verification.figures.style import save
+from verification.figures.waterfall import draw_waterfall
 
-__all__ = ["draw_bodies", "draw_residuals", "save"]
+__all__ = ["draw_bodies", "draw_region", "draw_residuals", "draw_waterfall", "save"]

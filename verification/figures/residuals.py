@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from ndtheory import Bounds
+from verification.editions import EditionRow
 from verification.figures.style import EDITIONS, PRESSURE, new_figure, plain, styled
 from verification.rates import noise
 from verification.runs import Run
 
 
-def draw_residuals(run: Run, bounds: Mapping[str, Bounds] | None = None) -> Figure:
+def draw_residuals(run: Run, editions: Sequence[EditionRow] = ()) -> Figure:
     """Unrelaxed residual over evaluations of T, the observed rate, the proved factors and the noise floor.
 
     Parameters
     ----------
     run : Run
-    bounds : mapping from edition to Bounds, optional
+    editions : sequence of EditionRow, optional
         Those with a factor are drawn.
     """
     history = np.array(run.history)
@@ -32,15 +32,13 @@ def draw_residuals(run: Run, bounds: Mapping[str, Bounds] | None = None) -> Figu
         ax.semilogy(steps[shown], history[shown], "o-", color=PRESSURE, markersize=3, label=f"residual ({run.outcome})")
         rate = run.observed_rate
         if rate is not None and shown.any():
-            last = int(steps[shown][-1])
-            begin = max(0, last - rate.steps)
-            middle = (begin + last) // 2
+            middle = (rate.begin + rate.end) // 2
             line = history[middle] * rate.value ** (steps - middle)
             ax.semilogy(steps, line, "--", color="#D55E00", label=f"observed rate {rate.value:.4g}")
-        for name, edition in (bounds or {}).items():
-            if edition.factor is not None and shown.any():
-                line = history[shown][0] * edition.factor.value**steps
-                ax.semilogy(steps, line, "-.", color=EDITIONS[name], label=f"{name} bound")
+        for row in editions:
+            if row.factor is not None and shown.any():
+                line = history[shown][0] * row.factor.value**steps
+                ax.semilogy(steps, line, "-.", color=EDITIONS[row.name], label=f"{row.name} bound")
         if run.last.scale > 0:
             floor = noise(run.pair, run.last) / run.last.scale
             ax.axhline(floor, color="0.7", linewidth=0.8, linestyle=":", label="rounding")

@@ -1,0 +1,309 @@
+"""Which body gets the Neumann problem, and which theta: advice from the theorem and from rho."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from fem1d2d import largest
+from fem1d2d.mesh import Floats
+from ndtheory import EnergyConstants, Number, SharpBounds, evaluate_sharp, exact
+from ndtheory.constants import take
+from ndtheory.sharp import LARGEST, SMALLEST, predicted_rate, predicted_theta
+from verification.bodies import build
+from verification.document import Document
+from verification.matrices import check_matrix, size
+from verification.measured import Measured, measure
+from verification.pair import Pair
+from verification.problem import Problem, read_theta
+from verification.reader import ProblemError
+from verification.relaxation import momentum_step
+from verification.threads import one_thread
+
+#: A theta chosen for the user stays below 1 by this much, however soft the contact body.
+CLOSEST_TO_ONE = 1 - 1e-6
+
+#: What is unknown of matrices and runs from elsewhere.
+UNITS = {"length": "any", "stress": "any"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Role:
+    """What is known of the iteration when one body gets the Neumann problem.
+
+    Attributes
+    ----------
+    neumann_body : {1, 2} or None
+        None where it is not known which body that is.
+    rho : Number
+        Stiffness of the contact body over that of the Neumann body, at worst; with rho_normal without friction.
+    theta_proved : float or None
+        The theta of least proved factor.
+    factor_proved, theta_max_proved : Number or None
+    theta_predicted, rate_predicted : float
+        ``2/(2 + rho)`` and ``rho/(2 + rho)``: a prediction, proved without friction.
+    friction_threshold : Number or None
+        Friction below which every small theta is proved.
+    singular : bool
+        Whether the Neumann problem has no unique solution; such roles are refused, so always False here.
+    reason : mapping
+        Why a value is None.
+    """
+
+    neumann_body: Literal[1, 2] | None
+    rho: Number
+    theta_proved: float | None
+    factor_proved: Number | None
+    theta_max_proved: Number | None
+    theta_predicted: float
+    rate_predicted: float
+    friction_threshold: Number | None
+    reason: Mapping[str, str]
+    singular: bool = False
+
+    def to_dict(self) -> dict[str, Any]:
+        """A member of ``roles``."""
+        values = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        values["reason"] = dict(self.reason)
+        return {name: v.to_dict() if isinstance(v, Number) else v for name, v in values.items()}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Advice(Document):
+    """The advice.
+
+    Attributes
+    ----------
+    neumann_body : {1, 2} or None
+        Who should get the Neumann problem; None where one run tells nothing of the other assignment.
+    roles : tuple of Role
+        The file's assignment first.
+    friction : float or None
+        None where it is not known.
+    outside : tuple of str
+        Why the theorem does not speak of the problem.
+    """
+
+    schema: ClassVar[str] = "ndtheory.advice/1"
+
+    neumann_body: Literal[1, 2] | None
+    roles: tuple[Role, ...]
+    units: Mapping[str, str]
+    friction: float | None = None
+    outside: tuple[str, ...] = ()
+
+    @property
+    def best(self) -> Role:
+        """The role that is advised; the only one where there is no choice."""
+        return next((r for r in self.roles if r.neumann_body == self.neumann_body), self.roles[0])
+
+    def content(self) -> dict[str, Any]:
+        reason = {} if self.neumann_body else {"neumann_body": "one run tells nothing of the other assignment"}
+        return {
+            "neumann_body": self.neumann_body,
+            "roles": [role.to_dict() for role in self.roles],
+            "outside_theorem": list(self.outside),
+            "reason": reason,
+        }
+
+
+def advise(problem: Problem) -> Advice:
+    """Advise on the roles of the bodies and on theta.
+
+    The body whose prediction ``rho/(2 + rho)`` is smaller gets the Neumann problem.
+
+    Raises
+    ------
+    ProblemError
+        As :func:`verification.measure`, and where the bodies hold different components of Gamma_c.
+
+    Examples
+    --------
+    >>> bars = {"dimension": 1,
+    ...     "body1": {"shape": "interval", "x": [0, 1], "cells": 8, "young": 3, "fixed": ["left"]},
+    ...     "body2": {"shape": "interval", "x": [1, 2], "cells": 8, "young": 1, "fixed": ["right"]}}
+    >>> found = advise(Problem.from_dict(bars))
+    >>> found.neumann_body, round(found.best.theta_predicted, 6)
+    (1, 0.857143)
+    """
+    pair = build(problem)
+    roles = tuple(_role(problem_, pair) for problem_ in (problem, problem.swapped()))
+    best = min(roles, key=lambda role: role.rate_predicted)
+    return Advice(
+        neumann_body=best.neumann_body,
+        roles=roles,
+        units=problem.units,
+        friction=float(problem.contact.friction),
+        outside=tuple(pair.outside),
+    )
+
+
+def _role(problem: Problem, pair: Pair) -> Role:
+    measured = measure(replace(pair, problem=problem))
+    sharp = sharp_bounds(measured)
+    if sharp is None:
+        why = next(iter(measured.reason.values()))
+        raise ProblemError(problem.source, "contact", None, f"no advice: {why}")
+    outside = pair.outside
+    threshold = None if outside else measured.friction_threshold
+    if outside:
+        proved = ("theta_proved", "factor_proved", "theta_max_proved", "friction_threshold")
+        reason = dict.fromkeys(proved, f"outside the theorem: {outside[0]}")
+    else:
+        reason = {name: why for name, why in sharp.reason.items() if name in Role.__dataclass_fields__}
+        if threshold is None:
+            reason["friction_threshold"] = "no law of friction"
+    return Role(
+        neumann_body=problem.iteration.neumann_body,
+        rho=sharp.rho,
+        theta_proved=None if outside else sharp.theta_proved,
+        factor_proved=None if outside else sharp.factor_proved,
+        theta_max_proved=None if outside else sharp.theta_max_proved,
+        theta_predicted=sharp.theta_predicted,
+        rate_predicted=sharp.rate_predicted,
+        friction_threshold=threshold,
+        reason=reason,
+    )
+
+
+def sharp_bounds(measured: Measured, theta: Any = None) -> SharpBounds | None:
+    """The theorem in energy norms for measured constants; None where they do not exist."""
+    constants = measured.energy_constants()
+    return None if constants is None else evaluate_sharp(constants, theta)
+
+
+def advise_matrices(S1: Floats, S2: Floats) -> Advice:
+    """Advice from the interface stiffness matrices alone, free of friction.
+
+    Parameters
+    ----------
+    S1, S2 : array, shape (n, n)
+        Schur complements of bodies 1 and 2 on the same interface unknowns; symmetric positive definite.
+
+    Raises
+    ------
+    ValueError
+        Matrices that are not square, finite, symmetric or positive definite, or do not fit.
+    """
+    for name, matrix in (("S1", S1), ("S2", S2)):
+        check_matrix(name, matrix)
+    if S1.shape != S2.shape:
+        raise ValueError(f"S1 is {size(S1)}, S2 is {size(S2)}: needed matrices on the same interface unknowns")
+    unit_1, unit_2 = float(np.abs(S1).max()), float(np.abs(S2).max())
+    one, two = S1 / unit_1, S2 / unit_2  # entries of order 1, whatever the unit
+    with one_thread():
+        ratios = {2: Fraction(largest(one, two).value), 1: Fraction(largest(two, one).value)}
+    unit = {2: Fraction(unit_1) / Fraction(unit_2), 1: Fraction(unit_2) / Fraction(unit_1)}
+    roles = tuple(_plain_role(neumann, rho * unit[neumann]) for neumann, rho in ratios.items())
+    best = min(roles, key=lambda role: role.rate_predicted)
+    return Advice(neumann_body=best.neumann_body, roles=roles, units=UNITS)
+
+
+def _plain_role(neumann_body: Any, rho: Fraction) -> Role:
+    bounds = evaluate_sharp(EnergyConstants(rho=rho))
+    return Role(
+        neumann_body=neumann_body,
+        rho=bounds.rho,
+        theta_proved=bounds.theta_proved,
+        factor_proved=bounds.factor_proved,
+        theta_max_proved=bounds.theta_max_proved,
+        theta_predicted=bounds.theta_predicted,
+        rate_predicted=bounds.rate_predicted,
+        friction_threshold=None,
+        reason={"friction_threshold": "matrices alone say nothing of friction: the proved values are for k = 0"},
+    )
+
+
+def advise_run(theta: Any, ratio: Any) -> Advice:
+    """Advice from one run of any code with constant theta.
+
+    While its residual alternates in sign at a steady ratio r, the slowest mode obeys ``1 - theta - theta rho = -r``,
+    so ``rho = (1 + r)/theta - 1``.
+
+    Parameters
+    ----------
+    theta : number
+        The run's relaxation factor, 0 < theta <= 1.
+    ratio : number
+        r > 0, above 1 where the run diverged.
+
+    Raises
+    ------
+    HypothesisError
+
+    Examples
+    --------
+    >>> advise_run("0.1", "1.4").best.rho.value
+    23.0
+    """
+    t = take("theta", theta, "the theta of a run, 0 < theta <= 1 (1e-75 or more)", lambda v: SMALLEST <= v <= 1)
+    needed = "the ratio of consecutive residuals, a number > 0 (1e-75 to 1e75)"
+    r = take("ratio", ratio, needed, lambda v: SMALLEST <= v <= LARGEST)
+    rho = (1 + r) / t - 1
+    nothing = "an observed ratio proves nothing"
+    role = Role(
+        neumann_body=None,
+        rho=Number.of_float(rho),
+        theta_proved=None,
+        factor_proved=None,
+        theta_max_proved=None,
+        theta_predicted=float(predicted_theta(rho)),
+        rate_predicted=float(predicted_rate(rho)),
+        friction_threshold=None,
+        reason={
+            "neumann_body": "whichever body had the Neumann problem in that run",
+            **dict.fromkeys(("theta_proved", "factor_proved", "theta_max_proved", "friction_threshold"), nothing),
+        },
+    )
+    return Advice(neumann_body=None, roles=(role,), units=UNITS)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Choice:
+    """The theta of a run and where it comes from.
+
+    Attributes
+    ----------
+    theta : Fraction
+    source : {'given', 'proved', 'predicted', 'momentum'}
+        ``momentum``: the step that the triple momentum method takes for this rho.
+    rho : float or None
+        Known where it was needed.
+    """
+
+    theta: Fraction
+    source: Literal["given", "proved", "predicted", "momentum"]
+    rho: float | None = None
+
+
+def choose(pair: Pair, theta: Any = None, measured: Measured | None = None) -> Choice:
+    """The theta of a run: the given one, else the problem's; for "auto" the proved one, else the predicted one.
+
+    Raises
+    ------
+    HypothesisError
+        A given theta outside (0, 1).
+    ProblemError
+        "auto" or momentum where rho does not exist.
+    """
+    settings = pair.problem.iteration
+    asked = settings.theta if theta is None else read_theta(theta)
+    if asked != "auto" and settings.relaxation != "momentum":
+        return Choice(theta=asked, source="given")
+    sharp = sharp_bounds(measured or measure(pair))
+    if sharp is None:
+        rule = settings.relaxation == "momentum"
+        key, value = ("iteration.relaxation", "momentum") if rule else ("iteration.theta", "auto")
+        needed = f"needed {'another rule' if rule else 'a number'}: rho does not exist here"
+        raise ProblemError(pair.problem.source, key, value, needed)
+    rho = sharp.rho.value
+    of = lambda value: exact(min(value, CLOSEST_TO_ONE))
+    if settings.relaxation == "momentum":
+        return Choice(theta=of(momentum_step(rho)), source="momentum", rho=rho)
+    if sharp.theta_proved is not None and not pair.outside:
+        return Choice(theta=of(sharp.theta_proved), source="proved", rho=rho)
+    return Choice(theta=of(sharp.theta_predicted), source="predicted", rho=rho)

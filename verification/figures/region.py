@@ -1,0 +1,44 @@
+"""The (theta, k) plane on logarithmic axes: regions by edition, runs over them."""
+
+from __future__ import annotations
+
+from matplotlib.figure import Figure
+
+from verification.figures.style import EDITIONS, HATCHES, OUTCOMES, new_figure, plain, styled
+from verification.plane import Plane
+
+
+def draw_region(plane: Plane) -> Figure:
+    """Regions in which contraction is proved, from the largest to the smallest, and the outcome of each run."""
+    ends = [hi for region in plane.regions.values() for _, hi in region.theta]
+    frictions = [k for region in plane.regions.values() for k in region.k]
+    left = 10 ** (-2) * min(ends)
+    bottom = 0.1 * min(frictions)
+    with styled():
+        figure = new_figure(7.2, 4.6)
+        ax = figure.subplots()
+        ax.set_xscale("log")
+        ax.set_yscale("log")
+        for name in ("lmi", "sharp", "repaired", "printed"):
+            region = plane.regions.get(name)
+            if region is None or not region.k:
+                continue
+            k = [bottom, *region.k]
+            low = [max(lo, left) for lo, _ in (region.theta[0], *region.theta)]
+            high = [hi for _, hi in (region.theta[0], *region.theta)]
+            label = f"{name}: k < {max(region.k):.2g}"
+            ax.fill_betweenx(
+                k, low, high, color=EDITIONS[name], alpha=0.55, linewidth=0, label=label, hatch=HATCHES[name]
+            )
+        for outcome, (colour, marker) in OUTCOMES.items():
+            chosen = [point for point in plane.points if point.outcome == outcome]
+            if chosen:
+                x, y = [p.theta for p in chosen], [p.k for p in chosen]
+                ax.plot(x, y, marker, color=colour, markersize=4, label=f"run {outcome}")
+        ax.set_xlim(left, 1.3)
+        ax.set_ylim(bottom, 2 * max([*frictions, *(p.k for p in plane.points)]))
+        ax.set_xlabel("relaxation factor theta")
+        ax.set_ylabel("coefficient of friction k")
+        ax.set_title(f"{plain(plane.title)}: where one step is proved to contract")
+        ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure

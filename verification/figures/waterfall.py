@@ -1,0 +1,48 @@
+"""What each inequality of the proof gives away, in decades."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from verification.figures.style import EDITIONS, new_figure, styled
+from verification.losses import Loss, Losses
+
+
+def draw_waterfall(losses: Losses) -> Figure:
+    """Each inequality by itself, then the steps from the largest quantity found to its bound, added up."""
+    chains = [
+        ("each inequality by itself", losses.links),
+        ("from the largest friction term found to its bound (5.30), printed", losses.friction),
+        ("from the largest |||T psi - T psi~||| found to its bound (5.38)", losses.lipschitz),
+    ]
+    chains = [(title, chain) for title, chain in chains if chain]
+    with styled():
+        figure = new_figure(7.2, 0.7 + 0.32 * sum(len(chain) + 2 for _, chain in chains))
+        shares = [len(chain) + 1 for _, chain in chains]
+        axes = figure.subplots(len(chains), 1, squeeze=False, height_ratios=shares)[:, 0]
+        for ax, (title, chain) in zip(axes, chains, strict=True):
+            _draw(ax, title, chain, adds_up=chain is not losses.links)
+    return figure
+
+
+def _draw(ax: Axes, title: str, chain: Sequence[Loss], *, adds_up: bool) -> None:
+    begin, farthest = 0.0, 0.0
+    for i, loss in enumerate(chain):
+        ax.barh(i, loss.decades, left=begin, color=EDITIONS["repaired"], edgecolor="black", linewidth=0.5)
+        end = begin + loss.decades
+        farthest = max(farthest, end)
+        ax.text(max(begin, end), i, f" {loss.decades:.1f}", va="center")
+        begin = end if adds_up else 0.0
+    labels = [loss.label for loss in chain]
+    if adds_up:
+        ax.barh(len(chain), begin, color=EDITIONS["printed"], edgecolor="black", linewidth=0.5)
+        ax.text(begin, len(chain), f" {begin:.1f}", va="center")
+        labels.append("in all")
+    ax.set_yticks(range(len(labels)), labels)
+    ax.invert_yaxis()
+    ax.set_xlim(right=1.12 * farthest)
+    ax.set_xlabel("decades given away")
+    ax.set_title(title)

@@ -1,0 +1,181 @@
+"""The (theta, k) plane: where each edition proves contraction, and what runs do there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ndtheory import EDITIONS, Constants, evaluate, evaluate_sharp, exact
+from verification.bodies import build
+from verification.document import Document
+from verification.editions import LARGEST
+from verification.measured import Measured, measure
+from verification.pair import Pair
+from verification.problem import Problem
+from verification.reader import ProblemError
+from verification.runs import Outcome, run
+
+#: How many friction values trace the border of a region, and of that of the semidefinite edition.
+TRACED, TRACED_LMI = 60, 8
+
+#: Where runs are started, and how long they may take.
+THETAS = tuple(float(f"{v:.3g}") for v in np.geomspace(0.04, 0.97, 9))
+FRICTIONS = tuple(float(f"{v:.3g}") for v in np.geomspace(0.01, 5, 7))
+MOST_STEPS = 300
+
+
+@dataclass(frozen=True, kw_only=True)
+class Region:
+    """Where one edition proves contraction.
+
+    Attributes
+    ----------
+    k : tuple of float
+        Friction, increasing; below the first value the region does not shrink.
+    theta : tuple of pairs of float
+        Contraction for lo < theta < hi.
+    """
+
+    k: tuple[float, ...]
+    theta: tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Point:
+    """What a run did."""
+
+    theta: float
+    k: float
+    outcome: Outcome
+    iterations: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plane(Document):
+    """Regions by edition, and runs.
+
+    Attributes
+    ----------
+    title : str
+    regions : mapping from edition to Region
+    points : tuple of Point
+    reason : mapping
+        Why an edition has no region.
+    """
+
+    schema: ClassVar[str] = "ndtheory.region/1"
+
+    title: str
+    regions: Mapping[str, Region]
+    points: tuple[Point, ...]
+    reason: Mapping[str, str]
+    units: Mapping[str, str]
+
+    def content(self) -> dict[str, Any]:
+        return {
+            "title": self.title,
+            "regions": {
+                name: {"k": list(region.k), "theta": [list(ends) for ends in region.theta]}
+                for name, region in self.regions.items()
+            },
+            "points": [vars(point) for point in self.points],
+            "reason": dict(self.reason),
+        }
+
+
+def chart(problem: Problem, *, watch: Callable[[float], None] = lambda share: None) -> Plane:
+    """Trace the regions of all editions for a problem's bodies, and run a grid of theta and k.
+
+    Parameters
+    ----------
+    problem : Problem
+    watch : callable
+        Called with the share that is done.
+
+    Raises
+    ------
+    ProblemError
+        A problem outside the theorem, or without a law of friction.
+    """
+    pair = build(problem)
+    if problem.contact.law == "local":
+        raise ProblemError(problem.source, "contact.law", "local", 'no region is proved of it; needed "nonlocal"')
+    if pair.outside:
+        raise ProblemError(problem.source, "contact", None, f"no region is proved: {pair.outside[0]}")
+    measured = measure(pair)
+    constants, sharp = measured.constants(), measured.friction_threshold
+    regions: dict[str, Region] = {}
+    reason: dict[str, str] = {}
+    if constants is None:
+        raise ProblemError(problem.source, "contact", None, next(iter(measured.reason.values())))
+    if sharp is None:
+        raise ProblemError(problem.source, "contact.radius", None, "needed a law of friction to vary k")
+    for edition in EDITIONS:
+        threshold = evaluate(edition, constants).C2
+        if threshold is not None:
+            bound = lambda k, e=edition: evaluate(e, _at(measured, k)).interval
+            regions[edition.name] = _trace(bound, threshold.value, TRACED)
+    beyond = sharp.value * 1.5  # theta away from 0 may contract a little beyond the threshold
+    regions["sharp"] = _trace(lambda k: _sharp_interval(measured.with_friction(k)), beyond, TRACED)
+    traced, why = _semidefinite(pair, measured, sharp.value)
+    if traced is None:
+        reason["lmi"] = why
+    else:
+        regions["lmi"] = traced
+    points = []
+    cells = [(theta, k) for k in FRICTIONS for theta in THETAS]
+    for i, (theta, k) in enumerate(cells):
+        watch(i / len(cells))
+        finished = run(_rubbing(pair, k), theta=theta)
+        if finished.outcome == "interrupted":
+            raise KeyboardInterrupt
+        points.append(Point(theta=theta, k=k, outcome=finished.outcome, iterations=finished.iterations))
+    return Plane(title=problem.title, regions=regions, points=tuple(points), reason=reason, units=problem.units)
+
+
+def _rubbing(pair: Pair, k: float) -> Pair:
+    """The same bodies at another friction, for runs of a limited length with a constant theta."""
+    problem = pair.problem
+    contact = replace(problem.contact, friction=exact(k))
+    iteration = replace(problem.iteration, relaxation="constant", max_iterations=MOST_STEPS)
+    return replace(pair, problem=replace(problem, contact=contact, iteration=iteration))
+
+
+def _sharp_interval(measured: Measured) -> tuple[float, float] | None:
+    constants = measured.energy_constants()
+    return None if constants is None else evaluate_sharp(constants).interval
+
+
+def _trace(interval: Callable[[float], tuple[float, float] | None], last: float, count: int) -> Region:
+    """Follow the border of a region up to the last friction, closer where it ends."""
+    ks = [last * (1 - 10.0**exponent) for exponent in np.linspace(-0.05, -6, count // 2)]
+    ks = sorted({*np.geomspace(last * 1e-3, last * 0.1, count - count // 2), *ks})
+    found = [(float(k), interval(float(k))) for k in ks]
+    kept = [(k, ends) for k, ends in found if ends is not None]
+    return Region(k=tuple(k for k, _ in kept), theta=tuple(ends for _, ends in kept))
+
+
+def _at(measured: Measured, k: float) -> Constants:
+    constants = measured.with_friction(k).constants()
+    assert constants is not None
+    return constants
+
+
+def _semidefinite(pair: Pair, measured: Measured, start: float) -> tuple[Region | None, str]:
+    from verification.lmi import LMIError, SemidefiniteEdition, friction_threshold
+
+    if pair.n > LARGEST:
+        return None, f"{pair.n} contact nodes: worked out up to {LARGEST}"
+    try:
+        last = friction_threshold(pair, measured, start)
+        kept = []
+        for k in np.append(np.geomspace(last * 1e-2, last * 0.9, TRACED_LMI - 1), last):
+            found = SemidefiniteEdition(pair, measured, friction=float(k)).largest_theta()
+            if found is not None:
+                kept.append((float(k), (0.0, found.value)))
+    except LMIError as error:
+        return None, str(error)
+    return Region(k=tuple(k for k, _ in kept), theta=tuple(ends for _, ends in kept)), ""
