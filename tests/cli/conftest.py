@@ -52,9 +52,11 @@ max_iterations = 500
 length = 1.0
 """
 
-#: Edits that open the file's gap so far that the bodies never meet, that load nothing, that end inside the theorem.
+#: Edits that open the file's gap so far that the bodies never meet, or all but meet, that load nothing, that end inside
+#: the theorem.
 EDITS = {
     "apart": {"contact.gap": "0.1"},
+    "all but apart": {"contact.gap": "0.01499999999999995", "iteration.tolerance": "0.5"},
     "unloaded": {"body2.prescribed": "{ top = [0.0, 0.0] }"},
     "inside the theorem": {"contact.friction": "1e-8", "iteration.theta": "1e-4", "iteration.max_iterations": "9"},
     "inside, unloaded": {
@@ -145,7 +147,8 @@ def write(tmp_path):
 def quick(monkeypatch):
     """Figures that cost nothing, where only their files matter."""
     monkeypatch.setattr(figures, "draw_bodies", lambda result: "bodies")
-    monkeypatch.setattr(figures, "draw_residuals", lambda run, bounds=None: "residuals")
+    monkeypatch.setattr(figures, "draw_residuals", lambda run, editions=(): "residuals")
+    monkeypatch.setattr(figures, "draw_waterfall", lambda losses: "waterfall")
     monkeypatch.setattr(
         figures,
         "save",

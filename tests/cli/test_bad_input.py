@@ -142,11 +142,8 @@ TOGETHER = {
         {"body1.shape": '"rigid"'} | dict.fromkeys(f"body1.{key}" for key in BESIDE_SHAPE),
         ["body1.shape", '"rigid"', "elastic body"],
     ),
-    "an automatic theta": ({"iteration.theta": '"auto"'}, ["iteration.theta", '"auto"', "not supported yet"]),
-    "an accelerated relaxation": (
-        {"iteration.relaxation": '"aitken"'},
-        ["iteration.relaxation", '"aitken"', "not supported yet"],
-    ),
+    "another word for auto": ({"iteration.theta": '"automatic"'}, ["iteration.theta", '"automatic"', 'or "auto"']),
+    "an unknown relaxation": ({"iteration.relaxation": '"broyden"'}, ["iteration.relaxation", '"broyden"', "aitken"]),
     "a force where only contact forces act": (
         {"body2.traction": "{ bottom = [0.0, -9.0] }"},
         ["body2.traction", "bottom"],
@@ -355,10 +352,23 @@ def test_a_bad_call_is_refused_by_name(call, write, arguments, fragments):
     assert_names(call(*(str(file) if a == "FILE" else a for a in arguments.split(" "))).complaint, *fragments)
 
 
-@pytest.mark.parametrize("edition", ["--rho 1", "--kappa1 1", "--kappa2 1"])
-def test_the_sharp_edition_is_refused_by_name_until_it_exists(call, edition):
-    answer = call(*f"bounds --m 1 --M 2 --CR 1 --CK 0 {edition}".split())
-    assert answer.status != 2 or "sharp edition is not supported yet" in answer.complaint
+@pytest.mark.parametrize(
+    ("options", "fragments"),
+    [
+        ("--kappa1 1", ["--m", "or --rho"]),
+        ("--rho 1 --kappa1 1", ["--kappa2 missing"]),
+        ("--rho 1 --k 0.2", ["--kappa1", "--kappa2", "with friction"]),
+        ("--m 1 --M 2 --CR 1 --CK 1 --rho 1", ["--kappa1", "--kappa2", "with friction"]),
+        ("--rho 0", ["--rho", "0", "rho > 0"]),
+        ("--rho -1", ["--rho", "-1", "rho > 0"]),
+        ("--rho nan", ["--rho", "nan"]),
+        ("--rho 1 --kappa1 -1 --kappa2 1", ["--kappa1", "-1", ">= 0"]),
+        ("--rho 1 --kappa1 1 --kappa2 nan", ["--kappa2", "nan", ">= 0"]),
+        ("--rho 1 --theta 1", ["theta", "0 < theta < 1"]),
+    ],
+)
+def test_the_sharp_edition_needs_rho_and_with_friction_both_kappas(call, options, fragments):
+    assert_names(call("bounds", *options.split()).complaint, *fragments)
 
 
 @pytest.mark.parametrize("folder", ["problem.toml", "problem.toml/results", "missing/../problem.toml", ""])

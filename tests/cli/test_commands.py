@@ -9,9 +9,9 @@ import pytest
 import ndtheory
 from verification.cli.problems import examples
 
-COMMANDS = ["example", "demo", "bounds", "constants", "run", "solve", "compare"]
+COMMANDS = ["example", "demo", "bounds", "constants", "run", "solve", "compare", "advise", "region"]
 CONSTANTS = ["--m", "3084", "--M", "153229", "--CR", "1.70", "--CK", "1e-8"]
-LATER = ["advise", "region", "sweep", "reproduce", "verify", "explore"]
+LATER = ["sweep", "reproduce", "verify", "explore"]
 
 #: Exit status of (run, compare) on each built-in problem; `inside` ends at its limit, which compare does not mind.
 BUILT_IN = {"inside": (1, 0), "section6": (0, 0), "signorini": (0, 0), "two-bars": (0, 0)}
@@ -27,7 +27,15 @@ HEADINGS = {
         "DOES THE RUN AGREE WITH THE BOUND?",
     ],
     "bounds": ["DOES ONE STEP CONTRACT?", "THE CONSTANTS OF SECTION 5"],
+    "advise": ["WHICH BODY GETS THE NEUMANN PROBLEM?", "WHICH THETA?", "HOW MUCH FRICTION IS PROVED?", "TO PASTE"],
 }
+
+#: Edits whose screens hold what others do not: reasons, rates next to 1, other rules.
+TOLD = [
+    *[None, "apart", "unloaded", "without friction", "held tangentially", "local law", "wrong roles"],
+    *["soft upper body", "stiff upper body", {"iteration.theta": '"auto"', "contact.friction": "3"}],
+    *({"iteration.relaxation": f'"{relaxation}"'} for relaxation in ("aitken", "anderson", "newton", "momentum")),
+]
 
 
 @pytest.fixture
@@ -114,6 +122,29 @@ def test_a_built_in_problem_ends_as_expected_on_one_screen(call, built_in, monke
     assert [line for line in lines if len(line) > 80] == []
 
 
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_advice_on_a_built_in_problem_fits_one_screen(call, built_in, monkeypatch, tmp_path, name):
+    monkeypatch.chdir(tmp_path)
+    built_in(name)
+    answer = call("advise", f"{name}.toml")
+    lines = answer.out.splitlines()
+    assert (answer.status, answer.err) == (0, "")
+    assert [line for line in lines if line in HEADINGS["advise"]] == HEADINGS["advise"]
+    assert lines[-1].startswith("Next: ndtheory run ")
+    assert len(lines) <= 40
+    assert [line for line in lines if len(line) > 80] == []
+
+
+@pytest.mark.parametrize("edits", TOLD, ids=str)
+@pytest.mark.parametrize("command", ["constants", "run", "solve", "compare", "advise"])
+def test_whatever_a_screen_has_to_tell_fits_into_80_columns(call, write, monkeypatch, tmp_path, command, edits):
+    monkeypatch.chdir(tmp_path)
+    write(edits)
+    lines = call(command, "problem.toml").out.splitlines()
+    assert lines or (command, edits) == ("advise", "held tangentially")
+    assert [line for line in lines if len(line) > 80] == []
+
+
 def test_the_calculator_answers_on_one_screen(call):
     answer = call("bounds", *CONSTANTS, "--theta", "1e-4")
     lines = answer.out.splitlines()
@@ -144,7 +175,7 @@ def test_stresses_carry_the_unit_of_the_file(call, write, stress):
 
 
 @pytest.mark.parametrize("edits", [None, "soft upper body", "stiff upper body", "inside the theorem", "local law"])
-@pytest.mark.parametrize("command", ["constants", "run", "solve", "compare"])
+@pytest.mark.parametrize("command", ["constants", "run", "solve", "compare", "advise"])
 def test_what_to_type_next_is_accepted(call, write, command, edits):
     following = call(command, write(edits)).out.splitlines()[-1].removeprefix("Next: ndtheory ")
     assert call(*shlex.split(following)).status != 2
@@ -213,6 +244,11 @@ def test_thresholds_are_on_k_where_C_s_and_C_tr_are_known_and_on_C_K_otherwise(c
         ("--m 3084 --M 153229 --CR 1.7 --CK 1e-8 --theta 1/2", 1),  # theta above C1
         ("--m 1/2 --M 1 --CR 1 --CK 0 --theta 1/100 --edition printed", 1),  # the printed proof needs m >= 1
         ("--m 1 --M 1 --CR 1 --CK 0 --theta 1/100 --edition printed", 0),
+        ("--rho 3 --theta 0.49", 0),  # 2/(1 + rho) = 1/2
+        ("--rho 3 --theta 0.5", 1),
+        ("--rho 1 --kappa1 2 --kappa2 1 --theta 0.1", 1),  # kappa_2 + kappa_1^2/4 = 2
+        ("--m 3084 --M 153229 --CR 1.7 --CK 0 --theta 1/2 --rho 1", 0),  # one edition proves it
+        ("--m 3084 --M 153229 --CR 1.7 --CK 0 --theta 1e-10 --rho 1e20", 0),
     ],
 )
 def test_check_asks_for_a_proved_contraction(call, given, status):
@@ -306,6 +342,9 @@ def test_a_radius_of_one_cell_is_not_below_the_mesh_width(call, write, radius, c
         ["run", "FILE", "--json"],
         ["solve", "FILE", "--json"],
         ["compare", "FILE", "--json"],
+        ["advise", "FILE", "--json"],
+        ["advise", "--theta", "0.1", "--ratio", "1.4", "--json"],
+        ["bounds", "--rho", "3", "--json"],
         ["demo", "-o", "FOLDER", "--json"],
     ],
     ids=lambda a: " ".join(a[:1]),
@@ -327,7 +366,7 @@ def test_the_demo_compares_section_6_and_leaves_problem_report_figures_and_json(
         "problem.toml",
         "report.html",
         "compare.json",
-        *(f"{figure}.{ending}" for figure in ("bodies", "residuals") for ending in ("svg", "png")),
+        *(f"{figure}.{ending}" for figure in ("bodies", "residuals", "waterfall") for ending in ("svg", "png")),
     }
     assert (folder / "problem.toml").read_text(encoding="utf-8") == examples()["section6"]
     assert call("demo") == answer  # over its own files

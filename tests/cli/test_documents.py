@@ -18,9 +18,11 @@ RUN = {
     *{"observed_rate_interval", "linearised_rate", "linearised_norm", "unrelaxed_residual", "kkt_residual", "solves"},
     *{"pattern", "contact", "force", "history"},
 }
+ENERGY = {"rho", "kappa_1", "kappa_2", "ratio", "friction_multiple", "factor_proved", "theta_max_proved"}
 VERDICTS = {"CONSISTENT", "VIOLATED", "INCONCLUSIVE", "HYPOTHESES_NOT_MET"}
 
 GIVEN = ["--m", "3084", "--M", "153229", "--CR", "1.70"]
+ON_ENERGY = ["--rho", "1/2", "--kappa1", "1/10", "--kappa2", "1/5"]
 CALCULATIONS = {
     "bounds on C_K": [*GIVEN, "--CK", "1e-8", "--theta", "1e-4"],
     "bounds on k": [*GIVEN, "--k", "1e-13", "--Cs", "1e5", "--Ctr", "1/2", "--theta", "1e-4"],
@@ -29,6 +31,12 @@ CALCULATIONS = {
     "bounds without friction": [*GIVEN, "--k", "0", "--Cs", "0", "--Ctr", "0", "--theta", "1e-4"],
     "bounds without theta": [*GIVEN, "--CK", "1e-8"],
     "bounds of one edition": [*GIVEN, "--CK", "1e-8", "--edition", "printed"],
+    "bounds of every edition": [*GIVEN, "--CK", "1e-8", *ON_ENERGY, "--theta", "1e-4"],
+    "bounds in energy norms": [*ON_ENERGY, "--theta", "1/2"],
+    "bounds in energy norms without friction": ["--rho", "3", "--theta", "1/3"],
+    "bounds in energy norms without theta": ON_ENERGY,
+    "bounds in energy norms outside the interval": ["--rho", "3", "--theta", "2/3"],
+    "bounds in energy norms with much friction": ["--rho", "3", "--kappa1", "2", "--kappa2", "2", "--theta", "1/3"],
 }
 PROBLEMS = [
     None,
@@ -42,17 +50,34 @@ PROBLEMS = [
     "wrong roles",
     "stiff upper body",
 ]
-DOCUMENTS = [*CALCULATIONS] + [
-    (command, edits) for command in ("constants", "run", "solve", "compare") for edits in PROBLEMS
+#: Edits by which a theta and a relaxation are chosen.
+CHOICES = [
+    {"iteration.theta": '"auto"'},
+    *({"iteration.relaxation": f'"{relaxation}"'} for relaxation in ("aitken", "anderson", "newton", "momentum")),
+    {"iteration.relaxation": '"momentum"', "contact.friction": "0"},
 ]
+DOCUMENTS = [
+    *CALCULATIONS,
+    *((command, edits) for command in ("constants", "run", "solve", "compare") for edits in PROBLEMS),
+    *(("advise", edits) for edits in PROBLEMS if edits != "held tangentially"),  # rho does not exist there
+    *((command, edits) for command in ("run", "compare") for edits in CHOICES),
+]
+SCHEMAS = {"advise": "advice"}
+
+
+@pytest.fixture(scope="module")
+def kept():
+    """Documents by what they are of: each is computed once."""
+    return {}
 
 
 @pytest.fixture
-def document(call, write):
+def document(call, write, kept):
     def document(of):
-        if isinstance(of, str):
-            return call("bounds", *CALCULATIONS[of], "--json").document
-        return call(of[0], write(of[1]), "--json").document
+        if str(of) not in kept:
+            arguments = ["bounds", *CALCULATIONS[of]] if isinstance(of, str) else [of[0], write(of[1])]
+            kept[str(of)] = call(*arguments, "--json").document
+        return kept[str(of)]
 
     return document
 
@@ -91,7 +116,7 @@ def unexplained(part, explained=frozenset(), path=""):
 @pytest.mark.parametrize("of", DOCUMENTS, ids=str)
 def test_every_document_names_its_schema_version_and_units(document, of):
     found = document(of)
-    assert found["schema"] == f"ndtheory.{'bounds' if isinstance(of, str) else of[0]}/1"
+    assert found["schema"] == f"ndtheory.{'bounds' if isinstance(of, str) else SCHEMAS.get(of[0], of[0])}/1"
     assert found["version"] == ndtheory.__version__
     assert {"length", "stress"} <= set(found["units"])
     if not isinstance(of, str):
@@ -114,14 +139,19 @@ def test_a_certified_number_says_its_level_and_encloses_its_value(document, of):
 
 
 @pytest.mark.parametrize("of", CALCULATIONS)
-def test_bounds_hold_the_constants_of_both_editions(document, of):
+def test_bounds_hold_the_constants_of_every_edition(document, of):
     found = document(of)
-    assert {"m", "M", "C_R", "C_K", "theta"} <= set(found["inputs"])
+    assert {"m", "M", "C_R", "C_K", "rho", "kappa_1", "kappa_2", "theta"} <= set(found["inputs"])
     assert set(found["editions"]) == {"printed", "repaired", "sharp"}
-    for edition in filter(None, found["editions"].values()):
-        assert set(edition) >= BOUNDS | {"interval", "theta", "verdict"}
-        for name in BOUNDS:
-            assert edition[name] is None or set(edition[name]) == NUMBER
+    assert (found["editions"]["sharp"] is not None) == ("--rho" in CALCULATIONS[of])
+    assert {name for name, edition in found["editions"].items() if edition is None} == set(found["reason"])
+    for name, edition in found["editions"].items():
+        if edition is None:
+            continue
+        certified = {"factor", "one_minus_factor"} | (ENERGY if name == "sharp" else BOUNDS)
+        assert set(edition) >= certified | {"interval", "theta", "verdict"}
+        for key in certified:
+            assert edition[key] is None or set(edition[key]) == NUMBER
         assert (edition["verdict"] is None) == (edition["theta"] is None)
         assert edition["verdict"] in {"contraction", "no conclusion", None}
         assert (edition["factor"] is None) == (edition["verdict"] != "contraction")
@@ -215,10 +245,22 @@ def test_a_comparison_holds_constants_bounds_run_and_verdicts(document, edits):
     assert set(found["verdicts"].values()) <= VERDICTS | {None}
 
 
-def test_a_comparison_has_a_verdict_for_every_edition_and_a_place_for_the_sharp_one(document):
+def test_a_comparison_has_a_verdict_for_every_edition_and_for_the_prediction(document):
     found = document(("compare", None))
-    assert set(found["verdicts"]) == {"printed", "repaired"}
-    assert found["sharp"] is found["lmi"] is None
+    assert set(found["verdicts"]) == {"printed", "repaired", "sharp", "lmi", "linearised"}
+    names = {"rho", "rho_normal", "kappa_1", "kappa_2", "factor", "theta_proved", "theta_max_proved"}
+    assert names | {"theta_predicted", "friction_threshold"} <= set(found["sharp"])
+    assert {"factor", "friction_threshold", "certified"} <= set(found["lmi"])
+
+
+def test_the_bounds_of_a_comparison_grow_sharper_from_edition_to_edition(document):
+    """|J| at most the semidefinite factor, at most the sharp one; thresholds the other way round."""
+    found = document(("compare", None))
+    assert found["run"]["linearised_norm"] <= found["lmi"]["lipschitz"]["value"]
+    repaired = found["bounds"]["editions"]["repaired"]["C2"]["value"]
+    assert repaired <= found["sharp"]["friction_threshold"]["value"] <= found["lmi"]["friction_threshold"]["value"]
+    if found["sharp"]["factor"] is not None:
+        assert found["lmi"]["factor"]["value"] <= found["sharp"]["factor"]["value"] * (1 + 1e-9)
 
 
 @pytest.mark.parametrize("edits", [None, "local law", "held tangentially"], ids=str)

@@ -26,7 +26,8 @@ ENDS = [
     ("run", "stiff upper body", NOT_MET, "diverged"),
     ("compare", "stiff upper body", NOT_MET, "diverged"),
     ("run", "unloaded", DONE, "converged"),
-    ("compare", "inside, unloaded", INCONCLUSIVE, "converged"),  # no step to judge
+    ("compare", "inside, unloaded", DONE, "converged"),  # no step to judge
+    ("compare", "all but apart", INCONCLUSIVE, "converged"),  # forces as small as rounding
     ("run", "apart", DONE, "converged"),
     ("compare", "apart", DONE, "converged"),
 ]
@@ -54,6 +55,11 @@ def test_a_command_ends_with_its_status_in_words_and_as_a_document(call, write, 
         ({"printed": "HYPOTHESES_NOT_MET", "repaired": "INCONCLUSIVE"}, "wrong roles", NOT_MET),
         ({"printed": "VIOLATED", "repaired": "CONSISTENT"}, None, DONE),  # a finding
         ({"printed": "VIOLATED", "repaired": "INCONCLUSIVE"}, None, INCONCLUSIVE),
+        ({"repaired": "CONSISTENT", "sharp": "VIOLATED", "lmi": "CONSISTENT"}, None, NOT_MET),
+        ({"repaired": "CONSISTENT", "sharp": "CONSISTENT", "lmi": "VIOLATED"}, None, NOT_MET),
+        ({"sharp": "CONSISTENT", "lmi": "INCONCLUSIVE"}, None, INCONCLUSIVE),
+        ({"sharp": "INCONCLUSIVE", "lmi": "VIOLATED"}, None, NOT_MET),
+        ({"sharp": "CONSISTENT", "linearised": "VIOLATED"}, None, DONE),  # a prediction, no claim
     ],
     ids=lambda v: " ".join(v.values()) if isinstance(v, dict) else str(v),
 )

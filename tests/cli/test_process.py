@@ -6,6 +6,7 @@ import subprocess
 import sys
 import textwrap
 
+import numpy as np
 import pytest
 
 HEAVY = ["numpy", "scipy", "matplotlib", "cvxpy", "clarabel", "rich", "meshio", "jinja2", "sympy"]
@@ -131,6 +132,21 @@ def test_a_title_beyond_the_encoding_of_the_terminal_is_no_crash(write, argument
     assert b"Kontakt" in found.stdout
 
 
+@pytest.mark.parametrize(
+    ("indices", "indptr"),
+    [([0, 10**6], [0, 1, 2]), ([0, -(10**6)], [0, 1, 2]), ([0, 1], [0, 10**6, 2]), ([0, 1], [0, 2, 10**6])],
+    ids=["a column outside", "a negative column", "a row that ends outside", "a last row that ends outside"],
+)
+def test_a_sparse_matrix_that_points_outside_itself_is_refused_and_not_followed(tmp_path, indices, indptr):
+    good, bad = tmp_path / "good.npz", tmp_path / "bad.npz"
+    np.savez(good, np.eye(2))
+    np.savez(bad, format="csr", shape=(2, 2), data=np.ones(2), indices=np.array(indices), indptr=np.array(indptr))
+    found = start("advise", "--S1", good, "--S2", bad)
+    assert (found.returncode, found.stdout) == (2, "")
+    assert found.stderr.count("\n") == 1
+    assert "bad.npz" in found.stderr
+
+
 def test_a_folder_that_was_removed_underneath_is_no_crash(write, tmp_path):
     file = write()
     remove = f"import os; os.chdir({str(tmp_path)!r}); os.mkdir('gone'); os.chdir('gone'); os.rmdir('../gone'); "
@@ -147,4 +163,4 @@ def test_two_comparisons_at_once_in_one_folder_leave_whole_files(write, tmp_path
     assert [(process.communicate(timeout=60)[1], process.returncode) for process in started] == [(written, 0)] * 2
     assert json.loads((tmp_path / "results" / "compare.json").read_text("utf-8"))["run"]["converged"]
     assert (tmp_path / "results" / "report.html").read_text("utf-8").rstrip().endswith("</html>")
-    assert len(list((tmp_path / "results").iterdir())) == 6
+    assert len(list((tmp_path / "results").iterdir())) == 8

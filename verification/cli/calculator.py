@@ -2,14 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import click
 
-from ndtheory import EDITIONS, Bounds, Constants, evaluate, relaxation_factor
+from ndtheory import (
+    EDITIONS,
+    Bounds,
+    Constants,
+    EnergyConstants,
+    HypothesisError,
+    SharpBounds,
+    evaluate,
+    evaluate_sharp,
+    relaxation_factor,
+)
+from ndtheory.constants import take
 from verification.cli.console import factor, figures, heading, say, table
 from verification.document import Document
+from verification.editions import EditionRow, row_of
+
+#: The constants of Section 5 by key, and the options that give them.
+CONSTANTS = {"m": "--m", "M": "--M", "C_R": "--CR", "C_s": "--Cs", "C_tr": "--Ctr", "k": "--k", "C_K": "--CK"}
+ENERGY = {"rho": "--rho", "kappa_1": "--kappa1", "kappa_2": "--kappa2"}
 
 
 class BoundsDocument(Document):
@@ -18,21 +34,18 @@ class BoundsDocument(Document):
     schema: ClassVar[str] = "ndtheory.bounds/1"
     units: Mapping[str, str] = {"length": "any", "stress": "that of m"}
 
-    def __init__(self, inputs: Mapping[str, Any], editions: Mapping[str, Bounds]) -> None:
-        self.inputs, self.editions = inputs, editions
+    def __init__(
+        self, inputs: Mapping[str, Any], editions: Mapping[str, Bounds | SharpBounds], why: Mapping[str, str]
+    ) -> None:
+        self.inputs, self.editions, self.why = inputs, editions, why
 
     def content(self) -> dict[str, Any]:
+        names = (*(e.name for e in EDITIONS), "sharp")
+        absent = [name for name in names if name not in self.editions]
         return {
             "inputs": dict(self.inputs),
-            "editions": {
-                **dict.fromkeys(("printed", "repaired")),
-                **{name: bounds.to_dict() for name, bounds in self.editions.items()},
-                "sharp": None,
-            },
-            "reason": {
-                **{e.name: "not asked for" for e in EDITIONS if e.name not in self.editions},
-                "sharp": "not computed by this version",
-            },
+            "editions": {n: self.editions[n].to_dict() if n in self.editions else None for n in names},
+            "reason": {name: self.why[name] for name in absent},
         }
 
 
@@ -50,81 +63,145 @@ class BoundsDocument(Document):
     type=click.Choice(["printed", "repaired", "both"]),
     default="both",
     show_default=True,
-    help="Edition of the theorem.",
+    help="Editions of Section 5.",
 )
-@click.option("--rho", metavar="NUMBER", help="For the sharp edition (not supported yet).")
-@click.option("--kappa1", metavar="NUMBER", help="For the sharp edition (not supported yet).")
-@click.option("--kappa2", metavar="NUMBER", help="For the sharp edition (not supported yet).")
+@click.option("--rho", metavar="NUMBER", help="Sharp edition: stiffness ratio of the bodies on Gamma_c.")
+@click.option("--kappa1", "kappa_1", metavar="NUMBER", help="Sharp edition: k C_s C_t1; 0 without friction.")
+@click.option("--kappa2", "kappa_2", metavar="NUMBER", help="Sharp edition: k C_s C_t2; 0 without friction.")
 @click.option("--check", is_flag=True, help="Exit 1 unless contraction at theta is proved.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout.")
-def bounds(
-    edition: str, theta: str | None, check: bool, as_json: bool, rho: Any, kappa1: Any, kappa2: Any, **given: str | None
-) -> int:
+def bounds(edition: str, theta: str | None, check: bool, as_json: bool, **given: str | None) -> int:
     """For which theta and friction does one step contract?
 
     Numbers may be rationals (1/3).  m, M, Cs and CK are in any one unit of stress; the printed theorem depends on
-    which, the repaired one does not.
+    which, the repaired one does not.  --rho, --kappa1 and --kappa2, dimensionless, give the theorem in energy norms
+    (`ndtheory constants` measures all of them), beside the others or alone.
 
     \b
-    Example, m and M in MPa:
+    Examples, m and M in MPa:
       ndtheory bounds --m 3084 --M 153229 --CR 1.70 --CK 1e-8 --theta 1e-4
+      ndtheory bounds --rho 0.475 --kappa1 0.986 --kappa2 0.427 --theta 0.7
     """
-    for name, value in (("--rho", rho), ("--kappa1", kappa1), ("--kappa2", kappa2)):
-        if value is not None:
-            raise click.UsageError(
-                f"{name} = {value}: the sharp edition is not supported yet", click.get_current_context()
-            )
-    for key, option in (("m", "--m"), ("M", "--M"), ("C_R", "--CR")):
-        if given[key] is None:
-            raise click.UsageError(f"{option} is missing: needed --m, --M, --CR and --CK", click.get_current_context())
+    of_section_5 = {key: given[key] for key in CONSTANTS}
+    energy = {key: given[key] for key in ENERGY}
     if check and theta is None:
         raise click.UsageError("--check needs --theta", click.get_current_context())
-    constants = Constants(**given)
-    chosen: dict[str, Bounds] = {e.name: evaluate(e, constants, theta) for e in EDITIONS if edition in (e.name, "both")}
+    editions: dict[str, Bounds | SharpBounds] = {}
+    why: dict[str, str] = {}
+    alone = energy["rho"] is not None and not any(
+        of_section_5[key] is not None for key in ("m", "M", "C_R", "C_K", "C_s", "C_tr")
+    )
+    constants = None if alone else _constants(of_section_5)
+    for e in EDITIONS:
+        if constants is not None and edition in (e.name, "both"):
+            editions[e.name] = evaluate(e, constants, theta)
+        else:
+            why[e.name] = "needs --m, --M, --CR and --CK" if alone else "not asked for"
+    friction = (
+        take("k", 0 if given["k"] is None else given["k"], "a number k >= 0", lambda k: k >= 0)
+        if constants is None
+        else constants.C_K
+    )
+    sharp = _energy(energy, friction > 0)
+    if sharp is None:
+        why["sharp"] = "needs --rho, and --kappa1, --kappa2 with friction"
+    else:
+        editions["sharp"] = evaluate_sharp(sharp, theta)
     if as_json:
-        inputs: dict[str, Any] = {key: getattr(constants, key) for key in given}
+        inputs: dict[str, Any] = {key: None if constants is None else getattr(constants, key) for key in CONSTANTS}
+        inputs |= {key: None if sharp is None else getattr(sharp, key) for key in ENERGY}
         inputs["theta"] = None if theta is None else relaxation_factor(theta)
         absent = dict.fromkeys((key for key, value in inputs.items() if value is None), "not given")
         inputs = {key: None if value is None else float(value) for key, value in inputs.items()} | {"reason": absent}
-        say(BoundsDocument(inputs, chosen).to_json())
+        say(BoundsDocument(inputs, editions, why).to_json())
     else:
-        _screen(constants, chosen)
-    proved = any(b.verdict == "contraction" and b.proved for b in chosen.values())
+        _screen(constants, editions)
+    proved = any(b.verdict == "contraction" and getattr(b, "proved", True) for b in editions.values())
     return 1 if check and not proved else 0
 
 
-def edition_rows(editions: Mapping[str, Bounds], steps: bool = False) -> list[list[str]]:
-    """The table of editions, head first; friction on k where that is known, else on C_K."""
-    some = next(iter(editions.values()))
+def _constants(given: Mapping[str, str | None]) -> Constants:
+    for key in ("m", "M", "C_R"):
+        if given[key] is None:
+            needed = "needed --m, --M, --CR and --CK, or --rho"
+            raise click.UsageError(f"{CONSTANTS[key]} is missing: {needed}", click.get_current_context())
+    return Constants(**given)
+
+
+def _energy(given: Mapping[str, str | None], rubs: bool) -> EnergyConstants | None:
+    """The constants of the sharp edition; None where they were not given."""
+    missing = [ENERGY[key] for key in ENERGY if given[key] is None]
+    if len(missing) == len(ENERGY):
+        return None
+    if given["rho"] is None or len(missing) == 1 or (rubs and missing):
+        needed = "the sharp edition needs --rho, and with friction --kappa1 and --kappa2"
+        raise click.UsageError(f"{', '.join(missing)} missing: {needed}", click.get_current_context())
+    try:
+        return EnergyConstants(**{key: value for key, value in given.items() if value is not None})
+    except HypothesisError as error:
+        raise HypothesisError(ENERGY[error.key], error.value, error.needed) from None
+
+
+def edition_table(rows: Sequence[EditionRow]) -> list[list[str]]:
+    """The table of editions, head first."""
     head = ["edition", "friction allowed", "theta allowed", "factor"]
-    if some.theta is not None:
-        head.append(f"theta = {some.theta:.4g}")
-    rows = [head]
-    for name, b in editions.items():
-        allowed = "any" if b.C2 is None else f"{b.threshold_on} < {figures(b.C2)}"
-        interval = "-" if b.interval is None else f"{b.interval[0]:.3g} < theta < {figures(b.interval[1])}"
-        row = [name, allowed, interval, factor(b.factor, b.one_minus_factor)]
-        if b.theta is not None:
-            row.append("contracts" if b.verdict == "contraction" else "no conclusion")
-        rows.append(row)
-    return rows
+    theta = rows[0].theta
+    if theta is not None:
+        head.append(f"theta = {theta:.4g}")
+    lines = [head]
+    for row in rows:
+        interval = "-" if row.interval is None else f"{row.interval[0]:.3g} < theta < {figures(row.interval[1])}"
+        line = [row.name, _allowed(row), interval, factor(row.factor, row.one_minus_factor)]
+        if theta is not None:
+            line.append("contracts" if row.factor is not None else "no conclusion")
+        lines.append(line)
+    return lines
 
 
-def _screen(constants: Constants, editions: Mapping[str, Bounds]) -> None:
-    values = ", ".join(f"{key} = {figures(float(getattr(constants, key)))}" for key in ("m", "M", "C_R", "C_K"))
-    say(values + ("" if constants.k is None else f" (k = {figures(float(constants.k))})"))
+def _allowed(row: EditionRow) -> str:
+    if row.threshold is None:
+        return "any"
+    if row.threshold_on == "multiple":
+        return f"{figures(row.threshold)} x this"
+    return f"{row.threshold_on} < {figures(row.threshold)}"
+
+
+def _screen(constants: Constants | None, editions: Mapping[str, Bounds | SharpBounds]) -> None:
+    if constants is not None:
+        values = ", ".join(f"{key} = {figures(float(getattr(constants, key)))}" for key in ("m", "M", "C_R", "C_K"))
+        say(values + ("" if constants.k is None else f" (k = {figures(float(constants.k))})"))
+    sharp = editions.get("sharp")
+    if isinstance(sharp, SharpBounds):
+        say(", ".join(f"{key} = {figures(getattr(sharp, key))}" for key in ENERGY))
     heading("DOES ONE STEP CONTRACT?")
-    table(edition_rows(editions))
-    heading("THE CONSTANTS OF SECTION 5")
-    names = ["C_T", "C0", "C1", "C2", "C3", "C4", "C5", "C6"]
-    some = next(iter(editions.values()))
-    rows = [["", *editions, "unit"]]
-    for name in names:
-        unit = f"on {some.threshold_on}" if name in ("C2", "C3", "C4", "C5") else "1"
-        rows.append([name, *(figures(getattr(b, name), 6) for b in editions.values()), unit])
-    table(rows, right=range(1, len(editions) + 1))
+    table(edition_table([row_of(name, b) for name, b in editions.items()]))
+    section_5 = {name: b for name, b in editions.items() if isinstance(b, Bounds)}
+    if section_5:
+        heading("THE CONSTANTS OF SECTION 5")
+        names = ["C_T", "C0", "C1", "C2", "C3", "C4", "C5", "C6"]
+        some = next(iter(section_5.values()))
+        rows = [["", *section_5, "unit"]]
+        for name in names:
+            unit = f"on {some.threshold_on}" if name in ("C2", "C3", "C4", "C5") else "1"
+            rows.append([name, *(figures(getattr(b, name), 6) for b in section_5.values()), unit])
+        table(rows, right=range(1, len(section_5) + 1))
+    if isinstance(sharp, SharpBounds):
+        heading("WHICH THETA?")
+        _thetas(sharp)
     say()
-    for name, b in editions.items():
+    for name, b in section_5.items():
         if not b.proved:
             say(f"The {name} proof needs m >= 1: below it (5.30) does not follow.")
     say("Next: ndtheory example section6 > my.toml; ndtheory constants my.toml")
+
+
+def _thetas(sharp: SharpBounds) -> None:
+    rows = [["", "theta", "factor", ""]]
+    if sharp.theta_proved is None:
+        rows.append(["proved", "-", "-", "q >= 1 for every theta: no conclusion"])
+    else:
+        rows.append(["proved", figures(sharp.theta_proved), figures(sharp.factor_proved), "least proved factor"])
+    frictionless = sharp.friction_multiple is None
+    note = "proved too: there is no friction" if frictionless else "2/(2 + rho), not a bound"
+    rows.append(["predicted", figures(sharp.theta_predicted), figures(sharp.rate_predicted), note])
+    table(rows)

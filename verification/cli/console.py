@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import sys
+import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +14,7 @@ import click
 from ndtheory import Number
 
 if TYPE_CHECKING:
-    from verification.iteration import State
+    from verification.state import State
 
 WIDTH = 80
 
@@ -61,15 +62,28 @@ def heading(question: str) -> None:
     say(click.style(question, bold=True))
 
 
+def note(text: str, indent: str = "") -> None:
+    """A sentence of the result, folded at the width of the screen."""
+    for line in textwrap.wrap(text, WIDTH, initial_indent=indent, subsequent_indent=indent + "  "):
+        say(line)
+
+
 def table(rows: Sequence[Sequence[str]], *, right: Sequence[int] = ()) -> None:
-    """Columns two spaces apart, the first row a head; ``right`` names columns aligned to the right."""
+    """Columns two spaces apart, the first row a head; ``right`` names columns aligned to the right.
+
+    The last column is folded where it does not fit on the screen.
+    """
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     for row in rows:
         cells = [
             cell.rjust(width) if i in right else cell.ljust(width)
             for i, (cell, width) in enumerate(zip(row, widths, strict=True))
         ]
-        say(("  " + "  ".join(cells)).rstrip())
+        start = "".join(f"  {cell}" for cell in cells[:-1]) + "  "
+        room = max(WIDTH - len(start), WIDTH // 8)
+        for line in textwrap.wrap(cells[-1], room, drop_whitespace=-1 not in right) or [""]:
+            say((start + line).rstrip())
+            start = " " * len(start)
 
 
 def figures(value: float | Number | None, digits: int = 3) -> str:
@@ -106,6 +120,20 @@ def factor(value: Number | None, one_minus: Number | None) -> str:
     if value is None or one_minus is None:
         return "-"
     return f"1 - {one_minus.value:.1e}" if one_minus.value < 1e-3 else figures(value)
+
+
+@contextlib.contextmanager
+def bar(title: str) -> Iterator[Callable[[float], None]]:
+    """A live bar on a terminal's stderr: the share that is done."""
+    if sys.stderr is None or not sys.stderr.isatty():
+        yield lambda share: None
+        return
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), transient=True) as live:
+        task = live.add_task(title, total=1.0)
+        yield lambda share: live.update(task, completed=share)
 
 
 @contextlib.contextmanager

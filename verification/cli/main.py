@@ -13,7 +13,7 @@ import click
 import ndtheory
 import verification
 from ndtheory import HypothesisError
-from verification.cli import calculator, problems
+from verification.cli import calculator, choices, problems
 from verification.cli.console import Interrupted, ReaderGone, complain
 
 #: Exit statuses of the interface.  A crash is none of them.
@@ -31,6 +31,7 @@ def cli() -> None:
     ndtheory demo                     the Section 6 model, end to end
     ndtheory example section6 > my.toml
     ndtheory compare my.toml          the same for a problem of your own
+    ndtheory advise my.toml           which body first, which theta
     """
 
 
@@ -42,6 +43,8 @@ for command in (
     problems.run,
     problems.solve,
     problems.compare,
+    choices.advise,
+    choices.region,
 ):
     cli.add_command(command)
 

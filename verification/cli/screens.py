@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from shlex import quote
 
-from verification.cli.calculator import edition_rows
-from verification.cli.console import figures, heading, near_one, printable, say, table
+from verification.advice import Advice
+from verification.cli.calculator import edition_table
+from verification.cli.console import figures, heading, near_one, note, printable, say, table
 from verification.contact_state import ContactState
-from verification.measured import Measured
+from verification.measured import ENERGY_NAMES, NAMES, Measured
 from verification.monolithic import Solution
-from verification.pair import Facing
+from verification.plane import Plane
 from verification.problem import Problem
 from verification.runs import Run
 from verification.verdicts import Comparison
@@ -31,7 +33,15 @@ def _setting(problem: Problem, nodes: int | None = None, interface: int | None =
     if any(body.rigid for body in bodies):
         say(f"Obstacle: {'lower' if problem.body1.rigid else 'upper'} body | {friction}")
     else:
-        say(f"Neumann body: {body} | {friction} | theta = {float(problem.iteration.theta):g}")
+        say(f"Neumann body: {body} | {friction} | {_how(problem)}")
+
+
+def _how(problem: Problem) -> str:
+    """How the iteration is relaxed."""
+    theta, relaxation = problem.iteration.theta, problem.iteration.relaxation
+    if relaxation != "constant":
+        return relaxation
+    return f"theta = {theta if theta == 'auto' else f'{float(theta):.4g}'}"
 
 
 def constants(problem: Problem, measured: Measured) -> None:
@@ -41,13 +51,12 @@ def constants(problem: Problem, measured: Measured) -> None:
     _setting(problem, measured.body1.nodes + measured.body2.nodes, measured.interface_nodes)
     heading("WHAT DOES THE THEOREM NEED TO KNOW?")
     units = {"m": stress, "M": stress, "C_K": stress}
-    names = ["m", "M", "C_R", "C_s", "C_tr", "C_tr_half", "C_K", "rho_max", "rho_min", "rho_normal"]
     rows = [["nodes", *(str(level.body1.nodes + level.body2.nodes) for level in levels), "unit"]]
-    for name in names:
+    for name in (*NAMES, *ENERGY_NAMES):
         rows.append([name, *(figures(getattr(level, name), 6) for level in levels), units.get(name, "")])
     table(rows, right=range(1, len(levels) + 1))
     for name, reason in measured.reason.items():
-        say(f"  {name}: {reason}")
+        note(f"{name}: {reason}", "  ")
     say()
     say("Exact for this mesh, up to rounding.  On a mesh m is above and M below its")
     say("continuous value: for the continuous theorem both err on the unsafe side.")
@@ -58,14 +67,31 @@ def constants(problem: Problem, measured: Measured) -> None:
 def _happened(run: Run) -> None:
     problem = run.pair.problem
     heading("WHAT HAPPENED")
-    rate = run.observed_rate
+    rate, linear = run.observed_rate, run.linearised
     rows = [["", "rate", "steps", ""]]
-    shown = "-" if rate is None else f"{near_one(rate.value)} in [{near_one(rate.lo)}, {near_one(rate.hi)}]"
+    if linear is not None:
+        steps = _steps(linear.rate, problem.iteration.tolerance)
+        rows.append(["linearised at the solution", near_one(linear.rate), steps, "predicted, not a bound"])
+    shown = "-" if rate is None else near_one(rate.value)
     rows.append(["observed", shown, str(run.iterations), run.outcome])
     table(rows)
     say()
+    if linear is None:
+        note(f"not linearised: {run.why_not_linearised}", "  ")
+    if run.relaxation != "constant":
+        proved = "" if run.proved_rate is None else f"; proved rate {near_one(run.proved_rate.value)}"
+        say(f"  {run.evaluations} evaluations of T, with the {run.relaxation} relaxation{proved}")
+    elif run.choice.source != "given":
+        say(f"  theta = {float(run.theta):.4g} is the {run.choice.source} one")
     _contact(problem, run.contact)
     say(f"  contact step solved to a KKT residual of {run.last.contact.kkt.residual:.1e}")
+
+
+def _steps(rate: float, tolerance: float) -> str:
+    """How many steps of a rate lead to a tolerance."""
+    if not 0 < rate < 1:
+        return "1" if rate == 0 else "-"
+    return str(math.ceil(math.log(tolerance) / math.log(rate)))
 
 
 def _contact(problem: Problem, contact: ContactState) -> None:
@@ -81,10 +107,10 @@ def _contact(problem: Problem, contact: ContactState) -> None:
         say(f"  largest pressure    {figures(float(contact.pressure.max()), 4)} {units['stress']}")
 
 
-def _limits(facing: Facing) -> None:
+def _limits(outside: list[str]) -> None:
     say()
-    for reason in facing.outside:
-        say(f"Outside the theorem: {reason}.")
+    for reason in outside:
+        note(f"Outside the theorem: {reason}.")
     say("Not claimed: anything about the continuum, or the local Coulomb law.")
 
 
@@ -93,7 +119,7 @@ def run(finished: Run, file: Path) -> None:
     bodies = (finished.pair.body1, finished.pair.body2)
     _setting(_at(finished), sum(len(body.mesh.points) for body in bodies), finished.pair.n)
     _happened(finished)
-    _limits(finished.pair)
+    _limits(finished.outside)
     say(f"Next: ndtheory compare {quote(str(file))}")
 
 
@@ -104,7 +130,7 @@ def solution(found: Solution, file: Path) -> None:
     heading("WHAT IS THE SOLUTION?")
     _contact(facing.problem, found.contact)
     say(f"  KKT residual {found.kkt_residual:.1e} after {found.linear_solves} linear systems on Gamma_c")
-    _limits(facing)
+    _limits(facing.outside)
     iterates = len(facing.elastic) == 2
     say(f"Next: ndtheory {'run' if iterates else 'solve'} {quote(str(file))}{'' if iterates else ' -o results'}")
 
@@ -125,21 +151,98 @@ def comparison(result: Comparison, file: Path) -> None:
     say(f"  m = {m} {stress}, M = {M} {stress}, C_R = {C_R}")
     say(f"  C_s = {C_s}, C_tr = {C_tr}, C_K = {C_K} {stress}, rho = {rho}")
     heading("DOES ONE STEP CONTRACT?")
-    if result.bounds:
-        table(edition_rows(result.bounds))
+    if result.editions:
+        table(edition_table(result.editions))
     else:
-        say("  no edition applies: " + next(iter(measured.reason.values()), ""))
+        note("no edition applies: " + next(iter(measured.reason.values()), ""), "  ")
+    for name in ("lmi", "losses"):
+        if name in result.reason:
+            note(f"{name}: {result.reason[name]}", "  ")
+    if result.losses is not None and result.losses.friction:
+        heading("WHERE IS IT LOST?")
+        total = sum(loss.decades for loss in result.losses.friction)
+        say(f"  {total:.1f} decades from the largest friction term found to its printed bound (5.30):")
+        say("  " + ", ".join(f"{loss.label} {loss.decades:.1f}" for loss in result.losses.friction))
     _happened(finished)
     heading("DOES THE RUN AGREE WITH THE BOUND?")
     table([["edition", "verdict", "why"], *([n, j.verdict, j.reason] for n, j in result.verdicts.items())])
-    _limits(finished.pair)
-    say(f"Next: ndtheory run {quote(str(file))} --theta {_next_theta(result)}")
+    _limits(finished.outside)
+    say(f"Next: ndtheory advise {quote(str(file))}")
 
 
-def _next_theta(result: Comparison) -> str:
-    """A theta worth trying, of two figures."""
-    rho = result.measured.rho_max
-    return "0.5" if rho is None else f"{worth_trying(rho.value):.2g}"
+def advice(found: Advice, file: Path | None) -> None:
+    """The screen of ``advise``."""
+    best = found.best
+    names = {1: "body 1", 2: "body 2", None: "as in that run"}
+    heading("WHICH BODY GETS THE NEUMANN PROBLEM?")
+    if found.neumann_body is None:
+        say("  One run tells nothing of the other assignment.")
+    else:
+        other = next(role for role in found.roles if role is not best)
+        say(f"  {names[found.neumann_body]}: predicted rate {near_one(best.rate_predicted)} a step,")
+        say(f"  against {near_one(other.rate_predicted)} with the roles exchanged")
+    heading("WHICH THETA?")
+    rows = [["Neumann", "rho", "", "theta", "rate", "steps", ""]]
+    why = {}
+    for role in found.roles:
+        name, rate = names[role.neumann_body], role.rate_predicted
+        theta = figures(role.theta_predicted)
+        rows.append([name, figures(role.rho), "predicted", theta, near_one(rate), _steps(rate, 1e-9), "not a bound"])
+        if role.factor_proved is not None and role.theta_proved is not None:
+            q = role.factor_proved.value
+            rows.append(["", "", "proved", figures(role.theta_proved), near_one(q), f"<= {_steps(q, 1e-9)}", ""])
+        else:
+            rows.append(["", "", "proved", "-", "-", "-", "no conclusion"])
+            why[name] = role.reason["theta_proved"]
+    table(rows)
+    for name, reason in why.items():
+        note(f"{name}: {reason}", "  ")
+    say("  predicted: theta = 2/(2 + rho); proved: the theta of least proved factor")
+    say("  steps: to 1e-9 of the first error")
+    if found.friction is not None:
+        heading("HOW MUCH FRICTION IS PROVED?")
+        for role in found.roles:
+            if role.friction_threshold is None:
+                note(f"{names[role.neumann_body]}: {role.reason['friction_threshold']}", "  ")
+            else:
+                allowed = f"every small theta contracts for k < {figures(role.friction_threshold)}"
+                say(f"  {names[role.neumann_body]}: {allowed} (here k = {figures(found.friction, 2)})")
+    heading("TO PASTE")
+    theta = f"{min(best.theta_predicted, 0.99):.3g}"
+    body = f"neumann_body = {found.neumann_body}\n  " if found.neumann_body else ""
+    say(f"  {body}theta = {theta}")
+    say(f'  <acceleration:constant><relaxation value="{theta}" /></acceleration:constant>')
+    say()
+    for reason in found.outside:
+        note(f"Outside the theorem: {reason}.")
+    say("Not claimed: that the predicted theta is the best one for your loads.")
+    if file is not None:
+        swap = "" if found.roles[0].neumann_body == found.neumann_body else " --swap-roles"
+        say(f"Next: ndtheory run {quote(str(file))}{swap} --theta {theta}")
+    else:
+        say("Next: ndtheory advise --help")
+
+
+def plane(found: Plane, target: Path) -> None:
+    """The screen of ``region``."""
+    say(printable(found.title))
+    heading("WHERE IS ONE STEP PROVED TO CONTRACT?")
+    rows = [["edition", "friction allowed", "theta at most"]]
+    for name, region in found.regions.items():
+        if region.k:
+            rows.append([name, f"k < {figures(max(region.k))}", figures(max(hi for _, hi in region.theta))])
+    table(rows)
+    for name, reason in found.reason.items():
+        note(f"{name}: {reason}", "  ")
+    heading("WHAT DID RUNS DO?")
+    outcomes = [point.outcome for point in found.points]
+    say("  " + ", ".join(f"{outcomes.count(name)} {name}" for name in dict.fromkeys(outcomes)))
+    strongest = max((p.k for p in found.points if p.outcome == "converged"), default=None)
+    if strongest is not None:
+        say(f"  the largest friction with a run that converged: k = {strongest:g}")
+    say()
+    say("Not claimed: that runs outside a region fail, or anything about the continuum.")
+    say(f"Next: open {quote(str(target))}")
 
 
 def worth_trying(rho: float) -> float:

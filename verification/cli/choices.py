@@ -1,0 +1,118 @@
+"""Commands for who has to choose: advise, region."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ndtheory import HypothesisError
+from verification.cli.console import bar, say
+from verification.cli.problems import JSON
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path), required=False)
+@click.option("--S1", "S1", type=click.Path(path_type=Path), help="Interface stiffness of body 1, .npz or .npy.")
+@click.option("--S2", "S2", type=click.Path(path_type=Path), help="Interface stiffness of body 2, .npz or .npy.")
+@click.option("--theta", metavar="NUMBER", help="Relaxation factor of a run of any code, 0 < theta <= 1.")
+@click.option("--ratio", metavar="NUMBER", help="Ratio of its consecutive residuals while they alternate in sign.")
+@JSON
+def advise(
+    file: Path | None, S1: Path | None, S2: Path | None, theta: str | None, ratio: str | None, as_json: bool
+) -> None:
+    """Which body gets the Neumann problem, and which theta?
+
+    Give a problem FILE; or the Schur complements of both bodies on the same interface unknowns (dimension: force per
+    displacement, any units); or one run of any other code with constant theta, whose residual alternates at a steady
+    ratio.
+
+    \b
+    Examples:
+      ndtheory advise my.toml
+      ndtheory advise --S1 a.npz --S2 b.npz
+      ndtheory advise --theta 0.1 --ratio 1.4
+    """
+    context = click.get_current_context()
+    forms: dict[str, list[Any]] = {"FILE": [file], "--S1 and --S2": [S1, S2], "--theta and --ratio": [theta, ratio]}
+    given = [name for name, values in forms.items() if any(value is not None for value in values)]
+    if len(given) != 1:
+        received = " with ".join(given) or "nothing"
+        raise click.UsageError(f"received {received}: needed one of {', '.join(forms)}", context)
+    if any(value is None for value in forms[given[0]]):
+        raise click.UsageError(f"needed both {given[0]}", context)
+    from verification import advice
+    from verification.cli import screens
+    from verification.problem import load
+
+    if file is not None:
+        found = advice.advise(load(file))
+    elif S1 is not None and S2 is not None:
+        from verification.matrices import read_matrix
+
+        matrices = [read_matrix(path) for path in (S1, S2)]
+        try:
+            found = advice.advise_matrices(*matrices)
+        except ValueError as error:
+            raise click.UsageError(f"{S1}, {S2}: {error}", context) from None
+    else:
+        try:
+            found = advice.advise_run(theta, ratio)
+        except HypothesisError as error:
+            raise click.UsageError(f"--{error}", context) from None
+    if as_json:
+        say(found.to_json())
+    else:
+        screens.advice(found, file)
+
+
+def _picture(context: click.Context, parameter: click.Parameter, value: Path) -> Path:
+    if value.suffix not in (".svg", ".png"):
+        raise click.BadParameter(f"{str(value)!r}: needed a name ending in .svg or .png", context, parameter)
+    return value
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option(
+    "-o",
+    "--output",
+    "target",
+    type=click.Path(path_type=Path),
+    callback=_picture,
+    required=True,
+    metavar="PICTURE",
+    help="Where to draw it: a name ending in .svg or .png.",
+)
+@JSON
+def region(file: Path, target: Path, as_json: bool) -> None:
+    """Draw the plane of theta and k: where one step is proved to contract, and what runs do there.
+
+    Both axes are logarithmic; theta and k have no unit.  The regions are those of the printed, the repaired, the sharp
+    and the semidefinite edition for the bodies of FILE; the points are runs, coloured by outcome.
+
+    \b
+    Example:
+      ndtheory region my.toml -o plane.svg
+    """
+    from functools import partial
+
+    from verification import figures
+    from verification.cli import screens
+    from verification.output import check_ours, put
+    from verification.plane import chart
+    from verification.problem import load
+    from verification.reader import ProblemError
+
+    problem = load(file)
+    if not target.parent.is_dir():
+        raise ProblemError(str(target), "", None, "needed a name in a folder that exists (-o)")
+    check_ours(target)
+    with bar("regions and runs") as watch:
+        plane: Any = chart(problem, watch=watch)
+    if as_json:
+        say(plane.to_json())
+    else:
+        screens.plane(plane, target)
+    put(target, partial(figures.save, figures.draw_region(plane)))
