@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from verification.advice import Advice, advise
     from verification.contact import ContactError
     from verification.iteration import iterate
+    from verification.ledger import Ledger, verify
     from verification.measured import Measured, measure
     from verification.monolithic import Solution, SolveError, solve
     from verification.problem import Problem, load
@@ -37,6 +38,7 @@ _HOME = {
     "Advice": "advice",
     "Comparison": "verdicts",
     "ContactError": "contact",
+    "Ledger": "ledger",
     "Measured": "measured",
     "Problem": "problem",
     "ProblemError": "reader",
@@ -51,12 +53,14 @@ _HOME = {
     "measure": "measured",
     "run": "runs",
     "solve": "monolithic",
+    "verify": "ledger",
 }
 
 __all__ = [
     "Advice",
     "Comparison",
     "ContactError",
+    "Ledger",
     "Measured",
     "Problem",
     "ProblemError",
@@ -71,6 +75,7 @@ __all__ = [
     "measure",
     "run",
     "solve",
+    "verify",
 ]
 
 

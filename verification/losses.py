@@ -71,23 +71,33 @@ class Losses:
         }
 
 
-class _Forms:
-    """The quadratic forms of Section 5 in ``y`` with ``psi - psi~ = L_2 y``, so that |y| is the norm (5.21)."""
+class Forms:
+    """The quadratic forms of Section 5 in y with ``psi - psi~ = L_2 y``, so that the length of y is the norm (5.21).
+
+    "1" is the contact body and "2" the Neumann body, whatever their numbers in the file.
+
+    Parameters
+    ----------
+    pair : Pair
+        A problem in which no contact node is held.
+    """
 
     def __init__(self, pair: Pair) -> None:
         self.pair = pair
         self.root, self.inverse = pair.neumann.root, pair.neumann.inverse
         turned = lambda matrix: pair.orient(pair.orient(matrix).T)
         of = lambda body: (turned(lift_gram(body)), turned(body.gram.schur))
-        self.N_1, _ = of(pair.contact.body)
+        self.N_1, self.E_1 = of(pair.contact.body)
         self.N_2, self.E_2 = of(pair.neumann.body)
         self.dual: Floats = np.asarray(np.linalg.inv(self.E_2))  # of the norm of V^2'
         self.d_2 = self.inverse @ self.root
 
     def force(self, piece: Piece) -> Floats:
+        """``T psi - T psi~``."""
         return piece.force @ self.root
 
     def d_1(self, piece: Piece) -> Floats:
+        """The trace of ``w^1 - w~^1``."""
         return (self.inverse + piece.jump) @ self.root
 
     def friction(self, piece: Piece) -> Floats:
@@ -98,11 +108,13 @@ class _Forms:
         return np.asarray(form + form.T) / 2
 
 
-def _top(form: Floats, against: Floats | None = None) -> float:
+def top(form: Floats, against: Floats | None = None) -> float:
+    """The largest eigenvalue of a symmetric form, against the identity by default."""
     return float(eigvalsh(form, against)[-1])
 
 
-def _square(rows: Floats, gram: Floats) -> Floats:
+def square(rows: Floats, gram: Floats) -> Floats:
+    """``rows' gram rows``, symmetric to the last digit."""
     form = rows.T @ gram @ rows
     return np.asarray(form + form.T) / 2
 
@@ -129,28 +141,28 @@ def locate(pair: Pair, measured: Measured, *, seed: int = 0) -> Losses | None:
     A = M * C_R
     X = (A + x + math.sqrt(x * m)) / m  # (5.11)
     with one_thread():
-        forms = _Forms(pair)
+        forms = Forms(pair)
         N_1, N_2, dual, d_2 = forms.N_1, forms.N_2, forms.dual, forms.d_2
-        S_1, size2 = pair.contact.stiffness, _square(d_2, N_2)
-        norm = _square(forms.root, dual)
+        S_1, size2 = pair.contact.stiffness, square(d_2, N_2)
+        norm = square(forms.root, dual)
 
         def found(form: Callable[[Piece], Floats], against: Floats | None = None) -> float:
             """The largest value of a quadratic form against another one, the norm (5.21) by default."""
             random = np.random.default_rng(seed)
-            return worst_piece(pair, lambda piece: _top(form(piece), against), random=random, starts=2).value
+            return worst_piece(pair, lambda piece: top(form(piece), against), random=random, starts=2).value
 
         # suprema against e = |||psi - psi~|||, squared
         F = found(forms.friction)
-        t = found(lambda piece: _square(forms.force(piece), forms.inverse))
-        t_dual = found(lambda piece: _square(forms.force(piece), dual))
-        d1 = found(lambda piece: _square(forms.d_1(piece), N_1))
-        d2, psi_dual = _top(size2), _top(norm)
+        t = found(lambda piece: square(forms.force(piece), forms.inverse))
+        t_dual = found(lambda piece: square(forms.force(piece), dual))
+        d1 = found(lambda piece: square(forms.d_1(piece), N_1))
+        d2, psi_dual = top(size2), top(norm)
         # and against other norms
-        ratio = found(lambda piece: _square(forms.d_1(piece), N_1), size2)
-        T_dual = found(lambda piece: _square(forms.force(piece), dual), norm)
-        reaction = _top(_square(S_1, dual), N_1)
-        energy = _top(_square(S_1, forms.inverse), S_1)
-        d2_dual, e_dual = _top(size2, norm), _top(np.eye(len(norm)), norm)
+        ratio = found(lambda piece: square(forms.d_1(piece), N_1), size2)
+        T_dual = found(lambda piece: square(forms.force(piece), dual), norm)
+        reaction = top(square(S_1, dual), N_1)
+        energy = top(square(S_1, forms.inverse), S_1)
+        d2_dual, e_dual = top(size2, norm), top(np.eye(len(norm)), norm)
 
     decades = lambda right, left: math.log10(right / left) if left > 0 else math.inf
     half = lambda right, left: decades(right * right, left) / 2

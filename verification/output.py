@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Literal
 from verification.reader import ProblemError
 
 if TYPE_CHECKING:
+    from verification.ledger import Ledger
     from verification.monolithic import Solution
     from verification.runs import Run
     from verification.verdicts import Comparison
 
-Kind = Literal["run", "solve", "compare"]
+Kind = Literal["run", "solve", "compare", "verify"]
 
 _PICTURES = ("bodies.svg", "bodies.png", "residuals.svg", "residuals.png")
 
@@ -25,6 +26,7 @@ FILES: dict[Kind, tuple[str, ...]] = {
     "run": ("run.json", *_PICTURES),
     "solve": ("solve.json", *_PICTURES[:2]),
     "compare": ("compare.json", *_PICTURES, "waterfall.svg", "waterfall.png", "report.html"),
+    "verify": ("ledger.json", "ledger.md", "errata.md", "verdicts.json"),
 }
 
 #: How a file of ours is told from somebody else's.
@@ -33,6 +35,7 @@ MARKS = {
     ".svg": b"<dc:title>ndtheory</dc:title>",
     ".png": b"Software\x00ndtheory",
     ".html": b'name="generator" content="ndtheory ',
+    ".md": b"<!-- ndtheory verify -->",
 }
 
 
@@ -73,7 +76,7 @@ class Folder:
     Parameters
     ----------
     path : Path
-    kind : {'run', 'solve', 'compare'}
+    kind : {'run', 'solve', 'compare', 'verify'}
         What will be written: none of those files may be somebody else's.
 
     Raises
@@ -130,6 +133,16 @@ class Folder:
         names = [name for name in ("bodies", "residuals", "waterfall") if name != "waterfall" or comparison.losses]
         figures = {name: (self.path / f"{name}.svg").read_text("utf-8") for name in names}
         self._text("report.html", report(comparison, figures))
+
+    def write_ledger(self, ledger: Ledger) -> None:
+        """Write ``ledger.json``, ``ledger.md``, and of a whole ledger ``errata.md`` and ``verdicts.json``."""
+        from verification.ledger import sheets
+
+        self._text("ledger.json", ledger.to_json())
+        self._text("ledger.md", sheets.page(ledger))
+        if ledger.whole:
+            self._text("errata.md", sheets.errata(ledger))
+            self._text("verdicts.json", sheets.verdicts(ledger))
 
     def _text(self, name: str, text: str) -> None:
         self._put(name, lambda path: path.write_text(text + "\n", encoding="utf-8"))

@@ -3,64 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
-import verification as vf
 from verification.bodies import Pair, build
 from verification.contact import ContactError, ContactSolution
 from verification.contact.active_set import Pattern
 from verification.iteration import FixedPointMap
+from verification.ledger.cases import problem, three_digits
 from verification.measured import Measured, measure
 from verification.runs import Run, run
-
-#: Heights over lengths: a thin layer to a column.
-SHAPES = [Fraction(1, 20), Fraction(1, 6), Fraction(1, 3), Fraction(1), Fraction(2)]
-
-CELL = Fraction(1, 5)
-
-
-def three_digits(value: float) -> Fraction:
-    return Fraction(f"{value:.3g}")
-
-
-def problem(random: np.random.Generator, friction: Any = None, **iteration: Any) -> vf.Problem:
-    """Two rectangles whose grids match, 2 to 9 contact nodes; one body may jut out over the other on either side.
-
-    E1/E2 from 1/50 to 50, either role, friction 0, 0.1, .., 1.  The lower body is clamped at its bottom, the top of
-    the upper one is pushed and sheared, its sides carry tractions, and in one case of three there is a gap.
-    """
-    whole = lambda low, high: int(random.integers(low, high + 1))
-    count = whole(1, 8)
-    wider = whole(0, 1)  # which body juts out
-    left, right = whole(0, 2), whole(0, 2)
-    ends = {wider: (-left, count + right), 1 - wider: (0, count)}
-    young = {0: Fraction(1000), 1: 1000 * three_digits(50 ** random.uniform(-1, 1))}
-    bodies = []
-    for i in (0, 1):
-        x = [CELL * end for end in ends[i]]
-        height = (x[1] - x[0]) * SHAPES[random.integers(len(SHAPES))]
-        body = {"shape": "rectangle", "x": x, "y": [-height, 0] if i == 0 else [0, height], "young": young[i]}
-        body |= {"cells": [ends[i][1] - ends[i][0], whole(1, 3)], "poisson": ["0", "0.3", "0.45"][random.integers(3)]}
-        bodies.append(body)
-    bodies[0]["fixed"] = ["bottom"]
-    slip, push = Fraction(whole(-20, 20), 1000), -Fraction(whole(1, 50), 1000)
-    bodies[1]["prescribed"] = {"top": [slip * height, push * height]}
-    bodies[1]["traction"] = {side: [whole(-20, 20), whole(-20, 20)] for side in ("left", "right")}
-    drawn = Fraction(whole(0, 10), 10)
-    radius = CELL * Fraction(3, 4) * whole(1, 3)
-    gap = [0, 0, CELL / 100][random.integers(3)]
-    neumann_body = whole(1, 2)
-    return vf.Problem.from_dict(
-        {
-            "body1": bodies[0],
-            "body2": bodies[1],
-            "contact": {"friction": drawn if friction is None else friction, "radius": radius, "gap": gap},
-            "iteration": {"neumann_body": neumann_body, **iteration},
-        }
-    )
 
 
 def relaxation_factor(random: np.random.Generator, rho: float) -> float:

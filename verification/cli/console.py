@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import re
 import sys
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
@@ -54,6 +55,32 @@ def complain(text: str) -> None:
     """A line about the result: errors, warnings, notes."""
     with contextlib.suppress(OSError):  # nowhere to complain to
         click.echo(text, err=True)
+
+
+#: What TeX names and a terminal shows otherwise.
+_SIGNS = {"le": "<=", "ge": ">=", "ne": "!=", "cdot": " ", "ldots": "..", "to": "->", "mapsto": "->", "leftarrow": "<-"}
+_SIGNS |= {"prime": "'", "langle": "<", "rangle": ">"}
+
+
+def plain(tex: str) -> str:
+    r"""A text with formulas in TeX as a terminal can show it.
+
+    >>> plain(r"$\theta \le \frac{1}{2}$")
+    'theta <= 1/2'
+    """
+    text = re.sub(r"\\sqrt\{([^{}]*)\}", r"sqrt(\1)", tex)
+    text = re.sub(r"\\frac(\d)(\w|\\theta)", r"\1/\2", text)
+    whole = lambda part: part if re.fullmatch(r"\w+|\w\^\w", part) else f"({part})"
+    text = re.sub(r"\\frac\{([^{}]*)\}\{([^{}]*)\}", lambda m: f"{whole(m[1])}/{whole(m[2])}", text)
+    text = re.sub(
+        r"\\(?:mathrm|bar|tilde) ?(?:\{([^{}]*)\}|\\?(\w+?)(?=\W|_|\d|$)|(\w))",
+        lambda m: f" {m[1] or m[2] or m[3]}" + ("~ " if "tilde" in m[0] else " "),
+        text,
+    )
+    text = re.sub(r"\\(left|right|[,;!])", " ", text).replace("\\|", "|")
+    text = re.sub(r"\\([A-Za-z]+)", lambda m: f" {_SIGNS.get(m[1], m[1])} ", text)
+    text = re.sub(r"(?<=[{(_^]) +| +(?=[})_^',.;:])|[$]", "", text)  # what TeX does not space
+    return re.sub(r" +", " ", re.sub(r"[{}\\]", "", text)).strip()
 
 
 def heading(question: str) -> None:
@@ -134,6 +161,20 @@ def bar(title: str) -> Iterator[Callable[[float], None]]:
     with Progress(console=Console(stderr=True), transient=True) as live:
         task = live.add_task(title, total=1.0)
         yield lambda share: live.update(task, completed=share)
+
+
+@contextlib.contextmanager
+def stages() -> Iterator[Callable[[str, float], None]]:
+    """A live bar on a terminal's stderr: what is being done, and the share of it that is done."""
+    if sys.stderr is None or not sys.stderr.isatty():
+        yield lambda what, share: None
+        return
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), transient=True) as live:
+        task = live.add_task("", total=1.0)
+        yield lambda what, share: live.update(task, description=what, completed=share)
 
 
 @contextlib.contextmanager

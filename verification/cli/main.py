@@ -13,7 +13,7 @@ import click
 import ndtheory
 import verification
 from ndtheory import HypothesisError
-from verification.cli import calculator, choices, problems
+from verification.cli import calculator, choices, ledger, problems
 from verification.cli.console import Interrupted, ReaderGone, complain
 
 #: Exit statuses of the interface.  A crash is none of them.
@@ -32,6 +32,7 @@ def cli() -> None:
     ndtheory example section6 > my.toml
     ndtheory compare my.toml          the same for a problem of your own
     ndtheory advise my.toml           which body first, which theta
+    ndtheory verify                   every statement of the paper, checked
     """
 
 
@@ -45,6 +46,7 @@ for command in (
     problems.compare,
     choices.advise,
     choices.region,
+    ledger.verify,
 ):
     cli.add_command(command)
 

@@ -1,0 +1,72 @@
+"""The numbered statements of the paper, and facts of ours: what each claims, and what is wrong with it if anything is.
+
+The texts are data, in ``statements.toml`` beside this module.  Verdicts are not among them: those are earned
+(:mod:`verification.ledger`).
+"""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.resources import files
+from typing import Literal
+
+Fault = Literal["false as printed", "does not follow", "gap", "typo"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Statement:
+    """A statement, told in our own words with formulas in TeX.
+
+    Attributes
+    ----------
+    id : str
+        ``"5.30"``, ``"prop-5.6.2"``, ``"C5"``, ``"case-2-1"``, ``"fig-10"``; own facts begin with ``x-``.
+    label : str
+        The paper's.
+    kind : str
+        definition, law, algorithm, equation, inequality, constant, case, lemma, proposition, theorem, remark,
+        experiment or own.
+    title, claims : str
+    leans_on : tuple of str
+        Statements that its proof uses.
+    fault : {'false as printed', 'does not follow', 'gap', 'typo'} or None
+        A counterexample exists; the step is broken; a hypothesis or argument is missing; a sign or an index that the
+        rest of the paper contradicts.
+    same_as : str
+        The statement whose fault it inherits; empty where the fault is its own.
+    wrong, repair, proof : str
+        Where there is a fault: what is wrong, the repaired form, its proof.
+    reading : str
+        What a definition or a cited result rests on.
+    note : str
+    """
+
+    id: str
+    label: str
+    kind: str
+    title: str
+    claims: str
+    leans_on: tuple[str, ...] = ()
+    fault: Fault | None = None
+    same_as: str = ""
+    wrong: str = ""
+    repair: str = ""
+    proof: str = ""
+    reading: str = ""
+    note: str = ""
+
+
+@lru_cache(maxsize=1)
+def statements() -> dict[str, Statement]:
+    """All statements by id, in the order of the paper, own facts last.
+
+    Examples
+    --------
+    >>> statements()["5.30"].fault
+    'false as printed'
+    """
+    text = files("ndtheory").joinpath("statements.toml").read_text("utf-8")
+    rows = tomllib.loads(text)["statement"]
+    return {row["id"]: Statement(**{**row, "leans_on": tuple(row.get("leans_on", ()))}) for row in rows}

@@ -1,0 +1,287 @@
+"""Deciding an algebraic statement over all admissible values: a proof, or an exact counterexample.
+
+A statement is an equation or inequality between sympy expressions.  What its symbols may be is told by charts:
+substitutions by expressions in parameters that run freely over p > 0 or p >= 0 and reach every admissible value, so
+that roots disappear and both sides become rational.  Then
+
+* an equation holds if the numerator of the difference of its sides expands to 0,
+* an inequality holds if its difference is a quotient of polynomials without a negative coefficient, squares taken
+  off first where that is needed,
+* it fails if it fails at one point with rational coordinates.
+
+Nothing here is rounded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+from random import Random
+from typing import Any, Literal
+
+import sympy as sp
+
+#: Values that parameters take in the search for a counterexample.
+TRIED = [sp.Rational(p, q) for p, q in ((1, 1), (1, 10), (3, 1), (1, 1000), (100, 1), (1, 2), (10**6, 1), (2, 1))]
+
+#: Points that are tried: all combinations of the first two values, then as many random ones.
+POINTS = 400
+
+Of = Literal["printed", "step", "repaired"]
+
+
+def positive(names: str) -> Any:
+    """Symbols that run over p > 0."""
+    return sp.symbols(names, positive=True)
+
+
+def nonnegative(names: str) -> Any:
+    """Symbols that run over p >= 0."""
+    return sp.symbols(names, nonnegative=True)
+
+
+@dataclass(frozen=True)
+class Relation:
+    """``left = right``, ``left <= right`` or ``left < right``."""
+
+    left: Any
+    sign: Literal["=", "<=", "<"]
+    right: Any
+
+    def __str__(self) -> str:
+        return f"{self.left} {self.sign} {self.right}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Decision:
+    """What was decided.
+
+    Attributes
+    ----------
+    holds : bool or None
+        None where neither a proof nor a counterexample was found.
+    counterexample : mapping
+        Symbol -> exact value, where it fails.
+    """
+
+    holds: bool | None
+    counterexample: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Goal:
+    """A relation with the charts that reach every admissible value of its symbols.
+
+    Attributes
+    ----------
+    relation : Relation
+    charts : sequence of mapping
+        Symbol -> expression in free parameters; one empty chart where the symbols are free already.
+    squares : sequence of expressions
+        Non-negative by sight (coefficients >= 0 times squares), taken off the difference before its coefficients are
+        looked at.
+    """
+
+    relation: Relation
+    charts: Sequence[Mapping[Any, Any]] = ({},)
+    squares: Sequence[Any] = ()
+
+
+def decide(goals: Goal | Iterable[Goal]) -> Decision:
+    """Decide goals together: each must hold in each of its charts.
+
+    Examples
+    --------
+    >>> p, q = positive("p q")
+    >>> decide(Goal(relation=Relation(2 * p * q, "<=", p**2 + q**2), squares=[(p - q) ** 2])).holds
+    True
+    >>> decide(Goal(relation=Relation(3 * p * q, "<=", p**2 + q**2))).counterexample
+    {'p': '1', 'q': '1'}
+    """
+    found: Decision = Decision(holds=True)
+    for goal in [goals] if isinstance(goals, Goal) else goals:
+        for chart in goal.charts:
+            decision = _in_chart(goal, chart)
+            if decision.holds is False:
+                return decision
+            if decision.holds is None:
+                found = decision
+    return found
+
+
+def rational(expression: Any) -> Any:
+    """The same without the roots of squares, for non-negative symbols."""
+    is_root = lambda term: term.is_Pow and term.exp.is_Rational and term.exp.q == 2
+    return sp.sympify(expression).replace(is_root, lambda term: sp.sqrt(sp.factor(term.base)) ** (2 * term.exp))
+
+
+def _in_chart(goal: Goal, chart: Mapping[Any, Any]) -> Decision:
+    relation = goal.relation
+    inserted = lambda expression: rational(sp.sympify(expression).subs(chart, simultaneous=True))
+    difference = inserted(relation.right) - inserted(relation.left)
+    numerator, denominator = sp.fraction(sp.together(difference))
+    if relation.sign == "=":
+        if sp.expand(numerator) == 0:
+            return Decision(holds=True)
+    elif _certified(difference - sum(map(inserted, goal.squares)), strict=relation.sign == "<"):
+        return Decision(holds=True)
+    fails = {"=": lambda d: d != 0, "<=": lambda d: d < 0, "<": lambda d: d <= 0}[relation.sign]
+    parameters = sorted(difference.free_symbols, key=str)
+    for point in _points(parameters):
+        if denominator.subs(point) != 0 and fails(difference.subs(point)):
+            names = sorted(sp.sympify(relation.left).free_symbols | sp.sympify(relation.right).free_symbols, key=str)
+            value = lambda symbol, at=point: rational(_rest_1(sp.sympify(chart.get(symbol, symbol)).subs(at)))
+            return Decision(holds=False, counterexample={str(symbol): str(value(symbol)) for symbol in names})
+    return Decision(holds=None)
+
+
+def _rest_1(expression: Any) -> Any:
+    """An expression with 1 for every symbol that is left: those that do not matter."""
+    return expression.subs(dict.fromkeys(expression.free_symbols, sp.Integer(1)))
+
+
+def _certified(difference: Any, *, strict: bool) -> bool:
+    """Whether numerator and denominator have coefficients of one sign, and a term of parameters > 0 alone if strict."""
+    numerator, denominator = sp.fraction(sp.cancel(sp.together(difference)))
+    signs = []
+    for part, nonzero in ((numerator, strict), (denominator, True)):
+        symbols = sorted(part.free_symbols, key=str)
+        if not all(symbol.is_nonnegative for symbol in symbols) or not part.is_polynomial(*symbols):
+            return False
+        terms = sp.Poly(part, *symbols).terms() if symbols else [((), part)]
+        coefficients = [coefficient for _, coefficient in terms]
+        if not all(coefficient.is_Rational for coefficient in coefficients):
+            return False
+        sign = 1 if max(coefficients) > 0 else -1
+        if min(sign * coefficient for coefficient in coefficients) < 0:
+            return False
+        sure = any(
+            coefficient != 0 and all(s.is_positive for s, power in zip(symbols, powers, strict=True) if power)
+            for powers, coefficient in terms
+        )
+        if nonzero and not sure:
+            return False
+        signs.append(sign)
+    return signs[0] == signs[1] or numerator == 0
+
+
+def _points(parameters: Sequence[Any]) -> Iterable[dict[Any, Any]]:
+    """Rational points in a fixed order, those with a parameter 0 among them where that is admissible."""
+    free = lambda symbol: symbol.is_nonnegative is None
+    values = [
+        TRIED
+        if symbol.is_positive
+        else [sp.Integer(0), *TRIED]
+        if not free(symbol)
+        else [*TRIED[:1], -TRIED[0], *TRIED]
+        for symbol in parameters
+    ]
+    if len(parameters) <= 8:
+        for choice in product(*(value[:2] for value in values)):
+            yield dict(zip(parameters, choice, strict=True))
+    random = Random(0)
+    for _ in range(POINTS):
+        yield {symbol: random.choice(value) for symbol, value in zip(parameters, values, strict=True)}
+
+
+# --- vectors and bilinear forms, with nothing known of them but linearity ------------------------------------------
+
+
+class Vector(sp.Symbol):  # type: ignore[misc]
+    """An element of a vector space; linear combinations are sympy expressions."""
+
+
+def _terms(combination: Any) -> dict[Any, Any]:
+    expanded = sp.expand(combination)
+    vectors = sorted((s for s in expanded.free_symbols if isinstance(s, Vector)), key=str)
+    return {vector: expanded.coeff(vector) for vector in vectors}
+
+
+def linear(name: str) -> Callable[[Any], Any]:
+    """A linear map that nothing else is known of."""
+    return lambda u: sum((c * Vector(f"{name} {v}") for v, c in _terms(u).items()), sp.Integer(0))
+
+
+def functional(name: str) -> Callable[[Any], Any]:
+    """A linear functional that nothing else is known of."""
+    return lambda u: sum((c * sp.Symbol(f"{name}({v})", real=True) for v, c in _terms(u).items()), sp.Integer(0))
+
+
+def bilinear(name: str) -> Callable[[Any, Any], Any]:
+    """A symmetric bilinear form that nothing else is known of.
+
+    Examples
+    --------
+    >>> u, v = Vector("u"), Vector("v")
+    >>> a = bilinear("a")
+    >>> decide(Goal(relation=Relation(a(u + v, u + v) - a(u - v, u - v), "=", 4 * a(u, v)))).holds
+    True
+    """
+
+    def form(u: Any, v: Any) -> Any:
+        pairs = product(_terms(u).items(), _terms(v).items())
+        entry = lambda x, y: sp.Symbol(f"{name}({min(str(x), str(y))}, {max(str(x), str(y))})", real=True)
+        return sum((a * b * entry(x, y) for (x, a), (y, b) in pairs), sp.Integer(0))
+
+    return form
+
+
+# --- a check of a statement ----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class Check:
+    """How a statement is decided, what it is as printed and as repaired, and mutants that must fail.
+
+    Attributes
+    ----------
+    id : str
+        Of the statement.
+    text : str
+        What is shown.
+    goals : callable
+        A form of the statement (a formula, a sign, ..) -> goals.
+    forms : mapping
+        'printed', 'step', 'repaired' -> form.
+    mutants : mapping
+        What was changed -> form that must be refuted.
+    units : mapping
+        'printed', 'repaired' -> relations whose units are compared.
+    """
+
+    id: str
+    text: str
+    goals: Callable[[Any], Goal | Iterable[Goal]]
+    forms: Mapping[Of, Any]
+    mutants: Mapping[str, Any]
+    units: Mapping[Of, Relation | Sequence[Relation]] = field(default_factory=dict)
+
+    def decide(self, form: Any) -> Decision:
+        """Decide one form."""
+        return decide(self.goals(form))
+
+
+def add(
+    checks: list[Check], *, states: Callable[[Any], Relation | Sequence[Relation]] | None = None, **fields: Any
+) -> None:
+    """Add a check to a list; ``states`` turns a form into the relations whose units are compared."""
+    if states is not None:
+        printed = lambda name: "printed" if name == "step" else name
+        fields["units"] = {printed(name): states(form) for name, form in fields["forms"].items()}
+    checks.append(Check(**fields))
+
+
+def equal(left: Any, right: Any, *charts: Any) -> Goal:
+    """left = right in each chart."""
+    return Goal(relation=Relation(left, "=", right), charts=charts or ({},))
+
+
+def at_most(bound: Any, value: Any, *charts: Any, squares: Sequence[Any] = ()) -> Goal:
+    """value <= bound in each chart."""
+    return Goal(relation=Relation(value, "<=", bound), charts=charts or ({},), squares=squares)
+
+
+def less(left: Any, right: Any, *charts: Any) -> Goal:
+    """left < right in each chart."""
+    return Goal(relation=Relation(left, "<", right), charts=charts or ({},))

@@ -1,0 +1,411 @@
+"""Section 5 from Lemma 5.3 to (5.33), derived a second time.
+
+Each inequality is proved from those before it: a quantity known to be at most b is written b/(1+p) or b - p with a free
+parameter, so that what is proved holds for every value the premises allow.  Inner products enter through the
+Cauchy-Schwarz inequality and the definitions of the constants alone; what is used is said in the text of each check.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import sympy as sp
+
+from ndtheory import bounds
+from ndtheory.symbolic.engine import Check, Goal, Relation, Vector, add, bilinear, equal, functional, linear, positive
+from ndtheory.symbolic.symbols import (
+    C_R,
+    CONSTANTS,
+    LARGE_M,
+    ROOTS,
+    WITH_THETA,
+    A,
+    C_s,
+    C_tr,
+    C_tr_half,
+    F,
+    M,
+    P,
+    W,
+    X,
+    at_most,
+    below,
+    d1,
+    d2,
+    e,
+    k,
+    m,
+    mu,
+    n,
+    of_h2,
+    p,
+    printed_P,
+    q,
+    q1,
+    r,
+    s,
+    t,
+    t_,
+    theta,
+    tn,
+    x,
+    xi,
+    y,
+)
+
+CHECKS: list[Check] = []
+check = partial(add, CHECKS)
+
+# --- Lemma 5.3 ------------------------------------------------------------------------------------------------------
+
+w1, v1, w2, v2 = Vector("w1"), Vector("w~1"), Vector("w2"), Vector("w~2")
+psi, psi2, test = Vector("psi"), Vector("psi~"), Vector("v")
+a1, a2, energy = bilinear("a1"), bilinear("a2"), bilinear("b")
+lift, lift2, of_T, L1, L2 = linear("R1"), linear("R2"), functional("T"), functional("L1"), functional("L2")
+delta1, delta2 = w1 - v1, w2 - v2
+
+check(
+    id="5.12",
+    text="The sum of (5.9) and (5.10) for the two test functions: their elastic terms, and that each test function has"
+    " the jump of the other solution (the trace of R_D phi is phi).",
+    goals=lambda form: [
+        equal(a1(w1, form[0] - w1) + a1(v1, form[1] - v1), -a1(delta1, delta1) + a1(delta1, lift(delta2))),
+        # traces: R_D1 leaves the trace as it is; (v - w2) must be the jump of w~, (v~ - w~2) that of w
+        *(
+            equal(form[i].subs({lift(w2): w2, lift(v2): v2}) - old, new)
+            for i, (old, new) in enumerate(((w2, v1 - v2), (v2, w1 - w2)))
+        ),
+    ],
+    forms={"printed": (v1 - lift(v2) + lift(w2), w1 - lift(w2) + lift(v2))},
+    mutants={
+        "the lift with the other sign": (v1 + lift(v2) - lift(w2), w1 + lift(w2) - lift(v2)),
+        "without the lift": (v1, w1),
+    },
+)
+
+check(
+    id="5.13",
+    text="Cauchy-Schwarz: F <= k |S sigma_N - S sigma~_N| |[w_T] - [w~_T]|, with factors of at most C_s d_2 and"
+    " C_tr (d_1 + d_2), both in L2(Gamma_c).",
+    goals=lambda form: at_most(form, k * (C_s * d2 / (1 + p)) * (C_tr * (d1 + d2) / (1 + q)) - r, {}),
+    forms={"repaired": k * C_s * C_tr * (d1 * d2 + d2**2)},
+    mutants={"without d_2^2": k * C_s * C_tr * d1 * d2, "C_s for C_s C_tr": k * C_s * (d1 * d2 + d2**2) / (1 + C_tr)},
+    units={
+        "printed": Relation(F, "<=", k * C_s * C_tr_half * (d1 * d2 + d2**2)),
+        "repaired": Relation(F, "<=", k * C_s * C_tr * (d1 * d2 + d2**2)),
+    },
+)
+
+check(
+    id="5.14",
+    text="m d_1^2 <= a_1(d, d) <= M d_1 (C_R d_2) + F by (5.12), with (5.13) for F.",
+    goals=lambda form: at_most(form, M * d1 * (C_R * d2 / (1 + p)) / (1 + q) + x * (d1 * d2 + d2**2) - r),
+    forms={"printed": (A + x) * d1 * d2 + x * d2**2},
+    mutants={"without C_R": (M + x) * d1 * d2 + x * d2**2, "without C_K d_2^2": (A + x) * d1 * d2},
+    states=lambda form: Relation(m * d1**2, "<=", form),
+)
+
+check(
+    id="5.15",
+    text="(5.15) is (5.14) with the square completed.",
+    goals=lambda form: equal(
+        m * (d1 - form * d2) ** 2 - (m * form**2 + x) * d2**2, m * d1**2 - (A + x) * d1 * d2 - x * d2**2
+    ),
+    forms={"printed": (A + x) / (2 * m)},
+    mutants={"the factor 1/2 dropped": (A + x) / m, "1/m dropped": (A + x) / 2},
+    states=lambda form: Relation(m * (d1 - form * d2) ** 2, "<=", ((A + x) ** 2 / (4 * m) + x) * d2**2),
+)
+
+check(
+    id="5.11",
+    text="No d_1 above the bound satisfies (5.14): at d_1 = (bound + y) d_2, y > 0, its left side is the larger one.",
+    goals=lambda form: Goal(relation=Relation((A + x) * (form + y) + x, "<", m * (form + y) ** 2), charts=(CONSTANTS,)),
+    forms={"printed": X},
+    mutants={
+        "without the root": (A + x) / m,
+        "1/m dropped under the root": (A + x) / m + sp.sqrt(x),
+        "C_R dropped": (M + x) / m + sp.sqrt(x / m),
+        "1/m dropped": A + x + sp.sqrt(x / m),
+    },
+    states=lambda form: Relation(d1, "<=", form * d2),
+)
+
+check(
+    id="lemma-5.3",
+    text="Two solutions of (5.9), (5.10) exist with sigma_N of w2 defined through (5.6): a functional a(w, .) on traces"
+    " needs a(w, z) = L(z) for all z that vanish on Gamma_c; without it the value depends on the extension chosen.",
+    # one dimension, Gamma_c at 1: w = x(1-x) + x, extensions x and x^2 of the trace 1
+    goals=lambda form: equal(
+        *(sp.integrate(sp.diff(form, y) * sp.diff(extension, y), (y, 0, 1)) for extension in (y, y**2))
+    ),
+    forms={"step": y + y * (1 - y), "repaired": y},
+    mutants={"another field that is not in equilibrium": y**3},
+)
+
+# --- Proposition 5.4 ------------------------------------------------------------------------------------------------
+
+check(
+    id="5.17",
+    text="The definition of T for psi and psi~, subtracted: the loads cancel.",
+    goals=lambda form: equal((-a1(w1, lift(test)) + L1(lift(test))) - (-a1(v1, lift(test)) + L1(lift(test))), form),
+    forms={"printed": -a1(w1 - v1, lift(test))},
+    mutants={"the sign": a1(w1 - v1, lift(test)), "without the lift": -a1(w1 - v1, test)},
+)
+
+check(
+    id="5.18",
+    text="|a_1(w1-w~1, R_D v)| <= M d_1 (C_R |v|), divided by |v|.",
+    goals=lambda form: at_most(form, M * d1 * (C_R * y / (1 + p)) / (1 + q) / y),
+    forms={"printed": A * d1},
+    mutants={"C_R dropped": M * d1, "m for M": m * C_R * d1},
+    states=lambda form: Relation(tn, "<=", form),
+)
+
+check(
+    id="5.19",
+    text="m d_2^2 <= a_2(w2-w~2, w2-w~2) = <psi-psi~, w2-w~2> <= n d_2, hence n = (1+p)(1+q) m d_2.",
+    goals=lambda form: at_most(form.subs(n, (1 + p) * (1 + q) * m * d2), d2),
+    forms={"printed": n / m},
+    mutants={"1/m^2 for 1/m": n / m**2, "M for m": n / M},
+    states=lambda form: Relation(d2, "<=", form),
+)
+
+check(
+    id="5.16",
+    text="C_T is the product of the constants of (5.18), (5.11) and (5.19).",
+    goals=lambda form: equal(form, A * X / m, CONSTANTS),
+    forms={"printed": bounds.lipschitz(m, M, C_R, x)},
+    mutants={
+        "C_R dropped": bounds.lipschitz(m, M, C_R, x) / C_R,
+        "1/m for 1/m^2": bounds.lipschitz(m, M, C_R, x) * m,
+        "the root of m dropped": A / m**2 * (A + x + sp.sqrt(x)),
+    },
+    states=lambda form: Relation(tn, "<=", form * n),
+)
+
+check(
+    id="prop-5.4",
+    text="|T psi - T psi~| <= A d_1, d_1 <= X d_2, d_2 <= n/m: the Lipschitz constant C_T.",
+    goals=lambda form: at_most(form, A * X / (1 + p) * (n / m) / (1 + q) / (1 + r)),
+    forms={"printed": bounds.lipschitz(m, M, C_R, x) * n},
+    mutants={"m for M": bounds.lipschitz(m, m, C_R, x) * n},
+    states=lambda form: Relation(tn, "<=", form),
+)
+
+# --- the norm (5.21) ------------------------------------------------------------------------------------------------
+
+check(
+    id="5.21",
+    text="The norm comes from an inner product: R2 is linear, and a_2(R2 psi, R2 chi) obeys the law of parallelograms.",
+    goals=lambda form: equal(form(psi + psi2) + form(psi - psi2), 2 * form(psi) + 2 * form(psi2)),
+    forms={"printed": lambda u: a2(lift2(u), lift2(u))},
+    mutants={"around another force": lambda u: a2(lift2(u) + test, lift2(u) + test)},
+)
+
+check(
+    id="5.22",
+    text="z = R2 psi: m |z|^2 <= a_2(z, z) = e^2 = <psi, z> <= n |z|, hence e^2 <= n^2/m.",
+    goals=lambda form: at_most((form**2).subs(n, m * y * (1 + p) * (1 + q)), m * y**2 * (1 + p)),
+    forms={"printed": n / sp.sqrt(m)},
+    mutants={"1/m for 1/sqrt(m)": n / m, "M for m": n / sp.sqrt(M)},
+    states=lambda form: Relation(e, "<=", form),
+)
+
+check(
+    id="5.23",
+    text="n = sup a_2(z, v)/|v| <= M |z|, and m |z|^2 <= e^2.",
+    goals=lambda form: at_most((form**2).subs(e, sp.sqrt(m * (1 + q)) * y), (M * y / (1 + p)) ** 2),
+    forms={"printed": M / sp.sqrt(m) * e},
+    mutants={"sqrt(m) dropped": M * e, "m for M": sp.sqrt(m) * e},
+    states=lambda form: Relation(n, "<=", form),
+)
+
+check(
+    id="x-root-M",
+    text="Cauchy-Schwarz in a_2: a_2(z, v)^2 <= e^2 a_2(v, v) <= e^2 M |v|^2, so sqrt(M) suffices; and it is at most"
+    " M/sqrt(m).",
+    goals=lambda form: [at_most((form * e) ** 2, e**2 * M / (1 + p), ROOTS), at_most(M / sp.sqrt(m), form, ROOTS)],
+    forms={"repaired": sp.sqrt(M)},
+    mutants={"sqrt(m)": sp.sqrt(m), "M": M},
+    states=lambda form: Relation(n, "<=", form * e),
+)
+
+check(
+    id="prop-5.5",
+    text="(5.22) and (5.23) together, and that the lower constant is at most the upper one.",
+    goals=lambda form: at_most(form[1], form[0]),
+    forms={"printed": (sp.sqrt(m), M / sp.sqrt(m))},
+    mutants={"constants exchanged": (M / sp.sqrt(m), sp.sqrt(m))},
+    states=lambda form: [Relation(form[0] * e, "<=", n), Relation(n, "<=", form[1] * e)],
+)
+
+# --- Proposition 5.6, first step ------------------------------------------------------------------------------------
+
+chi, rest = Vector("T psi - T psi~"), Vector("psi - psi~")
+
+check(
+    id="5.24",
+    text="The square of the norm (5.21) of theta chi + (1-theta) eta, expanded.",
+    goals=lambda form: equal(
+        energy(theta * chi + (1 - theta) * rest, theta * chi + (1 - theta) * rest),
+        theta**2 * energy(chi, chi) + (1 - theta) ** 2 * energy(rest, rest) + form * energy(chi, rest),
+    ),
+    forms={"printed": 2 * theta * (1 - theta)},
+    mutants={"the factor 2 dropped": theta * (1 - theta), "1 + theta": 2 * theta * (1 + theta)},
+    states=lambda form: Relation(t**2, "=", theta**2 * t**2 + (1 - theta) ** 2 * e**2 + form * W),
+)
+
+check(
+    id="5.25",
+    text="(5.6) for psi and psi~, subtracted: a_2(w2-w~2, v) = <psi-psi~, v>, the equation of R2(psi-psi~).",
+    goals=lambda form: equal((L2(test) + functional("psi")(test)) - (L2(test) + functional("psi~")(test)), form),
+    forms={"printed": functional("psi")(test) - functional("psi~")(test)},
+    mutants={"the sum": functional("psi")(test) + functional("psi~")(test)},
+)
+
+a1R = sp.Symbol("a_1R", real=True)  # a1(w1-w~1, R_D(w2-w~2))
+
+check(
+    id="5.26",
+    text="The definition (5.20) of R2 with v = w2-w~2: a_2(R2 chi, v) = <chi, v>, checked for any S_2 of two unknowns.",
+    goals=lambda form: equal(*_riesz(form)),
+    forms={"printed": 1},
+    mutants={"the sign": -1, "a factor 2": 2},
+)
+
+
+def _riesz(factor: Any) -> tuple[Any, Any]:
+    S = sp.Matrix(2, 2, [p + 1 + q**2, q, q, 1 + r])  # symmetric, positive definite
+    force, v = sp.Matrix(sp.symbols("f_1 f_2", real=True)), sp.Matrix(sp.symbols("v_1 v_2", real=True))
+    return ((S.inv() * force).T * S * v)[0], factor * (force.T * v)[0]
+
+
+check(
+    id="5.27",
+    text="(5.17) with v = w2-w~2.",
+    goals=lambda form: equal(
+        (-a1(w1, lift(delta2)) + L1(lift(delta2))) - (-a1(v1, lift(delta2)) + L1(lift(delta2))), form
+    ),
+    forms={"printed": -a1(delta1, lift(delta2))},
+    mutants={"the sign": a1(delta1, lift(delta2)), "the lift of w1": -a1(delta1, lift(delta1))},
+)
+
+check(
+    id="5.28",
+    text="(5.12), a_11 = a_1R + F - p with p >= 0, rearranged.",
+    goals=lambda form: at_most(form.subs(q1, a1R + F - p), -a1R, {}),
+    forms={"printed": -q1 + F},
+    mutants={"the sign of F": -q1 - F, "the sign of the energy": q1 + F},
+    states=lambda form: Relation(W, "<=", form),
+)
+
+check(
+    id="5.29",
+    text="a_11 >= m d_1^2 by coercivity, d_1 >= t_n/(M C_R) by (5.18), t_n^2 >= m t^2 by (5.22).",
+    goals=lambda form: at_most(m * (1 + p) * ((1 + q) / A) ** 2 * m * t**2 * (1 + r), form * t**2),
+    forms={"printed": m**2 / A**2},
+    mutants={"C_R^2 dropped": m**2 / M**2, "m for m^2": m / A**2, "C_R for C_R^2": m**2 / (M**2 * C_R)},
+    states=lambda form: Relation(form * t**2, "<=", q1),
+)
+
+check(
+    id="5.30",
+    text="F <= C_K (d_1 d_2 + d_2^2), d_1 <= X d_2, d_2 <= n/m, n <= M/sqrt(m) e, one after the other.",
+    goals=lambda form: at_most(form, P),
+    forms={"step": printed_P(m), "repaired": x / m**2 * ((A + x + s) / m + 1) * M**2 / m},
+    mutants={
+        "the bracket as printed": printed_P(m),
+        "1 dropped from the bracket": x / m**2 * ((A + x + s) / m) * M**2 / m,
+        "M for M^2": x / m**2 * ((A + x + s) / m + 1) * M / m,
+        "1/m for 1/m^2": x / m * ((A + x + s) / m + 1) * M**2 / m,
+    },
+    states=lambda form: Relation(F, "<=", form * e**2),
+)
+
+kappa, lam = positive("kappa lambda")
+#: One open node that slides under the friction of its own g_N: S_1 = S_2 = lambda I, the norm of R^2.  For
+#: psi = (0, psi_N) step I gives w2 = psi/lambda; in step II friction moves body 1 by -kappa psi_N/lambda, and
+#: T psi = (kappa psi_N, 0).
+#: Hence F = kappa^2 e^2, t = kappa e, W = 0 with e^2 = psi_N^2/lambda.
+ONE_NODE = {m: lam, M: 2 * lam, C_R: 1, x: kappa * lam, F: kappa**2 * e**2, t: kappa * e, W: 0}
+
+
+SMALL_UNIT = {lam: mu**2, kappa: xi**2, theta: t_ / (1 + t_)}
+
+
+def one_node(id: str, value: Any, printed: Any, repaired: Any) -> None:
+    """The printed bound of a quantity is exceeded in the one-node problem: small m, much friction."""
+    at_the_node = lambda expression: sp.sympify(expression).subs(ONE_NODE, simultaneous=True)
+    check(
+        id=id,
+        text="One open node that slides, S_1 = S_2 = m I, M = 2 m, C_R = 1, C_K = kappa m: exactly F = kappa^2 e^2,"
+        " t = kappa e, W = 0.",
+        goals=lambda form: at_most(
+            at_the_node(form), at_the_node(value), {lam: mu**2, kappa: xi**2, theta: t_ / (1 + t_)}
+        ),
+        forms={"printed": printed, "repaired": repaired},
+        mutants={"without friction": repaired.subs(x, 0)},
+    )
+
+
+one_node("5.30", F, printed_P(m) * e**2, P * e**2)
+
+check(
+    id="x-printed-at-large-m",
+    text="For m >= 1 the bracket printed in (5.30) is at least the one that the proof supplies.",
+    goals=lambda form: at_most(form, P, LARGE_M),
+    forms={"printed": printed_P(m)},
+    mutants={
+        "1 dropped from the bracket": x / m**2 * (A + x + s) * M**2 / m / (1 + x),
+        "m^2 for m": printed_P(m) / m**2,
+    },
+)
+
+check(
+    id="5.31",
+    text="(5.25) to (5.29), and the friction term of (5.30): W <= -(m/A)^2 t^2 + P e^2.",
+    goals=lambda form: at_most(form, -(m**2) / A**2 * t**2 * (1 + q) + P * e**2 - r),
+    forms={"step": -(m**2) / A**2 * t**2 + printed_P(m) * e**2, "repaired": -(m**2) / A**2 * t**2 + P * e**2},
+    mutants={
+        "the sign of the first term, no friction": -(m**2) / A**2 * t**2,
+        "C_R dropped": -(m**2) / M**2 * t**2 + P * e**2,
+    },
+    states=lambda form: Relation(W, "<=", form),
+)
+
+one_node("5.31", W, -(m**2) / A**2 * t**2 + printed_P(m) * e**2, -(m**2) / A**2 * t**2 + P * e**2)
+
+relaxed = lambda P: (theta**2 - below) * t**2 + of_h2(P) * e**2
+
+check(
+    id="5.32",
+    text="(5.31) in (5.24).",
+    goals=lambda form: at_most(
+        form,
+        theta**2 * t**2 + (1 - theta) ** 2 * e**2 + 2 * theta * (1 - theta) * (-(m**2) / A**2 * t**2 + P * e**2 - r),
+        WITH_THETA,
+    ),
+    forms={"step": relaxed(printed_P(m)), "repaired": relaxed(P)},
+    mutants={
+        "the factor 2 dropped": (theta**2 - below) * t**2 + ((1 - theta) ** 2 + theta * (1 - theta) * P) * e**2,
+        "C_R dropped": (theta**2 - below * C_R**2) * t**2 + of_h2(P) * e**2,
+    },
+    states=lambda form: Relation(t**2, "<=", form),
+)
+
+expanded = theta**2 * t**2 + (1 - theta) ** 2 * e**2 + 2 * theta * (1 - theta) * W
+for label in ("5.32", "5.33", "5.36"):
+    one_node(label, expanded, relaxed(printed_P(m)), relaxed(P))
+
+check(
+    id="5.33",
+    text="(5.32) with the friction term written by means of C_T = A X/m.",
+    goals=lambda form: at_most(form, P),
+    forms={
+        "step": M**2 / m * (x * (A * X / m) / A + x / m**2),
+        "repaired": M**2 / m * (x * (A * X / m) / (A * m) + x / m**2),
+    },
+    mutants={"1/m^2 dropped": M**2 / m * (x * (A * X / m) / (A * m)), "M for M^2": M / m * (x * X / m**2 + x / m**2)},
+    states=lambda form: Relation(W, "<=", form * e**2),
+)

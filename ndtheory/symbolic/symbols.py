@@ -1,0 +1,70 @@
+"""Symbols, units and charts of Section 5, and the bounds that its proof supplies."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import sympy as sp
+
+from ndtheory.symbolic import engine
+from ndtheory.symbolic.dimension import Dimension
+from ndtheory.symbolic.engine import Goal, nonnegative, positive
+
+# --- symbols: the constants, and the norms of the differences of two solutions --------------------------------------
+
+m, M, C_R, m_tilde = positive("m M C_R m_tilde")
+x = sp.Symbol("C_K", nonnegative=True)
+theta = positive("theta")
+d1, d2, n, e, tn, t = nonnegative("d_1 d_2 n e t_n t")  # |w1-w~1|_1, |w2-w~2|_2, |psi-psi~|, |||psi-psi~|||, same of T
+F, q1, W = sp.symbols("F a_11 W", real=True)  # (5.13) left, a1(w1-w~1, w1-w~1), a2(R2(T psi-T psi~), R2(psi-psi~))
+k, C_s, C_tr, C_tr_half = nonnegative("k C_s C_tr C_tr_half")
+C_T, C_T_tilde = positive("C_T C_T_tilde")
+
+#: Exponents of stress and length.  Energies and forces are per unit thickness.
+DIMENSIONS: dict[str, Dimension] = {
+    **dict.fromkeys(["m", "M", "C_K", "m_tilde"], (sp.Integer(1), sp.Integer(0))),
+    **dict.fromkeys(["d_1", "d_2"], (sp.Integer(0), sp.Integer(1))),
+    **dict.fromkeys(["n", "t_n"], (sp.Integer(1), sp.Integer(1))),
+    **dict.fromkeys(["e", "t"], (sp.Rational(1, 2), sp.Integer(1))),
+    **dict.fromkeys(["F", "a_11", "W"], (sp.Integer(1), sp.Integer(2))),
+    "C_s": (sp.Integer(1), sp.Rational(-1, 2)),
+    "C_tr": (sp.Integer(0), sp.Rational(1, 2)),
+}
+
+A = M * C_R
+s = sp.sqrt(m * x)
+
+# Parameters of the charts: p, q, r, o slack of a premise; mu, xi roots of m, C_K; 1 + b = M/m, 1 + c = C_R.
+mu, b, t_, y = positive("mu b tau y")
+c, xi, p, q, r, o = nonnegative("c xi p q r o")
+
+#: Every 0 < m < M, C_R >= 1, C_K >= 0; by (4.2) even M >= 2 m.
+CONSTANTS = {m: mu**2, M: mu**2 * (1 + b), C_R: 1 + c, x: xi**2}
+#: The same with a rational root of M.
+ROOTS = {m: mu**2, M: (mu * (1 + b)) ** 2}
+#: The same, and 0 < theta < 1.
+WITH_THETA = {**CONSTANTS, theta: t_ / (1 + t_)}
+#: The same for m <= 1 and for m >= 1, with m~ = min(m, 1).
+SMALL_M = {m: 1 / (1 + o) ** 2, m_tilde: 1 / (1 + o) ** 2, M: (1 + b) / (1 + o) ** 2, C_R: 1 + c, x: xi**2}
+LARGE_M = {m: (1 + o) ** 2, m_tilde: 1, M: (1 + b) * (1 + o) ** 2, C_R: 1 + c, x: xi**2}
+
+with_theta = lambda chart: {**chart, theta: t_ / (1 + t_)}
+
+# --- what the proof supplies ----------------------------------------------------------------------------------------
+
+#: d_1 <= X d_2, by (5.14).
+X = (A + x) / m + sp.sqrt(x / m)
+#: The friction term is at most P e^2, by (5.13), (5.11), (5.19), (5.23); and what the paper prints for it, by m.
+P = x / m**2 * (X + 1) * M**2 / m
+printed_P = lambda m: x / m**2 * (A + x + sp.sqrt(m * x) + 1) * M**2 / m
+#: |||T psi - T psi~|||^2 <= Q e^2, by (5.22), (5.18), (5.11), (5.19), (5.23).
+Q = (A * X / m * M / m) ** 2
+below = 2 * theta * (1 - theta) * m**2 / A**2  # what (5.29) takes off the coefficient of t^2
+
+of_h2 = lambda P: (1 - theta) ** 2 + 2 * theta * (1 - theta) * P
+of_h1 = lambda m, P, Q: (theta**2 - 2 * theta * (1 - theta) * m**2 / A**2) * Q + of_h2(P)
+
+
+def at_most(bound: Any, value: Any, *charts: Any) -> Goal:
+    """value <= bound in each chart; for all constants by default."""
+    return engine.at_most(bound, value, *(charts or (CONSTANTS,)))

@@ -1,0 +1,415 @@
+"""What the ledger says of solutions, of iterates and of Section 6, and that each check finds what is wrong."""
+
+import json
+from dataclasses import replace
+from fractions import Fraction
+from functools import cached_property
+
+import numpy as np
+import pytest
+
+from fem1d2d import Condensation
+from verification.bodies import build
+from verification.ledger import experiments as section_6
+from verification.ledger import solutions as ledger
+from verification.ledger import weak_forms
+from verification.ledger.evidence import settle
+from verification.ledger.experiments import Best, Count, Model, Stopped, Sweeps, experiments
+from verification.ledger.solutions import Convergence, Setting, solutions
+from verification.ledger.weak_forms import EXACT, Case, Fields, Weak
+from verification.monolithic import solve
+from verification.problem import Problem
+
+PRINTED, STEP, REPAIRED = "printed", "step", "repaired"
+HOLDS = [(PRINTED, True)]
+EXPECTED = {
+    "2.3": [(PRINTED, False), (REPAIRED, True)],
+    "2.4": HOLDS,
+    "2.6": HOLDS,
+    "3.1.3": [(PRINTED, False), (REPAIRED, True)],
+    "4.4": HOLDS,
+    "4.5": HOLDS,
+    "4.9.1": HOLDS,
+    "4.9.2": [(PRINTED, False), (REPAIRED, True)],
+    "4.9.3": HOLDS,
+    "prop-5.1": [(STEP, True), (PRINTED, True)],
+    "5.1": HOLDS,
+    "5.2": HOLDS,
+    "lemma-5.2": HOLDS,
+    "5.3": HOLDS,
+    "5.4": [(PRINTED, True), (PRINTED, True)],
+    "5.5": HOLDS,
+    "5.6": HOLDS,
+    "thm-5.9.1": [(PRINTED, True), (REPAIRED, True)],
+    "thm-5.9.2": [(PRINTED, True), (REPAIRED, True)],
+}
+OF_SECTION_6 = {
+    "sec-6.2": HOLDS,
+    "fig-5": [(PRINTED, None)],
+    "sec-6.3-stop": [(PRINTED, False), (REPAIRED, True)],
+    "sec-6.3": [(PRINTED, None)],
+    "fig-10": HOLDS,
+    "fig-11": HOLDS,
+    "fig-12": [(PRINTED, False)],
+}
+
+
+@pytest.fixture(scope="module")
+def found():
+    return solutions()
+
+
+@pytest.fixture(scope="module")
+def seen():
+    return experiments()
+
+
+def holds(evidence):
+    return [(e.of, e.holds) for e in evidence]
+
+
+@pytest.mark.parametrize("statement", EXPECTED)
+def test_a_statement_about_solutions_gets_its_evidence(found, statement):
+    assert holds(found[statement]) == EXPECTED[statement]
+
+
+def test_every_check_of_solutions_and_of_section_6_is_expected():
+    assert set(ledger.CHECKS) == set(EXPECTED)
+    assert set(section_6.CHECKS) == set(OF_SECTION_6)
+
+
+@pytest.mark.parametrize("statement", OF_SECTION_6)
+def test_a_result_of_section_6_gets_its_evidence(seen, statement):
+    assert holds(seen[statement]) == OF_SECTION_6[statement]
+
+
+def test_evidence_is_plain_data_and_repeats_itself(found):
+    text = json.dumps([e.to_dict() for e in found["4.9.2"]], allow_nan=False)
+    assert json.dumps([e.to_dict() for e in solutions(["4.9.2"])["4.9.2"]]) == text
+
+
+def test_floating_point_proves_nothing(found, seen):
+    verdicts = {settle(evidence)[0] for evidence in (*found.values(), *seen.values())}
+    assert verdicts == {"NUMERICAL", "REFUTED", "INCONCLUSIVE"}
+
+
+def test_only_what_is_asked_is_answered_and_the_share_done_is_told():
+    shares = []
+    assert set(solutions(["2.4", "5.6", "fig-5"], "quick", shares.append)) == {"2.4", "5.6"}
+    assert shares == [0, 0.5, 1]
+
+
+# Wrong solutions.
+
+
+def pressed(name="sheared, body 2 Neumann"):
+    return Case(name=name, problem=Problem.from_dict(weak_forms.PROBLEMS[name]))
+
+
+def loaded(case, force):
+    """The fields under nodal forces on body 1 and on body 2, in the frame of the pair."""
+    weak, fields = case.weak, []
+    for body, own in zip((weak.one, weak.two), force, strict=True):
+        load = body.load.copy()
+        load[body.interface] += weak.pair.orient(own)
+        fields.append(body.solve(load))
+    return Fields(one=fields[0], two=fields[1])
+
+
+def with_solution(case, u):
+    class Wrong(Case):
+        solution = limit = u
+
+    return Wrong(name=case.name, problem=case.problem)
+
+
+def asked(statement, *cases):
+    class Given(Setting):
+        @cached_property
+        def cases(self):
+            return list(cases)
+
+    return ledger.CHECKS[statement](Given(level="quick"))
+
+
+def changed(case, node, component, share):
+    """A nodal force on body 2 changed by a share of the largest one; component 0 is tangential."""
+    g = case.g.copy()
+    g[component * case.weak.pair.n + node] += share * np.abs(g).max()
+    return g
+
+
+AT_SOLUTION = ["2.3", "4.4", "5.1", "lemma-5.2"]
+
+
+@pytest.mark.parametrize("statement", AT_SOLUTION)
+def test_forces_that_are_not_opposite_are_found_out(statement):
+    case = pressed()
+    wrong = with_solution(case, loaded(case, (-case.g, changed(case, 3, 1, 1e-6))))
+    assert (holds(asked(statement, case))[-1][1], holds(asked(statement, wrong))[-1][1]) == (True, False)
+
+
+@pytest.mark.parametrize("statement", ["2.4", "4.4", "5.2", "5.3", "5.4"])
+@pytest.mark.parametrize("component", [0, 1])
+def test_a_contact_force_off_by_a_millionth_is_found_out(statement, component):
+    case = pressed()
+    g = changed(case, 3, component, 1e-6)
+    wrong = with_solution(case, loaded(case, (-g, g)))
+    if (statement, component) != ("2.4", 0):  # the normal jump hardly feels a shear at one node
+        assert holds(asked(statement, wrong))[-1][1] is False
+
+
+def test_a_shear_above_the_friction_bound_is_found_out():
+    case = pressed()
+    g = changed(case, 3, 0, 1e-6)
+    assert holds(asked("2.6", with_solution(case, loaded(case, (-g, g))))) == [(PRINTED, False)]
+
+
+def test_a_displacement_off_by_a_millionth_is_not_the_limit_of_the_run():
+    case = pressed()
+    wrong = with_solution(case, Fields(one=case.solution.one * (1 + 1e-6), two=case.solution.two))
+    wrong.__dict__["run"] = case.run
+    type(wrong).limit = case.limit
+    assert holds(asked("prop-5.1", wrong)) == [(STEP, True), (PRINTED, False)]
+
+
+class Slippery(Weak):
+    """A bound of friction that is one per mille too small."""
+
+    def bound(self, two):
+        return 0.999 * super().bound(two)
+
+
+class OtherBody(Weak):
+    """The bound of friction from the stress of the contact body."""
+
+    u = None
+
+    def bound(self, two):
+        g, pair = -self.force(self.one, self.u.one), self.pair
+        return float(pair.problem.contact.friction) * pair.weights * np.abs(pair.regularisation @ g[pair.normal])
+
+
+@pytest.mark.parametrize("statement", ["2.6", "4.4", "4.9.2", "5.2", "5.3", "5.5"])
+def test_a_friction_bound_one_per_mille_too_small_is_found_out(statement):
+    case = pressed()
+    case.__dict__["weak"] = Slippery(pair=build(case.problem))
+    assert holds(asked(statement, case))[-1][1] is False
+
+
+def test_the_friction_bound_is_that_of_the_neumann_body():
+    case = pressed()
+    rng = np.random.default_rng(0)
+    worst = []
+    for state in case.arbitrary:
+        weak = OtherBody(pair=case.weak.pair)
+        object.__setattr__(weak, "u", weak.at(state))
+        d = weak_forms.moves_of_one(weak, weak.u, rng, 10)
+        assert weak_forms.contact_inequality(case.weak, weak.u, d).min() >= -EXACT
+        worst.append(weak_forms.contact_inequality(weak, weak.u, d).min())
+    assert max(worst) < -1e-6
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_sign_of_step_III_is_found_out(sign):
+    case = pressed()
+    state, _ = case.steps[1]
+    v = weak_forms.directions(np.random.default_rng(0), case.weak.two, 5)
+    off = weak_forms.transfer(case.weak, case.weak.at(state), sign * state.image, v)
+    assert (off.max() <= EXACT) == (sign == 1)
+    assert sign == 1 or off.min() > 1e-6
+
+
+@pytest.mark.parametrize("statement", ["4.9.1", "4.9.3", "5.4", "5.6"])
+def test_a_force_off_by_a_millionth_is_found_out_in_the_weak_form(statement):
+    case = pressed()
+    spoil = lambda state: replace(
+        state, g=state.g * (1 + 1e-6), contact=replace(state.contact, force=1.000001 * state.image)
+    )
+    case.__dict__["steps"] = [(spoil(a), b) for a, b in case.steps]
+    case.__dict__["arbitrary"] = [spoil(state) for state in case.arbitrary]
+    assert holds(asked(statement, case))[0] == (PRINTED, False)
+
+
+def test_a_lift_that_is_not_harmonic_is_found_out(monkeypatch):
+    true = Condensation.extend
+
+    def rough(self, trace, load=None):
+        field = true(self, trace, load)
+        field[self.inside[0]] *= 1.001
+        return field
+
+    case = pressed()
+    assert holds(asked("4.5", case)) == HOLDS
+    monkeypatch.setattr(Condensation, "extend", rough)
+    assert holds(asked("4.5", case)) == [(PRINTED, False)]
+
+
+def test_the_printed_friction_term_fails_where_a_sticking_node_moves():
+    case = pressed("much friction")
+    defect, w = ledger.printed_defect(case.weak, case.solution)
+    assert defect < -0.5
+    assert w[case.weak.pair.normal].max() <= 1e-15
+    # without displacement along Gamma_c of body 1 both forms are one
+    still = case.solution.one.copy()
+    still[case.weak.one.interface[case.weak.pair.tangential]] = 0
+    assert ledger.printed_defect(case.weak, Fields(one=still, two=case.solution.two))[0] >= 0
+
+
+def test_on_two_bars_the_printed_sign_gives_the_factor_of_the_cobweb():
+    bars = Case(
+        name="bars", problem=Problem.from_dict(weak_forms.CONVERGENT["two bars"] | {"iteration": {"theta": "0.3"}})
+    )
+    distance = ledger.distances(bars, -1, 4)
+    rho, theta = 1.0, 0.3
+    # an error e gives T an error -rho e, so that the printed step is e (1 - theta + theta rho) - 2 theta g
+    error = [-1.0]
+    for _ in range(3):
+        error.append(error[-1] * (1 - theta + theta * rho) - 2 * theta)
+    assert distance[:2] == pytest.approx(np.abs(error[:2]), rel=1e-9)
+
+
+@pytest.mark.parametrize("of", [PRINTED, REPAIRED])
+def test_a_contraction_factor_one_per_cent_too_small_is_found_out(of):
+    runs = ledger.inside("quick") if of == PRINTED else ledger.sharp("quick")
+    assert ledger._falling(of, "", runs).holds is True
+    short = [Convergence(case=run.case, factor=0.99 * run.factor) for run in runs]
+    assert ledger._falling(of, "", short).holds is False
+
+
+def test_the_estimate_of_proposition_5_1_is_homogeneous_in_theta_m():
+    case = pressed()
+    states = case.run.states[:6]
+    one, other = (ledger.strong_convergence(case.weak, states, 0.6, m) for m in (1.0, 300.0))
+    assert other == pytest.approx(300 * one, rel=1e-12)
+    assert other.max() > 1
+
+
+# Section 6.
+
+
+def test_the_model_has_nearly_the_numbers_of_nodes_of_the_paper():
+    pairs = [build(Model(halvings=h).problem) for h in range(4)]
+    nodes = [len(pair.body1.mesh.points) + len(pair.body2.mesh.points) for pair in pairs]
+    assert nodes == [54, 170, 594, 2210]  # 60, 190, 666, 2482 in the paper
+
+
+def test_a_run_that_stops_early_does_not_give_the_same_results():
+    problem = Model().problem
+    loose = replace(problem, iteration=replace(problem.iteration, tolerance=1e-5))
+    assert section_6.difference(build(loose)) > section_6.SAME
+    tight = replace(problem, iteration=replace(problem.iteration, tolerance=1e-12))
+    assert section_6.difference(build(tight)) < 1e-10
+
+
+def test_the_increment_is_theta_times_the_unrelaxed_residual():
+    run = section_6.trace(build(Model().problem), 0.3, 20)
+    for n in range(1, 20):
+        step = np.linalg.norm(run.g[n] - run.g[n - 1])
+        assert step == pytest.approx(0.3 * run.residuals[n - 1] * np.linalg.norm(image(run, n, 0.3)), rel=1e-9)
+
+
+def image(run, n, theta):
+    """T g_{n-1} from two consecutive forces."""
+    return (run.g[n] - (1 - theta) * run.g[n - 1]) / theta
+
+
+def test_steps_are_counted_by_interpolation():
+    assert section_6.steps_to([1.0, 1e-4, 1e-8], 1e-6) == pytest.approx(1.5)
+    assert section_6.steps_to([1.0, 0.1], 1e-6) is None
+
+
+def test_equal_moduli_give_the_same_steps_whatever_their_size():
+    # 0.2e3 in Section 6.3 is most likely 0.2e5; only the quotient matters
+    counts = []
+    for young in (Fraction(200), Fraction(20000)):
+        pair = build(Model(young=(young, young), halvings=0).problem)
+        counts.append(section_6.trace(pair, 0.5).stop(absolute=False))
+    assert counts[0] == counts[1]
+
+
+def test_zones_are_read_from_left_to_right():
+    x = np.array([0.4, 0.8, 1.0, 1.4, 1.6])
+    found = section_6.zones(x, ["stick", "stick", "slip", "slip", "open"])
+    assert section_6.as_printed(found, 0.2)
+    assert not section_6.as_printed(found, 0.1)
+    assert not section_6.as_printed(section_6.zones(x, ["stick"] * 5), 0.2)
+
+
+def test_the_zones_of_mirrored_readings_mirror_each_other(seen):
+    readings = {(r["geometry"], r["u_x on the top"]): r["zones"] for r in seen["fig-5"][0].data["readings"]}
+    # P1 triangles are not symmetric: up to one cell
+    right = readings["right edges aligned", "held"]
+    left = [
+        {"state": z["state"], "from": 1.2 - z["to"], "to": 1.2 - z["from"]}
+        for z in reversed(readings["left edges aligned", "held"])
+    ]
+    assert [z["state"] for z in left] == [z["state"] for z in right]
+    assert all(abs(a["to"] - b["to"]) <= 0.1 + 1e-9 for a, b in zip(left, right, strict=True))
+
+
+class Made(Sweeps):
+    """Sweeps of given numbers of steps."""
+
+    def __init__(self, steps):
+        super().__init__("quick")
+        self.counts = lambda model: {
+            theta: Count(increment=steps[model.friction](float(theta)), residual=None) for theta in self.thetas
+        }
+        self.row = lambda model: {
+            "best_theta": float(self.best(model).theta),
+            "iterations": self.best(model).steps,
+            "iterations_at_0.6": 1,
+        }
+
+
+@pytest.mark.parametrize(("shift", "verdict"), [(0.05, True), (0.4, False)])
+def test_whether_one_theta_serves_is_found_out(shift, verdict):
+    valley = lambda best: lambda theta: 20 + 400 * (theta - best) ** 2
+    models = [Model(friction=Fraction(k, 10)) for k in (1, 2)]
+    steps = {models[0].friction: valley(0.5), models[1].friction: valley(0.5 + shift)}
+    sweeps = Made(steps)
+    assert sweeps.best(models[0]) == Best(theta=Fraction(1, 2), steps=20)
+    assert section_6._one_theta(sweeps, {"a reading": models}, "both").holds is verdict
+
+
+def test_readings_that_differ_decide_nothing():
+    assert section_6._all_or_none([True, True]) is True
+    assert section_6._all_or_none([False, False]) is False
+    assert section_6._all_or_none([True, False]) is None
+
+
+def ends(residual_slow, residual_fast, steps_in_tpa):
+    at = lambda steps, residual: Stopped(steps=steps, residual=residual, error=residual)
+    return {
+        (section_6.SLOW, "MPa"): at(300, residual_slow),
+        (section_6.SLOW, "TPa"): at(300, residual_slow),
+        (section_6.FAST, "MPa"): at(20, residual_fast),
+        (section_6.FAST, "TPa"): at(steps_in_tpa, residual_fast),
+    }
+
+
+@pytest.mark.parametrize(
+    ("runs", "verdict"),
+    [
+        (ends(9e-10, 8e-10, 20), True),
+        (ends(2e-8, 8e-10, 20), False),  # a small theta stops earlier
+        (ends(9e-10, 8e-10, 14), False),  # the unit of force changes the number of steps
+    ],
+)
+def test_a_test_measures_the_error_if_neither_theta_nor_the_unit_matters(runs, verdict):
+    assert section_6._verdict_on_test(PRINTED, runs, 1.0).holds is verdict
+
+
+def test_the_increment_test_hides_the_factor_one_over_theta(seen):
+    runs = seen["sec-6.3-stop"][0].data["runs"]
+    slow = runs["theta 0.05, MPa"]
+    # the last increment is at most 1e-9, and theta times the residual before it
+    assert 0.9e-9 / 0.05 < slow["residual"] < 1e-9 / 0.05
+    assert slow["error"] > 10e-9
+
+
+def test_a_global_solution_gives_the_zones(seen):
+    contact = solve(Model(halvings=2).problem).contact
+    told = seen["fig-5"][0].data["readings"][0]["zones"]
+    assert section_6.zones(contact.x, contact.state) == told

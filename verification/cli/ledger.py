@@ -1,0 +1,104 @@
+"""The command verify."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from verification.cli.console import heading, note, plain, say, stages, table
+from verification.cli.problems import FOLDER, JSON
+
+if TYPE_CHECKING:
+    from verification.ledger import Ledger, Row
+
+
+@click.command()
+@click.argument("ids", nargs=-1, metavar="[ID]...")
+@click.option(
+    "--level",
+    type=click.Choice(["quick", "full"]),
+    default="quick",
+    show_default=True,
+    help="How many problems the discrete evidence takes: within a minute, or within twenty.",
+)
+@FOLDER
+@JSON
+def verify(ids: tuple[str, ...], level: str, folder: Path | None, as_json: bool) -> int:
+    """Check every numbered statement of the paper, or those named by ID.
+
+    Each gets a verdict that was earned: by exact arithmetic, by the units of both sides, on random problems, or as a
+    definition.  Exit status 1 if one differs from its recorded verdict.
+
+    \b
+    Examples:
+      ndtheory verify
+      ndtheory verify 5.30 prop-5.6.1 C5
+      ndtheory verify --level full -o ledger
+    """
+    from ndtheory.statements import statements
+    from verification.ledger import verify as check
+    from verification.output import Folder
+
+    known = statements()
+    for id in ids:
+        if id not in known:
+            near = get_close_matches(id, known, n=3) or list(known)[:3]
+            context = click.get_current_context()
+            raise click.UsageError(f"{id!r}: no such statement; needed one like {', '.join(near)}", context)
+    target = None if folder is None else Folder(folder, "verify")
+    with stages() as watch:
+        found = check(ids, level="full" if level == "full" else "quick", watch=watch)
+    if as_json:
+        say(found.to_json())
+    elif ids:
+        for row in found.rows:
+            _row(row)
+    else:
+        _summary(found)
+    if target is not None:
+        target.write_ledger(found)
+    return 1 if found.changed else 0
+
+
+def _summary(found: Ledger) -> None:
+    from verification.ledger.sheets import FAULTS, WORDS
+
+    say(f"Bayada, Sabil, Sassi (2008), statement by statement | {len(found.rows)} rows | {found.level}")
+    heading("WHAT STANDS?")
+    table([["verdict", "rows", "means"], *([v, str(n), WORDS[v]] for v, n in found.counts().items())], right=[1])
+    heading("WHAT IS WRONG IN THE PAPER?")
+    for fault, name in FAULTS.items():
+        rows = [row for row in found.rows if row.statement.fault == fault]
+        if rows:
+            note(f"{name.lower()}: {', '.join(row.statement.id for row in rows)}", "  ")
+    if found.changed:
+        heading("WHAT HAS CHANGED?")
+        changed = [[row.statement.id, row.recorded or "-", row.verdict] for row in found.changed]
+        table([["statement", "recorded", "now"], *changed])
+    say()
+    say("Not claimed: that a numerical row is proved, or a proof beyond what it leans on.")
+    say("Next: ndtheory verify 5.30")
+
+
+def _row(row: Row) -> None:
+    s = row.statement
+    changed = f" (recorded: {row.recorded})" if row.changed else ""
+    heading(f"{s.id}  {plain(s.title)}: {row.verdict}{changed}")
+    note(plain(s.claims), "  ")
+    if s.fault:
+        note(f"{s.fault}: {plain(s.wrong)}", "  ")
+        note(f"repaired: {plain(s.repair)}", "  ")
+        note(f"because: {plain(s.proof)}", "  ")
+    if s.leans_on:
+        note(f"leans on {', '.join(s.leans_on)}", "  ")
+    for e in row.evidence:
+        holds = {True: "holds", False: "fails", None: "undecided"}[e.holds]
+        note(f"{e.method}, {e.of}: {holds}.  {plain(e.text)}", "  ")
+        at = e.data.get("counterexample")
+        if at:
+            note("at " + ", ".join(f"{name} = {value}" for name, value in at.items()), "    ")
+    if s.note:
+        note(plain(s.note), "  ")

@@ -1,0 +1,374 @@
+"""What Section 5 compares: the difference of two solutions of steps I and II for two forces psi and psi~.
+
+"1" is the contact body and "2" the Neumann body, whatever their numbers in the file.  Pairs come from two sources:
+forces pushed through steps I and II, and directions on the affine pieces of T (:mod:`verification.jacobian`), each of
+which is had for suitable loads.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+
+from fem1d2d.mesh import Floats
+from verification.contact import ContactError, ContactSolution
+from verification.contact.active_set import Pattern
+from verification.iteration import FixedPointMap
+from verification.jacobian import Piece
+from verification.losses import Forms, square, top
+from verification.pair import Body, Pair
+from verification.search import worst_piece
+
+#: Distances of two random forces, over their size.
+DISTANCES = (0.1, 0.3, 1.0, 3.0)
+
+#: Random directions on each piece, beside the worst ones.
+RANDOM_DIRECTIONS = 2
+
+
+def lifted_energy(body: Body) -> Floats:
+    """``R_a' A_a R_a`` from the lifted fields: ``a^a(R phi, R chi)`` on the interface.
+
+    It equals the Schur complement because the lift is a-harmonic, which is used nowhere here.
+    """
+    elastic, A = body.elastic, body.stiffness
+    inside, interface, lift = elastic.inside, elastic.interface, elastic.lift
+    cross = A[interface][:, inside] @ lift
+    return np.asarray(A[interface][:, interface].toarray() + cross + cross.T + lift.T @ (A[inside][:, inside] @ lift))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Setting:
+    """A problem with the matrices in which its differences are measured.
+
+    Attributes
+    ----------
+    pair : Pair
+        No contact node is held.
+    """
+
+    pair: Pair
+
+    @cached_property
+    def forms(self) -> Forms:
+        """Gram matrices and the forms on the pieces of T."""
+        return Forms(self.pair)
+
+    @cached_property
+    def bilinear_1(self) -> Floats:
+        """``a^1(R phi, R chi)`` from the lifted fields."""
+        return self._turned(lifted_energy(self.pair.contact.body))
+
+    @cached_property
+    def bilinear_2(self) -> Floats:
+        """``a^2(R phi, R chi)`` from the lifted fields."""
+        return self._turned(lifted_energy(self.pair.neumann.body))
+
+    def _turned(self, matrix: Floats) -> Floats:
+        return self.pair.orient(self.pair.orient(matrix).T)
+
+    @cached_property
+    def coordinates(self) -> Floats:
+        """The matrix that turns a force into coordinates whose Euclidean norm is (5.21)."""
+        return np.asarray(self.forms.root.T @ self.forms.inverse)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Difference:
+    """The difference of two solutions of steps I and II.
+
+    Attributes
+    ----------
+    setting : Setting
+    force, reaction : array, shape (2 n,)
+        ``psi - psi~`` and ``T psi - T psi~``, nodal forces.
+    d_1, d_2 : array, shape (2 n,)
+        Traces of ``w^1 - w~^1`` and ``w^2 - w~^2``, unit of length.
+    friction : float
+        The friction term, left side of (5.13); an energy.
+    size : float
+        The energies from which the difference was formed: what rounding is relative to.
+    """
+
+    setting: Setting
+    force: Floats
+    reaction: Floats
+    d_1: Floats
+    d_2: Floats
+    friction: float
+    size: float
+
+    @cached_property
+    def size_1(self) -> float:
+        """``|w^1 - w~^1|_1`` in H1."""
+        return _norm(self.d_1, self.setting.forms.N_1)
+
+    @cached_property
+    def size_2(self) -> float:
+        """``|w^2 - w~^2|_2`` in H1."""
+        return _norm(self.d_2, self.setting.forms.N_2)
+
+    @cached_property
+    def norm(self) -> float:
+        """``|||psi - psi~|||`` (5.21)."""
+        return _norm(self.force, self.setting.forms.inverse)
+
+    @cached_property
+    def dual(self) -> float:
+        """The norm of psi - psi~ in the dual of V^2."""
+        return _norm(self.force, self.setting.forms.dual)
+
+    @cached_property
+    def norm_T(self) -> float:
+        """``|||T psi - T psi~|||`` (5.21)."""
+        return _norm(self.reaction, self.setting.forms.inverse)
+
+    @cached_property
+    def dual_T(self) -> float:
+        """The norm of T psi - T psi~ in the dual of V^2."""
+        return _norm(self.reaction, self.setting.forms.dual)
+
+    @cached_property
+    def energy_1(self) -> float:
+        """``a^1(w^1 - w~^1, w^1 - w~^1)``."""
+        return float(self.d_1 @ self.setting.bilinear_1 @ self.d_1)
+
+    @cached_property
+    def mixed_1(self) -> float:
+        """``a^1(w^1 - w~^1, R_D^1 (w^2 - w~^2))``."""
+        return float(self.d_1 @ self.setting.bilinear_1 @ self.d_2)
+
+    @cached_property
+    def lift_T(self) -> Floats:
+        """The trace of ``R^2 (T psi - T psi~)`` (5.20)."""
+        return self.setting.pair.neumann.flexibility(self.reaction)
+
+    @cached_property
+    def inner(self) -> float:
+        """``a^2(R^2 (T psi - T psi~), R^2 (psi - psi~))``."""
+        return float(self.lift_T @ self.setting.bilinear_2 @ self.setting.pair.neumann.flexibility(self.force))
+
+    @cached_property
+    def mixed_2(self) -> float:
+        """``a^2(R^2 (T psi - T psi~), w^2 - w~^2)``."""
+        return float(self.lift_T @ self.setting.bilinear_2 @ self.d_2)
+
+    @cached_property
+    def work(self) -> float:
+        """``<T psi - T psi~, w^2 - w~^2>``."""
+        return float(self.reaction @ self.d_2)
+
+    @cached_property
+    def step(self) -> float:
+        """``|||psi - T psi - (psi~ - T psi~)|||``: the difference of the unrelaxed steps."""
+        return _norm(self.force - self.reaction, self.setting.forms.inverse)
+
+    def relaxed(self, theta: float) -> float:
+        """``|||T_theta psi - T_theta psi~|||`` (5.7)."""
+        return _norm(theta * self.reaction + (1 - theta) * self.force, self.setting.forms.inverse)
+
+
+def _norm(v: Floats, gram: Floats) -> float:
+    return math.sqrt(max(float(v @ gram @ v), 0.0))
+
+
+# --- two forces pushed through steps I and II
+
+
+def between(setting: Setting, psi: Floats, other: Floats) -> Difference:
+    """The difference of the solutions for two forces.
+
+    Raises
+    ------
+    ContactError
+    """
+    pair, t, forms = setting.pair, setting.pair.tangential.stop, setting.forms
+    solutions, states, stress, size = [], [], [], 0.0
+    for force in (psi, other):
+        u, solution = _solve(pair, force)
+        w_1 = u + solution.v
+        w_1[pair.normal] += pair.gap
+        parts = ((w_1, pair.contact.stiffness), (force + pair.neumann.load, forms.inverse))
+        size += sum(_norm(v, gram) ** 2 for v, gram in (*parts, (solution.force, forms.inverse)))
+        solutions.append(solution)
+        states.append(u)
+        stress.append(_stress(pair, force))
+    weights = float(pair.problem.contact.friction) * pair.weights[:t]  # t = 0 in one dimension
+    bounds = [np.abs(value)[:t] for value in stress]
+    slips = [np.abs(solution.v[:t]) for solution in solutions]
+    d_2 = states[0] - states[1]
+    return Difference(
+        setting=setting,
+        force=psi - other,
+        reaction=solutions[0].force - solutions[1].force,
+        d_1=d_2 + solutions[0].v - solutions[1].v,
+        d_2=d_2,
+        friction=-float(weights @ ((bounds[0] - bounds[1]) * (slips[0] - slips[1]))),
+        size=size + float(weights @ ((bounds[0] + bounds[1]) * (slips[0] + slips[1]))),
+    )
+
+
+def _solve(pair: Pair, force: Floats) -> tuple[Floats, ContactSolution]:
+    try:
+        return FixedPointMap(pair, "active-set")(force)
+    except ContactError:
+        return FixedPointMap(pair, "cvxpy")(force)
+
+
+def _stress(pair: Pair, force: Floats) -> Floats:
+    """``S sigma_N`` at the nodes."""
+    return np.zeros(pair.n) if pair.regularisation is None else np.asarray(pair.regularisation @ force[pair.normal])
+
+
+def random_pairs(setting: Setting, random: np.random.Generator, count: int) -> Iterator[Difference]:
+    """Forces from a tenth to ten times those that the loads bring up, at several distances; every second one presses.
+
+    Parameters
+    ----------
+    setting : Setting
+    random : Generator
+    count : int
+    """
+    pair = setting.pair
+    root = setting.forms.root
+    size = max(pair.neumann.dual_norm(side.load) for side in (pair.neumann, pair.contact)) or 1.0
+    for i in range(count):
+        psi, step = (root @ random.standard_normal(root.shape[1]) / math.sqrt(root.shape[1]) for _ in range(2))
+        psi *= size * 10 ** random.uniform(-1, 1)
+        other = psi + step * DISTANCES[i % len(DISTANCES)] * pair.neumann.dual_norm(psi)
+        if i % 2:
+            for force in (psi, other):
+                force[pair.normal] = np.abs(force[pair.normal])
+        yield between(setting, psi, other)
+
+
+# --- directions on the pieces of T
+
+
+def along(setting: Setting, piece: Piece, y: Floats) -> Difference:
+    """The difference on one piece of T in a direction ``psi - psi~ = L_2 y``."""
+    forms = setting.forms
+    root, t = forms.root, setting.pair.tangential.stop
+    force = root @ y
+    d_2 = forms.inverse @ force
+    jump = piece.jump @ force
+    reaction = piece.force @ force
+    bound, slip = piece.bound @ force, piece.pattern.sliding * jump[:t]
+    parts = (
+        (d_2 + jump, setting.pair.contact.stiffness),
+        (d_2, setting.pair.contact.stiffness),
+        (force, forms.inverse),
+        (reaction, forms.inverse),
+    )
+    return Difference(
+        setting=setting,
+        force=force,
+        reaction=reaction,
+        d_1=d_2 + jump,
+        d_2=d_2,
+        friction=-float(bound @ slip),
+        size=sum(_norm(v, gram) ** 2 for v, gram in parts) + float(np.abs(bound) @ np.abs(slip)),
+    )
+
+
+def work_form(forms: Forms, piece: Piece) -> Floats:
+    """The work ``<T psi - T psi~, w^2 - w~^2>`` as a quadratic form in y."""
+    form = forms.d_2.T @ forms.force(piece)
+    return np.asarray(form + form.T) / 2
+
+
+def uniform_piece(pair: Pair, *, touching: bool, sliding: int) -> Piece:
+    """The piece on which every node does the same; ``S sigma_N > 0``."""
+    t = pair.tangential.stop
+    pattern = Pattern(touching=np.full(pair.n, touching), sliding=np.full(t, sliding, dtype=np.int8))
+    still: NDArray[np.bool_] = np.zeros(pair.n, dtype=bool)
+    return Piece(pair=pair, pattern=pattern, sign=_signs(pair), still=still)
+
+
+def _signs(pair: Pair) -> NDArray[np.int8]:
+    rubs = bool(pair.problem.contact.friction and pair.regularisation is not None)
+    return np.full(pair.tangential.stop, int(rubs), dtype=np.int8)
+
+
+def pieces(setting: Setting, random: np.random.Generator, *, starts: int) -> list[Piece]:
+    """Pieces of T on which an inequality comes close to equality.
+
+    All nodes stick, all are open and slide one way, and the worst of a search for the largest friction term, the
+    largest ``|||T psi - T psi~|||`` and the largest work.
+
+    Parameters
+    ----------
+    setting : Setting
+    random : Generator
+    starts : int
+        Of each search; 0 leaves the searches out.
+    """
+    pair, forms = setting.pair, setting.forms
+    friction = bool(pair.problem.contact.friction)
+    found = [uniform_piece(pair, touching=True, sliding=0 if friction else 1)]
+    found.append(uniform_piece(pair, touching=False, sliding=1))
+    objectives = [
+        lambda piece: top(square(forms.force(piece), forms.inverse)),
+        lambda piece: top(work_form(forms, piece)),
+    ]
+    if friction:
+        objectives.append(lambda piece: top(forms.friction(piece)))
+    if starts:
+        found += [worst_piece(pair, measure, random=random, starts=starts).piece for measure in objectives]
+    return found
+
+
+def directions(setting: Setting, piece: Piece, random: np.random.Generator) -> list[Floats]:
+    """Directions on a piece: the worst ones of the pencils of Section 5, and random ones.
+
+    Parameters
+    ----------
+    setting : Setting
+    piece : Piece
+    random : Generator
+    """
+    forms = setting.forms
+    T, work, F = forms.force(piece), work_form(forms, piece), forms.friction(piece)
+    size_1, size_2 = square(forms.d_1(piece), forms.N_1), square(forms.d_2, forms.N_2)
+    dual, one = square(forms.root, forms.dual), np.eye(len(F))
+    square_T = square(T, forms.inverse)
+    pencils = [
+        (size_1, size_2),
+        (square_T, one),
+        (square(T, forms.dual), dual),
+        (size_2, dual),
+        (one, dual),
+        (dual, one),
+        (work, one),
+        (square_T + 2 * work, one),  # T_theta at theta = 1/2
+    ]
+    if setting.pair.problem.contact.friction:
+        # 2 |x| |y| <= |x|^2/r + r |y|^2 with equality at r = |x|/|y|: (5.13) where |x|/|y| is the largest there is
+        r = math.sqrt(max(top(size_1, size_2), 1e-12))
+        pencils += [(F, one), (F, size_1 / (2 * r) + (1 + r / 2) * size_2)]
+    worst = [eigh(form, against, subset_by_index=[len(F) - 1] * 2)[1][:, 0] for form, against in pencils]
+    return worst + [random.standard_normal(len(F)) for _ in range(RANDOM_DIRECTIONS)]
+
+
+def draw_pairs(setting: Setting, random: np.random.Generator, *, starts: int, realised: int) -> Iterator[Difference]:
+    """Pairs of one problem from both sources.
+
+    Parameters
+    ----------
+    setting : Setting
+    random : Generator
+    starts : int
+        Of each search over pieces.
+    realised : int
+        Pairs of random forces.
+    """
+    yield from random_pairs(setting, random, realised)
+    for piece in pieces(setting, random, starts=starts):
+        for y in directions(setting, piece, random):
+            yield along(setting, piece, y)

@@ -1,0 +1,77 @@
+"""What a check of a statement found, and the verdict that follows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+Method = Literal["symbolic", "dimension", "discrete", "reading"]
+Verdict = Literal["PROVED", "REPAIRED", "REFUTED", "NUMERICAL", "ASSUMED", "INCONCLUSIVE"]
+
+#: Strongest first.
+METHODS: tuple[Method, ...] = ("symbolic", "dimension", "discrete", "reading")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evidence:
+    """One piece of evidence.
+
+    Attributes
+    ----------
+    method : {'symbolic', 'dimension', 'discrete', 'reading'}
+        Exact arithmetic over all admissible values; units on both sides; floating point on random problems; a
+        definition or a cited result.
+    of : {'printed', 'step', 'repaired'}
+        What was checked: the statement as printed, the step by which the paper reaches it, or its repaired form.
+    holds : bool or None
+        None where the check could not decide.
+    text : str
+        What was checked and found.
+    data : mapping
+        What it takes to run it again: an exact counterexample, or seed, cases, worst ratio and where.
+    """
+
+    method: Method
+    of: Literal["printed", "step", "repaired"]
+    holds: bool | None
+    text: str
+    data: Mapping[str, Any] = field(default_factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """An entry of ``evidence`` in ``ndtheory.ledger/1``."""
+        return {
+            "method": self.method,
+            "of": self.of,
+            "holds": self.holds,
+            "text": self.text,
+            **({"data": dict(self.data)} if self.data else {}),
+        }
+
+
+def settle(evidence: Sequence[Evidence]) -> tuple[Verdict, Method | None]:
+    """The verdict on a statement, and the method that decided it.
+
+    A printed form or a step that fails makes the statement REPAIRED where a repaired form is proved in exact
+    arithmetic or rests on a definition, else REFUTED.  Floating point proves nothing: at best it is NUMERICAL.
+
+    Examples
+    --------
+    >>> seen = Evidence(method="discrete", of="printed", holds=True, text="ratio <= 0.4 in 100 cases")
+    >>> settle([seen])
+    ('NUMERICAL', 'discrete')
+    """
+    ordered = sorted(evidence, key=lambda e: METHODS.index(e.method))
+    broken = [e for e in ordered if e.holds is False and e.of != "repaired"]
+    if any(e.holds is False for e in ordered if e.of == "repaired"):
+        return "INCONCLUSIVE", ordered[0].method
+    if broken:
+        mended = any(e.holds and e.of == "repaired" and e.method != "discrete" for e in ordered)
+        return ("REPAIRED" if mended else "REFUTED"), broken[0].method
+    stands = [e for e in ordered if e.holds and e.method != "dimension"]
+    if any(e.holds is None for e in ordered) and not any(e.method == "symbolic" for e in stands):
+        return "INCONCLUSIVE", next(e.method for e in ordered if e.holds is None)
+    if not stands:
+        return "INCONCLUSIVE", None
+    verdicts: dict[Method, Verdict] = {"symbolic": "PROVED", "discrete": "NUMERICAL", "reading": "ASSUMED"}
+    return verdicts[stands[0].method], stands[0].method

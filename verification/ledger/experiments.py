@@ -1,0 +1,583 @@
+"""The numerical results of Section 6, on the model that can be read from the text.
+
+What the text leaves open is assumed and named: where the upper body sits, how its top is held, the kernel of S, the
+mesh (matching grids, so that the numbers of nodes are near the paper's 60, 190, 666, 2482 and not equal to them), which
+body gets the Neumann problem (Sections 3 and 6 differ).  Nothing is tuned.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cache
+from itertools import groupby
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from fem1d2d.mesh import Floats
+from verification.bodies import build
+from verification.contact import ContactError
+from verification.iteration import FixedPointMap
+from verification.ledger.evidence import Evidence
+from verification.measured import measure
+from verification.monolithic import solve
+from verification.pair import Pair
+from verification.problem import Problem, load
+from verification.runs import run
+from verification.threads import one_thread
+
+Level = Literal["quick", "full"]
+Neumann = Literal[1, 2]
+Top = Literal["held", "free"]
+
+#: The test of Section 6.3.
+STOP = 1e-9
+
+#: Beyond so many steps a theta is no candidate for the best one.
+MOST_STEPS = 150
+
+#: A run without a new least residual over so many steps does not arrive.
+PATIENCE = 40
+
+#: theta moves in such steps; a best theta that moves by no more has not moved.
+STEP = Fraction(1, 20)
+
+#: Results are the same below this relative difference.
+SAME = 1e-8
+
+#: Where the upper body, 1.2 long, may sit on the lower one, 2 long.
+GEOMETRIES = {
+    "centred": (Fraction(2, 5), Fraction(8, 5)),
+    "left edges aligned": (Fraction(0), Fraction(6, 5)),
+    "right edges aligned": (Fraction(4, 5), Fraction(2)),
+}
+#: Those whose best theta is asked for; the third mirrors the second.
+TWO = ("centred", "left edges aligned")
+
+#: Radius of the kernel of S: at least the width of a cell of every mesh.
+RADIUS = Fraction(1, 5)
+
+HARD, SOFT = Fraction(70000), Fraction(20000)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Model:
+    """A reading of Section 6.1.
+
+    Attributes
+    ----------
+    geometry : str
+    neumann : {1, 2}
+        1 as in Section 6, 2 as in Section 3.
+    young : pair of Fraction
+        E1 of the lower, E2 of the upper body, MPa.
+    friction : Fraction
+    halvings : int
+        Of the mesh with 10 x 2 and 6 x 2 cells, 54 nodes.
+    top : 'held' or 'free'
+        Whether u_x = 0 on the top.
+    """
+
+    geometry: str = "centred"
+    neumann: Neumann = 1
+    young: tuple[Fraction, Fraction] = (HARD, SOFT)
+    friction: Fraction = Fraction(1, 5)
+    halvings: int = 1
+    top: Top = "held"
+
+    @property
+    def problem(self) -> Problem:
+        """The problem, from the built-in file."""
+        base = load(Path(__file__).parents[1] / "data" / "section6.toml")
+        side, down = (Fraction(0) if self.top == "held" else None), base.body2.prescribed["top"][1]
+        lower = replace(base.body1, cells=(10, 2), young=self.young[0])
+        upper = replace(
+            base.body2, x=GEOMETRIES[self.geometry], cells=(6, 2), young=self.young[1], prescribed={"top": (side, down)}
+        )
+        contact = replace(base.contact, friction=self.friction, radius=RADIUS)
+        iteration = replace(base.iteration, neumann_body=self.neumann)
+        return replace(base, body1=lower, body2=upper, contact=contact, iteration=iteration).refined(self.halvings)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Count:
+    """Steps to the stopping test, and to the same bound on the unrelaxed residual; fractions by interpolation.
+
+    None where it was not reached in ``MOST_STEPS``.
+    """
+
+    increment: float | None
+    residual: float | None
+
+
+def steps_to(values: Sequence[float], bound: float = STOP) -> float | None:
+    """Where a sequence first falls to a bound, interpolated logarithmically, so that no two thetas tie."""
+    for n, value in enumerate(values):
+        if value <= bound:
+            if n == 0 or value <= 0:
+                return float(n)
+            before = values[n - 1]
+            return n - 1 + math.log(before / bound) / math.log(before / value)
+    return None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Trace:
+    """A run of (4.9) from g = 0, with the Euclidean norms of Section 6.3.
+
+    Attributes
+    ----------
+    g : list of array
+        g_0, g_1, ..
+    increments, residuals : list of float
+        ``|g_n - g_{n-1}|/|g_n|`` from n = 1 on, ``|T g_n - g_n|/|T g_n|`` from n = 0 on.
+    """
+
+    g: list[Floats]
+    increments: list[float]
+    residuals: list[float]
+
+    def stop(self, bound: float = STOP, *, absolute: bool = True) -> int | None:
+        """n at which the printed test stops."""
+        for n, relative in enumerate(self.increments, 1):
+            if relative < bound or (absolute and float(np.linalg.norm(self.g[n] - self.g[n - 1])) < bound):
+                return n
+        return None
+
+
+def trace(pair: Pair, theta: float, steps: int = MOST_STEPS, bound: float = STOP) -> Trace:
+    """Run until the relative increment and the unrelaxed residual are at most a bound, or wander about."""
+    T, size = FixedPointMap(pair, "active-set"), lambda force: float(np.linalg.norm(force))
+    g = np.zeros(len(pair.neumann.load))
+    result = Trace(g=[g], increments=[], residuals=[])
+    least, since = math.inf, 0
+    for _ in range(steps + 1):
+        try:
+            image = T(g)[1].force
+        except ContactError:
+            image = FixedPointMap(pair)(g)[1].force
+        result.residuals.append(size(image - g) / size(image) if image.any() else math.inf)
+        least, since = min(least, result.residuals[-1]), since + 1 if result.residuals[-1] >= least else 0
+        small = bool(result.increments) and result.increments[-1] <= bound and result.residuals[-1] <= bound
+        if small or since > PATIENCE:
+            break
+        following = theta * image + (1 - theta) * g
+        result.increments.append(size(following - g) / size(following) if following.any() else math.inf)
+        result.g.append(following)
+        g = following
+    return result
+
+
+class Sweeps:
+    """Numbers of steps over theta, each counted once.
+
+    Parameters
+    ----------
+    level : {'quick', 'full'}
+    """
+
+    def __init__(self, level: Level) -> None:
+        self.level = level
+        self.pair = cache(lambda model: build(model.problem))
+        self.rho = cache(lambda model: rho_of(self.pair(model)))
+        self.counts = cache(self._counts)
+
+    @property
+    def halvings(self) -> int:
+        """Of the mesh on which models are compared."""
+        return 1 if self.level == "quick" else 2
+
+    @property
+    def thetas(self) -> list[Fraction]:
+        """0.05 to 0.95; full halves the steps."""
+        step = STEP if self.level == "quick" else STEP / 2
+        return [n * step for n in range(1, int(1 / step))]
+
+    def _counts(self, model: Model) -> dict[Fraction, Count]:
+        """Outward from 2/(2 + rho); what takes more than twice the fewest steps so far is not followed to its end.
+
+        Quick goes on in either direction until that happens, full tries every theta.
+        """
+        start, result = 2 / (2 + self.rho(model)), {}
+        limit, arrived = MOST_STEPS, False
+        for side in ([t for t in self.thetas if t > start], [t for t in reversed(self.thetas) if t <= start]):
+            for theta in side:
+                seen = trace(self.pair(model), float(theta), limit)
+                count = Count(increment=steps_to([math.inf, *seen.increments]), residual=steps_to(seen.residuals))
+                result[theta] = count
+                if count.increment is not None and count.residual is not None:
+                    limit = min(limit, math.ceil(2 * max(count.increment, count.residual)) + 5)
+                    arrived = True
+                elif arrived and self.level == "quick":
+                    break
+        return result
+
+    def best(self, model: Model, test: Literal["increment", "residual"] = "increment") -> Best | None:
+        """The theta of fewest steps; None where none arrives."""
+        steps = {t: n for t, c in self.counts(model).items() if (n := getattr(c, test)) is not None}
+        if not steps:
+            return None
+        theta = min(steps, key=steps.__getitem__)
+        return Best(theta=theta, steps=math.ceil(steps[theta] - 1e-6))
+
+    def at(self, model: Model, theta: Fraction) -> int | None:
+        """Steps of the printed test, or None."""
+        return trace(self.pair(model), float(theta)).stop(absolute=False)
+
+    def serves(self, models: Sequence[Model]) -> tuple[Fraction, float]:
+        """The one theta that costs least, and by which factor at worst it takes more steps than the best of a model."""
+        factors = {}
+        for theta in self.thetas:
+            costs = []
+            for model in models:
+                steps = {t: c.increment for t, c in self.counts(model).items() if c.increment is not None}
+                costs.append(steps[theta] / min(steps.values()) if theta in steps else math.inf)
+            factors[theta] = max(costs)
+        theta = min(factors, key=factors.__getitem__)
+        return theta, factors[theta]
+
+    def row(self, model: Model) -> dict[str, Any]:
+        """Figures of a model."""
+        best, unrelaxed, rho = self.best(model), self.best(model, "residual"), self.rho(model)
+        pair = self.pair(model)
+        return {
+            "geometry": model.geometry,
+            "neumann_body": model.neumann,
+            "E1": float(model.young[0]),
+            "E2": float(model.young[1]),
+            "friction": float(model.friction),
+            "nodes": sum(len(body.mesh.points) for body in (pair.body1, pair.body2)),
+            "best_theta": None if best is None else float(best.theta),
+            "iterations": None if best is None else best.steps,
+            "best_theta_residual": None if unrelaxed is None else float(unrelaxed.theta),
+            "iterations_residual": None if unrelaxed is None else unrelaxed.steps,
+            "iterations_at_0.6": self.at(model, Fraction(3, 5)),
+            "rho": _figure(rho),
+            "predicted_theta": _figure(2 / (2 + rho)),
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Best:
+    """The best of the thetas tried."""
+
+    theta: Fraction
+    steps: int
+
+
+def rho_of(pair: Pair) -> float:
+    """rho of the roles."""
+    rho = measure(pair).rho_max
+    assert rho is not None
+    return rho.value
+
+
+def _figure(value: float, digits: int = 6) -> float:
+    return float(f"{value:.{digits - 1}e}")
+
+
+def _evidence(of: Any, holds: bool | None, text: str, **data: Any) -> Evidence:
+    assumed = {"radius": float(RADIUS), "law": "nonlocal"}
+    return Evidence(method="discrete", of=of, holds=holds, text=text, data={"assumed": assumed, **data})
+
+
+def _all_or_none(answers: Collection[bool]) -> bool | None:
+    """What every reading says; None where they differ."""
+    return None if len(set(answers)) > 1 else next(iter(answers))
+
+
+# The rows.
+
+
+def _same_results(sweeps: Sweeps) -> list[Evidence]:
+    """6.2: the run against the global method."""
+    apart = {}
+    for geometry in GEOMETRIES:
+        for neumann, young in ((1, (HARD, SOFT)), (2, (SOFT, HARD))):
+            problem = Model(geometry=geometry, neumann=neumann, young=young, halvings=sweeps.halvings).problem  # type: ignore[arg-type]
+            problem = replace(problem, iteration=replace(problem.iteration, theta=Fraction(3, 5), tolerance=1e-12))
+            apart[f"{geometry}, body {neumann} Neumann"] = difference(build(problem))
+    worst = max(apart, key=apart.__getitem__)
+    data = {"readings": list(apart), "limit": SAME}
+    if apart[worst] <= SAME:
+        text = f"stresses of runs at theta = 0.6 and of the global method agree to {SAME:g} in {len(apart)} readings"
+        return [_evidence("printed", True, text, **data)]
+    text = f"a stress of the run is off by {apart[worst]:.3g} of the largest one ({worst})"
+    return [_evidence("printed", False, text, worst=_figure(apart[worst], 3), where=worst, **data)]
+
+
+def difference(pair: Pair) -> float:
+    """Largest difference of nodal stress between run and global method, relative to the largest stress."""
+    one, other = run(pair, solver="active-set").contact, solve(pair).contact
+    size = float(max(np.abs(other.pressure).max(), np.abs(other.shear).max()))
+    apart = max(float(np.abs(one.pressure - other.pressure).max()), float(np.abs(one.shear - other.shear).max()))
+    return apart / size
+
+
+def zones(x: Floats, states: Sequence[str]) -> list[dict[str, Any]]:
+    """Runs of nodes in one state, with x from the left end of the interface.
+
+    Examples
+    --------
+    >>> zones(np.array([1.0, 1.5, 2.0]), ["slip", "stick", "stick"])
+    [{'state': 'slip', 'from': 0.0, 'to': 0.0}, {'state': 'stick', 'from': 0.5, 'to': 1.0}]
+    """
+    result, first = [], 0
+    for state, members in groupby(states):
+        last = first + len(list(members)) - 1
+        result.append({"state": state, "from": _figure(float(x[first] - x[0])), "to": _figure(float(x[last] - x[0]))})
+        first = last + 1
+    return result
+
+
+def as_printed(found: Sequence[Mapping[str, Any]], width: float) -> bool:
+    """Whether zones are stick up to 0.6, slip up to 1, open beyond, within the width of a cell."""
+    if [zone["state"] for zone in found] != ["stick", "slip", "open"]:
+        return False
+    return bool(abs(found[0]["to"] - 0.6) <= width and abs(found[1]["to"] - 1.0) <= width)
+
+
+def _zones(sweeps: Sweeps) -> list[Evidence]:
+    """Figure 5."""
+    readings: list[dict[str, Any]] = []
+    agree = []
+    tops: tuple[Top, ...] = ("held", "free")
+    for geometry in GEOMETRIES:
+        for top in tops:
+            problem = Model(geometry=geometry, top=top, halvings=sweeps.halvings + 1).problem
+            contact = solve(problem).contact
+            found = zones(contact.x, contact.state)
+            readings.append({"geometry": geometry, "u_x on the top": top, "zones": found})
+            if as_printed(found, float(np.diff(contact.x).max())):
+                agree.append(f"{geometry}, top {top}")
+    opened = [r["geometry"] for r in readings if any(zone["state"] == "open" for zone in r["zones"])]
+    told = "; ".join(f"{r['geometry']}, top {r['u_x on the top']}: {_tell(r['zones'])}" for r in readings)
+    closest = "as printed in " + ", ".join(agree) if agree else "as printed in none"
+    where = "the position of the upper body is not in the text"
+    text = f"{where}; {closest}, open somewhere in {len(opened)} of {len(readings)} readings: {told}"
+    return [_evidence("printed", None, text, readings=readings)]
+
+
+def _tell(found: Sequence[Mapping[str, Any]]) -> str:
+    return ", ".join(f"{zone['state']} {zone['from']:.3g} to {zone['to']:.3g}" for zone in found)
+
+
+#: A theta serves several models if none takes more than this many times its own fewest steps.
+SERVES = 1.25
+
+#: The mesh does not matter much if the fewest steps differ by no more than this factor.
+ALIKE = 1.5
+
+
+def _one_theta(sweeps: Sweeps, families: Mapping[str, Sequence[Model]], what: str) -> Evidence:
+    """Whether one theta serves all models of each reading."""
+    rows = {name: [sweeps.row(model) for model in models] for name, models in families.items()}
+    served = {name: sweeps.serves(models) for name, models in families.items()}
+    answers = {name: cost <= SERVES for name, (_, cost) in served.items()}
+    told = "; ".join(
+        f"{name}: best {', '.join(_number(row['best_theta']) for row in rows[name])}"
+        f" ({', '.join(_number(row['iterations']) for row in rows[name])} steps)"
+        + (f", theta = {float(theta):g} takes at most {cost:.3g} times as many" if math.isfinite(cost) else "")
+        for name, (theta, cost) in served.items()
+    )
+    unmet = [name for name, holds in answers.items() if not holds]
+    verdict = f"one theta serves {what}" if not unmet else f"no one theta serves {what}"
+    if unmet and len(unmet) < len(answers):
+        verdict += f" in {len(unmet)} of {len(answers)} readings"
+    criterion = f"one theta takes at most {SERVES:g} times the fewest steps of each, increment test at {STOP:g}"
+    data = {
+        "criterion": criterion,
+        "rows": rows,
+        "theta": {name: float(theta) if math.isfinite(cost) else None for name, (theta, cost) in served.items()},
+        "cost": {name: _figure(cost, 3) if math.isfinite(cost) else None for name, (_, cost) in served.items()},
+    }
+    return _evidence("printed", _all_or_none(list(answers.values())), f"{verdict}: {told}", **data)
+
+
+def _number(value: float | None) -> str:
+    return "none" if value is None else f"{value:g}"
+
+
+def _meshes(sweeps: Sweeps) -> list[Evidence]:
+    """Figure 10."""
+    halvings = range(3 if sweeps.level == "quick" else 4)
+    families = {name: [Model(geometry=name, halvings=h) for h in halvings] for name in TWO}
+    found = _one_theta(sweeps, families, "every mesh")
+    steps = [
+        [row["iterations"] for row in rows if row["iterations"] is not None] for rows in found.data["rows"].values()
+    ]
+    alike = all(len(counts) == len(halvings) and max(counts) <= ALIKE * min(counts) for counts in steps)
+    criterion = f"{found.data['criterion']}; the fewest steps differ by a factor of at most {ALIKE:g}"
+    return [replace(found, holds=found.holds if alike else False, data={**found.data, "criterion": criterion})]
+
+
+def _frictions(sweeps: Sweeps) -> list[Evidence]:
+    """Figure 11."""
+    values = (Fraction(1, 10), Fraction(1, 5), Fraction(2, 5))
+    families = {name: [Model(geometry=name, friction=k, halvings=sweeps.halvings) for k in values] for name in TWO}
+    return [_one_theta(sweeps, families, "k = 0.1, 0.2, 0.4")]
+
+
+def _moduli(sweeps: Sweeps) -> list[Evidence]:
+    """Figure 12."""
+    families: dict[str, list[Model]] = {}
+    roles: tuple[Neumann, ...] = (1, 2)
+    for name in TWO:
+        for neumann in roles:
+            families[f"{name}, body {neumann} Neumann"] = [
+                Model(geometry=name, neumann=neumann, young=young, halvings=sweeps.halvings)
+                for young in ((HARD, SOFT), (SOFT, SOFT), (SOFT, HARD))
+            ]
+    found = _one_theta(sweeps, families, "E1/E2 = 3.5, 1, 2/7")
+    rows = [row for rows in found.data["rows"].values() for row in rows]
+    fails = [name for name, rows in found.data["rows"].items() if any(r["iterations_at_0.6"] is None for r in rows)]
+    bests = [row["best_theta"] for row in rows if row["best_theta"] is not None]
+    text = (
+        f"{found.text}; best thetas from {min(bests):g} to {max(bests):g}, and 0.6 does not arrive for some moduli in"
+        f" {len(fails)} of {len(families)} readings"
+    )
+    return [replace(found, text=text)]
+
+
+def _optimum(sweeps: Sweeps) -> list[Evidence]:
+    """6.3: theta_opt = 0.6."""
+    models = [
+        Model(geometry=name, neumann=neumann, young=young, halvings=sweeps.halvings)  # type: ignore[arg-type]
+        for neumann, young in ((1, (HARD, SOFT)), (2, (HARD, SOFT)), (2, (SOFT, HARD)))
+        for name in TWO
+    ]
+    rows = [sweeps.row(model) for model in models]
+    told = "; ".join(
+        f"{row['geometry']}, body {row['neumann_body']} Neumann, E1 = {row['E1']:g}, E2 = {row['E2']:g}:"
+        f" {_number(row['best_theta'])} ({_number(row['iterations'])} steps,"
+        f" {_number(row['iterations_at_0.6'])} at 0.6)"
+        for row in rows
+    )
+    where = "the position of the upper body is not in the text, and Sections 3 and 6 give the roles differently"
+    text = f"{where}; best {told}"
+    return [_evidence("printed", None, text, rows=rows)]
+
+
+#: Two thetas that the increment test treats unlike, and units of stress in MPa.
+SLOW, FAST = Fraction(1, 20), Fraction(3, 5)
+UNITS = {"MPa": Fraction(1), "TPa": Fraction(10) ** 6}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stopped:
+    """A run when a test stops it.
+
+    Attributes
+    ----------
+    steps : int
+    residual : float
+        ``|T g - g|/|T g|`` there.
+    error : float
+        ``|g_n - g|/|g|`` with the g of the global method.
+    """
+
+    steps: int
+    residual: float
+    error: float
+
+
+def stopped(model: Model, theta: Fraction, unit: Fraction) -> tuple[Stopped, Stopped]:
+    """Run until the printed test stops it, and until the unrelaxed residual does, at a unit of stress."""
+    problem = model.problem
+    lower, upper = (replace(body, young=body.young / unit) for body in (problem.body1, problem.body2))
+    pair = build(replace(problem, body1=lower, body2=upper))
+    seen = trace(pair, float(theta), 3000)
+    solution = solve(pair).contact
+    g = np.concatenate([pair.upward * solution.shear, solution.pressure]) * np.tile(solution.weights, 2)
+
+    def at(n: int) -> Stopped:
+        error = float(np.linalg.norm(seen.g[n] - g) / np.linalg.norm(g))
+        return Stopped(steps=n, residual=seen.residuals[n], error=error)
+
+    first, second = seen.stop(), next(n for n, residual in enumerate(seen.residuals) if residual <= STOP)
+    assert first is not None
+    return at(first), at(second)
+
+
+def _stopping(sweeps: Sweeps) -> list[Evidence]:
+    """6.3: the stopping test."""
+    model = Model(halvings=sweeps.halvings)
+    rho = sweeps.rho(model)
+    runs = {(theta, unit): stopped(model, theta, UNITS[unit]) for theta in (SLOW, FAST) for unit in UNITS}
+    return [
+        _verdict_on_test("printed", {key: both[0] for key, both in runs.items()}, rho),
+        _verdict_on_test("repaired", {key: both[1] for key, both in runs.items()}, rho),
+    ]
+
+
+def _verdict_on_test(
+    of: Literal["printed", "repaired"], runs: Mapping[tuple[Fraction, str], Stopped], rho: float
+) -> Evidence:
+    """A test measures the error if it stops at one unrelaxed residual, whatever theta and the unit of force.
+
+    At one residual r the error ``(1 - T')^-1 r`` may still differ by the factor 1 + rho between slow and fast modes.
+    """
+    slow, fast = runs[SLOW, "MPa"], runs[FAST, "MPa"]
+    steps = {float(theta): {unit: runs[theta, unit].steps for unit in UNITS} for theta in (SLOW, FAST)}
+    same_unit = all(len(set(counts.values())) == 1 for counts in steps.values())
+    ratio = {"residual": slow.residual / fast.residual, "error": slow.error / fast.error}
+    # a stopped run lies within one step below the bound
+    measures = max(slow.residual, fast.residual) <= STOP and max(ratio["error"], 1 / ratio["error"]) <= 2 * (1 + rho)
+    name = "the increment test" if of == "printed" else "the unrelaxed relative residual"
+    text = (
+        f"{name} at {STOP:g} stops at theta = {float(SLOW):g} after {slow.steps} steps with |Tg - g|/|Tg| ="
+        f" {slow.residual:.2g} and an error of {slow.error:.2g}, at theta = {float(FAST):g} after {fast.steps} with"
+        f" {fast.residual:.2g} and {fast.error:.2g}; with forces in units of 1 MPa and of 1 TPa it takes"
+        f" {steps[float(SLOW)]['MPa']} and {steps[float(SLOW)]['TPa']} steps, and {steps[float(FAST)]['MPa']} and"
+        f" {steps[float(FAST)]['TPa']}"
+    )
+    figures = {
+        f"theta {float(theta):g}, {unit}": {
+            "iterations": seen.steps,
+            "residual": _figure(seen.residual, 3),
+            "error": _figure(seen.error, 3),
+        }
+        for (theta, unit), seen in runs.items()
+    }
+    ratios = {name: _figure(value, 3) for name, value in ratio.items()}
+    return _evidence(of, same_unit and measures, text, runs=figures, ratio=ratios, rho=_figure(rho))
+
+
+#: What answers for each statement.
+CHECKS: dict[str, Callable[[Sweeps], list[Evidence]]] = {
+    "sec-6.2": _same_results,
+    "fig-5": _zones,
+    "sec-6.3-stop": _stopping,
+    "sec-6.3": _optimum,
+    "fig-10": _meshes,
+    "fig-11": _frictions,
+    "fig-12": _moduli,
+}
+
+
+def experiments(
+    ids: Collection[str] | None = None, level: Level = "quick", watch: Callable[[float], None] = lambda done: None
+) -> dict[str, list[Evidence]]:
+    """Evidence for the numerical results of Section 6.
+
+    Parameters
+    ----------
+    ids : collection of str, optional
+        Statements; all by default, unknown ones have no evidence here.
+    level : {'quick', 'full'}
+        Full halves the mesh and the steps of theta once more.
+    watch : callable
+        Called with the share done.
+    """
+    chosen = [statement for statement in CHECKS if ids is None or statement in ids]
+    result, sweeps = {}, Sweeps(level)
+    with one_thread():
+        for done, statement in enumerate(chosen):
+            watch(done / len(chosen))
+            result[statement] = CHECKS[statement](sweeps)
+    watch(1.0)
+    return result

@@ -1,0 +1,224 @@
+"""Statement -> evidence -> verdict."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from importlib.resources import files
+from typing import Any, ClassVar, Literal
+
+from ndtheory.statements import Statement, statements
+from ndtheory.symbolic import checks
+from verification.document import Document
+from verification.ledger.evidence import Evidence, Method, Verdict, settle
+
+Level = Literal["quick", "full"]
+
+#: A statement cannot be proved from one of these.
+NO_GROUND = ("REFUTED", "INCONCLUSIVE")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """A statement with its evidence and verdict.
+
+    Attributes
+    ----------
+    statement : Statement
+    evidence : tuple of Evidence
+        Strongest first.
+    verdict : str
+    method : str or None
+        What decided.
+    recorded : str or None
+        The recorded verdict; None where none is recorded.
+    """
+
+    statement: Statement
+    evidence: tuple[Evidence, ...]
+    verdict: Verdict
+    method: Method | None
+    recorded: str | None
+
+    @property
+    def changed(self) -> bool:
+        """Whether the verdict differs from the recorded one."""
+        return self.verdict != self.recorded
+
+    def to_dict(self) -> dict[str, Any]:
+        """An entry of ``statements`` in ``ndtheory.ledger/1``."""
+        s = self.statement
+        faulty = {"fault": s.fault, "wrong": s.wrong, "repair": s.repair, "proof": s.proof} if s.fault else {}
+        return {
+            "id": s.id,
+            "label": s.label,
+            "kind": s.kind,
+            "title": s.title,
+            "claims": s.claims,
+            "verdict": self.verdict,
+            "recorded": self.recorded,
+            "method": self.method,
+            "leans_on": list(s.leans_on),
+            **faulty,
+            "evidence": [e.to_dict() for e in self.evidence],
+            "note": s.note,
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ledger(Document):
+    """Rows in the order of the paper."""
+
+    schema: ClassVar[str] = "ndtheory.ledger/1"
+
+    rows: tuple[Row, ...]
+    level: Level
+    units: Mapping[str, str]
+
+    @property
+    def whole(self) -> bool:
+        """Whether every statement is there."""
+        return len(self.rows) == len(statements())
+
+    @property
+    def changed(self) -> tuple[Row, ...]:
+        """The rows whose verdict differs from the recorded one."""
+        return tuple(row for row in self.rows if row.changed)
+
+    def counts(self) -> dict[str, int]:
+        """How many rows have each verdict."""
+        verdicts = [row.verdict for row in self.rows]
+        return {verdict: verdicts.count(verdict) for verdict in dict.fromkeys(verdicts)}
+
+    def content(self) -> dict[str, Any]:
+        return {"level": self.level, "counts": self.counts(), "statements": [row.to_dict() for row in self.rows]}
+
+
+@lru_cache(maxsize=1)
+def recorded() -> dict[str, str]:
+    """The recorded verdicts by id."""
+    text = files("verification").joinpath("data/verdicts.json").read_text("utf-8")
+    return dict(json.loads(text)["verdicts"])
+
+
+def verify(
+    ids: Collection[str] = (), *, level: Level = "quick", watch: Callable[[str, float], None] = lambda what, share: None
+) -> Ledger:
+    """Check statements and settle their verdicts.
+
+    Parameters
+    ----------
+    ids : collection of str
+        All by default.
+    level : {'quick', 'full'}
+        How many problems the discrete evidence takes.
+    watch : callable
+        Receives what is checked and the share of it that is done.
+
+    Raises
+    ------
+    KeyError
+        An id that no statement has.
+
+    Examples
+    --------
+    >>> [row.verdict for row in verify(["5.12", "5.42"]).rows]
+    ['PROVED', 'REPAIRED']
+    """
+    known = statements()
+    for id in ids:
+        if id not in known:
+            raise KeyError(id)
+    chosen = [s for s in known.values() if not ids or s.id in ids]
+    wanted = {s.id for s in chosen}
+    evidence: dict[str, list[Evidence]] = {id: [] for id in wanted}
+    for source, gather in _sources().items():
+        found = gather(wanted, level, partial(watch, source))
+        for id, entries in found.items():
+            evidence.setdefault(id, []).extend(entries)
+    rows = []
+    for s in chosen:
+        entries = _by_strength([*evidence[s.id], *_read(s, evidence[s.id])])
+        verdict, method = settle(entries)
+        rows.append(Row(statement=s, evidence=entries, verdict=verdict, method=method, recorded=recorded().get(s.id)))
+    return Ledger(rows=tuple(_grounded(rows)), level=level, units={})
+
+
+Source = Callable[[Collection[str], Level, Callable[[float], None]], Mapping[str, Sequence[Evidence]]]
+
+
+def _sources() -> dict[str, Source]:
+    from verification.ledger.experiments import experiments
+    from verification.ledger.inequalities import discrete
+    from verification.ledger.solutions import solutions
+
+    return {
+        "exact arithmetic and units": exact,
+        "inequalities on random problems": discrete,
+        "solutions": solutions,
+        "experiments of Section 6": experiments,
+    }
+
+
+def exact(ids: Collection[str], level: Level, watch: Callable[[float], None]) -> dict[str, list[Evidence]]:
+    """Symbolic evidence, and that of units."""
+    from ndtheory.symbolic.dimension import consistent
+    from ndtheory.symbolic.symbols import DIMENSIONS
+
+    found: dict[str, list[Evidence]] = {}
+    chosen = [check for check in checks() if check.id in ids]
+    for i, check in enumerate(chosen):
+        entries = found.setdefault(check.id, [])
+        for of, form in check.forms.items():
+            decision = check.decide(form)
+            data = {"counterexample": dict(decision.counterexample)} if decision.holds is False else {}
+            entries.append(Evidence(method="symbolic", of=of, holds=decision.holds, text=check.text, data=data))
+        for of, relations in check.units.items():
+            differ = consistent(relations, DIMENSIONS)
+            text = "both sides have one unit" if differ is None else f"units differ: {differ}"
+            entries.append(Evidence(method="dimension", of=of, holds=differ is None, text=text))
+        watch((i + 1) / len(chosen))
+    return found
+
+
+def _read(statement: Statement, found: Sequence[Evidence]) -> list[Evidence]:
+    """What reading alone says: what a definition rests on, and a gap with its repair where nothing else shows it."""
+    entries = []
+    if statement.reading:
+        entries.append(Evidence(method="reading", of="printed", holds=True, text=statement.reading))
+    if statement.fault:
+        if all(e.holds is not False for e in found if e.of != "repaired"):
+            entries.append(Evidence(method="reading", of="step", holds=False, text=statement.wrong))
+        proved = any(e.of == "repaired" and e.holds and e.method in ("symbolic", "reading") for e in found)
+        if statement.repair and not proved:
+            entries.append(Evidence(method="reading", of="repaired", holds=True, text=statement.proof))
+    return entries
+
+
+def _by_strength(evidence: Sequence[Evidence]) -> tuple[Evidence, ...]:
+    from verification.ledger.evidence import METHODS
+
+    return tuple(sorted(evidence, key=lambda e: METHODS.index(e.method)))
+
+
+def _grounded(rows: Sequence[Row]) -> list[Row]:
+    """Nothing is proved from a statement that is refuted or undecided (as recorded, where it was not checked now)."""
+    verdicts: dict[str, str] = recorded() | {row.statement.id: row.verdict for row in rows}
+    result = []
+    for row in rows:
+        bad = [id for id in row.statement.leans_on if verdicts.get(id) in NO_GROUND]
+        if bad and row.verdict in ("PROVED", "REPAIRED"):
+            missing = Evidence(
+                method="reading", of="step", holds=None, text=f"it leans on {', '.join(bad)}: {verdicts[bad[0]]}"
+            )
+            row = Row(
+                statement=row.statement,
+                evidence=(*row.evidence, missing),
+                verdict="INCONCLUSIVE",
+                method="reading",
+                recorded=row.recorded,
+            )
+        result.append(row)
+    return result

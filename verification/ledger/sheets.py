@@ -1,0 +1,137 @@
+"""The ledger as a page of the site, and the errata sheet: generated from the rows, never typed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+
+from verification.ledger.evidence import Evidence
+from verification.ledger.rows import Ledger, Row
+
+#: By this our files are known (:mod:`verification.output`).
+MARK = "<!-- ndtheory verify -->"
+
+SECTIONS = (
+    ("Section 2: the contact problem", "2."),
+    ("Section 3: the algorithm", "3."),
+    ("Section 4: the weak form", "4. norm-half prop-4 rem-4"),
+    ("Section 5: convergence", ""),
+    ("Section 6: the experiments", "sec-6 fig-"),
+    ("What the paper does not state", "x-"),
+)
+
+FAULTS = {
+    "false as printed": "False as printed",
+    "does not follow": "Steps that do not follow",
+    "gap": "Gaps",
+    "typo": "Slips of notation",
+}
+
+WORDS = {
+    "PROVED": "derived in exact arithmetic for all admissible values, from the rows it leans on",
+    "REPAIRED": "wrong or incomplete as printed; the repaired form is proved",
+    "REFUTED": "wrong as printed, and no repaired form is known",
+    "NUMERICAL": "holds in floating point on every problem that was tried",
+    "ASSUMED": "a definition, a law of the model or a cited result",
+    "INCONCLUSIVE": "the evidence does not decide",
+}
+
+
+def _section(id: str) -> str:
+    for title, prefixes in SECTIONS:
+        if any(id.startswith(prefix) for prefix in prefixes.split()):
+            return title
+    return SECTIONS[3][0]
+
+
+def page(ledger: Ledger) -> str:
+    """Every row with its evidence, in MyST Markdown."""
+    lines = ["# The ledger: every numbered statement, checked", ""]
+    lines += [
+        f"{len(ledger.rows)} statements, evidence at the level *{ledger.level}*; run it again with `ndtheory verify`. "
+        "Floating point proves nothing here: it makes a row numerical at best. Notation: {doc}`notation`; "
+        "what is wrong in the paper, on one page: {doc}`errata`.",
+        "",
+        "| verdict | rows | means |",
+        "|---|---|---|",
+        *(f"| {verdict} | {count} | {WORDS[verdict]} |" for verdict, count in ledger.counts().items()),
+        "",
+    ]
+    current = ""
+    for row in ledger.rows:
+        section = _section(row.statement.id)
+        if section != current:
+            lines += [f"## {section}", ""]
+            current = section
+        lines += [*_entry(row), ""]
+    return "\n".join([*lines, MARK])
+
+
+def _entry(row: Row) -> Iterable[str]:
+    s = row.statement
+    label = "" if s.kind == "own" else f"{s.label} "
+    yield f"### {label}{s.title}: {row.verdict}"
+    yield ""
+    yield f"`{s.id}`. {s.claims}"
+    if s.leans_on:
+        yield "Leans on " + ", ".join(f"`{id}`" for id in s.leans_on) + "."
+    if s.fault:
+        yield ""
+        inherited = f" (inherited from `{s.same_as}`)" if s.same_as else ""
+        yield f"*{FAULTS[s.fault]}*{inherited}. {s.wrong} **Repaired:** {s.repair} **Proof:** {s.proof}"
+    yield ""
+    for e in row.evidence:
+        yield f"- *{e.method}*, {e.of}, {OUTCOME[e.holds]}: {_shown(e)}"
+    if s.note:
+        yield ""
+        yield s.note
+
+
+OUTCOME = {True: "holds", False: "fails", None: "undecided"}
+
+
+def _shown(evidence: Evidence) -> str:
+    """The text of a piece of evidence with its formulas as code, and its exact counterexample."""
+    text = f"`{evidence.text}`" if evidence.method in ("symbolic", "dimension") else evidence.text
+    return text + _counterexample(evidence)
+
+
+def _counterexample(evidence: Evidence) -> str:
+    at = evidence.data.get("counterexample")
+    return f" Counterexample: {', '.join(f'`{name} = {value}`' for name, value in at.items())}." if at else ""
+
+
+def errata(ledger: Ledger) -> str:
+    """What is wrong in the paper, by kind of fault, for its authors: one line a fault, in MyST Markdown."""
+    faulty = [row for row in ledger.rows if row.statement.fault]
+    lines = [
+        "# Errata",
+        "",
+        "G. Bayada, J. Sabil, T. Sassi, *Convergence of a Neumann-Dirichlet algorithm for two-body contact problems"
+        " with non local Coulomb's friction law*, ESAIM: M2AN 42 (2008) 243-262. The theorem stands, even with the"
+        " printed constants; what follows mends its statement and its proof. Each entry was decided by an exact"
+        " counterexample, by the units of both sides, on random problems or by a reading; each repair is proved, in the"
+        " ledger.",
+        "",
+    ]
+    for fault, heading in FAULTS.items():
+        own = [row for row in faulty if row.statement.fault == fault and not row.statement.same_as]
+        if not own:
+            continue
+        lines += [f"## {heading}", ""]
+        for row in own:
+            s = row.statement
+            also = [r.statement.label for r in faulty if r.statement.same_as == s.id]
+            heirs = f" The same fault in {', '.join(also)}." if also else ""
+            shown = [e for e in row.evidence if e.holds is False and e.of == "printed" and fault == "false as printed"]
+            at = next((_counterexample(e) for e in shown if "counterexample" in e.data), "")
+            mended = f" *Read:* {s.repair}" if s.repair else ""
+            lines.append(f"- **{s.label}.** {s.wrong}{at}{mended}{heirs}")
+        lines.append("")
+    return "\n".join([*lines, MARK])
+
+
+def verdicts(ledger: Ledger) -> str:
+    """The verdicts as they are recorded in ``verification/data/verdicts.json``."""
+    found = {row.statement.id: row.verdict for row in ledger.rows}
+    return json.dumps({"schema": "ndtheory.verdicts/1", "verdicts": found}, indent=2)

@@ -1,0 +1,478 @@
+"""Displacement fields of whole bodies, and the problems of the paper as numbers that vanish or are not negative.
+
+The algorithm works on the interface alone, with condensed matrices.  Here a displacement is the field of a whole body,
+``a`` and ``L`` are its stiffness matrix and its load, and lifts are solved for anew: a second path to the same numbers.
+
+Indices are the paper's: body 1 is the contact body, body 2 the Neumann body.  Normal components are along n^1, and an
+initial gap d, which the paper has not, makes ``[v_N] <= d`` of ``[v_N] <= 0``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+
+from fem1d2d import solver
+from fem1d2d.mesh import Floats
+from verification.bodies import build
+from verification.contact import ContactError
+from verification.iteration import FixedPointMap, state_at
+from verification.monolithic import solve
+from verification.pair import Body, Pair
+from verification.problem import Problem
+from verification.runs import Run, run
+from verification.state import State
+
+Level = Literal["quick", "full"]
+
+#: Every draw of random numbers starts from it.
+SEED = 2008
+
+#: An equation holds below this relative residual, and an inequality above minus it.
+EXACT = 1e-10
+
+#: The same at the limit of a run, whose residual is at most TOLERANCE.
+LIMIT, TOLERANCE = 1e-9, 1e-13
+
+#: Distances to the solution below this share of its norm are not compared step by step: rounding stands behind them.
+CLEAR = 1e-4
+
+LOWER = {"shape": "rectangle", "x": [0, 2], "y": ["-0.3", 0], "cells": [10, 2], "young": 7, "poisson": "0.3"}
+UPPER = {"shape": "rectangle", "x": ["0.4", "1.6"], "y": [0, "0.3"], "cells": [6, 2], "young": 2, "poisson": "0.3"}
+RUN = {"tolerance": TOLERANCE, "max_iterations": 3000}
+
+
+def _plates(lower: Any = None, upper: Any = None, **tables: Any) -> dict[str, Any]:
+    """Two plates, the upper one pressed down."""
+    return {
+        "body1": {**LOWER, "fixed": ["bottom"], **(lower or {})},
+        "body2": {**UPPER, "prescribed": {"top": [0, "-0.015"]}, **(upper or {})},
+        "contact": {"friction": "0.2", "radius": "0.2", **tables.get("contact", {})},
+        "iteration": {"neumann_body": 1, "theta": "0.7", **RUN, **tables.get("iteration", {})},
+    }
+
+
+#: Both roles; nodes that stick, slip and are open; an initial gap; no friction; one dimension.
+PROBLEMS: dict[str, dict[str, Any]] = {
+    "pressed": _plates(),
+    "sheared, body 2 Neumann": _plates(
+        {"young": 2},
+        {"young": 7, "prescribed": {"top": ["0.006", "-0.015"]}},
+        contact={"friction": "0.1"},
+        iteration={"neumann_body": 2, "theta": "0.6"},
+    ),
+    "much friction": _plates(upper={"prescribed": {"top": ["0.004", "-0.015"]}}, contact={"friction": "0.6"}),
+    "open in part, with a gap": _plates(
+        upper={"prescribed": {"top": [0, "-0.006"]}, "traction": {"right": [0, "0.9"]}}, contact={"gap": "0.005"}
+    ),
+    "bent over an edge, body 2 Neumann": _plates(
+        {"fixed": ["left"], "body_force": [0, "-0.003"]},
+        contact={"interval": ["0.4", "1.6"]},
+        iteration={"neumann_body": 2, "theta": "0.7"},
+    ),
+    "without friction": _plates(contact={"friction": 0}),
+    "bars with a gap": {
+        "dimension": 1,
+        "body1": {"shape": "interval", "x": [0, 2], "cells": 3, "young": 1, "fixed": ["left"], "body_force": "0.1"},
+        "body2": {"shape": "interval", "x": [2, 3], "cells": 2, "young": 4, "prescribed": {"right": "-0.2"}},
+        "contact": {"gap": "0.05"},
+        "iteration": {"theta": "0.6", **RUN},
+    },
+}
+
+SQUARE = {"shape": "rectangle", "cells": [3, 3], "poisson": 0, "young": 1}
+#: Where Proposition 5.6 has an interval in which a run ends within some hundred steps.
+CONVERGENT: dict[str, dict[str, Any]] = {
+    "two bars": {
+        "dimension": 1,
+        "body1": {"shape": "interval", "x": [0, 1], "cells": 6, "young": 2, "fixed": ["left"], "body_force": "0.1"},
+        "body2": {"shape": "interval", "x": [1, 2], "cells": 6, "young": 2, "prescribed": {"right": "-0.1"}},
+        "iteration": {**RUN},
+    },
+    "two short bars": {
+        "dimension": 1,
+        "body1": {"shape": "interval", "x": [0, "0.5"], "cells": 4, "young": 1, "fixed": ["left"]},
+        "body2": {"shape": "interval", "x": ["0.5", 1], "cells": 4, "young": 2, "prescribed": {"right": "-0.1"}},
+        "contact": {"gap": "0.02"},
+        "iteration": {**RUN},
+    },
+}
+#: Plane bodies, for the friction of which see ``small_friction``.
+PLANE: dict[str, dict[str, Any]] = {
+    "squares": {
+        "body1": {**SQUARE, "x": [0, 1], "y": [-1, 0], "fixed": ["bottom"]},
+        "body2": {**SQUARE, "x": [0, 1], "y": [0, 1], "prescribed": {"top": ["0.01", "-0.05"]}},
+        "contact": {"friction": 0, "radius": "0.4"},
+        "iteration": {**RUN},
+    },
+    "plates": _plates({"young": 1}, {"young": 1, "prescribed": {"top": ["0.004", "-0.015"]}}, contact={"friction": 0}),
+}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fields:
+    """Displacements of both bodies, or columns of them: the unknowns of body 1 and of body 2."""
+
+    one: Floats
+    two: Floats
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Weak:
+    """The weak forms of a pair, in whole fields."""
+
+    pair: Pair
+
+    @property
+    def one(self) -> Body:
+        """The contact body."""
+        return self.pair.body1 if self.pair.problem.iteration.neumann_body == 2 else self.pair.body2
+
+    @property
+    def two(self) -> Body:
+        """The Neumann body."""
+        return self.pair.body2 if self.pair.problem.iteration.neumann_body == 2 else self.pair.body1
+
+    @cached_property
+    def _lifts(self) -> dict[str, Any]:
+        inside: dict[str, Any] = {}
+        for body in (self.one, self.two):
+            rows = np.setdiff1d(np.arange(len(body.free)), body.interface)
+            inside[body.name] = rows, solver(body.stiffness[rows][:, rows])
+        return inside
+
+    def lift(self, body: Body, trace: Floats) -> Floats:
+        """R_D phi of (4.5)."""
+        rows, solved = self._lifts[body.name]
+        field = np.zeros((len(body.free), *trace.shape[1:]))
+        field[body.interface] = self.pair.orient(trace)
+        field[rows] = -solved(np.asarray(body.stiffness[rows][:, body.interface] @ field[body.interface]))
+        return field
+
+    def trace(self, body: Body, field: Floats) -> Floats:
+        """gamma v on Gamma_c, tangential components first."""
+        return self.pair.orient(field[body.interface])
+
+    def excess(self, body: Body, field: Floats) -> Floats:
+        """``a(u, .) - L(.)`` on the unknowns; on Gamma_c the nodal forces ``sigma n`` of the body."""
+        return np.asarray(body.stiffness @ field - body.load)
+
+    def force(self, body: Body, field: Floats) -> Floats:
+        """Nodal forces ``sigma n`` on Gamma_c."""
+        return self.trace(body, self.excess(body, field))
+
+    def jump(self, one: Floats, two: Floats) -> Floats:
+        """``v^1 - v^2`` on Gamma_c, less the initial gap in the normal components."""
+        jump = self.trace(self.one, one) - self.trace(self.two, two)
+        jump[self.pair.normal] -= self.pair.gap.reshape(-1, *[1] * (jump.ndim - 1))
+        return jump
+
+    def bound(self, two: Floats) -> Floats:
+        """``w_j k |S sigma_N|`` at the nodes, sigma_N that of body 2."""
+        pair, k = self.pair, float(self.pair.problem.contact.friction)
+        if k == 0 or pair.regularisation is None:
+            return np.zeros(pair.tangential.stop)
+        stress = pair.regularisation @ self.force(self.two, two)[pair.normal]
+        return np.asarray(k * pair.weights * np.abs(stress))
+
+    def energy(self, fields: Fields) -> Floats:
+        """``sqrt(a(v, v))`` of the unknowns, for each column."""
+        squares = [_dot(v, body.stiffness @ v) for body, v in ((self.one, fields.one), (self.two, fields.two))]
+        return np.asarray(np.sqrt(squares[0] + squares[1]))
+
+    def of(self, displacements: tuple[Floats | None, Floats | None]) -> Fields:
+        """The unknowns of two displacement fields, the lower body's first."""
+        first, second = (
+            displacement.ravel()[body.free] if displacement is not None else np.zeros(len(body.free))
+            for body, displacement in zip((self.pair.body1, self.pair.body2), displacements, strict=True)
+        )
+        return Fields(one=first, two=second) if self.one is self.pair.body1 else Fields(one=second, two=first)
+
+    def at(self, state: State) -> Fields:
+        """``w^1`` and ``w^2`` of (5.5) and (5.6), steps II and I of an evaluation of T."""
+        pair = self.pair
+        moved = state.displacement + state.contact.v
+        moved[pair.normal] += pair.gap
+        traces = {self.one.name: pair.orient(moved), self.two.name: pair.orient(state.displacement)}
+        return self.of((pair.body1.displacement(traces["body1"]), pair.body2.displacement(traces["body2"])))
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    return np.asarray(np.einsum("i...,i...->...", a, b))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Case:
+    """A problem with its solution by the global method and its run."""
+
+    name: str
+    problem: Problem
+
+    @cached_property
+    def weak(self) -> Weak:
+        """The weak forms."""
+        return Weak(pair=build(self.problem))
+
+    @cached_property
+    def solution(self) -> Fields:
+        """The solution of the global method."""
+        return self.weak.of(solve(self.weak.pair).displacements)
+
+    @cached_property
+    def run(self) -> Run:
+        """The run from g = 0."""
+        return run(self.weak.pair, solver="active-set")
+
+    @cached_property
+    def limit(self) -> Fields:
+        """The displacements at the end of the run."""
+        return self.weak.of(self.run.displacements)
+
+    @cached_property
+    def steps(self) -> list[tuple[State, State]]:
+        """Some of the run's steps: the first ones, one in the middle, the last one."""
+        states = self.run.states
+        chosen = sorted({0, 1, 2, len(states) // 2, len(states) - 2} & set(range(len(states) - 1)))
+        return [(states[i], states[i + 1]) for i in chosen]
+
+    @cached_property
+    def g(self) -> Floats:
+        """The nodal forces on body 2 at the solution."""
+        return self.weak.force(self.weak.two, self.solution.two)
+
+    @cached_property
+    def arbitrary(self) -> list[State]:
+        """T at random forces: small and large, pressing and pulling."""
+        rng = generator("arbitrary")
+        size = np.abs(self.g).max() or 1.0
+        scales = size * 10.0 ** rng.uniform(-1, 1, 6)
+        return [
+            image_of(self.weak.pair, s * rng.standard_normal(len(self.g)) + o * self.g)
+            for s, o in zip(scales, (0, 0, 0, 1, 1, -1), strict=True)
+        ]
+
+
+def image_of(pair: Pair, psi: Floats) -> State:
+    """T at a force: by the active set, and by the convex program where that does not close."""
+    try:
+        return state_at(FixedPointMap(pair, "active-set"), psi)
+    except ContactError:
+        return state_at(FixedPointMap(pair), psi)
+
+
+def generator(key: str) -> np.random.Generator:
+    return np.random.default_rng([SEED, *key.encode()])
+
+
+def cases(level: Level) -> list[Case]:
+    """The problems of a level: quick takes the list, full halves their meshes too and draws more at random."""
+    named = {name: Problem.from_dict(data) for name, data in PROBLEMS.items()}
+    if level == "full":
+        named |= {f"{name}, halved": problem.refined(1) for name, problem in list(named.items())}
+        named |= {f"random {i}": Problem.from_dict(_drawn(generator(f"problem {i}"))) for i in range(24)}
+    return [Case(name=name, problem=problem) for name, problem in named.items()]
+
+
+def _drawn(rng: np.random.Generator) -> dict[str, Any]:
+    """Two plates with everything drawn at random."""
+    pick = lambda low, high: round(float(rng.uniform(low, high)), 3)
+    lower: dict[str, Any] = {"young": round(10 ** rng.uniform(-1, 1), 3), "poisson": pick(-0.3, 0.45)}
+    upper: dict[str, Any] = {"young": round(10 ** rng.uniform(-1, 1), 3), "poisson": pick(-0.3, 0.45)}
+    upper["prescribed"] = {"top": [pick(-0.01, 0.01), pick(-0.02, -0.005)]}
+    if rng.random() < 0.5:
+        upper["traction"] = {"right": [0, pick(0, 0.3) * upper["young"]]}
+    contact = {"friction": pick(0, 0.5), "radius": pick(0.2, 0.8), "gap": pick(0, 0.004)}
+    return _plates(lower, upper, contact=contact, iteration={"neumann_body": int(rng.integers(1, 3)), "theta": "auto"})
+
+
+# Test functions.
+
+
+def directions(rng: np.random.Generator, body: Body, count: int) -> Floats:
+    """Rough and smooth random fields of a body, largest value 1, as columns."""
+    rough = rng.standard_normal((len(body.free), count))
+    smooth = body.solve(rng.standard_normal((len(body.free), count)))
+    columns = np.concatenate([rough, smooth], axis=1)
+    return np.asarray(columns / np.abs(columns).max(axis=0))
+
+
+def hats(body: Body) -> Floats:
+    """Both signs of the hat function of every interface unknown, as columns."""
+    columns = np.zeros((len(body.free), len(body.interface)))
+    columns[body.interface, np.arange(len(body.interface))] = 1.0
+    return np.concatenate([columns, -columns], axis=1)
+
+
+def closing(weak: Weak, u: Fields) -> Floats:
+    """Moves of body 1 by hat functions that undo the jump of u at one node, in one direction."""
+    count = len(weak.one.interface)
+    return np.asarray(hats(weak.one)[:, :count] * -weak.pair.orient(weak.jump(u.one, u.two)))
+
+
+def _sizes(rng: np.random.Generator, size: float, count: int) -> Floats:
+    return np.asarray(size * 10.0 ** rng.uniform(-4, 1, count))
+
+
+def moves_in_K(weak: Weak, u: Fields, rng: np.random.Generator, count: int) -> Fields:
+    """Columns ``v - u`` with v in K: random fields, hat functions on one body, on the other and on both, closing moves.
+
+    Where a column would penetrate one of the bodies gives way.
+    """
+    size = largest(u)
+    one, two = (directions(rng, body, count) for body in (weak.one, weak.two))
+    hat_1, hat_2 = hats(weak.one), hats(weak.two)
+    columns_1 = np.concatenate([one, hat_1, 0 * hat_1, hat_1] * 2 + [100 * one], axis=1)
+    columns_2 = np.concatenate([two, 0 * hat_2, hat_2, hat_2] * 2 + [100 * two], axis=1)
+    sizes = _sizes(rng, size, columns_1.shape[1])
+    undone = closing(weak, u)
+    one = np.concatenate([sizes * columns_1, undone], axis=1)
+    two = np.concatenate([sizes * columns_2, np.zeros((len(u.two), undone.shape[1]))], axis=1)
+    normal, up = weak.pair.normal, weak.pair.upward
+    rows_1, rows_2 = weak.one.interface[normal], weak.two.interface[normal]
+    room = -weak.jump(u.one, u.two)[normal][:, None]
+    first = rng.random(one.shape[1]) < 0.5
+    above = up * one[rows_1], up * two[rows_2]
+    one[rows_1] = up * np.where(first, np.minimum(above[0], above[1] + room), above[0])
+    two[rows_2] = up * np.where(first, above[1], np.maximum(above[1], above[0] - room))
+    return Fields(one=one, two=two)
+
+
+def moves_of_one(weak: Weak, u: Fields, rng: np.random.Generator, count: int) -> Floats:
+    """Columns ``v - u^1`` with v in V^1_-(u^2_N): random fields, hat functions, closing moves."""
+    random, hat = directions(rng, weak.one, count), hats(weak.one)
+    columns = np.concatenate([random, hat, hat, 100 * random], axis=1)
+    d = np.concatenate([_sizes(rng, largest(u), columns.shape[1]) * columns, closing(weak, u)], axis=1)
+    normal, up = weak.pair.normal, weak.pair.upward
+    rows = weak.one.interface[normal]
+    d[rows] = up * np.minimum(up * d[rows], -weak.jump(u.one, u.two)[normal][:, None])
+    return np.asarray(d)
+
+
+def obstacle_tests(weak: Weak, u: Fields, rng: np.random.Generator, count: int) -> Floats:
+    """Columns w of V^1_-(0): random ones, and ``u^1 - R u^2`` moved as in ``moves_of_one``."""
+    body, normal, up = weak.one, weak.pair.normal, weak.pair.upward
+    random, hat = directions(rng, body, count), hats(body)
+    start = u.one - weak.lift(body, weak.trace(weak.two, u.two))
+    columns = np.concatenate([random, hat, hat], axis=1)
+    moves = np.concatenate([_sizes(rng, largest(u), columns.shape[1]) * columns, closing(weak, u)], axis=1)
+    w = np.concatenate([start[:, None] + moves, 10 * largest(u) * random], axis=1)
+    rows = body.interface[normal]
+    w[rows] = up * np.minimum(up * w[rows], weak.pair.gap[:, None])
+    return w
+
+
+def largest(u: Fields) -> float:
+    return float(max(np.abs(u.one).max(), np.abs(u.two).max()))
+
+
+# The statements, as numbers that should vanish or be non-negative; each relative to what its terms are made of.
+
+
+def unilateral(weak: Weak, u: Fields) -> dict[str, float]:
+    """(2.4): the largest violation of each condition, lengths relative to the largest displacement."""
+    normal, two = weak.pair.normal, weak.force(weak.two, u.two)
+    jump = weak.jump(u.one, u.two)[normal] / max(np.abs(u.one).max(), np.abs(u.two).max())
+    pressure = two[normal] / (np.abs(two).max() or 1.0)
+    worst = lambda values: float(np.max(values, initial=0.0))
+    return {
+        "[u_N] <= 0": worst(jump),
+        "sigma_N <= 0": worst(-pressure),
+        "sigma_N [u_N] = 0": worst(np.abs(pressure * jump)),
+    }
+
+
+def coulomb(weak: Weak, u: Fields) -> dict[str, float]:
+    """(2.6) with the tangential stress of body 1: the largest violation of each line."""
+    t = weak.pair.tangential
+    force, bound, jump = weak.force(weak.one, u.one)[t], weak.bound(u.two), weak.jump(u.one, u.two)[t]
+    forces = float(np.abs(weak.force(weak.two, u.two)).max()) or 1.0
+    lengths = float(max(np.abs(u.one).max(), np.abs(u.two).max()))
+    worst = lambda values: float(np.max(values, initial=0.0))
+    return {
+        "|sigma_T| <= k|S(sigma_N)|": worst((np.abs(force) - bound) / forces),
+        "k|S(sigma_N)||[u_T]| + sigma_T [u_T] = 0": worst(
+            np.abs(bound * np.abs(jump) + force * jump) / forces / lengths
+        ),
+    }
+
+
+def reaction(weak: Weak, u: Fields) -> dict[str, float]:
+    """(2.3): differences of the stress components of the two bodies, relative to the largest nodal force."""
+    t, normal = weak.pair.tangential, weak.pair.normal
+    one, two = weak.force(weak.one, u.one), weak.force(weak.two, u.two)
+    forces = float(np.abs(two).max()) or 1.0
+    worst = lambda values: float(np.max(np.abs(values), initial=0.0)) / forces
+    # sigma_N^a is the component along n^a, and both lists of forces are along n^1 = -n^2
+    return {
+        "sigma_N^1 = sigma_N^2": worst(one[normal] - -two[normal]),
+        "sigma_T^1 = sigma_T^2": worst(one[t] - two[t]),
+        "sigma_T^1 = -sigma_T^2": worst(one[t] + two[t]),
+    }
+
+
+def inequality(weak: Weak, u: Fields, d: Fields) -> Floats:
+    """(4.4): left minus right side for columns ``d = v - u``, relative to ``|u| |d|`` in the norm of a."""
+    work = weak.excess(weak.one, u.one) @ d.one + weak.excess(weak.two, u.two) @ d.two
+    value = work + _friction_of_move(weak, u, weak.trace(weak.one, d.one) - weak.trace(weak.two, d.two))
+    return _over(value, weak.energy(u) * _moved(weak.energy(d), weak.energy(u)))
+
+
+def contact_inequality(weak: Weak, u: Fields, d: Floats) -> Floats:
+    """(5.3), (5.5): left minus right side for columns ``d = v - u^1``, relative to ``|u| |d|``."""
+    work = weak.excess(weak.one, u.one) @ d
+    value = work + _friction_of_move(weak, u, weak.trace(weak.one, d))
+    return _over(value, weak.energy(u) * _moved(norm(weak.one, d), weak.energy(u)))
+
+
+def shifted_inequality(weak: Weak, u: Fields, w: Floats) -> Floats:
+    """(4.9) II with the jump, (5.2): left minus right side for columns w, relative to ``|u| |w + R u^2 - u^1|``."""
+    t = weak.pair.tangential
+    d = w + (weak.lift(weak.one, weak.trace(weak.two, u.two)) - u.one)[:, None]
+    slides = np.abs(weak.trace(weak.one, w)[t]) - np.abs(weak.jump(u.one, u.two)[t])[:, None]
+    value = weak.excess(weak.one, u.one) @ d + weak.bound(u.two) @ slides
+    return _over(value, weak.energy(u) * _moved(norm(weak.one, d), weak.energy(u)))
+
+
+def _friction_of_move(weak: Weak, u: Fields, moved: Floats) -> Floats:
+    """``j(v) - j(u)`` where the jump moves."""
+    t = weak.pair.tangential
+    jump = weak.jump(u.one, u.two)[t][:, None]
+    return np.asarray(weak.bound(u.two) @ (np.abs(jump + moved[t]) - np.abs(jump)))
+
+
+def neumann_equation(weak: Weak, two: Floats, psi: Floats, v: Floats) -> Floats:
+    """(4.9) I, (5.6): ``a^2(u^2, v) - L^2(v) - <psi, v>``, relative to ``|u^2| |v|``."""
+    rest = weak.excess(weak.two, two) @ v - psi @ weak.trace(weak.two, v)
+    return _over(np.abs(rest), norm(weak.two, two) * norm(weak.two, v))
+
+
+def transfer(weak: Weak, u: Fields, image: Floats, v: Floats) -> Floats:
+    """(4.9) III, (5.4): ``<T psi, v> + a^1(u^1, R v) - L^1(R v)``, relative to ``|u| |R v|``."""
+    trace = weak.trace(weak.two, v)
+    lifted = weak.lift(weak.one, trace)
+    rest = image @ trace + weak.excess(weak.one, u.one) @ lifted
+    return _over(np.abs(rest), weak.energy(u) * norm(weak.one, lifted))
+
+
+def balance(weak: Weak, u: Fields, v: Floats) -> Floats:
+    """(5.1): ``a^2(u^2, v) - L^2(v) + a^1(u^1, R v) - L^1(R v)``, relative to ``|u| |v|``."""
+    lifted = weak.lift(weak.one, weak.trace(weak.two, v))
+    rest = weak.excess(weak.two, u.two) @ v + weak.excess(weak.one, u.one) @ lifted
+    return _over(np.abs(rest), weak.energy(u) * (norm(weak.two, v) + norm(weak.one, lifted)))
+
+
+def norm(body: Body, field: Floats) -> Floats:
+    return np.asarray(np.sqrt(_dot(field, body.stiffness @ field)))
+
+
+def _moved(d: Floats, u: Floats) -> Floats:
+    """The size of v - u; less than any test function moves is what rounding left of one that K did not allow."""
+    return np.maximum(d, 1e-5 * u)
+
+
+def _over(value: Floats, scale: Floats) -> Floats:
+    """The quotient; 0 where both vanish."""
+    return np.asarray(np.divide(value, scale, out=np.zeros(np.broadcast(value, scale).shape), where=scale > 0))
