@@ -1,8 +1,12 @@
 """Sphinx configuration: ``make docs`` builds the site into docs/_build/html, with warnings as errors."""
 
 from importlib.metadata import distribution
+from pathlib import Path
+
+from sphinx.application import Sphinx
 
 from ndtheory import __version__
+from verification.ledger import sheets, verify
 
 project = "ndtheory"
 author = "The ndtheory maintainers"
@@ -52,3 +56,16 @@ mathjax3_config = {
         }
     }
 }
+
+
+def write_ledger(app: Sphinx) -> None:
+    """The ledger and the errata sheet, from the checks themselves: run at every build, never typed."""
+    folder = Path(app.srcdir) / "generated"
+    folder.mkdir(exist_ok=True)
+    found = verify()
+    for name, text in (("ledger", sheets.page(found)), ("errata", sheets.errata(found))):
+        (folder / f"{name}.md").write_text(text, encoding="utf-8")
+
+
+def setup(app: Sphinx) -> None:
+    app.connect("builder-inited", write_ledger)

@@ -89,7 +89,9 @@ def attained(piece: Piece, theta: float, random: np.random.Generator) -> float:
     pair = with_loads(pair, g, *state_of(pair, piece.pattern, g, random))
     stress = lambda g: 1.0 if pair.regularisation is None else float((pair.regularisation @ g[t:]).min())
     inside = lambda g: step_II(pair, g).pattern == piece.pattern and stress(g) > 0
-    assert inside(g)
+    if not inside(g):  # friction so slight that rounding decides between stick and slip
+        assert 0 < pair.problem.contact.friction < 1e-6
+        return float("nan")
     step = pair.neumann.root @ np.linalg.svd(piece.relaxed(theta))[2][0] * pair.neumann.dual_norm(g)
     while not (inside(g + step) and inside(g - step)):
         step = step / 2

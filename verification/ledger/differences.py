@@ -83,11 +83,11 @@ class Setting:
 class Difference:
     """The difference of two solutions of steps I and II.
 
+    Nodal forces of shape (2 n,): ``psi - psi~`` is ``force``, ``T psi - T psi~`` is ``reaction``.
+
     Attributes
     ----------
     setting : Setting
-    force, reaction : array, shape (2 n,)
-        ``psi - psi~`` and ``T psi - T psi~``, nodal forces.
     d_1, d_2 : array, shape (2 n,)
         Traces of ``w^1 - w~^1`` and ``w^2 - w~^2``, unit of length.
     friction : float

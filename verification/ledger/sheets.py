@@ -48,9 +48,9 @@ def page(ledger: Ledger) -> str:
     """Every row with its evidence, in MyST Markdown."""
     lines = ["# The ledger: every numbered statement, checked", ""]
     lines += [
-        f"{len(ledger.rows)} statements, evidence at the level *{ledger.level}*; run it again with `ndtheory verify`. "
-        "Floating point proves nothing here: it makes a row numerical at best. Notation: {doc}`notation`; "
-        "what is wrong in the paper, on one page: {doc}`errata`.",
+        f"{len(ledger.rows)} statements, evidence at the level *{ledger.level}*; run it again with `ndtheory verify`."
+        " Floating point proves nothing here: it makes a row numerical at best. What is wrong in the paper stands on"
+        " one page, the errata.",
         "",
         "| verdict | rows | means |",
         "|---|---|---|",
@@ -78,7 +78,7 @@ def _entry(row: Row) -> Iterable[str]:
     if s.fault:
         yield ""
         inherited = f" (inherited from `{s.same_as}`)" if s.same_as else ""
-        yield f"*{FAULTS[s.fault]}*{inherited}. {s.wrong} **Repaired:** {s.repair} **Proof:** {s.proof}"
+        yield f"*{s.fault.capitalize()}*{inherited}. {s.wrong} **Repaired:** {s.repair} **Proof:** {s.proof}"
     yield ""
     for e in row.evidence:
         yield f"- *{e.method}*, {e.of}, {OUTCOME[e.holds]}: {_shown(e)}"
