@@ -39,7 +39,8 @@ class Edition:
     unit : callable
         m -> u: 1 as printed, m as repaired.
     proved : callable
-        m -> whether the proof holds: everywhere when repaired, for m >= 1 as printed.
+        m -> whether the edition's own proof holds: everywhere when repaired, for m >= 1 as printed (below it the
+        constants hold for M >= 2 m by another estimate, ``x-printed-rescued`` of the ledger).
     """
 
     name: Literal["printed", "repaired"]

@@ -252,17 +252,15 @@ M_sum = {M: (2 + o) * m}
 
 check(
     id="x-printed-rescued",
-    text="Split a_11: half of it bounds t^2, as Cauchy-Schwarz in a_1 gives a_11 >= m t^2/(M^1 C_R^2) and M^2 >= 2 m"
-    " M^1;"
-    " by Young -m d_1^2/2 + C_K d_1 d_2 <= C_K^2 d_2^2/(2m).  With kappa = C_K/m and m d_2^2 <= e^2 friction adds at"
-    " most"
-    " (kappa + kappa^2/2) e^2, for kappa <= 6 below 4 kappa e^2 and so below the printed bound; and k < C_2 implies"
-    " kappa < 4.",
+    text="Split a_11: half of it bounds t^2, as Cauchy-Schwarz in a_1 gives a_11 >= m t^2/(M^1 C_R^2), and"
+    " M^2 >= 2 m M^1 for M >= 2 m and M >= M^1; by Young -m d_1^2/2 + C_K d_1 d_2 <= C_K^2 d_2^2/(2m).  With"
+    " kappa = C_K/m and m d_2^2 <= e^2 friction adds at most (kappa + kappa^2/2) e^2, for kappa <= 6 below 4 kappa e^2"
+    " and so below the printed bound; and k < C_2 implies kappa < 4.",
     goals=lambda form: [
         at_most(
             x**2 * d_2**2 / (2 * m), x * d_1 * d_2 - m * d_1**2 / 2, {}, squares=[(m * d_1 - x * d_2) ** 2 / (2 * m)]
         ),
-        at_most((m + p + m + q) ** 2, 2 * m * (m + p)),
+        at_most(M**2, 2 * m * M / (1 + p), {M: (2 + o) * m}),
         at_most(4 * kappa, kappa + kappa**2 / 2, {kappa: form[0] / (1 + p)}),
         at_most(printed_P(m).subs(M_sum), 4 * x / m, {**CONSTANTS, m: mu**2}),
         *(

@@ -757,7 +757,7 @@ def ends(region, every=1):
 
 
 def test_what_the_printed_theorem_contracts_the_repaired_one_does_where_m_is_at_least_1(charted):
-    """In MPa, that is; with m below 1 the printed threshold is the larger one, and the printed theorem unproved."""
+    """In MPa, that is; with m below 1 the printed threshold is the larger one."""
     _, measured, drawn, _ = charted
     assert measured.m.value >= 1
     for k, theta in ends(drawn.regions["printed"], every=9):

@@ -19,7 +19,7 @@ from ndtheory import (
     relaxation_factor,
 )
 from ndtheory.constants import take
-from verification.cli.console import factor, figures, heading, say, table
+from verification.cli.console import factor, figures, heading, note, say, table
 from verification.document import Document
 from verification.editions import EditionRow, row_of
 
@@ -191,7 +191,10 @@ def _screen(constants: Constants | None, editions: Mapping[str, Bounds | SharpBo
     say()
     for name, b in section_5.items():
         if not b.proved:
-            say(f"The {name} proof needs m >= 1: below it (5.30) does not follow.")
+            note(
+                f"The {name} proof needs m >= 1: below it (5.30) fails.  With M >= 2 m its constants hold all the"
+                " same, by another estimate: ndtheory verify x-printed-rescued."
+            )
     say("Next: ndtheory example section6 > my.toml; ndtheory constants my.toml")
 
 
