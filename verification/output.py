@@ -143,6 +143,9 @@ class Folder:
         if ledger.whole:
             self._text("errata.md", sheets.errata(ledger))
             self._text("verdicts.json", sheets.verdicts(ledger))
+        else:
+            for name in ("errata.md", "verdicts.json"):  # of another ledger
+                (self.path / name).unlink(missing_ok=True)
 
     def _text(self, name: str, text: str) -> None:
         self._put(name, lambda path: path.write_text(text + "\n", encoding="utf-8"))

@@ -60,7 +60,7 @@ def of(expression: Any, table: Mapping[str, Dimension]) -> Dimension:
         base, exponent = of(expression.base, table), expression.exp
         return (base[0] * exponent, base[1] * exponent)
     if expression.is_Add or isinstance(expression, (sp.Min, sp.Max)):
-        first, *others = expression.args
+        first, *others = sorted(expression.args, key=sp.default_sort_key)
         for other in others:
             _same(first, other, table)
         return of(first, table)
@@ -80,7 +80,7 @@ def consistent(relations: Relation | Sequence[Relation], table: Mapping[str, Dim
     --------
     >>> m, x = sp.symbols("m x")
     >>> consistent(Relation(x, "<=", m * x + x), {"m": (1, 0), "x": (1, 0)})
-    'm*x is stress^2, x is stress'
+    'x is stress, m*x is stress^2'
     """
     for relation in [relations] if isinstance(relations, Relation) else relations:
         try:

@@ -9,7 +9,8 @@ that roots disappear and both sides become rational.  Then
   off first where that is needed,
 * it fails if it fails at one point with rational coordinates.
 
-Nothing here is rounded.
+Nothing here is rounded.  Both sides must be defined wherever the charts lead: a common factor of numerator and
+denominator is cancelled.
 """
 
 from __future__ import annotations
@@ -91,6 +92,11 @@ class Goal:
 def decide(goals: Goal | Iterable[Goal]) -> Decision:
     """Decide goals together: each must hold in each of its charts.
 
+    Raises
+    ------
+    ValueError
+        No goal, no chart, a chart that leaves the range of a symbol, or a square that may be negative.
+
     Examples
     --------
     >>> p, q = positive("p q")
@@ -100,7 +106,10 @@ def decide(goals: Goal | Iterable[Goal]) -> Decision:
     {'p': '1', 'q': '1'}
     """
     found: Decision = Decision(holds=True)
-    for goal in [goals] if isinstance(goals, Goal) else goals:
+    together = [goals] if isinstance(goals, Goal) else list(goals)
+    if not together or not all(goal.charts for goal in together):
+        raise ValueError("nothing to decide: needed a goal, and a chart for each")
+    for goal in together:
         for chart in goal.charts:
             decision = _in_chart(goal, chart)
             if decision.holds is False:
@@ -118,15 +127,27 @@ def rational(expression: Any) -> Any:
 
 def _in_chart(goal: Goal, chart: Mapping[Any, Any]) -> Decision:
     relation = goal.relation
+    for symbol, value in chart.items():
+        if symbol.is_nonnegative and not _certified(rational(sp.sympify(value)), strict=symbol.is_positive):
+            raise ValueError(f"{symbol} = {value} leaves its range")
     inserted = lambda expression: rational(sp.sympify(expression).subs(chart, simultaneous=True))
     difference = inserted(relation.right) - inserted(relation.left)
     numerator, denominator = sp.fraction(sp.together(difference))
     if relation.sign == "=":
         if sp.expand(numerator) == 0:
             return Decision(holds=True)
-    elif _certified(difference - sum(map(inserted, goal.squares)), strict=relation.sign == "<"):
-        return Decision(holds=True)
-    fails = {"=": lambda d: d != 0, "<=": lambda d: d < 0, "<": lambda d: d <= 0}[relation.sign]
+    else:
+        squares = [inserted(square) for square in goal.squares]
+        if not all(map(_square, squares)):
+            raise ValueError(f"one of {goal.squares} may be negative")
+        if _certified(difference - sum(squares), strict=relation.sign == "<"):
+            return Decision(holds=True)
+    # exact numbers whose sign sympy knows; None, and so no failure, where it does not
+    fails = {
+        "=": lambda d: d.is_zero is False,
+        "<=": lambda d: d.is_negative is True,
+        "<": lambda d: d.is_nonpositive is True,
+    }[relation.sign]
     parameters = sorted(difference.free_symbols, key=str)
     for point in _points(parameters):
         if denominator.subs(point) != 0 and fails(difference.subs(point)):
@@ -139,6 +160,12 @@ def _in_chart(goal: Goal, chart: Mapping[Any, Any]) -> Decision:
 def _rest_1(expression: Any) -> Any:
     """An expression with 1 for every symbol that is left: those that do not matter."""
     return expression.subs(dict.fromkeys(expression.free_symbols, sp.Integer(1)))
+
+
+def _square(term: Any) -> bool:
+    """Whether a term is, by sight, a product of even powers and of what is certified."""
+    factors = sp.Mul.make_args(sp.factor(term))
+    return all((f.is_Pow and f.exp.is_even) or _certified(f, strict=False) for f in factors)
 
 
 def _certified(difference: Any, *, strict: bool) -> bool:
@@ -195,7 +222,10 @@ class Vector(sp.Symbol):  # type: ignore[misc]
 def _terms(combination: Any) -> dict[Any, Any]:
     expanded = sp.expand(combination)
     vectors = sorted((s for s in expanded.free_symbols if isinstance(s, Vector)), key=str)
-    return {vector: expanded.coeff(vector) for vector in vectors}
+    terms = {vector: expanded.coeff(vector) for vector in vectors}
+    if sp.expand(expanded - sum(c * v for v, c in terms.items())) != 0:
+        raise ValueError(f"{combination}: needed a linear combination of vectors")
+    return terms
 
 
 def linear(name: str) -> Callable[[Any], Any]:

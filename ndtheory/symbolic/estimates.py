@@ -13,7 +13,19 @@ from typing import Any
 import sympy as sp
 
 from ndtheory import bounds
-from ndtheory.symbolic.engine import Check, Goal, Relation, Vector, add, bilinear, equal, functional, linear, positive
+from ndtheory.symbolic.engine import (
+    Check,
+    Goal,
+    Relation,
+    Vector,
+    add,
+    bilinear,
+    equal,
+    functional,
+    linear,
+    nonnegative,
+    positive,
+)
 from ndtheory.symbolic.symbols import (
     C_R,
     CONSTANTS,
@@ -65,12 +77,17 @@ a1, a2, energy = bilinear("a1"), bilinear("a2"), bilinear("b")
 lift, lift2, of_T, L1, L2 = linear("R1"), linear("R2"), functional("T"), functional("L1"), functional("L2")
 delta1, delta2 = w1 - v1, w2 - v2
 
+S, S2, J1, J2 = nonnegative("S S~ J J~")
+
 check(
     id="5.12",
-    text="The sum of (5.9) and (5.10) for the two test functions: their elastic terms, and that each test function has"
-    " the jump of the other solution (the trace of R_D phi is phi).",
+    text="The sum of (5.9) and (5.10) for the two test functions: elastic terms, loads, friction (S, S~ the bounds,"
+    " J, J~"
+    " the sizes of the jumps), and that each test function has the jump of the other solution.",
     goals=lambda form: [
         equal(a1(w1, form[0] - w1) + a1(v1, form[1] - v1), -a1(delta1, delta1) + a1(delta1, lift(delta2))),
+        equal(L1(form[0] - w1) + L1(form[1] - v1), 0),
+        equal(S * (J2 - J1) + S2 * (J1 - J2), -(S - S2) * (J1 - J2)),
         # traces: R_D1 leaves the trace as it is; (v - w2) must be the jump of w~, (v~ - w~2) that of w
         *(
             equal(form[i].subs({lift(w2): w2, lift(v2): v2}) - old, new)
@@ -197,7 +214,8 @@ check(
 
 check(
     id="5.21",
-    text="The norm comes from an inner product: R2 is linear, and a_2(R2 psi, R2 chi) obeys the law of parallelograms.",
+    text="The norm comes from an inner product: R2 is linear, and a_2(R2 psi, R2 chi) obeys the law of"
+    " parallelograms; it is definite, as e = 0 means R2 psi = 0.",
     goals=lambda form: equal(form(psi + psi2) + form(psi - psi2), 2 * form(psi) + 2 * form(psi2)),
     forms={"printed": lambda u: a2(lift2(u), lift2(u))},
     mutants={"around another force": lambda u: a2(lift2(u) + test, lift2(u) + test)},
@@ -250,6 +268,7 @@ check(
     goals=lambda form: equal(
         energy(theta * chi + (1 - theta) * rest, theta * chi + (1 - theta) * rest),
         theta**2 * energy(chi, chi) + (1 - theta) ** 2 * energy(rest, rest) + form * energy(chi, rest),
+        {theta: t_ / (1 + t_)},
     ),
     forms={"printed": 2 * theta * (1 - theta)},
     mutants={"the factor 2 dropped": theta * (1 - theta), "1 + theta": 2 * theta * (1 + theta)},
@@ -323,7 +342,7 @@ check(
     states=lambda form: Relation(F, "<=", form * e**2),
 )
 
-kappa, lam = positive("kappa lambda")
+kappa, lam = nonnegative("kappa"), positive("lambda")
 #: One open node that slides under the friction of its own g_N: S_1 = S_2 = lambda I, the norm of R^2.  For
 #: psi = (0, psi_N) step I gives w2 = psi/lambda; in step II friction moves body 1 by -kappa psi_N/lambda, and
 #: T psi = (kappa psi_N, 0).
@@ -331,7 +350,7 @@ kappa, lam = positive("kappa lambda")
 ONE_NODE = {m: lam, M: 2 * lam, C_R: 1, x: kappa * lam, F: kappa**2 * e**2, t: kappa * e, W: 0}
 
 
-SMALL_UNIT = {lam: mu**2, kappa: xi**2, theta: t_ / (1 + t_)}
+SMALL_UNIT = {lam: 1 / (1 + p) ** 2, kappa: xi**2, theta: t_ / (1 + t_)}
 
 
 def one_node(id: str, value: Any, printed: Any, repaired: Any) -> None:
@@ -401,7 +420,7 @@ for label in ("5.32", "5.33", "5.36"):
 check(
     id="5.33",
     text="(5.32) with the friction term written by means of C_T = A X/m.",
-    goals=lambda form: at_most(form, P),
+    goals=lambda form: equal(form, P, CONSTANTS),
     forms={
         "step": M**2 / m * (x * (A * X / m) / A + x / m**2),
         "repaired": M**2 / m * (x * (A * X / m) / (A * m) + x / m**2),

@@ -9,16 +9,20 @@ import sympy as sp
 
 from ndtheory import bounds, sharp
 from ndtheory.symbolic.engine import Check, add, at_most, equal, less, nonnegative, positive
-from ndtheory.symbolic.intervals import C0, P_, Q_, any_theta, end_of_43, inside
+from ndtheory.symbolic.estimates import expanded
+from ndtheory.symbolic.intervals import C0, P_, Q_, above_C6, any_theta, end_of_43, inside, of_36
 from ndtheory.symbolic.symbols import (
     C_R,
     CONSTANTS,
     LARGE_M,
     SMALL_M,
+    WITH_THETA,
     A,
     M,
     P,
     Q,
+    W,
+    e,
     m,
     m_tilde,
     mu,
@@ -29,8 +33,9 @@ from ndtheory.symbolic.symbols import (
     printed_P,
     q,
     r,
-    t_,
+    t,
     theta,
+    with_theta,
     x,
     y,
 )
@@ -67,15 +72,16 @@ C0_of_z = 2 * z / (1 + 2 * z)
 
 
 def _merged(reach: Any) -> list[Any]:
-    """C_6 < C_0 < C_1 for P = 1 + z reach/(1+y), and h_1, h_2 < 1 between C_6 and C_1."""
-    strong = 1 + z * reach / (1 + y)
-    C1 = bounds.C1(Q_ * z - P_, Q_).subs(Q_, (P_ + r) / z).subs(P_, strong)
+    """C_6 < C_0 < C_1 for 1 < P < 1 + z reach, C_0 < C_1 for P <= 1, and h_1, h_2 < 1 between C_6 and C_1."""
+    strong, weak = 1 + z * reach / (1 + y), q / (1 + q)
+    C1 = lambda P: bounds.C1(Q_ * z - P_, Q_).subs(Q_, (P_ + r) / z).subs(P_, P)
     return [
         equal(C0_of_z.subs(z, m**2 / A**2), C0, CONSTANTS),
         less(bounds.C6(strong), C0_of_z),
-        less(C0_of_z, C1),
-        less(0, 1 - of_h2(1 + y).subs(theta, 1 - 1 / ((1 + 2 * y) * (1 + t_)))),  # theta > C_6, P > 1
-        less(0, 1 - of_h2(1 / (1 + p)).subs(theta, any_theta)),  # any theta, P <= 1
+        less(C0_of_z, C1(strong)),
+        *(less(C0_of_z, C1(P).subs(r, r + z)) for P in (weak, sp.Integer(1))),  # Q >= 1
+        less(0, 1 - of_h2(1 + y).subs(theta, above_C6.subs(y, 2 * y))),  # theta > C_6, P > 1
+        *(less(0, 1 - of_h2(P).subs(theta, any_theta)) for P in (weak, sp.Integer(1))),
     ]
 
 
@@ -173,7 +179,11 @@ check(
     " admissible u_1 is its multiplier, the reaction.",
     goals=lambda form: [
         equal(sp.diff(_energy(u), u).subs(u, (g + load_2) / S_2), g - _T(g)),
-        equal((theta * _T(g) + (1 - theta) * g + load_2) / S_2 - (g + load_2) / S_2, form * (g - _T(g)) / S_2),
+        equal(
+            (theta * _T(g) + (1 - theta) * g + load_2) / S_2 - (g + load_2) / S_2,
+            form * (g - _T(g)) / S_2,
+            {theta: any_theta},
+        ),
     ],
     forms={"repaired": -theta},
     mutants={"uphill": theta, "theta/S_2": -theta / S_2},
@@ -197,6 +207,8 @@ check(
 largest = root_rho + kappa_1 + more  # r, with kappa_2 = e (s + kappa_1 + e): every kappa_2 >= 0 once
 ENERGY = (root_rho**2, kappa_1, more * largest)
 
+vertex = (1 - theta) * kappa_1 / (2 - (2 + root_rho**2) * theta)
+
 check(
     id="x-sharp",
     text="x <= r by r^2 = (sqrt(rho) + kappa_1) r + kappa_2, no larger x satisfies it; f(r) = -sqrt(rho) r; the"
@@ -212,6 +224,10 @@ check(
             + 2 * theta * (1 - theta) * sharp.work(ratio, *ENERGY[1:])
             + theta**2 * ENERGY[0] * ratio**2,
         ),
+        # the vertex below r, and the end r: where the square is largest, and what 1 - q^2 is there
+        equal(sp.diff(sharp.square_at(ratio, theta, *ENERGY), ratio).subs(ratio, vertex), 0),
+        equal(1 - sharp.square_at(vertex, theta, *ENERGY), sharp.one_minus_inside(theta, *ENERGY)),
+        equal(1 - sharp.square_at(largest, theta, *ENERGY), sharp.one_minus_end(theta, *ENERGY)),
     ],
     forms={"repaired": largest},
     mutants={"without kappa_2": root_rho + kappa_1, "half as large": largest / 2},
@@ -222,7 +238,9 @@ check(
     text="The square at x is below 1 exactly where 2 (f - 1) + theta (1 - 2 f + rho x^2) < 0: linear in theta for"
     " each x,"
     " so that the good thetas form one interval.",
-    goals=lambda form: equal(sharp.square_at(ratio, theta, root_rho**2, kappa_1, kappa_2) - 1, theta * form),
+    goals=lambda form: equal(
+        sharp.square_at(ratio, theta, root_rho**2, kappa_1, kappa_2) - 1, theta * form, {theta: any_theta}
+    ),
     forms={
         "repaired": 2 * (sharp.work(ratio, kappa_1, kappa_2) - 1)
         + theta * (1 - 2 * sharp.work(ratio, kappa_1, kappa_2) + root_rho**2 * ratio**2)
@@ -246,7 +264,7 @@ check(
 
 # --- what a closer look at the printed proof shows ------------------------------------------------------------------
 
-kappa = positive("kappa")
+kappa = nonnegative("kappa")
 d_1, d_2 = nonnegative("d_1 d_2")
 M_sum = {M: (2 + o) * m}
 
@@ -261,7 +279,13 @@ check(
             x**2 * d_2**2 / (2 * m), x * d_1 * d_2 - m * d_1**2 / 2, {}, squares=[(m * d_1 - x * d_2) ** 2 / (2 * m)]
         ),
         at_most(M**2, 2 * m * M / (1 + p), {M: (2 + o) * m}),
-        at_most(4 * kappa, kappa + kappa**2 / 2, {kappa: form[0] / (1 + p)}),
+        at_most(4 * kappa, kappa + kappa**2 / 2, {kappa: form[0] * q / (1 + q)}),
+        at_most(of_36(m_tilde, printed_P(m_tilde)), of_36(m, P), with_theta(LARGE_M)),
+        at_most(
+            of_36(m, 4 * kappa),
+            expanded.subs(W, -(m**2) / A**2 * t**2 + (kappa + kappa**2 / 2) * e**2 - r),
+            {**WITH_THETA, kappa: form[0] * q / (1 + q)},
+        ),
         at_most(printed_P(m).subs(M_sum), 4 * x / m, {**CONSTANTS, m: mu**2}),
         *(
             at_most(
@@ -273,7 +297,7 @@ check(
         ),
     ],
     forms={"repaired": (6, 4)},
-    mutants={"for C_K <= 7 m": (7, 4), "k < C_2 implies C_K < m/100": (6, sp.Rational(1, 100))},
+    mutants={"for C_K <= 17 m": (17, 4), "k < C_2 implies C_K < m/100": (6, sp.Rational(1, 100))},
 )
 
 contrast, square, Q_more, D_share = positive("r"), 1 + p, nonnegative("Q_more"), nonnegative("D_share")
@@ -298,8 +322,8 @@ check(
 check(
     id="x-best-proved-theta",
     text="At C_0 the slope of h_1, convex, is positive; below it h_2 falls: its slope at C_0 is negative for"
-    " P < (2-C_0)/(1-C_0)/2 (if h_2 is convex it falls before, if it is concave its least value is at an end, and"
-    " h_2(0) = 1).  K^2 = h_2(C_0), and 1 - C_0 >= 2/3.",
+    " P < (2-C_0)/(1-C_0)/2 (if h_2 is convex it falls before; if it is concave on (0, C_0), h_2(0) = 1"
+    " exceeds h_2(C_0)).  K^2 = h_2(C_0), and 1 - C_0 >= 2/3.",
     goals=lambda form: [
         less(0, sp.diff(1 - bounds.one_minus_h1(theta, D_of, Q_of), theta).subs(theta, form)),
         less(sp.diff(of_h2(P_), theta).subs({theta: form, P_: (2 - C0_of) / (1 - C0_of) / 2 / (1 + y)}), 0),

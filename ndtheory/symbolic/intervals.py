@@ -105,8 +105,16 @@ check(
     text="0 < C_0 < 1: Case 5.7 and Case 5.8 both occur.",
     goals=lambda form: [less(0, form, CONSTANTS), less(form, 1, CONSTANTS)],
     forms={"printed": C0},
-    mutants={"twice as large": 2 * C0, "2 m^2 dropped below": 2 * m**2 / A**2},
+    mutants={"four times as large": 4 * C0, "the sign": -C0},
     states=lambda form: Relation(theta, "=", form),
+)
+
+check(
+    id="5.38",
+    text="(5.38) as printed, with m~ in front and C_T itself.",
+    goals=lambda form: at_most(form, (A * X / m) ** 2 / m * M**2 / m / (1 + p), SMALL_M, LARGE_M),
+    forms={"printed": bounds.lipschitz(m, M, C_R, x) ** 2 * M**2 / m_tilde**2},
+    mutants={"1/m~ for 1/m~^2": bounds.lipschitz(m, M, C_R, x) ** 2 * M**2 / m_tilde / m / (1 + m)},
 )
 
 check(
@@ -129,10 +137,17 @@ printed_a = tilde_Q + 2 * C_T_tilde**2 / C_R**2 - 2 * tilde_P + 1
 printed_b = -2 * C_T_tilde**2 / C_R**2 + 2 * tilde_P - 2
 first_line = lambda constant: of_h1(m_tilde, tilde_P, constant**2 * M**2 / m_tilde**2)
 
+of_edition = {C_T: bounds.lipschitz(m, M, C_R, x), C_T_tilde: bounds.lipschitz(m_tilde, M, C_R, x)}
+
 check(
     id="5.39",
-    text="h_1 = a theta^2 + b theta + 1 with the printed a and b.",
-    goals=lambda form: equal(form, printed_a * theta**2 + printed_b * theta + 1),
+    text="h_1 = a theta^2 + b theta + 1 with the printed a and b, (5.16) for C_T and (5.35) for C~_T.",
+    goals=lambda form: equal(
+        form.subs(of_edition, simultaneous=True),
+        (printed_a * theta**2 + printed_b * theta + 1).subs(of_edition, simultaneous=True),
+        with_theta(SMALL_M),
+        with_theta(LARGE_M),
+    ),
     forms={"printed": first_line(C_T), "repaired": first_line(C_T_tilde)},
     mutants={"C_T for C~_T": first_line(C_T), "the friction term halved": of_h1(m_tilde, tilde_P / 2, tilde_Q)},
     units={"printed": Relation(tilde_P, "=", 1), "repaired": Relation(P, "=", 1)},
@@ -142,8 +157,16 @@ check(
 P_, Q_, G_ = nonnegative("P Q G")
 a_ = 1 + 2 * (Q_ * m**2 / A**2 - P_) + Q_  # C_T^2/C_R^2 = Q m^2/A^2
 b_ = -2 * (1 + Q_ * m**2 / A**2 - P_)
-#: P <= C_T^2/C_R^2 = Q m^2/A^2, the constants as before: what a >= 1 and b <= -2 need.
-SMALL_P = {**{symbol: CONSTANTS[symbol] for symbol in (m, M, C_R)}, Q_: (P_ + r) * A.subs(CONSTANTS) ** 2 / mu**4}
+#: h_1 knows of m, M and C_R the ratio A/m >= 2 alone: m = 1, M = 2 reach all.  (A/m)^4 (M/m)^2 <= Q, the value without
+#: friction, and P < C_T^2/C_R^2 = Q m^2/A^2.
+Q_at_least = 64 * (1 + c) ** 4 + r
+ADMISSIBLE = {
+    m: sp.Integer(1),
+    M: sp.Integer(2),
+    C_R: 1 + c,
+    Q_: Q_at_least,
+    P_: Q_at_least / (4 * (1 + c) ** 2) * q / (1 + q),
+}
 
 check(
     id="h1",
@@ -181,7 +204,7 @@ check(
     text="h_1 = 1 at -b/a and h_1 < 1 below it, where P <= C_T^2/C_R^2.",
     goals=lambda form: [
         equal(1 - of_h1(m, P_, Q_).subs(theta, form), 0),
-        less(0, 1 - of_h1(m, P_, Q_).subs(theta, form / (1 + y)), SMALL_P),
+        less(0, 1 - of_h1(m, P_, Q_).subs(theta, form / (1 + y)), ADMISSIBLE),
     ],
     forms={"printed": -b_ / a_},
     mutants={"-b/(2a)": -b_ / (2 * a_), "2 for -b": 2 / a_},
@@ -190,7 +213,7 @@ check(
 check(
     id="C1",
     text="C_1 as it is computed is -b/a, and it is positive.",
-    goals=lambda form: [equal(form, -b_ / a_), less(0, form, SMALL_P)],
+    goals=lambda form: [equal(form, -b_ / a_), less(0, form, ADMISSIBLE)],
     forms={"repaired": bounds.C1(Q_ * m**2 / A**2 - P_, Q_)},
     mutants={"1 dropped below": 2 * (1 + Q_ * m**2 / A**2 - P_) / (2 * (Q_ * m**2 / A**2 - P_) + Q_)},
     units={
@@ -204,7 +227,7 @@ check(
     text="a + b = Q - 1 >= 0, because M >= m and C_R >= 1: C_1 <= 1, which the paper uses and does not prove.",
     goals=lambda form: [equal(a_ + b_, Q_ - 1), at_most(form, 1)],
     forms={"repaired": Q},
-    mutants={"C_R^2 dropped twice": Q * m**8 / M**8, "M^2 more below": Q / M**2},
+    mutants={"eight powers of M/m dropped": Q * m**8 / M**8, "M^2 more below": Q / M**2},
 )
 
 check(
@@ -244,12 +267,25 @@ check(
 end_of_43 = m**5 / A**2 + m**3
 G_below = lambda G: Relation(G, "<", end_of_43)
 
+right_of_43 = 2 * m**2 + 2 * A**2
+
 check(
     id="5.43",
-    text="C_0 < C_1 up to where G(C_K) = m^5/A^2 + m^3, and not there: the interval is half open.",
-    goals=lambda form: less(2 * A**2 / m**3 * form, 2 * m**2 + 2 * A**2, CONSTANTS),
-    forms={"printed": end_of_43, "repaired": end_of_43 / (1 + y)},
-    mutants={"C_R dropped": (m**5 / M**2 + m**3) / (1 + y), "twice as far": 2 * end_of_43},
+    text="C_0 < C_1 exactly for G(C_K) below m^5/A^2 + m^3: there the numerator of (5.41) is negative, from there on"
+    " it is"
+    " not.  The interval is half open.",
+    goals=lambda form: [
+        less(2 * A**2 / m**3 * form[0], right_of_43, CONSTANTS),
+        at_most(2 * A**2 / m**3 * form[1], right_of_43),
+    ],
+    forms={
+        "printed": (end_of_43 / (1 + q), end_of_43 * (1 + r)),
+        "repaired": (end_of_43 * q / (1 + q), end_of_43 * (1 + r)),
+    },
+    mutants={
+        "C_R dropped": ((m**5 / M**2 + m**3) * q / (1 + q), end_of_43 * (1 + r)),
+        "twice as far": (2 * end_of_43 * q / (1 + q), end_of_43 * (1 + r)),
+    },
     units={"printed": G_below(printed_G), "repaired": G_below(repaired_G)},
 )
 
@@ -357,16 +393,19 @@ check(
     mutants={"a' = -1 - y": -1 - y},
 )
 
+#: Thetas above and below C_6 = 1 + 1/a' for a' = -1 - y.
+above_C6, below_C6 = 1 - 1 / ((1 + y) * (1 + t_)), (1 - 1 / (1 + y)) / (1 + t_)
+
 check(
     id="case-2-3",
     text="For a' = -1 - y: 0 < h_2 < 1 on (1 + 1/a', 1), where 1 - theta = -1/(a' (1 + tau)); and C_0 exceeds C_6 by"
     " ((2-C_0) - 2 P (1-C_0))/(2P-1).",
     goals=lambda form: [
-        *inside(-1 - y, 1 - form / ((1 + y) * (1 + t_))),
+        *inside(-1 - y, form),
         equal(C0 - bounds.C6(P_), ((2 - C0) - 2 * P_ * (1 - C0)) / (2 * P_ - 1)),
     ],
-    forms={"printed": 1},
-    mutants={"below 1 + 1/a' too": 3},
+    forms={"printed": above_C6},
+    mutants={"below 1 + 1/a'": below_C6},
 )
 
 check(
@@ -381,15 +420,15 @@ check(
 # --- Proposition 5.6 and Theorem 5.9 --------------------------------------------------------------------------------
 
 
-def proposition(number: int, text: str, goals: Callable[[Any], list[Goal]], mutants: dict[str, Any]) -> None:
+def proposition(number: int, text: str, goals: Callable[[Any], list[Goal]], form: Any, mutants: dict[str, Any]) -> None:
     """One of the four claims; the bound (5.36) they rest on is its step."""
     bound = lambda form: at_most(form, of_36(m, P), with_theta(SMALL_M), with_theta(LARGE_M))
     check(
         id=f"prop-5.6.{number}",
         text=f"{text}; with (5.36) for the P that the proof supplies.",
         goals=lambda form: [bound(form[0]), *goals(form[1])],
-        forms={"step": (of_36(m_tilde, printed_P(m_tilde)), 1), "repaired": (of_36(m, P), 1)},
-        mutants={name: (of_36(m, P), form) for name, form in mutants.items()},
+        forms={"step": (of_36(m_tilde, printed_P(m_tilde)), form), "repaired": (of_36(m, P), form)},
+        mutants={name: (of_36(m, P), mutant) for name, mutant in mutants.items()},
         units={"printed": Relation(t**2, "<=", of_36(m, printed_P(m))), "repaired": Relation(t**2, "<=", of_36(m, P))},
     )
 
@@ -397,16 +436,20 @@ def proposition(number: int, text: str, goals: Callable[[Any], list[Goal]], muta
 proposition(
     1,
     "h_1 < 1 for theta = C_1/(1+y)",
-    lambda factor: [less(0, 1 - of_h1(m, P_, Q_).subs(theta, -factor * b_ / a_ / (1 + y)), SMALL_P)],
+    lambda factor: [less(0, 1 - of_h1(m, P_, Q_).subs(theta, -factor * b_ / a_ / (1 + y)), ADMISSIBLE)],
+    1,
     {"up to 2 C_1": 2},
 )
-proposition(2, "0 < h_2 < 1 for 0 < a' <= 1", lambda factor: inside(factor / (1 + p), any_theta), {"a' < 0": -3})
-proposition(3, "0 < h_2 < 1 for -1 < a' < 0", lambda factor: inside(-factor / (1 + y), any_theta), {"a' < -1": 3})
+proposition(
+    2, "0 < h_2 < 1 for 0 < a' <= 1", lambda slope: inside(slope, any_theta), 1 / (1 + p), {"a' = -3": sp.Integer(-3)}
+)
+proposition(3, "0 < h_2 < 1 for -1 < a' < 0", lambda slope: inside(slope, any_theta), -1 / (1 + y), {"a' < -1": -1 - y})
 proposition(
     4,
     "0 < h_2 < 1 for a' = -1 - y and theta > C_6",
-    lambda factor: inside(-1 - y, 1 - factor / ((1 + y) * (1 + t_))),
-    {"below C_6": 3},
+    lambda theta: inside(-1 - y, theta),
+    above_C6,
+    {"below C_6": below_C6},
 )
 
 check(
@@ -438,13 +481,14 @@ check(
 check(
     id="prop-5.1",
     text="n_1 + (n_2 + n_3)/theta <= (n_1 + n_2 + n_3)/theta for 0 < theta <= 1.  For all theta >= theta_min"
-    " convergence is never supplied: h_1 > 1 for theta = C_1 + y.",
+    " convergence"
+    " is never supplied: h_1 > 1 on all of (C_1, 1).",
     goals=lambda form: [
         at_most((p + q + r) / theta, (p + (q + r) / theta), {theta: 1 / (1 + o)}),
-        *([less(of_h1(m, P_, Q_).subs(theta, -b_ / a_ + y), 1, SMALL_P)] if form else []),
+        form(of_h1(m, P_, Q_).subs(theta, 1 - (1 + b_ / a_) / (1 + y))),
     ],
-    forms={"step": True, "repaired": False},
-    mutants={"theta beyond C_1": True},
+    forms={"step": lambda h1: less(h1, 1, ADMISSIBLE), "repaired": lambda h1: less(1, h1, ADMISSIBLE)},
+    mutants={"h_1 < 1 beyond C_1": lambda h1: less(h1, 1, ADMISSIBLE)},
 )
 
 check(
@@ -457,7 +501,7 @@ check(
             relation=Relation(
                 0, "<", 1 - of_h1(m, P_, Q_).subs(P_, form).subs(theta, -b_ / a_ / (1 + y)).subs(P_, form)
             ),
-            charts=({**SMALL_P, P_: 0},),
+            charts=({**ADMISSIBLE, P_: sp.Integer(0)},),
         ),
     ],
     forms={"printed": sp.Integer(0)},

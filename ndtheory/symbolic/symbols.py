@@ -34,19 +34,19 @@ DIMENSIONS: dict[str, Dimension] = {
 A = M * C_R
 s = sp.sqrt(m * x)
 
-# Parameters of the charts: p, q, r, o slack of a premise; mu, xi roots of m, C_K; 1 + b = M/m, 1 + c = C_R.
-mu, b, t_, y = positive("mu b tau y")
-c, xi, p, q, r, o = nonnegative("c xi p q r o")
+# Parameters of the charts: p, q, r, o slack of a premise; mu, xi roots of m, C_K; 2 + b = M/m, 1 + c = C_R.
+mu, t_, y = positive("mu tau y")
+b, c, xi, p, q, r, o = nonnegative("b c xi p q r o")
 
-#: Every 0 < m < M, C_R >= 1, C_K >= 0; by (4.2) even M >= 2 m.
-CONSTANTS = {m: mu**2, M: mu**2 * (1 + b), C_R: 1 + c, x: xi**2}
+#: Every m > 0, M >= 2 m by (4.2), C_R >= 1, C_K >= 0.
+CONSTANTS = {m: mu**2, M: mu**2 * (2 + b), C_R: 1 + c, x: xi**2}
 #: The same with a rational root of M.
-ROOTS = {m: mu**2, M: (mu * (1 + b)) ** 2}
+ROOTS = {m: mu**2, M: (mu * (1 + b)) ** 2}  # M >= m
 #: The same, and 0 < theta < 1.
 WITH_THETA = {**CONSTANTS, theta: t_ / (1 + t_)}
 #: The same for m <= 1 and for m >= 1, with m~ = min(m, 1).
-SMALL_M = {m: 1 / (1 + o) ** 2, m_tilde: 1 / (1 + o) ** 2, M: (1 + b) / (1 + o) ** 2, C_R: 1 + c, x: xi**2}
-LARGE_M = {m: (1 + o) ** 2, m_tilde: 1, M: (1 + b) * (1 + o) ** 2, C_R: 1 + c, x: xi**2}
+SMALL_M = {m: 1 / (1 + o) ** 2, m_tilde: 1 / (1 + o) ** 2, M: (2 + b) / (1 + o) ** 2, C_R: 1 + c, x: xi**2}
+LARGE_M = {m: (1 + o) ** 2, m_tilde: 1, M: (2 + b) * (1 + o) ** 2, C_R: 1 + c, x: xi**2}
 
 with_theta = lambda chart: {**chart, theta: t_ / (1 + t_)}
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import math
-import re
 import sys
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
@@ -15,6 +14,9 @@ import click
 from ndtheory import Number
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
+    from verification.document import Document
     from verification.state import State
 
 WIDTH = 80
@@ -57,36 +59,30 @@ def complain(text: str) -> None:
         click.echo(text, err=True)
 
 
-#: What TeX names and a terminal shows otherwise.
-_SIGNS = {"le": "<=", "ge": ">=", "ne": "!=", "cdot": " ", "ldots": "..", "to": "->", "mapsto": "->", "leftarrow": "<-"}
-_SIGNS |= {"prime": "'", "langle": "<", "rangle": ">"}
-
-
-def plain(tex: str) -> str:
-    r"""A text with formulas in TeX as a terminal can show it.
-
-    >>> plain(r"$\theta \le \frac{1}{2}$")
-    'theta <= 1/2'
-    """
-    text = re.sub(r"\\sqrt\{([^{}]*)\}", r"sqrt(\1)", tex)
-    text = re.sub(r"\\frac(\d)(\w|\\theta)", r"\1/\2", text)
-    whole = lambda part: part if re.fullmatch(r"\w+|\w\^\w", part) else f"({part})"
-    text = re.sub(r"\\frac\{([^{}]*)\}\{([^{}]*)\}", lambda m: f"{whole(m[1])}/{whole(m[2])}", text)
-    text = re.sub(
-        r"\\(?:mathrm|bar|tilde) ?(?:\{([^{}]*)\}|\\?(\w+?)(?=\W|_|\d|$)|(\w))",
-        lambda m: f" {m[1] or m[2] or m[3]}" + ("~ " if "tilde" in m[0] else " "),
-        text,
-    )
-    text = re.sub(r"\\(left|right|[,;!])", " ", text).replace("\\|", "|")
-    text = re.sub(r"\\([A-Za-z]+)", lambda m: f" {_SIGNS.get(m[1], m[1])} ", text)
-    text = re.sub(r"(?<=[{(_^]) +| +(?=[})_^',.;:])|[$]", "", text)  # what TeX does not space
-    return re.sub(r" +", " ", re.sub(r"[{}\\]", "", text)).strip()
+def deliver(
+    document: Document, screen: Callable[[], None], write: Callable[[], None] | None, folder: Path | None, as_json: bool
+) -> None:
+    """Show first, then write: what goes wrong while writing costs no result."""
+    if as_json:
+        say(document.to_json())
+    else:
+        screen()
+    if write is None:
+        return
+    try:
+        write()
+    except KeyboardInterrupt:
+        complain(f"interrupted while {folder} was written; the result is shown above")
+        raise Interrupted from None
+    if not as_json:
+        complain(f"written: {folder}")
 
 
 def heading(question: str) -> None:
     """The question that the lines below answer."""
     say()
-    say(click.style(question, bold=True))
+    for line in textwrap.wrap(question, WIDTH, subsequent_indent="  "):
+        say(click.style(line, bold=True))
 
 
 def note(text: str, indent: str = "") -> None:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from verification.cli.console import heading, note, plain, say, stages, table
+from ndtheory.statements import statements
+from verification.cli.console import Interrupted, complain, deliver, heading, note, say, stages, table
 from verification.cli.problems import FOLDER, JSON
+from verification.cli.tex import plain
 
 if TYPE_CHECKING:
     from verification.ledger import Ledger, Row
@@ -26,41 +28,45 @@ if TYPE_CHECKING:
 )
 @FOLDER
 @JSON
-def verify(ids: tuple[str, ...], level: str, folder: Path | None, as_json: bool) -> int:
+def verify(ids: tuple[str, ...], level: Any, folder: Path | None, as_json: bool) -> int:
     """Check every numbered statement of the paper, or those named by ID.
 
     Each gets a verdict that was earned: by exact arithmetic, by the units of both sides, on random problems, or as a
-    definition.  Exit status 1 if one differs from its recorded verdict.
+    definition.  Exit status 1 if one differs from its recorded verdict.  -o writes the ledger as JSON and Markdown, and
+    of all statements the errata sheet.
 
     \b
     Examples:
       ndtheory verify
-      ndtheory verify 5.30 prop-5.6.1 C5
+      ndtheory verify 5.30 prop-5.6 C5
       ndtheory verify --level full -o ledger
     """
-    from ndtheory.statements import statements
+    chosen = [one for id in ids for one in _named(id)]
     from verification.ledger import verify as check
     from verification.output import Folder
 
-    known = statements()
-    for id in ids:
-        if id not in known:
-            near = get_close_matches(id, known, n=3) or list(known)[:3]
-            context = click.get_current_context()
-            raise click.UsageError(f"{id!r}: no such statement; needed one like {', '.join(near)}", context)
     target = None if folder is None else Folder(folder, "verify")
-    with stages() as watch:
-        found = check(ids, level="full" if level == "full" else "quick", watch=watch)
-    if as_json:
-        say(found.to_json())
-    elif ids:
-        for row in found.rows:
-            _row(row)
-    else:
-        _summary(found)
-    if target is not None:
-        target.write_ledger(found)
+    try:
+        with stages() as watch:
+            found = check(chosen, level=level, watch=watch)
+    except KeyboardInterrupt:
+        complain("interrupted before every check was done: no verdict is reached")
+        raise Interrupted from None
+    write = None if target is None else lambda: target.write_ledger(found)
+    deliver(found, lambda: _rows(found) if ids else _summary(found), write, folder, as_json)
     return 1 if found.changed else 0
+
+
+def _named(id: str) -> list[str]:
+    """The statement of that id, or its parts: ``prop-5.6`` is four."""
+    known = statements()
+    parts = [id] if id in known else [other for other in known if id and other.startswith(f"{id}.")]
+    if not parts:
+        folded = {other.casefold(): other for other in known}
+        near = [folded[name] for name in get_close_matches(id.casefold(), folded, n=3)] or list(known)[:3]
+        context = click.get_current_context()
+        raise click.UsageError(f"{id!r}: no such statement; needed one like {', '.join(near)}", context)
+    return parts
 
 
 def _summary(found: Ledger) -> None:
@@ -83,13 +89,22 @@ def _summary(found: Ledger) -> None:
     say("Next: ndtheory verify 5.30")
 
 
+def _rows(found: Ledger) -> None:
+    for row in found.rows:
+        _row(row)
+    grounds = list(dict.fromkeys(id for row in found.rows for id in row.statement.leans_on))
+    say()
+    say(" ".join(["Next: ndtheory verify", *grounds[:4]]))
+
+
 def _row(row: Row) -> None:
     s = row.statement
-    changed = f" (recorded: {row.recorded})" if row.changed else ""
+    changed = f" (recorded: {row.recorded or '-'})" if row.changed else ""
     heading(f"{s.id}  {plain(s.title)}: {row.verdict}{changed}")
     note(plain(s.claims), "  ")
     if s.fault:
         note(f"{s.fault}: {plain(s.wrong)}", "  ")
+    if s.repair:
         note(f"repaired: {plain(s.repair)}", "  ")
         note(f"because: {plain(s.proof)}", "  ")
     if s.leans_on:

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from verification.cli.console import Interrupted, complain, progress, say
+from verification.cli.console import complain, deliver, progress, say
 
 if TYPE_CHECKING:
-    from verification.document import Document
     from verification.problem import Problem
     from verification.runs import Run
     from verification.verdicts import Comparison
@@ -36,7 +34,7 @@ def _folder(context: click.Context, parameter: click.Parameter, value: str | Non
     return None if value is None else Path(value)
 
 
-FOLDER = click.option("-o", "--output", "folder", callback=_folder, metavar="DIR", help="Folder for JSON and figures.")
+FOLDER = click.option("-o", "--output", "folder", callback=_folder, metavar="DIR", help="Folder for the results.")
 
 
 def examples() -> dict[str, str]:
@@ -152,7 +150,7 @@ def run(file: Path, theta: str | None, solver: Any, swap_roles: bool, folder: Pa
     with progress("iterating", problem.iteration.tolerance) as watch:
         finished = runs.run(pair, solver=solver, watch=watch)
     write = None if target is None else lambda: target.write_run(finished)
-    _deliver(finished, lambda: screens.run(finished, file), write, folder, as_json)
+    deliver(finished, lambda: screens.run(finished, file), write, folder, as_json)
     return _status_of_run(finished, swap_roles)
 
 
@@ -181,7 +179,7 @@ def solve(file: Path, folder: Path | None, as_json: bool) -> int:
     _warn(facing.warnings)
     solution = monolithic.solve(facing)
     write = None if target is None else lambda: target.write_solution(solution)
-    _deliver(solution, lambda: screens.solution(solution, file), write, folder, as_json)
+    deliver(solution, lambda: screens.solution(solution, file), write, folder, as_json)
     return 0
 
 
@@ -244,27 +242,8 @@ def _compare(problem: Problem, file: Path, folder: Path | None, solver: Any, as_
     with progress("iterating", problem.iteration.tolerance) as watch:
         comparison = verdicts.compare(pair, solver=solver, watch=watch)
     write = None if target is None else lambda: target.write_comparison(comparison)
-    _deliver(comparison, lambda: screens.comparison(comparison, file), write, folder, as_json)
+    deliver(comparison, lambda: screens.comparison(comparison, file), write, folder, as_json)
     return _status_of_comparison(comparison, swapped)
-
-
-def _deliver(
-    document: Document, screen: Callable[[], None], write: Callable[[], None] | None, folder: Path | None, as_json: bool
-) -> None:
-    """Show first, then write: what goes wrong while writing costs no result."""
-    if as_json:
-        say(document.to_json())
-    else:
-        screen()
-    if write is None:
-        return
-    try:
-        write()
-    except KeyboardInterrupt:
-        complain(f"interrupted while {folder} was written; the result is shown above")
-        raise Interrupted from None
-    if not as_json:
-        complain(f"written: {folder}")
 
 
 def _warn(warnings: list[str]) -> None:

@@ -53,7 +53,9 @@ def settle(evidence: Sequence[Evidence]) -> tuple[Verdict, Method | None]:
     """The verdict on a statement, and the method that decided it.
 
     A printed form or a step that fails makes the statement REPAIRED where a repaired form is proved in exact
-    arithmetic or rests on a definition, else REFUTED.  Floating point proves nothing: at best it is NUMERICAL.
+    arithmetic or by reading, else REFUTED; equal units mend nothing.  What exact arithmetic leaves undecided stays
+    INCONCLUSIVE, and a repaired form that fails is a fault of ours.  Floating point proves nothing: at best a statement
+    is NUMERICAL.
 
     Examples
     --------
@@ -62,16 +64,15 @@ def settle(evidence: Sequence[Evidence]) -> tuple[Verdict, Method | None]:
     ('NUMERICAL', 'discrete')
     """
     ordered = sorted(evidence, key=lambda e: METHODS.index(e.method))
-    broken = [e for e in ordered if e.holds is False and e.of != "repaired"]
-    if any(e.holds is False for e in ordered if e.of == "repaired"):
+    undecided = [e for e in ordered if e.holds is None]
+    if any(e.method == "symbolic" for e in undecided) or any(e.holds is False for e in ordered if e.of == "repaired"):
         return "INCONCLUSIVE", ordered[0].method
+    broken = [e for e in ordered if e.holds is False]
     if broken:
-        mended = any(e.holds and e.of == "repaired" and e.method != "discrete" for e in ordered)
+        mended = any(e.holds and e.of == "repaired" and e.method in ("symbolic", "reading") for e in ordered)
         return ("REPAIRED" if mended else "REFUTED"), broken[0].method
     stands = [e for e in ordered if e.holds and e.method != "dimension"]
-    if any(e.holds is None for e in ordered) and not any(e.method == "symbolic" for e in stands):
-        return "INCONCLUSIVE", next(e.method for e in ordered if e.holds is None)
-    if not stands:
-        return "INCONCLUSIVE", None
+    if not stands or (undecided and stands[0].method != "symbolic"):
+        return "INCONCLUSIVE", undecided[0].method if undecided else None
     verdicts: dict[Method, Verdict] = {"symbolic": "PROVED", "discrete": "NUMERICAL", "reading": "ASSUMED"}
     return verdicts[stands[0].method], stands[0].method

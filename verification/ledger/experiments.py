@@ -244,7 +244,7 @@ class Sweeps:
         """Figures of a model."""
         best, unrelaxed, rho = self.best(model), self.best(model, "residual"), self.rho(model)
         pair = self.pair(model)
-        return {
+        row = {
             "geometry": model.geometry,
             "neumann_body": model.neumann,
             "E1": float(model.young[0]),
@@ -259,6 +259,8 @@ class Sweeps:
             "rho": _figure(rho),
             "predicted_theta": _figure(2 / (2 + rho)),
         }
+        missing = [name for name, value in row.items() if value is None]
+        return row | {"reason": dict.fromkeys(missing, f"not within {MOST_STEPS} steps")}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -394,6 +396,11 @@ def _one_theta(sweeps: Sweeps, families: Mapping[str, Sequence[Model]], what: st
         "rows": rows,
         "theta": {name: float(theta) if math.isfinite(cost) else None for name, (theta, cost) in served.items()},
         "cost": {name: _figure(cost, 3) if math.isfinite(cost) else None for name, (_, cost) in served.items()},
+        "reason": {
+            name: f"no theta serves all within {MOST_STEPS} steps"
+            for name, (_, cost) in served.items()
+            if not math.isfinite(cost)
+        },
     }
     return _evidence("printed", _all_or_none(list(answers.values())), f"{verdict}: {told}", **data)
 

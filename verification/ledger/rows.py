@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from importlib.resources import files
 from typing import Any, ClassVar, Literal
 
 from ndtheory.statements import Statement, statements
-from ndtheory.symbolic import checks
 from verification.document import Document
-from verification.ledger.evidence import Evidence, Method, Verdict, settle
+from verification.ledger.evidence import METHODS, Evidence, Method, Verdict, settle
 
 Level = Literal["quick", "full"]
 
@@ -104,13 +103,16 @@ def recorded() -> dict[str, str]:
 
 
 def verify(
-    ids: Collection[str] = (), *, level: Level = "quick", watch: Callable[[str, float], None] = lambda what, share: None
+    ids: str | Collection[str] = (),
+    *,
+    level: Level = "quick",
+    watch: Callable[[str, float], None] = lambda what, share: None,
 ) -> Ledger:
     """Check statements and settle their verdicts.
 
     Parameters
     ----------
-    ids : collection of str
+    ids : str or collection of str
         All by default.
     level : {'quick', 'full'}
         How many problems the discrete evidence takes.
@@ -119,8 +121,8 @@ def verify(
 
     Raises
     ------
-    KeyError
-        An id that no statement has.
+    ValueError
+        An id that no statement has, or another level.
 
     Examples
     --------
@@ -128,10 +130,13 @@ def verify(
     ['PROVED', 'REPAIRED']
     """
     known = statements()
-    for id in ids:
+    asked = [ids] if isinstance(ids, str) else list(ids)
+    for id in asked:
         if id not in known:
-            raise KeyError(id)
-    chosen = [s for s in known.values() if not ids or s.id in ids]
+            raise ValueError(f"{id!r}: no such statement")
+    if level not in ("quick", "full"):
+        raise ValueError(f"level {level!r}: needed 'quick' or 'full'")
+    chosen = [s for s in known.values() if not asked or s.id in asked]
     wanted = {s.id for s in chosen}
     evidence: dict[str, list[Evidence]] = {id: [] for id in wanted}
     for source, gather in _sources().items():
@@ -143,7 +148,7 @@ def verify(
         entries = _by_strength([*evidence[s.id], *_read(s, evidence[s.id])])
         verdict, method = settle(entries)
         rows.append(Row(statement=s, evidence=entries, verdict=verdict, method=method, recorded=recorded().get(s.id)))
-    return Ledger(rows=tuple(_grounded(rows)), level=level, units={})
+    return Ledger(rows=tuple(_grounded(rows)), level=level, units={"length": "any", "stress": "any"})
 
 
 Source = Callable[[Collection[str], Level, Callable[[float], None]], Mapping[str, Sequence[Evidence]]]
@@ -164,6 +169,7 @@ def _sources() -> dict[str, Source]:
 
 def exact(ids: Collection[str], level: Level, watch: Callable[[float], None]) -> dict[str, list[Evidence]]:
     """Symbolic evidence, and that of units."""
+    from ndtheory.symbolic import checks
     from ndtheory.symbolic.dimension import consistent
     from ndtheory.symbolic.symbols import DIMENSIONS
 
@@ -173,7 +179,7 @@ def exact(ids: Collection[str], level: Level, watch: Callable[[float], None]) ->
         entries = found.setdefault(check.id, [])
         for of, form in check.forms.items():
             decision = check.decide(form)
-            data = {"counterexample": dict(decision.counterexample)} if decision.holds is False else {}
+            data = {"counterexample": dict(decision.counterexample)} if decision.counterexample else {}
             entries.append(Evidence(method="symbolic", of=of, holds=decision.holds, text=check.text, data=data))
         for of, relations in check.units.items():
             differ = consistent(relations, DIMENSIONS)
@@ -185,40 +191,38 @@ def exact(ids: Collection[str], level: Level, watch: Callable[[float], None]) ->
 
 def _read(statement: Statement, found: Sequence[Evidence]) -> list[Evidence]:
     """What reading alone says: what a definition rests on, and a gap with its repair where nothing else shows it."""
-    entries = []
-    if statement.reading:
-        entries.append(Evidence(method="reading", of="printed", holds=True, text=statement.reading))
+    entry = lambda of, holds, text: Evidence(method="reading", of=of, holds=holds, text=text)
+    entries = (
+        [entry("repaired" if statement.fault else "printed", True, statement.reading)] if statement.reading else []
+    )
     if statement.fault:
         if all(e.holds is not False for e in found if e.of != "repaired"):
-            entries.append(Evidence(method="reading", of="step", holds=False, text=statement.wrong))
-        proved = any(e.of == "repaired" and e.holds and e.method in ("symbolic", "reading") for e in found)
-        if statement.repair and not proved:
-            entries.append(Evidence(method="reading", of="repaired", holds=True, text=statement.proof))
+            entries.append(entry("step", False, statement.wrong))
+        if statement.repair and not any(e.of == "repaired" and e.method == "symbolic" for e in found):
+            entries.append(entry("repaired", True, statement.proof))
     return entries
 
 
 def _by_strength(evidence: Sequence[Evidence]) -> tuple[Evidence, ...]:
-    from verification.ledger.evidence import METHODS
-
     return tuple(sorted(evidence, key=lambda e: METHODS.index(e.method)))
 
 
 def _grounded(rows: Sequence[Row]) -> list[Row]:
     """Nothing is proved from a statement that is refuted or undecided (as recorded, where it was not checked now)."""
-    verdicts: dict[str, str] = recorded() | {row.statement.id: row.verdict for row in rows}
-    result = []
-    for row in rows:
-        bad = [id for id in row.statement.leans_on if verdicts.get(id) in NO_GROUND]
-        if bad and row.verdict in ("PROVED", "REPAIRED"):
-            missing = Evidence(
-                method="reading", of="step", holds=None, text=f"it leans on {', '.join(bad)}: {verdicts[bad[0]]}"
-            )
-            row = Row(
-                statement=row.statement,
-                evidence=(*row.evidence, missing),
-                verdict="INCONCLUSIVE",
-                method="reading",
-                recorded=row.recorded,
-            )
-        result.append(row)
-    return result
+    result = {row.statement.id: row for row in rows}
+    verdicts: dict[str, str] = recorded() | {id: row.verdict for id, row in result.items()}
+    while True:
+        fallen = {
+            id: [ground for ground in row.statement.leans_on if verdicts.get(ground) in NO_GROUND]
+            for id, row in result.items()
+            if row.verdict in ("PROVED", "REPAIRED")
+        }
+        fallen = {id: grounds for id, grounds in fallen.items() if grounds}
+        if not fallen:
+            return list(result.values())
+        for id, grounds in fallen.items():
+            text = f"it leans on {', '.join(f'{ground} ({verdicts[ground]})' for ground in grounds)}"
+            missing = Evidence(method="reading", of="step", holds=None, text=text)
+            row = result[id]
+            result[id] = replace(row, evidence=(*row.evidence, missing), verdict="INCONCLUSIVE", method="reading")
+        verdicts |= dict.fromkeys(fallen, "INCONCLUSIVE")

@@ -46,9 +46,10 @@ def _section(id: str) -> str:
 
 def page(ledger: Ledger) -> str:
     """Every row with its evidence, in MyST Markdown."""
+    count = f"{len(ledger.rows)} statements" if len(ledger.rows) > 1 else "One statement"
     lines = ["# The ledger: every numbered statement, checked", ""]
     lines += [
-        f"{len(ledger.rows)} statements, evidence at the level *{ledger.level}*; run it again with `ndtheory verify`."
+        f"{count}, evidence at the level *{ledger.level}*; run it again with `ndtheory verify`."
         " Floating point proves nothing here: it makes a row numerical at best. What is wrong in the paper stands on"
         " one page, the errata.",
         "",
@@ -78,7 +79,8 @@ def _entry(row: Row) -> Iterable[str]:
     if s.fault:
         yield ""
         inherited = f" (inherited from `{s.same_as}`)" if s.same_as else ""
-        yield f"*{s.fault.capitalize()}*{inherited}. {s.wrong} **Repaired:** {s.repair} **Proof:** {s.proof}"
+        mended = f" **Repaired:** {s.repair} **Proof:** {s.proof}" if s.repair else ""
+        yield f"*{s.fault.capitalize()}*{inherited}. {s.wrong}{mended}"
     yield ""
     for e in row.evidence:
         yield f"- *{e.method}*, {e.of}, {OUTCOME[e.holds]}: {_shown(e)}"
@@ -110,8 +112,8 @@ def errata(ledger: Ledger) -> str:
         "G. Bayada, J. Sabil, T. Sassi, *Convergence of a Neumann-Dirichlet algorithm for two-body contact problems"
         " with non local Coulomb's friction law*, ESAIM: M2AN 42 (2008) 243-262. The theorem stands, even with the"
         " printed constants; what follows mends its statement and its proof. Each entry was decided by an exact"
-        " counterexample, by the units of both sides, on random problems or by a reading; each repair is proved, in the"
-        " ledger.",
+        " counterexample, by the units of both sides, on random problems or by reading; the proof of each repair stands"
+        " in the ledger.",
         "",
     ]
     for fault, heading in FAULTS.items():
