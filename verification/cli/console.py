@@ -87,7 +87,8 @@ def heading(question: str) -> None:
 
 def note(text: str, indent: str = "") -> None:
     """A sentence of the result, folded at the width of the screen."""
-    for line in textwrap.wrap(text, WIDTH, initial_indent=indent, subsequent_indent=indent + "  "):
+    folded = textwrap.TextWrapper(WIDTH, indent, indent + "  ", break_on_hyphens=False)
+    for line in folded.wrap(text):
         say(line)
 
 
