@@ -8,9 +8,10 @@ from typing import Any
 import sympy as sp
 
 from ndtheory import bounds, sharp
+from ndtheory.symbolic.contraction import above_C6, any_theta, inside
 from ndtheory.symbolic.engine import Check, add, at_most, equal, less, nonnegative, positive
 from ndtheory.symbolic.estimates import expanded
-from ndtheory.symbolic.intervals import C0, P_, Q_, above_C6, any_theta, end_of_43, inside, of_36
+from ndtheory.symbolic.intervals import C0, P_, Q_, end_of_43, of_36
 from ndtheory.symbolic.symbols import (
     C_R,
     CONSTANTS,

@@ -19,19 +19,8 @@ from verification.ledger import inequalities
 from verification.ledger.cases import NAMED
 from verification.ledger.differences import Difference, Setting, along, between, directions, pieces, uniform_piece
 from verification.ledger.evidence import Evidence
-from verification.ledger.inequalities import (
-    ALLOWANCE,
-    INEQUALITIES,
-    LEVELS,
-    SHARES,
-    Case,
-    Inequality,
-    Reading,
-    Tally,
-    discrete,
-    draw_cases,
-    pairs_of,
-)
+from verification.ledger.inequalities import ALLOWANCE, INEQUALITIES, LEVELS, SHARES, Inequality, Reading
+from verification.ledger.worst import Case, Tally, discrete, draw_cases, pairs_of
 from verification.problem import Problem
 from verification.threads import one_thread
 

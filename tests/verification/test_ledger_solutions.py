@@ -10,12 +10,15 @@ import pytest
 
 from fem1d2d import Condensation
 from verification.bodies import build
+from verification.ledger import convergence, weak_forms
 from verification.ledger import experiments as section_6
 from verification.ledger import solutions as ledger
-from verification.ledger import weak_forms
+from verification.ledger import sweeps as sweeps_of
+from verification.ledger.convergence import Convergence, Setting
 from verification.ledger.evidence import settle
-from verification.ledger.experiments import Best, Count, Model, Stopped, Sweeps, experiments
-from verification.ledger.solutions import Convergence, Setting, solutions
+from verification.ledger.experiments import Stopped, experiments
+from verification.ledger.solutions import solutions
+from verification.ledger.sweeps import Best, Count, Model, Sweeps
 from verification.ledger.weak_forms import EXACT, Case, Fields, Weak
 from verification.monolithic import solve
 from verification.problem import Problem
@@ -260,7 +263,7 @@ def test_on_two_bars_the_printed_sign_gives_the_factor_of_the_cobweb():
     bars = Case(
         name="bars", problem=Problem.from_dict(weak_forms.CONVERGENT["two bars"] | {"iteration": {"theta": "0.3"}})
     )
-    distance = ledger.distances(bars, -1, 4)
+    distance = convergence.distances(bars, -1, 4)
     rho, theta = 1.0, 0.3
     # an error e gives T an error -rho e, so that the printed step is e (1 - theta + theta rho) - 2 theta g
     error = [-1.0]
@@ -271,16 +274,16 @@ def test_on_two_bars_the_printed_sign_gives_the_factor_of_the_cobweb():
 
 @pytest.mark.parametrize("of", [PRINTED, REPAIRED])
 def test_a_contraction_factor_one_per_cent_too_small_is_found_out(of):
-    runs = ledger.inside("quick") if of == PRINTED else ledger.sharp("quick")
-    assert ledger._falling(of, "", runs).holds is True
+    runs = convergence.inside("quick") if of == PRINTED else convergence.sharp("quick")
+    assert convergence._falling(of, "", runs).holds is True
     short = [Convergence(case=run.case, factor=0.99 * run.factor) for run in runs]
-    assert ledger._falling(of, "", short).holds is False
+    assert convergence._falling(of, "", short).holds is False
 
 
 def test_the_estimate_of_proposition_5_1_is_homogeneous_in_theta_m():
     case = pressed()
     states = case.run.states[:6]
-    one, other = (ledger.strong_convergence(case.weak, states, 0.6, m) for m in (1.0, 300.0))
+    one, other = (convergence.strong_convergence(case.weak, states, 0.6, m) for m in (1.0, 300.0))
     assert other == pytest.approx(300 * one, rel=1e-12)
     assert other.max() > 1
 
@@ -297,13 +300,13 @@ def test_the_model_has_nearly_the_numbers_of_nodes_of_the_paper():
 def test_a_run_that_stops_early_does_not_give_the_same_results():
     problem = Model().problem
     loose = replace(problem, iteration=replace(problem.iteration, tolerance=1e-5))
-    assert section_6.difference(build(loose)) > section_6.SAME
+    assert section_6.difference(build(loose)) > sweeps_of.SAME
     tight = replace(problem, iteration=replace(problem.iteration, tolerance=1e-12))
     assert section_6.difference(build(tight)) < 1e-10
 
 
 def test_the_increment_is_theta_times_the_unrelaxed_residual():
-    run = section_6.trace(build(Model().problem), 0.3, 20)
+    run = sweeps_of.trace(build(Model().problem), 0.3, 20)
     for n in range(1, 20):
         step = np.linalg.norm(run.g[n] - run.g[n - 1])
         assert step == pytest.approx(0.3 * run.residuals[n - 1] * np.linalg.norm(image(run, n, 0.3)), rel=1e-9)
@@ -315,8 +318,8 @@ def image(run, n, theta):
 
 
 def test_steps_are_counted_by_interpolation():
-    assert section_6.steps_to([1.0, 1e-4, 1e-8], 1e-6) == pytest.approx(1.5)
-    assert section_6.steps_to([1.0, 0.1], 1e-6) is None
+    assert sweeps_of.steps_to([1.0, 1e-4, 1e-8], 1e-6) == pytest.approx(1.5)
+    assert sweeps_of.steps_to([1.0, 0.1], 1e-6) is None
 
 
 def test_equal_moduli_give_the_same_steps_whatever_their_size():
@@ -324,7 +327,7 @@ def test_equal_moduli_give_the_same_steps_whatever_their_size():
     counts = []
     for young in (Fraction(200), Fraction(20000)):
         pair = build(Model(young=(young, young), halvings=0).problem)
-        counts.append(section_6.trace(pair, 0.5).stop(absolute=False))
+        counts.append(sweeps_of.trace(pair, 0.5).stop(absolute=False))
     assert counts[0] == counts[1]
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+Level = Literal["quick", "full"]
 Method = Literal["symbolic", "dimension", "discrete", "reading"]
 Verdict = Literal["PROVED", "REPAIRED", "REFUTED", "NUMERICAL", "ASSUMED", "INCONCLUSIVE"]
 
@@ -47,6 +48,11 @@ class Evidence:
             "text": self.text,
             **({"data": dict(self.data)} if self.data else {}),
         }
+
+
+def figure(value: float, digits: int = 6) -> float:
+    """A number to so many significant digits: what another machine reproduces."""
+    return float(f"{value:.{digits - 1}e}")
 
 
 def settle(evidence: Sequence[Evidence]) -> tuple[Verdict, Method | None]:

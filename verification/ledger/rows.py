@@ -7,13 +7,11 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from importlib.resources import files
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 from ndtheory.statements import Statement, statements
 from verification.document import Document
-from verification.ledger.evidence import METHODS, Evidence, Method, Verdict, settle
-
-Level = Literal["quick", "full"]
+from verification.ledger.evidence import METHODS, Evidence, Level, Method, Verdict, settle
 
 #: A statement cannot be proved from one of these.
 NO_GROUND = ("REFUTED", "INCONCLUSIVE")
@@ -156,8 +154,8 @@ Source = Callable[[Collection[str], Level, Callable[[float], None]], Mapping[str
 
 def _sources() -> dict[str, Source]:
     from verification.ledger.experiments import experiments
-    from verification.ledger.inequalities import discrete
     from verification.ledger.solutions import solutions
+    from verification.ledger.worst import discrete
 
     return {
         "exact arithmetic and units": exact,

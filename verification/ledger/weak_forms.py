@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -20,13 +20,12 @@ from fem1d2d.mesh import Floats
 from verification.bodies import build
 from verification.contact import ContactError
 from verification.iteration import FixedPointMap, state_at
+from verification.ledger.evidence import Level
 from verification.monolithic import solve
 from verification.pair import Body, Pair
 from verification.problem import Problem
 from verification.runs import Run, run
 from verification.state import State
-
-Level = Literal["quick", "full"]
 
 #: Every draw of random numbers starts from it.
 SEED = 2008

@@ -1,0 +1,290 @@
+"""Convergence of the iteration: (3.1) III, Proposition 5.1, Theorem 5.9 and (5.47), held against runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from fem1d2d import solver
+from fem1d2d.mesh import Floats
+from ndtheory import EDITIONS, evaluate, evaluate_sharp
+from verification.advice import CLOSEST_TO_ONE
+from verification.contact import ContactError
+from verification.iteration import FixedPointMap
+from verification.ledger.evidence import Evidence, Level, figure
+from verification.ledger.found import Found, equations, evidence
+from verification.ledger.weak_forms import CLEAR, CONVERGENT, EXACT, LIMIT, PLANE, Case, Weak, cases, image_of
+from verification.measured import measure
+from verification.pair import Body
+from verification.problem import Problem
+from verification.state import State
+
+# Section 3 and the convergence of the iteration.
+
+#: Steps of (3.1) with the printed sign.
+STEPS = 200
+
+
+def distances(case: Case, sign: int, steps: int) -> Floats:
+    """``|||g_i - g||| / |||g|||`` along ``g_i = sign theta (T g) + (1 - theta) g_{i-1}``, from g_0 = 0."""
+    pair, theta = case.weak.pair, float(case.run.theta)
+    g, size = np.zeros_like(case.g), pair.neumann.dual_norm(case.g) or 1.0
+    T, result = FixedPointMap(pair, "active-set"), []
+    for _ in range(steps):
+        result.append(pair.neumann.dual_norm(g - case.g) / size)
+        if result[-1] <= LIMIT:
+            break
+        try:
+            image = T(g)[1].force
+        except ContactError:
+            image = image_of(pair, g).image
+        g = sign * theta * image + (1 - theta) * g
+    return np.array(result)
+
+
+def strong_form(setting: Setting) -> list[Evidence]:
+    """Step III of (3.1): ``sigma^1 n^1`` is minus T g, so that the printed sign is that of minus T g."""
+    loaded = [case for case in setting.cases if np.abs(case.g).any()]
+    printed = {case.name: distances(case, -1, STEPS) for case in loaded}
+    repaired = {case.name: distances(case, +1, 3000) for case in loaded}
+    nearest = {name: float(d[1:].min()) for name, d in printed.items()}
+    where = min(nearest, key=lambda name: figure(nearest[name], 3))
+    data = {"problems": list(printed), "steps": STEPS, "limit": LIMIT}
+    text = (
+        f"with +theta sigma^1 n^1 no g_i of {STEPS} steps is closer to the solution g than {nearest[where]:.3g} of its"
+        f" norm, in any of {len(nearest)} problems; a step from g itself leads to (1 - 2 theta) g"
+    )
+    slowest = max(repaired, key=lambda name: len(repaired[name]))
+    good = all(d[-1] <= LIMIT for d in repaired.values())
+    seen = f"with -theta it falls below {LIMIT:g} within {len(repaired[slowest]) - 1} steps in each"
+    if not good:
+        bad = max(repaired, key=lambda name: repaired[name][-1])
+        seen = f"with -theta a distance of {repaired[bad][-1]:.3g} is left ({bad})"
+    return [
+        evidence(
+            "printed",
+            nearest[where] <= LIMIT,
+            text,
+            data | {"nearest": {name: figure(d, 3) for name, d in nearest.items()}, "where": where},
+        ),
+        evidence("repaired", good, seen, data | {"iterations": {n: len(d) - 1 for n, d in repaired.items()}}),
+    ]
+
+
+class Norms:
+    """The norms of V and of the dual of V^2, from the whole Gram matrices."""
+
+    def __init__(self, weak: Weak) -> None:
+        self.weak, self._solve = weak, solver(weak.two.gram_matrix)
+
+    def of(self, body: Body, field: Floats) -> float:
+        """The H1 norm."""
+        return float(np.sqrt(field @ (body.gram_matrix @ field)))
+
+    def dual(self, force: Floats) -> float:
+        """The norm of V^2' of nodal forces on Gamma_c."""
+        load = np.zeros(len(self.weak.two.free))
+        load[self.weak.two.interface] = self.weak.pair.orient(force)
+        return float(np.sqrt(max(float(load @ self._solve(load)), 0.0)))
+
+
+def strong_convergence(weak: Weak, states: Sequence[State], theta: float, m: float) -> Floats:
+    """Proposition 5.1: left side of its estimate over the right side, for pairs of steps of a run."""
+    norms = Norms(weak)
+    fields = [weak.at(state) for state in states[:-1]]
+    dual = lambda i, j: norms.dual(states[i].g - states[j].g)
+    result = []
+    for i in range(len(fields)):
+        for j in range(i):
+            difference = fields[i].one - fields[j].one
+            size = norms.of(weak.one, difference)
+            lifted = norms.of(weak.two, weak.lift(weak.two, weak.trace(weak.one, difference)))
+            right = (dual(i, j) + dual(i + 1, i) + dual(j + 1, j)) * lifted / (theta * m)
+            result.append(size**2 / right if right > 0 else 0.0)
+    return np.array(result)
+
+
+def forces_carry_displacements(setting: Setting) -> list[Evidence]:
+    ratios, ends = {}, []
+    for case in setting.cases:
+        clear = [s for s in case.run.states if s.relative_residual > CLEAR]
+        if len(clear) > 2:
+            m = measure(case.weak.pair).m.value
+            ratios[case.name] = float(strong_convergence(case.weak, clear[:12], float(case.run.theta), m).max())
+        if case.run.converged:
+            ends.append(Found(name=case.name, values=np.array([apart(case)]), limit=LIMIT))
+    where = max(ratios, key=lambda name: figure(ratios[name]))
+    data = {"problems": list(ratios), "worst": figure(ratios[where]), "where": where}
+    text = f"its estimate along runs, left over right side at most {ratios[where]:.3g} ({where})"
+    return [
+        evidence("step", ratios[where] <= 1, text, data),
+        equations("printed", "u_i at the end of runs against the solution of the global method, in V", ends),
+    ]
+
+
+def apart(case: Case) -> float:
+    """The distance in V of the end of the run to the global solution, relative to the latter."""
+    norms, weak = Norms(case.weak), case.weak
+    parts = [
+        (norms.of(body, a - b), norms.of(body, b))
+        for body, a, b in ((weak.one, case.limit.one, case.solution.one), (weak.two, case.limit.two, case.solution.two))
+    ]
+    return math.hypot(*(p[0] for p in parts)) / math.hypot(*(p[1] for p in parts))
+
+
+# Theorem 5.9.
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Convergence:
+    """A run beside the contraction factor K that is proved of it."""
+
+    case: Case
+    factor: float
+
+    @cached_property
+    def ratio(self) -> float:
+        """The largest ``|||g_i - g||| / |||g_{i-1} - g|||`` while the distance stands clear of rounding.
+
+        g is the functional of Theorem 5.9, from the displacement of body 1.
+        """
+        weak = self.case.weak
+        neumann, g = weak.pair.neumann, -weak.force(weak.one, self.case.solution.one)
+        distance = np.array([neumann.dual_norm(state.g - g) for state in self.case.run.states])
+        count = int((distance > CLEAR * neumann.dual_norm(g)).sum())
+        return float((distance[1:count] / distance[: count - 1]).max(initial=0.0))
+
+
+def inside(level: Level) -> list[Convergence]:
+    """Runs inside Proposition 5.6, as printed and as repaired: theta = C_0, and k half of its bound.
+
+    The plane ones take thousands of steps; quick makes the first few hundred.
+    """
+    result = []
+    for name, data in (CONVERGENT | PLANE).items():
+        problem = Problem.from_dict(data)
+        measured = measure(problem)
+        if name in PLANE:
+            constants = measured.with_friction(1e-12).constants()
+            assert constants is not None
+            thresholds = [evaluate(edition, constants).C2 for edition in EDITIONS]
+            k = Fraction(min(c.value for c in thresholds if c is not None) / 2).limit_denominator(10**9)
+            steps = 300 if level == "quick" else 20_000
+            iteration = replace(problem.iteration, max_iterations=steps)
+            problem = replace(problem, contact=replace(problem.contact, friction=k), iteration=iteration)
+            measured = measured.with_friction(float(k))
+        constants = measured.constants()
+        assert constants is not None
+        theta = min(evaluate(edition, constants).C0.value for edition in EDITIONS)
+        factors = [evaluate(edition, constants, theta=theta).factor for edition in EDITIONS]
+        factor = max(2.0 if f is None else f.value for f in factors)
+        result.append(Convergence(case=Case(name=name, problem=problem.with_theta(theta)), factor=factor))
+    return result
+
+
+def sharp(level: Level) -> list[Convergence]:
+    """Runs with half the friction that the theorem in energy norms allows, at its best theta."""
+    result = []
+    for name, problem in ((case.name, case.problem) for case in cases(level)):
+        measured = measure(problem)
+        threshold = measured.friction_threshold
+        if threshold is not None and float(problem.contact.friction) > threshold.value / 2:
+            k = Fraction(threshold.value / 2).limit_denominator(10**6)
+            problem = replace(problem, contact=replace(problem.contact, friction=k))
+            measured = measured.with_friction(float(k))
+        constants = measured.energy_constants()
+        assert constants is not None
+        bounds = evaluate_sharp(constants)
+        if bounds.theta_proved is not None and bounds.factor_proved is not None:
+            theta = min(bounds.theta_proved, CLOSEST_TO_ONE)
+            case = Case(name=name, problem=problem.with_theta(theta))
+            result.append(Convergence(case=case, factor=bounds.factor_proved.value))
+    return result
+
+
+def forces_converge(setting: Setting) -> list[Evidence]:
+    return [
+        _falling(
+            "printed", "inside the intervals of Proposition 5.6, printed and repaired, at theta = C_0", setting.inside
+        ),
+        _falling("repaired", "inside the interval of the theorem in energy norms", setting.sharp),
+    ]
+
+
+def _falling(of: Any, text: str, runs: Sequence[Convergence]) -> Evidence:
+    """(5.47) step by step."""
+    ratios = {r.case.name: r.ratio / r.factor for r in runs}
+    where = max(ratios, key=lambda name: figure(ratios[name]))
+    converged = [r for r in runs if r.case.run.converged]
+    ends = [Found(name=r.case.name, values=np.array([end_of(r.case)]), limit=LIMIT) for r in converged]
+    arrived = equations(of, "", ends)
+    data = {
+        "problems": list(ratios),
+        "worst": figure(ratios[where]),
+        "where": where,
+        "theta": {r.case.name: figure(float(r.case.run.theta)) for r in runs},
+        "K": {r.case.name: figure(r.factor) for r in runs},
+        "friction": {r.case.name: figure(float(r.case.problem.contact.friction)) for r in runs},
+        "steps": {r.case.name: r.case.run.iterations for r in runs},
+        "converged": [r.case.name for r in converged],
+    }
+    holds = ratios[where] <= 1 + EXACT and bool(arrived.holds)
+    seen = (
+        f"{text}: |||g_i - g||| falls by K or more at every step of {len(runs)} runs, at worst {ratios[where]:.6g} of K"
+        f" ({where}); {len(converged)} of them ran to the end, and arrive at the g of the global method"
+    )
+    if not holds:
+        seen = f"{text}: a step of {ratios[where]:.6g} times K ({where}); {arrived.text.lstrip(': ')}"
+    return evidence(of, holds, seen, data)
+
+
+def end_of(case: Case) -> float:
+    """``|||g_i - g||| / |||g|||`` at the end of the run."""
+    neumann = case.weak.pair.neumann
+    return neumann.dual_norm(case.run.last.g - case.g) / (neumann.dual_norm(case.g) or 1.0)
+
+
+def fields_converge(setting: Setting) -> list[Evidence]:
+    def arrive(of: Any, text: str, runs: Sequence[Convergence]) -> Evidence:
+        ends = [
+            Found(name=r.case.name, values=np.array([apart(r.case)]), limit=LIMIT) for r in runs if r.case.run.converged
+        ]
+        return equations(of, f"u_i at the end of runs {text}, against the global method in V", ends)
+
+    return [
+        arrive("printed", "inside the intervals of Proposition 5.6", setting.inside),
+        arrive("repaired", "inside the interval of the theorem in energy norms", setting.sharp),
+    ]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Setting:
+    """What the checks share."""
+
+    level: Level
+
+    @cached_property
+    def cases(self) -> list[Case]:
+        """The problems, solved when first asked."""
+        return cases(self.level)
+
+    @cached_property
+    def inside(self) -> list[Convergence]:
+        """Runs inside Proposition 5.6."""
+        return inside(self.level)
+
+    @cached_property
+    def sharp(self) -> list[Convergence]:
+        """Runs inside the theorem in energy norms."""
+        return sharp(self.level)
+
+    @property
+    def count(self) -> int:
+        """Random test functions of each kind."""
+        return 10 if self.level == "quick" else 60

@@ -1,0 +1,245 @@
+"""The worst ratio of each inequality on random problems: the search for a pair that breaks it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+from scipy.linalg import eigvalsh
+
+from fem1d2d.mesh import Floats
+from verification.bodies import build
+from verification.ledger.cases import NAMED, problem
+from verification.ledger.differences import Difference, Setting, draw_pairs
+from verification.ledger.evidence import Evidence
+from verification.ledger.inequalities import ALLOWANCE, INEQUALITIES, LEVELS, SEED, SHARES, Inequality, Reading
+from verification.measured import Measured, measure
+from verification.pair import Body, Pair
+from verification.problem import Problem
+from verification.threads import one_thread
+
+# --- the search
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Case:
+    """A problem with its constants.
+
+    Attributes
+    ----------
+    name : str
+    pair : Pair
+    measured : Measured
+        The constants of the mesh.
+    """
+
+    name: str
+    pair: Pair
+    measured: Measured
+
+    @classmethod
+    def of(cls, name: str, problem: Problem) -> Case:
+        """Build the bodies of a problem and measure its constants."""
+        pair = build(problem)
+        return cls(name=name, pair=pair, measured=measure(pair))
+
+    @cached_property
+    def setting(self) -> Setting:
+        """The matrices in which differences are measured."""
+        return Setting(pair=self.pair)
+
+    @cached_property
+    def reading(self) -> Reading:
+        """The constants, as repaired."""
+        return Reading.of(self.measured)
+
+    @property
+    def bodies(self) -> tuple[Body, Body]:
+        """The contact body and the Neumann body: the order of all that follows."""
+        return self.pair.contact.body, self.pair.neumann.body
+
+    @property
+    def N(self) -> tuple[Floats, Floats]:
+        """H1 norms squared of the lifts."""
+        return self.setting.forms.N_1, self.setting.forms.N_2
+
+    @property
+    def E(self) -> tuple[Floats, Floats]:
+        """The norms squared of H^1/2(Gamma_c)."""
+        return self.setting.forms.E_1, self.setting.forms.E_2
+
+    @cached_property
+    def spectra(self) -> list[tuple[float, float]]:
+        """Extremal eigenvalues of (A_a, H_a) from the whole spectrum of a dense pencil."""
+        spectra = [eigvalsh(body.stiffness.toarray(), body.gram_matrix.toarray()) for body in self.bodies]
+        return [(float(values[0]), float(values[-1])) for values in spectra]
+
+    @property
+    def m(self) -> list[float]:
+        """m^a."""
+        return [getattr(self.measured, body.name).m.value for body in self.bodies]
+
+    @property
+    def M(self) -> list[float]:
+        """M^a."""
+        return [getattr(self.measured, body.name).M.value for body in self.bodies]
+
+    def at_share(self, share: Fraction) -> Case:
+        """The same bodies at a share of the friction C_2 of the repaired edition."""
+        unit = self.measured.with_friction(1.0).C_K
+        k = float(share) * self.reading.threshold / (math.nan if unit is None else unit.value)
+        problem = self.pair.problem
+        slight = replace(problem, contact=replace(problem.contact, friction=Fraction(k)))
+        pair = replace(self.pair, problem=slight)  # the bodies know nothing of friction
+        return Case(name=self.name, pair=pair, measured=self.measured.with_friction(k))
+
+
+@dataclass(kw_only=True)
+class Tally:
+    """The worst ratio of one inequality so far.
+
+    Attributes
+    ----------
+    inequality : Inequality
+    pairs, problems : int
+        How many were compared.
+    by_unit : dict
+        Unit of stress -> the worst ratio, where, the theta, and the problem where it has a name.
+    """
+
+    inequality: Inequality
+    pairs: int = 0
+    problems: int = 0
+    by_unit: dict[float, tuple[float, str, float | None, str]] = field(default_factory=dict)
+
+    def take(self, case: Case, subjects: Sequence[Any]) -> None:
+        """Compare both sides on the pairs of a problem."""
+        inequality = self.inequality
+        self.problems += 1
+        self.pairs += len(subjects)
+        for unit in inequality.units:
+            reading = inequality.reading(case.reading.in_unit(unit))
+            thetas = (None,) if inequality.thetas is None else inequality.thetas(reading)
+            for number, subject in enumerate(subjects, start=1):
+                for theta in thetas:
+                    ratio = inequality.ratio(subject, reading, theta or 0.0)
+                    if math.isnan(ratio):
+                        ratio = math.inf
+                    # equal but for rounding: the first one stays, on any machine
+                    if unit not in self.by_unit or not ratio <= self.by_unit[unit][0] * (1 + ALLOWANCE):
+                        where = case.name if inequality.about == "bodies" else f"{case.name}, pair {number}"
+                        self.by_unit[unit] = (ratio, where, theta, case.name)
+
+    @property
+    def evidence(self) -> Evidence | None:
+        """What was found; None where nothing was compared."""
+        if not self.by_unit:
+            return None
+        unit = max(self.by_unit, key=lambda unit: (float(f"{self.by_unit[unit][0]:.6e}"), unit == 1.0))
+        worst, where, theta, name = self.by_unit[unit]
+        holds = worst <= 1 + ALLOWANCE
+        data: dict[str, Any] = {
+            "seed": SEED,
+            "problems": self.problems,
+            "pairs": self.pairs,
+            "worst_ratio": _digits(worst),
+            "where": where,
+        }
+        bodies = self.inequality.about == "bodies"
+        count = f"{self.problems} problems" if bodies else f"{self.pairs} pairs on {self.problems} problems"
+        if bodies:
+            del data["pairs"]
+        if theta is not None:
+            data["theta"] = _digits(theta)
+        if len(self.inequality.units) > 1:
+            data |= {"unit": unit, "worst_ratio_by_unit": {f"{u:g}": _digits(v[0]) for u, v in self.by_unit.items()}}
+        if name in NAMED:
+            data["problem"] = {key: dict(table) for key, table in NAMED[name].items()}
+        sides = "left/right" if not self.inequality.equality else "1 + |left - right|/energy"
+        units = self.inequality.units
+        if len(units) > 1:
+            count += ", stress in units of " + ", ".join(f"{u:g}" for u in units)
+        at = where if len(units) == 1 else f"{where}, unit {unit:g}"
+        found = f"{sides} <= {worst:.4g} over {count}" if holds else f"{sides} = {worst:.4g}: {at}; {count} tried"
+        return Evidence(method="discrete", of=self.inequality.of, holds=holds, text=found, data=data)
+
+
+def _digits(value: float) -> float | None:
+    """Seven digits: what another machine finds too; None where there is no number."""
+    return float(f"{value:.6e}") if math.isfinite(value) else None
+
+
+def draw_cases(count: int) -> Iterator[tuple[Case, np.random.Generator]]:
+    """The problems of a pass, each with a generator of its own: named ones, then random ones.
+
+    Parameters
+    ----------
+    count : int
+        Random problems; every sixth has friction 10.
+    """
+    for number, (name, data) in enumerate(NAMED.items()):
+        yield Case.of(name, Problem.from_dict(data)), np.random.default_rng([SEED, 0, number])
+    for number in range(1, count + 1):
+        random = np.random.default_rng([SEED, number])
+        yield Case.of(f"problem {number}", problem(random, 10 if number % 6 == 0 else None)), random
+
+
+def discrete(
+    ids: Collection[str] | None = None,
+    level: Literal["quick", "full"] = "quick",
+    watch: Callable[[float], None] = lambda done: None,
+) -> dict[str, list[Evidence]]:
+    """Search random problems for a pair that breaks an inequality.
+
+    One pass over the problems serves all inequalities, and what is found of one does not depend on which others were
+    asked for.
+
+    Parameters
+    ----------
+    ids : collection of str, optional
+        Statements; all by default, unknown ones have no evidence here.
+    level : {'quick', 'full'}
+        30 or 400 random problems.
+    watch : callable
+        Called with the share done.
+
+    Returns
+    -------
+    dict
+        Statement -> evidence, in the order of the table.
+    """
+    tallies = [Tally(inequality=inequality) for inequality in INEQUALITIES if ids is None or inequality.id in ids]
+    about = lambda kind: [tally for tally in tallies if tally.inequality.about == kind]
+    count, starts, realised = LEVELS[level]
+    total = count + len(NAMED)
+    with one_thread():
+        for done, (case, random) in enumerate(draw_cases(count), start=1):
+            for tally in about("bodies"):
+                tally.take(case, [case])
+            if about("pairs"):
+                found = pairs_of(case, random, starts=starts, realised=realised)
+                for tally in about("pairs"):
+                    tally.take(case, found)
+            if about("contraction"):
+                for share in SHARES:
+                    slight = case.at_share(share)
+                    found = pairs_of(slight, np.random.default_rng([SEED, done]), starts=0, realised=realised)
+                    for tally in about("contraction"):
+                        tally.take(slight, found)
+            watch(done / total)
+    result: dict[str, list[Evidence]] = {}
+    for tally in tallies:
+        if (evidence := tally.evidence) is not None:
+            result.setdefault(tally.inequality.id, []).append(evidence)
+    return result
+
+
+def pairs_of(case: Case, random: np.random.Generator, *, starts: int, realised: int) -> list[Difference]:
+    """The pairs of a problem; a named one has no loads worth trying."""
+    realised = 0 if case.name in NAMED else realised
+    return list(draw_pairs(case.setting, random, starts=starts, realised=realised))
