@@ -25,8 +25,6 @@ from verification.pair import Body
 from verification.problem import Problem
 from verification.state import State
 
-# Section 3 and the convergence of the iteration.
-
 #: Steps of (3.1) with the printed sign.
 STEPS = 200
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
+
+from verification.threads import one_thread
 
 Level = Literal["quick", "full"]
 Method = Literal["symbolic", "dimension", "discrete", "reading"]
@@ -53,6 +55,23 @@ class Evidence:
 def figure(value: float, digits: int = 6) -> float:
     """A number to so many significant digits: what another machine reproduces."""
     return float(f"{value:.{digits - 1}e}")
+
+
+def gather(
+    checks: Mapping[str, Callable[[Any], list[Evidence]]],
+    shared: Any,
+    ids: Collection[str] | None,
+    watch: Callable[[float], None],
+) -> dict[str, list[Evidence]]:
+    """Ask the checks of the statements that are wanted, all of them if ids is None; each receives what they share."""
+    chosen = [id for id in checks if ids is None or id in ids]
+    found = {}
+    with one_thread():
+        for done, id in enumerate(chosen):
+            watch(done / len(chosen))
+            found[id] = checks[id](shared)
+    watch(1.0)
+    return found
 
 
 def settle(evidence: Sequence[Evidence]) -> tuple[Verdict, Method | None]:

@@ -18,7 +18,7 @@ import numpy as np
 
 from fem1d2d.mesh import Floats
 from verification.bodies import build
-from verification.ledger.evidence import Evidence, Level, figure
+from verification.ledger.evidence import Evidence, Level, figure, gather
 from verification.ledger.sweeps import (
     GEOMETRIES,
     HARD,
@@ -37,7 +37,6 @@ from verification.ledger.sweeps import (
 from verification.monolithic import solve
 from verification.pair import Pair
 from verification.runs import run
-from verification.threads import one_thread
 
 
 def _evidence(of: Any, holds: bool | None, text: str, **data: Any) -> Evidence:
@@ -338,11 +337,4 @@ def experiments(
     watch : callable
         Called with the share done.
     """
-    chosen = [statement for statement in CHECKS if ids is None or statement in ids]
-    result, sweeps = {}, Sweeps(level)
-    with one_thread():
-        for done, statement in enumerate(chosen):
-            watch(done / len(chosen))
-            result[statement] = CHECKS[statement](sweeps)
-    watch(1.0)
-    return result
+    return gather(CHECKS, Sweeps(level), ids, watch)

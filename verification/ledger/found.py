@@ -12,8 +12,6 @@ from fem1d2d.mesh import Floats
 from verification.ledger.evidence import Evidence, figure
 from verification.ledger.weak_forms import SEED, Case
 
-# The evidence.
-
 
 @dataclass(frozen=True, kw_only=True)
 class Found:

@@ -15,7 +15,7 @@ from verification.ledger.convergence import (
     forces_converge,
     strong_form,
 )
-from verification.ledger.evidence import Evidence, Level, figure
+from verification.ledger.evidence import Evidence, Level, figure, gather
 from verification.ledger.found import Found, equations, evidence, figures, inequalities, with_friction
 from verification.ledger.weak_forms import (
     EXACT,
@@ -42,7 +42,6 @@ from verification.ledger.weak_forms import (
     unilateral,
 )
 from verification.state import State
-from verification.threads import one_thread
 
 
 def _action_and_reaction(setting: Setting) -> list[Evidence]:
@@ -290,12 +289,4 @@ def solutions(
     >>> [e.holds for e in solutions(["2.3"], "quick")["2.3"]]
     [False, True]
     """
-    chosen = [statement for statement in CHECKS if ids is None or statement in ids]
-    result = {}
-    with one_thread():
-        setting = Setting(level=level)
-        for done, statement in enumerate(chosen):
-            watch(done / len(chosen))
-            result[statement] = CHECKS[statement](setting)
-    watch(1.0)
-    return result
+    return gather(CHECKS, Setting(level=level), ids, watch)

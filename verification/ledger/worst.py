@@ -23,8 +23,6 @@ from verification.pair import Body, Pair
 from verification.problem import Problem
 from verification.threads import one_thread
 
-# --- the search
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Case:
