@@ -143,7 +143,9 @@ def verify(
             evidence.setdefault(id, []).extend(entries)
     rows = []
     for s in chosen:
-        entries = _by_strength([*evidence[s.id], *_read(s, evidence[s.id])])
+        own = s.kind == "own"  # not printed anywhere
+        seen = [replace(e, of="repaired") if own and e.holds else e for e in evidence[s.id]]
+        entries = _by_strength([*seen, *_read(s, seen)])
         verdict, method = settle(entries)
         rows.append(Row(statement=s, evidence=entries, verdict=verdict, method=method, recorded=recorded().get(s.id)))
     return Ledger(rows=tuple(_grounded(rows)), level=level, units={"length": "any", "stress": "any"})

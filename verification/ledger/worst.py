@@ -163,7 +163,7 @@ class Tally:
         if len(units) > 1:
             count += ", stress in units of " + ", ".join(f"{u:g}" for u in units)
         at = where if len(units) == 1 else f"{where}, unit {unit:g}"
-        found = f"{sides} <= {worst:.4g} over {count}" if holds else f"{sides} = {worst:.4g}: {at}; {count} tried"
+        found = f"{sides} {'<=' if holds else '='} {worst:.4g} ({at}), {count}"
         return Evidence(method="discrete", of=self.inequality.of, holds=holds, text=found, data=data)
 
 
