@@ -20,7 +20,7 @@ from verification.ledger.cases import NAMED
 from verification.ledger.differences import Difference, Setting, along, between, directions, pieces, uniform_piece
 from verification.ledger.evidence import Evidence
 from verification.ledger.inequalities import ALLOWANCE, INEQUALITIES, LEVELS, SHARES, Inequality, Reading
-from verification.ledger.worst import Case, Tally, discrete, draw_cases, pairs_of
+from verification.ledger.worst import Tally, Trial, discrete, draw_cases, pairs_of
 from verification.problem import Problem
 from verification.threads import one_thread
 
@@ -47,7 +47,7 @@ def found(quick) -> dict[tuple[str, str], Evidence]:
     return {(id, evidence.of): evidence for id, several in quick.items() for evidence in several}
 
 
-Subjects = list[tuple[Case, list[Any]]]
+Subjects = list[tuple[Trial, list[Any]]]
 
 
 @pytest.fixture(scope="module")
@@ -72,8 +72,8 @@ def worst(inequality: Inequality, pool: dict[str, Subjects]) -> float:
     return max(found for found, *_ in tally.by_unit.values())
 
 
-def case_named(name: str) -> Case:
-    return Case.of(name, Problem.from_dict(NAMED[name]))
+def case_named(name: str) -> Trial:
+    return Trial.of(name, Problem.from_dict(NAMED[name]))
 
 
 # --- what is found ----------------------------------------------------------------------------------------------------
@@ -125,7 +125,7 @@ def test_progress_grows_to_1():
 # --- the same figures by another route --------------------------------------------------------------------------------
 
 
-def random_and_named(level: str = "quick") -> Iterator[tuple[Case, DensePair]]:
+def random_and_named(level: str = "quick") -> Iterator[tuple[Trial, DensePair]]:
     for case, _ in draw_cases(LEVELS[level][0]):
         yield case, DensePair.of(case.pair)
 

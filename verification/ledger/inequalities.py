@@ -209,7 +209,7 @@ class Inequality:
         Of the statement in the ledger.
     of : {'printed', 'step', 'repaired'}
     left, right : callable
-        Difference (or :class:`Case`), constants, theta -> a number; several numbers are added, or compared one by one
+        Difference (or :class:`Trial`), constants, theta -> a number; several numbers are added, or compared one by one
         where ``about`` is 'bodies'.
     equality : bool
         Then both sides may be vectors whose Euclidean norm is (5.21).
@@ -241,7 +241,7 @@ class Inequality:
 
         Parameters
         ----------
-        subject : Difference or Case
+        subject : Difference or Trial
         reading : Reading
             As this inequality reads the constants.
         theta : float

@@ -25,7 +25,7 @@ from verification.threads import one_thread
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Case:
+class Trial:
     """A problem with its constants.
 
     Attributes
@@ -41,7 +41,7 @@ class Case:
     measured: Measured
 
     @classmethod
-    def of(cls, name: str, problem: Problem) -> Case:
+    def of(cls, name: str, problem: Problem) -> Trial:
         """Build the bodies of a problem and measure its constants."""
         pair = build(problem)
         return cls(name=name, pair=pair, measured=measure(pair))
@@ -87,14 +87,14 @@ class Case:
         """M^a."""
         return [getattr(self.measured, body.name).M.value for body in self.bodies]
 
-    def at_share(self, share: Fraction) -> Case:
+    def at_share(self, share: Fraction) -> Trial:
         """The same bodies at a share of the friction C_2 of the repaired edition."""
         unit = self.measured.with_friction(1.0).C_K
         k = float(share) * self.reading.threshold / (math.nan if unit is None else unit.value)
         problem = self.pair.problem
         slight = replace(problem, contact=replace(problem.contact, friction=Fraction(k)))
         pair = replace(self.pair, problem=slight)  # the bodies know nothing of friction
-        return Case(name=self.name, pair=pair, measured=self.measured.with_friction(k))
+        return Trial(name=self.name, pair=pair, measured=self.measured.with_friction(k))
 
 
 @dataclass(kw_only=True)
@@ -115,7 +115,7 @@ class Tally:
     problems: int = 0
     by_unit: dict[float, tuple[float, str, float | None, str]] = field(default_factory=dict)
 
-    def take(self, case: Case, subjects: Sequence[Any]) -> None:
+    def take(self, case: Trial, subjects: Sequence[Any]) -> None:
         """Compare both sides on the pairs of a problem."""
         inequality = self.inequality
         self.problems += 1
@@ -172,7 +172,7 @@ def _digits(value: float) -> float | None:
     return float(f"{value:.6e}") if math.isfinite(value) else None
 
 
-def draw_cases(count: int) -> Iterator[tuple[Case, np.random.Generator]]:
+def draw_cases(count: int) -> Iterator[tuple[Trial, np.random.Generator]]:
     """The problems of a pass, each with a generator of its own: named ones, then random ones.
 
     Parameters
@@ -181,10 +181,10 @@ def draw_cases(count: int) -> Iterator[tuple[Case, np.random.Generator]]:
         Random problems; every sixth has friction 10.
     """
     for number, (name, data) in enumerate(NAMED.items()):
-        yield Case.of(name, Problem.from_dict(data)), np.random.default_rng([SEED, 0, number])
+        yield Trial.of(name, Problem.from_dict(data)), np.random.default_rng([SEED, 0, number])
     for number in range(1, count + 1):
         random = np.random.default_rng([SEED, number])
-        yield Case.of(f"problem {number}", problem(random, 10 if number % 6 == 0 else None)), random
+        yield Trial.of(f"problem {number}", problem(random, 10 if number % 6 == 0 else None)), random
 
 
 def discrete(
@@ -237,7 +237,7 @@ def discrete(
     return result
 
 
-def pairs_of(case: Case, random: np.random.Generator, *, starts: int, realised: int) -> list[Difference]:
+def pairs_of(case: Trial, random: np.random.Generator, *, starts: int, realised: int) -> list[Difference]:
     """The pairs of a problem; a named one has no loads worth trying."""
     realised = 0 if case.name in NAMED else realised
     return list(draw_pairs(case.setting, random, starts=starts, realised=realised))
