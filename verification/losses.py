@@ -85,8 +85,7 @@ class Forms:
     def __init__(self, pair: Pair) -> None:
         self.pair = pair
         self.root, self.inverse = pair.neumann.root, pair.neumann.inverse
-        turned = lambda matrix: pair.orient(pair.orient(matrix).T)
-        of = lambda body: (turned(lift_gram(body)), turned(body.gram.schur))
+        of = lambda body: (pair.orient_form(lift_gram(body)), pair.orient_form(body.gram.schur))
         self.N_1, self.E_1 = of(pair.contact.body)
         self.N_2, self.E_2 = of(pair.neumann.body)
         self.dual: Floats = np.asarray(np.linalg.inv(self.E_2))  # of the norm of V^2'

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
+import scipy.sparse as sp
 from scipy.linalg import cho_factor, cho_solve
 
 from fem1d2d import largest, largest_sparse, solver
@@ -254,10 +255,15 @@ def _body(body: Body) -> BodyConstants:
 
 def lift_gram(body: Body) -> Floats:
     """``N_a = R_a' H_a R_a``: the H1 norm squared of the elastic lift (4.5), on the interface."""
-    elastic, H = body.elastic, body.gram_matrix
+    return on_lifts(body, body.gram_matrix)
+
+
+def on_lifts(body: Body, matrix: sp.csc_array) -> Floats:
+    """``R_a' X R_a``: a symmetric form on the unknowns of a body, evaluated at the lifts of interface vectors."""
+    elastic = body.elastic
     inside, interface, lift = elastic.inside, elastic.interface, elastic.lift
-    cross = H[interface][:, inside] @ lift
-    product = H[interface][:, interface].toarray() + cross + cross.T + lift.T @ (H[inside][:, inside] @ lift)
+    cross = matrix[interface][:, inside] @ lift
+    product = matrix[interface][:, interface].toarray() + cross + cross.T + lift.T @ (matrix[inside][:, inside] @ lift)
     return np.asarray((product + product.T) / 2)
 
 

@@ -250,6 +250,10 @@ class Pair(Facing):
         turned[self.normal] *= self.upward
         return turned
 
+    def orient_form(self, matrix: Floats) -> Floats:
+        """The same for a symmetric matrix on interface vectors."""
+        return self.orient(self.orient(matrix).T)
+
     def _side(self, body: Body) -> Side:
         size = len(body.unknown)
         rows = np.flatnonzero(body.unknown)
@@ -257,7 +261,7 @@ class Pair(Facing):
         matrix[np.ix_(rows, rows)] = body.elastic.schur
         load = np.zeros(size)
         load[rows] = body.elastic.condense(body.load)
-        matrix = self.orient(self.orient(matrix).T)
+        matrix = self.orient_form(matrix)
         return Side(body=body, stiffness=matrix, load=self.orient(load), known=self.orient(body.known_trace))
 
     @cached_property

@@ -74,7 +74,7 @@ check = partial(add, CHECKS)
 w1, v1, w2, v2 = Vector("w1"), Vector("w~1"), Vector("w2"), Vector("w~2")
 psi, psi2, test = Vector("psi"), Vector("psi~"), Vector("v")
 a1, a2, energy = bilinear("a1"), bilinear("a2"), bilinear("b")
-lift, lift2, of_T, L1, L2 = linear("R1"), linear("R2"), functional("T"), functional("L1"), functional("L2")
+lift, lift2, L1, L2 = linear("R1"), linear("R2"), functional("L1"), functional("L2")
 delta1, delta2 = w1 - v1, w2 - v2
 
 S, S2, J1, J2 = nonnegative("S S~ J J~")
@@ -350,7 +350,7 @@ kappa, lam = nonnegative("kappa"), positive("lambda")
 ONE_NODE = {m: lam, M: 2 * lam, C_R: 1, x: kappa * lam, F: kappa**2 * e**2, t: kappa * e, W: 0}
 
 
-SMALL_UNIT = {lam: 1 / (1 + p) ** 2, kappa: xi**2, theta: t_ / (1 + t_)}
+AT_THE_NODE = {lam: mu**2, kappa: xi**2, theta: t_ / (1 + t_)}
 
 
 def one_node(id: str, value: Any, printed: Any, repaired: Any) -> None:
@@ -360,9 +360,7 @@ def one_node(id: str, value: Any, printed: Any, repaired: Any) -> None:
         id=id,
         text="One open node that slides, S_1 = S_2 = m I, M = 2 m, C_R = 1, C_K = kappa m: exactly F = kappa^2 e^2,"
         " t = kappa e, W = 0.",
-        goals=lambda form: at_most(
-            at_the_node(form), at_the_node(value), {lam: mu**2, kappa: xi**2, theta: t_ / (1 + t_)}
-        ),
+        goals=lambda form: at_most(at_the_node(form), at_the_node(value), AT_THE_NODE),
         forms={"printed": printed, "repaired": repaired},
         mutants={"without friction": repaired.subs(x, 0)},
     )

@@ -301,7 +301,7 @@ check(
     mutants={"for C_K <= 17 m": (17, 4), "k < C_2 implies C_K < m/100": (6, sp.Rational(1, 100))},
 )
 
-contrast, square, Q_more, D_share = positive("r"), 1 + p, nonnegative("Q_more"), nonnegative("D_share")
+square, Q_more, D_share = 1 + p, nonnegative("Q_more"), nonnegative("D_share")
 C0_of = 2 / ((4 + o) * square + 2)  # (M/m)^2 = 4 + o, C_R^2 = 1 + p
 Q_of = (4 + o) ** 3 * square**2 + Q_more  # Q >= (A/m)^4 (M/m)^2
 D_of = Q_of / ((4 + o) * square) / (1 + D_share)  # 0 < D = C_T^2/C_R^2 - P <= C_T^2/C_R^2 = Q m^2/A^2

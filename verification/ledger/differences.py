@@ -22,6 +22,7 @@ from verification.contact.active_set import Pattern
 from verification.iteration import FixedPointMap
 from verification.jacobian import Piece
 from verification.losses import Forms, square, top
+from verification.measured import on_lifts
 from verification.pair import Body, Pair
 from verification.search import worst_piece
 
@@ -37,10 +38,7 @@ def lifted_energy(body: Body) -> Floats:
 
     It equals the Schur complement because the lift is a-harmonic, which is used nowhere here.
     """
-    elastic, A = body.elastic, body.stiffness
-    inside, interface, lift = elastic.inside, elastic.interface, elastic.lift
-    cross = A[interface][:, inside] @ lift
-    return np.asarray(A[interface][:, interface].toarray() + cross + cross.T + lift.T @ (A[inside][:, inside] @ lift))
+    return on_lifts(body, body.stiffness)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -63,15 +61,12 @@ class Setting:
     @cached_property
     def bilinear_1(self) -> Floats:
         """``a^1(R phi, R chi)`` from the lifted fields."""
-        return self._turned(lifted_energy(self.pair.contact.body))
+        return self.pair.orient_form(lifted_energy(self.pair.contact.body))
 
     @cached_property
     def bilinear_2(self) -> Floats:
         """``a^2(R phi, R chi)`` from the lifted fields."""
-        return self._turned(lifted_energy(self.pair.neumann.body))
-
-    def _turned(self, matrix: Floats) -> Floats:
-        return self.pair.orient(self.pair.orient(matrix).T)
+        return self.pair.orient_form(lifted_energy(self.pair.neumann.body))
 
     @cached_property
     def coordinates(self) -> Floats:

@@ -16,7 +16,7 @@ from fem1d2d.mesh import Floats
 from verification.bodies import build
 from verification.ledger.cases import NAMED, problem
 from verification.ledger.differences import Difference, Setting, draw_pairs
-from verification.ledger.evidence import Evidence
+from verification.ledger.evidence import Evidence, figure
 from verification.ledger.inequalities import ALLOWANCE, INEQUALITIES, LEVELS, SEED, SHARES, Inequality, Reading
 from verification.measured import Measured, measure
 from verification.pair import Body, Pair
@@ -138,7 +138,7 @@ class Tally:
         """What was found; None where nothing was compared."""
         if not self.by_unit:
             return None
-        unit = max(self.by_unit, key=lambda unit: (float(f"{self.by_unit[unit][0]:.6e}"), unit == 1.0))
+        unit = max(self.by_unit, key=lambda unit: (figure(self.by_unit[unit][0], 7), unit == 1.0))
         worst, where, theta, name = self.by_unit[unit]
         holds = worst <= 1 + ALLOWANCE
         data: dict[str, Any] = {
@@ -169,7 +169,7 @@ class Tally:
 
 def _digits(value: float) -> float | None:
     """Seven digits: what another machine finds too; None where there is no number."""
-    return float(f"{value:.6e}") if math.isfinite(value) else None
+    return figure(value, 7) if math.isfinite(value) else None
 
 
 def draw_cases(count: int) -> Iterator[tuple[Trial, np.random.Generator]]:
@@ -212,6 +212,9 @@ def discrete(
         Statement -> evidence, in the order of the table.
     """
     tallies = [Tally(inequality=inequality) for inequality in INEQUALITIES if ids is None or inequality.id in ids]
+    if not tallies:  # no problem need be built
+        watch(1.0)
+        return {}
     about = lambda kind: [tally for tally in tallies if tally.inequality.about == kind]
     count, starts, realised = LEVELS[level]
     total = count + len(NAMED)
