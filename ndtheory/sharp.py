@@ -177,6 +177,24 @@ def friction_multiple(kappa_1: Any, kappa_2: Any) -> Any:
     return 2 / (kappa_2 + sqrt(kappa_2**2 + kappa_1**2))
 
 
+def friction_limit(rho: Any, kappa_1: Any, kappa_2: Any, margin: Any = 0) -> Any:
+    """The factor t by which friction may grow until no theta at all is proved; not below :func:`friction_multiple`.
+
+    q grows with kappa_1 and kappa_2, so some theta is proved below t and none above.  Scalars that round need a
+    ``margin``, as for :func:`contraction_interval`.
+
+    Examples
+    --------
+    >>> friction_multiple(0.0, 0.25), round(friction_limit(1.0, 0.0, 0.25, 1e-12), 3)
+    (4.0, 8.0)
+    """
+    some = lambda t: contraction_interval(rho, t * kappa_1, t * kappa_2, margin) is not None
+    low = friction_multiple(kappa_1, kappa_2)
+    while some(2 * low):
+        low = 2 * low
+    return _last_where(some, low, 2 * low)
+
+
 def predicted_theta(rho: Any) -> Any:
     """``2/(2 + rho)``: the best theta without friction, and a prediction with it."""
     return 2 / (2 + rho)
@@ -253,6 +271,8 @@ class SharpBounds:
         r, the largest ``|d_1|/|d_2|``.
     friction_multiple : Number or None
         The factor by which friction may grow until no small theta is proved; None without friction.
+    friction_limit_multiple : Number or None
+        The factor by which it may grow until no theta at all is proved; None without friction.
     interval : tuple of float or None
         q < 1 for lo < theta < hi, capped at 1; None where q >= 1 everywhere.
     theta_proved : float or None
@@ -274,6 +294,7 @@ class SharpBounds:
     kappa_2: Number
     ratio: Number
     friction_multiple: Number | None
+    friction_limit_multiple: Number | None
     interval: tuple[float, float] | None
     theta_proved: float | None
     factor_proved: Number | None
@@ -290,7 +311,7 @@ class SharpBounds:
         """Why a value is None."""
         reasons: dict[str, str] = {}
         if self.friction_multiple is None:
-            reasons["friction_multiple"] = "no friction"
+            reasons |= dict.fromkeys(("friction_multiple", "friction_limit_multiple"), "no friction")
         if self.interval is None:
             names = ("interval", "theta_proved", "factor_proved", "theta_max_proved")
             reasons |= dict.fromkeys(names, "q >= 1 for every theta")
@@ -355,6 +376,7 @@ def evaluate_sharp(constants: EnergyConstants, theta: Any = None) -> SharpBounds
             kappa_2=Number.of_float(kappa_2),
             ratio=Number.of_float(largest_ratio(*data)),
             friction_multiple=None if constants.frictionless else Number.of_float(friction_multiple(kappa_1, kappa_2)),
+            friction_limit_multiple=None if constants.frictionless else Number.of_float(_limit(data)),
             interval=None if interval is None else (float(interval[0]), float(interval[1])),
             theta_proved=None if best is None else float(best),
             factor_proved=None if best is None else Number.of_float(_factor(best, data)[0]),
@@ -366,6 +388,12 @@ def evaluate_sharp(constants: EnergyConstants, theta: Any = None) -> SharpBounds
             one_minus_factor=one_minus,
             verdict=verdict,
         )
+
+
+def _limit(data: tuple[Decimal, Decimal, Decimal]) -> Any:
+    """:func:`friction_limit` with digits for a double: towards it the ends of the interval meet as a root does."""
+    with working_precision(80):
+        return friction_limit(*data, Decimal("1e-60"))
 
 
 def _factor(theta: Decimal, data: tuple[Decimal, Decimal, Decimal]) -> tuple[Decimal, Decimal]:

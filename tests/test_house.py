@@ -12,7 +12,7 @@ ROOMS = ("fem1d2d", "ndtheory", "verification")
 
 #: module: the modules and packages that alone may import it
 DOORS = {
-    "cvxpy": ("verification.contact.model", "verification.lmi"),
+    "cvxpy": ("verification.contact.model", "verification.lmi_program"),
     "matplotlib": ("verification.figures",),
     "click": ("verification.cli",),
     "rich": ("verification.cli",),
@@ -132,7 +132,7 @@ def test_a_forbidden_edge_is_found(module, source):
         ("verification", "importlib.import_module(f'verification.{home}')"),
         ("verification.compare", "import ndtheory, fem1d2d, numpy"),
         ("verification.contact.model", "import cvxpy"),
-        ("verification.lmi", "def f():\n    import cvxpy"),
+        ("verification.lmi_program", "def f():\n    import cvxpy"),
         ("verification.figures.region", "import matplotlib"),
         ("verification.figures", "import matplotlib"),
         ("verification.cli.run", "import click\nfrom rich import print\nprint('done')"),

@@ -12,72 +12,70 @@ Lipschitz constant of T_theta once the quadratic form::
     q^2 |g|^2 - |theta p + (1 - theta) g|^2 - sum_j [lambda p_N v_N + tau p_T v_T + w k (a zeta^2 + b v_T^2)]_j
 
 in (g, p) is positive semidefinite for some multipliers lambda, tau, a, b >= 0.  The solver only proposes multipliers:
-the bound is the least q for which the form *with them* is positive semidefinite, an eigenvalue.  One set of multipliers
-is known in closed form, and proves the factor of the theorem in energy norms: this edition is never weaker.  Proofs in
-``docs/sharp.md``.
+the bound is a q for which the form *with them* is positive definite, checked in doubles with a bound on their
+rounding.  One set of multipliers is known in closed form, and proves the factor of the theorem in energy norms: up to
+that rounding this edition is never weaker.  Proofs in ``docs/sharp.md``.
 """
 
 from __future__ import annotations
 
-import contextlib
 import math
-import warnings
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
-import cvxpy as cp
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, eigvalsh, solve_triangular
+from scipy.linalg import block_diag, cho_factor, cho_solve, eigvalsh, solve_triangular
 
 from fem1d2d.mesh import Floats
 from ndtheory import Number
 from ndtheory.sharp import contraction_interval, turning_theta, worst_ratio
+from verification.editions import LARGEST
+from verification.lmi_program import LMIError, Program, Weights
 from verification.measured import Measured
 from verification.pair import Pair
-from verification.threads import one_thread
-
-#: Rows of the form up to which Clarabel is as fast as SCS; its work grows with the sixth power of them.
-SMALL = 40
-
-#: Accuracy asked of SCS; the certificate decides what is reported.
-TOLERANCE = 1e-4
-
-#: Beyond this a program takes minutes.
-MOST_NODES = 40
+from verification.trace_forms import TraceForms
 
 #: The friction threshold is searched until its bracket is this narrow, relatively.
 NARROW = 1e-2
 
+#: A value that rounding leaves undecided is moved to the safe side by these shares, from the least to 1.7 %.
+SHARES = tuple(1e-15 * 4.0**k for k in range(23))
 
-class LMIError(RuntimeError):
-    """The solver proposed no multipliers that certify anything."""
-
-
-Weights = tuple[Floats, ...]
+#: Why no value of this edition is called certified.
+NOT_CERTIFIED = "checked in doubles with a bound on their rounding, for the interface matrices as computed"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Certified:
-    """A value with the multipliers that prove it, up to rounding.
+    """A value with the multipliers that prove it.
 
     Attributes
     ----------
     value : float
-        What the multipliers prove.
+        What the multipliers prove, on the safe side of ``evaluated`` by a bound on the rounding of the check.
+    evaluated : float
+        The eigenvalue that these multipliers give in doubles.
     proposed : float
-        What the solver believed to be optimal.
+        What the solver believed to be optimal; nan where the multipliers are the known ones.
     multipliers : tuple of arrays
         lambda, tau, a, b by node; lambda alone without friction.
+    gave_up : str
+        Why the solver proposed nothing; empty where it did.
     """
 
     value: float
+    evaluated: float
     proposed: float
     multipliers: Weights
+    gave_up: str = ""
 
 
 class SemidefiniteEdition:
     """The quadratic forms of a pair of bodies, in coordinates in which ``|g|`` and ``|d_1|`` are Euclidean norms.
+
+    What the solver proposes in them is checked in traces (:class:`verification.trace_forms.TraceForms`).
 
     Parameters
     ----------
@@ -92,12 +90,12 @@ class SemidefiniteEdition:
     Raises
     ------
     ValueError
-        A contact node is held, or there are more than ``MOST_NODES``.
+        A contact node is held, or there are more than :data:`verification.editions.LARGEST`.
     """
 
     def __init__(self, pair: Pair, measured: Measured, *, friction: float | None = None, nodewise: bool = True) -> None:
-        if pair.n > MOST_NODES:
-            raise ValueError(f"{pair.n} contact nodes: the semidefinite edition takes at most {MOST_NODES}")
+        if pair.n > LARGEST:
+            raise ValueError(f"{pair.n} contact nodes: worked out up to {LARGEST}")
         if not all(body.unknown.all() for body in pair.elastic):
             raise ValueError("a contact node is held: the semidefinite edition needs every one free")
         self.nodewise = nodewise
@@ -112,9 +110,13 @@ class SemidefiniteEdition:
         carries = slice(0, size) if k else normal  # without friction p_T = 0
         # g = L_2 y and p = B z with L_2 L_2' = S_2 and B' S_1^-1 B = 1: |y| = |||g|||, |z| = |d_1|
         L_2, flexible = pair.neumann.root, pair.contact.inverse
-        root = np.linalg.cholesky(flexible[carries, carries])
-        B = np.zeros((size, len(root)))
-        B[carries] = solve_triangular(root.T, np.eye(len(root)), lower=False)
+        inner = flexible[carries, carries]
+        turn = solve_triangular(np.linalg.cholesky(inner).T, np.eye(len(inner)), lower=False)
+        B = np.zeros((size, len(inner)))
+        B[carries] = turn
+        S_1 = pair.contact.stiffness if k else cho_solve(cho_factor(inner), np.eye(len(inner)))
+        near = block_diag(pair.neumann.flexibility(L_2), inner @ turn)
+        self._traces = TraceForms(pair, k, S_1=S_1, carries=carries, near=near)
         self.size = size
         self.g = np.hstack([np.eye(size), np.zeros(B.shape)])
         self.p = np.hstack([np.zeros((size, size)), L_2.T @ pair.neumann.flexibility(B)])
@@ -144,28 +146,36 @@ class SemidefiniteEdition:
         return np.asarray(cross + cross.T) / 2
 
     def factor(self, theta: float) -> Certified:
-        """The least certified Lipschitz constant of T_theta in the norm (5.21), for 0 < theta <= 1.
+        """The least Lipschitz constant of T_theta in the norm (5.21) that multipliers prove, for 0 < theta <= 1.
 
         Raises
         ------
         LMIError
         """
         step = theta * self.p + (1 - theta) * self.g
-        found = self._least(-step.T @ step, self._known(theta))
+        found = self._least(
+            -step.T @ step,
+            self._known(theta),
+            lambda value, weights: self._traces.definite(weights, square=value, step=(theta, 1 - theta)),
+        )
         root = lambda square: float(np.sqrt(max(square, 0.0)))
-        return Certified(value=root(found.value), proposed=root(found.proposed), multipliers=found.multipliers)
+        return replace(found, value=root(found.value), evaluated=root(found.evaluated), proposed=root(found.proposed))
 
     def friction_number(self) -> Certified:
-        """The least certified c with ``<g, p> <= c |g|^2``: every small theta contracts where c < 1.
+        """The least c with ``<g, p> <= c |g|^2`` that multipliers prove: every small theta contracts where c < 1.
 
         Raises
         ------
         LMIError
         """
-        return self._least(-self._cross, self._uniform(1.0, self._sharp[1] / 2))
+        return self._least(
+            -self._cross,
+            self._uniform(1.0, self._sharp[1] / 2),
+            lambda value, weights: self._traces.definite(weights, square=value, cross=1.0),
+        )
 
     def largest_theta(self) -> Certified | None:
-        """The largest certified theta <= 1 below which every T_theta contracts; None where there is none.
+        """The largest theta <= 1 below which multipliers prove that every T_theta contracts; None where there is none.
 
         With q = 1 the form, over theta, is linear in theta and the multipliers: one program answers for all theta.
 
@@ -178,44 +188,61 @@ class SemidefiniteEdition:
         sharp = contraction_interval(*self._sharp, 1e-12)
         highest = 0.5 if sharp is None else sharp[1] * (1 - 1e-9)
         known = tuple(m / highest for m in self._known(highest))
-        best = None
-        for proposed, multipliers in self._candidates(still, -moving, known, maximise=True):
+        candidates, gave_up = self._candidates(still, -moving, known, maximise=True)
+        found = []
+        for proposed, multipliers in candidates:
             rest = still - self.conditions(multipliers)
             if not eigvalsh(rest)[0] > 0:
                 continue
             theta = min(1 / float(eigvalsh(moving, rest)[-1]), 1.0)
-            if best is None or theta > best.value:
-                best = Certified(value=theta, proposed=proposed, multipliers=multipliers)
-        return best
+            holds = lambda t, weights=multipliers: self._traces.definite(
+                weights, square=2.0, cross=2.0, step=(1.0, -1.0), weight=t
+            )
+            safe = next((t for share in SHARES if holds(t := theta * (1 - share))), None)
+            if safe is not None:
+                found.append(
+                    Certified(value=safe, evaluated=theta, proposed=proposed, multipliers=multipliers, gave_up=gave_up)
+                )
+        return max(found, key=lambda certified: certified.value, default=None)
 
-    def _least(self, fixed: Floats, known: tuple[Floats, ...]) -> Certified:
-        """The least s for which ``s |g|^2 + fixed - conditions`` is positive semidefinite, certified."""
+    def _least(self, fixed: Floats, known: Weights, holds: Callable[[float, Weights], bool]) -> Certified:
+        """The least s for which multipliers prove that ``s |g|^2 + fixed - conditions`` is positive definite."""
+        candidates, gave_up = self._candidates(fixed, self.g.T @ self.g, known)
         found = []
-        for proposed, multipliers in self._candidates(fixed, self.g.T @ self.g, known):
+        for proposed, multipliers in candidates:
             form, n = fixed - self.conditions(multipliers), self.size
-            with contextlib.suppress(np.linalg.LinAlgError):  # multipliers that certify nothing
+            try:
                 inner = cho_solve(cho_factor(form[n:, n:]), form[n:, :n])
-                value = -float(eigvalsh(form[:n, :n] - form[:n, n:] @ inner)[0])
-                found.append(Certified(value=value, proposed=proposed, multipliers=multipliers))
+            except np.linalg.LinAlgError:  # multipliers that prove nothing
+                continue
+            least = -float(eigvalsh(form[:n, :n] - form[:n, n:] @ inner)[0])
+            size = max(abs(least), 1e-3)
+            safe = next((s for share in SHARES if holds(s := least + share * size, multipliers)), None)
+            if safe is not None:
+                found.append(
+                    Certified(value=safe, evaluated=least, proposed=proposed, multipliers=multipliers, gave_up=gave_up)
+                )
         if not found:
-            raise LMIError("no multipliers certify anything")
+            raise LMIError(gave_up or "no multipliers prove anything: what they leave is lost in rounding")
         return min(found, key=lambda certified: certified.value)
 
     def _candidates(
         self, fixed: Floats, free: Floats, known: Weights, *, maximise: bool = False
-    ) -> list[tuple[float, Weights]]:
+    ) -> tuple[list[tuple[float, Weights]], str]:
         """What the solver proposes, drawn towards known multipliers by several steps, and those alone.
 
-        Where both branches of q meet, the block of d_1 is singular: multipliers a little larger are inside.
+        Where both branches of q meet, the block of d_1 is singular: multipliers a little larger are inside.  The text
+        says why the solver gave up; it is empty where it did not.
         """
         alone = [(math.nan, tuple((1 + more) * m for m in known)) for more in (0.0, 1e-12, 1e-9, 1e-6)]
         try:
             proposed, multipliers = self._program.solve(fixed, free, maximise=maximise)
-        except LMIError:
-            return alone
+        except LMIError as error:
+            return [(value, _inside(weights)) for value, weights in alone], str(error)
         shares = (1.0, 0.9999, 0.999, 0.99, 0.9)
         mixed = (tuple(s * a + (1 - s) * b for a, b in zip(multipliers, known, strict=True)) for s in shares)
-        return [*((proposed, weights) for weights in mixed), *alone]
+        tried = [*((proposed, weights) for weights in mixed), *alone]
+        return [(value, _inside(weights)) for value, weights in tried], ""
 
     def _known(self, theta: float) -> Weights:
         """The multipliers that prove the factor q(theta) of the theorem in energy norms.
@@ -239,60 +266,16 @@ class SemidefiniteEdition:
         return tuple(np.full(len(a), value) for value, (a, _) in zip(values, self.families, strict=True))
 
     @cached_property
-    def _program(self) -> _Program:
-        return _Program(self)
+    def _program(self) -> Program:
+        return Program(self.families, nodewise=self.nodewise)
 
 
-class _Program:
-    """``fixed + s free - conditions`` positive semidefinite, in s and the multipliers, as cvxpy sees it."""
-
-    def __init__(self, edition: SemidefiniteEdition) -> None:
-        self._families = edition.families
-        lengths = [np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1) for a, b in edition.families]
-        if not edition.nodewise:
-            lengths = [np.full_like(scale, scale.mean()) for scale in lengths]
-        self._scales = lengths  # the solver sees numbers near one in any unit
-        self._nodewise = edition.nodewise
-        self._variables = [cp.Variable(len(s) if edition.nodewise else 1, nonneg=True) for s in lengths]
-
-    def solve(self, fixed: Floats, free: Floats, *, maximise: bool = False) -> tuple[float, tuple[Floats, ...]]:
-        """The least s (or the largest, at most 1), and multipliers with ``4 a b >= tau^2``.
-
-        Raises
-        ------
-        LMIError
-        """
-        s = cp.Variable()
-        total: Any = fixed.ravel() + s * free.ravel()
-        for variable, scale, (a, b) in zip(self._variables, self._scales, self._families, strict=True):
-            forms = a[:, :, None] * b[:, None, :]
-            forms = (forms + forms.transpose(0, 2, 1)).reshape(len(scale), -1).T / (2 * scale)
-            total = total - (forms if self._nodewise else forms.sum(axis=1, keepdims=True)) @ variable
-        size = len(fixed)
-        constraints = [cp.reshape(total, (size, size), order="C") >> 0]
-        if len(self._variables) > 1:
-            tau, a, b = self._variables[1:]
-            ratio = np.sqrt(self._scales[2] * self._scales[3]) / self._scales[1]
-            for j in range(tau.size):
-                constraints.append(cp.SOC(a[j] + b[j], cp.hstack([ratio[j] * tau[j], a[j] - b[j]])))
-        problem = (
-            cp.Problem(cp.Maximize(s), [*constraints, s <= 1]) if maximise else cp.Problem(cp.Minimize(s), constraints)
-        )
-        with warnings.catch_warnings(), one_thread():
-            warnings.simplefilter("ignore")  # "may be inaccurate": the certificate decides
-            try:
-                if size <= SMALL:
-                    problem.solve(solver=cp.CLARABEL)
-                else:
-                    problem.solve(solver=cp.SCS, eps=TOLERANCE, max_iters=20_000)
-            except cp.SolverError as error:
-                raise LMIError(f"the solver failed: {error}") from None
-        if s.value is None:
-            raise LMIError(f"the solver found no multipliers: {problem.status}")
-        values = [np.maximum(np.asarray(v.value), 0.0) / z for v, z in zip(self._variables, self._scales, strict=True)]
-        if len(values) > 1:
-            values[1] = np.minimum(values[1], 2 * np.sqrt(values[2] * values[3]))
-        return float(s.value), tuple(values)
+def _inside(multipliers: Weights) -> Weights:
+    """Multipliers of the cone ``4 a b >= tau^2``, rounding included."""
+    if len(multipliers) == 1:
+        return multipliers
+    lam, tau, a, b = multipliers
+    return lam, np.minimum(tau, 2 * np.sqrt(a * b) * (1 - 1e-15)), a, b
 
 
 def friction_threshold(pair: Pair, measured: Measured, start: float, *, nodewise: bool = True) -> float:
@@ -335,24 +318,40 @@ class Semidefinite:
     Attributes
     ----------
     lipschitz : Number
-        A certified Lipschitz constant of T_theta in the norm (5.21).
+        A Lipschitz constant of T_theta in the norm (5.21), checked in doubles with a bound on their rounding.
     theta_max : Number or None
-        Every smaller theta contracts; None where none is certified.
+        Every smaller theta contracts; None where none is proved to.
     friction_threshold : Number or None
         Every small theta contracts below it; None without a law of friction.
+    gave_up : str
+        Why the solver proposed no multipliers at this theta, so that the known ones alone stand behind ``lipschitz``;
+        empty where it did.
     """
 
     lipschitz: Number
     theta_max: Number | None
     friction_threshold: Number | None
+    gave_up: str = ""
 
     @property
     def factor(self) -> Number | None:
         """The Lipschitz constant where it is a contraction factor."""
         return self.lipschitz if self.lipschitz.value < 1 else None
 
+    @property
+    def certified(self) -> bool:
+        """Whether the factor is more than a number in doubles."""
+        return self.lipschitz.level != "float"
+
+    @property
+    def why_no_factor(self) -> str:
+        """Why there is no conclusion at this theta; empty where there is."""
+        if self.factor is not None:
+            return ""
+        return self.gave_up or f"its bound {self.lipschitz.value:.3g} of the Lipschitz constant is not below 1"
+
     def to_dict(self) -> dict[str, Any]:
-        """The object ``lmi`` of ``ndtheory.compare/1``; every value was certified with the returned multipliers."""
+        """The object ``lmi`` of ``ndtheory.compare/1``."""
         numbers = {
             "factor": self.factor,
             "lipschitz": self.lipschitz,
@@ -360,14 +359,15 @@ class Semidefinite:
             "friction_threshold": self.friction_threshold,
         }
         reasons = {
-            "factor": f"Lipschitz constant {self.lipschitz.value:.4g} >= 1: no conclusion",
-            "theta_max": "no theta is certified at this friction",
+            "factor": self.why_no_factor,
+            "theta_max": "no theta is proved to contract at this friction",
             "friction_threshold": "no law of friction",
         }
+        reason = {name: reasons[name] for name, number in numbers.items() if number is None}
         return {
             **{name: None if number is None else number.to_dict() for name, number in numbers.items()},
-            "certified": True,
-            "reason": {name: reasons[name] for name, number in numbers.items() if number is None},
+            "certified": self.certified,
+            "reason": reason if self.certified else reason | {"certified": NOT_CERTIFIED},
         }
 
 
@@ -390,8 +390,10 @@ def evaluate_lmi(pair: Pair, measured: Measured, theta: float) -> Semidefinite:
     largest = edition.largest_theta()
     sharp = measured.friction_threshold
     allowed = None if sharp is None else friction_threshold(pair, measured, sharp.value)
+    factor = edition.factor(theta)
     return Semidefinite(
-        lipschitz=Number.of_float(edition.factor(theta).value),
+        lipschitz=Number.of_float(factor.value),
         theta_max=None if largest is None else Number.of_float(largest.value),
         friction_threshold=None if allowed is None else Number.of_float(allowed),
+        gave_up=factor.gave_up,
     )

@@ -12,7 +12,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from fem1d2d import largest, largest_sparse, solver
 from fem1d2d.mesh import Floats
-from ndtheory import Constants, EnergyConstants, Number
+from ndtheory import Constants, EnergyConstants, Number, evaluate_sharp
 from ndtheory.sharp import friction_multiple
 from verification.bodies import build
 from verification.document import Document
@@ -142,6 +142,12 @@ class Measured(Document):
             return None
         C_s, C_t1, C_t2 = (value.value for value in self.of_friction)
         return Number.of_float(friction_multiple(C_s * C_t1, C_s * C_t2))
+
+    @property
+    def friction_limit(self) -> Number | None:
+        """The friction below which some theta is proved by the theorem in energy norms; None without a law."""
+        constants = self.with_friction(1.0).energy_constants() if self.of_friction else None
+        return None if constants is None else evaluate_sharp(constants).friction_limit_multiple
 
     def with_friction(self, k: float) -> Measured:
         """The same bodies at another friction.

@@ -158,7 +158,7 @@ class Folder:
         if isinstance(result, Run):
             drawn["residuals"] = figures.draw_residuals(result, [] if comparison is None else comparison.editions)
         if comparison is not None and comparison.losses is not None:
-            drawn["waterfall"] = figures.draw_waterfall(comparison.losses)
+            drawn["waterfall"] = figures.draw_waterfall(comparison.losses, comparison.units["stress"])
         elif comparison is not None:  # one of an earlier run would tell of another problem
             for ending in ("svg", "png"):
                 (self.path / f"waterfall.{ending}").unlink(missing_ok=True)

@@ -37,10 +37,16 @@ class Region:
         Friction, increasing; below the first value the region does not shrink.
     theta : tuple of pairs of float
         Contraction for lo < theta < hi.
+    every : float
+        Friction below which every small theta contracts.
+    some : float or None
+        Friction below which some theta contracts; None where that was not worked out.
     """
 
     k: tuple[float, ...]
     theta: tuple[tuple[float, float], ...]
+    every: float
+    some: float | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,7 +84,12 @@ class Plane(Document):
         return {
             "title": self.title,
             "regions": {
-                name: {"k": list(region.k), "theta": [list(ends) for ends in region.theta]}
+                name: {
+                    "k": list(region.k),
+                    "theta": [list(ends) for ends in region.theta],
+                    "every_small_theta": region.every,
+                    "some_theta": region.some,
+                }
                 for name, region in self.regions.items()
             },
             "points": [vars(point) for point in self.points],
@@ -106,20 +117,19 @@ def chart(problem: Problem, *, watch: Callable[[float], None] = lambda share: No
     if pair.outside:
         raise ProblemError(problem.source, "contact", None, f"no region is proved: {pair.outside[0]}")
     measured = measure(pair)
-    constants, sharp = measured.constants(), measured.friction_threshold
+    constants, sharp, limit = measured.constants(), measured.friction_threshold, measured.friction_limit
     regions: dict[str, Region] = {}
     reason: dict[str, str] = {}
     if constants is None:
         raise ProblemError(problem.source, "contact", None, next(iter(measured.reason.values())))
-    if sharp is None:
+    if sharp is None or limit is None:
         raise ProblemError(problem.source, "contact.radius", None, "needed a law of friction to vary k")
     for edition in EDITIONS:
-        threshold = evaluate(edition, constants).C2
-        if threshold is not None:
-            bound = lambda k, e=edition: evaluate(e, _at(measured, k)).interval
-            regions[edition.name] = _trace(bound, threshold.value, TRACED)
-    beyond = sharp.value * 1.5  # theta away from 0 may contract a little beyond the threshold
-    regions["sharp"] = _trace(lambda k: _sharp_interval(measured.with_friction(k)), beyond, TRACED)
+        of = evaluate(edition, constants)
+        if of.C2 is not None and of.C4 is not None:
+            interval = lambda k, e=edition: evaluate(e, _at(measured, k)).interval
+            regions[edition.name] = _trace(interval, every=of.C4.value, some=of.C2.value)
+    regions["sharp"] = _trace(lambda k: _sharp_interval(measured.with_friction(k)), every=sharp.value, some=limit.value)
     traced, why = _semidefinite(pair, measured, sharp.value)
     if traced is None:
         reason["lmi"] = why
@@ -149,13 +159,13 @@ def _sharp_interval(measured: Measured) -> tuple[float, float] | None:
     return None if constants is None else evaluate_sharp(constants).interval
 
 
-def _trace(interval: Callable[[float], tuple[float, float] | None], last: float, count: int) -> Region:
-    """Follow the border of a region up to the last friction, closer where it ends."""
-    ks = [last * (1 - 10.0**exponent) for exponent in np.linspace(-0.05, -6, count // 2)]
-    ks = sorted({*np.geomspace(last * 1e-3, last * 0.1, count - count // 2), *ks})
+def _trace(interval: Callable[[float], tuple[float, float] | None], *, every: float, some: float) -> Region:
+    """Follow the border of a region up to the last friction that allows some theta, closer where it ends."""
+    ks = [some * (1 - 10.0**exponent) for exponent in np.linspace(-0.05, -6, TRACED // 2)]
+    ks = sorted({*np.geomspace(some * 1e-3, some * 0.1, TRACED - TRACED // 2), *ks})
     found = [(float(k), interval(float(k))) for k in ks]
     kept = [(k, ends) for k, ends in found if ends is not None]
-    return Region(k=tuple(k for k, _ in kept), theta=tuple(ends for _, ends in kept))
+    return Region(k=tuple(k for k, _ in kept), theta=tuple(ends for _, ends in kept), every=every, some=some)
 
 
 def _at(measured: Measured, k: float) -> Constants:
@@ -165,7 +175,8 @@ def _at(measured: Measured, k: float) -> Constants:
 
 
 def _semidefinite(pair: Pair, measured: Measured, start: float) -> tuple[Region | None, str]:
-    from verification.lmi import LMIError, SemidefiniteEdition, friction_threshold
+    from verification.lmi import SemidefiniteEdition, friction_threshold
+    from verification.lmi_program import LMIError
 
     if pair.n > LARGEST:
         return None, f"{pair.n} contact nodes: worked out up to {LARGEST}"
@@ -178,4 +189,4 @@ def _semidefinite(pair: Pair, measured: Measured, start: float) -> tuple[Region 
                 kept.append((float(k), (0.0, found.value)))
     except LMIError as error:
         return None, str(error)
-    return Region(k=tuple(k for k, _ in kept), theta=tuple(ends for _, ends in kept)), ""
+    return Region(k=tuple(k for k, _ in kept), theta=tuple(ends for _, ends in kept), every=last, some=None), ""

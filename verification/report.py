@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ndtheory import Number, __version__
+from verification.editions import bounded
 from verification.verdicts import Comparison
 
 
@@ -39,6 +40,7 @@ def report(comparison: Comparison, figures: Mapping[str, str]) -> str:
     return environment.get_template("report.html.j2").render(
         comparison=comparison,
         run=comparison.run,
+        bounded=bounded(comparison.editions),
         problem=comparison.run.pair.problem,
         title="".join(c if c.isprintable() else " " for c in comparison.run.pair.problem.title),
         measured=comparison.measured,

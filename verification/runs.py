@@ -18,11 +18,12 @@ from verification.contact import ContactError, Solver
 from verification.contact_state import ContactState
 from verification.document import Document
 from verification.iteration import FixedPointMap, state_at, states
+from verification.linearisation import Forecast, Linearisation, NotLinear, forecast, linearise
 from verification.measured import Measured
 from verification.monolithic import SolveError, solve
 from verification.pair import Pair
 from verification.problem import Problem, Relaxation
-from verification.rates import Linearisation, NotLinear, ObservedRate, linearise, observed_rate
+from verification.rates import ObservedRate, observed_rate
 from verification.relaxation import momentum_rate, outside, rule
 from verification.state import State
 from verification.threads import one_thread
@@ -101,9 +102,19 @@ class Run(Document):
         return len(self.states)
 
     @cached_property
-    def observed_rate(self) -> ObservedRate | None:
-        """The asymptotic rate, None where too few steps stand clear of the noise."""
+    def _at_the_end(self) -> ObservedRate | None:
         return observed_rate(self.pair, self.states)
+
+    @property
+    def observed_rate(self) -> ObservedRate | None:
+        """The asymptotic rate; None where too few steps stand clear of the noise, or the run diverged."""
+        return None if self.outcome == "diverged" else self._at_the_end
+
+    @property
+    def observed_growth(self) -> float | None:
+        """By what factor a step the residual of a run that diverged grew at its end; None of any other run."""
+        grown = self._at_the_end if self.outcome == "diverged" else None
+        return None if grown is None else grown.value
 
     @cached_property
     def linearised(self) -> Linearisation | None:
@@ -128,6 +139,28 @@ class Run(Document):
                     return linearise(self.pair, self.last, float(self.theta), self.states), ""
                 return linearise(self.pair, self._solution(), float(self.theta)), ""
         except (NotLinear, SolveError, ContactError) as error:
+            return None, str(error)
+
+    @property
+    def forecast(self) -> Forecast | None:
+        """What could be said of the run half way; None where ``why_no_forecast`` says why."""
+        return self._forecast[0]
+
+    @property
+    def why_no_forecast(self) -> str:
+        """Why there is no forecast; empty where there is."""
+        return self._forecast[1]
+
+    @cached_property
+    def _forecast(self) -> tuple[Forecast | None, str]:
+        if self.relaxation != "constant":
+            return None, f"the {self.relaxation} relaxation is no constant theta"
+        settings = self.pair.problem.iteration
+        try:
+            with one_thread():
+                made = forecast(self.pair, self.states, float(self.theta), settings.tolerance, settings.max_iterations)
+            return made, ""
+        except NotLinear as error:
             return None, str(error)
 
     def _solution(self) -> State:
@@ -193,9 +226,14 @@ class Run(Document):
                 reason["predicted_rate"] = "the run did not end in a stretch of steps without a change of state"
             if not np.isfinite(linear.margin):
                 reason["linearised_margin"] = "no change of g changes a state"
+        few = "fewer than two step ratios stand clear of rounding"
         if rate is None:
-            few = "fewer than two step ratios stand clear of rounding"
-            reason |= {"observed_rate": few, "observed_rate_interval": few}
+            why = "the run diverged: it shows growth, not a rate" if self.outcome == "diverged" else few
+            reason |= {"observed_rate": why, "observed_rate_interval": why}
+        if self.observed_growth is None:
+            reason["observed_growth"] = "the run did not diverge" if self.outcome != "diverged" else few
+        if self.forecast is None:
+            reason["forecast"] = self.why_no_forecast
         return {
             "title": self.pair.problem.title,
             "theta": float(self.theta),
@@ -209,6 +247,8 @@ class Run(Document):
             "proved_rate": None if proved is None else proved.to_dict(),
             "observed_rate": None if rate is None else rate.value,
             "observed_rate_interval": None if rate is None else [rate.lo, rate.hi],
+            "observed_growth": self.observed_growth,
+            "forecast": None if self.forecast is None else vars(self.forecast),
             "linearised_rate": None if linear is None else linear.rate,
             "linearised_norm": None if linear is None else linear.norm,
             "linearised_radius": None if linear is None else linear.radius,

@@ -12,7 +12,7 @@ from verification.advice import sharp_bounds
 from verification.bodies import build
 from verification.contact import Solver
 from verification.document import Document
-from verification.editions import LARGEST, EditionRow, row_of
+from verification.editions import LARGEST, EditionRow, Thresholds, row_of
 from verification.losses import Losses, locate
 from verification.measured import Measured, measure
 from verification.pair import Pair
@@ -30,10 +30,10 @@ PROVED = ("repaired", "sharp", "lmi")
 #: A bound may be attained: a ratio above it by less than this share of 1 - bound is equal to it.
 TIGHT = 1e-6
 
-#: A rate observed and the one predicted for the same steps agree to this.
+#: A forecast comes true where its rate is the observed one to this, and its steps to one.
 AGREES = 1e-3
 
-Verdict = Literal["CONSISTENT", "VIOLATED", "INCONCLUSIVE", "HYPOTHESES_NOT_MET"]
+Verdict = Literal["CONSISTENT", "VIOLATED", "INCONCLUSIVE", "HYPOTHESES_NOT_MET", "NOT_COMPUTED"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +63,7 @@ class Comparison(Document):
     step_ratio : StepRatio or None
         The largest Lipschitz quotient seen.
     verdicts : mapping from edition to Judgement
-        And of ``linearised``, a prediction.
+        And of ``linearised``, the forecast made half way.
     reason : mapping
         Why sharp, lmi, losses or step_ratio is None.
     """
@@ -89,14 +89,16 @@ class Comparison(Document):
         """Every edition there is, from the weakest to the strongest."""
         rows = [row_of(name, b) for name, b in self.bounds.items()]
         if self.sharp is not None:
-            rows.append(row_of("sharp", self.sharp, self.measured.friction_threshold))
+            every, some = self.measured.friction_threshold, self.measured.friction_limit
+            rows.append(
+                row_of("sharp", self.sharp, Thresholds(every=every, some=some, on="any" if every is None else "k"))
+            )
         if self.lmi is not None:
-            factor, highest = self.lmi.factor, self.lmi.theta_max
+            factor, highest, allowed = self.lmi.factor, self.lmi.theta_max, self.lmi.friction_threshold
             rows.append(
                 EditionRow(
                     name="lmi",
-                    threshold=self.lmi.friction_threshold,
-                    threshold_on="k",
+                    friction=Thresholds(every=allowed, on="any" if allowed is None else "k"),
                     interval=None if highest is None else (0.0, highest.value),
                     theta=float(self.run.theta),
                     factor=factor,
@@ -140,30 +142,34 @@ class Comparison(Document):
         }
 
     def _sharp(self) -> dict[str, Any] | None:
-        """The object ``sharp``: the edition's own document with both rho and the threshold on k."""
+        """The object ``sharp``: the edition's own document with both rho and both thresholds on k."""
         if self.sharp is None:
             return None
         measured, document = self.measured, self.sharp.to_dict()
         threshold = measured.friction_threshold
         if threshold is None:
-            document["reason"]["friction_threshold"] = "no law of friction"
+            document["reason"] |= dict.fromkeys(("friction_threshold", "friction_limit"), "no law of friction")
         number = lambda value: None if value is None else value.to_dict()
         return document | {
             "rho": number(measured.rho_max),
             "rho_normal": number(measured.rho_normal),
             "rho_at_work": document["rho"],
             "friction_threshold": number(threshold),
+            "friction_limit": number(measured.friction_limit),
         }
 
 
 def judge(bound: float | None, seen: StepRatio | None, why_none: str) -> Judgement:
     """Hold a bound on the factor of one step against the largest factor seen.
 
+    A bound may be attained: what lies above it by less than :data:`TIGHT` of ``1 - bound`` is not told from it.
+
     Parameters
     ----------
     bound : float or None
         None: the edition draws no conclusion; ``why_none`` says why.
     seen : StepRatio or None
+        None: no step stands clear of rounding.
 
     Examples
     --------
@@ -175,7 +181,7 @@ def judge(bound: float | None, seen: StepRatio | None, why_none: str) -> Judgeme
     if seen is None:
         return Judgement(verdict="INCONCLUSIVE", reason="no step stands clear of rounding")
     if seen.steps == 0:
-        return Judgement(verdict="CONSISTENT", reason="no step was taken")
+        return Judgement(verdict="NOT_COMPUTED", reason="no step was taken")
     digits = 4 if seen.hi <= bound else 6  # six where the bound is attained or violated
     says = f"ratios <= {seen.value:.{digits}g} in {seen.steps} steps, bound {bound:.{digits}g}"
     if seen.hi <= bound:
@@ -188,16 +194,21 @@ def judge(bound: float | None, seen: StepRatio | None, why_none: str) -> Judgeme
     return Judgement(verdict="INCONCLUSIVE", reason=f"{says}: closer than rounding")
 
 
-def judge_prediction(run: Run) -> Judgement:
-    """Hold the linearised rate against the observed one, over the same steps."""
-    linear, observed = run.linearised, run.observed_rate
-    if linear is None:
-        return Judgement(verdict="HYPOTHESES_NOT_MET", reason=run.why_not_linearised)
-    if observed is None or linear.predicted is None:
-        return Judgement(verdict="HYPOTHESES_NOT_MET", reason="the run shows no rate near the solution")
-    says = f"rate {observed.value:.5g}, predicted {linear.predicted:.5g}"
-    agrees = abs(observed.value - linear.predicted) <= AGREES
-    return Judgement(verdict="CONSISTENT" if agrees else "VIOLATED", reason=says)
+def judge_forecast(run: Run) -> Judgement:
+    """Hold what was said half way against what the run then did."""
+    made, seen = run.forecast, run.observed_rate
+    if made is None:
+        return Judgement(verdict="NOT_COMPUTED", reason=run.why_no_forecast)
+    says = f"at step {made.made_at_iteration}: {made.rate:.4g} a step, {made.iterations} steps"
+    if run.outcome == "interrupted":
+        return Judgement(verdict="NOT_COMPUTED", reason=f"{says}; the run was interrupted")
+    if seen is None:
+        return Judgement(verdict="VIOLATED", reason=f"{says}; the run {run.outcome}, and shows no rate")
+    ended = "" if run.converged else f", {run.outcome}"
+    right = abs(seen.value - made.rate) <= AGREES and abs(run.iterations - made.iterations) <= 1 and run.converged
+    return Judgement(
+        verdict="CONSISTENT" if right else "VIOLATED", reason=f"{says}; seen {seen.value:.4g}, {run.iterations}{ended}"
+    )
 
 
 def compare(
@@ -239,23 +250,32 @@ def compare(
         outside = f"the editions speak of a constant theta, not of {finished.relaxation}"
     verdicts: dict[str, Judgement] = {}
 
-    def hold(name: str, factor: Number | None, why: str) -> None:
-        verdicts[name] = judge(None if outside or factor is None else factor.value, seen, outside or why)
-
-    absent = next(iter(measured.reason.values()), "")
-    for name, b, threshold in (
-        *((e.name, bounds.get(e.name), bounds[e.name].C2 if bounds else None) for e in EDITIONS),
-        ("sharp", sharp, measured.friction_threshold),
-    ):
-        if b is None:
-            hold(name, None, absent)
+    def hold(name: str, factor: Number | None, why: str, absent: str = "") -> None:
+        if outside:
+            verdicts[name] = Judgement(verdict="HYPOTHESES_NOT_MET", reason=outside)
+        elif absent:
+            verdicts[name] = Judgement(verdict="NOT_COMPUTED", reason=absent)
         else:
-            hold(name, b.factor, _why_not(b.interval, threshold, measured.friction, chosen))
-    if lmi is None:
-        hold("lmi", None, reason["lmi"])
+            verdicts[name] = judge(None if factor is None else factor.value, seen, why)
+
+    unknown = next(iter(measured.reason.values()), "")
+    friction = measured.friction
+    for e in EDITIONS:
+        if e.name not in bounds:
+            hold(e.name, None, "", unknown)
+        else:
+            of = bounds[e.name]
+            unit = f" (in {pair.problem.units['stress']})" if e.name == "printed" else ""
+            hold(e.name, of.factor, _why_not(of.interval, of.C2, friction, chosen) + unit)
+    if sharp is None:
+        hold("sharp", None, "", unknown)
     else:
-        hold("lmi", lmi.factor, f"Lipschitz constant {lmi.lipschitz.value:.3g} is not below 1")
-    verdicts["linearised"] = judge_prediction(finished)
+        hold("sharp", sharp.factor, _why_not(sharp.interval, measured.friction_limit, friction, chosen))
+    if lmi is None:
+        hold("lmi", None, "", reason["lmi"])
+    else:
+        hold("lmi", lmi.factor, lmi.why_no_factor, lmi.gave_up if lmi.factor is None else "")
+    verdicts["linearised"] = judge_forecast(finished)
     return Comparison(
         measured=measured,
         bounds=bounds,
@@ -278,7 +298,8 @@ def _why_not(interval: tuple[float, float] | None, threshold: Number | None, fri
 
 
 def _semidefinite(pair: Pair, theta: float, measured: Measured) -> tuple[Semidefinite | None, str]:
-    from verification.lmi import LMIError, evaluate_lmi
+    from verification.lmi import evaluate_lmi
+    from verification.lmi_program import LMIError
 
     try:
         return evaluate_lmi(pair, measured, theta), ""

@@ -21,7 +21,7 @@ from verification.contact import ContactError
 from verification.contact.active_set import Pattern
 from verification.iteration import FixedPointMap, state_at
 from verification.jacobian import Piece, piece_of
-from verification.rates import NotLinear, linearise
+from verification.linearisation import NotLinear, linearise
 from verification.state import State
 
 seeds = st.integers(0, 2**32 - 1).map(np.random.default_rng)

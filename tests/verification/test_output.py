@@ -97,7 +97,7 @@ def quick(monkeypatch):
     """Figures that cost nothing: only their files matter here."""
     monkeypatch.setattr(figures, "draw_bodies", lambda result: "bodies")
     monkeypatch.setattr(figures, "draw_residuals", lambda run, editions=(): "residuals")
-    monkeypatch.setattr(figures, "draw_waterfall", lambda losses: "waterfall")
+    monkeypatch.setattr(figures, "draw_waterfall", lambda losses, unit: "waterfall")
     monkeypatch.setattr(
         figures,
         "save",

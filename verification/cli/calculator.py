@@ -21,7 +21,7 @@ from ndtheory import (
 from ndtheory.constants import take
 from verification.cli.console import factor, figures, heading, note, say, table
 from verification.document import Document
-from verification.editions import EditionRow, row_of
+from verification.editions import EditionRow, bounded, row_of
 
 #: The constants of Section 5 by key, and the options that give them.
 CONSTANTS = {"m": "--m", "M": "--M", "C_R": "--CR", "C_s": "--Cs", "C_tr": "--Ctr", "k": "--k", "C_K": "--CK"}
@@ -142,28 +142,39 @@ def _energy(given: Mapping[str, str | None], rubs: bool) -> EnergyConstants | No
         raise HypothesisError(ENERGY[error.key], error.value, error.needed) from None
 
 
-def edition_table(rows: Sequence[EditionRow]) -> list[list[str]]:
-    """The table of editions, head first."""
-    head = ["edition", "friction allowed", "theta allowed", "factor"]
-    theta = rows[0].theta
-    if theta is not None:
-        head.append(f"theta = {theta:.4g}")
-    lines = [head]
+def editions_table(rows: Sequence[EditionRow], unit: str) -> None:
+    """Print the editions, and in which unit of stress the printed one speaks.
+
+    Parameters
+    ----------
+    rows : sequence of EditionRow
+    unit : str
+        "MPa", or what the unit of stress is that of.
+    """
+    friction, theta = bounded(rows), rows[0].theta
+    end = [] if theta is None else [f"theta = {theta:.4g}"]
+    lines = [
+        ["", "every small", "some", "", "", *([] if theta is None else [""])],
+        ["edition", f"theta: {friction} <", f"theta: {friction} <", "theta allowed", "factor", *end],
+    ]
     for row in rows:
         interval = "-" if row.interval is None else f"{row.interval[0]:.3g} < theta < {figures(row.interval[1])}"
-        line = [row.name, _allowed(row), interval, factor(row.factor, row.one_minus_factor)]
+        line = [row.name, *_allowed(row), interval, factor(row.factor, row.one_minus_factor)]
         if theta is not None:
             line.append("contracts" if row.factor is not None else "no conclusion")
         lines.append(line)
-    return lines
+    table(lines)
+    if any(row.name == "printed" for row in rows):
+        note(f"printed: with stresses in {unit}; in another unit its figures are others", "  ")
 
 
-def _allowed(row: EditionRow) -> str:
-    if row.threshold is None:
-        return "any"
-    if row.threshold_on == "multiple":
-        return f"{figures(row.threshold)} x this"
-    return f"{row.threshold_on} < {figures(row.threshold)}"
+def _allowed(row: EditionRow) -> list[str]:
+    """The two thresholds on friction."""
+    friction = row.friction
+    if friction.on == "any":
+        return ["any", "any"]
+    times = " x this" if friction.on == "multiple" else ""
+    return ["-" if value is None else figures(value) + times for value in (friction.every, friction.some)]
 
 
 def _screen(constants: Constants | None, editions: Mapping[str, Bounds | SharpBounds]) -> None:
@@ -174,7 +185,7 @@ def _screen(constants: Constants | None, editions: Mapping[str, Bounds | SharpBo
     if isinstance(sharp, SharpBounds):
         say(", ".join(f"{key} = {figures(getattr(sharp, key))}" for key in ENERGY))
     heading("DOES ONE STEP CONTRACT?")
-    table(edition_table([row_of(name, b) for name, b in editions.items()]))
+    editions_table([row_of(name, b) for name, b in editions.items()], "the unit of --m")
     section_5 = {name: b for name, b in editions.items() if isinstance(b, Bounds)}
     if section_5:
         heading("THE CONSTANTS OF SECTION 5")

@@ -7,12 +7,12 @@ from pathlib import Path
 from shlex import quote
 
 from verification.advice import Advice
-from verification.cli.calculator import edition_table
+from verification.cli.calculator import editions_table
 from verification.cli.console import figures, heading, near_one, note, printable, say, table
 from verification.contact_state import ContactState
 from verification.measured import ENERGY_NAMES, NAMES, Measured
 from verification.monolithic import Solution
-from verification.plane import Plane
+from verification.plane import MOST_STEPS, Plane
 from verification.problem import Problem
 from verification.runs import Run
 from verification.verdicts import Comparison
@@ -69,15 +69,26 @@ def _happened(run: Run) -> None:
     heading("WHAT HAPPENED")
     rate, linear = run.observed_rate, run.linearised
     rows = [["", "rate", "steps", ""]]
+    if run.forecast is not None:
+        made = run.forecast
+        name = f"forecast at step {made.made_at_iteration}"
+        rows.append([name, near_one(made.rate), str(made.iterations), "prediction, not a bound"])
     if linear is not None:
         steps = _steps(linear.rate, problem.iteration.tolerance)
-        rows.append(["linearised at the solution", near_one(linear.rate), steps, "predicted, not a bound"])
+        rows.append(["linearised at the solution", near_one(linear.rate), steps, "prediction, made afterwards"])
     shown = "-" if rate is None else near_one(rate.value)
-    rows.append(["observed", shown, str(run.iterations), run.outcome])
+    if run.observed_growth is not None:
+        shown = f"grows by {run.observed_growth:.4g}"
+    rows.append(["observed", shown, str(run.iterations), f"seen: {run.outcome}"])
     table(rows)
     say()
+    if run.forecast is None and run.relaxation == "constant":
+        note(f"no forecast: {run.why_no_forecast}", "  ")
     if linear is None:
         note(f"not linearised: {run.why_not_linearised}", "  ")
+    elif linear.predicted is not None and rate is not None:
+        says = f"on the run's own error J gives {near_one(linear.predicted)} over the steps observed"
+        note(f"consistency of J: {says}, {near_one(rate.value)} seen", "  ")
     if run.relaxation != "constant":
         proved = "" if run.proved_rate is None else f"; proved rate {near_one(run.proved_rate.value)}"
         say(f"  {run.evaluations} evaluations of T, with the {run.relaxation} relaxation{proved}")
@@ -152,17 +163,20 @@ def comparison(result: Comparison, file: Path) -> None:
     say(f"  C_s = {C_s}, C_tr = {C_tr}, C_K = {C_K} {stress}, rho = {rho}")
     heading("DOES ONE STEP CONTRACT?")
     if result.editions:
-        table(edition_table(result.editions))
+        editions_table(result.editions, stress)
     else:
         note("no edition applies: " + next(iter(measured.reason.values()), ""), "  ")
     for name in ("lmi", "losses"):
         if name in result.reason:
             note(f"{name}: {result.reason[name]}", "  ")
     if result.losses is not None and result.losses.friction:
-        heading("WHERE IS IT LOST?")
-        total = sum(loss.decades for loss in result.losses.friction)
-        say(f"  {total:.1f} decades from the largest friction term found to its printed bound (5.30):")
-        say("  " + ", ".join(f"{loss.label} {loss.decades:.1f}" for loss in result.losses.friction))
+        heading("WHAT DOES EACH ESTIMATE GIVE AWAY?")
+        estimates = [loss for loss in result.losses.friction if not loss.only_unit]
+        total = sum(loss.decades for loss in estimates)
+        unit = sum(loss.decades for loss in result.losses.friction) - total
+        say(f"  {total:.1f} decades from the largest friction term found to its repaired bound (5.30):")
+        say("  " + ", ".join(f"{loss.label} {loss.decades:.1f}" for loss in estimates))
+        note(f"{unit:.1f} more to the printed one, which are only the unit of stress, {stress}", "  ")
     _happened(finished)
     heading("DOES THE RUN AGREE WITH THE BOUND?")
     table([["edition", "verdict", "why"], *([n, j.verdict, j.reason] for n, j in result.verdicts.items())])
@@ -227,16 +241,19 @@ def plane(found: Plane, target: Path) -> None:
     """The screen of ``region``."""
     say(printable(found.title))
     heading("WHERE IS ONE STEP PROVED TO CONTRACT?")
-    rows = [["edition", "friction allowed", "theta at most"]]
+    rows = [["edition", "every small theta: k <", "some theta: k <", "theta at most"]]
     for name, region in found.regions.items():
         if region.k:
-            rows.append([name, f"k < {figures(max(region.k))}", figures(max(hi for _, hi in region.theta))])
+            highest = figures(max(hi for _, hi in region.theta))
+            rows.append([name, figures(region.every), figures(region.some), highest])
     table(rows)
+    note(f"printed: with stresses in {found.units['stress']}; in another unit its figures are others", "  ")
     for name, reason in found.reason.items():
         note(f"{name}: {reason}", "  ")
     heading("WHAT DID RUNS DO?")
     outcomes = [point.outcome for point in found.points]
-    say("  " + ", ".join(f"{outcomes.count(name)} {name}" for name in dict.fromkeys(outcomes)))
+    words = {"limit": f"still falling when stopped after {MOST_STEPS} steps"}
+    note(", ".join(f"{outcomes.count(name)} {words.get(name, name)}" for name in dict.fromkeys(outcomes)), "  ")
     strongest = max((p.k for p in found.points if p.outcome == "converged"), default=None)
     if strongest is not None:
         say(f"  the largest friction with a run that converged: k = {strongest:g}")

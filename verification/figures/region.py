@@ -26,7 +26,8 @@ def draw_region(plane: Plane) -> Figure:
             k = [bottom, *region.k]
             low = [max(lo, left) for lo, _ in (region.theta[0], *region.theta)]
             high = [hi for _, hi in (region.theta[0], *region.theta)]
-            label = f"{name}: k < {max(region.k):.2g}"
+            unit = f" ({plane.units['stress']})" if name == "printed" else ""
+            label = f"{name}{unit}: k < {max(region.k):.2g}"
             ax.fill_betweenx(
                 k, low, high, color=EDITIONS[name], alpha=0.55, linewidth=0, label=label, hatch=HATCHES[name]
             )
@@ -34,7 +35,11 @@ def draw_region(plane: Plane) -> Figure:
             chosen = [point for point in plane.points if point.outcome == outcome]
             if chosen:
                 x, y = [p.theta for p in chosen], [p.k for p in chosen]
-                ax.plot(x, y, marker, color=colour, markersize=4, label=f"run {outcome}")
+                # a run that was still falling when it was stopped contradicts nothing: an empty marker
+                fill, label = (
+                    ("none", "run still falling when stopped") if outcome == "limit" else (None, f"run {outcome}")
+                )
+                ax.plot(x, y, marker, color=colour, markerfacecolor=fill, markersize=4, label=label)
         ax.set_xlim(left, 1.3)
         ax.set_ylim(bottom, 2 * max([*frictions, *(p.k for p in plane.points)]))
         ax.set_xlabel("relaxation factor theta")

@@ -7,15 +7,25 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from verification.figures.style import EDITIONS, new_figure, styled
+from verification.figures.style import EDITIONS, HATCHES, STATES, new_figure, styled
 from verification.losses import Loss, Losses
 
 
-def draw_waterfall(losses: Losses) -> Figure:
-    """Each inequality by itself, then the steps from the largest quantity found to its bound, added up."""
+def draw_waterfall(losses: Losses, unit: str) -> Figure:
+    """Each inequality by itself, then the steps from the largest quantity found to its bound, added up.
+
+    Parameters
+    ----------
+    losses : Losses
+    unit : str
+        The unit of stress, on which alone the step from the repaired to the printed bound depends.
+    """
     chains = [
         ("each inequality by itself", losses.links),
-        ("from the largest friction term found to its bound (5.30), printed", losses.friction),
+        (
+            f"from the largest friction term found to its bound (5.30), repaired, then printed in {unit}",
+            losses.friction,
+        ),
         ("from the largest |||T psi - T psi~||| found to its bound (5.38)", losses.lipschitz),
     ]
     chains = [(title, chain) for title, chain in chains if chain]
@@ -31,14 +41,17 @@ def draw_waterfall(losses: Losses) -> Figure:
 def _draw(ax: Axes, title: str, chain: Sequence[Loss], *, adds_up: bool) -> None:
     begin, farthest = 0.0, 0.0
     for i, loss in enumerate(chain):
-        ax.barh(i, loss.decades, left=begin, color=EDITIONS["repaired"], edgecolor="black", linewidth=0.5)
+        name = "printed" if loss.only_unit else "repaired"
+        hatch = HATCHES["printed"] if loss.only_unit else None
+        ax.barh(i, loss.decades, left=begin, color=EDITIONS[name], hatch=hatch, edgecolor="black", linewidth=0.5)
         end = begin + loss.decades
         farthest = max(farthest, end)
-        ax.text(max(begin, end), i, f" {loss.decades:.1f}", va="center")
+        says = f" {loss.decades:.1f}" + (", only the unit" if loss.only_unit else "")
+        ax.text(max(begin, end), i, says, va="center")
         begin = end if adds_up else 0.0
     labels = [loss.label for loss in chain]
     if adds_up:
-        ax.barh(len(chain), begin, color=EDITIONS["printed"], edgecolor="black", linewidth=0.5)
+        ax.barh(len(chain), begin, color=STATES["open"], edgecolor="black", linewidth=0.5)
         ax.text(begin, len(chain), f" {begin:.1f}", va="center")
         labels.append("in all")
     ax.set_yticks(range(len(labels)), labels)

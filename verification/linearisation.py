@@ -1,0 +1,274 @@
+"""The Jacobian of T_theta at the solution: the rate it gives, what a run excites of it, and a forecast of the run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import schur
+
+from fem1d2d.mesh import Floats
+from verification.jacobian import Piece, piece_of
+from verification.pair import Pair
+from verification.rates import noise, observed_rate, rate_at_the_end, settled
+from verification.state import State
+
+#: Contact nodes up to which T is linearised: eigenvalues of larger Jacobians take minutes.
+MOST_NODES = 300
+
+#: A mode whose share of the error is below this is not excited: rounding alone does not count.
+SHARE = 1e-10
+
+
+@dataclass(frozen=True, kw_only=True)
+class Linearisation:
+    """The Jacobian J of T_theta at the solution g*, in the norm (5.21).
+
+    T is piecewise affine, so near g* the error obeys ``e <- J e`` exactly.  J is not normal: single steps may exceed
+    rho(J), never ``|J|``.
+
+    Attributes
+    ----------
+    radius : float
+        rho(J).
+    excited : float or None
+        The spectral radius of J on what the run excites; None where the run did not reach the solution.
+    norm : float
+        ``|J|``.
+    margin : float
+        How far g may move until a node changes state, ``|||g - g*||| / |||g*|||``.
+    predicted : float or None
+        What J makes of the run's own error over the very steps that the observed rate compares; None where they lie
+        elsewhere.  It tests J, not the future: :class:`Forecast` is what could be said before.  It differs from
+        ``excited`` as long as no single mode dominates.
+    """
+
+    radius: float
+    excited: float | None
+    norm: float
+    margin: float
+    predicted: float | None
+
+    @property
+    def rate(self) -> float:
+        """The rate to expect of the run."""
+        return self.radius if self.excited is None else self.excited
+
+
+class NotLinear(ValueError):
+    """Why linearisation does not apply."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Near:
+    """T_theta on the affine piece of a state: its Jacobian, and how far the state lies from the piece's fixed point.
+
+    Attributes
+    ----------
+    piece : Piece
+    J : array
+        In the coordinates of ``piece.basis``.
+    error : array
+        ``g - g*`` there, by one Newton step.
+    margin : float
+        How far g may move, in the norm (5.21), until a node changes state.
+    """
+
+    piece: Piece
+    J: Floats
+    error: Floats
+    margin: float
+
+    def step(self, error: Floats) -> float:
+        """The size of a relaxation step from an error, in the norm (5.21): theta times the residual."""
+        return float(np.linalg.norm(self.J @ error - error))
+
+
+def _near(pair: Pair, state: State, theta: float) -> _Near:
+    """Linearise T_theta at a state close to the solution: no node may change its state in between.
+
+    Raises
+    ------
+    NotLinear
+    """
+    if pair.n > MOST_NODES:
+        raise NotLinear(f"{pair.n} contact nodes: T is linearised up to {MOST_NODES}")
+    piece = piece_of(pair, state.g, state.contact.pattern)
+    basis, inverse = piece.basis, pair.neumann.flexibility
+    J = piece.relaxed(theta)
+    try:
+        # one Newton step: exact on an affine piece
+        newton = np.linalg.solve(np.eye(len(J)) - J, theta * basis.T @ inverse(state.g - state.image))
+    except np.linalg.LinAlgError:
+        raise NotLinear("1 is an eigenvalue of the Jacobian: the solution is not isolated") from None
+    error: Floats = np.asarray(newton, dtype=float)
+    margin, node = _margin(piece, state)
+    if not margin > np.linalg.norm(error):
+        raise NotLinear(f"the node at x = {pair.x[node]:g} is about to change its state")
+    return _Near(piece=piece, J=J, error=error, margin=margin)
+
+
+def linearise(pair: Pair, state: State, theta: float, history: Sequence[State] = ()) -> Linearisation:
+    """Linearise T_theta at the solution next to a state.
+
+    Parameters
+    ----------
+    pair : Pair
+    state : State
+        Close to the solution: no node may change its state in between.
+    theta : float
+    history : sequence of State
+        The run that led to the state; its error decides what is excited.
+
+    Raises
+    ------
+    NotLinear
+        A node about to change its state (strict complementarity fails), or too many nodes.
+    """
+    near = _near(pair, state, theta)
+    piece, J = near.piece, near.J
+    excited = predicted = None
+    if history:
+        observed = observed_rate(pair, history)
+        first = len(history) - 1
+        while first > 0 and _same(piece, piece_of(pair, history[first - 1].g, history[first - 1].contact.pattern)):
+            first -= 1
+        start = near.error + piece.basis.T @ pair.neumann.flexibility(history[first].g - state.g)
+        excited = _excited(J, start)
+        if observed is not None and first <= observed.begin:
+            e = np.linalg.matrix_power(J, observed.begin - first) @ start
+            steps = observed.end - observed.begin
+            after = near.step(np.linalg.matrix_power(J, steps) @ e)
+            predicted = (after / near.step(e)) ** (1 / steps) if near.step(e) > 0 else None
+    size = pair.neumann.dual_norm(state.g)
+    return Linearisation(
+        radius=float(np.abs(np.linalg.eigvals(J)).max(initial=0.0)),
+        excited=excited,
+        norm=float(np.linalg.norm(J, 2)) if len(J) else 0.0,
+        margin=near.margin / size if size else float("inf"),
+        predicted=predicted,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Forecast:
+    """What could be said of the rest of a run half way, from the states up to there alone.
+
+    Attributes
+    ----------
+    made_at_iteration : int
+        The first iteration at which the residual had fallen half way, in decades, to the tolerance.
+    rate : float
+        The rate that the run should show at its end, by the definition of the observed rate.
+    iterations : int
+        After how many the run should have converged.
+    tolerance : float
+        What "converged" means.
+    """
+
+    made_at_iteration: int
+    rate: float
+    iterations: int
+    tolerance: float
+
+
+def forecast(pair: Pair, states: Sequence[State], theta: float, tolerance: float, most: int) -> Forecast:
+    """Say of a run, half way to its tolerance, how it will end.
+
+    From there on the error is taken to obey ``e <- J e`` with the Jacobian of the piece that the run is on: right if no
+    node changes its state any more.
+
+    Parameters
+    ----------
+    pair : Pair
+    states : sequence of State
+        Those after the half-way state are not looked at.
+    theta : float
+    tolerance : float
+        Of the relative residual.
+    most : int
+        Iterations after which the run stops.
+
+    Raises
+    ------
+    NotLinear
+        Why nothing can be said.
+    """
+    half = next((i for i, s in enumerate(states) if s.residual <= math.sqrt(tolerance) * s.scale), None)
+    if half is None:
+        raise NotLinear("the residual never fell half way, in decades, to the tolerance")
+    state = states[half]
+    if state.residual <= tolerance * state.scale:
+        raise NotLinear("the run converged before a forecast could be made half way")
+    near = _near(pair, state, theta)
+    residuals = [s.residual for s in states[: half + 1]]
+    floors = [noise(pair, s) for s in states[: half + 1]]
+    error = near.error
+    while residuals[-1] > tolerance * state.scale:
+        if len(residuals) > most:
+            raise NotLinear(f"the forecast at iteration {half} is that {most} iterations do not suffice")
+        error = near.J @ error
+        residuals.append(near.step(error) / theta)
+        floors.append(floors[-1])
+    if len(residuals) < 3:
+        raise NotLinear("the run is too short for a rate")
+    return Forecast(
+        made_at_iteration=half,
+        rate=rate_at_the_end(residuals, floors, settled(states[: half + 1])).value,
+        iterations=len(residuals) - 1,
+        tolerance=tolerance,
+    )
+
+
+def _same(a: Piece, b: Piece) -> bool:
+    return a.pattern == b.pattern and np.array_equal(a.sign, b.sign)
+
+
+def _margin(piece: Piece, state: State) -> tuple[float, int]:
+    """Distance in the norm (5.21) from g to the next change of state, and the node it happens at."""
+    pair, t, touching = piece.pair, piece.pair.tangential.stop, piece.pattern.touching
+    v, force, basis = state.contact.v, state.contact.force, piece.basis
+    jump, reaction = piece.jump @ basis, piece.force @ basis
+    rows = [np.where(touching[:, None], reaction[t:], -jump[t:])]
+    slack = [np.where(touching, force[t:], -v[t:])]
+    nodes = [np.arange(pair.n)]
+    if t and piece.sign.any():
+        assert pair.regularisation is not None
+        stress, bound = pair.regularisation @ state.g[pair.normal], piece.bound @ basis
+        limit = float(pair.problem.contact.friction) * pair.weights * np.abs(stress)
+        sliding, rubs = piece.pattern.sliding, piece.sign != 0
+        slips, sticks = np.flatnonzero(rubs & (sliding != 0)), np.flatnonzero(rubs & (sliding == 0))
+        rows += [sliding[slips, None] * jump[slips], bound[sticks] - reaction[sticks], bound[sticks] + reaction[sticks]]
+        slack += [sliding[slips] * v[slips], limit[sticks] - force[sticks], limit[sticks] + force[sticks]]
+        rows.append(piece.sign[rubs, None] * (pair.regularisation[rubs] @ basis[pair.normal]))
+        slack.append(np.abs(stress[rubs]))
+        nodes += [slips, sticks, sticks, np.flatnonzero(rubs)]
+    gradient = np.linalg.norm(np.vstack(rows), axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        distance = np.where(gradient > 0, np.concatenate(slack) / gradient, np.inf)
+    least = int(np.argmin(distance))
+    return float(distance[least]), int(np.concatenate(nodes)[least])
+
+
+def _excited(J: Floats, error: Floats) -> float:
+    """The largest modulus of an eigenvalue of J whose modes have a share of the error.
+
+    The modes of modulus >= r have no share if and only if the error is orthogonal to the left invariant subspace of
+    those eigenvalues, which an ordered Schur form of J' spans with orthonormal columns.
+    """
+    size = float(np.linalg.norm(error))
+    if size == 0.0:
+        return 0.0
+    moduli = np.unique(np.abs(np.linalg.eigvals(J)))[::-1]
+    low, high = 0, len(moduli) - 1  # the first modulus that shows: by halving, as shares only grow
+    while low < high:
+        middle = (low + high) // 2
+        r = moduli[middle] * (1 - 1e-9)
+        _, vectors, count = schur(J.T, output="complex", sort=lambda z, r=r: abs(z) >= r)
+        if np.linalg.norm(vectors[:, :count].conj().T @ error) > SHARE * size:
+            high = middle
+        else:
+            low = middle + 1
+    return float(moduli[low])

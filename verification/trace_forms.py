@@ -1,0 +1,101 @@
+"""The forms of the semidefinite edition in traces (d, c), and whether they are positive definite in spite of rounding.
+
+With ``g = S_2 d`` and ``p = P c`` every term but ``|a p + b g|^2`` is a product of the interface matrices themselves.
+That term has an inverse, ``|.|^2 = .' S_2^-1 .``, which a Schur complement takes away: ``Q - weight M' S_2^-1 M`` is
+positive definite if and only if ``[[S_2 / weight, M], [M', Q]]`` is.  So rounding enters by sums and products alone,
+and has a bound.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from fem1d2d.mesh import Floats
+from verification.pair import Pair
+from verification.rounding import gamma, positive_definite
+
+
+class TraceForms:
+    """The forms of a pair of bodies at a friction k > 0, or at 0.
+
+    Without friction p has no tangential part: c is then the normal part of a trace and P has S_1 with the tangential
+    components condensed out.
+
+    Parameters
+    ----------
+    pair : Pair
+    k : float
+    S_1 : array, shape (m, m)
+        From c to the components of p that are not 0.
+    carries : slice
+        Which components of p these are.
+    near : array, shape (N + m, N + m)
+        Changes of (d, c), as columns, in which the forms are of size 1: the nearer, the less is lost to rounding.
+    """
+
+    def __init__(self, pair: Pair, k: float, *, S_1: Floats, carries: slice, near: Floats) -> None:
+        S_2, size = pair.neumann.stiffness, pair.normal.stop
+        still = np.zeros((size, len(S_1)))
+        moved, pressed = still.copy(), still.copy()
+        moved[carries], pressed[carries] = np.eye(len(S_1)), S_1
+        self._S_2, self._near, self._near_2 = S_2, near, near[:size, :size]
+        self._d = np.hstack([np.eye(size), still])
+        self._g = np.hstack([S_2, still])
+        self._p = np.hstack([np.zeros((size, size)), pressed])
+        jump = -np.hstack([np.eye(size), moved])
+        families = [(self._p[pair.normal], jump[pair.normal])]
+        sizes = [(np.abs(a), np.abs(b)) for a, b in families]
+        if k:
+            assert pair.regularisation is not None
+            weight = np.sqrt(k * pair.weights)[:, None]
+            shear, slip = self._p[pair.tangential], jump[pair.tangential]
+            zeta = weight * (pair.regularisation @ self._g[pair.normal])
+            zeta_size = weight * (np.abs(pair.regularisation) @ np.abs(self._g[pair.normal]))
+            families += [(shear, slip), (zeta, zeta), (weight * slip, weight * slip)]
+            sizes += [(np.abs(shear), np.abs(slip)), (zeta_size, zeta_size), (weight * np.abs(slip),) * 2]
+        self._families, self._sizes = families, sizes
+        # inner products over nodes, over traces twice, and the scalars
+        self._error = gamma(4 * (2 * size + len(S_1)) + 2 * pair.n + 20)
+
+    def definite(
+        self,
+        multipliers: Sequence[Floats],
+        *,
+        square: float,
+        cross: float = 0.0,
+        step: tuple[float, float] | None = None,
+        weight: float = 1.0,
+    ) -> bool:
+        """Whether ``square |g|^2 - cross <g, p> - weight |a p + b g|^2 - conditions`` is positive definite for sure.
+
+        Parameters
+        ----------
+        multipliers : sequence of arrays
+            lambda, tau, a, b by node; lambda alone without friction.
+        square, cross, weight : float
+        step : (a, b), optional
+            None: without that term.
+        """
+        sum_of = lambda g, p, d, families, sign: (
+            square * d.T @ g + sign * cross * d.T @ p + sign * _conditions(multipliers, families)
+        )
+        form = sum_of(self._g, self._p, self._d, self._families, -1)
+        size = sum_of(np.abs(self._g), np.abs(self._p), self._d, self._sizes, 1)
+        near = self._near
+        if step is not None:
+            a, b = step
+            row, row_size = a * self._p + b * self._g, abs(a) * np.abs(self._p) + abs(b) * np.abs(self._g)
+            form = np.block([[self._S_2 / weight, row], [row.T, form]])
+            size = np.block([[np.abs(self._S_2) / weight, row_size], [row_size.T, size]])
+            near = block_diag(np.sqrt(weight) * self._near_2, near)
+        form = near.T @ ((form + form.T) / 2) @ near
+        size = np.abs(near).T @ ((size + size.T) / 2) @ np.abs(near)
+        return positive_definite((form + form.T) / 2, self._error * (size + size.T) / 2)
+
+
+def _conditions(multipliers: Sequence[Floats], families: Sequence[tuple[Floats, Floats]]) -> Floats:
+    """The sum over the nodes of the multiplied conditions."""
+    return np.asarray(sum(a.T @ (values[:, None] * b) for values, (a, b) in zip(multipliers, families, strict=True)))
