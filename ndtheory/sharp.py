@@ -177,22 +177,18 @@ def friction_multiple(kappa_1: Any, kappa_2: Any) -> Any:
     return 2 / (kappa_2 + sqrt(kappa_2**2 + kappa_1**2))
 
 
-def friction_limit(rho: Any, kappa_1: Any, kappa_2: Any, margin: Any = 0) -> Any:
-    """The factor t by which friction may grow until no theta at all is proved; not below :func:`friction_multiple`.
-
-    q grows with kappa_1 and kappa_2, so some theta is proved below t and none above.  Scalars that round need a
-    ``margin``, as for :func:`contraction_interval`.
+def friction_limit(rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
+    """The factor t by which friction may grow until no theta at all is proved; never below :func:`friction_multiple`.
 
     Examples
     --------
-    >>> friction_multiple(0.0, 0.25), round(friction_limit(1.0, 0.0, 0.25, 1e-12), 3)
-    (4.0, 8.0)
+    >>> friction_multiple(0.0, 0.25), friction_limit(1.0, 0.0, 0.25), friction_limit(4.0, 1.0, 0.0)
+    (4.0, 8.0, 2.0)
     """
-    some = lambda t: contraction_interval(rho, t * kappa_1, t * kappa_2, margin) is not None
-    low = friction_multiple(kappa_1, kappa_2)
-    while some(2 * low):
-        low = 2 * low
-    return _last_where(some, low, 2 * low)
+    root = sqrt(rho)
+    if kappa_1 * (root - 1 / root) < 2 * kappa_2:
+        return (1 + 1 / rho) / (kappa_2 + kappa_1 / root)
+    return friction_multiple(kappa_1, kappa_2)
 
 
 def predicted_theta(rho: Any) -> Any:
@@ -376,7 +372,7 @@ def evaluate_sharp(constants: EnergyConstants, theta: Any = None) -> SharpBounds
             kappa_2=Number.of_float(kappa_2),
             ratio=Number.of_float(largest_ratio(*data)),
             friction_multiple=None if constants.frictionless else Number.of_float(friction_multiple(kappa_1, kappa_2)),
-            friction_limit_multiple=None if constants.frictionless else Number.of_float(_limit(data)),
+            friction_limit_multiple=None if constants.frictionless else Number.of_float(friction_limit(*data)),
             interval=None if interval is None else (float(interval[0]), float(interval[1])),
             theta_proved=None if best is None else float(best),
             factor_proved=None if best is None else Number.of_float(_factor(best, data)[0]),
@@ -388,12 +384,6 @@ def evaluate_sharp(constants: EnergyConstants, theta: Any = None) -> SharpBounds
             one_minus_factor=one_minus,
             verdict=verdict,
         )
-
-
-def _limit(data: tuple[Decimal, Decimal, Decimal]) -> Any:
-    """:func:`friction_limit` with digits for a double: towards it the ends of the interval meet as a root does."""
-    with working_precision(80):
-        return friction_limit(*data, Decimal("1e-60"))
 
 
 def _factor(theta: Decimal, data: tuple[Decimal, Decimal, Decimal]) -> tuple[Decimal, Decimal]:

@@ -40,6 +40,9 @@ from verification.trace_forms import TraceForms
 #: The friction threshold is searched until its bracket is this narrow, relatively.
 NARROW = 1e-2
 
+#: It is given up below this share of the threshold of the theorem in energy norms, which it should exceed.
+LEAST = 1e-2
+
 #: A value that rounding leaves undecided is moved to the safe side by these shares, from the least to 1.7 %.
 SHARES = tuple(1e-15 * 4.0**k for k in range(23))
 
@@ -294,10 +297,15 @@ def friction_threshold(pair: Pair, measured: Measured, start: float, *, nodewise
     """
 
     def spare(k: float) -> float:
-        return 1 - SemidefiniteEdition(pair, measured, friction=k, nodewise=nodewise).friction_number().value
+        try:
+            return 1 - SemidefiniteEdition(pair, measured, friction=k, nodewise=nodewise).friction_number().value
+        except LMIError:  # nothing is proved at this friction
+            return -1.0
 
     low, high, k = 0.0, float("inf"), start
     while high - low > NARROW * high or high == float("inf"):
+        if high < LEAST * start:
+            raise LMIError(f"no friction above {high:.1e} leaves multipliers that prove anything")
         left = spare(k)
         if left > 0:
             low = k

@@ -37,8 +37,8 @@ def positive_definite(matrix: Floats, error: Floats) -> bool:
     """Whether every symmetric matrix within an entrywise error of this one is positive definite.
 
     Where the floating-point Cholesky factorisation of ``A - c`` runs to its end, with ``c >= gamma_{n+1}/(1 -
-    gamma_{n+1}) tr A``, A is positive definite (Rump, Verification of positive definiteness, BIT 46, 2006).  False says
-    nothing.
+    gamma_{n+1}) tr A``, A is positive definite (Rump, Verification of positive definiteness, BIT 46, 2006).  Rows and
+    columns are scaled first, so that what is large does not hide what is small.  False says nothing.
 
     Parameters
     ----------
@@ -53,6 +53,11 @@ def positive_definite(matrix: Floats, error: Floats) -> bool:
     (True, False)
     """
     n = len(matrix)
+    diagonal = np.diag(matrix)
+    if not (np.isfinite(matrix).all() and (diagonal > 0).all()):
+        return False
+    scale = 2.0 ** -np.round(np.log2(diagonal) / 2)  # powers of two: rounding does not enter
+    matrix, error = matrix * np.outer(scale, scale), error * np.outer(scale, scale)
     of_cholesky = gamma(n + 2) / (1 - gamma(n + 2)) * float(np.abs(np.diag(matrix)).sum())
     shift = (norm_bound(error) + of_cholesky) * (1 + 4 * UNIT)
     try:

@@ -698,11 +698,9 @@ def test_the_written_form_holds_the_numbers_themselves(constants, theta):
 def test_each_reason_says_what_is_missing():
     reason = lambda theta=None, **given: evaluate_sharp(EnergyConstants(rho=1, **given), theta).reason
     none, outside = "no theta given", "theta outside the interval: no conclusion"
-    assert reason() == {
-        "friction_multiple": "no friction",
-        **dict.fromkeys(["theta", "factor", "one_minus_factor", "verdict"], none),
-    }
-    assert reason("1/2") == {"friction_multiple": "no friction"}
+    still = dict.fromkeys(["friction_multiple", "friction_limit_multiple"], "no friction")
+    assert reason() == {**still, **dict.fromkeys(["theta", "factor", "one_minus_factor", "verdict"], none)}
+    assert reason("1/2") == still
     assert reason("9/10", kappa_1="1/2") == dict.fromkeys(["factor", "one_minus_factor"], outside)
     assert reason("9/10", kappa_2=3) == {
         **dict.fromkeys(["interval", "theta_proved", "factor_proved", "theta_max_proved"], "q >= 1 for every theta"),
@@ -860,3 +858,33 @@ def test_no_mutated_formula_of_the_energy_norms_survives_the_comparison(monkeypa
 def test_the_comparison_knows_which_rho_is_at_work(monkeypatch, rule):
     monkeypatch.setattr(EnergyConstants, "at_work", property(rule))
     assert any(map(refuted, WITNESSES))
+
+
+# --- two thresholds on friction ---------------------------------------------------------------------------------------
+
+
+def least_square(rho: float, kappa_1: float, kappa_2: float) -> float:
+    """The least q^2 over theta, by looking: theta and x on grids, the definition of q^2 and nothing else."""
+    s = rho**0.5 + kappa_1
+    r = (s + (s * s + 4 * kappa_2) ** 0.5) / 2
+    xs, thetas = [r * i / 400 for i in range(401)], [i / 400 for i in range(1, 401)]
+    f = [kappa_2 + kappa_1 * x - x * x for x in xs]
+    square = lambda t: max((1 - t) ** 2 + 2 * t * (1 - t) * v + t * t * rho * x * x for v, x in zip(f, xs, strict=True))
+    return min(square(t) - 1 for t in thetas)
+
+
+@pytest.mark.parametrize("rho", ["1/20", "1/2", 1, 3])
+@pytest.mark.parametrize(("kappa_1", "kappa_2"), [(1, 0), (0, 1), (1, "1/3"), ("1/4", 2)])
+def test_below_the_limit_of_friction_some_theta_is_proved_and_above_it_none(rho, kappa_1, kappa_2):
+    found = evaluate_sharp(EnergyConstants(rho=rho, kappa_1=kappa_1, kappa_2=kappa_2))
+    every, some = found.friction_multiple.value, found.friction_limit_multiple.value
+    assert every <= some
+    rho, kappa_1, kappa_2 = (float(F(v)) for v in (rho, kappa_1, kappa_2))
+    assert least_square(rho, 0.99 * some * kappa_1, 0.99 * some * kappa_2) < 0
+    assert least_square(rho, 1.001 * some * kappa_1, 1.001 * some * kappa_2) >= 0
+
+
+def test_without_friction_nothing_limits_it():
+    found = evaluate_sharp(EnergyConstants(rho=2))
+    assert found.friction_limit_multiple is None
+    assert found.reason["friction_limit_multiple"] == "no friction"

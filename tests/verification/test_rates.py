@@ -1,0 +1,144 @@
+"""The observed rate and the largest step ratio: each step judged by the noise of its own states."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from fractions import Fraction
+from itertools import pairwise
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import verification as vf
+from verification.rates import CLEAR_OF_NOISE, largest_step_ratio, noise, observed_rate, rate_at_the_end
+from verification.runs import Run, run
+
+EPSILON = sys.float_info.epsilon
+
+#: A pair whose noise at a state is 4 eps |g|.
+PAIR = SimpleNamespace(
+    neumann=SimpleNamespace(dual_norm=lambda v: float(np.linalg.norm(v))),
+    contact=SimpleNamespace(stiffness=np.zeros((1, 1)), load=np.zeros(1)),
+)
+
+
+def states(residuals: list[float], noises: list[float], patterns: str = "") -> list[SimpleNamespace]:
+    """Made-up states with these residuals, noises and, letter by letter, contact patterns."""
+    of = lambda r, noise, pattern: SimpleNamespace(
+        residual=r,
+        g=np.array([noise / (4 * EPSILON)]),
+        displacement=np.zeros(1),
+        contact=SimpleNamespace(pattern=pattern),
+    )
+    return [of(*one) for one in zip(residuals, noises, patterns or "a" * len(residuals), strict=True)]
+
+
+def soft_contact_body(theta: str) -> Run:
+    """E1/E2 = 1e-4 with the Neumann problem on the soft body: the iteration runs away."""
+    problem = vf.load(_section6())
+    softer = replace(problem, body1=replace(problem.body1, young=Fraction(2)))
+    return run(softer, theta=theta)
+
+
+def _section6():
+    from importlib import resources
+
+    return resources.files("verification") / "data" / "section6.toml"
+
+
+@pytest.fixture(scope="module")
+def diverged() -> Run:
+    return soft_contact_body("0.5")
+
+
+def test_a_run_that_diverges_shows_its_growth_and_no_rate(diverged):
+    """By a factor of 65 in one step; the noise of its last state is larger than the residuals before that step."""
+    assert diverged.outcome == "diverged"
+    residuals = [s.residual for s in diverged.states]
+    grown = [b / a for a, b in pairwise(residuals)]
+    seen = largest_step_ratio(diverged.pair, diverged.states)
+    assert seen.value == pytest.approx(max(grown), rel=1e-12)
+    assert seen.lo > 60
+    assert CLEAR_OF_NOISE * noise(diverged.pair, diverged.last) > residuals[np.argmax(grown)]
+    assert diverged.observed_rate is None
+    assert diverged.observed_growth > 1
+    document = diverged.to_dict()
+    assert document["observed_rate"] is None
+    assert "growth" in document["reason"]["observed_rate"]
+    assert document["observed_growth"] == diverged.observed_growth
+
+
+def test_a_run_that_does_not_diverge_has_no_growth():
+    done = run(vf.load(_section6()))
+    assert (done.outcome, done.observed_growth) == ("converged", None)
+    assert "observed_growth" in done.to_dict()["reason"]
+
+
+def test_a_step_is_judged_by_the_noise_of_its_own_two_states():
+    """The noise of the last state does not reach the steps before it."""
+    some = states([1.0, 0.5, 50.0], [1e-15, 1e-14, 1e-2])
+    seen = largest_step_ratio(PAIR, some)
+    assert (seen.value, seen.steps) == (100.0, 2)
+    assert seen.lo == pytest.approx((50 - 1e-2) / (0.5 + 1e-14), rel=1e-12)
+    assert seen.hi == pytest.approx((50 + 1e-2) / (0.5 - 1e-14), rel=1e-12)
+
+
+def test_a_step_begins_clear_of_the_noise_and_may_end_below_it():
+    seen = largest_step_ratio(PAIR, states([1.0, 1e-3, 1e-5], [1e-4] * 3))
+    assert (seen.value, seen.steps) == (1e-3, 1)  # from 1e-3 the noise of 1e-4 hides where it leads
+    assert seen.lo == pytest.approx((1e-3 - 1e-4) / (1 + 1e-4), rel=1e-9)
+    assert seen.hi == pytest.approx((1e-3 + 1e-4) / (1 - 1e-4), rel=1e-9)
+    assert largest_step_ratio(PAIR, states([1.0, 0.5], [1.1 / CLEAR_OF_NOISE] * 2)) is None
+    below = largest_step_ratio(PAIR, states([1.0, 1e-6], [1e-4] * 2))
+    assert below.lo == 0.0
+
+
+def test_steps_far_above_the_noise_count_alone_where_there_are_any():
+    seen = largest_step_ratio(PAIR, states([1.0, 0.1, 0.09], [1e-10, 1e-4, 1e-4]))
+    assert (seen.value, seen.steps) == (0.1, 1)
+
+
+def test_a_start_at_the_solution_takes_no_step():
+    assert largest_step_ratio(PAIR, states([0.0], [1e-9])).steps == 0
+    assert largest_step_ratio(PAIR, []) is None
+
+
+def test_a_residual_that_overflows_ends_what_counts():
+    some = states([1.0, 3.0, float("inf"), float("nan")], [1e-15, 1e-15, float("inf"), float("nan")])
+    assert largest_step_ratio(PAIR, some).value == 3.0
+    assert observed_rate(PAIR, some) is None
+
+
+def test_two_step_ratios_are_the_least_that_show_a_rate():
+    assert observed_rate(PAIR, states([1.0, 0.5], [1e-15] * 2)) is None
+    found = observed_rate(PAIR, states([1.0, 0.5, 0.125], [1e-15] * 3))
+    assert found.value == pytest.approx(np.sqrt(0.125), rel=1e-12)
+    assert (found.begin, found.end) == (0, 2)
+    assert observed_rate(PAIR, states([1.0, 0.5, 1e-20], [1e-15] * 3)) is None  # the third is noise
+
+
+def test_the_rate_is_that_of_the_last_quarter_since_the_pattern_changed():
+    """Sixteen steps in the final pattern: the last four count, and the four before them for the interval."""
+    steps = [0.9] * 3 + [0.8] * 8 + [0.5] * 4 + [0.4] * 4
+    residuals = [float(r) for r in np.cumprod([1.0, *steps])]
+    found = observed_rate(PAIR, states(residuals, [1e-30] * 20, "aaa" + "b" * 17))
+    assert (found.begin, found.end) == (15, 19)
+    assert found.value == pytest.approx(0.4, rel=1e-12)
+    assert (found.lo, found.hi) == (pytest.approx(0.4, rel=1e-9), pytest.approx(0.5, rel=1e-9))
+
+
+def test_a_change_of_pattern_shortens_what_counts():
+    """From the last change on there are seven steps, of which the last two count."""
+    residuals = [float(r) for r in np.cumprod([1.0, *[0.9] * 12, *[0.5] * 7])]
+    assert observed_rate(PAIR, states(residuals, [1e-30] * 20, "a" * 12 + "b" * 8)).begin == 17
+    assert observed_rate(PAIR, states(residuals, [1e-30] * 20)).begin == 15
+
+
+def test_the_interval_holds_the_noise_of_both_ends():
+    """``(r_j +- noise_j) / (r_i -+ noise_i)``."""
+    found = rate_at_the_end([1.0, 0.5, 0.25], [0.01, 0.0, 0.02], 0)
+    assert found.value == pytest.approx(0.5)
+    assert found.lo == pytest.approx(np.sqrt(0.23 / 1.01), rel=1e-12)
+    assert found.hi == pytest.approx(np.sqrt(0.27 / 0.99), rel=1e-12)
