@@ -22,7 +22,8 @@ from ndtheory import REPAIRED, bounds, evaluate, sharp
 from verification.bodies import Pair
 from verification.contact.active_set import Pattern
 from verification.jacobian import Piece
-from verification.lmi import SemidefiniteEdition
+from verification.lmi import NARROW, SemidefiniteEdition, friction_threshold
+from verification.lmi_program import LMIError
 from verification.measured import Measured
 from verification.rates import largest_step_ratio
 from verification.search import largest_factor, worst_piece
@@ -496,3 +497,26 @@ def test_the_friction_number_bounds_the_work_of_every_piece_and_is_at_most_that_
     _, kappa_1, kappa_2 = (float(v) for v in energy(measured))
     assert worst_piece(pair, lambda piece: float(work(piece)), random=random).value <= c + 1e-9
     assert c <= sharp.friction_number(kappa_1, kappa_2) + 1e-9
+
+
+@pytest.mark.parametrize("seed", [2, 11, 23])
+def test_the_friction_threshold_lies_where_the_friction_number_reaches_1(seed):
+    """From below, within a share of NARROW; never below that of the theorem in energy norms where both are resolved."""
+    pair, measured, _, _ = case(seed)
+    start = measured.friction_threshold.value
+    found = friction_threshold(pair, measured, start)
+    number = lambda k: SemidefiniteEdition(pair, measured, friction=k).friction_number()
+    assert number(found).value < 1
+    assert number(found * (1 + 1.5 * NARROW)).evaluated >= 1
+    assert found >= start * (1 - NARROW)
+
+
+def test_where_no_friction_leaves_multipliers_that_prove_anything_no_threshold_is_named(monkeypatch):
+    pair, measured, _, _ = case(2)
+
+    def fail(self):
+        raise LMIError("made up")
+
+    monkeypatch.setattr(SemidefiniteEdition, "friction_number", fail)
+    with pytest.raises(LMIError, match="no friction above"):
+        friction_threshold(pair, measured, measured.friction_threshold.value)

@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from verification.contact import KKT, TOLERANCE, ContactError, ContactStep, certify
+from verification.contact.active_set import ActiveSet, Pattern
 
 CONDITIONS = ("equilibrium", "non_penetration", "compression", "complementarity", "bound", "slip")
 
@@ -159,6 +160,19 @@ def test_one_bar_opens_under_a_pull_and_passes_a_push_on(stiffness, q):
     found = ContactStep(np.array([[stiffness]]), np.array([True]), 0, "active-set").solve(np.array([q]), np.zeros(0))
     assert found.v[0] == pytest.approx(min(q / stiffness, 0), rel=1e-14)
     assert found.force[0] == pytest.approx(max(q, 0), rel=1e-14, abs=1e-15 * abs(q))
+
+
+@pytest.mark.parametrize("guess", [-1, 0, 1])
+@pytest.mark.parametrize(("pull", "slip"), [(0.5, 0.0), (-0.5, 0.0), (2.0, 1.0), (-2.0, -1.0)])
+def test_a_slip_of_the_wrong_sign_goes_to_stick_before_it_turns_round(guess, pull, slip):
+    """One node of stiffness 1 under a bound of 1: going straight to the opposite slip would cycle where it sticks."""
+    start = Pattern(touching=np.array([True]), sliding=np.array([guess], dtype=np.int8))
+    free = np.ones(2, dtype=bool)
+    found = ActiveSet(np.eye(2), free, 1).solve(np.array([pull, 3.0]), np.array([1.0]), start)
+    assert found is not None
+    v, force, pattern = found
+    assert (v[0], force[0]) == (slip, pull - slip)
+    assert pattern.sliding[0] == np.sign(slip)
 
 
 @given(random=seeds)
