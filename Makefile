@@ -9,6 +9,7 @@ PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check --con
 NEEDS  := pyproject.toml requirements.lock ndtheory/__init__.py
 
 .PHONY: demo test check lint docs nightly bench lock clean
+.NOTPARALLEL:  # one pip at a time; pytest and sphinx use the processors themselves
 
 demo: $(VENV)/.run
 	$(BIN)/ndtheory demo
@@ -16,7 +17,7 @@ demo: $(VENV)/.run
 test: $(VENV)/.test
 	$(BIN)/python -m pytest -n auto --dist worksteal
 
-check: lint test docs
+check: $(VENV)/.docs lint test docs
 
 lint: $(VENV)/.test
 	$(BIN)/ruff check .
@@ -24,7 +25,7 @@ lint: $(VENV)/.test
 	$(BIN)/mypy
 
 docs: $(VENV)/.docs
-	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
+	$(BIN)/python -m sphinx -W --keep-going -q -j auto -b html docs docs/_build/html
 	$(BIN)/python tests/docs/test_site.py docs/_build/html
 	@echo "the site: docs/_build/html/index.html"
 
@@ -47,13 +48,13 @@ $(VENV)/.run: $(VENV)/.venv $(NEEDS)
 	$(PIP) --editable .
 	touch $@
 
-$(VENV)/.test: $(VENV)/.run
+$(VENV)/.test: $(VENV)/.venv $(NEEDS)
 	$(PIP) --editable '.[test]'
-	touch $@
+	touch $(VENV)/.run $@
 
-$(VENV)/.docs: $(VENV)/.test
+$(VENV)/.docs: $(VENV)/.venv $(NEEDS)
 	$(PIP) --editable '.[test,docs]'
-	touch $@
+	touch $(VENV)/.run $(VENV)/.test $@
 
 clean:
 	rm -rf $(VENV) docs/_build .pytest_cache .mypy_cache .ruff_cache .hypothesis

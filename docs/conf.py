@@ -28,6 +28,8 @@ exclude_patterns = ["_build"]
 # Pages with code cells run at every build; a cell that fails fails the build.
 nb_execution_mode = "force"
 nb_execution_raise_on_error = True
+nb_execution_timeout = -1  # no limit: a cell takes 16 s of processor time, and a machine may be slow
+nb_merge_streams = True  # one block for what a cell prints, however the kernel has cut it
 myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
 
 bibtex_bibfiles = ["references.bib"]

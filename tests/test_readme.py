@@ -9,7 +9,8 @@ import pytest
 
 from verification.cli import main
 
-README = (Path(__file__).parents[1] / "README.md").read_text("utf-8")
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text("utf-8")
 
 
 def test_the_first_screen_is_the_output_of_demo(
@@ -33,6 +34,14 @@ def test_the_python_example_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     monkeypatch.chdir(tmp_path)
     Path("my.toml").write_text(examples()["section6"], "utf-8")
     exec(compile(code[1], "README.md", "exec"), {})
+
+
+def test_the_way_from_make_to_the_command_is_told_before_the_first_command_is_shown() -> None:
+    before = README.partition("\n    ndtheory ")[0]
+    assert "source .venv/bin/activate" in before
+    assert ".venv/bin/ndtheory " in before
+    assert "pip install ." in before
+    assert "VENV   := .venv\nBIN    := $(VENV)/bin\n" in (ROOT / "Makefile").read_text("utf-8")
 
 
 def test_every_command_shown_exists(capsys: pytest.CaptureFixture[str]) -> None:

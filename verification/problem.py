@@ -214,7 +214,7 @@ class Problem:
                 raise ProblemError(self.source, f"{name}.cells", list(cells), needed)
             return replace(body, cells=cells)
 
-        if not isinstance(halvings, int) or halvings < 0:
+        if not isinstance(halvings, int) or halvings < 0:  # type: ignore[redundant-expr]  # a caller need not be typed
             raise ValueError(f"{halvings} halvings: a whole number >= 0 is needed")
         return replace(self, body1=halved("body1", self.body1), body2=halved("body2", self.body2))
 

@@ -6,14 +6,12 @@ import os
 import re
 import shlex
 import signal
-import subprocess
-import sys
-import textwrap
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import pytest
+from processes import ended
 
 import ndtheory
 from ndtheory.statements import statements
@@ -126,9 +124,7 @@ def record(monkeypatch):
 
 def start(*arguments, code=CALL, environment=None, **streams):
     """The command in a fresh interpreter."""
-    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | streams
-    command = [sys.executable, "-c", textwrap.dedent(code), *arguments]
-    return subprocess.run(command, text=True, timeout=60, check=False, env=os.environ | (environment or {}), **streams)
+    return ended(code, *arguments, env=os.environ | (environment or {}), **streams)
 
 
 def leaning_on(id):

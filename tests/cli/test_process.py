@@ -2,12 +2,10 @@
 
 import json
 import os
-import subprocess
-import sys
-import textwrap
 
 import numpy as np
 import pytest
+from processes import PATIENCE, ended, running
 
 HEAVY = ["numpy", "scipy", "matplotlib", "cvxpy", "clarabel", "rich", "meshio", "jinja2", "sympy"]
 
@@ -17,9 +15,7 @@ BOUNDS = ["bounds", "--m", "3084", "--M", "153229", "--CR", "1.70", "--CK", "1e-
 
 def start(*arguments, code=CALL, **streams):
     """The command in a fresh interpreter."""
-    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | streams
-    command = [sys.executable, "-c", code, *map(str, arguments)]
-    return subprocess.run(command, text=True, timeout=60, check=False, **streams)
+    return ended(code, *arguments, **streams)
 
 
 def imported_by(code, *arguments):
@@ -74,7 +70,7 @@ def test_ctrl_c_ends_the_process_with_130_and_a_document(write, command):
         problems.progress = progress
         sys.exit(main())
     """
-    found = start(command, file, "--json", code=textwrap.dedent(code))
+    found = start(command, file, "--json", code=code)
     assert found.returncode == 130
     assert found.stderr == "interrupted after 5 evaluations of T: what was computed is kept\n"
     document = json.loads(found.stdout)
@@ -126,8 +122,7 @@ def test_a_full_disk_behind_stdout_is_told_in_one_line(write):
 def test_a_title_beyond_the_encoding_of_the_terminal_is_no_crash(write, arguments, encoding):
     file = write({"title": '"Kontakt \N{GREEK SMALL LETTER MU} \N{CJK UNIFIED IDEOGRAPH-63A5}"'})
     environment = os.environ | {"PYTHONIOENCODING": encoding}
-    command = [sys.executable, "-c", CALL, *(str(file) if a == "FILE" else a for a in arguments)]
-    found = subprocess.run(command, capture_output=True, env=environment, timeout=60, check=False)
+    found = start(*(file if a == "FILE" else a for a in arguments), env=environment, text=False)
     assert (found.returncode, found.stderr) == (0, b"")
     assert b"Kontakt" in found.stdout
 
@@ -157,10 +152,11 @@ def test_a_folder_that_was_removed_underneath_is_no_crash(write, tmp_path):
 
 
 def test_two_comparisons_at_once_in_one_folder_leave_whole_files(write, tmp_path):
-    command = [sys.executable, "-c", CALL, "compare", str(write()), "-o", str(tmp_path / "results")]
-    started = [subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) for _ in range(2)]
-    written = f"written: {tmp_path / 'results'}\n".encode()
-    assert [(process.communicate(timeout=60)[1], process.returncode) for process in started] == [(written, 0)] * 2
+    command = ["compare", write(), "-o", tmp_path / "results"]
+    with running(CALL, *command) as one, running(CALL, *command) as other:
+        said = [process.communicate(timeout=PATIENCE)[1] for process in (one, other)]
+    assert said == [f"written: {tmp_path / 'results'}\n"] * 2
+    assert (one.returncode, other.returncode) == (0, 0)
     assert json.loads((tmp_path / "results" / "compare.json").read_text("utf-8"))["run"]["converged"]
     assert (tmp_path / "results" / "report.html").read_text("utf-8").rstrip().endswith("</html>")
     assert len(list((tmp_path / "results").iterdir())) == 8

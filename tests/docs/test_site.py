@@ -3,6 +3,7 @@
 Run on a built site: ``python tests/docs/test_site.py docs/_build/html`` prints what it would fetch elsewhere, exit 1.
 """
 
+import ast
 import importlib
 import re
 import sys
@@ -118,6 +119,17 @@ def test_the_built_site_asks_no_other_host():
     if not (SITE / "index.html").exists():
         pytest.skip("the site is not built: run `make docs`")
     assert external_requests(SITE) == []
+
+
+def test_a_slow_machine_and_a_stream_in_pieces_build_the_same_site():
+    """No cell has a time limit (30 s by default), and what a cell prints is one block."""
+    settings = {
+        node.targets[0].id: ast.literal_eval(node.value)
+        for node in ast.parse((DOCS / "conf.py").read_text(encoding="utf-8")).body
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]).startswith("nb_")
+    }
+    assert settings["nb_execution_timeout"] == -1
+    assert settings["nb_merge_streams"]
 
 
 def code_names(page: str) -> list[str]:

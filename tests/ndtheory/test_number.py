@@ -2,7 +2,6 @@
 
 import dataclasses
 import json
-import subprocess
 import sys
 from decimal import Decimal
 from fractions import Fraction as F
@@ -13,6 +12,7 @@ import strategies
 from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp, mpf
+from processes import ended
 
 from ndtheory import Number, exact
 from ndtheory.number import decimal, sqrt, working_precision
@@ -169,19 +169,17 @@ def test_a_number_is_frozen():
 def test_the_theory_needs_the_standard_library_alone():
     """Isolated and without site-packages: a third-party import would fail, and none is hidden in a try."""
     program = f"import sys; sys.path.insert(0, {str(ROOT)!r}); import ndtheory; print(*sys.modules)"
-    loaded = subprocess.run(
-        [sys.executable, "-I", "-S", "-c", program], capture_output=True, text=True, check=True
-    ).stdout.split()
-    roots = {name.partition(".")[0] for name in loaded}
+    found = ended(program, flags=["-I", "-S"])
+    assert (found.returncode, found.stderr) == (0, "")
+    roots = {name.partition(".")[0] for name in found.stdout.split()}
     assert roots - sys.stdlib_module_names == {"ndtheory", "__main__"}
 
 
 def test_importing_the_theory_loads_no_third_party_module():
     """As installed, where third-party modules could be had."""
     program = "import sys; before = set(sys.modules); import ndtheory; print(*set(sys.modules) - before)"
-    loaded = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=ROOT
-    ).stdout.split()
-    roots = {name.partition(".")[0] for name in loaded}
+    found = ended(program, cwd=ROOT)
+    assert (found.returncode, found.stderr) == (0, "")
+    roots = {name.partition(".")[0] for name in found.stdout.split()}
     assert "ndtheory" in roots
     assert roots - sys.stdlib_module_names == {"ndtheory"}

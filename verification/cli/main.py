@@ -73,7 +73,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if sys.stdout is not None:
             sys.stdout.flush()
     except click.exceptions.NoArgsIsHelpError as error:
-        complain(error.ctx.get_help() if error.ctx else str(error))
+        complain(error.ctx.get_help())
         return BAD_INPUT
     except click.UsageError as error:
         where = error.ctx.command_path if error.ctx else "ndtheory"

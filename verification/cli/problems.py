@@ -223,11 +223,15 @@ def demo(folder: Path, as_json: bool) -> int:
     Example:
       ndtheory demo -o section6
     """
+    from verification.cli.shell import unreached
     from verification.output import Folder
     from verification.problem import load
 
     written = Folder(folder, "compare").write_problem(examples()["section6"])
-    return _compare(load(written), written, folder, "auto", as_json, False)
+    status = _compare(load(written), written, folder, "auto", as_json, False)
+    for line in [] if as_json else unreached():
+        complain(line)
+    return status
 
 
 def _compare(problem: Problem, file: Path, folder: Path | None, solver: Any, as_json: bool, swapped: bool) -> int:

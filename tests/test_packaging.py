@@ -1,0 +1,32 @@
+"""Which Pythons are promised, tried and run: the same in the classifiers, the workflow, the Makefile and the README."""
+
+import re
+import tomllib
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+PROMISED = re.findall(r"Python :: (3\.\d+)", " ".join(PROJECT["classifiers"]))
+
+
+def read(name: str) -> str:
+    return (ROOT / name).read_text("utf-8")
+
+
+def test_every_promised_python_runs_the_whole_suite_in_the_workflow():
+    workflow = read(".github/workflows/check.yml")
+    [matrix] = re.findall(r"python: \[(.*)\]", workflow)
+    assert re.findall(r'"(3\.\d+)"', matrix) == PROMISED
+    assert "run: bash .ci/run" in workflow
+    assert {"make check", ".venv/bin/python .ci/packages.py"} <= set(read(".ci/run").splitlines())
+    [check] = re.findall(r"(?m)^check: (.*)$", read("Makefile"))
+    assert {"lint", "test", "docs"} <= set(check.split())
+
+
+def test_the_least_promised_python_is_the_one_that_is_needed():
+    least = PROMISED[0]
+    assert sorted(PROMISED, key=lambda version: int(version.partition(".")[2])) == PROMISED
+    assert PROJECT["requires-python"] == f">={least}"
+    assert f"Python {least} or later" in read("README.md")
+    assert f"--python-version {least}" in read("Makefile")
+    assert f"sys.version_info < ({least.replace('.', ', ')})" in read("Makefile")
