@@ -20,6 +20,7 @@ from ndtheory.statements import statements
 from verification import ledger
 from verification.cli.tex import plain
 from verification.ledger import Evidence, rows
+from verification.ledger.evidence import settle
 
 STATEMENTS = statements()
 
@@ -522,6 +523,11 @@ def test_floating_point_proves_nothing(document):
             assert not exact
         if s["verdict"] in ("REPAIRED", "REFUTED"):
             assert any(e["holds"] is False and e["of"] != "repaired" for e in s["evidence"])
+
+
+def test_no_verdict_rests_on_units(whole):
+    for row in whole.ledger.rows:
+        assert settle([e for e in row.evidence if e.method != "dimension"]) == (row.verdict, row.method)
 
 
 def test_every_number_of_the_document_is_finite(document):
