@@ -629,6 +629,17 @@ def test_a_changed_row_is_written_all_the_same(call, record, tmp_path):
     assert json.loads((tmp_path / "ledger.json").read_text("utf-8"))["statements"][0]["recorded"] == "NUMERICAL"
 
 
+def test_the_calculator_says_of_the_printed_proof_what_is_recorded(call, monkeypatch):
+    small_m = ["bounds", "--m", "1/2", "--M", "2", "--CR", "1", "--CK", "1/100"]
+    assert f"whose verdict in the ledger is {rows.recorded()['5.30']}" in one_line(call(*small_m).out)
+    other = rows.recorded() | {"5.30": "NUMERICAL"}
+    monkeypatch.setattr("verification.ledger.record.recorded", lambda: other)
+    answer = call(*small_m)
+    assert "whose verdict in the ledger is NUMERICAL" in one_line(answer.out)
+    assert wide(answer) == []
+    assert "in the ledger" not in call("bounds", "--m", "2", "--M", "4", "--CR", "1", "--CK", "1/100").out
+
+
 # --- premises ---
 
 
