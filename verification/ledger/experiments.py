@@ -189,7 +189,10 @@ def _meshes(sweeps: Sweeps) -> list[Evidence]:
     ]
     alike = all(len(counts) == len(halvings) and max(counts) <= ALIKE * min(counts) for counts in steps)
     criterion = f"{found.data['criterion']}; the fewest steps differ by a factor of at most {ALIKE:g}"
-    return [replace(found, holds=found.holds if alike else False, data={**found.data, "criterion": criterion})]
+    nodes = ", ".join(f"{row['nodes']}" for row in next(iter(found.data["rows"].values())))
+    text = f"{found.text}; tried on matching grids of {nodes} nodes"
+    data = {**found.data, "criterion": criterion}
+    return [replace(found, holds=found.holds if alike else False, text=text, data=data)]
 
 
 def _frictions(sweeps: Sweeps) -> list[Evidence]:
