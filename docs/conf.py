@@ -3,10 +3,13 @@
 from importlib.metadata import distribution
 from pathlib import Path
 
+from docutils import nodes
 from sphinx.application import Sphinx
+from sphinx.errors import ExtensionError
+from sphinx.util.docutils import SphinxRole
 
 from ndtheory import __version__
-from verification.ledger import sheets, verify
+from verification.ledger import quote, sheets, verify
 
 project = "ndtheory"
 author = "The ndtheory maintainers"
@@ -61,13 +64,38 @@ mathjax3_config = {
 
 
 def write_ledger(app: Sphinx) -> None:
-    """The ledger and the errata sheet, from the checks themselves: run at every build, never typed."""
+    """The ledger and the errata sheet, from the checks themselves: run at every build, never typed.
+
+    Raises
+    ------
+    ExtensionError
+        A verdict differs from the recorded one, which the pages quote.
+    """
     folder = Path(app.srcdir) / "generated"
     folder.mkdir(exist_ok=True)
     found = verify()
+    if found.changed:
+        raise ExtensionError(f"verdicts to be recorded anew: {', '.join(row.statement.id for row in found.changed)}")
     for name, text in (("ledger", sheets.page(found)), ("errata", sheets.errata(found))):
         (folder / f"{name}.md").write_text(text, encoding="utf-8")
 
 
+class FromLedger(SphinxRole):
+    """A role that shows what the ledger says of a statement.
+
+    ``{verdict}`5.30` `` is its recorded verdict, with a link to the ledger; ``{ledger}`5.30 wrong` `` one of its texts.
+    An unknown statement, or a text that it has not, fails the build.
+    """
+
+    def run(self) -> tuple[list[nodes.Node], list[nodes.system_message]]:
+        try:
+            text = quote(*self.text.split()) if self.name == "ledger" else f"[{quote(self.text)}](/generated/ledger.md)"
+        except (TypeError, ValueError) as error:
+            raise ExtensionError(f"{self.env.docname}, line {self.lineno}: {self.rawtext}: {error}") from None
+        return self.inliner.parse(text, self.lineno, self.inliner, self.inliner.parent)
+
+
 def setup(app: Sphinx) -> None:
     app.connect("builder-inited", write_ledger)
+    for name in ("verdict", "ledger"):
+        app.add_role(name, FromLedger())

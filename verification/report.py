@@ -9,6 +9,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ndtheory import Number, __version__
 from verification.editions import bounded
+from verification.ledger.record import on_the_printed_proof
 from verification.verdicts import Comparison
 
 
@@ -45,5 +46,6 @@ def report(comparison: Comparison, figures: Mapping[str, str]) -> str:
         title="".join(c if c.isprintable() else " " for c in comparison.run.pair.problem.title),
         measured=comparison.measured,
         figures={name: _inline(name, text) for name, text in figures.items()},
+        on_the_printed_proof=on_the_printed_proof(),
         version=__version__,
     )

@@ -109,7 +109,7 @@ class Comparison(Document):
 
     @property
     def proved_violated(self) -> bool:
-        """Whether a proved claim failed: a bug, or an error in a proof.  A violated printed claim is a finding."""
+        """Whether a proved claim was violated: a bug, or an error in a proof.  A printed one violated is a finding."""
         return any(judgement.verdict == "VIOLATED" for name, judgement in self.verdicts.items() if name in PROVED)
 
     @property

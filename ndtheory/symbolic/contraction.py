@@ -10,7 +10,7 @@ import sympy as sp
 
 from ndtheory import bounds
 from ndtheory.symbolic.engine import Check, Goal, Relation, add, equal, less
-from ndtheory.symbolic.intervals import ADMISSIBLE, C0, G_, P_, Q_, a_, b_, of_36, printed_G, repaired_G
+from ndtheory.symbolic.intervals import ADMISSIBLE, C0, P_, Q_, a_, b_, of_36, of_edition, repaired_G, tilde_G, tilde_P
 from ndtheory.symbolic.symbols import (
     C_R,
     CONSTANTS,
@@ -75,28 +75,37 @@ check(
 )
 
 slope = sp.Symbol("a'", real=True)
+TILDE = (with_theta(SMALL_M), with_theta(LARGE_M))
 h2_of = lambda slope, theta: slope * theta**2 - (1 + slope) * theta + 1
 
 check(
     id="5.45",
-    text="h_2 = a' theta^2 + b' theta + 1 = a' (theta - 1)(theta - 1/a') with b' = -1 - a'.",
+    text="h_2 = a' theta^2 + b' theta + 1 = a' (theta - 1)(theta - 1/a') with b' = -1 - a', as printed with (5.35) for"
+    " C~_T.",
     goals=lambda form: [
-        equal(of_h2(P_), form[0] * theta**2 + form[1] * theta + 1),
+        equal(of_h2(form[0]).subs(of_edition), (form[1] * theta**2 + form[2] * theta + 1).subs(of_edition), *TILDE),
         equal(h2_of(slope, theta), slope * (theta - 1) * (theta - 1 / slope)),
-        equal(form[0], -form[1] - 1),
+        equal(form[1], -form[2] - 1),
     ],
-    forms={"repaired": (1 - 2 * P_, -2 + 2 * P_)},
-    mutants={"P for 2 P": (1 - P_, -2 + P_), "the sign of b'": (1 - 2 * P_, 2 - 2 * P_)},
-    units={"printed": Relation(1 - 2 * printed_P(m), "=", 1), "repaired": Relation(1 - 2 * P, "=", 1)},
+    forms={"printed": (tilde_P, 1 - 2 * tilde_P, -2 + 2 * tilde_P), "repaired": (P, 1 - 2 * P, -2 + 2 * P)},
+    mutants={
+        "P for 2 P": (tilde_P, 1 - tilde_P, -2 + tilde_P),
+        "the sign of b'": (tilde_P, 1 - 2 * tilde_P, 2 - 2 * tilde_P),
+    },
+    units={"repaired": Relation(1 - 2 * P, "=", 1)},
 )
 
 check(
     id="5.46",
-    text="a' = 1 - 2 P with P = G(C_K)/m^3.",
-    goals=lambda form: equal(1 - 2 * P_, form.subs(G_, P_ * m**3)),
-    forms={"repaired": 1 - 2 * G_ / m**3},
-    mutants={"the factor 2 dropped": 1 - G_ / m**3, "m^2 for m^3": 1 - 2 * G_ / m**2},
-    units={"printed": Relation(printed_G / m**3, "=", 1), "repaired": Relation(repaired_G / m**3, "=", 1)},
+    text="a' = 1 - 2 G(C_K)/m~^3 is the a' of (5.45), with (5.35) for C~_T and the G of (5.42).",
+    goals=lambda form: equal((1 - 2 * form[0]).subs(of_edition), form[1], *TILDE),
+    forms={"printed": (tilde_P, 1 - 2 * tilde_G / m_tilde**3), "repaired": (P, 1 - 2 * repaired_G / m**3)},
+    mutants={
+        "the factor 2 dropped": (tilde_P, 1 - tilde_G / m_tilde**3),
+        "m~^2 for m~^3": (tilde_P, 1 - 2 * tilde_G / m_tilde**2),
+        "the repaired G with the printed P": (tilde_P, 1 - 2 * repaired_G / m**3),
+    },
+    units={"repaired": Relation(repaired_G / m**3, "=", 1)},
 )
 
 any_theta = t_ / (1 + t_)
@@ -141,11 +150,11 @@ check(
 
 check(
     id="C6",
-    text="C_6 as it is computed is 1 + 1/a'; h_2 = 1 there.",
+    text="C_6 as it is computed, from whatever P the edition has, is 1 + 1/a'; h_2 = 1 there.",
     goals=lambda form: [equal(form, 1 + 1 / (1 - 2 * P_)), equal(h2_of(1 - 2 * P_, form), 1)],
-    forms={"repaired": bounds.C6(P_)},
+    forms={"printed": bounds.C6(P_)},
     mutants={"1 - 1/a'": 1 - 1 / (1 - 2 * P_), "P for 2 P": 1 + 1 / (1 - P_)},
-    units={"printed": Relation(1 - 2 * printed_P(m), "=", 1), "repaired": Relation(1 - 2 * P, "=", 1)},
+    units={"repaired": Relation(1 - 2 * P, "=", 1)},
 )
 
 # --- Proposition 5.6 and Theorem 5.9 --------------------------------------------------------------------------------
@@ -203,7 +212,8 @@ check(
 
 check(
     id="thm-5.9.2",
-    text="For any fixed 0 < theta <= 1, m d^2 <= (n_1 + (n_2 + n_3)/theta) C_R d: theta_min is not needed.",
+    text="For a fixed 0 < theta <= 1, m d^2 <= (n_1 + (n_2 + n_3)/theta) C_R d, at most (n_1 + n_2 + n_3)/theta C_R d;"
+    " theta_min is not needed.",
     goals=lambda form: at_most(form, (p + (q + r) / theta), {theta: 1 / (1 + o)}),
     forms={"repaired": (p + q + r) / theta},
     mutants={"without 1/theta": p + q + r},

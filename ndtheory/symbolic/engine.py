@@ -278,6 +278,8 @@ class Check:
         What was changed -> form that must be refuted.
     units : mapping
         'printed', 'repaired' -> relations whose units are compared.
+    one_case : bool
+        Whether only one case is computed, such as a bar: it may refute a form and cannot prove one.
     """
 
     id: str
@@ -286,6 +288,7 @@ class Check:
     forms: Mapping[Of, Any]
     mutants: Mapping[str, Any]
     units: Mapping[Of, Relation | Sequence[Relation]] = field(default_factory=dict)
+    one_case: bool = False
 
     def decide(self, form: Any) -> Decision:
         """Decide one form."""

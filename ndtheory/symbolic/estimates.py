@@ -148,16 +148,23 @@ check(
     states=lambda form: Relation(d1, "<=", form * d2),
 )
 
+z = Vector("z")  # a field that vanishes on Gamma_c: v and v + z extend the same trace
+
+
+def _stress(work: Any) -> Goal:
+    """a(w, .) - L(.) takes one value at every extension of a trace, where a(w, z) is ``work``."""
+    at = lambda extension: (a2(w2, extension) - L2(extension)).subs(a2(w2, z), work)
+    return equal(at(test + z), at(test))
+
+
 check(
     id="lemma-5.3",
-    text="Two solutions of (5.9), (5.10) exist with sigma_N of w2 defined through (5.6): a functional a(w, .) on traces"
-    " needs a(w, z) = L(z) for all z that vanish on Gamma_c; without it the value depends on the extension chosen.",
-    # one dimension, Gamma_c at 1: w = x(1-x) + x, extensions x and x^2 of the trace 1
-    goals=lambda form: equal(
-        *(sp.integrate(sp.diff(form, y) * sp.diff(extension, y), (y, 0, 1)) for extension in (y, y**2))
-    ),
-    forms={"step": y + y * (1 - y), "repaired": y},
-    mutants={"another field that is not in equilibrium": y**3},
+    text="sigma_N(w2) is the functional a(w2, .) - L(.) on traces.  It takes one value at all extensions of a trace, v"
+    " and v + z with z = 0 on Gamma_c, where a(w2, z) = L(z), as (5.6) has it; for any other w2 the value depends on"
+    " the extension.",
+    goals=_stress,
+    forms={"step": a2(w2, z), "repaired": L2(z)},
+    mutants={"the load with the other sign": -L2(z), "no load": sp.Integer(0)},
 )
 
 # --- Proposition 5.4 ------------------------------------------------------------------------------------------------
@@ -285,19 +292,16 @@ check(
 
 a1R = sp.Symbol("a_1R", real=True)  # a1(w1-w~1, R_D(w2-w~2))
 
+Tpsi = functional("T psi - T psi~")
+riesz = {a2(lift2(chi), v): Tpsi(v) for v in (w2, v2)}  # (5.20) for w2 and for w~2
+
 check(
     id="5.26",
-    text="The definition (5.20) of R2 with v = w2-w~2: a_2(R2 chi, v) = <chi, v>, checked for any S_2 of two unknowns.",
-    goals=lambda form: equal(*_riesz(form)),
-    forms={"printed": 1},
-    mutants={"the sign": -1, "a factor 2": 2},
+    text="The definition (5.20) of R2 for v = w2 and v = w~2, subtracted: a_2(R2 chi, w2-w~2) = <chi, w2-w~2>.",
+    goals=lambda form: equal(a2(lift2(chi), delta2).subs(riesz), form),
+    forms={"printed": Tpsi(delta2)},
+    mutants={"the sign": -Tpsi(delta2), "w2 for the difference": Tpsi(w2)},
 )
-
-
-def _riesz(factor: Any) -> tuple[Any, Any]:
-    S = sp.Matrix(2, 2, [p + 1 + q**2, q, q, 1 + r])  # symmetric, positive definite
-    force, v = sp.Matrix(sp.symbols("f_1 f_2", real=True)), sp.Matrix(sp.symbols("v_1 v_2", real=True))
-    return ((S.inv() * force).T * S * v)[0], factor * (force.T * v)[0]
 
 
 check(

@@ -337,10 +337,9 @@ check(
 
 check(
     id="x-open-shear",
-    text="The hat kernel of radius r gives S(sigma_N) = f/(2r) at the distance r/2 of a node pressed by f, whatever"
-    " the gap"
-    " there.",
-    goals=lambda form: less(0, sp.Max(0, 1 - form) / y),
-    forms={"repaired": sp.Rational(1, 2)},
-    mutants={"at the distance r": sp.Integer(1)},
+    text="The hat kernel of radius r gives S(sigma_N) = f (1 - t/r)/r at the distance t of a node pressed by f,"
+    " which is positive for every t < r, whatever the gap there.",
+    goals=lambda form: less(0, (1 - form) / y),
+    forms={"repaired": q / (1 + p + q)},
+    mutants={"at the distance r": sp.Integer(1), "beyond r": 1 + q},
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import Any
 
 import sympy as sp
 
@@ -44,15 +45,6 @@ CHECKS: list[Check] = []
 check = partial(add, CHECKS)
 
 # --- second step ----------------------------------------------------------------------------------------------------
-
-check(
-    id="5.34",
-    text="What min(m, 1) is there for, C_T^2/C_R^2 >= P, holds with m itself for the P that the proof supplies.",
-    goals=lambda form: at_most((A * X / m) ** 2 / C_R**2, form),
-    forms={"repaired": P},
-    mutants={"1/m more": P / m, "1/m^2 more": P / m**2},
-    units={"printed": Relation(m_tilde, "=", sp.Min(m, 1)), "repaired": Relation(m_tilde, "=", m)},
-)
 
 check(
     id="5.35",
@@ -182,7 +174,8 @@ check(
 
 check(
     id="a-b",
-    text="a >= 1 and b <= -2 say that P <= C_T^2/C_R^2; the printed P needs m~ <= 1.",
+    text="a >= 1 and b <= -2 say that P <= C_T^2/C_R^2: for the printed P with m~ <= 1, for the repaired one with any"
+    " m.",
     goals=lambda form: at_most(form[0], form[1], SMALL_M, LARGE_M),
     forms={
         "printed": ((bounds.lipschitz(m_tilde, M, C_R, x) / C_R) ** 2, printed_P(m_tilde)),
@@ -192,7 +185,7 @@ check(
         "C_R^2 for C_R": ((bounds.lipschitz(m, M, C_R, x) / C_R**2) ** 2, P),
         "m itself in the printed P": ((bounds.lipschitz(m, M, C_R, x) / C_R) ** 2, printed_P(m)),
     },
-    states=lambda form: Relation(form[1], "<=", form[0].subs(m_tilde, m)),
+    units={"repaired": Relation(P, "<=", (bounds.lipschitz(m, M, C_R, x) / C_R) ** 2)},
 )
 
 check(
@@ -206,16 +199,23 @@ check(
     mutants={"-b/(2a)": -b_ / (2 * a_), "2 for -b": 2 / a_},
 )
 
+#: C~_T^2/C_R^2 minus the printed friction term: a = 1 + 2 D + Q, b = -2 (1 + D).
+tilde_D = C_T_tilde**2 / C_R**2 - tilde_P
+
 check(
     id="C1",
-    text="C_1 as it is computed is -b/a, and it is positive.",
-    goals=lambda form: [equal(form, -b_ / a_), less(0, form, ADMISSIBLE)],
-    forms={"repaired": bounds.C1(Q_ * m**2 / A**2 - P_, Q_)},
-    mutants={"1 dropped below": 2 * (1 + Q_ * m**2 / A**2 - P_) / (2 * (Q_ * m**2 / A**2 - P_) + Q_)},
-    units={
-        "printed": Relation((A * X / m) ** 2 / C_R**2 - printed_P(m), "=", 1),
-        "repaired": Relation((A * X / m) ** 2 / C_R**2 - P, "=", 1),
+    text="C_1 as it is computed is -b/a with the a and b printed below (5.39), and it is positive, as b <= -2 and"
+    " a >= 1: D = C_T^2/C_R^2 - P >= 0.",
+    goals=lambda form: [
+        equal(form[0](tilde_D, tilde_Q), -printed_b / printed_a),
+        less(0, form[0](form[1], nonnegative("Q"))),
+    ],
+    forms={"printed": (bounds.C1, nonnegative("D"))},
+    mutants={
+        "1 dropped below": (lambda D, Q: 2 * (1 + D) / (2 * D + Q), nonnegative("D")),
+        "D below -1": (bounds.C1, -1 - nonnegative("D")),
     },
+    units={"repaired": Relation((A * X / m) ** 2 / C_R**2 - P, "=", 1)},
 )
 
 check(
@@ -226,24 +226,36 @@ check(
     mutants={"eight powers of M/m dropped": Q * m**8 / M**8, "M^2 more below": Q / M**2},
 )
 
-check(
-    id="5.41",
-    text="C_0 - C_1 reduced to one fraction.",
-    goals=lambda form: equal((C0 + b_ / a_).subs(Q_, Q), (form / ((A**2 + 2 * m**2) * a_)).subs(Q_, Q), CONSTANTS),
-    forms={"repaired": -2 * m**2 - 2 * A**2 + 2 * A**2 * P_},
-    mutants={
-        "C_R dropped": -2 * m**2 - 2 * A**2 + 2 * M**2 * P_,
-        "the sign of m^2": 2 * m**2 - 2 * A**2 + 2 * A**2 * P_,
-    },
-    units={
-        "printed": Relation(-2 * m**2 - 2 * A**2, "=", 2 * A**2 * printed_P(m)),
-        "repaired": Relation(-2 * m**2 - 2 * A**2, "=", 2 * A**2 * P),
-    },
-)
-
 # --- G and the thresholds -------------------------------------------------------------------------------------------
 
 printed_G, repaired_G = (bounds.G(x, m, M, C_R, u) for u in (sp.Integer(1), m))
+tilde_G = bounds.G(x, m_tilde, M, C_R, sp.Integer(1))
+
+
+def _one_fraction(form: Any) -> list[Goal]:
+    """C_0 - C_1 = numerator/((A^2 + 2 m^2) a), line by line: with P for the friction term, and with (5.35) inserted."""
+    bracket, sign, m_, a, b, P_of_a = form
+    numerator = lambda P: -2 * sign * m_**2 - 2 * A**2 + 2 * A**2 * P
+    return [
+        equal(bounds.C0(m_, M, C_R) + b / a, numerator(P_of_a) / ((A**2 + 2 * m_**2) * a)),
+        equal(numerator(P_of_a).subs(of_edition), numerator(bracket / m_**3), SMALL_M, LARGE_M),
+    ]
+
+
+as_printed = (m_tilde, printed_a, printed_b, tilde_P)
+
+check(
+    id="5.41",
+    text="C_0 - C_1 reduced to one fraction, as printed: with m~, (5.35) for C~_T and the bracket that is G/M^2.",
+    goals=_one_fraction,
+    forms={"printed": (tilde_G, 1, *as_printed), "repaired": (m**3 * P_, 1, m, a_, b_, P_)},
+    mutants={
+        "C_R dropped": (tilde_G / C_R**2, 1, *as_printed),
+        "the sign of m^2": (tilde_G, -1, *as_printed),
+        "1 dropped from the bracket": (tilde_G - M**2 * x, 1, *as_printed),
+    },
+    units={"repaired": Relation(-2 * m**2 - 2 * A**2, "=", 2 * A**2 * P)},
+)
 
 check(
     id="5.42",
@@ -304,4 +316,27 @@ for name, where, holds, value, changed in (
         forms={"repaired": value},
         mutants=changed,
         units={"printed": Relation(printed_G, "=", m**3), "repaired": Relation(repaired_G, "=", m**3)},
+    )
+
+#: Bodies with m = 1/100, M = 2 m, C_R = 1; C_K over m where the printed G is below a threshold and the friction term is
+#: not.
+SMALL_BODIES = {m: sp.Rational(1, 100), M: sp.Rational(1, 50), C_R: sp.Integer(1)}
+
+for name, value, share in (
+    ("C2", end_of_43 / m**3, sp.Rational(1, 4)),
+    ("C3", sp.Rational(1, 2), sp.Rational(1, 9)),
+    ("C4", sp.Integer(1), sp.Rational(1, 9)),
+    ("C5", (2 - C0) / (1 - C0) / 2, sp.Rational(1, 4)),
+):
+    at = {**SMALL_BODIES, x: share / 100}
+    check(
+        id=name,
+        text=f"At m = 1/100, M = 2 m, C_R = 1, C_K = m/{share.q} the printed G is below the threshold of {name}, and"
+        " the friction term P that the proof supplies above it.",
+        goals=lambda form, value=value, at=at: [
+            less(printed_P(m).subs(at), sp.sympify(value).subs(at)),
+            less(form.subs(at), sp.sympify(value).subs(at)),
+        ],
+        forms={"step": P},
+        mutants={"twice the friction term": 2 * P},
     )

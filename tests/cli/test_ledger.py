@@ -18,6 +18,7 @@ from ndtheory.statements import statements
 from verification import ledger
 from verification.cli.tex import plain
 from verification.ledger import Evidence, rows
+from verification.ledger.evidence import settle
 
 STATEMENTS = statements()
 
@@ -520,6 +521,11 @@ def test_floating_point_proves_nothing(document):
             assert any(e["holds"] is False and e["of"] != "repaired" for e in s["evidence"])
 
 
+def test_no_verdict_rests_on_units(whole):
+    for row in whole.ledger.rows:
+        assert settle([e for e in row.evidence if e.method != "dimension"]) == (row.verdict, row.method)
+
+
 def test_every_number_of_the_document_is_finite(document):
     numbers = list(plain_numbers(document))
     assert numbers
@@ -617,6 +623,17 @@ def test_a_changed_row_is_written_all_the_same(call, record, tmp_path):
     record({READ: "NUMERICAL"})
     assert call("verify", READ, "-o", tmp_path).status == 1
     assert json.loads((tmp_path / "ledger.json").read_text("utf-8"))["statements"][0]["recorded"] == "NUMERICAL"
+
+
+def test_the_calculator_says_of_the_printed_proof_what_is_recorded(call, monkeypatch):
+    small_m = ["bounds", "--m", "1/2", "--M", "2", "--CR", "1", "--CK", "1/100"]
+    assert f"whose verdict in the ledger is {rows.recorded()['5.30']}" in one_line(call(*small_m).out)
+    other = rows.recorded() | {"5.30": "NUMERICAL"}
+    monkeypatch.setattr("verification.ledger.record.recorded", lambda: other)
+    answer = call(*small_m)
+    assert "whose verdict in the ledger is NUMERICAL" in one_line(answer.out)
+    assert wide(answer) == []
+    assert "in the ledger" not in call("bounds", "--m", "2", "--M", "4", "--CR", "1", "--CK", "1/100").out
 
 
 # --- premises ---

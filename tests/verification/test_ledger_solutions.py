@@ -382,6 +382,44 @@ def test_readings_that_differ_decide_nothing():
     assert section_6._all_or_none([True, False]) is None
 
 
+def test_a_claim_on_bodies_that_are_not_known_in_full_is_never_refuted_by_readings_of_them():
+    assert section_6._particular([True, True]) is True
+    assert section_6._particular([True, False]) is None
+    assert section_6._particular([False, False]) is None
+
+
+def test_figure_5_holds_where_every_reading_shows_its_zones(monkeypatch, seen):
+    assert seen["fig-5"][0].holds is None
+    monkeypatch.setattr(section_6, "as_printed", lambda found, width: True)
+    (evidence,) = experiments(["fig-5"])["fig-5"]
+    assert evidence.holds is True
+
+
+def test_the_best_theta_holds_where_it_serves_every_reading(monkeypatch):
+    steps = {"iterations": 20, "iterations_at_0.6": 21}
+    told = {"geometry": "made", "neumann_body": 1, "E1": 7e4, "E2": 2e4, "best_theta": 0.65}
+    sweeps = Made({})
+    sweeps.row = lambda model: told | steps
+    assert section_6._optimum(sweeps)[0].holds is True
+    steps["iterations_at_0.6"] = 40
+    assert section_6._optimum(sweeps)[0].holds is None
+    steps["iterations_at_0.6"] = None
+    assert section_6._optimum(sweeps)[0].holds is None
+
+
+def test_figure_12_says_which_readings_were_tried_and_what_each_gave(seen):
+    (evidence,) = seen["fig-12"]
+    rows = evidence.data["rows"]
+    assert len(rows) == 4
+    for name, family in rows.items():
+        best = ", ".join(f"{row['best_theta']:g}" for row in family)
+        at = ", ".join(f"{row['iterations_at_0.6'] or 'none'}" for row in family)
+        assert f"{name}: best {best} (" in evidence.text
+        assert f"{name}: {at}" in evidence.text
+    assert "tried are 4 readings of the geometry and of the roles, with the top held and k = 0.2" in evidence.text
+    assert evidence.text.endswith(f"{family[0]['nodes']} nodes")
+
+
 def ends(residual_slow, residual_fast, steps_in_tpa):
     at = lambda steps, residual: Stopped(steps=steps, residual=residual, error=residual)
     return {

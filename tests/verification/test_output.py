@@ -11,6 +11,7 @@ import pytest
 
 import verification as vf
 from verification import figures
+from verification.ledger.record import on_the_printed_proof
 from verification.output import Folder
 from verification.report import report
 
@@ -261,6 +262,10 @@ def test_the_report_holds_its_figures_and_every_verdict_with_its_reason(comparis
     assert "Not claimed" in page.text
     for unit in ("MPa", "mm"):
         assert unit in page.text
+
+
+def test_the_report_says_of_the_printed_proof_what_is_recorded(written):
+    assert on_the_printed_proof() in read(written).text
 
 
 def test_every_name_in_the_report_is_given_once(written):

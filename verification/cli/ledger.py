@@ -31,9 +31,9 @@ if TYPE_CHECKING:
 def verify(ids: tuple[str, ...], level: Any, folder: Path | None, as_json: bool) -> int:
     """Check every numbered statement of the paper, or those named by ID.
 
-    Each gets a verdict that was earned: by exact arithmetic, by the units of both sides, on random problems, or as a
-    definition.  Exit status 1 if one differs from its recorded verdict.  -o writes the ledger as JSON and Markdown, and
-    of all statements the errata sheet.
+    Each gets a verdict that was earned: by exact arithmetic, on random problems, by reading, or as a definition; the
+    units of both sides are compared too.  Exit status 1 if one differs from its recorded verdict.  -o writes the ledger
+    as JSON and Markdown, and of all statements the errata sheet.
 
     \b
     Examples:

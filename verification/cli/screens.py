@@ -258,7 +258,7 @@ def plane(found: Plane, target: Path) -> None:
     if strongest is not None:
         say(f"  the largest friction with a run that converged: k = {strongest:g}")
     say()
-    say("Not claimed: that runs outside a region fail, or anything about the continuum.")
+    say("Not claimed: non-convergence outside a region, or anything on the continuum.")
     say(f"Next: open {quote(str(target))}")
 
 

@@ -1,4 +1,4 @@
-"""Problems to test a statement on: random ones with real loads, and the two bodies on which a printed bound fails."""
+"""Problems to test a statement on: random ones with real loads, and bodies on which a printed bound is false."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def _clamped_plate(thickness: str) -> Mapping[str, Any]:
     }
 
 
-#: Problems on which a bound fails as printed, as the problem file reads them.  Loads do not matter: a pair of forces
+#: Problems on which a bound is false as printed, as the problem file reads them.  Loads do not matter: a pair of forces
 #: in one piece of T is had for suitable loads.
 NAMED: Mapping[str, Mapping[str, Any]] = {
     **{f"plate of thickness {t} clamped at one end": _clamped_plate(t) for t in ("0.05", "0.02", "0.01")},

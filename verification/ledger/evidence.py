@@ -23,8 +23,8 @@ class Evidence:
     Attributes
     ----------
     method : {'symbolic', 'dimension', 'discrete', 'reading'}
-        Exact arithmetic over all admissible values; units on both sides; floating point on random problems; a
-        definition or a cited result.
+        Exact arithmetic over all admissible values, or an exact counterexample; units on both sides; floating point on
+        random problems; a definition, a cited result, a proof in words or one case computed exactly.
     of : {'printed', 'step', 'repaired'}
         What was checked: the statement as printed, the step by which the paper reaches it, or its repaired form.
     holds : bool or None
@@ -78,26 +78,30 @@ def settle(evidence: Sequence[Evidence]) -> tuple[Verdict, Method | None]:
     """The verdict on a statement, and the method that decided it.
 
     A printed form or a step that fails makes the statement REPAIRED where a repaired form is proved in exact
-    arithmetic or by reading, else REFUTED; equal units mend nothing.  What exact arithmetic leaves undecided stays
-    INCONCLUSIVE, and a repaired form that fails is a fault of ours.  Floating point proves nothing: at best a statement
-    is NUMERICAL.
+    arithmetic or by reading, else REFUTED.  Units decide nothing: in one fixed unit of stress numbers may be added, and
+    sides of one unit may still differ.  What exact arithmetic leaves undecided stays INCONCLUSIVE, and a repaired form
+    that fails is a fault of ours.  Floating point proves nothing: at best a statement is NUMERICAL.  Nor does it add
+    anything to a definition or to a theorem of others, which stay ASSUMED on however many problems they were seen.
 
     Examples
     --------
     >>> seen = Evidence(method="discrete", of="printed", holds=True, text="ratio <= 0.4 in 100 cases")
     >>> settle([seen])
     ('NUMERICAL', 'discrete')
+    >>> settle([seen, Evidence(method="reading", of="printed", holds=True, text="Definition.")])
+    ('ASSUMED', 'reading')
     """
     ordered = sorted(evidence, key=lambda e: METHODS.index(e.method))
     undecided = [e for e in ordered if e.holds is None]
     if any(e.method == "symbolic" for e in undecided) or any(e.holds is False for e in ordered if e.of == "repaired"):
         return "INCONCLUSIVE", ordered[0].method
-    broken = [e for e in ordered if e.holds is False]
+    broken = [e for e in ordered if e.holds is False and e.method != "dimension"]
     if broken:
         mended = any(e.holds and e.of == "repaired" and e.method in ("symbolic", "reading") for e in ordered)
         return ("REPAIRED" if mended else "REFUTED"), broken[0].method
-    stands = [e for e in ordered if e.holds and e.method != "dimension"]
-    if not stands or (undecided and stands[0].method != "symbolic"):
-        return "INCONCLUSIVE", undecided[0].method if undecided else None
-    verdicts: dict[Method, Verdict] = {"symbolic": "PROVED", "discrete": "NUMERICAL", "reading": "ASSUMED"}
-    return verdicts[stands[0].method], stands[0].method
+    differ = [e for e in ordered if e.holds is False]  # units alone
+    stands = {e.method for e in ordered if e.holds}
+    if differ or (undecided and "symbolic" not in stands):
+        return "INCONCLUSIVE", (*differ, *undecided)[0].method
+    verdicts: dict[Method, Verdict] = {"symbolic": "PROVED", "reading": "ASSUMED", "discrete": "NUMERICAL"}
+    return next(((verdict, method) for method, verdict in verdicts.items() if method in stands), ("INCONCLUSIVE", None))

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
-from importlib.resources import files
+from functools import partial
 from typing import Any, ClassVar
 
 from ndtheory.statements import Statement, statements
 from verification.document import Document
 from verification.ledger.evidence import METHODS, Evidence, Level, Method, Verdict, settle
+from verification.ledger.record import recorded
 
 #: A statement cannot be proved from one of these.
 NO_GROUND = ("REFUTED", "INCONCLUSIVE")
@@ -91,13 +90,6 @@ class Ledger(Document):
 
     def content(self) -> dict[str, Any]:
         return {"level": self.level, "counts": self.counts(), "statements": [row.to_dict() for row in self.rows]}
-
-
-@lru_cache(maxsize=1)
-def recorded() -> dict[str, str]:
-    """The recorded verdicts by id."""
-    text = files("verification").joinpath("data/verdicts.json").read_text("utf-8")
-    return dict(json.loads(text)["verdicts"])
 
 
 def verify(
@@ -180,7 +172,11 @@ def exact(ids: Collection[str], level: Level, watch: Callable[[float], None]) ->
         for of, form in check.forms.items():
             decision = check.decide(form)
             data = {"counterexample": dict(decision.counterexample)} if decision.counterexample else {}
-            entries.append(Evidence(method="symbolic", of=of, holds=decision.holds, text=check.text, data=data))
+            # one case refutes; where it does not, it shows no more than that case
+            shown = check.one_case and decision.holds
+            method: Method = "reading" if shown else "symbolic"
+            text = f"One case, computed exactly.  {check.text}" if shown else check.text
+            entries.append(Evidence(method=method, of=of, holds=decision.holds, text=text, data=data))
         for of, relations in check.units.items():
             differ = consistent(relations, DIMENSIONS)
             text = "both sides have one unit" if differ is None else f"units differ: {differ}"
@@ -196,7 +192,7 @@ def _read(statement: Statement, found: Sequence[Evidence]) -> list[Evidence]:
         [entry("repaired" if statement.fault else "printed", True, statement.reading)] if statement.reading else []
     )
     if statement.fault:
-        if all(e.holds is not False for e in found if e.of != "repaired"):
+        if all(e.holds is not False for e in found if e.of != "repaired" and e.method != "dimension"):
             entries.append(entry("step", False, statement.wrong))
         if statement.repair and not any(e.of == "repaired" and e.method == "symbolic" for e in found):
             entries.append(entry("repaired", True, statement.proof))

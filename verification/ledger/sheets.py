@@ -29,7 +29,7 @@ FAULTS = {
 
 WORDS = {
     "PROVED": "derived in exact arithmetic for all admissible values, from the rows it leans on",
-    "REPAIRED": "wrong or incomplete as printed; the repaired form is proved",
+    "REPAIRED": "wrong or incomplete as printed; the repaired form is proved, exactly or in words",
     "REFUTED": "wrong as printed, and no repaired form is known",
     "NUMERICAL": "holds in floating point on every problem that was tried",
     "ASSUMED": "a definition, a law of the model or a cited result",
@@ -110,11 +110,15 @@ def errata(ledger: Ledger) -> str:
         "# Errata",
         "",
         "G. Bayada, J. Sabil, T. Sassi, *Convergence of a Neumann-Dirichlet algorithm for two-body contact problems"
-        " with non local Coulomb's friction law*, ESAIM: M2AN 42 (2008) 243-262. The theorem stands, even with the"
-        " printed constants; what follows mends its statement and its proof. Each entry was decided by an exact"
-        " counterexample, by the units of both sides, on random problems or by reading; the proof of each repair stands"
-        " in the ledger.",
+        " with non local Coulomb's friction law*, ESAIM: M2AN 42 (2008) 243-262. What follows mends the statement of"
+        " the theorem and its proof. Each entry was decided by an exact counterexample, on random problems or by"
+        " reading; the proof of each repair stands in the ledger.",
         "",
+        *(
+            f"{s.title}: {s.claims} (`{s.id}`, {row.verdict} in the ledger.)\n"
+            for row in ledger.rows
+            if (s := row.statement).id == "x-printed-rescued"
+        ),
     ]
     for fault, heading in FAULTS.items():
         own = [row for row in faulty if row.statement.fault == fault and not row.statement.same_as]

@@ -30,7 +30,7 @@ STOP = 1e-9
 #: Beyond so many steps a theta is no candidate for the best one.
 MOST_STEPS = 150
 
-#: A run without a new least residual over so many steps does not arrive.
+#: A run without a new least residual over so many steps is given up.
 PATIENCE = 40
 
 #: theta moves in such steps; a best theta that moves by no more has not moved.

@@ -18,6 +18,7 @@ from verification.ledger.cases import NAMED, problem
 from verification.ledger.differences import Difference, Setting, draw_pairs
 from verification.ledger.evidence import Evidence, figure
 from verification.ledger.inequalities import ALLOWANCE, INEQUALITIES, LEVELS, SEED, SHARES, Inequality, Reading
+from verification.losses import top
 from verification.measured import Measured, measure
 from verification.pair import Body, Pair
 from verification.problem import Problem
@@ -86,6 +87,17 @@ class Trial:
     def M(self) -> list[float]:
         """M^a."""
         return [getattr(self.measured, body.name).M.value for body in self.bodies]
+
+    @property
+    def contrast(self) -> Floats:
+        """``M^a/m^a``."""
+        return np.array([M / m for M, m in zip(self.M, self.m, strict=True)])
+
+    @property
+    def between_traces(self) -> Floats:
+        """The constants from the norm of H^1/2(Gamma_c) squared of the other body into that of each body."""
+        one, other = self.E
+        return np.array([top(one, other), top(other, one)])
 
     def at_share(self, share: Fraction) -> Trial:
         """The same bodies at a share of the friction C_2 of the repaired edition."""
