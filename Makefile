@@ -9,7 +9,7 @@ PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check --con
 NEEDS  := pyproject.toml requirements.lock ndtheory/__init__.py
 
 .PHONY: demo test check lint docs nightly bench lock clean
-.NOTPARALLEL:  # one pip at a time; pytest and sphinx use the processors themselves
+.NOTPARALLEL:  # one pip at a time; pytest uses the processors itself
 
 demo: $(VENV)/.run
 	$(BIN)/ndtheory demo
@@ -25,7 +25,7 @@ lint: $(VENV)/.test
 	$(BIN)/mypy
 
 docs: $(VENV)/.docs
-	$(BIN)/python -m sphinx -W --keep-going -q -j auto -b html docs docs/_build/html
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
 	$(BIN)/python tests/docs/test_site.py docs/_build/html
 	@echo "the site: docs/_build/html/index.html"
 
