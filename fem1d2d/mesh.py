@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import io
+import re
+import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from fem1d2d import overlap
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -21,9 +25,15 @@ class MeshError(ValueError):
     """A mesh that cannot be used; the message says what was needed and what was received."""
 
 
+#: Coordinates are not larger than this: beyond, products of a few overflow a double.
+LARGEST = 1e30
+
+
 @dataclass(frozen=True, kw_only=True)
 class Mesh:
-    """A simplicial mesh in one or two dimensions.
+    """A simplicial mesh in one or two dimensions, whose cells meet in common facets and nowhere else.
+
+    It may have holes, and pieces that share single nodes or nothing.
 
     Parameters
     ----------
@@ -32,54 +42,146 @@ class Mesh:
     cells : int array, shape (c, d + 1)
         Vertices of each cell; positively oriented.
     sides : mapping from name to int array, shape (s, d)
-        Boundary facets of each named side: end points in 1D, edges in 2D.
+        Boundary facets of each named side: end points in 1D, edges in 2D, each listed once.
+
+    Attributes
+    ----------
+    boundary : int array, shape (b, d)
+        Facets that belong to one cell only; in 2D the body lies to the left of each.
 
     Raises
     ------
     MeshError
-        Indices of cells or sides out of range, a cell of zero or negative measure, a node that no cell uses.
+        Indices of cells or sides out of range, a cell of zero or negative measure, a node that no cell uses, cells
+        that lie on each other or touch without being joined, a side with a facet inside the body or listed twice.
     """
 
     points: NDArray[Any]
     cells: Ints
     sides: Mapping[str, Ints]
+    boundary: Ints = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        points, cells = np.array(self.points), np.array(self.cells, dtype=np.int64)
+        points = np.array(self.points)
         if points.ndim != 2 or points.shape[1] not in (1, 2):
             raise MeshError(f"points of shape {points.shape}: (n, 1) or (n, 2) is needed")
-        if cells.ndim != 2 or cells.shape[1] != points.shape[1] + 1 or len(cells) == 0:
+        if points.dtype.kind not in "iufO":
+            raise MeshError(f"points hold {points.dtype} values: numbers are needed")
+        if points.dtype != object:
+            points = points.astype(float)
+            if not np.isfinite(points).all():
+                raise MeshError("a coordinate is not finite")
+            if not (np.abs(points) <= LARGEST).all():
+                raise MeshError(f"a coordinate is {np.abs(points).max():g}: at most {LARGEST:g} is needed")
+        cells = _whole("cells", self.cells, points.shape[1] + 1)
+        if len(cells) == 0:
             raise MeshError(f"cells of shape {cells.shape}: (c, {points.shape[1] + 1}) with c >= 1 is needed")
-        sides = {name: np.array(facets, dtype=np.int64) for name, facets in self.sides.items()}
+        sides = {name: _whole(f"side {name!r}", facets, points.shape[1]) for name, facets in self.sides.items()}
         for what, named in (("cells", cells), *((f"side {name!r}", facets) for name, facets in sides.items())):
             outside = named[(named < 0) | (named >= len(points))]
             if len(outside):
                 raise MeshError(f"{what} name node {outside[0]}, the mesh has {len(points)} nodes")
-        if points.dtype != object and not np.isfinite(points).all():
-            raise MeshError("a coordinate is not finite")
-        if not (measures(points, cells) > 0).all():
-            raise MeshError(f"cell {int(np.argmin(measures(points, cells) > 0))} has no positive measure")
-        if len(np.unique(cells)) != len(points):
-            raise MeshError(f"{len(points) - len(np.unique(cells))} nodes belong to no cell")
-        for array in (points, cells, *sides.values()):
+        positive = measures(points, cells) > 0
+        if not positive.all():
+            raise MeshError(f"cell {int(np.argmin(positive))} has no positive measure")
+        loose = int((np.bincount(cells.ravel(), minlength=len(points)) == 0).sum())
+        if loose:
+            raise MeshError(f"{loose} nodes belong to no cell")
+        boundary = _boundary(points, cells)
+        why = overlap.fault(points, boundary) if points.shape[1] == 2 else _line_fault(points, cells)
+        if why:
+            raise MeshError(why)
+        on_boundary = _undirected(boundary, len(points))
+        for name, facets in sides.items():
+            named = _undirected(facets, len(points))
+            wrong = ~np.isin(named, on_boundary)
+            if wrong.any():
+                inside = _where(points, facets[int(np.argmax(wrong))])
+                raise MeshError(f"side {name!r} has a facet {inside}, which is none of the boundary")
+            _, first, count = np.unique(named, return_index=True, return_counts=True)
+            if (count > 1).any():
+                twice = _where(points, facets[first[np.argmax(count > 1)]])
+                raise MeshError(f"side {name!r} lists the facet {twice} {count.max()} times: once is needed")
+        for array in (points, cells, boundary, *sides.values()):
             array.setflags(write=False)
         object.__setattr__(self, "points", points)
         object.__setattr__(self, "cells", cells)
         object.__setattr__(self, "sides", MappingProxyType(sides))
+        object.__setattr__(self, "boundary", boundary)
 
     @property
     def dimension(self) -> int:
         """1 or 2."""
         return int(self.points.shape[1])
 
-    @property
-    def boundary(self) -> Ints:
-        """Facets that belong to one cell only, shape (b, d); in 2D the body lies to the left of each."""
-        corners = self.cells.shape[1]
-        opposite = [[(i + j) % corners for j in range(1, corners)] for i in range(corners)]
-        facets = np.concatenate([self.cells[:, facet] for facet in opposite])
-        _, first, count = np.unique(np.sort(facets, axis=1), axis=0, return_index=True, return_counts=True)
-        return np.asarray(facets[first[count == 1]], dtype=np.int64)
+
+def _whole(what: str, values: Any, columns: int) -> Ints:
+    """Node numbers, shape (n, columns)."""
+    array = np.array(values)
+    if array.shape == (0,):
+        array = array.reshape(0, columns)
+    if array.ndim != 2 or array.shape[1] != columns:
+        least = " with c >= 1" if what == "cells" else ""
+        raise MeshError(f"{what} of shape {array.shape}: ({what[0]}, {columns}){least} is needed")
+    if len(array) and array.dtype.kind not in "iu":
+        raise MeshError(f"{what} hold {array.dtype} numbers: whole ones are needed")
+    return array.astype(np.int64)
+
+
+def _where(points: NDArray[Any], facet: Ints) -> str:
+    """Where a facet lies, for a message."""
+    ends = [f"({', '.join(f'{float(c):.6g}' for c in points[node])})" for node in facet]
+    return f"at {ends[0]}" if len(ends) == 1 else f"from {ends[0]} to {ends[1]}"
+
+
+def _undirected(facets: Ints, nodes: int) -> Ints:
+    """One number for each facet, whatever its direction."""
+    return np.asarray(facets.min(axis=1) * nodes + facets.max(axis=1) if facets.shape[1] == 2 else facets[:, 0])
+
+
+def _boundary(points: NDArray[Any], cells: Ints) -> Ints:
+    """Facets that belong to one cell only, in order of their nodes.
+
+    Raises
+    ------
+    MeshError
+        Two cells on the same side of a facet.
+    """
+    n = len(points)
+    if points.shape[1] == 1:  # a node is the end of one cell and the beginning of another
+        facets = np.concatenate([cells[:, 1:], cells[:, :1]])
+        forwards = np.repeat([1, 0], len(cells))
+    else:
+        facets = np.concatenate([cells[:, [1, 2]], cells[:, [2, 0]], cells[:, [0, 1]]])
+        forwards = (facets[:, 0] < facets[:, 1]).astype(np.int64)
+    directed = np.sort(2 * _undirected(facets, n) + forwards)
+    if (directed[1:] == directed[:-1]).any():
+        _, inverse, count = np.unique(2 * _undirected(facets, n) + forwards, return_inverse=True, return_counts=True)
+        facet = int(np.argmax((count > 1)[inverse]))
+        one, other = np.flatnonzero(inverse == inverse[facet])[:2] % len(cells)
+        if set(cells[one].tolist()) == set(cells[other].tolist()):
+            raise MeshError(f"cells {one} and {other} have the same nodes: each cell is needed once")
+        raise MeshError(f"cells {one} and {other} lie on the same side of the facet {_where(points, facets[facet])}")
+    either = directed // 2
+    alone = np.ones(len(either), dtype=bool)
+    alone[1:] &= either[1:] != either[:-1]
+    alone[:-1] &= either[1:] != either[:-1]
+    either, forwards = either[alone], directed[alone] % 2
+    if points.shape[1] == 1:
+        return np.asarray(either[:, None])
+    low, high = either // n, either % n
+    return np.column_stack([np.where(forwards, low, high), np.where(forwards, high, low)])
+
+
+def _line_fault(points: NDArray[Any], cells: Ints) -> str | None:
+    """Why cells of a line lie on each other or are not joined, or None."""
+    order = np.argsort(points[cells[:, 0], 0], kind="stable")
+    ends, starts = cells[order[:-1], 1], cells[order[1:], 0]
+    wrong = (points[ends, 0] > points[starts, 0]) | ((points[ends, 0] == points[starts, 0]) & (ends != starts))
+    if not wrong.any():
+        return None
+    k = int(np.argmax(wrong))
+    return f"cells {order[k]} and {order[k + 1]} lie on each other or touch without a common node"
 
 
 def measures(points: NDArray[Any], cells: Ints) -> NDArray[Any]:
@@ -171,51 +273,128 @@ def rectangle(x: Sequence[Any], y: Sequence[Any], cells: tuple[int, int]) -> Mes
 def from_file(path: Path | str) -> Mesh:
     """A triangle mesh in any format meshio reads; its sides are the physical names of its lines.
 
+    A triangle that the file lists clockwise is turned over; points that no triangle uses and names without lines are
+    left out.
+
     Raises
     ------
     MeshError
-        Unreadable, no triangles or other cells too, not plane, no named lines, a side that no triangle touches.
+        Unreadable, no triangles or other cells too, not plane, no named lines, or no mesh as :class:`Mesh` needs it.
     """
     import meshio
 
     path = Path(path)
-    if not path.is_file():
-        raise MeshError(f"{path}: no such mesh file")
+    try:
+        if not path.is_file():
+            raise MeshError(f"{path}: no such mesh file")
+    except (OSError, ValueError) as error:
+        if isinstance(error, MeshError):
+            raise
+        raise MeshError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
     words = io.StringIO()  # its readers print, and exit the interpreter on what they cannot read
     try:
-        with contextlib.redirect_stdout(words), contextlib.redirect_stderr(words):
+        with contextlib.redirect_stdout(words), contextlib.redirect_stderr(words), warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # numpy's, about what does not parse
             read = meshio.read(path)
+            triangles, lines = read.cells_dict.get("triangle"), _named_lines(read)
     except (Exception, SystemExit) as error:
         why = " ".join(words.getvalue().split()) or f"{type(error).__name__}: {error}"
         raise MeshError(f"{path}: meshio cannot read it ({why})") from None
-    triangles = read.cells_dict.get("triangle")
-    if triangles is None or len(triangles) == 0:
-        raise MeshError(f"{path}: no triangles in it, only {', '.join(read.cells_dict) or 'nothing'}")
-    others = sorted(set(read.cells_dict) - {"triangle", "line", "vertex"})
-    if others:
-        raise MeshError(f"{path}: needed triangles alone, it has {', '.join(others)} too")
-    points = np.asarray(read.points, dtype=float)
-    if points.shape[1] == 3 and np.ptp(points[:, 2]) > 0:
-        raise MeshError(f"{path}: the points do not lie in a plane z = constant")
-    points = points[:, :2]
-    flipped = measures(points, triangles) < 0
-    triangles = np.where(flipped[:, None], triangles[:, ::-1], triangles)
+    try:
+        if triangles is None or len(triangles) == 0:
+            raise MeshError(f"no triangles in it, only {', '.join(read.cells_dict) or 'nothing'}")
+        others = sorted(set(read.cells_dict) - {"triangle", "line", "vertex"})
+        if others:
+            raise MeshError(f"needed triangles alone, it has {', '.join(others)} too")
+        if not lines:
+            raise MeshError("no named lines; give the sides physical names")
+        try:
+            least = _least_number(path)
+        except (IndexError, KeyError, ValueError):
+            raise MeshError("its elements do not fit its format") from None
+        if least < 1:
+            raise MeshError(f"an element names node {least}: nodes are numbered from 1")
+        return _plane_mesh(np.asarray(read.points, dtype=float), np.asarray(triangles, dtype=np.int64), lines)
+    except MeshError as error:
+        raise MeshError(f"{path}: {error}") from None
+
+
+def _named_lines(read: Any) -> dict[str, Ints]:
+    """The lines that a name of the file gathers; names without lines are left out."""
     lines: dict[str, Ints] = {}
     for name, blocks in read.cell_sets_dict.items():
         if "line" in blocks and not name.startswith("gmsh:"):
-            lines[name] = np.asarray(read.cells_dict["line"][blocks["line"]], dtype=np.int64)
-    if not lines and "gmsh:physical" in read.cell_data_dict:
-        tags = read.cell_data_dict["gmsh:physical"].get("line", np.empty(0))
+            lines[name] = read.cells_dict["line"][blocks["line"]]
+    if not lines and "gmsh:physical" in read.cell_data_dict and "line" in read.cells_dict:
+        tags = read.cell_data_dict["gmsh:physical"]["line"]
         for name, (tag, dimension) in read.field_data.items():
             if dimension == 1:
-                lines[name] = np.asarray(read.cells_dict["line"][tags == tag], dtype=np.int64)
-    if not lines:
-        raise MeshError(f"{path}: no named lines; give the sides physical names")
+                lines[name] = read.cells_dict["line"][tags == tag]
+    return {name: np.asarray(facets, dtype=np.int64) for name, facets in lines.items() if len(facets)}
+
+
+def _least_number(path: Path) -> int:
+    """The least node number of points, lines and triangles of a Gmsh file; meshio counts 0 and below from the end.
+
+    1 for other formats, other elements and the binary variants of version 4.
+    """
+    content = path.read_bytes()
+    start = re.search(rb"\$Elements\s*?\n", content)
+    if not content.startswith(b"$MeshFormat") or start is None:
+        return 1
+    version, binary = content.split(None, 3)[1:3]
+    corners, least, at = {15: 1, 1: 2, 2: 3}, 1, 0
+    if binary == b"1":
+        if not version.startswith(b"2"):
+            return 1
+        data = content[content.index(b"\n", start.end()) + 1 :]
+        numbers = np.frombuffer(data[: len(data) // 4 * 4], dtype=np.int32)
+        left = int(content[start.end() :].split(None, 1)[0])
+        while left > 0:
+            kind, count, tags = numbers[at : at + 3].tolist()
+            width = 1 + tags + corners[kind]
+            rows = numbers[at + 3 : at + 3 + count * width].reshape(count, width)
+            least = min(least, int(rows[:, 1 + tags :].min(initial=1)))
+            at, left = at + 3 + count * width, left - count
+        return least
+    numbers = np.array(content[start.end() :].partition(b"$EndElements")[0].split(), dtype=np.int64)
+    if version.startswith(b"2"):
+        listed = numbers[1:].tolist()
+        while at < len(listed):
+            nodes = at + 3 + listed[at + 2]
+            at = nodes + corners[listed[at + 1]]
+            least = min(least, *listed[nodes:at])
+        return least
+    at = 2 if version == b"4" else 4
+    while at < len(numbers):
+        width, count = 1 + corners[int(numbers[at + 2])], int(numbers[at + 3])
+        rows = numbers[at + 4 : at + 4 + count * width].reshape(count, width)
+        least, at = min(least, int(rows[:, 1:].min(initial=1))), at + 4 + count * width
+    return least
+
+
+def _plane_mesh(points: Floats, triangles: Ints, sides: Mapping[str, Ints]) -> Mesh:
+    """A mesh of the points in use, its triangles turned anticlockwise."""
+    for what, named in (("a triangle", triangles), *((f"side {name!r}", facets) for name, facets in sides.items())):
+        outside = named[(named < 0) | (named >= len(points))]
+        if len(outside):
+            raise MeshError(f"{what} names a node that the file does not have")
     used = np.unique(triangles)  # geometry points of the mesher belong to no triangle
     number = np.full(len(points), -1)
     number[used] = np.arange(len(used))
-    sides = {name: number[facets] for name, facets in lines.items()}
     for name, facets in sides.items():
-        if (facets < 0).any():
-            raise MeshError(f"{path}: side {name!r} has a node that no triangle uses")
-    return Mesh(points=points[used], cells=number[triangles], sides=sides)
+        if (number[facets] < 0).any():
+            raise MeshError(f"side {name!r} has a node that no triangle uses")
+    points = points[used]
+    if not np.isfinite(points).all():
+        raise MeshError("a coordinate is not finite")
+    if points.shape[1] == 3 and np.ptp(points[:, 2]) > 0:
+        raise MeshError("the points do not lie in a plane z = constant")
+    points, triangles = points[:, :2], number[triangles]
+    with np.errstate(over="ignore", invalid="ignore"):  # coordinates too large for their products are refused later
+        flipped = measures(points, triangles) < 0
+    return Mesh(
+        points=points,
+        cells=np.where(flipped[:, None], triangles[:, ::-1], triangles),
+        sides={name: number[facets] for name, facets in sides.items()},
+    )

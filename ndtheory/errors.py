@@ -7,6 +7,9 @@ from typing import Any
 
 from ndtheory.number import decimal
 
+#: Most characters of a value that a message repeats.
+LONGEST = 100
+
 
 class HypothesisError(ValueError):
     """A hypothesis of the theorem fails.
@@ -27,7 +30,9 @@ class HypothesisError(ValueError):
             shown = decimal(value)
         elif isinstance(value, int) and value.bit_length() > 1000:
             shown = f"an integer of {value.bit_length()} bits"
-        super().__init__(f"{key} = {shown}: needed {needed}")
+        text = "".join(c if c.isprintable() else " " for c in str(shown))  # one line, whatever was received
+        text = text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
+        super().__init__(f"{key} = {text}: needed {needed}")
         self.key = key
         self.value = value
         self.needed = needed

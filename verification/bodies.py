@@ -27,11 +27,14 @@ from fem1d2d.mesh import Floats, Ints
 from fem1d2d.trace import SAME, extent
 from verification.friction import friction_operator
 from verification.pair import Body, Facing, Name, Pair
-from verification.problem import BodySpec, Problem
-from verification.reader import ProblemError
+from verification.problem import MOST_CELLS, BodySpec, Problem
+from verification.reader import ProblemError, short, unreadable
 
 #: Interface matrices are dense; more contact nodes would fill the memory.
 MOST_NODES = 2000
+
+#: Largest size of a mesh file: that of some MOST_CELLS rectangles as text, several times over.
+MOST_BYTES = 200_000_000
 
 
 def build(problem: Problem) -> Pair:
@@ -55,12 +58,14 @@ def build(problem: Problem) -> Pair:
     for body in facing.elastic:
         k = body.motions.shape[1]
         if k:
+            neumann = problem.iteration.neumann_body == int(body.name[-1])
+            step = "the Neumann problem of step I" if neumann else "the contact problem of step II"
             raise ProblemError(
                 problem.source,
                 body.name,
                 None,
-                f"{body.name} can move rigidly ({k} free motion{'s' if k > 1 else ''}), so that its Neumann problem is"
-                " singular: fix or prescribe more of its sides",
+                f"{body.name} can move rigidly ({k} free motion{'s' if k > 1 else ''}), so that its stiffness matrix in"
+                f" {step} is singular: fix or prescribe more of its sides, or use `ndtheory solve`",
             )
     return Pair(**vars(facing))
 
@@ -98,10 +103,16 @@ def _specs(problem: Problem) -> list[tuple[Name, BodySpec]]:
 def _mesh(problem: Problem, name: Name) -> Mesh:
     spec: BodySpec = getattr(problem, name)
     if spec.mesh is not None:
+        refuse = lambda needed: ProblemError(problem.source, f"{name}.mesh", spec.mesh, needed)
+        why = unreadable(spec.mesh, MOST_BYTES)
+        if why:
+            raise refuse(why)
         try:
             mesh = from_file(spec.mesh)
         except MeshError as error:
-            raise ProblemError(problem.source, f"{name}.mesh", str(spec.mesh), str(error)) from None
+            raise refuse(str(error).removeprefix(f"{spec.mesh}: ")) from None
+        if len(mesh.cells) > 2 * MOST_CELLS:
+            raise refuse(f"needed at most {2 * MOST_CELLS} triangles, these are {len(mesh.cells)}")
         for key, sides in (("fixed", spec.fixed), ("prescribed", spec.prescribed), ("traction", spec.traction)):
             for side in sides:
                 if side not in mesh.sides:
@@ -109,7 +120,7 @@ def _mesh(problem: Problem, name: Name) -> Mesh:
                         problem.source,
                         f"{name}.{key}",
                         side,
-                        "unknown side; the mesh file names " + ", ".join(mesh.sides),
+                        "unknown side; the mesh file names " + short(", ".join(mesh.sides)),
                     )
         return mesh
     assert spec.x is not None

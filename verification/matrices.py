@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import math
+import struct
+import warnings
 import zipfile
+import zlib
+from collections.abc import Iterator
 from pathlib import Path
+from typing import IO, BinaryIO
 
 import numpy as np
 import scipy.sparse as sp
 
 from fem1d2d.mesh import Floats
-from verification.reader import ProblemError
+from verification.reader import ProblemError, unreadable
 from verification.threads import one_thread
 
 #: Matrices of more rows than this do not fit a dense eigenvalue problem.
@@ -19,36 +25,77 @@ MOST_ROWS = 4000
 ASYMMETRY = 1e-8
 
 
+#: Largest size of a matrix file: a full matrix of MOST_ROWS rows, with the two indices of each entry.
+MOST_BYTES = 24 * MOST_ROWS**2
+
+#: What numpy, scipy and zipfile raise on a file that is no matrix.
+UNREADABLE = (
+    ArithmeticError, AttributeError, EOFError, LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError,
+    struct.error, zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
+
+
 def read_matrix(path: Path) -> Floats:
     """A matrix from ``.npz`` (scipy.sparse.save_npz, or numpy.savez of one array) or ``.npy``.
+
+    Shapes are read first: a small file may unpack to more than the memory holds.
 
     Raises
     ------
     ProblemError
     """
     refuse = lambda needed: ProblemError(str(path), "", None, needed)
-    if path.is_dir() or not path.exists():
-        raise refuse("a matrix file (.npz or .npy) is needed, this is a folder" if path.is_dir() else "no such file")
+    why = unreadable(path, MOST_BYTES)
+    if why:
+        raise refuse(why if "folder" not in why else "a matrix file (.npz or .npy) is needed, this is a folder")
     try:
-        with path.open("rb") as file:
+        with warnings.catch_warnings(), path.open("rb") as file:
+            warnings.simplefilter("ignore")  # of numbers that do not fit their type: what comes out is checked
+            most = max(_rows(file), default=0)
+            if most > MOST_ROWS:
+                raise refuse(f"needed at most {MOST_ROWS} rows, received {most}")
+            file.seek(0)
             data = np.load(file, allow_pickle=False)
             if isinstance(data, np.ndarray):
                 return _real(data)
             if "format" in data.files and "shape" in data.files:
-                sparse = sp.load_npz(path)
-                if max(sparse.shape) > MOST_ROWS:
-                    raise refuse(f"needed at most {MOST_ROWS} rows, received {sparse.shape[0]}")
+                rows = int(np.max(data["shape"]))
+                if rows > MOST_ROWS:
+                    raise refuse(f"needed at most {MOST_ROWS} rows, received {rows}")
+                file.seek(0)
+                sparse = sp.load_npz(file)
                 if hasattr(sparse, "check_format"):
                     sparse.check_format(full_check=True)  # else indices that point outside are followed
                 return _real(sparse.toarray())
             if len(data.files) != 1:
                 raise refuse(f"needed one array, received {', '.join(data.files) or 'none'}")
             return _real(data[data.files[0]])
-    except (OSError, ValueError, TypeError, EOFError, KeyError, MemoryError, zipfile.BadZipFile) as error:
+    except UNREADABLE as error:
         if isinstance(error, ProblemError):
             raise
         why = f": {error}" if "needed real numbers" in str(error) else ""
         raise refuse(f"not a matrix that numpy or scipy saved{why}") from None
+
+
+def _rows(file: BinaryIO) -> Iterator[int]:
+    """For each array of a file how many rows a square matrix of as many entries has, from its header alone."""
+    if not zipfile.is_zipfile(file):
+        file.seek(0)
+        yield _square(file)
+        return
+    with zipfile.ZipFile(file) as archive:
+        for name in archive.namelist():
+            with archive.open(name) as member:
+                yield _square(member)
+
+
+def _square(stream: IO[bytes]) -> int:
+    version = np.lib.format.read_magic(stream)
+    read = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}[version]
+    shape, _, dtype = read(stream)
+    if dtype.itemsize > np.dtype(np.clongdouble).itemsize:
+        raise ValueError("needed real numbers")
+    return math.isqrt(math.prod(shape))
 
 
 def _real(matrix: np.ndarray) -> Floats:

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from verification.reader import ProblemError
+from verification.reader import ProblemError, unreadable
 
 if TYPE_CHECKING:
     from verification.ledger import Ledger
@@ -39,6 +39,10 @@ MARKS = {
 }
 
 
+#: No file of ours is larger: reading another one to tell whose it is must end.
+MOST_BYTES = 500_000_000
+
+
 def check_ours(target: Path) -> None:
     """Refuse to overwrite what is not ours.
 
@@ -46,7 +50,7 @@ def check_ours(target: Path) -> None:
     ------
     ProblemError
     """
-    if target.is_dir() or (target.exists() and MARKS[target.suffix] not in target.read_bytes()):
+    if target.exists() and (unreadable(target, MOST_BYTES) or MARKS[target.suffix] not in target.read_bytes()):
         raise ProblemError(str(target), "", None, "not written by this program; needed another folder or name (-o)")
 
 

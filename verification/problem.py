@@ -24,6 +24,7 @@ from verification.reader import (
     positive,
     several,
     text,
+    unreadable,
 )
 
 #: A displacement or a force by component; None leaves a displacement component free.
@@ -40,6 +41,12 @@ INTERVAL_SIDES = ("left", "right")
 
 #: Largest number of cells of a body; a typing error should not fill the memory.
 MOST_CELLS = 250_000
+
+#: Largest ratio of the two moduli: in doubles the softer body is lost beside the stiffer one beyond it.
+MOST_CONTRAST = Fraction(10**15)
+
+#: Largest size of a problem file.
+MOST_BYTES = 1_000_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -244,14 +251,13 @@ def load(path: Path | str) -> Problem:
     """
     path = Path(path)
     name = str(path)
+    why = unreadable(path, MOST_BYTES)
+    if why:
+        raise ProblemError(name, "", None, why)
     try:
         content = path.read_bytes()
-    except IsADirectoryError:
-        raise ProblemError(name, "", None, "a problem file is needed, this is a folder") from None
-    except FileNotFoundError:
-        raise ProblemError(name, "", None, "no such file") from None
-    except (OSError, ValueError) as error:
-        raise ProblemError(name, "", None, f"cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    except OSError as error:
+        raise ProblemError(name, "", None, f"cannot be read: {error.strerror}") from None
     if not content.strip():
         raise ProblemError(name, "", None, "the file is empty; `ndtheory example` prints one to start from")
     try:
@@ -275,6 +281,9 @@ def _read_problem(top: Table, source: str) -> Problem:
     body2 = _read_body(top.table("body2", required=True), dimension, source)
     if body1.rigid and body2.rigid:
         raise top.refuse("body2.shape", "rigid", "needed at least one elastic body")
+    if not (body1.rigid or body2.rigid or 1 / MOST_CONTRAST <= body1.young / body2.young <= MOST_CONTRAST):
+        needed = f"needed a modulus within {float(MOST_CONTRAST):g} times that of body1, {float(body1.young):g}"
+        raise top.refuse("body2.young", body2.young, f'{needed}; for `solve`, shape = "rigid" makes an obstacle')
     contact = _read_contact(top.table("contact"), dimension)
     iteration = _read_iteration(top.table("iteration"))
     norm = top.table("norm")

@@ -3,18 +3,30 @@
 from __future__ import annotations
 
 import difflib
+import stat
 from collections.abc import Callable, Iterable, Mapping
 from decimal import Decimal
 from fractions import Fraction
+from pathlib import Path
 from typing import Any, TypeVar
 
 from ndtheory import exact
+from ndtheory.number import decimal
 
 V = TypeVar("V")
 _MISSING: Any = object()
 
 #: Numbers of a problem file lie between these sizes or are 0; beyond them products of a few overflow a double.
 SMALLEST, LARGEST = Fraction(1, 10**30), Fraction(10**30)
+
+
+DIGITS = "0123456789"
+
+#: Most characters of a value that a message repeats.
+LONGEST = 60
+
+#: How a message writes an empty key.
+QUOTED = '""'
 
 
 class ProblemError(ValueError):
@@ -34,7 +46,7 @@ class ProblemError(ValueError):
 
     def __init__(self, file: str, key: str, value: Any, needed: str) -> None:
         received = "" if value is None else f" = {show(value)}"
-        message = ": ".join(part for part in (file, f"{key}{received}", needed) if part)
+        message = ": ".join(part for part in (file, f"{short(key)}{received}", short(needed, 400)) if part)
         super().__init__("".join(c if c.isprintable() else " " for c in message))  # one line, whatever was received
         self.file = file
         self.key = key
@@ -46,6 +58,35 @@ class Unfit(Exception):
     """A value that a reading function refuses; carries what is needed."""
 
 
+def short(text: str, most: int = 100) -> str:
+    """A text of at most so many characters, its end left out where it has more.
+
+    >>> short("a" * 200, 10)
+    'aaaaaaa...'
+    """
+    return text if len(text) <= most else text[: most - 3] + "..."
+
+
+def unreadable(path: Path, most: int) -> str | None:
+    """Why a path is no regular file of at most ``most`` bytes, or None where it is one.
+
+    Asked before a file is opened: a pipe or a device may have no end.
+    """
+    try:
+        found = path.stat()
+    except FileNotFoundError:
+        return "no such file"
+    except (OSError, ValueError) as error:
+        return f"cannot be read: {getattr(error, 'strerror', None) or error}"
+    if stat.S_ISDIR(found.st_mode):
+        return "a file is needed, this is a folder"
+    if not stat.S_ISREG(found.st_mode):
+        return "a regular file is needed, this is a pipe or a device"
+    if found.st_size > most:
+        return f"a file of at most {most / 1e6:g} MB is needed, this one has {found.st_size / 1e6:.0f}"
+    return None
+
+
 def show(value: Any) -> str:
     """A value on one short line, as a problem file writes it."""
     if isinstance(value, bool):
@@ -54,16 +95,20 @@ def show(value: Any) -> str:
         text = f"an integer of {value.bit_length()} bits"
     elif isinstance(value, str):
         text = repr(value).replace("'", '"')
+    elif isinstance(value, Fraction) and max(abs(value.numerator), value.denominator) > 10**17:
+        text = f"{decimal(value):.6g}"
     elif isinstance(value, (Decimal, Fraction)):
         text = str(value)
+    elif isinstance(value, Path):  # its end names the file
+        name = str(value)
+        return show(name if len(name) < LONGEST - 2 else "..." + name[5 - LONGEST :])
     elif isinstance(value, Mapping):
         text = "{" + ", ".join(f"{key} = {show(v)}" for key, v in value.items()) + "}"
     elif isinstance(value, (list, tuple)):
         text = "[" + ", ".join(map(show, value)) + "]"
     else:
         text = str(value)
-    text = " ".join(text.split())
-    return text if len(text) <= 60 else text[:57] + "..."
+    return short(" ".join(text.split()), LONGEST)
 
 
 def number(needed: str = "a number", holds: Callable[[Fraction], bool] = lambda v: True) -> Callable[[Any], Fraction]:
@@ -159,8 +204,8 @@ class Table:
         self._known: list[str] = []
 
     def key(self, name: str) -> str:
-        """Dotted path of a key in this table."""
-        return f"{self._path}.{name}" if self._path else name
+        """Dotted path of a key in this table, an empty one in quotes."""
+        return f"{self._path}.{name or QUOTED}" if self._path else name or QUOTED
 
     def refuse(self, name: str, value: Any, needed: str) -> ProblemError:
         """The error for a key of this table."""
@@ -213,7 +258,9 @@ class Table:
             Naming the unknown key and the nearest known one.
         """
         for name, value in self._data.items():
-            near = difflib.get_close_matches(str(name), self._known, n=1)
+            # body3 is no misspelling of body2: names that differ in their number alone are meant as they are
+            others = [known for known in self._known if known.rstrip(DIGITS) != str(name).rstrip(DIGITS)]
+            near = difflib.get_close_matches(short(str(name)), others, n=1)
             known = f"did you mean {near[0]!r}?" if near else "known here: " + ", ".join(self._known)
             what = "table" if isinstance(value, Mapping) else "key"
             raise self.refuse(str(name), None, f"unknown {what}; {known}")

@@ -1,13 +1,18 @@
 """Bad input: status 2, nothing on stdout, one line that names file, key, value received and what is needed."""
 
+import io
+import os
 import re
+import zipfile
 
 import meshio
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 from fem1d2d import rectangle
 from verification.cli.problems import examples
+from verification.matrices import read_matrix
 
 NUMBERS = {
     "body1.young": "a number > 0",
@@ -384,6 +389,161 @@ def test_an_output_folder_that_cannot_be_one_is_refused_before_anything_is_compu
     assert_names(call(*([command] if command == "demo" else [command, file]), "-o", folder).complaint, folder, "folder")
 
 
+@pytest.mark.parametrize(
+    ("neumann", "body2"), [(2, "the Neumann problem of step I"), (1, "the contact problem of step II")]
+)
+def test_a_body_that_can_move_is_named_with_the_problem_it_has(call, write, neumann, body2):
+    edits = {"body2.prescribed": '{ top = ["free", 0.0] }', "iteration.neumann_body": str(neumann)}
+    assert_names(call("run", write(edits)).complaint, "problem.toml: body2", "can move rigidly", body2, "is singular")
+
+
+def test_a_third_body_is_no_misspelling_of_the_second(call, write):
+    line = call("run", write({"body3.young": "1"})).complaint
+    assert_names(line, "problem.toml: body3", "unknown table", "known here: ", "body1, body2")
+    assert "did you mean" not in line
+
+
+@pytest.mark.parametrize(
+    ("key", "shown"), [('""', ': ""'), ('body1.""', 'body1.""'), ('contact.""', 'contact.""'), ('"".x', ': ""')]
+)
+def test_an_empty_key_is_shown_in_quotes(call, write, key, shown):
+    assert_names(call("run", write({key: "1"})).complaint, "problem.toml", shown, "unknown")
+
+
+LONG = "x" * 5000
+
+
+@pytest.mark.parametrize(
+    "edits",
+    [
+        {LONG: "1"},
+        {f"body1.{LONG}": "1"},
+        {f"{LONG}.x": "1"},
+        {"body1.fixed": f'["{LONG}"]'},
+        {"body2.prescribed": f"{{ {LONG} = [0, 0] }}"},
+        {"contact.law": f'"{LONG}"'},
+        {"iteration.theta": f'"0.{"3" * 5000}x"'},
+        {"body1.mesh": f'"{LONG}"', **dict.fromkeys(f"body1.{key}" for key in ("shape", "x", "y", "cells"))},
+    ],
+    ids=lambda edits: next(iter(edits))[:20],
+)
+def test_what_was_received_is_not_repeated_at_length(call, write, tmp_path, edits):
+    line = call("run", write(edits)).complaint
+    assert_names(line, "problem.toml: ")
+    assert len(line.replace(str(tmp_path), "")) < 700
+
+
+@pytest.mark.parametrize("value", ["0.5\nx", "0.5\x1b[2Jx", "9" * 5000, "0." + "3" * 5000 + "x"], ids=lambda v: v[:8])
+def test_a_theta_of_the_command_line_is_refused_on_one_short_line(call, write, value):
+    line = call("run", write(), "--theta", value).complaint
+    assert line.isprintable()
+    assert len(line) < 400
+    assert_names(line, "theta = ", "0 < theta < 1")
+
+
+@pytest.mark.parametrize("command", ["constants", "compare", "run", "advise"])
+def test_moduli_that_doubles_cannot_hold_side_by_side_are_refused(call, write, command):
+    line = call(command, write({"body1.young": "1e30", "body2.young": "1e-30"})).complaint
+    assert_names(
+        line,
+        "problem.toml",
+        "body2.young = ",
+        "1e-30",
+        "needed a modulus within 1e15 times that of body1, 1e30",
+        "rigid",
+    )
+
+
+# --- files without an end ---
+
+
+def endless(path, kind):
+    """A pipe nobody writes to, a device, or a file of 3 GB that takes no room."""
+    if kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "device":
+        path.symlink_to("/dev/zero")
+    else:
+        with path.open("wb") as file:
+            file.truncate(3 * 10**9)
+    return path
+
+
+ENDLESS = {"pipe": "this is a pipe or a device", "device": "this is a pipe or a device", "large": "this one has 3000"}
+
+
+@pytest.mark.parametrize(("kind", "says"), ENDLESS.items())
+@pytest.mark.parametrize("command", ["run", "compare", "constants", "solve", "advise"])
+def test_a_problem_file_without_an_end_is_refused_unread(call, tmp_path, command, kind, says):
+    assert_names(call(command, endless(tmp_path / "problem.toml", kind)).complaint, "problem.toml", says)
+
+
+@pytest.mark.parametrize(("kind", "says"), ENDLESS.items())
+def test_a_mesh_file_without_an_end_is_refused_unread(call, write, tmp_path, kind, says):
+    endless(tmp_path / "body1.msh", kind)
+    assert_names(call("run", write(MESHED)).complaint, "problem.toml", "body1.mesh", "body1.msh", says)
+
+
+@pytest.mark.parametrize(("kind", "says"), ENDLESS.items())
+def test_a_matrix_without_an_end_is_refused_unread(call, tmp_path, kind, says):
+    bad = endless(tmp_path / "bad.npz", kind)
+    np.save(tmp_path / "good.npy", np.eye(2))
+    assert_names(call("advise", "--S1", bad, "--S2", tmp_path / "good.npy").complaint, "bad.npz", says)
+
+
+@pytest.mark.parametrize("kind", ["pipe", "device"])
+@pytest.mark.parametrize(
+    ("command", "name"), [("run", "run.json"), ("compare", "report.html"), ("solve", "bodies.svg")]
+)
+def test_a_result_without_an_end_is_somebody_elses(call, write, tmp_path, kind, command, name):
+    (tmp_path / "results").mkdir()
+    endless(tmp_path / "results" / name, kind)
+    line = call(command, write(), "-o", tmp_path / "results").complaint
+    assert_names(line, name, "not written by this program")
+
+
+def packed(path, **headers):
+    """An archive of arrays whose headers promise more than their data hold."""
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, (shape, kind) in headers.items():
+            head = io.BytesIO()
+            np.lib.format.write_array_header_1_0(head, {"shape": shape, "fortran_order": False, "descr": kind})
+            archive.writestr(f"{name}.npy", head.getvalue() + bytes(10_000_000))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("headers", "says"),
+    [
+        ({"S": ((100_000, 100_000), "<f8")}, "needed at most 4000 rows, received 100000"),
+        ({"S": ((10**12,), "<f8")}, "needed at most 4000 rows, received 1000000"),
+        ({"S": ((3,), "<U300000000")}, "not a matrix"),
+        ({"format": ((), "|S3"), "shape": ((2,), "<i8"), "data": ((10**11,), "<f8")}, "needed at most 4000 rows"),
+    ],
+)
+def test_a_matrix_that_would_fill_the_memory_is_refused_by_its_header(call, tmp_path, headers, says):
+    bomb = packed(tmp_path / "bomb.npz", **headers)
+    assert bomb.stat().st_size < 100_000
+    assert_names(call("advise", "--S1", bomb, "--S2", bomb).complaint, "bomb.npz", says)
+
+
+@pytest.mark.parametrize("blocks", [((0, 0), (0, 0, 0)), ((2, 2), (1, 0, 0)), ((2, 2), (1, 0, 2))])
+def test_a_matrix_of_empty_blocks_is_refused(call, tmp_path, blocks):
+    shape, data = blocks
+    np.savez(
+        tmp_path / "S.npz", format=np.array(b"bsr"), shape=np.array(shape), data=np.zeros(data),
+        indices=np.zeros(len(np.zeros(data)), dtype=int), indptr=np.array([0, len(np.zeros(data))]),
+    )  # fmt: skip
+    assert_names(call("advise", "--S1", tmp_path / "S.npz", "--S2", tmp_path / "S.npz").complaint, "S.npz", "not a matrix")
+
+
+@pytest.mark.parametrize("kind", ["csr", "csc", "coo", "dia", "bsr"])
+def test_a_sparse_matrix_of_every_kind_is_read(tmp_path, kind):
+    full = np.diag([2.0, 3.0, 4.0, 5.0]) + np.eye(4, k=1) + np.eye(4, k=-1)
+    sp.save_npz(tmp_path / "S.npz", sp.coo_array(full).asformat(kind))
+    assert np.array_equal(read_matrix(tmp_path / "S.npz"), full)
+
+
 # --- numbers that a file may hold and arithmetic may not ---
 
 
@@ -437,21 +597,24 @@ def test_a_hexadecimal_number_of_5000_digits_is_refused(call, write, key):
 # --- mesh files ---
 
 
-def mesh_file(path, x=(0.0, 2.0), y=(-0.3, 0.0), cells=(10, 2), names=("left", "right", "bottom", "top"), lift=None):
-    """The built-in rectangle as a Gmsh file; ``lift`` moves its upper side."""
+def mesh_file(
+    path, x=(0.0, 2.0), y=(-0.3, 0.0), cells=(10, 2), names=("left", "right", "bottom", "top"), lift=None, twice=False
+):
+    """The built-in rectangle as a Gmsh file; ``lift`` moves its upper side, ``twice`` doubles its cells."""
     mesh = rectangle(x, y, cells)
+    listed = np.tile(mesh.cells, (2 if twice else 1, 1))
     points = np.column_stack([mesh.points, np.zeros(len(mesh.points))])
     if lift is not None:
         upper = points[:, 1] == y[1]
         points[upper, 1] += lift(points[upper, 0])
     sides = ("left", "right", "bottom", "top")
     tags = np.concatenate([np.full(len(mesh.sides[side]), i) for i, side in enumerate(sides, 1)])
-    inside = np.full(len(mesh.cells), 9)
+    inside = np.full(len(listed), 9)
     meshio.write(
         path,
         meshio.Mesh(
             points,
-            [("line", np.concatenate([mesh.sides[side] for side in sides])), ("triangle", np.array(mesh.cells))],
+            [("line", np.concatenate([mesh.sides[side] for side in sides])), ("triangle", listed)],
             cell_data={"gmsh:physical": [tags, inside], "gmsh:geometrical": [tags, inside]},
             field_data={name: np.array([i, 1]) for i, name in enumerate(names, 1)},
         ),
@@ -508,6 +671,37 @@ def test_a_mesh_file_cannot_be_halved_and_that_is_said_before_anything_is_measur
     monkeypatch.setattr("verification.measured._measure", None)
     line = call("constants", write(MESHED), "--refine", "1").complaint
     assert_names(line, "problem.toml", "body1.mesh", "body1.msh", "halved")
+
+
+@pytest.mark.parametrize(
+    ("fault", "says"),
+    [
+        (lambda lines: [*lines, lines[0]], "listed twice|2 times"),
+        (lambda lines: [*lines, [*lines[0][:-1], "12"]], "none of the boundary"),
+        (lambda lines: [*lines, lines[-1]], "have the same nodes"),
+    ],
+    ids=["a line twice", "a line inside", "a cell twice"],
+)
+@pytest.mark.parametrize("command", ["run", "compare", "constants", "solve"])
+def test_a_malformed_mesh_is_refused_by_its_fault(call, write, tmp_path, command, fault, says):
+    mesh_file(tmp_path / "body1.msh")
+    head, _, rest = (tmp_path / "body1.msh").read_text().partition("$Elements\n")
+    _count, *lines = rest.partition("\n$EndElements")[0].splitlines()
+    lines = fault([line.split() for line in lines])
+    listed = "\n".join(" ".join([str(i), *line[1:]]) for i, line in enumerate(lines, 1))
+    (tmp_path / "body1.msh").write_text(f"{head}$Elements\n{len(lines)}\n{listed}\n$EndElements\n")
+    line = call(command, write(MESHED)).complaint
+    assert_names(line, "problem.toml: body1.mesh", "body1.msh")
+    assert re.search(says, line)
+    assert "matching" not in line
+
+
+def test_a_mesh_with_every_cell_twice_is_refused_as_that(call, write, tmp_path):
+    """Not for its grid on Gamma_c: no edge would be left on the boundary."""
+    mesh_file(tmp_path / "body1.msh", twice=True)
+    line = call("run", write(MESHED)).complaint
+    assert_names(line, "body1.mesh", "have the same nodes: each cell is needed once")
+    assert "matching" not in line
 
 
 @pytest.mark.parametrize("command", ["run", "compare", "constants", "solve"])

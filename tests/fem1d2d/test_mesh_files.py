@@ -307,3 +307,100 @@ def test_a_body_partly_of_quadrangles_is_refused_and_not_cut_down_to_its_triangl
     more = [("quad", np.array([[1, 4, 5, 2]]))]
     path = write(tmp_path / "body.msh", points, TRIANGLES, {"bottom": [[0, 1]]}, more=more)
     refused(path, "needed triangles alone, it has quad too")
+
+
+# --- files whose numbers do not fit together ---
+
+#: Nodes 1 to 4 of a unit square, one line of the side "bottom", two triangles; numbers count from 1.
+MSH = """$MeshFormat
+2.2 0 8
+$EndMeshFormat
+$PhysicalNames
+2
+1 1 "bottom"
+2 9 "body"
+$EndPhysicalNames
+$Nodes
+4
+1 0 0 0
+2 1 0 0
+3 1 1 0
+4 0 1 0
+$EndNodes
+$Elements
+{count}
+{elements}
+$EndElements
+"""
+LINE, CELLS = "1 2 1 1 1 2", ["2 2 9 1 1 2 3", "2 2 9 1 1 3 4"]
+
+
+def written(path, *elements):
+    numbered = "\n".join(f"{i} {element}" for i, element in enumerate(elements, 1))
+    path.write_text(MSH.format(count=len(elements), elements=numbered))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("elements", "message"),
+    [
+        ([LINE, LINE, *CELLS], r"side 'bottom' lists the facet from \(0, 0\) to \(1, 0\) 2 times: once is needed"),
+        ([LINE, "1 2 1 1 2 1", *CELLS], "2 times"),
+        (
+            ["1 2 1 1 1 3", *CELLS],
+            r"side 'bottom' has a facet from \(0, 0\) to \(1, 1\), which is none of the boundary",
+        ),
+        (["1 2 1 1 2 4", *CELLS], "none of the boundary"),
+        ([LINE, *CELLS, *CELLS], "cells 0 and 2 have the same nodes: each cell is needed once"),
+        ([LINE, *CELLS, "2 2 9 1 3 2 1"], "cells 0 and 2 have the same nodes"),
+        ([LINE, *CELLS, "2 2 9 1 1 2 4"], r"cells \d and 2 lie on the same side of the facet"),
+        ([LINE, *CELLS, "2 2 9 1 2 3 4"], r"cells \d and 2 lie on the same side of the facet"),
+        ([LINE, "2 2 9 1 1 2 0", *CELLS], "an element names node 0: nodes are numbered from 1"),
+        ([LINE, "2 2 9 1 1 2 -1", *CELLS], "an element names node -1: nodes are numbered from 1"),
+        ([LINE, "2 2 9 1 1 2 7", *CELLS], "meshio cannot read it"),
+        (["1 2 1 1 1 0", *CELLS], "an element names node 0: nodes are numbered from 1"),
+        (CELLS, "no named lines; give the sides physical names"),
+    ],
+)
+def test_a_file_whose_cells_or_sides_do_not_fit_together_is_refused(tmp_path, elements, message):
+    refused(written(tmp_path / "body.msh", *elements), message)
+
+
+@pytest.mark.parametrize("turned", [[0], [1], [0, 1]])
+def test_triangles_listed_clockwise_are_turned_over(tmp_path, turned):
+    backwards = lambda cell: " ".join(cell.split()[:4] + cell.split()[:3:-1])
+    cells = [backwards(cell) if i in turned else cell for i, cell in enumerate(CELLS)]
+    found = from_file(written(tmp_path / "body.msh", LINE, *cells))
+    assert measures(found.points, found.cells).tolist() == [0.5, 0.5]
+    assert len(found.boundary) == 4
+
+
+@pytest.mark.parametrize("binary", [False, True])
+@pytest.mark.parametrize(("where", "node"), [("triangles", -1), ("triangles", -4), ("lines", -1)])
+def test_a_node_number_below_one_is_no_node_counted_from_the_end(tmp_path, binary, where, node):
+    """meshio would take the last one: a valid square, of another body."""
+    triangles, lines = TRIANGLES.copy(), [[3, 0]]
+    if where == "triangles":
+        triangles[1, 2] = node
+    else:
+        lines = [[node, 0]]
+    path = write(tmp_path / "body.msh", SQUARE, triangles, {"left": lines}, binary=binary)
+    refused(path, f"an element names node {node + 1}: nodes are numbered from 1")
+
+
+def test_a_node_number_below_one_of_format_4_is_refused(tmp_path):
+    path = tmp_path / "square.msh"
+    path.write_text(GMSH41.replace("6 2 11 9\n", "6 2 0 9\n"))
+    refused(path, "an element names node 0: nodes are numbered from 1")
+
+
+def test_names_without_lines_are_left_out(tmp_path):
+    path = written(tmp_path / "body.msh", LINE, *CELLS)
+    path.write_text(path.read_text().replace('2\n1 1 "bottom"', '3\n1 2 "nothing"\n1 1 "bottom"'))
+    assert list(from_file(path).sides) == ["bottom"]
+
+
+@pytest.mark.parametrize("name", ["m" * 300 + ".msh", "a\0b.msh"])
+def test_a_path_that_can_name_no_file_is_refused_as_one(tmp_path, name):
+    with pytest.raises(MeshError, match=r"cannot be read: |no such mesh file"):
+        from_file(tmp_path / name)

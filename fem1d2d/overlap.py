@@ -1,0 +1,185 @@
+"""Whether cells of a plane mesh lie on each other, read off the boundary edges alone.
+
+Where all cells are positively oriented and each inner edge lies in two cells with opposite directions, the number of
+cells over a point changes across boundary edges only: on the left of one it is larger by 1 than on its right.  So no
+point lies in two cells if and only if every boundary edge has no cell on its right.  Edges that meet in end points
+alone have the same number of cells along their whole right side, and one point of each is enough.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+#: Coordinates that a mesher computed differ by this part of the largest one: nothing smaller is judged.
+ROUNDING = 8 * float(np.finfo(float).eps)
+
+#: A box with no more edges than this is not divided further.
+FEW = 16
+
+#: Pairs that are looked at together: arrays of some 10 MB.
+TOGETHER = 200_000
+
+
+def fault(points: NDArray[Any], edges: Ints) -> str | None:
+    """Why the cells lie on each other or are not joined, or None where they fit together.
+
+    Parameters
+    ----------
+    points : array, shape (n, 2)
+        Floats, or rationals in an object array (judged exactly).
+    edges : int array, shape (b, 2)
+        The boundary, the body to the left of each edge.
+
+    Examples
+    --------
+    >>> square, triangle = [(0, 0), (2, 0), (2, 2), (0, 2)], [(1, 0.5), (1.5, 1), (1, 1.5)]
+    >>> edges = np.array([(0, 1), (1, 2), (2, 3), (3, 0)])
+    >>> print(fault(np.array(square, dtype=float), edges))
+    None
+    >>> fault(np.array([*square, *triangle], dtype=float), np.array([*edges, (4, 5), (5, 6), (6, 4)]))
+    'the boundary edge from (1, 0.5) to (1.5, 1) lies inside another cell'
+    """
+    given = points
+    of = lambda i: "from ({:.6g}, {:.6g}) to ({:.6g}, {:.6g})".format(*map(float, given[edges[i]].ravel()))
+    rounding: float = 0 if points.dtype == object else ROUNDING
+    if rounding:  # powers of two: the same digits, near one in any unit
+        points = np.ldexp(points, -np.frexp(np.abs(points).max(axis=0))[1])
+    start, end = points[edges[:, 0]], points[edges[:, 1]]
+    floats = start.astype(float), end.astype(float)
+    for i, j in _near(*floats):
+        crossing, touching = _meet(start[i], end[i], start[j], end[j], rounding)
+        if crossing.any():
+            k = int(np.argmax(crossing))
+            return f"the boundary edges {of(i[k])} and {of(j[k])} cross: cells lie on each other"
+        if touching.any():
+            k = int(np.argmax(touching))
+            return f"the boundary edges {of(i[k])} and {of(j[k])} touch, but their cells are not joined there"
+    flat = np.abs(floats[1] - floats[0])
+    flat = flat[:, 0] >= flat[:, 1]
+    mirrored = floats[1][:, ::-1], floats[0][:, ::-1]  # at the diagonal: with the ends exchanged the body stays left
+    for ends, asked in ((floats, np.flatnonzero(flat)), (mirrored, np.flatnonzero(~flat))):
+        covered = _covered(*ends, asked)
+        if covered.any():
+            return f"the boundary edge {of(np.argmax(covered))} lies inside another cell"
+    return None
+
+
+def _meet(a: NDArray[Any], b: NDArray[Any], c: NDArray[Any], d: NDArray[Any], rounding: float) -> tuple[Bools, Bools]:
+    """Whether edges ab and cd cross, and whether they touch in more than an end point of both."""
+
+    def place(p: NDArray[Any], q: NDArray[Any], r: NDArray[Any]) -> tuple[Any, Any, Any]:
+        """On which side of pq lies r (0: on its line), how far along, and what rounding makes of either."""
+        u, v = q - p, r - p
+        slack = rounding * (np.abs(u).sum(axis=1) + np.abs(v).sum(axis=1))
+        turn = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+        return (turn > slack).astype(int) - (turn < -slack), (u * v).sum(axis=1), slack
+
+    placed = [place(p, q, r) for p, q, r in ((a, b, c), (a, b, d), (c, d, a), (c, d, b))]
+    (side_c, along_c, slack_c), (side_d, along_d, slack_d), (side_a, _, _), (side_b, _, _) = placed
+    crossing = (side_c * side_d < 0) & (side_a * side_b < 0)
+    length = [((q - p) ** 2).sum(axis=1) for p, q in ((a, b), (a, b), (c, d), (c, d))]
+    touching = np.zeros(len(a), dtype=bool)
+    for (side, along, slack), whole in zip(placed, length, strict=True):
+        touching |= (side == 0) & (along > slack) & (along < whole - slack)
+    shared = np.minimum(length[0], np.maximum(along_c, along_d)) - np.maximum(0, np.minimum(along_c, along_d))
+    on_one_line = (side_a == 0) & (side_b == 0) & (side_c == 0) & (side_d == 0)
+    return crossing, touching | (on_one_line & (shared > np.maximum(slack_c, slack_d)))
+
+
+def _near(start: Floats, end: Floats) -> Iterator[tuple[Ints, Ints]]:
+    """Pairs of edges in the same small box; all that meet are among them.
+
+    A box fits around its edges and is halved across the axis that leaves fewer of them in its fuller half, as long as
+    it has many and the cut goes through less than half of them.
+    """
+    slack = 4 * ROUNDING
+    least, most, along = np.minimum(start, end) - slack, np.maximum(start, end) + slack, end - start
+
+    def meets(edge: Ints, low: Floats, high: Floats) -> Bools:
+        """Whether edges meet boxes that their own boxes meet: their shadows on the edge's normal do."""
+        u, v, half = along[edge], (low + high) / 2 - start[edge], (high - low) / 2
+        turn = np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+        return np.asarray(turn <= half[:, 0] * np.abs(u[:, 1]) + half[:, 1] * np.abs(u[:, 0]) + slack)
+
+    edge, first = np.arange(len(start)), np.zeros(1, dtype=np.int64)
+    low, high = least.min(axis=0)[None], most.max(axis=0)[None]
+    while len(edge):
+        low = np.maximum(low, np.minimum.reduceat(least[edge], first))
+        high = np.minimum(high, np.maximum.reduceat(most[edge], first))
+        count = np.diff(first, append=len(edge))
+        box = np.repeat(np.arange(len(first)), count)
+        middle = (low + high) / 2
+        halves, fuller, cut = [], [], []
+        for axis in range(2):
+            lower_high, upper_low = high.copy(), low.copy()
+            lower_high[:, axis] = upper_low[:, axis] = middle[:, axis]
+            lower, upper = least[edge, axis] <= middle[box, axis], most[edge, axis] >= middle[box, axis]
+            lower[lower] = meets(edge[lower], low[box[lower]], lower_high[box[lower]])
+            upper[upper] = meets(edge[upper], upper_low[box[upper]], high[box[upper]])
+            halves.append((lower, upper, lower_high, upper_low))
+            inside = [np.add.reduceat(part.astype(np.int64), first) for part in (lower, upper, lower & upper)]
+            fuller.append(np.maximum(*inside[:2]))
+            cut.append(inside[2])
+        across = (fuller[1] < fuller[0]).astype(int)
+        done = (count <= FEW) | (2 * np.where(across, cut[1], cut[0]) > count)
+        yield from _pairs(edge[done[box]], box[done[box]])
+        edges, boxes, lows, highs = [], [], [], []
+        for axis, (lower, upper, lower_high, upper_low) in enumerate(halves):
+            chosen = (~done & (across == axis))[box]
+            for part, (half, bottom, top) in enumerate(((lower, low, lower_high), (upper, upper_low, high))):
+                kept = np.flatnonzero(chosen & half)
+                edges.append(edge[kept])
+                boxes.append(2 * box[kept] + part)
+                lows.append(bottom[box[kept]])
+                highs.append(top[box[kept]])
+        order = np.argsort(np.concatenate(boxes), kind="stable")
+        edge = np.concatenate(edges)[order]
+        _, first = np.unique(np.concatenate(boxes)[order], return_index=True)
+        low, high = np.concatenate(lows)[order][first], np.concatenate(highs)[order][first]
+
+
+def _pairs(edge: Ints, box: Ints) -> Iterator[tuple[Ints, Ints]]:
+    """Pairs of edges of the same box, which follow each other, some at a time."""
+    after = np.searchsorted(box, box, side="right") - np.arange(len(box)) - 1  # how many follow in the same box
+    for one, other in _ranges(np.arange(1, len(box) + 1), after):
+        yield edge[one], edge[other]
+
+
+def _ranges(first: Ints, count: Ints) -> Iterator[tuple[Ints, Ints]]:
+    """(i, j) for all i and first[i] <= j < first[i] + count[i], some at a time."""
+    total = np.concatenate([[0], np.cumsum(count)])
+    for begin in range(0, int(total[-1]), TOGETHER):
+        place = np.arange(begin, min(begin + TOGETHER, int(total[-1])))
+        i = np.searchsorted(total, place, side="right") - 1
+        yield i, first[i] + place - total[i]
+
+
+def _covered(start: Floats, end: Floats, asked: Ints) -> Bools:
+    """Whether a cell lies to the right of an edge's middle, for edges that meet in end points alone.
+
+    Cells over a point are counted by the edges below it, +1 where one runs rightwards and -1 where it runs leftwards.
+    Asked of edges less steep than 45 degrees: the middle of a steep one may round to the abscissa of an end.
+    """
+    rightwards = np.sign(end[:, 0] - start[:, 0]).astype(int)
+    left, right = np.where((rightwards > 0)[:, None], (start, end), (end, start))
+    asked = asked[np.argsort(start[asked, 0] + end[asked, 0], kind="stable")]
+    middle = (start[asked] + end[asked]) / 2
+    spans = np.flatnonzero(rightwards)
+    first, last = (np.searchsorted(middle[:, 0], ends[spans, 0]) for ends in (left, right))
+    below = np.zeros(len(asked), dtype=np.int64)
+    for i, point in _ranges(first, last - first):
+        edge = spans[i]
+        u, v = right[edge] - left[edge], middle[point] - left[edge]
+        under = (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0] > 0) & (edge != asked[point])
+        np.add.at(below, point[under], rightwards[edge[under]])
+    covered = np.zeros(len(start), dtype=bool)
+    covered[asked] = below != (rightwards[asked] < 0)
+    return covered
