@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, ClassVar, Literal
@@ -13,19 +14,22 @@ from fem1d2d import largest
 from fem1d2d.mesh import Floats
 from ndtheory import EnergyConstants, Number, SharpBounds, evaluate_sharp, exact
 from ndtheory.constants import take
-from ndtheory.sharp import LARGEST, SMALLEST, predicted_rate, predicted_theta
+from ndtheory.sharp import LARGEST, SMALLEST, predicted_factor, predicted_rate, predicted_theta
 from verification.bodies import build
 from verification.document import Document
 from verification.matrices import check_matrix, size
 from verification.measured import Measured, measure
 from verification.pair import Pair
-from verification.problem import Problem, read_theta
+from verification.problem import Problem
 from verification.reader import ProblemError
 from verification.relaxation import momentum_step
 from verification.threads import one_thread
 
 #: A theta chosen for the user stays below 1 by this much, however soft the contact body.
 CLOSEST_TO_ONE = 1 - 1e-6
+
+#: An automatic theta need not be a proved one that takes more than so many times the steps of the predicted one.
+TOO_SLOW = 2
 
 #: What is unknown of matrices and runs from elsewhere.
 UNITS = {"length": "any", "stress": "any"}
@@ -52,6 +56,8 @@ class Role:
         Whether the Neumann problem has no unique solution; such roles are refused, so always False here.
     reason : mapping
         Why a value is None.
+    theta_auto : Choice or None
+        What ``theta = "auto"`` takes in these roles; None where there is no problem file.
     """
 
     neumann_body: Literal[1, 2] | None
@@ -64,12 +70,15 @@ class Role:
     friction_threshold: Number | None
     reason: Mapping[str, str]
     singular: bool = False
+    theta_auto: Choice | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """A member of ``roles``."""
         values = {name: getattr(self, name) for name in self.__dataclass_fields__}
         values["reason"] = dict(self.reason)
-        return {name: v.to_dict() if isinstance(v, Number) else v for name, v in values.items()}
+        if self.theta_auto is None:
+            values["reason"]["theta_auto"] = "no problem file"
+        return {name: v.to_dict() if isinstance(v, (Number, Choice)) else v for name, v in values.items()}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -167,6 +176,7 @@ def _role(problem: Problem, pair: Pair) -> Role:
         rate_predicted=sharp.rate_predicted,
         friction_threshold=threshold,
         reason=reason,
+        theta_auto=automatic(sharp, outside, problem.iteration.tolerance),
     )
 
 
@@ -273,37 +283,90 @@ class Choice:
         ``momentum``: the step that the triple momentum method takes for this rho.
     rho : float or None
         Known where it was needed.
+    why : str
+        Why this theta, in words.
     """
 
     theta: Fraction
     source: Literal["given", "proved", "predicted", "momentum"]
     rho: float | None = None
+    why: str = "given by the problem or beside it"
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object ``theta_auto`` of a role."""
+        return {"theta": float(self.theta), "source": self.source, "why": self.why}
 
 
 def choose(pair: Pair, theta: Any = None, measured: Measured | None = None) -> Choice:
-    """The theta of a run: the given one, else the problem's; for "auto" the proved one, else the predicted one.
+    """The theta of a run: the given one, else the problem's; for "auto" that of :func:`automatic`.
 
     Raises
     ------
     HypothesisError
         A given theta outside (0, 1).
     ProblemError
-        "auto" or momentum where rho does not exist.
+        "auto" or momentum where rho does not exist; a given theta beside momentum.
     """
-    settings = pair.problem.iteration
-    asked = settings.theta if theta is None else read_theta(theta)
-    if asked != "auto" and settings.relaxation != "momentum":
-        return Choice(theta=asked, source="given")
+    problem = pair.problem if theta is None else pair.problem.asked(theta)
+    settings = problem.iteration
+    momentum = settings.relaxation == "momentum"
+    if settings.theta != "auto" and not momentum:
+        return Choice(theta=settings.theta, source="given")
     sharp = sharp_bounds(measured or measure(pair))
     if sharp is None:
-        rule = settings.relaxation == "momentum"
-        key, value = ("iteration.relaxation", "momentum") if rule else ("iteration.theta", "auto")
-        needed = f"needed {'another rule' if rule else 'a number'}: rho does not exist here"
-        raise ProblemError(pair.problem.source, key, value, needed)
+        key, value = ("iteration.relaxation", "momentum") if momentum else ("iteration.theta", "auto")
+        needed = f"needed {'another rule' if momentum else 'a number'}: rho does not exist here"
+        raise ProblemError(problem.source, key, value, needed)
+    if momentum:
+        rho = sharp.rho.value
+        why = "the step of the triple momentum method for this rho"
+        return Choice(theta=below_one(momentum_step(rho)), source="momentum", rho=rho, why=why)
+    return automatic(sharp, pair.outside, settings.tolerance)
+
+
+def automatic(sharp: SharpBounds, outside: Sequence[str] = (), tolerance: float = 1e-9) -> Choice:
+    """The theta that theory chooses: the proved one, unless it is predicted to need more than twice as many steps.
+
+    Both thetas are judged by one formula, :func:`ndtheory.sharp.predicted_factor`.  The proved factor would be no fair
+    judge: with friction it is far from attained.
+
+    Parameters
+    ----------
+    sharp : SharpBounds
+    outside : sequence of str
+        Why the theorem does not speak of the problem; empty where it does.
+    tolerance : float
+        What the steps lead to.
+
+    Examples
+    --------
+    >>> chosen = automatic(evaluate_sharp(EnergyConstants(rho=2)))
+    >>> chosen.source, chosen.theta
+    ('proved', Fraction(1, 2))
+    """
     rho = sharp.rho.value
-    of = lambda value: exact(min(value, CLOSEST_TO_ONE))
-    if settings.relaxation == "momentum":
-        return Choice(theta=of(momentum_step(rho)), source="momentum", rho=rho)
-    if sharp.theta_proved is not None and not pair.outside:
-        return Choice(theta=of(sharp.theta_proved), source="proved", rho=rho)
-    return Choice(theta=of(sharp.theta_predicted), source="predicted", rho=rho)
+    predicted = below_one(sharp.theta_predicted)
+    nothing = outside[0] if outside else "q >= 1 for every theta" if sharp.theta_proved is None else None
+    if nothing is not None or sharp.theta_proved is None:
+        return Choice(theta=predicted, source="predicted", rho=rho, why=f"no theta is proved: {nothing}")
+    proved = below_one(sharp.theta_proved)
+    of_proved, of_predicted = (predicted_steps(theta, rho, tolerance) for theta in (proved, predicted))
+    if of_proved > TOO_SLOW * of_predicted:
+        why = f"{of_predicted} steps predicted, against {of_proved} at the proved theta {float(proved):.4g}"
+        return Choice(theta=predicted, source="predicted", rho=rho, why=why)
+    why = f"{of_proved} steps predicted, at most twice the {of_predicted} at the predicted theta {float(predicted):.4g}"
+    if sharp.friction_multiple is None:
+        why = "without friction the predicted one is proved"
+    return Choice(theta=proved, source="proved", rho=rho, why=why)
+
+
+def below_one(theta: float) -> Fraction:
+    """A theta chosen for the user, below 1."""
+    return exact(min(theta, CLOSEST_TO_ONE))
+
+
+def predicted_steps(theta: Fraction, rho: float, tolerance: float) -> int:
+    """Steps that the predicted factor needs from 1 down to a tolerance."""
+    # of 1 - factor, as a small theta is lost in the factor itself
+    gain = float(1 - predicted_factor(theta, Fraction(rho)))
+    return math.ceil(math.log(tolerance) / math.log1p(-gain))

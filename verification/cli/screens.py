@@ -82,7 +82,7 @@ def _happened(run: Run) -> None:
         proved = "" if run.proved_rate is None else f"; proved rate {near_one(run.proved_rate.value)}"
         say(f"  {run.evaluations} evaluations of T, with the {run.relaxation} relaxation{proved}")
     elif run.choice.source != "given":
-        say(f"  theta = {float(run.theta):.4g} is the {run.choice.source} one")
+        note(f"theta = {float(run.theta):.4g} is the {run.choice.source} one: {run.choice.why}", "  ")
     _contact(problem, run.contact)
     say(f"  contact step solved to a KKT residual of {run.last.contact.kkt.residual:.1e}")
 
@@ -199,6 +199,11 @@ def advice(found: Advice, file: Path | None) -> None:
         note(f"{name}: {reason}", "  ")
     say("  predicted: theta = 2/(2 + rho); proved: the theta of least proved factor")
     say("  steps: to 1e-9 of the first error")
+    for role in found.roles:
+        auto = role.theta_auto
+        if auto is not None:
+            takes = f'theta = "auto" takes {float(auto.theta):.4g}, the {auto.source} one: {auto.why}'
+            note(f"{names[role.neumann_body]}: {takes}", "  ")
     if found.friction is not None:
         heading("HOW MUCH FRICTION IS PROVED?")
         for role in found.roles:
