@@ -201,6 +201,26 @@ def predicted_rate(rho: Any) -> Any:
     return rho / (2 + rho)
 
 
+def predicted_factor(theta: Any, rho: Any) -> Any:
+    """``max(|1 - theta|, |1 - theta (1 + rho)|)``: q(theta) without friction, and a prediction with it.
+
+    The first is the factor of a node that stays open, the second that of the stiffest mode in contact.  Without
+    friction it is attained, with friction q is never less (theta <= 1).
+
+    Parameters
+    ----------
+    theta : dimensionless, 0 < theta <= 1
+    rho : dimensionless
+        rho_normal without friction.
+
+    Examples
+    --------
+    >>> predicted_factor(Fraction(1, 2), 2), predicted_factor(Fraction(1, 4), 2), predicted_factor(Fraction(3, 4), 2)
+    (Fraction(1, 2), Fraction(3, 4), Fraction(5, 4))
+    """
+    return max(abs(1 - theta), abs(1 - theta * (1 + rho)))
+
+
 def contraction_interval(rho: Any, kappa_1: Any, kappa_2: Any, margin: Any = 0) -> tuple[Any, Any] | None:
     """The thetas with q < 1, an open interval inside (0, 1), or None where there are none.
 

@@ -120,7 +120,8 @@ class IterationSpec:
     neumann_body : {1, 2}
         Who gets the linear problem of step I: 2 as in Section 3, 1 as in Section 6.
     theta : Fraction or 'auto'
-        ``auto``: the proved theta, else the predicted one.
+        ``auto``: the proved theta; the predicted one where nothing is proved or the proved one is more than twice as
+        slow.  Momentum takes its step from rho: ``auto`` unless the file has a theta, which is then not used.
     relaxation : {'constant', 'aitken', 'anderson', 'newton', 'momentum'}
         Beside ``constant`` outside the theorem; see :mod:`verification.relaxation`.
     tolerance : float
@@ -133,6 +134,13 @@ class IterationSpec:
     relaxation: Relaxation
     tolerance: float
     max_iterations: int
+
+    @property
+    def warnings(self) -> list[str]:
+        """What is set and has no effect."""
+        if self.relaxation != "momentum" or self.theta == "auto":
+            return []
+        return [f"iteration.theta = {float(self.theta):g} is not used: momentum takes its step from rho"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -191,6 +199,27 @@ class Problem:
             Unless 0 < theta < 1 or "auto".
         """
         return replace(self, iteration=replace(self.iteration, theta=read_theta(theta)))
+
+    def asked(self, theta: Any, key: str = "theta") -> Problem:
+        """The same problem at the theta of a call, which must have a meaning for the relaxation.
+
+        Parameters
+        ----------
+        theta : number or 'auto'
+        key : str
+            What the caller names it; errors do too.
+
+        Raises
+        ------
+        ProblemError
+            Beside momentum, which takes its step from rho.
+        HypothesisError
+            Unless 0 < theta < 1 or "auto".
+        """
+        if self.iteration.relaxation == "momentum":
+            needed = 'needed no theta beside relaxation = "momentum", which takes its step from rho'
+            raise ProblemError(self.source, key, theta, needed)
+        return self.with_theta(theta)
 
     def swapped(self) -> Problem:
         """The same problem with the Neumann problem given to the other body."""
@@ -440,10 +469,11 @@ def _read_iteration(table: Table) -> IterationSpec:
         except HypothesisError as error:
             raise Unfit(f"needed {error.needed}") from None
 
+    relaxation: Relaxation = table.take("relaxation", choice(*RELAXATIONS), "constant")
     spec = IterationSpec(
         neumann_body=table.take("neumann_body", choice(1, 2), 2),
-        theta=table.take("theta", theta, Fraction(1, 2)),
-        relaxation=table.take("relaxation", choice(*RELAXATIONS), "constant"),
+        theta=table.take("theta", theta, "auto" if relaxation == "momentum" else Fraction(1, 2)),
+        relaxation=relaxation,
         tolerance=float(
             table.take("tolerance", number("a number with 0 < tolerance < 1", lambda v: 0 < v < 1), Fraction(1, 10**9))
         ),

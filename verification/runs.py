@@ -238,6 +238,7 @@ class Run(Document):
             "title": self.pair.problem.title,
             "theta": float(self.theta),
             "theta_source": self.choice.source,
+            "theta_reason": self.choice.why,
             "relaxation": self.relaxation,
             "neumann_body": self.pair.problem.iteration.neumann_body,
             "iterations": self.iterations,
@@ -260,7 +261,7 @@ class Run(Document):
             **self.contact.to_dict(),
             "history": [_finite(r) for r in self.history],
             "outside_theorem": self.outside,
-            "warnings": self.pair.warnings,
+            "warnings": self.pair.warnings + self.pair.problem.iteration.warnings,
             "reason": reason,
         }
 

@@ -230,6 +230,7 @@ def formula_differences(constants, theta) -> list[str]:
         "friction_number": (friction, found.largest_work),
         "predicted_theta": ((data[0],), predicted(data[0])[0]),
         "predicted_rate": ((data[0],), predicted(data[0])[1]),
+        "predicted_factor": ((t, data[0]), mp.sqrt(Energy(data[0], mpf(0), mpf(0)).square(t))),
     }
     if found.friction_multiple is not None:
         values["friction_multiple"] = (friction, found.friction_multiple)
@@ -820,6 +821,9 @@ MUTANTS = {
     "one over the friction number": ("friction_multiple", lambda k1, k2: 1 / (k2 + k1**2 / 4)),
     "2/(1 + rho) predicted": ("predicted_theta", lambda rho: 2 / (1 + rho)),
     "1/(2 + rho) predicted": ("predicted_rate", lambda rho: 1 / (2 + rho)),
+    "no open node in the predicted factor": ("predicted_factor", lambda t, rho: abs(1 - t * (1 + rho))),
+    "an open node alone in the predicted factor": ("predicted_factor", lambda t, rho: abs(1 - t)),
+    "theta rho with the printed sign": ("predicted_factor", lambda t, rho: max(1 - t, abs(1 - t + t * rho))),
     "an interval that always starts at 0": ("contraction_interval", with_interval(lambda lo, hi, *data: (0 * lo, hi))),
     "an interval capped at the turning theta": (
         "contraction_interval",
@@ -836,7 +840,7 @@ MUTANTS = {
         for name in [
             *("largest_ratio", "work", "square_at", "turning_theta", "worst_ratio", "one_minus_end"),
             *("one_minus_inside", "one_minus_square", "slope_inside", "friction_number", "friction_multiple"),
-            *("predicted_theta", "predicted_rate", "best_theta"),
+            *("predicted_theta", "predicted_rate", "predicted_factor", "best_theta"),
         ]
     },
 }

@@ -17,7 +17,12 @@ from verification.cli.problems import JSON
 @click.option("--S1", "S1", type=click.Path(path_type=Path), help="Interface stiffness of body 1, .npz or .npy.")
 @click.option("--S2", "S2", type=click.Path(path_type=Path), help="Interface stiffness of body 2, .npz or .npy.")
 @click.option("--theta", metavar="NUMBER", help="Relaxation factor of a run of any code, 0 < theta <= 1.")
-@click.option("--ratio", metavar="NUMBER", help="Ratio of its consecutive residuals while they alternate in sign.")
+@click.option(
+    "--ratio",
+    metavar="NUMBER",
+    help="Ratio of its residual |Tg - g|, absolute and unrelaxed, from one step to the next, steady over 10 or more; "
+    "1 where it rises and falls.",
+)
 @JSON
 def advise(
     file: Path | None, S1: Path | None, S2: Path | None, theta: str | None, ratio: str | None, as_json: bool
@@ -25,8 +30,9 @@ def advise(
     """Which body gets the Neumann problem, and which theta?
 
     Give a problem FILE; or the Schur complements of both bodies on the same interface unknowns (dimension: force per
-    displacement, any units); or one run of any other code with constant theta, whose residual alternates at a steady
-    ratio.
+    displacement, any units); or one run of any other code with constant theta: what the ratio of its residuals can
+    mean, and which theta to run next.  Read its absolute residual |Tg - g|, not the relative one of coupling
+    libraries.
 
     \b
     Examples:

@@ -94,7 +94,7 @@ def _load(file: Path, theta: str | None, swap: bool) -> Problem:
 
     problem = load(file)
     if theta is not None:
-        problem = problem.with_theta(theta)
+        problem = problem.asked(theta, "--theta")
     return problem.swapped() if swap else problem
 
 
@@ -149,6 +149,7 @@ def run(file: Path, theta: str | None, solver: Any, swap_roles: bool, folder: Pa
     _warn(pair.warnings)
     with progress("iterating", problem.iteration.tolerance) as watch:
         finished = runs.run(pair, solver=solver, watch=watch)
+    _warn(problem.iteration.warnings)  # not beside a refusal
     write = None if target is None else lambda: target.write_run(finished)
     deliver(finished, lambda: screens.run(finished, file), write, folder, as_json)
     return _status_of_run(finished, swap_roles)
@@ -245,6 +246,7 @@ def _compare(problem: Problem, file: Path, folder: Path | None, solver: Any, as_
     _warn(pair.warnings)
     with progress("iterating", problem.iteration.tolerance) as watch:
         comparison = verdicts.compare(pair, solver=solver, watch=watch)
+    _warn(problem.iteration.warnings)
     write = None if target is None else lambda: target.write_comparison(comparison)
     deliver(comparison, lambda: screens.comparison(comparison, file), write, folder, as_json)
     return _status_of_comparison(comparison, swapped)

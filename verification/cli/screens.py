@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 from shlex import quote
 
-from verification.advice import Advice
+from verification.advice import Advice, NextRun, Reading, SeenRun
 from verification.cli.calculator import editions_table
 from verification.cli.console import figures, heading, near_one, note, printable, say, table
 from verification.contact_state import ContactState
@@ -93,7 +93,7 @@ def _happened(run: Run) -> None:
         proved = "" if run.proved_rate is None else f"; proved rate {near_one(run.proved_rate.value)}"
         say(f"  {run.evaluations} evaluations of T, with the {run.relaxation} relaxation{proved}")
     elif run.choice.source != "given":
-        say(f"  theta = {float(run.theta):.4g} is the {run.choice.source} one")
+        note(f"theta = {float(run.theta):.4g} is the {run.choice.source} one: {run.choice.why}", "  ")
     _contact(problem, run.contact)
     say(f"  contact step solved to a KKT residual of {run.last.contact.kkt.residual:.1e}")
 
@@ -186,6 +186,42 @@ def comparison(result: Comparison, file: Path) -> None:
 
 def advice(found: Advice, file: Path | None) -> None:
     """The screen of ``advise``."""
+    if found.run is not None and found.next is not None:
+        _seen(found.run, found.readings, found.next)
+    theta = _roles(found) if found.roles else None
+    say()
+    for reason in found.outside:
+        note(f"Outside the theorem: {reason}.")
+    if found.next is not None:
+        say("Not claimed: a bound of rho with friction, or that a reading is the right one.")
+        say(f"Next: ndtheory advise --theta {found.next.theta:g} --ratio R (R: the ratio of that run)")
+        return
+    say("Not claimed: that the predicted theta is the best one for your loads.")
+    if file is not None:
+        swap = "" if found.roles[0].neumann_body == found.neumann_body else " --swap-roles"
+        say(f"Next: ndtheory run {quote(str(file))}{swap} --theta {theta}")
+    else:
+        say("Next: ndtheory advise --help")
+
+
+def _seen(run: SeenRun, readings: tuple[Reading, ...], following: NextRun) -> None:
+    """What a run says of rho, and which one is to be made next."""
+    heading("WHAT DOES THE RUN SAY OF RHO?")
+    given = f"theta = {float(run.theta):.4g}; the residual |Tg - g| changes by {float(run.ratio):.4g} a step"
+    note(f"{given}, absolute and unrelaxed, steadily over {run.steps} steps or more.", "  ")
+    note("A residual that rises and falls has no steady ratio: give 1.", "  ")
+    note("The relative residual |Tg - g|/|Tg| of coupling libraries tells other things.", "  ")
+    rows = [["reading", "rho", "if it is the right one"]]
+    for reading in readings:
+        rho = "-" if reading.lo is None else f">= {figures(reading.lo)}"
+        rows.append([reading.kind, rho, reading.says])
+    table(rows)
+    heading("WHICH RUN NEXT?")
+    note(f"theta = {following.theta:g}: {following.why}", "  ")
+
+
+def _roles(found: Advice) -> str:
+    """What is known of each role; returns the theta to paste."""
     best = found.best
     names = {1: "body 1", 2: "body 2", None: "as in that run"}
     heading("WHICH BODY GETS THE NEUMANN PROBLEM?")
@@ -213,6 +249,11 @@ def advice(found: Advice, file: Path | None) -> None:
         note(f"{name}: {reason}", "  ")
     say("  predicted: theta = 2/(2 + rho); proved: the theta of least proved factor")
     say("  steps: to 1e-9 of the first error")
+    for role in found.roles:
+        auto = role.theta_auto
+        if auto is not None:
+            takes = f'theta = "auto" takes {float(auto.theta):.4g}, the {auto.source} one: {auto.why}'
+            note(f"{names[role.neumann_body]}: {takes}", "  ")
     if found.friction is not None:
         heading("HOW MUCH FRICTION IS PROVED?")
         for role in found.roles:
@@ -222,19 +263,11 @@ def advice(found: Advice, file: Path | None) -> None:
                 allowed = f"every small theta contracts for k < {figures(role.friction_threshold)}"
                 say(f"  {names[role.neumann_body]}: {allowed} (here k = {figures(found.friction, 2)})")
     heading("TO PASTE")
-    theta = f"{min(best.theta_predicted, 0.99):.3g}"
+    theta = f"{min(best.theta_predicted, 0.99):.3g}" if found.next is None else f"{found.next.theta:g}"
     body = f"neumann_body = {found.neumann_body}\n  " if found.neumann_body else ""
     say(f"  {body}theta = {theta}")
     say(f'  <acceleration:constant><relaxation value="{theta}" /></acceleration:constant>')
-    say()
-    for reason in found.outside:
-        note(f"Outside the theorem: {reason}.")
-    say("Not claimed: that the predicted theta is the best one for your loads.")
-    if file is not None:
-        swap = "" if found.roles[0].neumann_body == found.neumann_body else " --swap-roles"
-        say(f"Next: ndtheory run {quote(str(file))}{swap} --theta {theta}")
-    else:
-        say("Next: ndtheory advise --help")
+    return theta
 
 
 def plane(found: Plane, target: Path) -> None:

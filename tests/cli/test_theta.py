@@ -1,0 +1,97 @@
+"""What screens and documents say of an automatic theta, of a theta beside momentum, and of the run of another code."""
+
+import pytest
+
+import verification as vf
+
+MOMENTUM = {"iteration.relaxation": '"momentum"'}
+
+
+# --- theta = "auto" --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("poisson", "source"), [("0.3", "proved"), ("0.49", "predicted")])
+def test_run_and_advise_say_which_theta_is_taken_and_why(call, write, poisson, source):
+    file = write({"body2.poisson": poisson, "contact.radius": "0.2", "iteration.theta": '"auto"'})
+    chosen = vf.run(vf.load(file)).choice
+    assert chosen.source == source
+    said = f"{float(chosen.theta):.4g} is the {source} one: {chosen.why}"
+    assert f"theta = {said}" in " ".join(call("run", file).out.split())
+    run = call("run", file, "--json").document
+    assert (run["theta_source"], run["theta_reason"]) == (source, chosen.why)
+    screen = call("advise", file).out
+    assert max(map(len, screen.splitlines()[:-1])) <= 80  # the last line names the file
+    assert f'theta = "auto" takes {float(chosen.theta):.4g}, the {source} one: {chosen.why}' in " ".join(screen.split())
+    role = call("advise", file, "--json").document["roles"][0]
+    assert role["theta_auto"] == {"theta": float(chosen.theta), "source": source, "why": chosen.why}
+
+
+def test_a_given_theta_is_called_given(call, write):
+    run = call("run", write(), "--json").document
+    assert run["theta_source"] == "given"
+    assert "given" in run["theta_reason"]
+
+
+# --- momentum takes its step from rho --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("command", ["run", "compare"])
+@pytest.mark.parametrize("theta", ["0.5", "auto", "1e-3"])
+def test_a_theta_beside_momentum_is_refused_in_one_line(call, write, command, theta):
+    complaint = call(command, write(MOMENTUM), "--theta", theta).complaint
+    assert f'--theta = "{theta}": needed no theta beside relaxation = "momentum"' in complaint
+
+
+def test_a_theta_of_the_file_beside_momentum_is_one_line_of_warning(call, write):
+    answers = {
+        theta: call("run", write(MOMENTUM | {"contact.friction": "0", "iteration.theta": theta}), "--json")
+        for theta in ("0.7", '"auto"', None)
+    }
+    warning = "iteration.theta = 0.7 is not used: momentum takes its step from rho"
+    assert answers["0.7"].err == f"warning: {warning}\n"
+    assert answers['"auto"'].err == answers[None].err == ""
+    runs = [answer.document for answer in answers.values()]
+    assert [run.pop("warnings") for run in runs] == [[warning], [], []]
+    assert runs[0] == runs[1] == runs[2]
+
+
+# --- one run of another code -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("ratio", ["1.4", "1", "0.97", "0.5", "0.9", "4.51"])
+def test_nothing_is_pasted_while_a_ratio_has_several_readings(call, ratio):
+    answer = call("advise", "--theta", "0.1", "--ratio", ratio)
+    document = call("advise", "--theta", "0.1", "--ratio", ratio, "--json").document
+    assert (answer.status, answer.err) == (0, "")
+    assert max(map(len, answer.out.splitlines())) <= 80
+    assert len(document["readings"]) > 1
+    assert document["roles"] == []
+    assert "TO PASTE" not in answer.out
+    assert "relaxation value" not in answer.out
+    shown = [line.split()[0] for line in answer.out.splitlines() if line.startswith(("  mode-", "  level", "  open"))]
+    assert shown == [reading["kind"] for reading in document["readings"]]
+    flat = " ".join(answer.out.split())
+    assert f"theta = {document['next']['theta']:g}: {document['next']['why']}" in flat
+    assert f"Next: ndtheory advise --theta {document['next']['theta']:g} --ratio R" in answer.out
+
+
+def test_the_screen_of_a_run_says_which_residual_is_meant_and_what_is_sure(call):
+    flat = " ".join(call("advise", "--theta", "0.1", "--ratio", "1.4").out.split())
+    for said in (
+        "|Tg - g| changes by 1.4 a step, absolute and unrelaxed",
+        "The relative residual |Tg - g|/|Tg| of coupling libraries tells other things",
+        "without friction rho is at least 19, nothing more; with friction this says nothing of rho",
+        "rho is at least 23",
+        "rises and falls has no steady ratio: give 1",
+    ):
+        assert said in flat
+    assert "absolute" in " ".join(call("advise", "--help").out.split())
+
+
+def test_what_is_pasted_from_a_run_is_the_next_run(call):
+    answer = call("advise", "--theta", "0.45", "--ratio", "0.8")
+    document = call("advise", "--theta", "0.45", "--ratio", "0.8", "--json").document
+    assert [reading["kind"] for reading in document["readings"]] == ["mode-high"]
+    assert document["next"]["theta"] == 0.4
+    assert '<relaxation value="0.4" />' in answer.out
+    assert "Next: ndtheory advise --theta 0.4 --ratio R" in answer.out
