@@ -534,7 +534,8 @@ def test_a_matrix_of_empty_blocks_is_refused(call, tmp_path, blocks):
         tmp_path / "S.npz", format=np.array(b"bsr"), shape=np.array(shape), data=np.zeros(data),
         indices=np.zeros(len(np.zeros(data)), dtype=int), indptr=np.array([0, len(np.zeros(data))]),
     )  # fmt: skip
-    assert_names(call("advise", "--S1", tmp_path / "S.npz", "--S2", tmp_path / "S.npz").complaint, "S.npz", "not a matrix")
+    answer = call("advise", "--S1", tmp_path / "S.npz", "--S2", tmp_path / "S.npz")
+    assert_names(answer.complaint, "S.npz", "not a matrix")
 
 
 @pytest.mark.parametrize("kind", ["csr", "csc", "coo", "dia", "bsr"])
