@@ -205,7 +205,8 @@ u, v, u_1, v_1 = Vector("u2"), Vector("u~2"), Vector("u1"), Vector("u~1")
 psi, image, loads = Vector("psi"), Vector("T psi"), Vector("l2")
 a1, a2, L1, L2 = bilinear("a1"), bilinear("a2"), functional("L1"), functional("L2")
 solve = linear("S2^-1")
-c_N, gap_, u_N, below = nonnegative("c_N"), *sp.symbols("gap u_2N u~_2N", real=True)
+c_N = nonnegative("c_N")
+gap_, u_N, below = sp.symbols("gap u_2N u~_2N", real=True)
 
 
 def _descent(form: Any) -> list[Goal]:

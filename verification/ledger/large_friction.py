@@ -33,7 +33,7 @@ BEYOND = 4
 #: C_K and the rest of the printed bracket in the unit that is chosen, beside its 1.
 BRACKET = 1e-3
 
-#: Step of the two forces over their size: a state with all inequalities strict by half their size does not change.
+#: Half the distance of the two forces over their size: far too little to change a state whose inequalities are strict.
 STEP = 1e-4
 
 
@@ -95,19 +95,21 @@ def loaded(pair: Pair, g: Floats, v: Floats, force: Floats) -> Pair:
     Parameters
     ----------
     pair : Pair
+        The two bodies with any loads.
     g : array, shape (2 n,)
         Force on the Neumann body.
     v, force : array, shape (2 n,)
         They must obey the conditions of step II.
     """
-    neumann, contact, name = pair.neumann, pair.contact, pair.contact.body.name
+    neumann, contact = pair.neumann, pair.contact
     u = neumann.known + neumann.flexibility(g + neumann.load) + v
     u[pair.normal] += pair.gap
     more = pair.orient(force + contact.stiffness @ u - contact.load)
     body = contact.body
     load = body.load.copy()
     load[body.interface] += more[body.unknown]
-    return replace(pair, **{name: replace(body, load=load)})
+    pushed = replace(body, load=load)
+    return replace(pair, body1=pushed) if body.name == "body1" else replace(pair, body2=pushed)
 
 
 def witness(case: Trial, random: np.random.Generator) -> Witness:
@@ -134,27 +136,23 @@ def witness(case: Trial, random: np.random.Generator) -> Witness:
     pair = _with_friction(case.pair, k)
     reading = Reading.of(case.measured.with_friction(float(k)))
     unit = BRACKET / (reading.A + 2 * reading.C_K + reading.m)  # sqrt(m x) <= m + x
-    n = pair.n
+    setting, n = Setting(pair=pair), pair.n
     g = np.concatenate([random.uniform(-1, 1, t), random.uniform(0.5, 1, n)])
-    bound = FixedPointMap(pair).bound(g)
-    length = np.linalg.norm(g) / np.linalg.norm(pair.contact.stiffness, 2)
-    apart = length * np.concatenate([random.uniform(0.5, 1, t), -random.uniform(0.5, 1, n)])
-    # room for the change of the slip that the two forces bring about
-    setting = Setting(pair=pair)
-    step = setting.forms.root @ y
-    step *= STEP * np.abs(g[t:]).min() / np.abs(step).max()
-    change = along(setting, uniform_piece(pair, touching=False, sliding=1), np.linalg.solve(setting.forms.root, step))
-    room = np.abs(change.d_1 - change.d_2).max() / (STEP * length)
-    apart *= max(room, 1.0)
-    pair = loaded(pair, g, apart, np.concatenate([bound, np.zeros(n)]))
-    difference = between(Setting(pair=pair), g + step, g - step)
+    length = STEP * np.abs(g[t:]).min() / np.abs(setting.forms.root @ y).max()
+    change = along(setting, uniform_piece(pair, touching=False, sliding=1), length * y)
+    # nodes slide and are open by more than the two forces change
+    far = np.linalg.norm(g) / np.linalg.norm(pair.contact.stiffness, 2)
+    far = max(far, np.abs(change.d_1 - change.d_2).max() / STEP)
+    jump = far * np.concatenate([random.uniform(0.5, 1, t), -random.uniform(0.5, 1, n)])
+    pair = loaded(pair, g, jump, np.concatenate([FixedPointMap(pair).bound(g), np.zeros(n)]))
+    difference = between(Setting(pair=pair), g + change.force, g - change.force)
     return Witness(name=case.name, difference=difference, reading=reading.in_unit(unit), friction=float(k), unit=unit)
 
 
 def _with_friction(pair: Pair, k: Fraction) -> Pair:
     """The same bodies at another friction, without a gap."""
     contact = replace(pair.problem.contact, friction=k, gap=Fraction(0))
-    return replace(pair, problem=replace(pair.problem, contact=contact))
+    return replace(pair, problem=replace(pair.problem, contact=contact), gap=np.zeros(pair.n))
 
 
 def large_friction(
