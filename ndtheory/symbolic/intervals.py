@@ -137,7 +137,8 @@ of_edition = {C_T: bounds.lipschitz(m, M, C_R, x), C_T_tilde: bounds.lipschitz(m
 
 check(
     id="5.39",
-    text="The first line of h_1 is a theta^2 + b theta + 1 with the printed a and b, (5.16) for C_T and (5.35) for C~_T.",
+    text="The first line of h_1 is a theta^2 + b theta + 1 with the printed a and b, (5.16) for C_T and (5.35) for"
+    " C~_T.",
     goals=lambda form: equal(
         form.subs(of_edition, simultaneous=True),
         (printed_a * theta**2 + printed_b * theta + 1).subs(of_edition, simultaneous=True),
