@@ -30,7 +30,8 @@ class FixedPointMap:
 
     def __init__(self, pair: Pair, solver: Solver = "auto") -> None:
         self.pair = pair
-        self._step = ContactStep(pair.contact.stiffness, pair.contact.body.unknown, pair.tangential.stop, solver)
+        contact, near = pair.contact, pair.nearly_incompressible
+        self._step = ContactStep(contact.stiffness, contact.body.unknown, pair.tangential.stop, solver, near)
 
     def bound(self, g: Floats) -> Floats:
         """Friction bound on nodal forces, ``w_j k |(S sigma_N)_j|`` with sigma_N = g_N, shape (t,)."""

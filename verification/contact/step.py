@@ -58,12 +58,16 @@ class ContactStep:
     solver : {'auto', 'cvxpy', 'active-set'}
         ``cvxpy``: every step by the convex program; ``active-set``: never; ``auto``: the first step, and each on
         which the active set does not close with its certificate.
+    near : str
+        What an error should name besides, as a Poisson ratio near 1/2.
     """
 
-    def __init__(self, S: Floats, free: NDArray[np.bool_], tangential: int, solver: Solver = "auto") -> None:
+    def __init__(
+        self, S: Floats, free: NDArray[np.bool_], tangential: int, solver: Solver = "auto", near: str = ""
+    ) -> None:
         if solver not in ("auto", "cvxpy", "active-set"):
             raise ValueError(f"solver {solver!r}: needed 'auto', 'cvxpy' or 'active-set'")
-        self._S, self._free, self._t, self._solver = S, free, tangential, solver
+        self._S, self._free, self._t, self._solver, self._near = S, free, tangential, solver, near
         self._active = ActiveSet(S, free, tangential)
         self._model: ContactModel | None = None
         self._pattern = Pattern.sticking(len(S) - tangential, tangential)
@@ -87,7 +91,8 @@ class ContactStep:
             n = len(self._S) - self._t
             found = self._by_active_set(q, bound, Pattern.sticking(n, self._t), "active-set")
         if found is None:
-            raise ContactError(f"the contact step did not reach a KKT residual of {TOLERANCE:g}")
+            why = f": {self._near} is too near 1/2 for doubles" if self._near else ""
+            raise ContactError(f"the contact step did not reach a KKT residual of {TOLERANCE:g}{why}")
         self._pattern = found.pattern
         return found
 

@@ -1,0 +1,182 @@
+"""Warnings: what linear triangles cannot do near nu = 1/2, and what the kernel of the friction law does to friction."""
+
+import re
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+from problem_list import plates
+from sample_problems import SHEARED, changed
+
+import verification as vf
+from fem1d2d import rectangle
+from verification.bodies import face
+from verification.cli.problems import examples
+from verification.pair import LOCKING, SHARE
+
+
+def warned(data):
+    return face(vf.Problem.from_dict(data)).warnings
+
+
+# --- Poisson ratios near 1/2 ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "named"),
+    [
+        ("0.3", "0.3", None),
+        ("0.479", "0.47", None),
+        ("0.48", "0.3", "body1.poisson = 0.48"),
+        ("0.3", "0.4999", "body2.poisson = 0.4999"),
+        ("0.49", "0.499", "body1.poisson = 0.49 and body2.poisson = 0.499"),
+    ],
+)
+def test_a_poisson_ratio_of_048_or_more_is_warned_of_by_its_key(lower, upper, named):
+    warnings = warned(plates(body1_poisson=lower, body2_poisson=upper))
+    assert warnings == [] if named is None else warnings[0].startswith(f"{named}: near 1/2 linear triangles ")
+    assert len(warnings) == (named is not None)
+
+
+def split(path, x, y, cells, both):
+    """A rectangle whose cells are split by both diagonals or by one direction of them, as a mesh file."""
+    mesh = rectangle(x, y, cells)
+    node = np.arange((cells[0] + 1) * (cells[1] + 1)).reshape(cells[0] + 1, -1)
+    sw, se, nw, ne = (block.ravel() for block in (node[:-1, :-1], node[1:, :-1], node[:-1, 1:], node[1:, 1:]))
+    points, corners = mesh.points, [(sw, se, ne), (sw, ne, nw)]
+    if both:
+        middle = len(points) + np.arange(len(sw))
+        points = np.concatenate([points, (points[sw] + points[ne]) / 2])
+        corners = [(sw, se, middle), (se, ne, middle), (ne, nw, middle), (nw, sw, middle)]
+    triangles = np.concatenate([np.column_stack(three) for three in corners])
+    tags = np.concatenate([np.full(len(facets), i) for i, facets in enumerate(mesh.sides.values(), 1)])
+    inside = np.full(len(triangles), 9)
+    meshio.write(
+        path,
+        meshio.Mesh(
+            np.pad(points, ((0, 0), (0, 1))),
+            [("line", np.concatenate(list(mesh.sides.values()))), ("triangle", triangles)],
+            cell_data={"gmsh:physical": [tags, inside], "gmsh:geometrical": [tags, inside]},
+            field_data={name: np.array([i, 1]) for i, name in enumerate(mesh.sides, 1)},
+        ),
+        file_format="gmsh22",
+        binary=False,
+    )
+    return str(path)
+
+
+def test_near_one_half_one_diagonal_multiplies_the_force_and_both_diagonals_do_not_lock(tmp_path):
+    """The figures of the page: 20 x 3 and 12 x 3 rectangles, nu = 0.499, against both diagonals twice as fine."""
+
+    def force(halvings, diagonals):
+        data = plates(body1_poisson="0.499", body2_poisson="0.499", contact_radius="0.1")
+        for name, x, y, cells in (
+            ("body1", (0.0, 2.0), (-0.3, 0.0), (20, 3)),
+            ("body2", (0.4, 1.6), (0.0, 0.3), (12, 3)),
+        ):
+            if diagonals != "alternating":
+                for key in ("shape", "x", "y", "cells"):
+                    del data[name][key]
+                grid = tuple(n * 2**halvings for n in cells)
+                path = tmp_path / f"{name}-{halvings}-{diagonals}.msh"
+                data[name]["mesh"] = split(path, x, y, grid, diagonals == "both")
+        return vf.solve(vf.Problem.from_dict(data)).to_dict()["force"]["normal"]
+
+    fine = force(1, "both")
+    assert force(0, "both") == pytest.approx(fine, rel=0.05)
+    assert 1.1 < force(0, "alternating") / fine < 1.25
+    assert 3 < force(0, "one") / fine < 6
+
+
+@pytest.mark.parametrize("solver", ["auto", "active-set"])
+def test_a_contact_step_that_fails_names_a_poisson_ratio_near_one_half(solver):
+    sheared = {"poisson": "0.4999999999", "prescribed": SHEARED}
+    data = changed(
+        body1={"poisson": "0.4999999999"}, body2=sheared, contact={"friction": "0.6"}, iteration={"theta": "0.1"}
+    )
+    named = "body1.poisson = 0.4999999999 and body2.poisson = 0.4999999999 is too near 1/2"
+    with pytest.raises(vf.ContactError, match=re.escape(named)):
+        vf.run(vf.Problem.from_dict(data), solver=solver)
+
+
+# --- the kernel of the friction law -----------------------------------------------------------------------------------
+
+CELLS = 20
+
+
+def block(radius, friction="0.2"):
+    """A block on Gamma_c of length 1 and mesh width 1/20, pushed so far that it slides as a whole."""
+    lower = {"shape": "rectangle", "x": [-1, 2], "y": [-1, 0], "cells": [3 * CELLS, CELLS // 2]}
+    upper = {"shape": "rectangle", "x": [0, 1], "y": [0, "0.5"], "cells": [CELLS, CELLS // 2]}
+    return {
+        "body1": lower | {"young": 70000, "poisson": "0.3", "fixed": ["bottom"]},
+        "body2": upper | {"young": 20000, "poisson": "0.3", "prescribed": {"top": ["0.05", "-0.01"]}},
+        "contact": {"friction": friction, "radius": str(radius)},
+        "iteration": {"neumann_body": 1},
+    }
+
+
+def carried(radius):
+    """Tangential force over k times the normal one."""
+    solution = vf.solve(vf.Problem.from_dict(block(radius))).to_dict()
+    assert solution["pattern"]["stick"] == 0
+    return abs(solution["force"]["tangential"]) / (0.2 * solution["force"]["normal"])
+
+
+@pytest.mark.parametrize("radius", ["0.4", "0.7", "1", "2"])
+def test_a_wide_kernel_is_warned_of_with_what_its_ends_lose(radius):
+    (warning,) = warned(block(radius))
+    percent = float(re.search(r"carries (\d+) % of k times the normal force", warning)[1])
+    assert percent / 100 == pytest.approx(carried(radius), abs=0.015)
+    assert f"contact.radius = {radius} is not small against the length 1 of Gamma_c" in warning
+
+
+@pytest.mark.parametrize("radius", ["0.025", "0.04"])
+def test_a_kernel_narrower_than_a_cell_is_warned_of_with_its_multiple_of_friction(radius):
+    (warning,) = warned(block(radius))
+    multiple = float(re.search(r"multiplies friction by about width/radius = ([\d.]+)", warning)[1])
+    assert multiple == pytest.approx(0.05 / float(radius))
+    assert carried(radius) == pytest.approx(multiple, rel=0.05)
+
+
+@pytest.mark.parametrize("radius", ["0.05", "0.1", "0.2", "0.25"])
+def test_a_kernel_that_is_wide_beside_a_cell_and_narrow_beside_the_interface_is_not_warned_of(radius):
+    assert warned(block(radius)) == []
+    assert carried(radius) == pytest.approx(1 - float(radius) / 3, abs=0.02)
+
+
+@pytest.mark.parametrize("radius", ["0.01", "2"])
+def test_without_friction_the_kernel_changes_nothing_and_is_not_warned_of(radius):
+    assert warned(block(radius, friction=0)) == []
+
+
+def test_a_radius_between_one_and_two_cells_that_adds_a_tenth_is_warned_of():
+    fine = block("0.0133333")
+    fine["body1"]["cells"], fine["body2"]["cells"] = [300, 2], [100, 2]
+    (warning,) = warned(fine)
+    assert "contact.radius = 0.0133333 is no multiple of the mesh width 0.01" in warning
+    assert "by about 1.12" in warning
+
+
+# --- what the page and the built-in files say -------------------------------------------------------------------------
+
+PAGE = (Path(__file__).parents[2] / "docs" / "problem_file.md").read_text("utf-8")
+
+
+@pytest.mark.parametrize("name", ["section6", "inside"])
+def test_a_built_in_file_with_friction_says_that_its_law_is_static(name):
+    assert "static: right for one monotone loading, not for unloading" in examples()[name]
+
+
+def test_the_page_gives_the_borders_of_the_warnings():
+    assert f"From {LOCKING} on a warning is given" in PAGE
+    assert f"below ${3 * SHARE:.1g}\\,\\ell$" in PAGE
+
+
+@pytest.mark.parametrize(("radius", "part"), [("0.1", "0.96"), ("0.3", "0.89"), ("1", "0.66")])
+def test_the_page_gives_the_friction_that_a_sliding_block_carries(radius, part):
+    heads, _, values = (line.split("|")[2:-1] for line in PAGE[PAGE.index("| $r/\\ell$ |") :].splitlines()[:3])
+    table = dict(zip(map(str.strip, heads), map(str.strip, values), strict=True))
+    assert table[radius] == part
+    assert carried(radius) == pytest.approx(float(part), abs=0.006)
