@@ -135,7 +135,7 @@ def _all_slide(form: Any) -> list[Goal]:
 
 
 check(
-    id="x-printed-fails-everywhere",
+    id="x-printed-false-everywhere",
     text="Loads make every node open and slide one way with S sigma_N > 0, for any pair of bodies and no gap.  Then"
     " p_N = 0, p_T = k W zeta, d_1 = -S_1^-1 p and F = k^2 <W zeta, (S_1^-1)_TT W zeta> + k <W zeta, d_2T>: of"
     " e^2, alpha k^2 - gamma k at least, alpha > 0.  In a unit of stress in which all stresses are lambda times as"

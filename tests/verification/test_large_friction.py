@@ -35,7 +35,7 @@ def test_what_is_printed_fails_on_each_problem_and_what_is_repaired_holds(id, ev
 
 
 def test_the_fact_itself_holds_on_every_problem(evidence):
-    (found,) = evidence["x-printed-fails-everywhere"]
+    (found,) = evidence["x-printed-false-everywhere"]
     assert found.holds
     assert found.data["least_ratio"] == min(evidence[id][0].data["least_ratio"] for id in HEIRS)
 

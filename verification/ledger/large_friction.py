@@ -84,7 +84,7 @@ class Witness:
         }
 
 
-IDS = ("5.30", "5.31", "5.32", "5.33", "5.36", "5.39", "5.44", "x-printed-fails-everywhere")
+IDS = ("5.30", "5.31", "5.32", "5.33", "5.36", "5.39", "5.44", "x-printed-false-everywhere")
 
 
 def loaded(pair: Pair, g: Floats, v: Floats, force: Floats) -> Pair:
