@@ -17,6 +17,7 @@ from verification.bodies import build
 from verification.contact import ContactError, Solver
 from verification.contact_state import ContactState
 from verification.document import Document
+from verification.interrupts import INTERRUPTED
 from verification.iteration import FixedPointMap, state_at, states
 from verification.linearisation import Forecast, Linearisation, NotLinear, forecast, linearise
 from verification.measured import Measured
@@ -49,6 +50,8 @@ class Run(Document):
     states : tuple of State
         At least one.
     outcome : {'converged', 'stalled', 'limit', 'diverged', 'interrupted'}
+    interrupted : bool
+        Whether Ctrl-C ended the run, or what was to be worked out after it: nothing is linearised then.
     """
 
     schema: ClassVar[str] = "ndtheory.run/1"
@@ -57,6 +60,7 @@ class Run(Document):
     choice: Choice
     states: tuple[State, ...]
     outcome: Outcome
+    interrupted: bool = False
 
     @property
     def theta(self) -> Fraction:
@@ -131,6 +135,8 @@ class Run(Document):
 
     @cached_property
     def _linearised(self) -> tuple[Linearisation | None, str]:
+        if self.interrupted:
+            return None, INTERRUPTED
         if self.relaxation != "constant":
             return None, f"the {self.relaxation} relaxation is no constant theta"
         try:
@@ -153,6 +159,8 @@ class Run(Document):
 
     @cached_property
     def _forecast(self) -> tuple[Forecast | None, str]:
+        if self.interrupted:
+            return None, INTERRUPTED
         if self.relaxation != "constant":
             return None, f"the {self.relaxation} relaxation is no constant theta"
         settings = self.pair.problem.iteration
@@ -326,4 +334,4 @@ def run(
         if not seen:
             raise
         outcome = "interrupted"
-    return Run(pair=pair, choice=choice, states=tuple(seen), outcome=outcome)
+    return Run(pair=pair, choice=choice, states=tuple(seen), outcome=outcome, interrupted=outcome == "interrupted")
