@@ -25,6 +25,7 @@ from verification.monolithic import SolveError, solve
 from verification.pair import Pair
 from verification.problem import Problem, Relaxation
 from verification.rates import ObservedRate, observed_rate
+from verification.reader import ProblemError
 from verification.relaxation import momentum_rate, outside, rule
 from verification.state import State
 from verification.threads import one_thread
@@ -36,6 +37,9 @@ PATIENCE = 50
 
 #: A residual grown by this factor over the first one has diverged.
 RUNAWAY = 1e8
+
+#: What the states of a run may fill, and what each of them takes beside its four arrays: measured.
+MOST_BYTES, STATE_BYTES = 2_000_000_000, 1600
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -278,6 +282,15 @@ def _finite(value: float) -> float | None:
     return value if np.isfinite(value) else None
 
 
+def _check_memory(pair: Pair) -> None:
+    """Refuse a run whose states would not fit into memory: every one is kept."""
+    problem, size = pair.problem, len(pair.neumann.load)
+    most, asked = MOST_BYTES // (STATE_BYTES + 4 * 8 * size), problem.iteration.max_iterations
+    if asked > most:
+        needed = f"needed at most {most}: every state is kept, and so many of {pair.n} contact nodes fill 2 GB"
+        raise ProblemError(problem.source, "iteration.max_iterations", asked, needed)
+
+
 def run(
     problem: Problem | Pair,
     *,
@@ -311,6 +324,7 @@ def run(
     """
     pair = build(problem) if isinstance(problem, Problem) else problem
     settings = pair.problem.iteration
+    _check_memory(pair)
     choice = choose(pair, theta, measured)
     relax = rule(pair, settings.relaxation, float(choice.theta), choice.rho)
     seen: list[State] = []
