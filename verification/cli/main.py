@@ -14,7 +14,8 @@ import ndtheory
 import verification
 from ndtheory import HypothesisError
 from verification.cli import calculator, choices, ledger, problems
-from verification.cli.console import Interrupted, ReaderGone, complain
+from verification.cli.console import Interrupted, ReaderGone, complain, printable
+from verification.reader import short
 
 #: Exit statuses of the interface.  A crash is none of them.
 DONE, NOT_MET, BAD_INPUT, INCONCLUSIVE, INTERRUPTED, CRASH = 0, 1, 2, 3, 130, 70
@@ -77,7 +78,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return BAD_INPUT
     except click.UsageError as error:
         where = error.ctx.command_path if error.ctx else "ndtheory"
-        complain(f"{where}: {' '.join(error.format_message().split())}")
+        complain(f"{where}: {short(printable(' '.join(error.format_message().split())), 600)}")
         return BAD_INPUT
     except (click.Abort, KeyboardInterrupt):
         complain("interrupted before anything was computed")
