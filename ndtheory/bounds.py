@@ -39,8 +39,10 @@ class Edition:
     unit : callable
         m -> u: 1 as printed, m as repaired.
     proved : callable
-        m -> whether the edition's own proof holds: everywhere when repaired, for m >= 1 as printed (below it the
-        constants hold for M >= 2 m by another estimate, ``x-printed-rescued`` of the ledger).
+        m -> whether the edition's own proof, the chain of estimates as it stands, holds: everywhere when repaired, for
+        m >= 1 as printed.  The flag says nothing of what is true beside that proof: (5.30) holds as printed exactly
+        where M^2 >= m, and Proposition 5.6 for every m with M >= 2 m and C_tr into L2(Gamma_c), by other estimates
+        (``x-printed-border`` and ``x-printed-rescued`` of the ledger).
     """
 
     name: Literal["printed", "repaired"]

@@ -508,14 +508,16 @@ class Choice:
 def choose(pair: Pair, theta: Any = None, measured: Measured | None = None) -> Choice:
     """The theta of a run: the given one, else the problem's; for "auto" that of :func:`automatic`.
 
+    Momentum takes its step from rho, whatever theta is.
+
     Raises
     ------
     HypothesisError
         A given theta outside (0, 1).
     ProblemError
-        "auto" or momentum where rho does not exist; a given theta beside momentum.
+        "auto" or momentum where rho does not exist.
     """
-    problem = pair.problem if theta is None else pair.problem.asked(theta)
+    problem = pair.problem if theta is None else pair.problem.with_theta(theta)
     settings = problem.iteration
     momentum = settings.relaxation == "momentum"
     if settings.theta != "auto" and not momentum:

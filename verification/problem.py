@@ -200,27 +200,6 @@ class Problem:
         """
         return replace(self, iteration=replace(self.iteration, theta=read_theta(theta)))
 
-    def asked(self, theta: Any, key: str = "theta") -> Problem:
-        """The same problem at the theta of a call, which must have a meaning for the relaxation.
-
-        Parameters
-        ----------
-        theta : number or 'auto'
-        key : str
-            What the caller names it; errors do too.
-
-        Raises
-        ------
-        ProblemError
-            Beside momentum, which takes its step from rho.
-        HypothesisError
-            Unless 0 < theta < 1 or "auto".
-        """
-        if self.iteration.relaxation == "momentum":
-            needed = 'needed no theta beside relaxation = "momentum", which takes its step from rho'
-            raise ProblemError(self.source, key, theta, needed)
-        return self.with_theta(theta)
-
     def swapped(self) -> Problem:
         """The same problem with the Neumann problem given to the other body."""
         other: Literal[1, 2] = 1 if self.iteration.neumann_body == 2 else 2

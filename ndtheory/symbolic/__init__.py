@@ -1,7 +1,7 @@
 """A second derivation of every algebraic step of the paper, in sympy: proofs and exact counterexamples.
 
 ``engine`` decides, ``dimension`` compares units; ``mechanics`` (Sections 2 to 4), ``estimates``, ``intervals``,
-``contraction`` (Section 5) and ``further`` (what the paper does not state) hold the checks.
+``contraction``, ``printed`` (Section 5), ``further`` and ``energy`` (what the paper does not state) hold the checks.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from ndtheory.symbolic.engine import Check
 
 def checks() -> Sequence[Check]:
     """All checks, in the order of the paper; sympy is loaded here."""
-    from ndtheory.symbolic import contraction, estimates, further, intervals, mechanics
+    from ndtheory.symbolic import contraction, energy, estimates, further, intervals, mechanics, printed
 
-    return [*mechanics.CHECKS, *estimates.CHECKS, *intervals.CHECKS, *contraction.CHECKS, *further.CHECKS]
+    modules = (mechanics, estimates, intervals, contraction, printed, further, energy)
+    return [check for module in modules for check in module.CHECKS]

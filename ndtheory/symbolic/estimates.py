@@ -357,20 +357,20 @@ ONE_NODE = {m: lam, M: 2 * lam, C_R: 1, x: kappa * lam, F: kappa**2 * e**2, t: k
 AT_THE_NODE = {lam: mu**2, kappa: xi**2, theta: t_ / (1 + t_)}
 
 
-def one_node(id: str, value: Any, printed: Any, repaired: Any) -> None:
+def one_node(id: str, value: Any, printed: Any, repaired: Any, chart: Any = AT_THE_NODE, more: str = "") -> Check:
     """The printed bound of a quantity is exceeded in the one-node problem: small m, much friction."""
     at_the_node = lambda expression: sp.sympify(expression).subs(ONE_NODE, simultaneous=True)
-    check(
+    return Check(
         id=id,
         text="One open node that slides, S_1 = S_2 = m I, M = 2 m, C_R = 1, C_K = kappa m: exactly F = kappa^2 e^2,"
-        " t = kappa e, W = 0.",
-        goals=lambda form: at_most(at_the_node(form), at_the_node(value), AT_THE_NODE),
+        f" t = kappa e, W = 0.{more}",
+        goals=lambda form: at_most(at_the_node(form), at_the_node(value), chart),
         forms={"printed": printed, "repaired": repaired},
         mutants={"without friction": repaired.subs(x, 0)},
     )
 
 
-one_node("5.30", F, printed_P(m) * e**2, P * e**2)
+CHECKS.append(one_node("5.30", F, printed_P(m) * e**2, P * e**2))
 
 check(
     id="x-printed-at-large-m",
@@ -395,7 +395,7 @@ check(
     states=lambda form: Relation(W, "<=", form),
 )
 
-one_node("5.31", W, -(m**2) / A**2 * t**2 + printed_P(m) * e**2, -(m**2) / A**2 * t**2 + P * e**2)
+CHECKS.append(one_node("5.31", W, -(m**2) / A**2 * t**2 + printed_P(m) * e**2, -(m**2) / A**2 * t**2 + P * e**2))
 
 relaxed = lambda P: (theta**2 - below) * t**2 + of_h2(P) * e**2
 
@@ -417,7 +417,7 @@ check(
 
 expanded = theta**2 * t**2 + (1 - theta) ** 2 * e**2 + 2 * theta * (1 - theta) * W
 for label in ("5.32", "5.33", "5.36"):
-    one_node(label, expanded, relaxed(printed_P(m)), relaxed(P))
+    CHECKS.append(one_node(label, expanded, relaxed(printed_P(m)), relaxed(P)))
 
 check(
     id="5.33",

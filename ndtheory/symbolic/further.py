@@ -7,39 +7,11 @@ from typing import Any
 
 import sympy as sp
 
-from ndtheory import bounds, sharp
+from ndtheory import bounds
 from ndtheory.symbolic.contraction import above_C6, any_theta, inside
 from ndtheory.symbolic.engine import Check, add, at_most, equal, less, nonnegative, positive
-from ndtheory.symbolic.estimates import expanded
-from ndtheory.symbolic.intervals import C0, P_, Q_, end_of_43, of_36
-from ndtheory.symbolic.symbols import (
-    C_R,
-    CONSTANTS,
-    LARGE_M,
-    SMALL_M,
-    WITH_THETA,
-    A,
-    M,
-    P,
-    Q,
-    W,
-    e,
-    m,
-    m_tilde,
-    mu,
-    o,
-    of_h1,
-    of_h2,
-    p,
-    printed_P,
-    q,
-    r,
-    t,
-    theta,
-    with_theta,
-    x,
-    y,
-)
+from ndtheory.symbolic.intervals import C0, P_, Q_, end_of_43
+from ndtheory.symbolic.symbols import C_R, CONSTANTS, A, M, P, Q, m, o, of_h1, of_h2, p, printed_P, q, r, theta, x, y
 
 CHECKS: list[Check] = []
 check = partial(add, CHECKS)
@@ -164,142 +136,7 @@ check(
     mutants={"lambda for 2 lambda": sp.Integer(1)},
 )
 
-# --- gradient descent, uniqueness, the theorem in energy norms ------------------------------------------------------
-
-S_1, S_2 = positive("S_1 S_2")
-u, g, load_1, load_2 = sp.symbols("u g l_1 l_2", real=True)
-_energy = lambda u: S_2 * u**2 / 2 - load_2 * u + S_1 * u**2 / 2 - load_1 * u
-_T = lambda g: load_1 - S_1 * (g + load_2) / S_2
-
-check(
-    id="x-gradient-descent",
-    text="Without friction, bars in contact: E(u) = S_2 u^2/2 - l_2 u + (energy of body 1 at u) has the slope g - T g"
-    " at"
-    " u = (g + l_2)/S_2, and step III moves u by -theta S_2^-1 E'(u).  For more unknowns the slope of a minimum over"
-    " the"
-    " admissible u_1 is its multiplier, the reaction.",
-    goals=lambda form: [
-        equal(sp.diff(_energy(u), u).subs(u, (g + load_2) / S_2), g - _T(g)),
-        equal(
-            (theta * _T(g) + (1 - theta) * g + load_2) / S_2 - (g + load_2) / S_2,
-            form * (g - _T(g)) / S_2,
-            {theta: any_theta},
-        ),
-    ],
-    forms={"repaired": -theta},
-    mutants={"uphill": theta, "theta/S_2": -theta / S_2},
-)
-
-kappa_1, kappa_2, root_rho, more = nonnegative("kappa_1 kappa_2 s e")
-ratio = positive("x")
-
-check(
-    id="x-threshold-uniqueness",
-    text="Two solutions: x^2 + 1 <= kappa_1 x + kappa_2 for x = |d_1|/|d_2| by the energy argument; impossible for"
-    " every"
-    " x exactly where kappa_2 + kappa_1^2/4 < 1, as 1 - f(x) = (x - kappa_1/2)^2 + 1 - kappa_2 - kappa_1^2/4.",
-    goals=lambda form: equal(
-        1 + ratio**2 - kappa_1 * ratio - kappa_2, (ratio - kappa_1 / 2) ** 2 + 1 - form(kappa_1, kappa_2)
-    ),
-    forms={"repaired": sharp.friction_number},
-    mutants={"kappa_1^2/2": lambda k1, k2: k2 + k1**2 / 2, "kappa_1/4": lambda k1, k2: k2 + k1 / 4},
-)
-
-largest = root_rho + kappa_1 + more  # r, with kappa_2 = e (s + kappa_1 + e): every kappa_2 >= 0 once
-ENERGY = (root_rho**2, kappa_1, more * largest)
-
-vertex = (1 - theta) * kappa_1 / (2 - (2 + root_rho**2) * theta)
-
-check(
-    id="x-sharp",
-    text="x <= r by r^2 = (sqrt(rho) + kappa_1) r + kappa_2, no larger x satisfies it; f(r) = -sqrt(rho) r; the"
-    " square of"
-    " (5.24) with t^2 <= rho x^2 and W <= f(x) is what q(theta)^2 is the largest value of.",
-    goals=lambda form: [
-        equal(sharp.largest_ratio(*ENERGY), largest),
-        less((root_rho + kappa_1) * (form + y) + ENERGY[2], (form + y) ** 2),
-        equal(sharp.work(form, *ENERGY[1:]), -root_rho * form),
-        equal(
-            sharp.square_at(ratio, theta, *ENERGY),
-            (1 - theta) ** 2
-            + 2 * theta * (1 - theta) * sharp.work(ratio, *ENERGY[1:])
-            + theta**2 * ENERGY[0] * ratio**2,
-        ),
-        # the vertex below r, and the end r: where the square is largest, and what 1 - q^2 is there
-        equal(sp.diff(sharp.square_at(ratio, theta, *ENERGY), ratio).subs(ratio, vertex), 0),
-        equal(1 - sharp.square_at(vertex, theta, *ENERGY), sharp.one_minus_inside(theta, *ENERGY)),
-        equal(1 - sharp.square_at(largest, theta, *ENERGY), sharp.one_minus_end(theta, *ENERGY)),
-    ],
-    forms={"repaired": largest},
-    mutants={"without kappa_2": root_rho + kappa_1, "half as large": largest / 2},
-)
-
-check(
-    id="x-sharp-interval",
-    text="The square at x is below 1 exactly where 2 (f - 1) + theta (1 - 2 f + rho x^2) < 0: linear in theta for"
-    " each x,"
-    " so that the good thetas form one interval.",
-    goals=lambda form: equal(
-        sharp.square_at(ratio, theta, root_rho**2, kappa_1, kappa_2) - 1, theta * form, {theta: any_theta}
-    ),
-    forms={
-        "repaired": 2 * (sharp.work(ratio, kappa_1, kappa_2) - 1)
-        + theta * (1 - 2 * sharp.work(ratio, kappa_1, kappa_2) + root_rho**2 * ratio**2)
-    },
-    mutants={"the factor 2 dropped": sharp.work(ratio, kappa_1, kappa_2) - 1 + theta * root_rho**2 * ratio**2},
-)
-
-check(
-    id="x-best-theta",
-    text="Without friction |1-theta| and |1 - theta (1+rho)| are equal and opposite at theta = 2/(2+rho), where both"
-    " are"
-    " rho/(2+rho): C_0 is this theta with rho estimated by (M C_R/m)^2.",
-    goals=lambda form: [
-        equal(1 - form, form * (1 + S_1) - 1),
-        equal(1 - form, sharp.predicted_rate(S_1)),
-        equal(C0, form.subs(S_1, A**2 / m**2), CONSTANTS),
-    ],
-    forms={"repaired": sharp.predicted_theta(S_1)},
-    mutants={"1/(1+rho)": 1 / (1 + S_1), "2/(1+rho)": 2 / (1 + S_1)},
-)
-
-# --- what a closer look at the printed proof shows ------------------------------------------------------------------
-
-kappa = nonnegative("kappa")
-d_1, d_2 = nonnegative("d_1 d_2")
-M_sum = {M: (2 + o) * m}
-
-check(
-    id="x-printed-rescued",
-    text="Split a_11: half of it bounds t^2, as Cauchy-Schwarz in a_1 gives a_11 >= m t^2/(M^1 C_R^2), and"
-    " M^2 >= 2 m M^1 for M >= 2 m and M >= M^1; by Young -m d_1^2/2 + C_K d_1 d_2 <= C_K^2 d_2^2/(2m).  With"
-    " kappa = C_K/m and m d_2^2 <= e^2 friction adds at most (kappa + kappa^2/2) e^2, for kappa <= 6 below 4 kappa e^2"
-    " and so below the printed bound; and k < C_2 implies kappa < 4.",
-    goals=lambda form: [
-        at_most(
-            x**2 * d_2**2 / (2 * m), x * d_1 * d_2 - m * d_1**2 / 2, {}, squares=[(m * d_1 - x * d_2) ** 2 / (2 * m)]
-        ),
-        at_most(M**2, 2 * m * M / (1 + p), {M: (2 + o) * m}),
-        at_most(4 * kappa, kappa + kappa**2 / 2, {kappa: form[0] * q / (1 + q)}),
-        at_most(of_36(m_tilde, printed_P(m_tilde)), of_36(m, P), with_theta(LARGE_M)),
-        at_most(
-            of_36(m, 4 * kappa),
-            expanded.subs(W, -(m**2) / A**2 * t**2 + (kappa + kappa**2 / 2) * e**2 - r),
-            {**WITH_THETA, kappa: form[0] * q / (1 + q)},
-        ),
-        at_most(printed_P(m).subs(M_sum), 4 * x / m, {**CONSTANTS, m: mu**2}),
-        *(
-            at_most(
-                bounds.G(x, m_tilde, M, C_R, sp.Integer(1)).subs(x, form[1] * m),
-                m_tilde**3 + m_tilde**5 / A**2,
-                {**chart, x: sp.Integer(0), M: chart[m] * (2 + q)},
-            )
-            for chart in (SMALL_M, LARGE_M)
-        ),
-    ],
-    forms={"repaired": (6, 4)},
-    mutants={"for C_K <= 17 m": (17, 4), "k < C_2 implies C_K < m/100": (6, sp.Rational(1, 100))},
-)
+# --- what the interval can reach -------------------------------------------------------------------------------------
 
 square, Q_more, D_share = 1 + p, nonnegative("Q_more"), nonnegative("D_share")
 C0_of = 2 / ((4 + o) * square + 2)  # (M/m)^2 = 4 + o, C_R^2 = 1 + p

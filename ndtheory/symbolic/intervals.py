@@ -129,14 +129,15 @@ of_edition = {C_T: bounds.lipschitz(m, M, C_R, x), C_T_tilde: bounds.lipschitz(m
 
 check(
     id="5.39",
-    text="h_1 = a theta^2 + b theta + 1 with the printed a and b, (5.16) for C_T and (5.35) for C~_T.",
+    text="The first line of h_1 is a theta^2 + b theta + 1 with the printed a and b, (5.16) for C_T and (5.35) for"
+    " C~_T.",
     goals=lambda form: equal(
         form.subs(of_edition, simultaneous=True),
         (printed_a * theta**2 + printed_b * theta + 1).subs(of_edition, simultaneous=True),
         with_theta(SMALL_M),
         with_theta(LARGE_M),
     ),
-    forms={"printed": first_line(C_T), "repaired": first_line(C_T_tilde)},
+    forms={"step": first_line(C_T), "repaired": first_line(C_T_tilde)},
     mutants={"C_T for C~_T": first_line(C_T), "the friction term halved": of_h1(m_tilde, tilde_P / 2, tilde_Q)},
     units={"printed": Relation(tilde_P, "=", 1), "repaired": Relation(P, "=", 1)},
 )

@@ -77,14 +77,16 @@ check(
     mutants={"twice": -2},
 )
 
+apart = positive("d")  # how far tau moves
+
 check(
     id="2.5",
     text="That |S(tau)| <= |tau| does not make S Lipschitz, which (5.13) uses: S(tau) = tau for tau >= 1 and 0 below"
-    " jumps"
-    " by 1 where tau moves by any p.  A linear S has the difference S(p).",
-    goals=lambda form: at_most(C * p, form(p), {C: y, p: p}),
-    forms={"step": lambda p: sp.Integer(1), "repaired": lambda p: C * p / (1 + q)},
-    mutants={"twice the bound": lambda p: 2 * C * p},
+    " jumps by 1 between 1 - d and 1, however small d > 0 is, while C d < 1 for every d < 1/C, whatever C.  A linear S"
+    " has the difference S(d).",
+    goals=lambda form: [at_most(C * apart, form(apart)), less(C * apart, 1, {apart: 1 / (C * (1 + y))})],
+    forms={"step": lambda d: sp.Integer(1), "repaired": lambda d: C * d / (1 + q)},
+    mutants={"twice the bound": lambda d: 2 * C * d},
 )
 
 b, slip = positive("b"), nonnegative("u_T")

@@ -3,12 +3,15 @@
 A counterexample is put in again, by floating point with 40 digits and not by the code that found it.
 """
 
+from fractions import Fraction
+
 import pytest
 import strategies
 import sympy as sp
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ndtheory import PRINTED, bounds
 from ndtheory.statements import statements
 from ndtheory.symbolic import checks, dimension, engine
 from ndtheory.symbolic.engine import Goal, Relation, Vector, at_most, bilinear, decide, equal, functional, less, linear
@@ -174,6 +177,42 @@ def test_what_is_called_false_has_an_exact_counterexample_or_a_problem_that_brea
 @pytest.mark.parametrize("id", [id for id, s in statements().items() if s.fault == "does not follow"])
 def test_of_what_merely_does_not_follow_no_counterexample_is_known(id):
     assert all(c.decide(c.forms["printed"]).holds for c in CHECKS if c.id == id and "printed" in c.forms)
+
+
+@pytest.mark.parametrize(
+    ("id", "theta", "shown"), [("5.44", Fraction(33, 100), (17424, 708)), ("5.39", Fraction(1, 3), (17778, 712))]
+)
+def test_one_open_sliding_node_breaks_what_is_printed_near_C_0(id, theta, shown):
+    """kappa = 400, m = 1e-6, M = 2 m, C_R = 1: T psi has 400 times the norm of psi and is orthogonal to it."""
+    kappa, m = 400, Fraction(1, 10**6)
+    read, x = PRINTED.coercivity(m), kappa * m  # the root of m x is 20 m
+    P = x / m**2 * (2 * m + x + 20 * m + 1) * (2 * m) ** 2 / m
+    assert (read, bounds.C0(m, 2 * m, 1)) == (m, Fraction(1, 3))
+    left, right = theta**2 * kappa**2 + (1 - theta) ** 2, (1 - theta) ** 2 + 2 * theta * (1 - theta) * P
+    assert (round(left), round(right)) == shown
+    if id == "5.39":
+        Q = (2 * m / m**2 * (2 * m + x + 20 * m) * 2) ** 2
+        assert 1 - bounds.one_minus_h1(theta, Q / 4 - P, Q) == right
+    for number in shown:
+        assert str(number) in statements()[id].wrong
+    exact = [c for c in CHECKS if c.id == id and "one open node" in c.text.lower()]
+    assert [c.decide(c.forms["printed"]).holds for c in exact] == [False]
+
+
+def test_the_map_that_shows_that_S_must_be_lipschitz_jumps_between_two_arguments():
+    (check,) = (c for c in CHECKS if c.id == "2.5")
+    at = check.decide(check.forms["step"]).counterexample
+    C, d = sp.Rational(at["C"]), sp.Rational(at["d"])
+    S = lambda tau: tau if tau >= 1 else 0
+    assert 0 < d < 1
+    assert abs(S(1) - S(1 - d)) > C * d
+
+
+@pytest.mark.parametrize("id", ["x-gradient-descent", "x-best-theta", "x-sharp", "x-printed-literal"])
+def test_a_fact_of_ours_leans_on_rows_with_checks_of_their_own(id):
+    own = {ground for ground in statements()[id].leans_on if ground.startswith("x-")}
+    assert own
+    assert own <= {check.id for check in CHECKS}
 
 
 # --- the statements ------------------------------------------------------------------------------------------------

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from verification.contact import ContactError, ContactSolution
 from verification.contact.active_set import Pattern
 from verification.iteration import FixedPointMap
 from verification.ledger.cases import problem, three_digits
+from verification.ledger.large_friction import loaded
 from verification.measured import Measured, measure
 from verification.runs import Run, run
 
@@ -45,19 +45,7 @@ def step_II(pair: Pair, g: np.ndarray) -> ContactSolution:
         return FixedPointMap(pair, "cvxpy")(g)[1]
 
 
-def with_loads(pair: Pair, g: np.ndarray, v: np.ndarray, force: np.ndarray) -> Pair:
-    """The same bodies, the contact body loaded so that step II answers g with the jump v and the reaction `force`.
-
-    ``l_1 = force + S_1 (u_2 + gap + v)``, applied as forces on the contact nodes: condensation leaves these alone.
-    """
-    neumann, contact, name = pair.neumann, pair.contact, pair.contact.body.name
-    u = neumann.known + neumann.flexibility(g + neumann.load) + v
-    u[pair.normal] += pair.gap
-    more = pair.orient(force + contact.stiffness @ u - contact.load)
-    body = contact.body
-    load = body.load.copy()
-    load[body.interface] += more[body.unknown]
-    return replace(pair, **{name: replace(body, load=load)})
+with_loads = loaded
 
 
 def state_of(pair: Pair, pattern: Pattern, g: np.ndarray, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:

@@ -14,7 +14,6 @@ from ndtheory import EnergyConstants, evaluate_sharp
 from verification.advice import advise_matrices, automatic, choose, sharp_bounds
 from verification.bodies import build
 from verification.cli.problems import examples
-from verification.reader import ProblemError
 
 
 def steps(theta, rho, tolerance=1e-9):
@@ -107,9 +106,7 @@ def test_the_other_rules_take_a_theta_without_a_word(relaxation):
     assert choose(build(problem), "0.3").theta == F(3, 10)
 
 
-def test_a_theta_given_from_python_beside_momentum_is_refused():
+def test_the_step_of_momentum_is_that_of_rho_whatever_theta_is():
     pair = build(vf.Problem.from_dict(changed(contact={"friction": 0}, iteration={"relaxation": "momentum"})))
-    with pytest.raises(ProblemError, match=r"theta = 0\.5: needed no theta beside"):
-        vf.run(pair, theta=0.5)
-    with pytest.raises(ProblemError, match="needed no theta beside"):
-        next(vf.iterate(pair, theta="1/2"))
+    assert choose(pair, 0.5) == choose(pair, "auto") == choose(pair)
+    assert choose(pair).source == "momentum"

@@ -294,6 +294,10 @@ MUTANTS: list[tuple[str, str, str, Callable[[Any, Reading, float], Any]]] = [
     ("5.31", "repaired", "no friction term", lambda d, r, t: -r.give * d.norm_T**2),
     ("5.36", "repaired", "no T", lambda d, r, t: (1 - t) ** 2 * d.norm**2),
     ("5.44", "repaired", "P halved", lambda d, r, t: (1 - t) ** 2 * d.norm**2 * 0.99),
+    ("x-reaction", "printed", "half of rho", lambda d, r, t: r.energy[0] / 2 * d.energy_1),
+    ("x-friction-energy", "printed", "no kappa_2", lambda d, r, t: r.energy[1] * math.sqrt(d.energy_1) * d.norm),
+    ("x-friction-energy", "printed", "no kappa_1", lambda d, r, t: r.energy[2] * d.norm**2),
+    ("x-ratio", "printed", "no friction", lambda d, r, t: math.sqrt(r.energy[0]) * d.norm),
     (
         "x-sharp",
         "printed",

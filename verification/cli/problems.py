@@ -91,10 +91,14 @@ def _title(text: str) -> str:
 
 def _load(file: Path, theta: str | None, swap: bool) -> Problem:
     from verification.problem import load
+    from verification.reader import ProblemError
 
     problem = load(file)
     if theta is not None:
-        problem = problem.asked(theta, "--theta")
+        if problem.iteration.relaxation == "momentum":
+            needed = 'needed no theta beside relaxation = "momentum", which takes its step from rho'
+            raise ProblemError(str(file), "--theta", theta, needed)
+        problem = problem.with_theta(theta)
     return problem.swapped() if swap else problem
 
 

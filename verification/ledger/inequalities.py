@@ -397,6 +397,17 @@ INEQUALITIES: tuple[Inequality, ...] = (
     ),
     *_editions("5.39", _square_of_step, lambda d, r, t: r.h_1(t) * d.norm**2, thetas=above),
     *_editions("5.44", _square_of_step, lambda d, r, t: r.h_2(t) * d.norm**2, thetas=below),
+    Inequality(id="x-reaction", left=lambda d, r, _: d.norm_T**2, right=lambda d, r, _: r.energy[0] * d.energy_1),
+    Inequality(
+        id="x-friction-energy",
+        left=lambda d, r, _: d.friction,
+        right=lambda d, r, _: r.energy[1] * math.sqrt(max(d.energy_1, 0.0)) * d.norm + r.energy[2] * d.norm**2,
+    ),
+    Inequality(
+        id="x-ratio",
+        left=lambda d, r, _: math.sqrt(max(d.energy_1, 0.0)),
+        right=lambda d, r, _: float(sharp.largest_ratio(*r.energy)) * d.norm,
+    ),
     Inequality(id="x-sharp", thetas=everywhere, left=_square_of_step, right=lambda d, r, t: r.q_squared(t) * d.norm**2),
     # --- Proposition 5.6.  (1 - K^2)/theta e^2 <= (e^2 - |||T_theta psi - T_theta psi~|||^2)/theta: nothing of 1 - K
     # is lost to rounding where theta is small

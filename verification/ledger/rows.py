@@ -148,12 +148,14 @@ Source = Callable[[Collection[str], Level, Callable[[float], None]], Mapping[str
 
 def _sources() -> dict[str, Source]:
     from verification.ledger.experiments import experiments
+    from verification.ledger.large_friction import large_friction
     from verification.ledger.solutions import solutions
     from verification.ledger.worst import discrete
 
     return {
         "exact arithmetic and units": exact,
         "inequalities on random problems": discrete,
+        "large friction": large_friction,
         "solutions": solutions,
         "experiments of Section 6": experiments,
     }

@@ -1,0 +1,209 @@
+"""How the printed (5.30) fails on any pair of bodies: much friction, a unit of stress in which m is a small number.
+
+All nodes are open and slide one way, for loads that are put on the contact body, without a gap.  There the friction
+term grows as k^2; the printed bound grows as k where the unit makes its bracket 1 (``docs/theory.md``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import numpy as np
+from scipy.linalg import eigh
+
+from fem1d2d.mesh import Floats
+from verification.iteration import FixedPointMap
+from verification.ledger.cases import three_digits
+from verification.ledger.differences import Difference, Setting, along, between, uniform_piece
+from verification.ledger.evidence import Evidence, Level, figure
+from verification.ledger.inequalities import SEED, Reading
+from verification.ledger.worst import Trial, draw_cases
+from verification.losses import square
+from verification.pair import Pair
+from verification.threads import one_thread
+
+#: Random problems, beside the named ones.
+COUNT: dict[str, int] = {"quick": 6, "full": 60}
+
+#: Friction over that from which each bound is exceeded where the bracket is 1: both sides then differ by this factor.
+BEYOND = 4
+
+#: C_K and the rest of the printed bracket in the unit that is chosen, beside its 1.
+BRACKET = 1e-3
+
+#: Half the distance of the two forces over their size: far too little to change a state whose inequalities are strict.
+STEP = 1e-4
+
+
+@dataclass(frozen=True, kw_only=True)
+class Witness:
+    """Two forces, for loads of their own, that break what is printed.
+
+    Attributes
+    ----------
+    name : str
+        Of the problem.
+    difference : Difference
+        Of the two solutions of steps I and II.
+    reading : Reading
+        The constants in the unit that is chosen, as repaired.
+    friction, unit : float
+        k, and the factor of all stresses.
+    """
+
+    name: str
+    difference: Difference
+    reading: Reading
+    friction: float
+    unit: float
+
+    def ratios(self, *, printed: bool) -> dict[str, float]:
+        """Left over right of each inequality: those with a theta just below C_0, (5.39) at C_0.
+
+        (5.32), (5.33) and (5.36) are one where m is below 1.  Negative terms change sides first.
+
+        Parameters
+        ----------
+        printed : bool
+            As printed, or as repaired.
+        """
+        d, r = self.difference, self.reading.printed if printed else self.reading
+        e2, t2 = d.norm**2 * self.unit, d.norm_T**2 * self.unit
+        work, friction = d.inner * self.unit, d.friction * self.unit
+        below, at = 0.99 * r.C_0, r.C_0
+        step = lambda theta: theta**2 * t2 + (1 - theta) ** 2 * e2 + 2 * theta * (1 - theta) * work
+        of_step = (step(below) - min(r.weight(below), 0.0) * t2) / (r.h_2(below) * e2)
+        return {
+            "5.30": friction / (r.P * e2),
+            "5.31": (max(work, 0.0) + r.give * t2) / (r.P * e2 + max(-work, 0.0)),
+            **dict.fromkeys(("5.32", "5.33", "5.36"), of_step),
+            "5.39": step(at) / (r.h_2(at) * e2),  # h_1(C_0) = h_2(C_0)
+            "5.44": step(below) / (r.h_2(below) * e2),
+        }
+
+
+IDS = ("5.30", "5.31", "5.32", "5.33", "5.36", "5.39", "5.44", "x-printed-false-everywhere")
+
+
+def loaded(pair: Pair, g: Floats, v: Floats, force: Floats) -> Pair:
+    """The same bodies, the contact body loaded so that step II answers g with the jump v and the reaction ``force``.
+
+    ``l_1 = force + S_1 (u_2 + gap + v)``, applied as forces on the contact nodes: condensation leaves these alone.
+
+    Parameters
+    ----------
+    pair : Pair
+        The two bodies with any loads.
+    g : array, shape (2 n,)
+        Force on the Neumann body.
+    v, force : array, shape (2 n,)
+        They must obey the conditions of step II.
+    """
+    neumann, contact = pair.neumann, pair.contact
+    u = neumann.known + neumann.flexibility(g + neumann.load) + v
+    u[pair.normal] += pair.gap
+    more = pair.orient(force + contact.stiffness @ u - contact.load)
+    body = contact.body
+    load = body.load.copy()
+    load[body.interface] += more[body.unknown]
+    pushed = replace(body, load=load)
+    return replace(pair, body1=pushed) if body.name == "body1" else replace(pair, body2=pushed)
+
+
+def witness(case: Trial, random: np.random.Generator) -> Witness:
+    """Friction, a unit, loads and two forces that break what is printed.
+
+    Parameters
+    ----------
+    case : Trial
+        A problem with a law of friction.
+    random : Generator
+    """
+    one = case.measured.with_friction(1.0)
+    reading = Reading.of(one)
+    steep = reading.C_K * reading.M**2 / reading.m**3  # of the printed bound in k, where the bracket is 1
+    first = Setting(pair=_with_friction(case.pair, Fraction(1)))
+    piece = uniform_piece(first.pair, touching=False, sliding=1)
+    T, t = first.forms.force(piece), case.pair.tangential.stop
+    y = eigh(square(T, first.forms.inverse))[1][:, -1]
+    unit_step = along(first, piece, y)  # |y| = 1: e = 1; F = alpha k^2 + gamma k, W = gamma k, t^2 = beta k^2
+    gamma, beta = unit_step.work, unit_step.norm_T**2
+    alpha = unit_step.friction - gamma
+    least = max((steep + abs(gamma)) / alpha, (steep + abs(gamma)) / (reading.give * beta))
+    k = three_digits(BEYOND * least)
+    pair = _with_friction(case.pair, k)
+    reading = Reading.of(case.measured.with_friction(float(k)))
+    unit = BRACKET / (reading.A + 2 * reading.C_K + reading.m)  # sqrt(m x) <= m + x
+    setting, n = Setting(pair=pair), pair.n
+    g = np.concatenate([random.uniform(-1, 1, t), random.uniform(0.5, 1, n)])
+    length = STEP * np.abs(g[t:]).min() / np.abs(setting.forms.root @ y).max()
+    change = along(setting, uniform_piece(pair, touching=False, sliding=1), length * y)
+    # nodes slide and are open by more than the two forces change
+    far = np.linalg.norm(g) / np.linalg.norm(pair.contact.stiffness, 2)
+    far = max(far, np.abs(change.d_1 - change.d_2).max() / STEP)
+    jump = far * np.concatenate([random.uniform(0.5, 1, t), -random.uniform(0.5, 1, n)])
+    pair = loaded(pair, g, jump, np.concatenate([FixedPointMap(pair).bound(g), np.zeros(n)]))
+    difference = between(Setting(pair=pair), g + change.force, g - change.force)
+    return Witness(name=case.name, difference=difference, reading=reading.in_unit(unit), friction=float(k), unit=unit)
+
+
+def _with_friction(pair: Pair, k: Fraction) -> Pair:
+    """The same bodies at another friction, without a gap."""
+    contact = replace(pair.problem.contact, friction=k, gap=Fraction(0))
+    return replace(pair, problem=replace(pair.problem, contact=contact), gap=np.zeros(pair.n))
+
+
+def large_friction(
+    ids: Collection[str], level: Level, watch: Callable[[float], None] = lambda share: None
+) -> dict[str, list[Evidence]]:
+    """Break what is printed on each of some problems.
+
+    Parameters
+    ----------
+    ids : collection of str
+        Statements; those without evidence here have none.
+    level : {'quick', 'full'}
+    watch : callable
+        Called with the share done.
+    """
+    wanted = [id for id in IDS if id in ids]
+    found: list[Witness] = []
+    if wanted:
+        with one_thread():
+            cases = [(case, random) for case, random in draw_cases(COUNT[level]) if case.measured.of_friction]
+            for case, random in cases:
+                found.append(witness(case, random))
+                watch(len(found) / len(cases))
+    watch(1.0)
+    return {id: _evidence(id, found) for id in wanted}
+
+
+def _evidence(id: str, found: Sequence[Witness]) -> list[Evidence]:
+    everywhere = id.startswith("x-")
+    of_all = [w.ratios(printed=True) for w in found]
+    printed = [min(r.values()) if everywhere else r[id] for r in of_all]
+    repaired = max(max(r.values()) if everywhere else r[id] for r in (w.ratios(printed=False) for w in found))
+    # the forces differ little, so that a quotient is right to about four digits; equal ones: the first stays
+    worst = int(np.argmax([figure(value, 2) for value in printed]))
+    data = {
+        "seed": SEED,
+        "problems": len(found),
+        "pairs": len(found),
+        "least_ratio": figure(min(printed), 2),
+        "worst_ratio": figure(printed[worst], 2),
+        "where": found[worst].name,
+        "friction": figure(found[worst].friction, 3),
+        "unit": figure(found[worst].unit, 3),
+    }
+    state = "all nodes open and sliding one way for loads of their own, no gap, much friction, a unit with small m"
+    of_printed = f"{state}: left/right from {min(printed):.2g} to {max(printed):.2g} on {len(found)} problems"
+    if everywhere:
+        return [Evidence(method="discrete", of="printed", holds=min(printed) > 1, text=of_printed, data=data)]
+    of_repaired = f"the same pairs, repaired: left/right <= {repaired:.2g} on {len(found)} problems"
+    more = {"seed": SEED, "problems": len(found), "pairs": len(found), "worst_ratio": figure(repaired, 2)}
+    return [
+        Evidence(method="discrete", of="printed", holds=min(printed) <= 1, text=of_printed, data=data),
+        Evidence(method="discrete", of="repaired", holds=repaired <= 1, text=of_repaired, data=more),
+    ]
