@@ -15,12 +15,15 @@ Everything is imported when first asked for: ``ndtheory bounds`` starts without 
 from __future__ import annotations
 
 import importlib
-from typing import TYPE_CHECKING, Any
+
+TYPE_CHECKING = False  # as typing has it, which takes longer to import than all the rest
 
 #: Must equal ndtheory.__version__; the command checks it, as another distribution installs a package of this name.
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from typing import Any
+
     from verification.advice import Advice, advise
     from verification.contact import ContactError
     from verification.iteration import iterate

@@ -35,6 +35,7 @@ from verification.editions import LARGEST
 from verification.lmi_program import LMIError, Program, Weights
 from verification.measured import Measured
 from verification.pair import Pair
+from verification.progress import Progress, silent
 from verification.trace_forms import TraceForms
 
 #: The friction threshold is searched until its bracket is this narrow, relatively.
@@ -281,7 +282,9 @@ def _inside(multipliers: Weights) -> Weights:
     return lam, np.minimum(tau, 2 * np.sqrt(a * b) * (1 - 1e-15)), a, b
 
 
-def friction_threshold(pair: Pair, measured: Measured, start: float, *, nodewise: bool = True) -> float:
+def friction_threshold(
+    pair: Pair, measured: Measured, start: float, *, nodewise: bool = True, progress: Progress = silent
+) -> float:
     """The friction below which every small theta is certified to contract: a bound from below, close to ``NARROW``.
 
     Parameters
@@ -290,6 +293,8 @@ def friction_threshold(pair: Pair, measured: Measured, start: float, *, nodewise
     measured : Measured
     start : float
         The threshold of the theorem in energy norms, which is below it.
+    progress : callable
+        Told which friction is tried.
 
     Raises
     ------
@@ -297,6 +302,7 @@ def friction_threshold(pair: Pair, measured: Measured, start: float, *, nodewise
     """
 
     def spare(k: float) -> float:
+        progress(f"semidefinite edition: friction threshold, k = {k:.3g} is tried", None)
         try:
             return 1 - SemidefiniteEdition(pair, measured, friction=k, nodewise=nodewise).friction_number().value
         except LMIError:  # nothing is proved at this friction
@@ -379,7 +385,7 @@ class Semidefinite:
         }
 
 
-def evaluate_lmi(pair: Pair, measured: Measured, theta: float) -> Semidefinite:
+def evaluate_lmi(pair: Pair, measured: Measured, theta: float, *, progress: Progress = silent) -> Semidefinite:
     """The semidefinite edition for the problem's friction.
 
     Parameters
@@ -387,6 +393,8 @@ def evaluate_lmi(pair: Pair, measured: Measured, theta: float) -> Semidefinite:
     pair : Pair
     measured : Measured
     theta : float
+    progress : callable
+        Told which program is solved.
 
     Raises
     ------
@@ -394,10 +402,12 @@ def evaluate_lmi(pair: Pair, measured: Measured, theta: float) -> Semidefinite:
     ValueError
         As :class:`SemidefiniteEdition`.
     """
+    progress("semidefinite edition: largest theta", None)
     edition = SemidefiniteEdition(pair, measured)
     largest = edition.largest_theta()
     sharp = measured.friction_threshold
-    allowed = None if sharp is None else friction_threshold(pair, measured, sharp.value)
+    allowed = None if sharp is None else friction_threshold(pair, measured, sharp.value, progress=progress)
+    progress("semidefinite edition: factor of one step", None)
     factor = edition.factor(theta)
     return Semidefinite(
         lipschitz=Number.of_float(factor.value),

@@ -8,8 +8,10 @@ from typing import Any
 
 import cvxpy as cp
 import numpy as np
+import scs
 
 from fem1d2d.mesh import Floats
+from verification.interrupts import undisturbed
 from verification.threads import one_thread
 
 #: Rows of the form up to which Clarabel is as fast as SCS, which takes over where Clarabel fails; its work grows with
@@ -73,11 +75,11 @@ class Program:
         second = first_order | {"max_iters": 1000}  # it converges in some 150 where a solution exists
         solvers = [{"solver": cp.CLARABEL}, second] if size <= SMALL else [first_order]
         why = []
-        with warnings.catch_warnings(), one_thread():
+        with warnings.catch_warnings(), one_thread(), undisturbed():
             warnings.simplefilter("ignore")  # "may be inaccurate": the check of the form decides
             for options in solvers:
                 try:
-                    problem.solve(**options)
+                    _solve(problem, **options)
                 except cp.SolverError:
                     why.append(f"{options['solver']} failed")
                     continue
@@ -88,3 +90,12 @@ class Program:
                 raise LMIError(f"the solver gave up: {', '.join(why)}")
         values = [np.maximum(np.asarray(v.value), 0.0) / z for v, z in zip(self._variables, self._scales, strict=True)]
         return float(s.value), tuple(values)
+
+
+def _solve(problem: cp.Problem, *, solver: str, **options: Any) -> None:
+    """``problem.solve``, from which Ctrl-C returns: cvxpy takes an SCS that was interrupted for one that failed."""
+    data, chain, inverse = problem.get_problem_data(solver, solver_opts=options)
+    found = chain.solve_via_data(problem, data, solver_opts=options)
+    if solver == cp.SCS and found["info"]["status_val"] == scs.SIGINT:
+        raise KeyboardInterrupt
+    problem.unpack_results(found, chain, inverse)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import count, pairwise
 from typing import Any
 
 import numpy as np
@@ -22,8 +22,12 @@ from ndtheory import bounds as formulas
 from verification.jacobian import Piece
 from verification.measured import Measured, lift_gram
 from verification.pair import Pair
+from verification.progress import Progress, silent
 from verification.search import worst_piece
 from verification.threads import one_thread
+
+#: How often the patterns are searched for the losses of one problem.
+SEARCHES = 6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,7 +125,7 @@ def square(rows: Floats, gram: Floats) -> Floats:
     return np.asarray(form + form.T) / 2
 
 
-def locate(pair: Pair, measured: Measured, *, seed: int = 0) -> Losses | None:
+def locate(pair: Pair, measured: Measured, *, seed: int = 0, progress: Progress = silent) -> Losses | None:
     """Find what each inequality gives away at the problem's friction.
 
     Parameters
@@ -130,6 +134,8 @@ def locate(pair: Pair, measured: Measured, *, seed: int = 0) -> Losses | None:
     measured : Measured
     seed : int
         Of the search.
+    progress : callable
+        Told how many of the searches are done.
 
     Returns
     -------
@@ -140,7 +146,7 @@ def locate(pair: Pair, measured: Measured, *, seed: int = 0) -> Losses | None:
     if constants is None or not all(body.unknown.all() for body in pair.elastic):
         return None
     m, M, C_R, x = (float(v) for v in (constants.m, constants.M, constants.C_R, constants.C_K))
-    A = M * C_R
+    A, done = M * C_R, count()
     X = (A + x + math.sqrt(x * m)) / m  # (5.11)
     with one_thread():
         forms = Forms(pair)
@@ -150,6 +156,7 @@ def locate(pair: Pair, measured: Measured, *, seed: int = 0) -> Losses | None:
 
         def found(form: Callable[[Piece], Floats], against: Floats | None = None) -> float:
             """The largest value of a quadratic form against another one, the norm (5.21) by default."""
+            progress("searching what the inequalities lose", next(done) / SEARCHES)
             random = np.random.default_rng(seed)
             return worst_piece(pair, lambda piece: top(form(piece), against), random=random, starts=2).value
 

@@ -18,6 +18,7 @@ from verification.bodies import build
 from verification.document import Document
 from verification.pair import Body, Pair
 from verification.problem import Problem
+from verification.progress import Progress, silent
 from verification.threads import one_thread
 
 #: The constants of both bodies together, as documents and screens list them.
@@ -178,7 +179,7 @@ class Measured(Document):
         }
 
 
-def measure(problem: Problem | Pair, *, refine: int = 0) -> Measured:
+def measure(problem: Problem | Pair, *, refine: int = 0, progress: Progress = silent) -> Measured:
     """Measure the constants of a problem.
 
     Parameters
@@ -186,11 +187,15 @@ def measure(problem: Problem | Pair, *, refine: int = 0) -> Measured:
     problem : Problem or Pair
     refine : int
         With N > 0 the result lists the constants on meshes halved 0 to N times.
+    progress : callable
+        Told which mesh is measured.
 
     Raises
     ------
     ProblemError
         A problem that has no bodies facing each other.
+    KeyboardInterrupt
+        Before the given mesh was measured; later it ends the list, and ``reason["levels"]`` says so.
 
     Examples
     --------
@@ -201,11 +206,19 @@ def measure(problem: Problem | Pair, *, refine: int = 0) -> Measured:
     1.5
     """
     pair = build(problem) if isinstance(problem, Problem) else problem
+    progress("measuring the constants", None)
     with one_thread():
         finer = [pair.problem.refined(level) for level in range(1, refine + 1)]  # refused before any is measured
         result = _measure(pair)
         if refine:
-            result = replace(result, levels=(result, *(_measure(build(problem)) for problem in finer)))
+            levels, reason = [result], dict(result.reason)
+            try:
+                for halvings, halved in enumerate(finer, 1):
+                    progress(f"measuring the constants, {halvings} of {refine} halvings", (halvings - 1) / refine)
+                    levels.append(_measure(build(halved)))
+            except KeyboardInterrupt:
+                reason["levels"] = f"interrupted after {len(levels) - 1} of {refine} halvings"
+            result = replace(result, levels=tuple(levels), reason=reason)
     return result
 
 

@@ -1,15 +1,23 @@
-"""Writing results into a folder: only our own files, each whole or not at all."""
+"""Writing results into a folder: only our own files, all of one run or none."""
 
 from __future__ import annotations
 
+import contextlib
 import os
 import tempfile
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from verification.interrupts import undisturbed
 from verification.reader import ProblemError, unreadable
+
+try:
+    import fcntl
+
+    LOCKS = True
+except ImportError:  # Windows: what a killed process leaves stays there
+    LOCKS = False
 
 if TYPE_CHECKING:
     from verification.ledger import Ledger
@@ -54,24 +62,94 @@ def check_ours(target: Path) -> None:
         raise ProblemError(str(target), "", None, "not written by this program; needed another folder or name (-o)")
 
 
-def put(target: Path, write: Callable[[Path], object]) -> None:
-    """Write a file whole or not at all.
+#: Files are written into a folder of such a name before they take their places.
+ROOM = ".ndtheory-writing-"
+
+
+@contextlib.contextmanager
+def staged(folder: Path, stale: Collection[str] = (), *, shown: Path | None = None) -> Iterator[Path]:
+    """A folder to write into, whose files take their places together at the end; after an error none does.
+
+    What is to be replaced goes before anything comes: a process that is killed in between leaves files of one run, some
+    of which are missing, never files of two.  Ctrl-C keeps the documents where there is nothing to replace.
+
+    Parameters
+    ----------
+    folder : Path
+        Where the files belong.
+    stale : collection of str
+        Names of the files of an earlier run, which go when the others come.
+    shown : Path, optional
+        What an error names; the folder by default.
 
     Raises
     ------
     ProblemError
     """
     try:
-        handle, temporary = tempfile.mkstemp(dir=target.parent, suffix=target.suffix)
-        os.close(handle)
-        try:
-            write(Path(temporary))
-            os.chmod(temporary, 0o644)
-            os.replace(temporary, target)
-        finally:
-            Path(temporary).unlink(missing_ok=True)
+        with contextlib.ExitStack() as stack:
+            with _held(folder):
+                _sweep(folder)
+                room = Path(tempfile.mkdtemp(prefix=ROOM, dir=folder))
+                stack.callback(_remove, room)
+                stack.enter_context(_held(room))
+            try:
+                yield room
+            except KeyboardInterrupt:
+                if not any((folder / name).exists() for name in stale):
+                    _place(room, folder, "*.json")
+                raise
+            _place(room, folder, "*", stale)
     except OSError as error:
-        raise ProblemError(str(target), "", None, f"cannot be written: {error.strerror}") from None
+        raise ProblemError(str(shown or folder), "", None, f"cannot be written: {error.strerror}") from None
+
+
+def _place(room: Path, folder: Path, pattern: str, stale: Collection[str] = ()) -> None:
+    """Move files where they belong."""
+    names = sorted(path.name for path in room.glob(pattern))
+    with _held(folder), undisturbed():
+        for name in {*stale, *names}:
+            (folder / name).unlink(missing_ok=True)
+        for name in names:
+            (room / name).replace(folder / name)
+
+
+@contextlib.contextmanager
+def _held(folder: Path) -> Iterator[None]:
+    """Hold a folder against other processes of this program; when a process ends the system lets go of it."""
+    if not LOCKS:
+        yield
+        return
+    number = os.open(folder, os.O_RDONLY)
+    try:
+        with contextlib.suppress(OSError):  # some file systems have no locks
+            fcntl.flock(number, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(number)
+
+
+def _sweep(folder: Path) -> None:
+    """Remove what a killed process left: folders of ours that nobody holds, with nothing else in them."""
+    if not LOCKS:
+        return
+    for room in folder.glob(ROOM + "*"):
+        with contextlib.suppress(OSError):  # held, or no folder
+            number = os.open(room, os.O_RDONLY | os.O_DIRECTORY)
+            try:
+                fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                if all(path.is_file() and path.suffix in (*MARKS, ".toml") for path in room.iterdir()):
+                    _remove(room)
+            finally:
+                os.close(number)
+
+
+def _remove(room: Path) -> None:
+    """Remove a folder with the files in it."""
+    with contextlib.suppress(OSError):
+        for path in room.iterdir():
+            path.unlink()
+        room.rmdir()
 
 
 class Folder:
@@ -100,9 +178,6 @@ class Folder:
         for name in FILES[kind]:
             check_ours(path / name)
 
-    def _put(self, name: str, write: Callable[[Path], object]) -> None:
-        put(self.path / name, write)
-
     def write_problem(self, text: str) -> Path:
         """Write ``problem.toml``.
 
@@ -115,57 +190,60 @@ class Folder:
         if target.exists() and (target.is_dir() or target.read_bytes() != text.encode()):
             needed = "differs from the built-in problem: needed another folder (-o), or run compare on this file"
             raise ProblemError(str(target), "", None, needed)
-        self._put(target.name, lambda path: path.write_text(text, encoding="utf-8"))
+        with staged(self.path, shown=target) as room:
+            (room / target.name).write_text(text, encoding="utf-8")
         return target
 
     def write_run(self, run: Run) -> None:
         """Write ``run.json`` and the figures."""
-        self._text("run.json", run.to_json())
-        self._pictures(run)
+        with staged(self.path, FILES["run"]) as room:
+            _text(room / "run.json", run.to_json())
+            _pictures(room, run)
 
     def write_solution(self, solution: Solution) -> None:
         """Write ``solve.json`` and the figure of the bodies."""
-        self._text("solve.json", solution.to_json())
-        self._pictures(solution)
+        with staged(self.path, FILES["solve"]) as room:
+            _text(room / "solve.json", solution.to_json())
+            _pictures(room, solution)
 
     def write_comparison(self, comparison: Comparison) -> None:
         """Write ``compare.json``, the figures and ``report.html``."""
         from verification.report import report
 
-        self._text("compare.json", comparison.to_json())
-        self._pictures(comparison.run, comparison)
-        names = [name for name in ("bodies", "residuals", "waterfall") if name != "waterfall" or comparison.losses]
-        figures = {name: (self.path / f"{name}.svg").read_text("utf-8") for name in names}
-        self._text("report.html", report(comparison, figures))
+        with staged(self.path, FILES["compare"]) as room:
+            _text(room / "compare.json", comparison.to_json())
+            names = _pictures(room, comparison.run, comparison)
+            figures = {name: (room / f"{name}.svg").read_text("utf-8") for name in names}
+            _text(room / "report.html", report(comparison, figures))
 
     def write_ledger(self, ledger: Ledger) -> None:
         """Write ``ledger.json``, ``ledger.md``, and of a whole ledger ``errata.md`` and ``verdicts.json``."""
         from verification.ledger import sheets
 
-        self._text("ledger.json", ledger.to_json())
-        self._text("ledger.md", sheets.page(ledger))
-        if ledger.whole:
-            self._text("errata.md", sheets.errata(ledger))
-            self._text("verdicts.json", sheets.verdicts(ledger))
-        else:
-            for name in ("errata.md", "verdicts.json"):  # of another ledger
-                (self.path / name).unlink(missing_ok=True)
+        with staged(self.path, FILES["verify"]) as room:
+            _text(room / "ledger.json", ledger.to_json())
+            _text(room / "ledger.md", sheets.page(ledger))
+            if ledger.whole:
+                _text(room / "errata.md", sheets.errata(ledger))
+                _text(room / "verdicts.json", sheets.verdicts(ledger))
 
-    def _text(self, name: str, text: str) -> None:
-        self._put(name, lambda path: path.write_text(text + "\n", encoding="utf-8"))
 
-    def _pictures(self, result: Run | Solution, comparison: Comparison | None = None) -> None:
-        from verification import figures
-        from verification.runs import Run
+def _text(path: Path, text: str) -> None:
+    with undisturbed():  # whole or not there
+        path.write_text(text + "\n", encoding="utf-8")
 
-        drawn = {"bodies": figures.draw_bodies(result)}
-        if isinstance(result, Run):
-            drawn["residuals"] = figures.draw_residuals(result, [] if comparison is None else comparison.editions)
-        if comparison is not None and comparison.losses is not None:
-            drawn["waterfall"] = figures.draw_waterfall(comparison.losses, comparison.units["stress"])
-        elif comparison is not None:  # one of an earlier run would tell of another problem
-            for ending in ("svg", "png"):
-                (self.path / f"waterfall.{ending}").unlink(missing_ok=True)
-        for name, figure in drawn.items():
-            for ending in ("svg", "png"):
-                self._put(f"{name}.{ending}", partial(figures.save, figure))
+
+def _pictures(room: Path, result: Run | Solution, comparison: Comparison | None = None) -> list[str]:
+    """Draw all there is to draw; returns the names of the figures."""
+    from verification import figures
+    from verification.runs import Run
+
+    drawn = {"bodies": figures.draw_bodies(result)}
+    if isinstance(result, Run):
+        drawn["residuals"] = figures.draw_residuals(result, [] if comparison is None else comparison.editions)
+    if comparison is not None and comparison.losses is not None:
+        drawn["waterfall"] = figures.draw_waterfall(comparison.losses, comparison.units["stress"])
+    for name, figure in drawn.items():
+        for ending in ("svg", "png"):
+            figures.save(figure, room / f"{name}.{ending}")
+    return list(drawn)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -12,9 +12,11 @@ from ndtheory import EDITIONS, Constants, evaluate, evaluate_sharp, exact
 from verification.bodies import build
 from verification.document import Document
 from verification.editions import LARGEST
+from verification.interrupts import INTERRUPTED
 from verification.measured import Measured, measure
 from verification.pair import Pair
 from verification.problem import Problem
+from verification.progress import Progress, silent
 from verification.reader import ProblemError
 from verification.runs import Outcome, run
 
@@ -69,7 +71,7 @@ class Plane(Document):
     regions : mapping from edition to Region
     points : tuple of Point
     reason : mapping
-        Why an edition has no region.
+        Why an edition has no region; ``points`` where Ctrl-C left some out.
     """
 
     schema: ClassVar[str] = "ndtheory.region/1"
@@ -79,6 +81,11 @@ class Plane(Document):
     points: tuple[Point, ...]
     reason: Mapping[str, str]
     units: Mapping[str, str]
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C left something out."""
+        return "points" in self.reason
 
     def content(self) -> dict[str, Any]:
         return {
@@ -97,20 +104,23 @@ class Plane(Document):
         }
 
 
-def chart(problem: Problem, *, watch: Callable[[float], None] = lambda share: None) -> Plane:
+def chart(problem: Problem, *, progress: Progress = silent) -> Plane:
     """Trace the regions of all editions for a problem's bodies, and run a grid of theta and k.
 
     Parameters
     ----------
     problem : Problem
-    watch : callable
-        Called with the share that is done.
+    progress : callable
+        Told what is being done.
 
     Raises
     ------
     ProblemError
         A problem outside the theorem, or without a law of friction.
+    KeyboardInterrupt
+        Before the regions of the theorem were traced; later it leaves out what was still to come.
     """
+    progress("tracing the regions", None)
     pair = build(problem)
     if problem.contact.law == "local":
         raise ProblemError(problem.source, "contact.law", "local", 'no region is proved of it; needed "nonlocal"')
@@ -130,20 +140,32 @@ def chart(problem: Problem, *, watch: Callable[[float], None] = lambda share: No
             interval = lambda k, e=edition: evaluate(e, _at(measured, k)).interval
             regions[edition.name] = _trace(interval, every=of.C4.value, some=of.C2.value)
     regions["sharp"] = _trace(lambda k: _sharp_interval(measured.with_friction(k)), every=sharp.value, some=limit.value)
-    traced, why = _semidefinite(pair, measured, sharp.value)
-    if traced is None:
-        reason["lmi"] = why
-    else:
-        regions["lmi"] = traced
-    points = []
+    points: list[Point] = []
     cells = [(theta, k) for k in FRICTIONS for theta in THETAS]
-    for i, (theta, k) in enumerate(cells):
-        watch(i / len(cells))
-        finished = run(_rubbing(pair, k), theta=theta)
-        if finished.outcome == "interrupted":
-            raise KeyboardInterrupt
-        points.append(Point(theta=theta, k=k, outcome=finished.outcome, iterations=finished.iterations))
+    reason |= dict.fromkeys(("lmi", "points"), INTERRUPTED)
+    try:
+        traced, why = _semidefinite(pair, measured, sharp.value, progress)
+        if traced is None:
+            reason["lmi"] = why
+        else:
+            regions["lmi"] = traced
+            del reason["lmi"]
+        for point in _points(pair, cells, progress):
+            points.append(point)
+        del reason["points"]
+    except KeyboardInterrupt:
+        reason["points"] = f"interrupted after {len(points)} of {len(cells)} runs"
     return Plane(title=problem.title, regions=regions, points=tuple(points), reason=reason, units=problem.units)
+
+
+def _points(pair: Pair, cells: Sequence[tuple[float, float]], progress: Progress) -> Iterator[Point]:
+    """What runs do at each theta and k."""
+    for i, (theta, k) in enumerate(cells):
+        progress(f"runs: theta = {theta:g}, k = {k:g}", i / len(cells))
+        finished = run(_rubbing(pair, k), theta=theta)
+        if finished.interrupted:
+            raise KeyboardInterrupt
+        yield Point(theta=theta, k=k, outcome=finished.outcome, iterations=finished.iterations)
 
 
 def _rubbing(pair: Pair, k: float) -> Pair:
@@ -174,16 +196,17 @@ def _at(measured: Measured, k: float) -> Constants:
     return constants
 
 
-def _semidefinite(pair: Pair, measured: Measured, start: float) -> tuple[Region | None, str]:
+def _semidefinite(pair: Pair, measured: Measured, start: float, progress: Progress) -> tuple[Region | None, str]:
     from verification.lmi import SemidefiniteEdition, friction_threshold
     from verification.lmi_program import LMIError
 
     if pair.n > LARGEST:
         return None, f"{pair.n} contact nodes: worked out up to {LARGEST}"
     try:
-        last = friction_threshold(pair, measured, start)
+        last = friction_threshold(pair, measured, start, progress=progress)
         kept = []
-        for k in np.append(np.geomspace(last * 1e-2, last * 0.9, TRACED_LMI - 1), last):
+        for i, k in enumerate(np.append(np.geomspace(last * 1e-2, last * 0.9, TRACED_LMI - 1), last)):
+            progress(f"semidefinite edition: largest theta at k = {k:.3g}", i / TRACED_LMI)
             found = SemidefiniteEdition(pair, measured, friction=float(k)).largest_theta()
             if found is not None:
                 kept.append((float(k), (0.0, found.value)))

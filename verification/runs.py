@@ -17,6 +17,7 @@ from verification.bodies import build
 from verification.contact import ContactError, Solver
 from verification.contact_state import ContactState
 from verification.document import Document
+from verification.interrupts import INTERRUPTED
 from verification.iteration import FixedPointMap, state_at, states
 from verification.linearisation import Forecast, Linearisation, NotLinear, forecast, linearise
 from verification.measured import Measured
@@ -24,6 +25,7 @@ from verification.monolithic import SolveError, solve
 from verification.pair import Pair
 from verification.problem import Problem, Relaxation
 from verification.rates import ObservedRate, observed_rate
+from verification.reader import ProblemError
 from verification.relaxation import momentum_rate, outside, rule
 from verification.state import State
 from verification.threads import one_thread
@@ -35,6 +37,9 @@ PATIENCE = 50
 
 #: A residual grown by this factor over the first one has diverged.
 RUNAWAY = 1e8
+
+#: What the states of a run may fill, and what each of them takes beside its four arrays: measured.
+MOST_BYTES, STATE_BYTES = 2_000_000_000, 1600
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -49,6 +54,8 @@ class Run(Document):
     states : tuple of State
         At least one.
     outcome : {'converged', 'stalled', 'limit', 'diverged', 'interrupted'}
+    interrupted : bool
+        Whether Ctrl-C ended the run, or what was to be worked out after it: nothing is linearised then.
     """
 
     schema: ClassVar[str] = "ndtheory.run/1"
@@ -57,6 +64,7 @@ class Run(Document):
     choice: Choice
     states: tuple[State, ...]
     outcome: Outcome
+    interrupted: bool = False
 
     @property
     def theta(self) -> Fraction:
@@ -131,6 +139,8 @@ class Run(Document):
 
     @cached_property
     def _linearised(self) -> tuple[Linearisation | None, str]:
+        if self.interrupted:
+            return None, INTERRUPTED
         if self.relaxation != "constant":
             return None, f"the {self.relaxation} relaxation is no constant theta"
         try:
@@ -153,6 +163,8 @@ class Run(Document):
 
     @cached_property
     def _forecast(self) -> tuple[Forecast | None, str]:
+        if self.interrupted:
+            return None, INTERRUPTED
         if self.relaxation != "constant":
             return None, f"the {self.relaxation} relaxation is no constant theta"
         settings = self.pair.problem.iteration
@@ -270,6 +282,15 @@ def _finite(value: float) -> float | None:
     return value if np.isfinite(value) else None
 
 
+def _check_memory(pair: Pair) -> None:
+    """Refuse a run whose states would not fit into memory: every one is kept."""
+    problem, size = pair.problem, len(pair.neumann.load)
+    most, asked = MOST_BYTES // (STATE_BYTES + 4 * 8 * size), problem.iteration.max_iterations
+    if asked > most:
+        needed = f"needed at most {most}: every state is kept, and so many of {pair.n} contact nodes fill 2 GB"
+        raise ProblemError(problem.source, "iteration.max_iterations", asked, needed)
+
+
 def run(
     problem: Problem | Pair,
     *,
@@ -303,6 +324,7 @@ def run(
     """
     pair = build(problem) if isinstance(problem, Problem) else problem
     settings = pair.problem.iteration
+    _check_memory(pair)
     choice = choose(pair, theta, measured)
     relax = rule(pair, settings.relaxation, float(choice.theta), choice.rho)
     seen: list[State] = []
@@ -326,4 +348,4 @@ def run(
         if not seen:
             raise
         outcome = "interrupted"
-    return Run(pair=pair, choice=choice, states=tuple(seen), outcome=outcome)
+    return Run(pair=pair, choice=choice, states=tuple(seen), outcome=outcome, interrupted=outcome == "interrupted")

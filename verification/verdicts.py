@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
@@ -13,10 +13,12 @@ from verification.bodies import build
 from verification.contact import Solver
 from verification.document import Document
 from verification.editions import LARGEST, EditionRow, Thresholds, row_of
+from verification.interrupts import INTERRUPTED
 from verification.losses import Losses, locate
 from verification.measured import Measured, measure
 from verification.pair import Pair
 from verification.problem import Problem
+from verification.progress import Progress, silent
 from verification.rates import StepRatio, largest_step_ratio
 from verification.runs import Run, run
 from verification.state import State
@@ -217,13 +219,17 @@ def compare(
     theta: Any = None,
     solver: Solver = "auto",
     watch: Callable[[State], None] = lambda state: None,
+    progress: Progress = silent,
 ) -> Comparison:
     """Measure the constants, evaluate the bounds, run the algorithm, and judge.
 
-    Parameters and errors as for :func:`verification.run`.
+    Parameters and errors as for :func:`verification.run`; ``progress`` is told what is being done.  Ctrl-C after the
+    first state of the run leaves out what was still to come: ``run.interrupted`` is true, ``reason`` says what is
+    missing.
     """
     pair = build(problem) if isinstance(problem, Problem) else problem
-    measured = measure(pair)
+    measured = measure(pair, progress=progress)
+    progress("iterating", None)
     finished = run(pair, theta=theta, solver=solver, watch=watch, measured=measured)
     chosen, constants = finished.theta, measured.constants()
     bounds: dict[str, Bounds] = {} if constants is None else {e.name: evaluate(e, constants, chosen) for e in EDITIONS}
@@ -233,12 +239,18 @@ def compare(
     if pair.n > LARGEST:
         reason |= dict.fromkeys(("lmi", "losses"), f"{pair.n} contact nodes: worked out up to {LARGEST}")
     else:
-        losses = locate(pair, measured)
-        lmi, why = _semidefinite(pair, float(chosen), measured)
-        if lmi is None:
-            reason["lmi"] = why
-        if losses is None:
+        reason |= dict.fromkeys(("lmi", "losses"), INTERRUPTED)
+    try:
+        if pair.n <= LARGEST and not finished.interrupted:
+            losses = locate(pair, measured, progress=progress)
             reason["losses"] = next(iter(measured.reason.values()), "a contact node is held")
+            lmi, reason["lmi"] = _semidefinite(pair, float(chosen), measured, progress)
+        progress("linearising", None)
+        _ = finished.forecast, finished.linearised  # here, where Ctrl-C keeps what there is
+    except KeyboardInterrupt:
+        finished = replace(finished, interrupted=True)
+    for name in [name for name, found in (("lmi", lmi), ("losses", losses)) if found is not None]:
+        del reason[name]
     if sharp is None:
         reason["sharp"] = next(iter(measured.reason.values()), "")
     seen = largest_step_ratio(pair, finished.states)
@@ -297,11 +309,11 @@ def _why_not(interval: tuple[float, float] | None, threshold: Number | None, fri
     return f"friction {friction:g} is not below {scale:.2g}"
 
 
-def _semidefinite(pair: Pair, theta: float, measured: Measured) -> tuple[Semidefinite | None, str]:
+def _semidefinite(pair: Pair, theta: float, measured: Measured, progress: Progress) -> tuple[Semidefinite | None, str]:
     from verification.lmi import evaluate_lmi
     from verification.lmi_program import LMIError
 
     try:
-        return evaluate_lmi(pair, measured, theta), ""
+        return evaluate_lmi(pair, measured, theta, progress=progress), ""
     except (LMIError, ValueError) as error:
         return None, str(error)

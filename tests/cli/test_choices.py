@@ -692,13 +692,14 @@ def charted(tmp_path_factory):
     file.write_text(text, encoding="utf-8")
     problem = vf.load(file)
     shares = []
-    return file, vf.measure(problem), plane.chart(problem, watch=shares.append), shares
+    told = lambda what, share: shares.append(share) if what.startswith("runs") else None
+    return file, vf.measure(problem), plane.chart(problem, progress=told), shares
 
 
 @pytest.fixture
 def region(call, charted, monkeypatch):
     """`region` on that plane, as often as one likes."""
-    monkeypatch.setattr(plane, "chart", lambda problem, watch: charted[2])
+    monkeypatch.setattr(plane, "chart", lambda problem, progress: charted[2])
     return lambda *arguments: call("region", charted[0], *arguments)
 
 

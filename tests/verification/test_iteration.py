@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import tracemalloc
 from collections.abc import Callable, Mapping
 from fractions import Fraction
 from functools import cache
@@ -21,7 +23,7 @@ from verification.advice import Choice
 from verification.bodies import build
 from verification.contact import TOLERANCE, ContactError
 from verification.iteration import FixedPointMap, State
-from verification.runs import PATIENCE, RUNAWAY, Run
+from verification.runs import MOST_BYTES, PATIENCE, RUNAWAY, Run
 
 by_name = pytest.mark.parametrize("name", PROBLEMS)
 
@@ -401,6 +403,21 @@ def test_a_run_that_wanders_at_a_level_stalls():
 def test_a_run_ends_at_max_iterations():
     run = vf.run(problem(SECTION_6, max_iterations=3), solver="active-set")
     assert (run.outcome, run.iterations, run.evaluations, run.converged) == ("limit", 3, 4, False)
+
+
+def test_a_run_whose_states_would_fill_the_memory_is_refused_before_its_first_step():
+    given = problem(SECTION_6, max_iterations=10**9)
+    with pytest.raises(vf.ProblemError, match="every state is kept") as error:
+        vf.run(given, watch=lambda state: pytest.fail("a step was taken"))
+    assert error.value.key == "iteration.max_iterations"
+    most = int(re.search(r"at most (\d+)", error.value.needed)[1])
+    tracemalloc.start()
+    kept = list(islice(vf.iterate(given, theta=0.01), 120))[20:]  # the first steps build what is kept once
+    start, _ = tracemalloc.get_traced_memory()
+    del kept
+    end, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert (start - end) / 100 * most < 1.2 * MOST_BYTES
 
 
 def test_a_run_whose_residual_grows_without_bound_diverges():

@@ -3,6 +3,10 @@
 import errno
 import json
 import re
+import signal
+import subprocess
+import sys
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from xml.etree import ElementTree
@@ -12,7 +16,7 @@ import pytest
 import verification as vf
 from verification import figures
 from verification.ledger.record import on_the_printed_proof
-from verification.output import Folder
+from verification.output import LOCKS, Folder, staged
 from verification.report import report
 
 SMALL = {
@@ -175,8 +179,99 @@ def test_a_file_is_whole_or_not_there_when_writing_fails(quick, results, tmp_pat
     before = contents(tmp_path)
     monkeypatch.setattr(figures, "save", fail)
     with pytest.raises((type(error), vf.ProblemError)):
-        write(tmp_path, "run", results["run"])
+        write(tmp_path, "run", vf.run(problem(iteration=ONE_STEP)))
     assert contents(tmp_path) == before
+
+
+def test_a_report_that_fails_leaves_the_comparison_before_it(quick, comparison, tmp_path, monkeypatch):
+    """The document of another theta beside an old report would be two runs in one folder."""
+    write(tmp_path, "comparison", comparison)
+    before = contents(tmp_path)
+
+    def fail(*arguments):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("verification.report.report", fail)
+    with pytest.raises(vf.ProblemError, match="No space left"):
+        write(tmp_path, "comparison", vf.compare(problem(iteration=ONE_STEP)))
+    assert contents(tmp_path) == before
+
+
+def test_ctrl_c_in_a_new_folder_keeps_the_document(quick, results, tmp_path, monkeypatch):
+    def interrupt(figure, path):
+        path.write_bytes(b"half")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(figures, "save", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        write(tmp_path, "run", results["run"])
+    assert set(contents(tmp_path)) == {"run.json"}
+
+
+def test_a_comparison_without_losses_takes_the_waterfall_of_another_away(quick, comparison, tmp_path):
+    write(tmp_path, "comparison", comparison)
+    write(tmp_path, "comparison", replace(comparison, losses=None, reason={"losses": "made up"}))
+    assert set(contents(tmp_path)) == WRITTEN["comparison"] - {"waterfall.svg", "waterfall.png"}
+
+
+#: Writes two files into a folder, and is killed: before they take their places, or when one of them has.
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from verification.output import staged
+
+folder, moves = Path(sys.argv[1]), int(sys.argv[2])
+replace = Path.replace
+
+def moved(self, target):
+    global moves
+    if moves == 0:
+        os.kill(os.getpid(), signal.SIGKILL)
+    moves -= 1
+    return replace(self, target)
+
+Path.replace = moved
+with staged(folder, ("a.json", "b.json", "c.json")) as room:
+    for name in ("a.json", "b.json"):
+        (room / name).write_text("new")
+    if moves < 0:
+        os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+@pytest.mark.skipif(not LOCKS, reason="needs locks of files")
+@pytest.mark.parametrize("moves", [-1, 0, 1])
+def test_a_process_that_is_killed_leaves_files_of_one_run_and_the_next_one_cleans_up(tmp_path, moves):
+    for name in ("a.json", "b.json", "c.json"):
+        (tmp_path / name).write_text("old")
+    killed = subprocess.run([sys.executable, "-c", KILLED, str(tmp_path), str(moves)], check=False)
+    assert killed.returncode == -signal.SIGKILL
+    left = {path.name: path.read_text() for path in tmp_path.iterdir() if path.is_file()}
+    assert left == {-1: dict.fromkeys(("a.json", "b.json", "c.json"), "old"), 0: {}, 1: {"a.json": "new"}}[moves]
+    assert len([path for path in tmp_path.iterdir() if path.is_dir()]) == 1
+    with staged(tmp_path, ("a.json", "b.json", "c.json")) as room:
+        (room / "b.json").write_text("newest")
+    assert contents(tmp_path) == {"b.json": b"newest"}
+
+
+def test_files_that_another_process_is_writing_are_left_to_it(tmp_path):
+    with staged(tmp_path) as room:
+        (room / "a.json").write_text("mine")
+        with staged(tmp_path) as other:
+            (other / "b.json").write_text("its own")
+        assert (room / "a.json").read_text() == "mine"
+    assert contents(tmp_path) == {"a.json": b"mine", "b.json": b"its own"}
+
+
+def test_what_only_looks_temporary_is_left_alone(tmp_path):
+    for name in ("tmpab12cd.svg", ".ndtheory-writing-notes"):
+        (tmp_path / name).write_text("mine")
+    (tmp_path / ".ndtheory-writing-thesis").mkdir()
+    (tmp_path / ".ndtheory-writing-thesis" / "thesis.tex").write_text("mine")
+    before = sorted(path.name for path in tmp_path.rglob("*"))
+    with staged(tmp_path):
+        pass
+    assert sorted(path.name for path in tmp_path.rglob("*")) == before
 
 
 @pytest.mark.parametrize("place", ["file", "file/folder", "loop"])

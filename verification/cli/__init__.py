@@ -1,5 +1,14 @@
 """The command ``ndtheory``: the one door, and the only room that prints."""
 
-from verification.cli.main import main
+import sys
+
+try:
+    from verification.interrupts import undisturbed
+
+    with undisturbed():  # an import that is interrupted may fail in any way
+        from verification.cli.main import main
+except KeyboardInterrupt:
+    sys.stderr.write("interrupted before anything was computed\n")
+    sys.exit(130)
 
 __all__ = ["main"]

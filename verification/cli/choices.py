@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from ndtheory import HypothesisError
-from verification.cli.console import bar, say
+from verification.cli.console import Interrupted, complain, deliver, stages
 from verification.cli.problems import JSON
 
 
@@ -67,10 +67,7 @@ def advise(
             found = advice.advise_run(theta, ratio)
         except HypothesisError as error:
             raise click.UsageError(f"--{error}", context) from None
-    if as_json:
-        say(found.to_json())
-    else:
-        screens.advice(found, file)
+    deliver(found, lambda: screens.advice(found, file), as_json)
 
 
 def _picture(context: click.Context, parameter: click.Parameter, value: Path) -> Path:
@@ -102,11 +99,9 @@ def region(file: Path, target: Path, as_json: bool) -> None:
     Example:
       ndtheory region my.toml -o plane.svg
     """
-    from functools import partial
-
     from verification import figures
     from verification.cli import screens
-    from verification.output import check_ours, put
+    from verification.output import check_ours, staged
     from verification.plane import chart
     from verification.problem import load
     from verification.reader import ProblemError
@@ -115,10 +110,12 @@ def region(file: Path, target: Path, as_json: bool) -> None:
     if not target.parent.is_dir():
         raise ProblemError(str(target), "", None, "needed a name in a folder that exists (-o)")
     check_ours(target)
-    with bar("regions and runs") as watch:
-        plane: Any = chart(problem, watch=watch)
-    if as_json:
-        say(plane.to_json())
-    else:
-        screens.plane(plane, target)
-    put(target, partial(figures.save, figures.draw_region(plane)))
+    with stages() as tell:
+        plane = chart(problem, progress=tell)
+    deliver(plane, lambda: screens.plane(plane, target), as_json)
+    with stages() as tell, staged(target.parent, shown=target) as room:
+        tell("drawing", None)
+        figures.save(figures.draw_region(plane), room / target.name)
+    if plane.interrupted:
+        complain(f"{plane.reason['points']}: what was computed is drawn")
+        raise Interrupted

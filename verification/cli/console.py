@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import math
+import os
 import sys
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
 from ndtheory import Number
+from verification.interrupts import undisturbed
+from verification.progress import Progress, silent
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -27,7 +31,21 @@ class ReaderGone(Exception):
 
 
 class Interrupted(Exception):
-    """Ctrl-C after the result was shown."""
+    """Ctrl-C, of which a line has told already."""
+
+
+#: What a command says that Ctrl-C ended before and after its result was shown.
+NOTHING, SHOWN = "interrupted before anything was computed", "interrupted; the result is shown above"
+
+
+class _Voice:
+    """Where results go, and whether one was shown."""
+
+    stream: TextIO | None = None
+    said = False
+
+
+_voice = _Voice()
 
 
 def say(text: str = "") -> None:
@@ -38,10 +56,69 @@ def say(text: str = "") -> None:
     ReaderGone
         The other end of a pipe was closed.
     """
+    _voice.said = True
     try:
-        click.echo(text)
+        click.echo(text, file=_voice.stream)
     except BrokenPipeError:
         raise ReaderGone from None
+
+
+@contextlib.contextmanager
+def alone() -> Iterator[None]:
+    """Let results alone reach stdout: what else is written there, by a C library too, goes to stderr."""
+    out, _voice.said = sys.stdout, False
+    try:
+        number = None if out is None else out.fileno()
+    except (OSError, ValueError):  # no file: what no C library can reach
+        number = None
+    with contextlib.ExitStack() as stack:
+        if number is not None:
+            out.flush()
+            _voice.stream = open(os.dup(number), "w", encoding=out.encoding, errors=out.errors)  # noqa: SIM115
+            stack.callback(_restore, _voice.stream, number)
+            os.dup2(_elsewhere(stack), number)
+        else:
+            _voice.stream = out
+        stack.callback(setattr, _voice, "stream", None)
+        stack.enter_context(contextlib.redirect_stdout(sys.stderr))
+        yield
+
+
+def _elsewhere(stack: contextlib.ExitStack) -> int:
+    """The file number of stderr, or of nothing where it is closed."""
+    try:
+        os.fstat(2)
+    except OSError:
+        return stack.enter_context(open(os.devnull, "w")).fileno()
+    return 2
+
+
+def _restore(stream: TextIO, number: int) -> None:
+    """End a diversion of a file number: what C libraries still hold back leaves by the way it was written for."""
+    import ctypes
+
+    with contextlib.suppress(OSError, TypeError, AttributeError):  # Windows
+        ctypes.CDLL(None).fflush(None)
+    with contextlib.suppress(OSError):  # a reader that has gone, a disk that is full: told already
+        stream.flush()
+    os.dup2(stream.fileno(), number)
+    with contextlib.suppress(OSError):
+        stream.close()
+
+
+def interruptible(command: Callable[..., Any]) -> Callable[..., Any]:
+    """A command whose result alone reaches stdout, and that ends with one line after Ctrl-C."""
+
+    @functools.wraps(command)
+    def run(*args: Any, **options: Any) -> Any:
+        with alone():
+            try:
+                return command(*args, **options)
+            except KeyboardInterrupt:
+                complain(SHOWN if _voice.said else NOTHING)
+                raise Interrupted from None
+
+    return run
 
 
 def printable(text: str) -> str:
@@ -60,17 +137,25 @@ def complain(text: str) -> None:
 
 
 def deliver(
-    document: Document, screen: Callable[[], None], write: Callable[[], None] | None, folder: Path | None, as_json: bool
+    document: Document,
+    screen: Callable[[], None],
+    as_json: bool,
+    write: Callable[[], None] | None = None,
+    folder: Path | None = None,
 ) -> None:
     """Show first, then write: what goes wrong while writing costs no result."""
-    if as_json:
-        say(document.to_json())
-    else:
-        screen()
+    text = document.to_json() if as_json else ""
+    with undisturbed():  # shown whole
+        if as_json:
+            say(text)
+        else:
+            screen()
     if write is None:
         return
     try:
-        write()
+        with stages() as tell:
+            tell(f"drawing and writing {folder}", None)
+            write()
     except KeyboardInterrupt:
         complain(f"interrupted while {folder} was written; the result is shown above")
         raise Interrupted from None
@@ -147,49 +232,32 @@ def factor(value: Number | None, one_minus: Number | None) -> str:
 
 
 @contextlib.contextmanager
-def bar(title: str) -> Iterator[Callable[[float], None]]:
-    """A live bar on a terminal's stderr: the share that is done."""
+def stages() -> Iterator[Progress]:
+    """A live line on a terminal's stderr: what is being done, the share of it that is done, the time it takes."""
     if sys.stderr is None or not sys.stderr.isatty():
-        yield lambda share: None
+        yield silent
         return
     from rich.console import Console
-    from rich.progress import Progress
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress as Live
 
-    with Progress(console=Console(stderr=True), transient=True) as live:
-        task = live.add_task(title, total=1.0)
-        yield lambda share: live.update(task, completed=share)
+    columns = (TextColumn("{task.description}"), BarColumn(bar_width=20), TimeElapsedColumn())
+    with contextlib.ExitStack() as stack:
+        with undisturbed():  # its thread takes no signal from the main one
+            live = stack.enter_context(Live(*columns, console=Console(stderr=True), transient=True))
+        task = live.add_task("", total=None)
+        yield lambda what, share: live.update(
+            task, description=what, total=None if share is None else 1.0, completed=share or 0.0
+        )
 
 
 @contextlib.contextmanager
-def stages() -> Iterator[Callable[[str, float], None]]:
-    """A live bar on a terminal's stderr: what is being done, and the share of it that is done."""
-    if sys.stderr is None or not sys.stderr.isatty():
-        yield lambda what, share: None
-        return
-    from rich.console import Console
-    from rich.progress import Progress
+def progress(tell: Progress, tolerance: float) -> Iterator[Callable[[State], None]]:
+    """Tell how far the residual has fallen towards its tolerance."""
 
-    with Progress(console=Console(stderr=True), transient=True) as live:
-        task = live.add_task("", total=1.0)
-        yield lambda what, share: live.update(task, description=what, completed=share)
+    def watch(state: State) -> None:
+        residual = state.relative_residual
+        fallen = math.log(residual) / math.log(tolerance) if 0 < residual < 1 else 0.0
+        tell(f"iterating: step {state.iteration}, residual {residual:.2e}", min(fallen, 1.0))
 
-
-@contextlib.contextmanager
-def progress(title: str, tolerance: float) -> Iterator[Callable[[State], None]]:
-    """A live line on a terminal's stderr: how far the residual has fallen towards its tolerance."""
-    if sys.stderr is None or not sys.stderr.isatty():
-        yield lambda state: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn
-
-    columns: list[Any] = [TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[note]}")]
-    with Progress(*columns, console=Console(stderr=True), transient=True) as live:
-        task = live.add_task(title, total=-math.log10(tolerance), note="")
-
-        def watch(state: State) -> None:
-            residual = state.relative_residual
-            fallen = -math.log10(residual) if 0 < residual < 1 else 0.0
-            live.update(task, completed=fallen, note=f"step {state.iteration}, residual {residual:.2e}")
-
-        yield watch
+    yield watch

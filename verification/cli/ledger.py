@@ -53,7 +53,7 @@ def verify(ids: tuple[str, ...], level: Any, folder: Path | None, as_json: bool)
         complain("interrupted before every check was done: no verdict is reached")
         raise Interrupted from None
     write = None if target is None else lambda: target.write_ledger(found)
-    deliver(found, lambda: _rows(found) if ids else _summary(found), write, folder, as_json)
+    deliver(found, lambda: _rows(found) if ids else _summary(found), as_json, write, folder)
     return 1 if found.changed else 0
 
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import os
+import signal
 import sys
+import threading
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import click
 
@@ -14,8 +17,7 @@ import ndtheory
 import verification
 from ndtheory import HypothesisError
 from verification.cli import calculator, choices, ledger, problems
-from verification.cli.console import Interrupted, ReaderGone, complain, printable
-from verification.reader import short
+from verification.cli.console import NOTHING, SHOWN, Interrupted, ReaderGone, complain, interruptible, printable
 
 #: Exit statuses of the interface.  A crash is none of them.
 DONE, NOT_MET, BAD_INPUT, INCONCLUSIVE, INTERRUPTED, CRASH = 0, 1, 2, 3, 130, 70
@@ -49,6 +51,8 @@ for command in (
     choices.region,
     ledger.verify,
 ):
+    assert command.callback is not None
+    command.callback = interruptible(command.callback)
     cli.add_command(command)
 
 
@@ -56,7 +60,69 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit status.
 
     2 bad input (one line), 1 a run that did not converge or a proved claim violated, 3 inconclusive, 130 Ctrl-C.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Those of the process by default: it is then ours, and what it does at its end is not interrupted any more.
     """
+    ours = arguments is None
+    try:
+        if ours:
+            # one thread, which blocks a signal for all: see `undisturbed`; matrices here are too small for more anyway
+            os.environ["OPENBLAS_NUM_THREADS"] = "1"
+        with _interrupts(last=ours) as seen:
+            return _run(arguments, seen)
+    except KeyboardInterrupt:
+        complain("interrupted")
+        return INTERRUPTED
+
+
+@contextlib.contextmanager
+def _interrupts(last: bool) -> Iterator[list[int]]:
+    """Take notice of Ctrl-C even where a library makes something else of it.
+
+    Python drops what is raised in a finaliser: such a Ctrl-C comes again by an alarm.  An extension module that is
+    interrupted while it is imported raises an ImportError.
+
+    Parameters
+    ----------
+    last : bool
+        Nothing may be interrupted afterwards.
+    """
+    seen: list[int] = []
+    first_thread = threading.current_thread() is threading.main_thread()
+    if not first_thread or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield seen
+        return
+
+    def note(number: int, frame: object) -> None:
+        seen.append(number)
+        raise KeyboardInterrupt
+
+    def again(dropped: sys.UnraisableHookArgs) -> None:
+        if issubclass(dropped.exc_type, KeyboardInterrupt):
+            signal.setitimer(signal.ITIMER_REAL, 0.01)  # the finaliser has ended by then
+        else:
+            hook(dropped)
+
+    alarm = hasattr(signal, "setitimer")  # not on Windows
+    hook = sys.unraisablehook
+    try:
+        signal.signal(signal.SIGINT, note)
+        if alarm:
+            before = signal.signal(signal.SIGALRM, note)
+            sys.unraisablehook = again
+        yield seen
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_IGN if last else signal.default_int_handler)
+        sys.unraisablehook = hook
+        if alarm:
+            signal.signal(signal.SIGALRM, before)
+
+
+def _run(arguments: Sequence[str] | None, seen: Sequence[int]) -> int:
+    """The command, and what every error becomes."""
     found = getattr(verification, "__version__", "unknown")
     if found != ndtheory.__version__:
         complain(
@@ -77,11 +143,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         complain(error.ctx.get_help())
         return BAD_INPUT
     except click.UsageError as error:
+        from verification.reader import short
+
         where = error.ctx.command_path if error.ctx else "ndtheory"
         complain(f"{where}: {short(printable(' '.join(error.format_message().split())), 600)}")
         return BAD_INPUT
     except (click.Abort, KeyboardInterrupt):
-        complain("interrupted before anything was computed")
+        complain(NOTHING)
         return INTERRUPTED
     except Interrupted:
         return INTERRUPTED
@@ -91,8 +159,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except SystemExit as error:  # click meets a closed pipe with an exit of its own
         return error.code if isinstance(error.code, int) and error.code != NOT_MET else DONE
     except Exception as error:
+        if seen:
+            complain(NOTHING)
+            return INTERRUPTED
         return _explain(error)
-    return status if isinstance(status, int) else DONE
+    status = status if isinstance(status, int) else DONE
+    if seen and status != INTERRUPTED:
+        complain(SHOWN)
+        return INTERRUPTED
+    return status
 
 
 def _explain(error: Exception) -> int:

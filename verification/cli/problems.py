@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from verification.cli.console import complain, deliver, progress, say
+from verification.cli.console import Interrupted, complain, deliver, progress, say, stages
 
 if TYPE_CHECKING:
     from verification.problem import Problem
@@ -119,11 +120,12 @@ def constants(file: Path, refine: int, as_json: bool) -> None:
     from verification.measured import measure
 
     problem = _load(file, None, False)
-    measured = measure(problem, refine=refine)
-    if as_json:
-        say(measured.to_json())
-    else:
-        screens.constants(problem, measured)
+    with stages() as tell:
+        measured = measure(problem, refine=refine, progress=tell)
+    deliver(measured, lambda: screens.constants(problem, measured), as_json)
+    if "levels" in measured.reason:
+        complain(f"{measured.reason['levels']}: what was computed is shown")
+        raise Interrupted
 
 
 @click.command()
@@ -151,11 +153,16 @@ def run(file: Path, theta: str | None, solver: Any, swap_roles: bool, folder: Pa
     target = None if folder is None else Folder(folder, "run")
     pair = build(problem)
     _warn(pair.warnings)
-    with progress("iterating", problem.iteration.tolerance) as watch:
+    with stages() as tell, progress(tell, problem.iteration.tolerance) as watch:
         finished = runs.run(pair, solver=solver, watch=watch)
+        tell("linearising", None)
+        try:
+            _ = finished.forecast, finished.linearised  # here, where Ctrl-C costs no run
+        except KeyboardInterrupt:
+            finished = replace(finished, interrupted=True)
     _warn(problem.iteration.warnings)  # not beside a refusal
     write = None if target is None else lambda: target.write_run(finished)
-    deliver(finished, lambda: screens.run(finished, file), write, folder, as_json)
+    deliver(finished, lambda: screens.run(finished, file), as_json, write, folder)
     return _status_of_run(finished, swap_roles)
 
 
@@ -182,9 +189,11 @@ def solve(file: Path, folder: Path | None, as_json: bool) -> int:
     target = None if folder is None else Folder(folder, "solve")
     facing = face(problem)
     _warn(facing.warnings)
-    solution = monolithic.solve(facing)
+    with stages() as tell:
+        tell("solving both bodies at once", None)
+        solution = monolithic.solve(facing)
     write = None if target is None else lambda: target.write_solution(solution)
-    deliver(solution, lambda: screens.solution(solution, file), write, folder, as_json)
+    deliver(solution, lambda: screens.solution(solution, file), as_json, write, folder)
     return 0
 
 
@@ -248,11 +257,11 @@ def _compare(problem: Problem, file: Path, folder: Path | None, solver: Any, as_
     target = None if folder is None else Folder(folder, "compare")
     pair = build(problem)
     _warn(pair.warnings)
-    with progress("iterating", problem.iteration.tolerance) as watch:
-        comparison = verdicts.compare(pair, solver=solver, watch=watch)
+    with stages() as tell, progress(tell, problem.iteration.tolerance) as watch:
+        comparison = verdicts.compare(pair, solver=solver, watch=watch, progress=tell)
     _warn(problem.iteration.warnings)
     write = None if target is None else lambda: target.write_comparison(comparison)
-    deliver(comparison, lambda: screens.comparison(comparison, file), write, folder, as_json)
+    deliver(comparison, lambda: screens.comparison(comparison, file), as_json, write, folder)
     return _status_of_comparison(comparison, swapped)
 
 
@@ -262,8 +271,9 @@ def _warn(warnings: list[str]) -> None:
 
 
 def _status_of_run(finished: Run, swapped: bool) -> int:
-    if finished.outcome == "interrupted":
-        complain(f"interrupted after {finished.evaluations} evaluations of T: what was computed is kept")
+    if finished.interrupted:
+        ended = "" if finished.outcome == "interrupted" else f"the run had ended ({finished.outcome}), "
+        complain(f"interrupted after {ended}{finished.evaluations} evaluations of T: what was computed is kept")
         return 130
     if not finished.converged:
         complain(remedy(finished, swapped))
@@ -305,7 +315,7 @@ def remedy(finished: Run, swapped: bool) -> str:
 
 def _status_of_comparison(comparison: Comparison, swapped: bool) -> int:
     outcome = comparison.run.outcome
-    if outcome == "interrupted":
+    if comparison.run.interrupted:
         return _status_of_run(comparison.run, swapped)
     if comparison.proved_violated:
         complain("a proved bound is violated: a bug in this program or an error in the proof; please report it")

@@ -1,0 +1,297 @@
+"""Ctrl-C in a process of its own, at many moments: one line, status 130, and on stdout one document or nothing."""
+
+import json
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from contextlib import contextmanager
+
+import pytest
+
+from verification.cli.problems import examples
+
+#: Says on stderr when the command begins: before that the interpreter answers for what Ctrl-C does.
+CALL = """
+    import os, sys
+    import click
+    from verification.cli import main
+
+    begin = click.Group.main
+
+    def here(*args, **options):
+        os.write(2, b"here\\n")
+        return begin(*args, **options)
+
+    click.Group.main = here
+    sys.exit(main())
+"""
+
+MINUTES = 300
+
+
+@contextmanager
+def started(*arguments, code=CALL, mark="here"):
+    """A process, once it has written a line on stderr; at once where that is None."""
+    command = [sys.executable, "-c", textwrap.dedent(code), *map(str, arguments)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        while mark and process.stderr.readline().strip() != mark:
+            pass
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def interrupted(process, after):
+    """Status, stdout and the lines of stderr of a process that gets Ctrl-C after some seconds."""
+    time.sleep(after)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=MINUTES)
+    return process.returncode, out, [line for line in err.splitlines() if line]
+
+
+def told(status, out, lines):
+    """The document of an interrupted command, None where there is none; the rest of what it must be."""
+    document = json.loads(out) if out else None
+    if status == 0:  # too late
+        assert document is not None
+        assert lines == []
+    else:
+        assert status == 130
+        assert len(lines) == 1
+        assert lines[0].startswith("interrupted")
+        assert document is not None or "before" in lines[0]
+    return document
+
+
+LONG = {"iteration.theta": "1e-4", "iteration.max_iterations": "100000"}
+
+
+@pytest.mark.parametrize("moment", [0, 0.1, 0.4])
+def test_ctrl_c_while_the_command_starts_is_one_line(write, moment):
+    with started("run", write(LONG), "--json") as process:
+        told(*interrupted(process, moment))
+
+
+@pytest.mark.parametrize(
+    "module",
+    [
+        "verification.cli.main",
+        "click.core",
+        "ndtheory.bounds",
+        "verification.problem",
+        "numpy",
+        "scipy.linalg",
+        "cvxpy",
+    ],
+)
+def test_ctrl_c_while_a_module_is_imported_is_one_line(write, module):
+    code = f"""
+        import os, signal, sys
+
+        class Interrupts:
+            def find_spec(self, name, path, target=None):
+                if name == {module!r}:
+                    os.kill(os.getpid(), signal.SIGINT)
+
+        sys.meta_path.insert(0, Interrupts())
+        from verification.cli import main
+        sys.exit(main())
+    """
+    with started("run", write(), "--json", code=code, mark=None) as process:
+        out, err = process.communicate(timeout=MINUTES)
+    assert (process.returncode, out) == (130, "")
+    assert err == "interrupted before anything was computed\n"
+
+
+@pytest.mark.parametrize(
+    ("command", "moment"),
+    [
+        *(("compare", moment) for moment in (0.5, 1, 2, 4)),
+        *(("region", moment) for moment in (0.7, 2, 5)),
+        *(("constants", moment) for moment in (0.6, 2)),
+        *(("verify", moment) for moment in (0.5, 2)),
+        ("advise", 0.3),
+        ("solve", 0.3),
+    ],
+)
+def test_ctrl_c_in_any_command_leaves_one_document_or_none(write, tmp_path, command, moment):
+    options = {
+        "region": [write(), "-o", tmp_path / "plane.svg"],
+        "constants": [write(), "--refine", "5"],
+        "compare": [write(), "-o", tmp_path / "results"],
+        "verify": ["5.30", "5.12"],
+    }
+    with started(command, *options.get(command, [write()]), "--json") as process:
+        told(*interrupted(process, moment))
+
+
+#: Says when SCS begins; the losses, which come before, are left out.
+SOLVING = """
+    import os, sys
+    import click
+    from verification.cli import main
+
+    begin = click.Group.main
+
+    def prepared(*args, **options):
+        import scs
+        from verification import verdicts
+
+        class Solver(scs.SCS):
+            def __init__(self, *args, **options):
+                os.write(2, b"solving\\n")
+                super().__init__(*args, **options)
+
+        scs.SCS = Solver
+        verdicts.locate = lambda pair, measured, progress: None
+        return begin(*args, **options)
+
+    click.Group.main = prepared
+    sys.exit(main())
+"""
+
+
+@pytest.mark.parametrize("moment", [0, 0.05, 0.15, 0.4, 0.8])
+def test_ctrl_c_while_scs_factorises_or_iterates_is_never_lost(tmp_path, moment):
+    file = tmp_path / "problem.toml"
+    file.write_text(examples()["section6"], encoding="utf-8")
+    with started("compare", file, "--json", code=SOLVING, mark="solving") as process:
+        status, out, lines = interrupted(process, moment)
+    document = json.loads(out)
+    assert status == 130
+    assert [line for line in lines if line != "solving"] == [
+        f"interrupted after the run had ended (converged), {document['run']['evaluations']} evaluations of T: "
+        "what was computed is kept"
+    ]
+    assert lines.count("solving") <= 1  # no other program was begun
+    assert (document["lmi"], document["verdicts"]["lmi"]) == (None, "NOT_COMPUTED")
+    assert document["reason"]["lmi"] == "interrupted before it was worked out"
+    assert document["run"]["converged"]
+
+
+def test_what_a_c_library_writes_on_stdout_is_not_in_the_document(write):
+    noisy = """
+        import ctypes, os, sys
+        from verification import runs
+        from verification.cli import main
+
+        run = runs.run
+
+        def noisy(*args, **options):
+            print("python was here")
+            os.write(1, b"a descriptor was here\\n")
+            ctypes.CDLL(None).printf(b"C was here\\n")
+            return run(*args, **options)
+
+        runs.run = noisy
+        sys.exit(main())
+    """
+    with started("run", write(), "--json", code=noisy, mark=None) as process:
+        out, err = process.communicate(timeout=MINUTES)
+    assert json.loads(out)["converged"]
+    assert sorted(err.splitlines()) == ["C was here", "a descriptor was here", "python was here"]
+
+
+def test_ctrl_c_that_a_finaliser_drops_comes_again(write):
+    code = """
+        import os, signal, sys
+        from verification import runs
+        from verification.cli import main
+
+        class Dropped:
+            def __del__(self):
+                os.kill(os.getpid(), signal.SIGINT)
+                for _ in range(1000):
+                    pass
+
+        run = runs.run
+
+        def dropping(*args, watch, **options):
+            def also(state):
+                watch(state)
+                if state.iteration == 4:
+                    Dropped()
+            return run(*args, watch=also, **options)
+
+        runs.run = dropping
+        sys.exit(main())
+    """
+    with started("run", write(LONG), "--json", code=code, mark=None) as process:
+        out, err = process.communicate(timeout=MINUTES)
+    assert process.returncode == 130
+    assert err.startswith("interrupted after ")
+    assert err.count("\n") == 1
+    assert json.loads(out)["outcome"] == "interrupted"
+
+
+@pytest.mark.parametrize("module", ["numpy", "cvxpy", "matplotlib"])
+def test_an_import_that_ctrl_c_breaks_is_no_bug(write, tmp_path, module):
+    """An extension module may turn Ctrl-C into an error of its own."""
+    code = f"""
+        import os, signal, sys
+        from verification.cli import main
+
+        class Breaks:
+            def find_spec(self, name, path, target=None):
+                if name == {module!r}:
+                    try:
+                        os.kill(os.getpid(), signal.SIGINT)
+                    except KeyboardInterrupt:
+                        raise ImportError("initialization failed") from None
+
+        sys.meta_path.insert(0, Breaks())
+        sys.exit(main())
+    """
+    with started("run", write(), "-o", tmp_path / "results", "--json", code=code, mark=None) as process:
+        out, err = process.communicate(timeout=MINUTES)
+    assert process.returncode == 130
+    assert "Traceback" not in err
+    assert err.startswith("interrupted")
+    assert err.count("\n") == 1
+    assert (json.loads(out)["converged"] if out else module) in (True, module)
+
+
+def test_constants_keep_the_meshes_that_were_measured(call, write, monkeypatch):
+    from verification import measured
+
+    build, built = measured.build, []
+
+    def interrupt(problem):
+        built.append(problem)
+        if len(built) == 3:
+            signal.raise_signal(signal.SIGINT)
+        return build(problem)
+
+    monkeypatch.setattr(measured, "build", interrupt)
+    answer = call("constants", write(), "--refine", "4", "--json")
+    assert answer.status == 130
+    assert len(answer.document["levels"]) == 2
+    assert answer.document["reason"]["levels"] == "interrupted after 1 of 4 halvings"
+    assert answer.err == "interrupted after 1 of 4 halvings: what was computed is shown\n"
+
+
+def test_region_draws_the_runs_that_were_made(call, write, tmp_path, monkeypatch):
+    from verification import plane
+
+    monkeypatch.setattr(plane, "THETAS", (0.2, 0.4))
+    monkeypatch.setattr(plane, "FRICTIONS", (0.1, 0.3))
+    monkeypatch.setattr(plane, "LARGEST", 0)  # without the semidefinite edition
+    run, runs = plane.run, []
+
+    def interrupt(*args, **options):
+        runs.append(options["theta"])
+        if len(runs) == 3:
+            signal.raise_signal(signal.SIGINT)
+        return run(*args, **options)
+
+    monkeypatch.setattr(plane, "run", interrupt)
+    answer = call("region", write(), "-o", tmp_path / "plane.svg", "--json")
+    assert answer.status == 130
+    assert len(answer.document["points"]) == 2
+    assert answer.document["reason"]["points"] == "interrupted after 2 of 4 runs"
+    assert answer.err == "interrupted after 2 of 4 runs: what was computed is drawn\n"
+    assert b"<dc:title>ndtheory</dc:title>" in (tmp_path / "plane.svg").read_bytes()

@@ -1,0 +1,64 @@
+"""A command that takes its time says what it is doing: on a terminal, and to whoever asks from Python."""
+
+import os
+import pty
+import re
+import subprocess
+import sys
+
+import verification as vf
+
+CALL = "import sys; from verification.cli import main; sys.exit(main())"
+
+#: What a comparison does, in its order.
+STAGES = ["measuring", "iterating", "searching", "semidefinite edition", "linearising"]
+
+
+def stages(told):
+    """The stages that were told, each once."""
+    return list(dict.fromkeys(stage for what in told for stage in STAGES if what.startswith(stage)))
+
+
+def test_a_comparison_names_everything_it_does_in_its_order(write):
+    told = []
+    vf.compare(vf.load(write()), progress=lambda what, share: told.append((what, share)))
+    assert stages(what for what, _ in told) == STAGES
+    assert all(any(what.startswith(stage) for stage in STAGES) for what, _ in told)
+    assert all(share is None or 0 <= share <= 1 for _, share in told)
+    programs = {what for what, _ in told if what.startswith("semidefinite edition")}
+    assert len(programs) > 3  # the largest theta, the threshold at several frictions, the factor
+
+
+def test_constants_name_the_mesh_that_is_measured(write):
+    told = []
+    vf.measure(vf.load(write()), refine=2, progress=lambda what, share: told.append(what))
+    assert told == ["measuring the constants", *(f"measuring the constants, {i} of 2 halvings" for i in (1, 2))]
+
+
+def on_a_terminal(*arguments):
+    """What a command writes to a terminal on stderr."""
+    leader, follower = pty.openpty()
+    environment = os.environ | {"TERM": "xterm", "COLUMNS": "120"}
+    command = [sys.executable, "-c", CALL, *map(str, arguments)]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=follower, env=environment) as process:
+        os.close(follower)
+        written = b""
+        while True:
+            try:
+                chunk = os.read(leader, 4096)
+            except OSError:  # the other end was closed
+                break
+            if not chunk:
+                break
+            written += chunk
+    os.close(leader)
+    assert process.returncode == 0
+    return re.sub(rb"\x1b\[[0-9;?]*[a-zA-Z]", b"", written).decode()
+
+
+def test_a_terminal_shows_what_compare_is_doing(write, tmp_path):
+    shown = on_a_terminal("compare", write(), "-o", tmp_path / "results")
+    assert "searching what the inequalities lose" in shown
+    assert "semidefinite edition: " in shown
+    assert "drawing and writing" in shown
+    assert len(re.findall("iterating", shown)) < len(re.findall("semidefinite edition", shown))
