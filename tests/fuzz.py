@@ -2,7 +2,7 @@
 
 ``python tests/fuzz.py 10000 3000 500 [SEED]`` tries as many of each and prints what broke a rule; tests try a few.
 An answer keeps the rules if it has an exit status of 0 to 3, no traceback and no warning of a library; a refusal is one
-short line and nothing on stdout; a document is valid JSON of finite numbers that obeys its own laws; all within LIMIT.
+short line and nothing on stdout; a document is valid JSON of finite numbers that obeys its own laws; within LIMIT.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from fem1d2d.mesh import measures
 from verification.cli import main
 from verification.cli.problems import examples
 
-#: Seconds for an answer.
+#: Seconds of computing for an answer, whatever else the machine does.
 LIMIT = 30
 
 PLANE = """title = "small"
@@ -305,13 +305,13 @@ def in_time() -> Iterator[None]:
     def stop(*_: object) -> None:
         raise Late
 
-    before = signal.signal(signal.SIGALRM, stop)
-    signal.alarm(LIMIT)
+    before = signal.signal(signal.SIGPROF, stop)
+    signal.setitimer(signal.ITIMER_PROF, LIMIT)
     try:
         yield
     finally:
-        signal.alarm(0)
-        signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
 
 
 def finite(value: Any) -> Any:
@@ -371,7 +371,7 @@ def judge(arguments: list[str]) -> str | None:
         if len(lines) != 1 or not lines[0].isprintable() or len(lines[0]) > 1000:
             return f"a refusal that is not one short line: {said[:600]!r}"
         named = [word for word in arguments if word.endswith("problem.toml")]
-        if named and named[0] not in said and arguments[0] not in ("bounds",) and len(arguments) == 3:
+        if named and named[0] not in said and arguments[2:] == ["--json"]:
             return f"a refusal that does not name the file: {said!r}"
     if status != 2 and "--json" in arguments and "--help" not in arguments:
         if not shown and status == 1 and len(lines) == 1:
@@ -405,16 +405,16 @@ def campaign(counts: dict[str, int], first: int) -> int:
     broken = 0
     with tempfile.TemporaryDirectory() as folder:
         for kind, count in counts.items():
-            start, slowest, here = time.monotonic(), 0.0, 0
+            start, slowest, here = time.process_time(), 0.0, 0
             for seed in range(first, first + count):
-                begin = time.monotonic()
+                begin = time.process_time()
                 complaint = attempt(kind, seed, Path(folder))
-                slowest = max(slowest, time.monotonic() - begin)
+                slowest = max(slowest, time.process_time() - begin)
                 if complaint:
                     here += 1
                     print(complaint, flush=True)
             print(f"{kind}: {count} tried, {here} broke a rule, slowest {slowest:.1f} s, "
-                  f"{time.monotonic() - start:.0f} s", flush=True)  # fmt: skip
+                  f"{time.process_time() - start:.0f} s", flush=True)  # fmt: skip
             broken += here
     return broken
 
