@@ -25,6 +25,9 @@ class MeshError(ValueError):
     """A mesh that cannot be used; the message says what was needed and what was received."""
 
 
+#: Nodes of a file are not numbered beyond this: a table of them would fill the memory.
+LARGEST_NUMBER = 10**8
+
 #: Coordinates are not larger than this: beyond, products of a few overflow a double.
 LARGEST = 1e30
 
@@ -291,6 +294,9 @@ def from_file(path: Path | str) -> Mesh:
         if isinstance(error, MeshError):
             raise
         raise MeshError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    largest = _largest_number(path)
+    if largest > LARGEST_NUMBER:
+        raise MeshError(f"{path}: a node has the number {largest:g}: at most {LARGEST_NUMBER} is needed")
     words = io.StringIO()  # its readers print, and exit the interpreter on what they cannot read
     try:
         with contextlib.redirect_stdout(words), contextlib.redirect_stderr(words), warnings.catch_warnings():
@@ -333,6 +339,19 @@ def _named_lines(read: Any) -> dict[str, Ints]:
     return {name: np.asarray(facets, dtype=np.int64) for name, facets in lines.items() if len(facets)}
 
 
+def _largest_number(path: Path) -> float:
+    """The largest number that a Gmsh text file gives a node; meshio fills a table as long."""
+    content = path.read_bytes()
+    nodes = re.search(rb"\$Nodes\s(.*?)\$EndNodes", content, re.DOTALL)
+    if not content.startswith(b"$MeshFormat") or nodes is None or content.split(None, 3)[2:3] != [b"0"]:
+        return 0
+    width = 4 if content.split(None, 2)[1].startswith(b"2") else 1  # beside its coordinates, or on a line of its own
+    first = (line.split() for line in nodes[1].splitlines())
+    with contextlib.suppress(ValueError):  # what is no number is meshio's to refuse
+        return max((float(words[0]) for words in first if len(words) == width), default=0)
+    return 0
+
+
 def _least_number(path: Path) -> int:
     """The least node number of points, lines and triangles of a Gmsh file; meshio counts 0 and below from the end.
 
@@ -352,22 +371,26 @@ def _least_number(path: Path) -> int:
         left = int(content[start.end() :].split(None, 1)[0])
         while left > 0:
             kind, count, tags = numbers[at : at + 3].tolist()
+            if count < 1 or tags < 0:
+                raise ValueError("no block of elements")
             width = 1 + tags + corners[kind]
             rows = numbers[at + 3 : at + 3 + count * width].reshape(count, width)
             least = min(least, int(rows[:, 1 + tags :].min(initial=1)))
             at, left = at + 3 + count * width, left - count
         return least
-    numbers = np.array(content[start.end() :].partition(b"$EndElements")[0].split(), dtype=np.int64)
-    if version.startswith(b"2"):
-        listed = numbers[1:].tolist()
-        while at < len(listed):
-            nodes = at + 3 + listed[at + 2]
-            at = nodes + corners[listed[at + 1]]
-            least = min(least, *listed[nodes:at])
+    listed = content[start.end() :].partition(b"$EndElements")[0]
+    if version.startswith(b"2"):  # meshio takes the last numbers of a line for its nodes
+        for line in listed.splitlines()[1:]:
+            row = [int(word) for word in line.split()]
+            if row and len(row) != 3 + row[2] + corners[row[1]]:
+                raise ValueError("another number of tags and nodes than the line says")
+            least = min([least, *row[3 + row[2] :]]) if row else least
         return least
-    at = 2 if version == b"4" else 4
+    numbers, at = np.array(listed.split(), dtype=np.int64), 2 if version == b"4" else 4
     while at < len(numbers):
         width, count = 1 + corners[int(numbers[at + 2])], int(numbers[at + 3])
+        if count < 0:
+            raise ValueError("no block of elements")
         rows = numbers[at + 4 : at + 4 + count * width].reshape(count, width)
         least, at = min(least, int(rows[:, 1:].min(initial=1))), at + 4 + count * width
     return least

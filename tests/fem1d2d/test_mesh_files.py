@@ -360,6 +360,7 @@ def written(path, *elements):
         ([LINE, "2 2 9 1 1 2 7", *CELLS], "meshio cannot read it"),
         (["1 2 1 1 1 0", *CELLS], "an element names node 0: nodes are numbered from 1"),
         (CELLS, "no named lines; give the sides physical names"),
+        ([LINE, *("2 3 9 1 1 2 3", "2 3 9 1 1 3 4")], "its elements do not fit its format"),
     ],
 )
 def test_a_file_whose_cells_or_sides_do_not_fit_together_is_refused(tmp_path, elements, message):
@@ -392,6 +393,17 @@ def test_a_node_number_below_one_of_format_4_is_refused(tmp_path):
     path = tmp_path / "square.msh"
     path.write_text(GMSH41.replace("6 2 11 9\n", "6 2 0 9\n"))
     refused(path, "an element names node 0: nodes are numbered from 1")
+
+
+@pytest.mark.parametrize(
+    ("text", "old", "new"), [(MSH, "4 0 1 0\n", "1e9 0 1 0\n"), (GMSH41, "11\n0 0 0", "9999999999\n0 0 0")]
+)
+def test_a_node_number_that_would_fill_the_memory_is_refused(tmp_path, text, old, new):
+    path = tmp_path / "body.msh"
+    path.write_text(
+        (text.format(count=3, elements="\n".join([LINE, *CELLS])) if text == MSH else text).replace(old, new)
+    )
+    refused(path, r"a node has the number 1e\+(09|10): at most 100000000 is needed")
 
 
 def test_names_without_lines_are_left_out(tmp_path):

@@ -1,10 +1,11 @@
 """Cells side by side: nothing twice, nothing on top of another, and no valid mesh refused."""
 
 from fractions import Fraction
+from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from strategies import fewer, in_floats, lines, numbers, plane_meshes
 
@@ -238,6 +239,63 @@ def test_a_wide_strip_of_cells_is_judged_in_time_near_linear():
     assert len(mesh.boundary) == 40_002
     with pytest.raises(MeshError, match=r"cross|touch|inside"):
         Mesh(**joined(mesh, box((0.5, 0.7), (0.5, 0.7))))
+
+
+def common(one, other):
+    """The common part of two triangles by clipping, as a set of corners; exact."""
+    part = one
+    for a, b in pairwise([*other, other[0]]):
+        side = lambda p, a=a, b=b: (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
+        kept = []
+        for p, q in pairwise([*part, *part[:1]]) if len(part) > 1 else [(p, p) for p in part]:
+            if side(p) >= 0:
+                kept.append(p)
+            if side(p) * side(q) < 0:
+                t = side(p) / (side(p) - side(q))
+                kept.append((p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])))
+        part = list(dict.fromkeys(kept))
+    return set(part)
+
+
+def fit(points, one, other):
+    """Whether two cells meet in nothing, a corner of both, or an edge with common nodes; by definition."""
+    shared = common([points[n] for n in one], [points[n] for n in other])
+    corners = {points[n] for n in one} & {points[n] for n in other}
+    if len(shared) == 2 and shared <= corners:
+        return len(set(one) & set(other)) == 2
+    return not shared or (len(shared) == 1 and shared <= corners)
+
+
+@st.composite
+def few_triangles(draw):
+    """Two to four positively oriented triangles between points of a small grid, some of them doubled."""
+    points = draw(st.lists(st.tuples(*[numbers(0, 3, 1)] * 2), min_size=4, max_size=8, unique=draw(st.booleans())))
+    cells = []
+    for _ in range(draw(st.integers(2, 4))):
+        a, b, c = draw(st.permutations(range(len(points))))[:3]
+        area = (points[b][0] - points[a][0]) * (points[c][1] - points[a][1])
+        area -= (points[b][1] - points[a][1]) * (points[c][0] - points[a][0])
+        if area:
+            cells.append((a, b, c) if area > 0 else (a, c, b))
+    return points, cells
+
+
+@given(few_triangles(), st.booleans())
+def test_triangles_make_a_mesh_if_and_only_if_each_two_meet_as_a_mesh_defines(given_mesh, exact):
+    points, cells = given_mesh
+    assume(cells)
+    used = sorted({n for cell in cells for n in cell})
+    kind = {"dtype": object if exact else float}
+    make = lambda: Mesh(
+        points=np.array([points[n] for n in used], **kind),
+        cells=np.array([[used.index(n) for n in cell] for cell in cells]),
+        sides={},
+    )
+    if all(fit(points, one, other) for one, other in combinations(cells, 2)):
+        assert len(make().cells) == len(cells)
+    else:
+        with pytest.raises(MeshError):
+            make()
 
 
 # --- one dimension ----------------------------------------------------------------------------------------------------

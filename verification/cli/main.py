@@ -17,7 +17,7 @@ import ndtheory
 import verification
 from ndtheory import HypothesisError
 from verification.cli import calculator, choices, ledger, problems
-from verification.cli.console import NOTHING, SHOWN, Interrupted, ReaderGone, complain, interruptible
+from verification.cli.console import NOTHING, SHOWN, Interrupted, ReaderGone, complain, interruptible, printable
 
 #: Exit statuses of the interface.  A crash is none of them.
 DONE, NOT_MET, BAD_INPUT, INCONCLUSIVE, INTERRUPTED, CRASH = 0, 1, 2, 3, 130, 70
@@ -143,8 +143,10 @@ def _run(arguments: Sequence[str] | None, seen: Sequence[int]) -> int:
         complain(error.ctx.get_help())
         return BAD_INPUT
     except click.UsageError as error:
+        from verification.reader import short
+
         where = error.ctx.command_path if error.ctx else "ndtheory"
-        complain(f"{where}: {' '.join(error.format_message().split())}")
+        complain(f"{where}: {short(printable(' '.join(error.format_message().split())), 600)}")
         return BAD_INPUT
     except (click.Abort, KeyboardInterrupt):
         complain(NOTHING)

@@ -1,0 +1,425 @@
+"""Mutated problem files, meshes and option sets, and what the command may answer to them.
+
+``python tests/fuzz.py 10000 3000 500 [SEED]`` tries as many of each and prints what broke a rule; tests try a few.
+An answer keeps the rules if it has an exit status of 0 to 3, no traceback and no warning of a library; a refusal is one
+short line and nothing on stdout; a document is valid JSON of finite numbers that obeys its own laws; within LIMIT.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import random
+import re
+import signal
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fem1d2d import Mesh, MeshError, from_file, rectangle
+from fem1d2d.mesh import measures
+from verification.cli import main
+from verification.cli.problems import examples
+
+#: Seconds of computing for an answer, whatever else the machine does.
+LIMIT = 30
+
+PLANE = """title = "small"
+dimension = 2
+[units]
+length = "mm"
+stress = "MPa"
+[body1]
+shape = "rectangle"
+x = [0.0, 2.0]
+y = [-0.3, 0.0]
+cells = [10, 2]
+young = 7.0e4
+poisson = 0.3
+fixed = ["bottom"]
+prescribed = {}
+traction = { right = [0.0, 0.0] }
+body_force = [0.0, 0.0]
+[body2]
+shape = "rectangle"
+x = [0.4, 1.6]
+y = [0.0, 0.3]
+cells = [6, 2]
+young = 2.0e4
+poisson = 0.3
+fixed = []
+prescribed = { top = [0.0, -0.015] }
+traction = {}
+body_force = [0.0, 0.0]
+[contact]
+interval = [0.4, 1.6]
+friction = 0.2
+law = "nonlocal"
+radius = 0.2
+gap = 0.0
+[iteration]
+neumann_body = 1
+theta = 0.7
+relaxation = "constant"
+tolerance = 1e-9
+max_iterations = 60
+[norm]
+length = 1.0
+"""
+MESHED = re.sub(r'shape = "rectangle"\nx = \[0.0, 2.0\]\ny = .*\ncells = .*\n', 'mesh = "body.msh"\n', PLANE, count=1)
+BASES = (PLANE, PLANE, examples()["two-bars"])
+
+NUMBERS = (
+    *(
+        "0",
+        "1",
+        "-1",
+        "2",
+        "0.5",
+        "0.1",
+        "1e-9",
+        "1e9",
+        "1e30",
+        "1e-30",
+        "-1e30",
+        "1e31",
+        "1e-31",
+        "1e308",
+        "nan",
+        "inf",
+    ),
+    *("0.49", "0.4999999", "0.49999999999999", "-0.9999", "1e-7", '"1/3"', '"1/0"', "0.30000000000000004", "1e16"),
+)
+VALUES = (
+    *NUMBERS,
+    *('""', '"x"', "true", "[]", "{}", "[0.0, 1.0]", "[1.0, 0.0]", "[0.0, 0.0, 0.0]", "1979-05-27", '"auto"', '"free"'),
+    *('["bottom"]', '["top"]', '["left", "right"]', '["bottom", "left"]', '"local"', '"rigid"', '"mesh"', '"interval"'),
+    *("{ top = [0.0, -0.015] }", '{ top = ["free", -0.01] }', "{ top = [0.01, 0.01] }", "{ left = [0.0, 0.0] }"),
+    *("{ right = [0.0, -60.0] }", "{ bottom = [1.0, 1.0] }", '"aitken"', '"anderson"', '"newton"', '"momentum"'),
+    *("[1, 1]", "[2, 1]", "[6, 2]", "[7, 3]", "[1000000, 1]", '"\\u0000"', '"' + "y" * 300 + '"', "0x" + "F" * 300),
+)  # fmt: skip
+
+
+def mutated(text: str, draw: random.Random, times: int) -> bytes:
+    """A text with values, lines and bytes changed."""
+    for _ in range(times):
+        lines = text.splitlines()
+        i = draw.randrange(len(lines))
+        kind = draw.random()
+        if kind < 0.45 and "=" in lines[i]:
+            lines[i] = lines[i].partition("=")[0] + "= " + draw.choice(VALUES)
+        elif kind < 0.65:
+            scale = lambda found: f"{float(found[0]) * draw.choice((0, -1, 2, 0.5, 10, 0.1, 1e6, 1e-6, 1.0000001)):.9g}"
+            if not lines[i].startswith("cells"):
+                lines[i] = re.sub(r"(?<![\w.\"])-?\d+(\.\d+)?(e-?\d+)?(?![\w.])", scale, lines[i], count=1)
+        elif kind < 0.72:
+            del lines[i]
+        elif kind < 0.78:
+            lines.insert(draw.randrange(len(lines)), lines[i])
+        elif kind < 0.84:
+            lines[i] = lines[i].replace(
+                draw.choice(lines[i] or " "), draw.choice('abz"[]{}=.,#\\ 019\N{GREEK SMALL LETTER RHO}'), 1
+            )
+        elif kind < 0.9:
+            j = draw.randrange(len(lines))
+            lines[i], lines[j] = lines[j], lines[i]
+        elif kind < 0.95:
+            lines = [
+                line
+                for line in lines
+                if not line.startswith(draw.choice(("fixed", "prescribed", "radius", "x", "interval")))
+            ]
+        text = "\n".join(lines or [""]) + "\n"
+    data = bytearray(text.encode())
+    if draw.random() < 0.1:
+        for _ in range(draw.randrange(1, 4)):
+            data[draw.randrange(len(data))] = draw.randrange(256)
+    if draw.random() < 0.03:
+        del data[draw.randrange(len(data)) :]
+    return bytes(data)
+
+
+def problem(draw: random.Random, folder: Path) -> list[str]:
+    """A command on a mutated problem file."""
+    (folder / "problem.toml").write_bytes(mutated(draw.choice(BASES), draw, draw.choice((1, 1, 2, 2, 3, 5))))
+    command = draw.choice(("run",) * 5 + ("solve",) * 5 + ("constants",) * 3 + ("advise",) * 2 + ("compare",))
+    return [command, str(folder / "problem.toml"), "--json"]
+
+
+# --- meshes -----------------------------------------------------------------------------------------------------------
+
+
+def gmsh(mesh: Mesh) -> str:
+    """A mesh as a Gmsh file of version 2.2."""
+    names = [f'1 {i} "{name}"' for i, name in enumerate(mesh.sides, 1)]
+    nodes = [f"{i} {x!r} {y!r} 0" for i, (x, y) in enumerate(mesh.points.tolist(), 1)]
+    elements = [f"1 2 {i} {i} {a + 1} {b + 1}" for i, facets in enumerate(mesh.sides.values(), 1) for a, b in facets]
+    elements += [f"2 2 9 1 {a + 1} {b + 1} {c + 1}" for a, b, c in mesh.cells]
+    numbered = [f"{i} {element}" for i, element in enumerate(elements, 1)]
+    blocks = {"MeshFormat": ["2.2 0 8"], "PhysicalNames": [str(len(names)), *names]}
+    blocks |= {"Nodes": [str(len(nodes)), *nodes], "Elements": [str(len(elements)), *numbered]}
+    return "".join(f"${name}\n" + "\n".join(block) + f"\n$End{name}\n" for name, block in blocks.items())
+
+
+def broken_mesh(draw: random.Random) -> dict[str, Any]:
+    """The arrays of a rectangle with some entries changed."""
+    mesh = rectangle((0.0, 2.0), (0.0, 1.0), (draw.randint(1, 4), draw.randint(1, 3)))
+    points, cells, sides = mesh.points.copy(), mesh.cells.copy(), {name: f.copy() for name, f in mesh.sides.items()}
+    for _ in range(draw.choice((1, 1, 2, 3))):
+        kind, i, j = draw.randrange(9), draw.randrange(len(cells)), draw.randrange(len(points))
+        if kind == 0:
+            points[j] += [draw.gauss(0, 0.3), draw.gauss(0, 0.3)]
+        elif kind == 1:
+            points[j] = points[draw.randrange(len(points))]
+        elif kind == 2:
+            points[j, draw.randrange(2)] = draw.choice((np.nan, np.inf, 1e300, 1e31, -1e29, 5e-324, 0.5))
+        elif kind == 3:
+            cells[i, draw.randrange(3)] = draw.choice((-1, 0, j, len(points), 10**12))
+        elif kind == 4:
+            cells = np.concatenate([cells, cells[[i]]])
+        elif kind == 5 and len(cells) > 1:
+            cells = np.delete(cells, i, axis=0)
+        elif kind == 6:
+            name = draw.choice(list(sides))
+            sides[name] = np.concatenate([sides[name], sides[draw.choice(list(sides))][:1]])
+        elif kind == 7:
+            name = draw.choice(list(sides))
+            sides[name] = np.concatenate([sides[name], [[j, draw.randrange(-1, len(points) + 1)]]])
+        else:
+            cells[i] = cells[i][::-1]
+    return {"points": points, "cells": cells, "sides": sides}
+
+
+def check_arrays(draw: random.Random, folder: Path) -> str | None:
+    """Whether Mesh refuses arrays by a MeshError, or makes of them what areas and the divergence theorem confirm."""
+    given = broken_mesh(draw)
+    try:
+        mesh = Mesh(**given)
+    except MeshError:
+        return None
+    a, b = (mesh.points[mesh.boundary[:, i]] for i in range(2))
+    around = float((a[:, 0] * b[:, 1] - b[:, 0] * a[:, 1]).sum() / 2)
+    area = float(measures(mesh.points, mesh.cells).sum())
+    # Random points lie in as many cells as they are wound round by the boundary: 0 or 1.
+    p = np.array([[draw.uniform(-0.5, 2.5), draw.uniform(-0.5, 1.5)] for _ in range(100)])
+    corners = mesh.points[mesh.cells]
+    inside = np.ones((len(p), len(corners)), dtype=bool)
+    for k in range(3):
+        u, v = corners[:, (k + 1) % 3] - corners[:, k], p[:, None] - corners[None, :, k]
+        inside &= u[:, 0] * v[..., 1] - u[:, 1] * v[..., 0] > 0
+    if inside.sum(axis=1).max() > 1 or not np.isclose(around, area, rtol=1e-9):
+        return f"accepted with overlap: {given}"
+    return None
+
+
+def mesh_file(draw: random.Random, folder: Path) -> list[str] | None:
+    """A mutated Gmsh file, in a problem or read alone."""
+    mesh = rectangle((0.0, 2.0), (-0.3, 0.0), (10, 2))
+    lines = gmsh(mesh).splitlines()
+    for _ in range(draw.choice((1, 1, 2, 3, 5))):
+        i = draw.randrange(len(lines))
+        kind, words = draw.random(), lines[i].split()
+        if kind < 0.5 and words:
+            k = draw.randrange(len(words))
+            words[k] = draw.choice(
+                ("0", "-1", "1", "2", "3", "7", "15", "99", "1e9", "nan", "x", "", "0.1", "33", "9" * 12)
+            )
+            lines[i] = " ".join(words)
+        elif kind < 0.65:
+            del lines[i]
+        elif kind < 0.8:
+            lines.insert(draw.randrange(len(lines)), lines[i])
+        else:
+            j = draw.randrange(len(lines))
+            lines[i], lines[j] = lines[j], lines[i]
+    data = bytearray("\n".join(lines).encode())
+    if draw.random() < 0.2:
+        data[draw.randrange(len(data))] = draw.randrange(256)
+    if draw.random() < 0.1:
+        del data[draw.randrange(len(data)) :]
+    (folder / "body.msh").write_bytes(data)
+    if draw.random() < 0.7:
+        with contextlib.suppress(MeshError):
+            from_file(folder / "body.msh")
+        return None
+    (folder / "problem.toml").write_text(MESHED, encoding="utf-8")
+    return [draw.choice(("run", "solve", "constants")), str(folder / "problem.toml"), "--json"]
+
+
+# --- options ----------------------------------------------------------------------------------------------------------
+
+OPTIONS: dict[str, dict[str, tuple[str, ...] | None]] = {
+    "run": {"--theta": NUMBERS, "--solver": ("auto", "cvxpy", "active-set", "x"), "--swap-roles": None, "--json": None},
+    "compare": {"--theta": NUMBERS, "--solver": ("auto", "x"), "--swap-roles": None, "--json": None},
+    "constants": {"--refine": ("0", "1", "-1", "9", "x", ""), "--json": None},
+    "solve": {"--json": None, "--theta": NUMBERS},
+    "advise": {"--json": None, "--theta": NUMBERS, "--ratio": NUMBERS},
+    "bounds": {
+        **dict.fromkeys(("--m", "--M", "--CR", "--Cs", "--Ctr", "--k", "--CK", "--theta", "--rho"), NUMBERS),
+        **dict.fromkeys(("--kappa1", "--kappa2"), NUMBERS), "--edition": ("printed", "repaired", "both", "x"),
+        "--check": None, "--json": None,
+    },
+    "example": {"--json": None, "section6": None, "x" * 3000: None},
+    "verify": {"2.1": None, "--level": ("quick", "x"), "--json": None},
+}  # fmt: skip
+USUAL = {"--m": "1", "--M": "3", "--CR": "1.5", "--CK": "0", "--theta": "0.3", "--rho": "1"}
+
+
+def options(draw: random.Random, folder: Path) -> list[str]:
+    """A call with options that may not fit."""
+    command = draw.choice(tuple(OPTIONS) + ("bounds",) * 6 + ("advise",) * 3 + ("run",) * 3)
+    words = (
+        [command, draw.choice(("5.30", "x", "C5"))] if command == "verify" else [command]
+    )  # all of them take minutes
+    known = OPTIONS[command]
+    if command not in ("bounds", "example", "verify") and draw.random() < (0.3 if command == "advise" else 0.95):
+        (folder / "problem.toml").write_text(PLANE, encoding="utf-8")
+        words.append(str(folder / "problem.toml"))
+    for name in draw.sample(sorted(known), draw.randint(0, min(len(known), 8))):
+        values = known[name]
+        if values is None:
+            words.append(name)
+        else:
+            value = draw.choice(values) if name not in USUAL or draw.random() < 0.4 else USUAL[name]
+            words += [name, value.strip('"')] if draw.random() < 0.9 else [f"{name}={value}"]
+    if draw.random() < 0.05:
+        words.append(draw.choice(("--bogus", "-o", "--help", "extra", "", "-", "\n", "\x1b[2J", "9" * 5000)))
+    return words
+
+
+# --- the judge --------------------------------------------------------------------------------------------------------
+
+
+class Late(BaseException):
+    """No answer within LIMIT."""
+
+
+@contextlib.contextmanager
+def in_time() -> Iterator[None]:
+    def stop(*_: object) -> None:
+        raise Late
+
+    before = signal.signal(signal.SIGPROF, stop)
+    signal.setitimer(signal.ITIMER_PROF, LIMIT)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
+
+
+def finite(value: Any) -> Any:
+    """The numbers of a document."""
+    if isinstance(value, dict):
+        value = list(value.values())
+    if isinstance(value, list):
+        for item in value:
+            yield from finite(item)
+    elif isinstance(value, float):
+        yield value
+
+
+def laws(document: dict[str, Any]) -> str | None:
+    """What a document says against itself."""
+    if not all(np.isfinite(v) for v in finite(document)):
+        return "a number that is not finite"
+    kind = document["schema"].partition("/")[0].removeprefix("ndtheory.")
+    if kind == "compare":
+        document, kind = document["run"], "run"
+    if kind in ("run", "solve"):
+        if not document["kkt_residual"] <= 1e-8:
+            return f"kkt_residual {document['kkt_residual']}"
+        pressure = np.array(document["contact"]["pressure"])
+        if len(pressure) and pressure.min() < -1e-6 * np.abs(pressure).max():
+            return "tension on Gamma_c"
+    if kind == "run" and document["converged"] and document["outcome"] != "converged":
+        return "converged and not"
+    if kind == "constants":
+        for name in ("m", "M", "rho_max", "rho_min"):
+            if document[name] is not None and not document[name]["value"] > 0:
+                return f"{name} = {document[name]['value']}"
+        if not document["m"]["value"] <= document["M"]["value"]:
+            return "m > M"
+    return None
+
+
+def judge(arguments: list[str]) -> str | None:
+    """The rule that the answer to a call breaks, or None."""
+    out, err = io.StringIO(), io.StringIO()
+    try:
+        with in_time(), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            status = main(arguments)
+    except Late:
+        return f"no answer in {LIMIT} s"
+    except BaseException as error:
+        return f"{type(error).__name__} escapes: {error}"
+    shown, said = out.getvalue(), err.getvalue()
+    if status not in (0, 1, 2, 3) or "Traceback" in said:
+        return f"status {status}: {said[-600:]}"
+    if re.search(r"\w+Warning\b|\.py:\d+", said):
+        return f"a warning of a library: {said[-600:]}"
+    lines = [line for line in said.splitlines() if not line.startswith("warning: ")]
+    if status == 2 and "Usage: ndtheory" not in said:
+        if shown:
+            return f"a refusal with {len(shown)} characters on stdout"
+        if len(lines) != 1 or not lines[0].isprintable() or len(lines[0]) > 1000:
+            return f"a refusal that is not one short line: {said[:600]!r}"
+        named = [word for word in arguments if word.endswith("problem.toml")]
+        if named and named[0] not in said and arguments[2:] == ["--json"]:
+            return f"a refusal that does not name the file: {said!r}"
+    if status != 2 and "--json" in arguments and "--help" not in arguments:
+        if not shown and status == 1 and len(lines) == 1:
+            return None  # no certified solution
+        try:
+            return laws(json.loads(shown))
+        except (ValueError, KeyError, TypeError) as error:
+            return f"status {status}, no valid document: {type(error).__name__} {error}; {said[-300:]}"
+    return None
+
+
+KINDS = {"problem": problem, "mesh": mesh_file, "arrays": check_arrays, "options": options}
+
+
+def attempt(kind: str, seed: int, folder: Path) -> str | None:
+    """The rule that one mutated input breaks, or None."""
+    draw = random.Random(f"{kind} {seed}")
+    try:
+        with in_time():
+            made = KINDS[kind](draw, folder)
+    except Late:
+        return f"no answer in {LIMIT} s"
+    except Exception as error:
+        return f"{type(error).__name__} escapes: {error}"
+    found = made if made is None or isinstance(made, str) else judge(made)
+    return None if found is None else f"{kind} {seed}: {made if isinstance(made, list) else ''} {found}"
+
+
+def campaign(counts: dict[str, int], first: int) -> int:
+    """Try as many of each kind and print what broke a rule; returns how many did."""
+    broken = 0
+    with tempfile.TemporaryDirectory() as folder:
+        for kind, count in counts.items():
+            start, slowest, here = time.process_time(), 0.0, 0
+            for seed in range(first, first + count):
+                begin = time.process_time()
+                complaint = attempt(kind, seed, Path(folder))
+                slowest = max(slowest, time.process_time() - begin)
+                if complaint:
+                    here += 1
+                    print(complaint, flush=True)
+            print(f"{kind}: {count} tried, {here} broke a rule, slowest {slowest:.1f} s, "
+                  f"{time.process_time() - start:.0f} s", flush=True)  # fmt: skip
+            broken += here
+    return broken
+
+
+if __name__ == "__main__":
+    problems, meshes, calls, *seed = map(int, sys.argv[1:])
+    asked = {"options": calls, "arrays": meshes // 2, "mesh": meshes - meshes // 2, "problem": problems}
+    sys.exit(campaign(asked, *(seed or [0])) > 0)
