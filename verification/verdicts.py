@@ -8,8 +8,8 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from ndtheory import EDITIONS, Bounds, Number, SharpBounds, evaluate
-from verification.advice import sharp_bounds
 from verification.bodies import build
+from verification.choice import sharp_bounds
 from verification.contact import Solver
 from verification.document import Document
 from verification.editions import LARGEST, EditionRow, Thresholds, row_of

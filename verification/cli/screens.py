@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 from shlex import quote
 
-from verification.advice import Advice, NextRun, Reading, SeenRun
+from verification.advice import Advice
 from verification.cli.calculator import editions_table
 from verification.cli.console import figures, heading, near_one, note, printable, say, table
 from verification.contact_state import ContactState
@@ -14,6 +14,7 @@ from verification.measured import ENERGY_NAMES, NAMES, Measured
 from verification.monolithic import Solution
 from verification.plane import MOST_STEPS, Plane
 from verification.problem import Problem
+from verification.readings import NextRun, Reading, SeenRun
 from verification.runs import Run
 from verification.verdicts import Comparison
 
