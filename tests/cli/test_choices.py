@@ -652,7 +652,8 @@ def test_a_run_with_a_rule_speaks_for_no_bound_of_a_constant_theta(call, write, 
     edits = {"iteration.relaxation": f'"{relaxation}"', "contact.friction": friction}
     answer = call("compare", write(edits, **text), "--json")
     verdicts = answer.document["verdicts"]
-    assert {verdicts[name] for name in ("printed", "repaired", "sharp", "lmi", "linearised")} == {"HYPOTHESES_NOT_MET"}
+    assert {verdicts[name] for name in ("printed", "repaired", "sharp", "lmi")} == {"HYPOTHESES_NOT_MET"}
+    assert verdicts["linearised"] == "NOT_COMPUTED"
     assert answer.status == 0
     reasons = answer.document["reasons"]
     assert all(relaxation in reasons[name] for name in ("sharp", "lmi", "linearised"))
@@ -712,8 +713,9 @@ def test_region_writes_a_picture_with_both_axes_every_edition_and_every_outcome(
     text = "\n".join("".join(element.itertext()).strip() for element in drawn.iter() if element.tag.endswith("}text"))
     assert "relaxation factor theta" in text
     assert "coefficient of friction k" in text
-    assert all(f"{name}: k < " in text for name in ("printed", "repaired", "sharp", "lmi"))
-    assert all(f"run {outcome}" in text for outcome in {point.outcome for point in charted[2].points})
+    assert all(f"{name}: k < " in text for name in ("printed (MPa)", "repaired", "sharp", "lmi"))
+    words = lambda outcome: "run still falling when stopped" if outcome == "limit" else f"run {outcome}"
+    assert all(words(outcome) in text for outcome in {point.outcome for point in charted[2].points})
     assert region("-o", tmp_path / "plane.png").status == 0
     assert (tmp_path / "plane.png").read_bytes().startswith(b"\x89PNG")
     assert b"Software\x00ndtheory" in (tmp_path / "plane.png").read_bytes()
@@ -733,8 +735,10 @@ def test_the_screen_of_region_counts_runs_and_gives_each_edition_its_line(region
     lines = region("-o", tmp_path / "plane.svg").out.splitlines()
     outcomes = [point.outcome for point in charted[2].points]
     assert any(f"{outcomes.count('converged')} converged" in line for line in lines)
-    rows = [line.split()[0] for line in lines if " k < " in line]
-    assert rows == ["printed", "repaired", "sharp", "lmi"]
+    assert any("still falling when stopped after" in line for line in lines)
+    head = next(i for i, line in enumerate(lines) if "every small theta: k <" in line and "some theta: k <" in line)
+    assert [line.split()[0] for line in lines[head + 1 : head + 5]] == ["printed", "repaired", "sharp", "lmi"]
+    assert "stresses in MPa" in lines[head + 5]
     assert lines[-1].endswith("plane.svg")
     assert [line for line in lines[:-1] if len(line) > 80] == []
 

@@ -379,3 +379,29 @@ def test_the_demo_compares_section_6_and_leaves_problem_report_figures_and_json(
 def test_the_written_document_is_that_of_stdout(call, quick, write, tmp_path, command):
     answer = call(command, write(), "-o", tmp_path / "results", "--json")
     assert (tmp_path / "results" / f"{command}.json").read_text(encoding="utf-8") == answer.out
+
+
+def test_two_thresholds_on_friction_have_two_names_and_the_printed_one_its_unit(call, write):
+    """Every small theta, some theta: on the screens of compare and of the calculator."""
+    calculator = ["bounds", "--m", "1", "--M", "2", "--CR", "3/2", "--CK", "1/400", "--theta", "1/10"]
+    for arguments, on, unit in ((["compare", write()], "k", "MPa"), (calculator, "C_K", "the unit of --m")):
+        lines = call(*arguments).out.splitlines()
+        head = next(i for i, line in enumerate(lines) if "every small" in line)
+        assert lines[head].split() == ["every", "small", "some"]
+        assert lines[head + 1].count(f"theta: {on} <") == 2
+        assert any(line.startswith("  printed: with stresses in " + unit) for line in lines)
+    small = call("compare", write(), "--json").document
+    assert small["sharp"]["friction_threshold"]["value"] < small["sharp"]["friction_limit"]["value"]
+
+
+def test_what_each_estimate_gives_away_is_told_from_what_is_only_the_unit(call, write):
+    """Moduli in Pa instead of MPa change the one and not the other."""
+    lost: dict[str, dict[bool, float]] = {}
+    for stress, factor in (("MPa", 1), ("Pa", 10**6)):
+        edits = {"units.stress": f'"{stress}"', "body1.young": f"{7e4 * factor:g}", "body2.young": f"{2e4 * factor:g}"}
+        losses = call("compare", write(edits), "--json").document["losses"]["friction"]
+        lost[stress] = {loss["only_unit"]: 0.0 for loss in losses}
+        for loss in losses:
+            lost[stress][loss["only_unit"]] += loss["decades"]
+    assert lost["MPa"][False] == pytest.approx(lost["Pa"][False], rel=1e-6)
+    assert lost["Pa"][True] > lost["MPa"][True] + 10

@@ -16,10 +16,12 @@ CONSTANTS = {"m", "M", "C_R", "C_s", "C_tr", "C_tr_half", "C_K", "rho_max", "rho
 RUN = {
     *{"theta", "relaxation", "neumann_body", "iterations", "evaluations", "outcome", "converged", "observed_rate"},
     *{"observed_rate_interval", "linearised_rate", "linearised_norm", "unrelaxed_residual", "kkt_residual", "solves"},
-    *{"pattern", "contact", "force", "history"},
+    *{"pattern", "contact", "force", "history", "observed_growth", "forecast"},
 }
-ENERGY = {"rho", "kappa_1", "kappa_2", "ratio", "friction_multiple", "factor_proved", "theta_max_proved"}
-VERDICTS = {"CONSISTENT", "VIOLATED", "INCONCLUSIVE", "HYPOTHESES_NOT_MET"}
+ENERGY = {"rho", "kappa_1", "kappa_2", "ratio", "friction_multiple", "factor_proved", "theta_max_proved"} | {
+    "friction_limit_multiple"
+}
+VERDICTS = {"CONSISTENT", "VIOLATED", "INCONCLUSIVE", "HYPOTHESES_NOT_MET", "NOT_COMPUTED"}
 
 GIVEN = ["--m", "3084", "--M", "153229", "--CR", "1.70"]
 ON_ENERGY = ["--rho", "1/2", "--kappa1", "1/10", "--kappa2", "1/5"]
@@ -249,7 +251,7 @@ def test_a_comparison_has_a_verdict_for_every_edition_and_for_the_prediction(doc
     found = document(("compare", None))
     assert set(found["verdicts"]) == {"printed", "repaired", "sharp", "lmi", "linearised"}
     names = {"rho", "rho_normal", "kappa_1", "kappa_2", "factor", "theta_proved", "theta_max_proved"}
-    assert names | {"theta_predicted", "friction_threshold"} <= set(found["sharp"])
+    assert names | {"theta_predicted", "friction_threshold", "friction_limit"} <= set(found["sharp"])
     assert {"factor", "friction_threshold", "certified"} <= set(found["lmi"])
 
 
@@ -259,6 +261,7 @@ def test_the_bounds_of_a_comparison_grow_sharper_from_edition_to_edition(documen
     assert found["run"]["linearised_norm"] <= found["lmi"]["lipschitz"]["value"]
     repaired = found["bounds"]["editions"]["repaired"]["C2"]["value"]
     assert repaired <= found["sharp"]["friction_threshold"]["value"] <= found["lmi"]["friction_threshold"]["value"]
+    assert found["sharp"]["friction_threshold"]["value"] <= found["sharp"]["friction_limit"]["value"]
     if found["sharp"]["factor"] is not None:
         assert found["lmi"]["factor"]["value"] <= found["sharp"]["factor"]["value"] * (1 + 1e-9)
 
