@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from fem1d2d import Mesh, MeshError, from_file, rectangle
 from fem1d2d.mesh import measures
@@ -293,6 +294,42 @@ def options(draw: random.Random, folder: Path) -> list[str]:
     return words
 
 
+def matrices(draw: random.Random, folder: Path) -> list[str]:
+    """Advice from two matrices, many of them none, in files that may be damaged."""
+    rng = np.random.default_rng(draw.randrange(2**32))
+    n = draw.randint(1, 5)
+    words = ["advise"]
+    for name in ("S1", "S2"):
+        root = rng.normal(size=(n, n))
+        matrix = root @ root.T + np.eye(n) * draw.choice((1.0, 1e-3, 1e-12))
+        kind = draw.randrange(12)
+        if kind == 0:
+            matrix = matrix * draw.choice((1e300, 1e-300, 1e150, 5e-324, 0.0))
+        elif kind == 1:
+            matrix[0, 0] = draw.choice((np.nan, np.inf, 1e308, -1.0))
+        elif kind == 2:
+            matrix = (matrix * 10).astype(draw.choice(("i1", "i8", "u4", "c16", "?", "U8", "f2", "f4", "f16")))
+        elif kind == 3:
+            matrix = draw.choice((matrix[:, :-1], matrix.ravel(), matrix[None], matrix[:0, :0]))
+        path = folder / f"{name}.npz"
+        written = draw.randrange(4)
+        if written == 0 or matrix.ndim != 2 or matrix.dtype.kind in "U?" or matrix.dtype == np.float16:
+            np.savez(path, matrix)
+        elif written == 1:
+            np.savez_compressed(path, a=matrix, b=matrix)
+        elif matrix.size:
+            sp.save_npz(path, sp.csr_array(matrix).asformat(draw.choice(("csr", "csc", "coo", "bsr", "dia"))))
+        else:
+            np.savez(path, matrix)
+        if draw.random() < 0.3:
+            data = bytearray(path.read_bytes())
+            for _ in range(draw.randint(1, 3)):
+                data[draw.randrange(len(data))] = draw.randrange(256)
+            path.write_bytes(data[: draw.choice((len(data), len(data) // 2))])
+        words += [f"--{name}", str(path)]
+    return [*words, "--json"]
+
+
 # --- the judge --------------------------------------------------------------------------------------------------------
 
 
@@ -383,7 +420,7 @@ def judge(arguments: list[str]) -> str | None:
     return None
 
 
-KINDS = {"problem": problem, "mesh": mesh_file, "arrays": check_arrays, "options": options}
+KINDS = {"problem": problem, "mesh": mesh_file, "arrays": check_arrays, "options": options, "matrices": matrices}
 
 
 def attempt(kind: str, seed: int, folder: Path) -> str | None:
@@ -421,5 +458,11 @@ def campaign(counts: dict[str, int], first: int) -> int:
 
 if __name__ == "__main__":
     problems, meshes, calls, *seed = map(int, sys.argv[1:])
-    asked = {"options": calls, "arrays": meshes // 2, "mesh": meshes - meshes // 2, "problem": problems}
+    asked = {
+        "options": calls,
+        "matrices": calls,
+        "arrays": meshes // 2,
+        "mesh": meshes - meshes // 2,
+        "problem": problems,
+    }
     sys.exit(campaign(asked, *(seed or [0])) > 0)

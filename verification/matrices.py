@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
+import tokenize
 import warnings
 import zipfile
 import zlib
@@ -15,7 +16,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fem1d2d.mesh import Floats
-from verification.reader import ProblemError, unreadable
+from verification.reader import LARGEST, SMALLEST, ProblemError, unreadable
 from verification.threads import one_thread
 
 #: Matrices of more rows than this do not fit a dense eigenvalue problem.
@@ -31,7 +32,7 @@ MOST_BYTES = 24 * MOST_ROWS**2
 #: What numpy, scipy and zipfile raise on a file that is no matrix.
 UNREADABLE = (
     ArithmeticError, AttributeError, EOFError, LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError,
-    struct.error, zipfile.BadZipFile, zlib.error,
+    struct.error, tokenize.TokenError, SyntaxError, zipfile.BadZipFile, zlib.error,
 )  # fmt: skip
 
 
@@ -122,6 +123,9 @@ def check_matrix(name: str, matrix: Floats) -> None:
     if not np.isfinite(matrix).all():
         raise ValueError(f"{name} has entries that are not finite: needed numbers")
     largest_entry = float(np.abs(matrix).max())
+    if largest_entry and not SMALLEST <= largest_entry <= LARGEST:
+        needed = f"needed one between {float(SMALLEST):g} and {float(LARGEST):g}, in any units"
+        raise ValueError(f"{name} has {largest_entry:.3g} for its largest entry: {needed}")
     if not float(np.abs(matrix - matrix.T).max()) <= ASYMMETRY * largest_entry:
         raise ValueError(f"{name} is not symmetric: needed a Schur complement of a stiffness matrix")
     with one_thread():

@@ -538,6 +538,22 @@ def test_a_matrix_of_empty_blocks_is_refused(call, tmp_path, blocks):
     assert_names(answer.complaint, "S.npz", "not a matrix")
 
 
+@pytest.mark.parametrize("entry", ["1e300", "1e31", "1e-31", "1e-300"])
+def test_a_matrix_whose_eigenvalues_would_overflow_is_refused_by_its_largest_entry(call, tmp_path, entry):
+    np.save(tmp_path / "S.npy", float(entry) * np.eye(3))
+    line = call("advise", "--S1", tmp_path / "S.npy", "--S2", tmp_path / "S.npy").complaint
+    assert_names(line, "S.npy", f"S1 has {entry} for its largest entry", "needed one between 1e-30 and 1e30")
+
+
+def test_a_matrix_whose_header_is_damaged_is_refused(call, tmp_path):
+    np.save(tmp_path / "S.npy", np.eye(3))
+    whole = (tmp_path / "S.npy").read_bytes()
+    (tmp_path / "S.npy").write_bytes(whole.replace(b"}", b"{", 1))
+    assert_names(
+        call("advise", "--S1", tmp_path / "S.npy", "--S2", tmp_path / "S.npy").complaint, "S.npy", "not a matrix"
+    )
+
+
 @pytest.mark.parametrize("kind", ["csr", "csc", "coo", "dia", "bsr"])
 def test_a_sparse_matrix_of_every_kind_is_read(tmp_path, kind):
     full = np.diag([2.0, 3.0, 4.0, 5.0]) + np.eye(4, k=1) + np.eye(4, k=-1)
