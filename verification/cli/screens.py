@@ -113,7 +113,7 @@ def _contact(problem: Problem, contact: ContactState) -> None:
         return
     rounding = 1e-12 * max(abs(total["normal"]), abs(total["tangential"]))
     tangential = total["tangential"] if abs(total["tangential"]) > rounding else 0.0
-    unit = f"{units['stress']} {units['length']} per thickness"
+    unit = f"{units['stress']} {units['length']} (per unit thickness)"
     note(f"force               {normal}, {figures(tangential)} tangential, {unit}", "  ")
     say(f"  largest pressure    {figures(float(contact.pressure.max()), 4)} {units['stress']}")
 
