@@ -42,8 +42,11 @@ INTERVAL_SIDES = ("left", "right")
 #: Largest number of cells of a body; a typing error should not fill the memory.
 MOST_CELLS = 250_000
 
-#: Largest ratio of the two moduli: in doubles the softer body is lost beside the stiffer one beyond it.
-MOST_CONTRAST = Fraction(10**15)
+#: Largest ratio of the two moduli: at 1e60 the bounds of Section 5, with high powers of M C_R / m, overflow a double.
+MOST_CONTRAST = Fraction(10**30)
+
+#: Largest coefficient of friction; larger ones differ from it by nothing but overflow, as all contact sticks.
+MOST_FRICTION = Fraction(10**9)
 
 #: Largest size of a problem file.
 MOST_BYTES = 1_000_000
@@ -423,7 +426,8 @@ def _read_body(table: Table, dimension: int, source: str) -> BodySpec:
 
 
 def _read_contact(table: Table, dimension: int) -> ContactSpec:
-    friction = table.take("friction", non_negative, Fraction(0))
+    coefficient = number(f"a number >= 0, at most {float(MOST_FRICTION):g}", lambda v: 0 <= v <= MOST_FRICTION)
+    friction = table.take("friction", coefficient, Fraction(0))
     law = table.take("law", choice("nonlocal", "local"), "nonlocal")
     radius = table.take("radius", positive, None)
     interval = table.take("interval", ends, None)

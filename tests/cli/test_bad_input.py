@@ -449,7 +449,7 @@ def test_moduli_that_doubles_cannot_hold_side_by_side_are_refused(call, write, c
         "problem.toml",
         "body2.young = ",
         "1e-30",
-        "needed a modulus within 1e15 times that of body1, 1e30",
+        "needed a modulus within 1e30 times that of body1, 1e30",
         "rigid",
     )
 
@@ -538,11 +538,14 @@ def test_a_matrix_of_empty_blocks_is_refused(call, tmp_path, blocks):
     assert_names(answer.complaint, "S.npz", "not a matrix")
 
 
-@pytest.mark.parametrize("entry", ["1e300", "1e31", "1e-31", "1e-300"])
-def test_a_matrix_whose_eigenvalues_would_overflow_is_refused_by_its_largest_entry(call, tmp_path, entry):
+@pytest.mark.parametrize("entry", ["1.7e308", "1e300", "5e-324"])
+def test_a_matrix_at_the_ends_of_the_doubles_is_judged_without_a_warning_of_numpy(call, tmp_path, entry):
     np.save(tmp_path / "S.npy", float(entry) * np.eye(3))
-    line = call("advise", "--S1", tmp_path / "S.npy", "--S2", tmp_path / "S.npy").complaint
-    assert_names(line, "S.npy", f"S1 has {entry} for its largest entry", "needed one between 1e-30 and 1e30")
+    np.save(tmp_path / "bad.npy", float(entry) * (np.eye(3) - 1))
+    answer = call("advise", "--S1", tmp_path / "S.npy", "--S2", tmp_path / "S.npy")
+    assert (answer.status, answer.err) == (0, "")
+    line = call("advise", "--S1", tmp_path / "S.npy", "--S2", tmp_path / "bad.npy").complaint
+    assert_names(line, "S2 is indefinite", "needed a positive definite matrix")
 
 
 def test_a_matrix_whose_header_is_damaged_is_refused(call, tmp_path):
