@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from decimal import ROUND_DOWN, Context, Decimal
 from fractions import Fraction
 from typing import Any, ClassVar, Literal
 
@@ -13,41 +11,19 @@ import numpy as np
 
 from fem1d2d import largest
 from fem1d2d.mesh import Floats
-from ndtheory import EnergyConstants, Number, SharpBounds, evaluate_sharp, exact
+from ndtheory import EnergyConstants, Number, evaluate_sharp
 from ndtheory.constants import take
-from ndtheory.sharp import LARGEST, SMALLEST, predicted_factor, predicted_rate, predicted_theta
+from ndtheory.sharp import LARGEST, SMALLEST, predicted_rate, predicted_theta
 from verification.bodies import build
+from verification.choice import Choice, automatic, sharp_bounds
 from verification.document import Document
 from verification.matrices import check_matrix, size
-from verification.measured import Measured, measure
+from verification.measured import measure
 from verification.pair import Pair
 from verification.problem import Problem
 from verification.reader import ProblemError
-from verification.relaxation import momentum_step
+from verification.readings import NextRun, Reading, SeenRun, read_ratio
 from verification.threads import one_thread
-
-#: A theta chosen for the user stays below 1 by this much, however soft the contact body.
-CLOSEST_TO_ONE = 1 - 1e-6
-
-#: An automatic theta need not be a proved one that takes more than so many times the steps of the predicted one.
-TOO_SLOW = 2
-
-#: The largest theta that is offered to paste.
-LARGEST_TO_PASTE = Fraction(99, 100)
-
-#: A ratio must be steady over so many steps at least.
-FEWEST_STEPS = 10
-
-#: How far from 1 the ratio of a residual that stays at a level may come out, at most and at least.  In 52 runs of the
-#: model of Section 6 whose contact opened and closed in turn, averages over ten steps lay between 0.92 and 1.11, over
-#: twenty between 0.96 and 1.06.
-WIDEST, NARROWEST = Fraction(1, 10), Fraction(3, 100)
-
-#: A run to make next has a theta larger by this factor at least, unless that would come too close to 1.
-SHORTEST_STEP = Fraction(9, 8)
-
-#: Ratios this close to 1 - theta, as a share of theta and of 1 - theta, are those of open nodes.
-SAME = Fraction(1, 20)
 
 #: What is unknown of matrices and runs from elsewhere.
 UNITS = {"length": "any", "stress": "any"}
@@ -97,80 +73,6 @@ class Role:
         if self.theta_auto is None:
             values["reason"]["theta_auto"] = "no problem file"
         return {name: v.to_dict() if isinstance(v, (Number, Choice)) else v for name, v in values.items()}
-
-
-@dataclass(frozen=True, kw_only=True)
-class Reading:
-    """One thing that the ratio of a run can mean.
-
-    Attributes
-    ----------
-    kind : {'mode-high', 'mode-low', 'level', 'open'}
-        What sets the pace: the stiffest mode in contact, which changes sign in every step; the softest one, which keeps
-        its sign; contact that opens and closes in turn, so that the residual stays at a level; nodes that are open.
-    value : float or None
-        rho where all of Gamma_c is closed and nothing slides; None where the reading gives a bound at most.
-    lo : float or None
-        If this reading is right, rho is at least this without friction, or tied.
-    says : str
-        The same in words.
-    """
-
-    kind: Literal["mode-high", "mode-low", "level", "open"]
-    value: float | None = None
-    lo: float | None = None
-    says: str
-
-    def to_dict(self) -> dict[str, Any]:
-        """A member of ``readings``; the level is that of the arithmetic."""
-        reason = {"rho.hi": "a run bounds rho from below at most"}
-        if self.value is None:
-            reason["rho.value"] = "this reading does not tell rho itself"
-        if self.lo is None:
-            reason["rho.lo"] = "this reading does not bound rho"
-        rho = {"value": self.value, "lo": self.lo, "hi": None, "level": "float" if self.lo is None else "exact"}
-        return {"kind": self.kind, "rho": rho, "says": self.says, "reason": reason}
-
-
-@dataclass(frozen=True, kw_only=True)
-class NextRun:
-    """The run to make next: its theta, and what it will show."""
-
-    theta: float
-    why: str
-
-    def to_dict(self) -> dict[str, Any]:
-        """The object ``next``."""
-        return {"theta": self.theta, "why": self.why}
-
-
-@dataclass(frozen=True, kw_only=True)
-class SeenRun:
-    """What was given of a run of any code with constant theta.
-
-    Attributes
-    ----------
-    theta : Fraction
-    ratio : Fraction
-        Of the residual ``|T g - g|``, absolute and before relaxation, from one step to the next.
-    """
-
-    theta: Fraction
-    ratio: Fraction
-
-    @property
-    def steps(self) -> int:
-        """Over how many steps at least the ratio must be steady, for a level to be told from a decay."""
-        return max(FEWEST_STEPS, math.ceil(5 / self.theta))
-
-    def to_dict(self) -> dict[str, Any]:
-        """The object ``run``."""
-        return {
-            "theta": float(self.theta),
-            "ratio": float(self.ratio),
-            "residual": "|Tg - g|, absolute and unrelaxed",
-            "steady_over": self.steps,
-        }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -294,12 +196,6 @@ def _role(problem: Problem, pair: Pair) -> Role:
     )
 
 
-def sharp_bounds(measured: Measured, theta: Any = None) -> SharpBounds | None:
-    """The theorem in energy norms for measured constants; None where they do not exist."""
-    constants = measured.energy_constants()
-    return None if constants is None else evaluate_sharp(constants, theta)
-
-
 def advise_matrices(S1: Floats, S2: Floats) -> Advice:
     """Advice from the interface stiffness matrices alone, free of friction.
 
@@ -381,70 +277,15 @@ def advise_run(theta: Any, ratio: Any) -> Advice:
     t = take("theta", theta, "the theta of a run, 0 < theta <= 1 (1e-75 or more)", lambda v: SMALLEST <= v <= 1)
     needed = "the ratio of consecutive residuals, a number > 0 (1e-75 to 1e75)"
     r = take("ratio", ratio, needed, lambda v: SMALLEST <= v <= LARGEST)
-    high, low = (1 + r) / t - 1, (1 - r) / t - 1
-    readings = _readings(t, r, high, low)
-    kinds = [reading.kind for reading in readings]
-    best = predicted_theta(high)
-    between = 2 / (high + Fraction(7, 4))  # above the best theta of mode-high, below the one at which it diverges
-    roles: tuple[Role, ...] = ()
-    if kinds == ["mode-high"]:
-        roles = (_role_of_run(high),)
-        following = min(best, LARGEST_TO_PASTE)
-        why = f"the best one if rho is {_few(high)}, and smaller than that of this run, which converges"
-    elif r > 1 + _spread(t):
-        following = between
-        confirmed = f"a ratio of {_few(following * (1 + high) - 1)} there confirms mode-high"
-        why = f"smaller, as this run does not converge; {confirmed}, and else come back with what you see"
-    elif "level" in kinds:
-        following = t / 2
-        why = f"half of {_few(t)}, which does not converge, or hardly; come back with the ratio that you see there"
-    else:
-        following = min(between if between >= SHORTEST_STEP * t else 3 * t / 2, (1 + t) / 2)
-        confirmed = f"a ratio of {_few(following * (1 + high) - 1)} there confirms mode-high"
-        why = f"larger; {confirmed}, a smaller one rules it out"
-        if following * (1 + high) >= 2:
-            why += f"; if the residual does not fall there, keep {_few(t)}, which converges"
+    run, readings, following, rho = read_ratio(t, r)
     return Advice(
         neumann_body=None,
-        roles=roles,
+        roles=() if rho is None else (_role_of_run(rho),),
         units=UNITS,
-        run=SeenRun(theta=t, ratio=r),
+        run=run,
         readings=readings,
-        next=NextRun(theta=_rounded_down(following), why=why),
+        next=following,
     )
-
-
-def _readings(theta: Fraction, r: Fraction, high: Fraction, low: Fraction) -> tuple[Reading, ...]:
-    """What a ratio r can mean; ``high`` and ``low`` are the lambda of a mode that changes or keeps its sign."""
-    fastest = f"the stiffest mode in this run has lambda = {_few(high)} at most"
-    proved = f"without friction, or tied, rho is at least {_few(high)}, and about that if all of Gamma_c stays closed"
-    found = []
-    if r > 1:
-        says = f"the residual grows by this ratio in every step: {proved}"
-    elif r > 1 - theta:
-        says = f"the stiffest mode changes its sign in every step: {proved}"
-    else:
-        says = f"the stiffest mode changes its sign in every step and is the slowest: {proved}"
-    found.append(Reading(kind="mode-high", value=float(high), lo=_double_below(high), says=says))
-    if r <= 1 - theta:
-        bound = f"without friction, or tied, rho is at least {_few(low)}"
-        says = f"the softest mode keeps its sign and is the slowest: {bound}; {fastest}"
-        found.append(Reading(kind="mode-low", lo=_double_below(low), says=says))
-    open_too = abs(r - (1 - theta)) <= SAME * min(theta, 1 - theta)
-    if open_too:
-        says = f"nodes that are open set the pace, 1 - theta a step, whatever rho is; {fastest}"
-        found.append(Reading(kind="open", says=says))
-    if r >= 1 - _spread(theta) and r > 1 - theta and not open_too:
-        least = 2 / theta - 1
-        level = "contact opens and closes in turn, and the residual stays at a level or grows for a while only"
-        bound = f"without friction rho is at least {_few(least)}, nothing more; with friction this says nothing of rho"
-        found.append(Reading(kind="level", lo=_double_below(least), says=f"{level}: {bound}"))
-    return tuple(found)
-
-
-def _spread(theta: Fraction) -> Fraction:
-    """How far from 1 the ratio of a residual that stays at a level may come out, averaged over the steps asked for."""
-    return min(WIDEST, max(NARROWEST, theta / 2))
 
 
 def _role_of_run(rho: Fraction) -> Role:
@@ -463,120 +304,3 @@ def _role_of_run(rho: Fraction) -> Role:
             **dict.fromkeys(("theta_proved", "factor_proved", "theta_max_proved", "friction_threshold"), nothing),
         },
     )
-
-
-def _few(value: Fraction) -> str:
-    return f"{float(value):.4g}"
-
-
-def _double_below(value: Fraction) -> float:
-    """The largest double that is not above a bound from below."""
-    near = float(value)
-    return near if Fraction(near) <= value else math.nextafter(near, -math.inf)
-
-
-def _rounded_down(theta: Fraction) -> float:
-    """A theta in four figures, not above the one meant."""
-    return float(Context(prec=4, rounding=ROUND_DOWN).divide(Decimal(theta.numerator), Decimal(theta.denominator)))
-
-
-@dataclass(frozen=True, kw_only=True)
-class Choice:
-    """The theta of a run and where it comes from.
-
-    Attributes
-    ----------
-    theta : Fraction
-    source : {'given', 'proved', 'predicted', 'momentum'}
-        ``momentum``: the step that the triple momentum method takes for this rho.
-    rho : float or None
-        Known where it was needed.
-    why : str
-        Why this theta, in words.
-    """
-
-    theta: Fraction
-    source: Literal["given", "proved", "predicted", "momentum"]
-    rho: float | None = None
-    why: str = "given by the problem or beside it"
-
-    def to_dict(self) -> dict[str, Any]:
-        """The object ``theta_auto`` of a role."""
-        return {"theta": float(self.theta), "source": self.source, "why": self.why}
-
-
-def choose(pair: Pair, theta: Any = None, measured: Measured | None = None) -> Choice:
-    """The theta of a run: the given one, else the problem's; for "auto" that of :func:`automatic`.
-
-    Momentum takes its step from rho, whatever theta is.
-
-    Raises
-    ------
-    HypothesisError
-        A given theta outside (0, 1).
-    ProblemError
-        "auto" or momentum where rho does not exist.
-    """
-    problem = pair.problem if theta is None else pair.problem.with_theta(theta)
-    settings = problem.iteration
-    momentum = settings.relaxation == "momentum"
-    if settings.theta != "auto" and not momentum:
-        return Choice(theta=settings.theta, source="given")
-    sharp = sharp_bounds(measured or measure(pair))
-    if sharp is None:
-        key, value = ("iteration.relaxation", "momentum") if momentum else ("iteration.theta", "auto")
-        needed = f"needed {'another rule' if momentum else 'a number'}: rho does not exist here"
-        raise ProblemError(problem.source, key, value, needed)
-    if momentum:
-        rho = sharp.rho.value
-        why = "the step of the triple momentum method for this rho"
-        return Choice(theta=below_one(momentum_step(rho)), source="momentum", rho=rho, why=why)
-    return automatic(sharp, pair.outside, settings.tolerance)
-
-
-def automatic(sharp: SharpBounds, outside: Sequence[str] = (), tolerance: float = 1e-9) -> Choice:
-    """The theta that theory chooses: the proved one, unless it is predicted to need more than twice as many steps.
-
-    Both thetas are judged by one formula, :func:`ndtheory.sharp.predicted_factor`.  The proved factor would be no fair
-    judge: with friction it is far from attained.
-
-    Parameters
-    ----------
-    sharp : SharpBounds
-    outside : sequence of str
-        Why the theorem does not speak of the problem; empty where it does.
-    tolerance : float
-        What the steps lead to.
-
-    Examples
-    --------
-    >>> chosen = automatic(evaluate_sharp(EnergyConstants(rho=2)))
-    >>> chosen.source, chosen.theta
-    ('proved', Fraction(1, 2))
-    """
-    rho = sharp.rho.value
-    predicted = below_one(sharp.theta_predicted)
-    nothing = outside[0] if outside else "q >= 1 for every theta" if sharp.theta_proved is None else None
-    if nothing is not None or sharp.theta_proved is None:
-        return Choice(theta=predicted, source="predicted", rho=rho, why=f"no theta is proved: {nothing}")
-    proved = below_one(sharp.theta_proved)
-    of_proved, of_predicted = (predicted_steps(theta, rho, tolerance) for theta in (proved, predicted))
-    if of_proved > TOO_SLOW * of_predicted:
-        why = f"{of_predicted} steps predicted, against {of_proved} at the proved theta {float(proved):.4g}"
-        return Choice(theta=predicted, source="predicted", rho=rho, why=why)
-    why = f"{of_proved} steps predicted, at most twice the {of_predicted} at the predicted theta {float(predicted):.4g}"
-    if sharp.friction_multiple is None:
-        why = "without friction the predicted one is proved"
-    return Choice(theta=proved, source="proved", rho=rho, why=why)
-
-
-def below_one(theta: float) -> Fraction:
-    """A theta chosen for the user, below 1."""
-    return exact(min(theta, CLOSEST_TO_ONE))
-
-
-def predicted_steps(theta: Fraction, rho: float, tolerance: float) -> int:
-    """Steps that the predicted factor needs from 1 down to a tolerance."""
-    # of 1 - factor, as a small theta is lost in the factor itself
-    gain = float(1 - predicted_factor(theta, Fraction(rho)))
-    return math.ceil(math.log(tolerance) / math.log1p(-gain))

@@ -14,8 +14,8 @@ INTERRUPTED = "interrupted before it was worked out"
 def undisturbed() -> Iterator[None]:
     """A context in which Ctrl-C waits: it is raised at the end.
 
-    SCS has a handler of its own, which drops the signal while it factorises.  A signal that is blocked reaches no
-    handler; other threads must not take it instead, so the command keeps BLAS from starting any.
+    A signal that is blocked reaches no handler, Python's or another one.  No other thread may take it instead: the
+    command keeps BLAS from starting any.
     """
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from fem1d2d.mesh import Floats
-from verification.advice import choose
 from verification.bodies import build
+from verification.choice import choose
 from verification.contact import ContactSolution, ContactStep, Solver
 from verification.pair import Pair
 from verification.problem import Problem

@@ -198,7 +198,7 @@ def forecast(pair: Pair, states: Sequence[State], theta: float, tolerance: float
     """
     half = next((i for i, s in enumerate(states) if s.residual <= math.sqrt(tolerance) * s.scale), None)
     if half is None:
-        raise NotLinear("the residual never fell half way, in decades, to the tolerance")
+        raise NotLinear("the run never got half way to the tolerance")
     state = states[half]
     if state.residual <= tolerance * state.scale:
         raise NotLinear("the run converged before a forecast could be made half way")

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import cvxpy as cp
 import numpy as np
 import scs
+from cvxpy.reductions.solvers.conic_solvers.scs_conif import dims_to_solver_dict
 
 from fem1d2d.mesh import Floats
 from verification.interrupts import undisturbed
@@ -75,7 +78,7 @@ class Program:
         second = first_order | {"max_iters": 1000}  # it converges in some 150 where a solution exists
         solvers = [{"solver": cp.CLARABEL}, second] if size <= SMALL else [first_order]
         why = []
-        with warnings.catch_warnings(), one_thread(), undisturbed():
+        with warnings.catch_warnings(), one_thread():
             warnings.simplefilter("ignore")  # "may be inaccurate": the check of the form decides
             for options in solvers:
                 try:
@@ -95,7 +98,27 @@ class Program:
 def _solve(problem: cp.Problem, *, solver: str, **options: Any) -> None:
     """``problem.solve``, from which Ctrl-C returns: cvxpy takes an SCS that was interrupted for one that failed."""
     data, chain, inverse = problem.get_problem_data(solver, solver_opts=options)
-    found = chain.solve_via_data(problem, data, solver_opts=options)
-    if solver == cp.SCS and found["info"]["status_val"] == scs.SIGINT:
-        raise KeyboardInterrupt
+    found = _by_scs(data, **options) if solver == cp.SCS else chain.solve_via_data(problem, data, solver_opts=options)
     problem.unpack_results(found, chain, inverse)
+
+
+def _by_scs(data: Mapping[str, Any], *, eps: float, max_iters: int) -> Mapping[str, Any]:
+    """Solve cvxpy's data for SCS.
+
+    SCS puts a handler of its own in the place of Python's.  While it factorises that one drops Ctrl-C, which has to
+    wait then; while it iterates it ends with a status, and with a word on stdout.
+
+    Raises
+    ------
+    KeyboardInterrupt
+    """
+    matrices = {name: data[name] for name in ("P", "A", "b", "c") if name in data}
+    with undisturbed():
+        program = scs.SCS(
+            matrices, dims_to_solver_dict(data["dims"]), verbose=False, eps_abs=eps, eps_rel=eps, max_iters=max_iters
+        )
+    with contextlib.redirect_stdout(io.StringIO()):
+        found: Mapping[str, Any] = program.solve()
+    if found["info"]["status_val"] == scs.SIGINT:
+        raise KeyboardInterrupt
+    return found

@@ -122,13 +122,14 @@ def check_matrix(name: str, matrix: Floats) -> None:
         raise ValueError(f"{name} has {len(matrix)} rows: needed at most {MOST_ROWS}")
     if not np.isfinite(matrix).all():
         raise ValueError(f"{name} has entries that are not finite: needed numbers")
-    unit = float(np.abs(matrix).max()) or 1.0
-    scaled = matrix / unit  # entries of order 1, whatever the unit
-    if not float(np.abs(scaled - scaled.T).max()) <= ASYMMETRY:
+    largest_entry = float(np.abs(matrix).max())
+    unit = matrix / (largest_entry or 1.0)  # in units in which sums neither overflow nor vanish
+    if not float(np.abs(unit - unit.T).max()) <= ASYMMETRY:
         raise ValueError(f"{name} is not symmetric: needed a Schur complement of a stiffness matrix")
     with one_thread():
-        eigenvalues = np.linalg.eigvalsh((scaled + scaled.T) / 2)
+        eigenvalues = np.linalg.eigvalsh((unit + unit.T) / 2)
     least = float(eigenvalues[0])
     if not least > len(matrix) * np.finfo(float).eps:
         kind = "singular: the body has too little support" if least >= -1e-10 else "indefinite"
-        raise ValueError(f"{name} is {kind} (least eigenvalue {least * unit:.3g}): needed a positive definite matrix")
+        shown = f"least eigenvalue {least * largest_entry:.3g}"
+        raise ValueError(f"{name} is {kind} ({shown}): needed a positive definite matrix")

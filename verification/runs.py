@@ -12,8 +12,8 @@ import numpy as np
 
 from fem1d2d.mesh import Floats
 from ndtheory import Number
-from verification.advice import Choice, choose
 from verification.bodies import build
+from verification.choice import Choice, choose
 from verification.contact import ContactError, Solver
 from verification.contact_state import ContactState
 from verification.document import Document

@@ -8,8 +8,8 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from ndtheory import EDITIONS, Bounds, Number, SharpBounds, evaluate
-from verification.advice import sharp_bounds
 from verification.bodies import build
+from verification.choice import sharp_bounds
 from verification.contact import Solver
 from verification.document import Document
 from verification.editions import LARGEST, EditionRow, Thresholds, row_of
@@ -201,7 +201,7 @@ def judge_forecast(run: Run) -> Judgement:
     made, seen = run.forecast, run.observed_rate
     if made is None:
         return Judgement(verdict="NOT_COMPUTED", reason=run.why_no_forecast)
-    says = f"at step {made.made_at_iteration}: {made.rate:.4g} a step, {made.iterations} steps"
+    says = f"forecast {made.rate:.4g}, {made.iterations} steps"
     if run.outcome == "interrupted":
         return Judgement(verdict="NOT_COMPUTED", reason=f"{says}; the run was interrupted")
     if seen is None:

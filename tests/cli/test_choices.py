@@ -170,7 +170,7 @@ def test_what_is_pasted_is_the_advice_and_the_next_line_runs_it(call, write, edi
     assert run["converged"]
 
 
-@pytest.mark.parametrize("edits", ["soft upper body", "stiff upper body", {"body2.young": "7e-20"}], ids=str)
+@pytest.mark.parametrize("edits", ["soft upper body", "stiff upper body", {"body2.young": "7e-10"}], ids=str)
 def test_however_soft_a_body_what_is_pasted_is_a_theta(call, write, edits):
     assert 0 < float(pasted(call("advise", write(edits)).out)) < 1
 
@@ -584,7 +584,7 @@ def test_a_comparison_at_the_proved_theta_is_consistent(call, write):
 
 
 def test_an_automatic_theta_stays_below_1_however_soft_the_contact_body(call, write):
-    found = call("run", write({"body2.young": "7e-20", "contact.friction": "0"}), "--theta", "auto", "--json").document
+    found = call("run", write({"body2.young": "7e-10", "contact.friction": "0"}), "--theta", "auto", "--json").document
     assert 0.999 < found["theta"] < 1
 
 

@@ -58,7 +58,6 @@ def on_a_terminal(*arguments):
 
 def test_a_terminal_shows_what_compare_is_doing(write, tmp_path):
     shown = on_a_terminal("compare", write(), "-o", tmp_path / "results")
-    assert "searching what the inequalities lose" in shown
-    assert "semidefinite edition: " in shown
-    assert "drawing and writing" in shown
-    assert len(re.findall("iterating", shown)) < len(re.findall("semidefinite edition", shown))
+    found = [shown.find(stage) for stage in [*STAGES, "drawing and writing"]]
+    assert -1 not in found
+    assert found == sorted(found)

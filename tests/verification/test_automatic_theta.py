@@ -11,8 +11,9 @@ from sample_problems import changed
 
 import verification as vf
 from ndtheory import EnergyConstants, evaluate_sharp
-from verification.advice import advise_matrices, automatic, choose, sharp_bounds
+from verification.advice import advise_matrices
 from verification.bodies import build
+from verification.choice import automatic, choose, sharp_bounds
 from verification.cli.problems import examples
 
 

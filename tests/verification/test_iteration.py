@@ -19,8 +19,8 @@ from hypothesis import strategies as st
 from sample_problems import PROBLEMS, SECTION_6, SHEARED, bars, changed
 
 import verification as vf
-from verification.advice import Choice
 from verification.bodies import build
+from verification.choice import Choice
 from verification.contact import TOLERANCE, ContactError
 from verification.iteration import FixedPointMap, State
 from verification.runs import MOST_BYTES, PATIENCE, RUNAWAY, Run

@@ -156,10 +156,10 @@ def editions_table(rows: Sequence[EditionRow], unit: str) -> None:
     end = [] if theta is None else [f"theta = {theta:.4g}"]
     lines = [
         ["", "every small", "some", "", "", *([] if theta is None else [""])],
-        ["edition", f"theta: {friction} <", f"theta: {friction} <", "theta allowed", "factor", *end],
+        ["edition", f"theta {friction} <", f"theta {friction} <", "theta allowed", "factor", *end],
     ]
     for row in rows:
-        interval = "-" if row.interval is None else f"{row.interval[0]:.3g} < theta < {figures(row.interval[1])}"
+        interval = "-" if row.interval is None else f"({row.interval[0]:.3g}, {figures(row.interval[1])})"
         line = [row.name, *_allowed(row), interval, factor(row.factor, row.one_minus_factor)]
         if theta is not None:
             line.append("contracts" if row.factor is not None else "no conclusion")

@@ -246,9 +246,12 @@ def stages() -> Iterator[Progress]:
         with undisturbed():  # its thread takes no signal from the main one
             live = stack.enter_context(Live(*columns, console=Console(stderr=True), transient=True))
         task = live.add_task("", total=None)
-        yield lambda what, share: live.update(
-            task, description=what, total=None if share is None else 1.0, completed=share or 0.0
-        )
+
+        def tell(what: str, share: float | None) -> None:
+            total = None if share is None else 1.0
+            live.update(task, description=what, total=total, completed=share or 0.0, refresh=not share)  # at a start
+
+        yield tell
 
 
 @contextlib.contextmanager

@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 from shlex import quote
 
-from verification.advice import Advice, NextRun, Reading, SeenRun
+from verification.advice import Advice
 from verification.cli.calculator import editions_table
 from verification.cli.console import figures, heading, near_one, note, printable, say, table
 from verification.contact_state import ContactState
@@ -14,6 +14,7 @@ from verification.measured import ENERGY_NAMES, NAMES, Measured
 from verification.monolithic import Solution
 from verification.plane import MOST_STEPS, Plane
 from verification.problem import Problem
+from verification.readings import NextRun, Reading, SeenRun
 from verification.runs import Run
 from verification.verdicts import Comparison
 
@@ -75,20 +76,17 @@ def _happened(run: Run) -> None:
         rows.append([name, near_one(made.rate), str(made.iterations), "prediction, not a bound"])
     if linear is not None:
         steps = _steps(linear.rate, problem.iteration.tolerance)
-        rows.append(["linearised at the solution", near_one(linear.rate), steps, "prediction, made afterwards"])
+        consistency = "" if linear.predicted is None else f"; consistency of J {near_one(linear.predicted)}"
+        rows.append(["linearised at the solution", near_one(linear.rate), steps, f"afterwards{consistency}"])
     shown = "-" if rate is None else near_one(rate.value)
     if run.observed_growth is not None:
         shown = f"grows by {run.observed_growth:.4g}"
     rows.append(["observed", shown, str(run.iterations), f"seen: {run.outcome}"])
     table(rows)
-    say()
     if run.forecast is None and run.relaxation == "constant":
         note(f"no forecast: {run.why_no_forecast}", "  ")
     if linear is None:
         note(f"not linearised: {run.why_not_linearised}", "  ")
-    elif linear.predicted is not None and rate is not None:
-        says = f"on the run's own error J gives {near_one(linear.predicted)} over the steps observed"
-        note(f"consistency of J: {says}, {near_one(rate.value)} seen", "  ")
     if run.relaxation != "constant":
         proved = "" if run.proved_rate is None else f"; proved rate {near_one(run.proved_rate.value)}"
         say(f"  {run.evaluations} evaluations of T, with the {run.relaxation} relaxation{proved}")
@@ -108,14 +106,16 @@ def _steps(rate: float, tolerance: float) -> str:
 def _contact(problem: Problem, contact: ContactState) -> None:
     """What happens along Gamma_c, in totals."""
     units, total = problem.units, contact.force
-    force = units["stress"] + (f" {units['length']} (per unit thickness)" if problem.dimension == 2 else "")
+    normal = f"{figures(total['normal'], 6)} normal"
     say("  nodes               " + ", ".join(f"{count} {name}" for name, count in contact.pattern.items()))
-    say(f"  normal force        {figures(total['normal'], 6)} {force}")
-    if problem.dimension == 2:
-        rounding = 1e-12 * max(abs(total["normal"]), abs(total["tangential"]))
-        tangential = total["tangential"] if abs(total["tangential"]) > rounding else 0.0
-        say(f"  tangential force    {figures(tangential)} {force}")
-        say(f"  largest pressure    {figures(float(contact.pressure.max()), 4)} {units['stress']}")
+    if problem.dimension == 1:
+        say(f"  force               {normal}, {units['stress']}")
+        return
+    rounding = 1e-12 * max(abs(total["normal"]), abs(total["tangential"]))
+    tangential = total["tangential"] if abs(total["tangential"]) > rounding else 0.0
+    unit = f"{units['stress']} {units['length']} (per unit thickness)"
+    note(f"force               {normal}, {figures(tangential)} tangential, {unit}", "  ")
+    say(f"  largest pressure    {figures(float(contact.pressure.max()), 4)} {units['stress']}")
 
 
 def _limits(outside: list[str]) -> None:
@@ -174,9 +174,9 @@ def comparison(result: Comparison, file: Path) -> None:
         estimates = [loss for loss in result.losses.friction if not loss.only_unit]
         total = sum(loss.decades for loss in estimates)
         unit = sum(loss.decades for loss in result.losses.friction) - total
-        say(f"  {total:.1f} decades from the largest friction term found to its repaired bound (5.30):")
-        say("  " + ", ".join(f"{loss.label} {loss.decades:.1f}" for loss in estimates))
-        note(f"{unit:.1f} more to the printed one, which are only the unit of stress, {stress}", "  ")
+        say(f"  {total:.1f} decades from the largest friction term found to (5.30), repaired:")
+        links = ", ".join(f"{loss.label} {loss.decades:.1f}" for loss in estimates)
+        note(f"{links}; the unit adds {unit:.1f}", "  ")
     _happened(finished)
     heading("DOES THE RUN AGREE WITH THE BOUND?")
     table([["edition", "verdict", "why"], *([n, j.verdict, j.reason] for n, j in result.verdicts.items())])

@@ -14,7 +14,7 @@ import numpy as np
 from fem1d2d import solver
 from fem1d2d.mesh import Floats
 from ndtheory import EDITIONS, evaluate, evaluate_sharp
-from verification.advice import CLOSEST_TO_ONE
+from verification.choice import CLOSEST_TO_ONE
 from verification.contact import ContactError
 from verification.iteration import FixedPointMap
 from verification.ledger.evidence import Evidence, Level, figure

@@ -1,0 +1,131 @@
+"""The theta of a run: given, or chosen by theory."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, Literal
+
+from ndtheory import SharpBounds, evaluate_sharp, exact
+from ndtheory.sharp import predicted_factor
+from verification.measured import Measured, measure
+from verification.pair import Pair
+from verification.reader import ProblemError
+from verification.relaxation import momentum_step
+
+#: A theta chosen for the user stays below 1 by this much, however soft the contact body.
+CLOSEST_TO_ONE = 1 - 1e-6
+
+#: An automatic theta need not be a proved one that takes more than so many times the steps of the predicted one.
+TOO_SLOW = 2
+
+
+def sharp_bounds(measured: Measured, theta: Any = None) -> SharpBounds | None:
+    """The theorem in energy norms for measured constants; None where they do not exist."""
+    constants = measured.energy_constants()
+    return None if constants is None else evaluate_sharp(constants, theta)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Choice:
+    """The theta of a run and where it comes from.
+
+    Attributes
+    ----------
+    theta : Fraction
+    source : {'given', 'proved', 'predicted', 'momentum'}
+        ``momentum``: the step that the triple momentum method takes for this rho.
+    rho : float or None
+        Known where it was needed.
+    why : str
+        Why this theta, in words.
+    """
+
+    theta: Fraction
+    source: Literal["given", "proved", "predicted", "momentum"]
+    rho: float | None = None
+    why: str = "given by the problem or beside it"
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object ``theta_auto`` of a role."""
+        return {"theta": float(self.theta), "source": self.source, "why": self.why}
+
+
+def choose(pair: Pair, theta: Any = None, measured: Measured | None = None) -> Choice:
+    """The theta of a run: the given one, else the problem's; for "auto" that of :func:`automatic`.
+
+    Momentum takes its step from rho, whatever theta is.
+
+    Raises
+    ------
+    HypothesisError
+        A given theta outside (0, 1).
+    ProblemError
+        "auto" or momentum where rho does not exist.
+    """
+    problem = pair.problem if theta is None else pair.problem.with_theta(theta)
+    settings = problem.iteration
+    momentum = settings.relaxation == "momentum"
+    if settings.theta != "auto" and not momentum:
+        return Choice(theta=settings.theta, source="given")
+    sharp = sharp_bounds(measured or measure(pair))
+    if sharp is None:
+        key, value = ("iteration.relaxation", "momentum") if momentum else ("iteration.theta", "auto")
+        needed = f"needed {'another rule' if momentum else 'a number'}: rho does not exist here"
+        raise ProblemError(problem.source, key, value, needed)
+    if momentum:
+        rho = sharp.rho.value
+        why = "the step of the triple momentum method for this rho"
+        return Choice(theta=below_one(momentum_step(rho)), source="momentum", rho=rho, why=why)
+    return automatic(sharp, pair.outside, settings.tolerance)
+
+
+def automatic(sharp: SharpBounds, outside: Sequence[str] = (), tolerance: float = 1e-9) -> Choice:
+    """The theta that theory chooses: the proved one, unless it is predicted to need more than twice as many steps.
+
+    Both thetas are judged by one formula, :func:`ndtheory.sharp.predicted_factor`.  The proved factor would be no fair
+    judge: with friction it is far from attained.
+
+    Parameters
+    ----------
+    sharp : SharpBounds
+    outside : sequence of str
+        Why the theorem does not speak of the problem; empty where it does.
+    tolerance : float
+        What the steps lead to.
+
+    Examples
+    --------
+    >>> from ndtheory import EnergyConstants
+    >>> chosen = automatic(evaluate_sharp(EnergyConstants(rho=2)))
+    >>> chosen.source, chosen.theta
+    ('proved', Fraction(1, 2))
+    """
+    rho = sharp.rho.value
+    predicted = below_one(sharp.theta_predicted)
+    nothing = outside[0] if outside else "q >= 1 for every theta" if sharp.theta_proved is None else None
+    if nothing is not None or sharp.theta_proved is None:
+        return Choice(theta=predicted, source="predicted", rho=rho, why=f"no theta is proved: {nothing}")
+    proved = below_one(sharp.theta_proved)
+    of_proved, of_predicted = (predicted_steps(theta, rho, tolerance) for theta in (proved, predicted))
+    if of_proved > TOO_SLOW * of_predicted:
+        why = f"{of_predicted} steps predicted, against {of_proved} at the proved theta {float(proved):.4g}"
+        return Choice(theta=predicted, source="predicted", rho=rho, why=why)
+    why = f"{of_proved} steps predicted, at most twice the {of_predicted} at the predicted theta {float(predicted):.4g}"
+    if sharp.friction_multiple is None:
+        why = "without friction the predicted one is proved"
+    return Choice(theta=proved, source="proved", rho=rho, why=why)
+
+
+def below_one(theta: float) -> Fraction:
+    """A theta chosen for the user, below 1."""
+    return exact(min(theta, CLOSEST_TO_ONE))
+
+
+def predicted_steps(theta: Fraction, rho: float, tolerance: float) -> int:
+    """Steps that the predicted factor needs from 1 down to a tolerance."""
+    # of 1 - factor, as a small theta is lost in the factor itself
+    gain = float(1 - predicted_factor(theta, Fraction(rho)))
+    return math.ceil(math.log(tolerance) / math.log1p(-gain))

@@ -1,0 +1,185 @@
+"""What the ratio of a run of any code can mean for rho, and the run that decides."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from decimal import ROUND_DOWN, Context, Decimal
+from fractions import Fraction
+from typing import Any, Literal
+
+from ndtheory.sharp import predicted_theta
+
+#: The largest theta that is offered to paste.
+LARGEST_TO_PASTE = Fraction(99, 100)
+
+#: A ratio must be steady over so many steps at least.
+FEWEST_STEPS = 10
+
+#: How far from 1 the ratio of a residual that stays at a level may come out, at most and at least.  In 52 runs of the
+#: model of Section 6 whose contact opened and closed in turn, averages over ten steps lay between 0.92 and 1.11, over
+#: twenty between 0.96 and 1.06.
+WIDEST, NARROWEST = Fraction(1, 10), Fraction(3, 100)
+
+#: A run to make next has a theta larger by this factor at least, unless that would come too close to 1.
+SHORTEST_STEP = Fraction(9, 8)
+
+#: Ratios this close to 1 - theta, as a share of theta and of 1 - theta, are those of open nodes.
+SAME = Fraction(1, 20)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """One thing that the ratio of a run can mean.
+
+    Attributes
+    ----------
+    kind : {'mode-high', 'mode-low', 'level', 'open'}
+        What sets the pace: the stiffest mode in contact, which changes sign in every step; the softest one, which keeps
+        its sign; contact that opens and closes in turn, so that the residual stays at a level; nodes that are open.
+    value : float or None
+        rho where all of Gamma_c is closed and nothing slides; None where the reading gives a bound at most.
+    lo : float or None
+        If this reading is right, rho is at least this without friction, or tied.
+    says : str
+        The same in words.
+    """
+
+    kind: Literal["mode-high", "mode-low", "level", "open"]
+    value: float | None = None
+    lo: float | None = None
+    says: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """A member of ``readings``; the level is that of the arithmetic."""
+        reason = {"rho.hi": "a run bounds rho from below at most"}
+        if self.value is None:
+            reason["rho.value"] = "this reading does not tell rho itself"
+        if self.lo is None:
+            reason["rho.lo"] = "this reading does not bound rho"
+        rho = {"value": self.value, "lo": self.lo, "hi": None, "level": "float" if self.lo is None else "exact"}
+        return {"kind": self.kind, "rho": rho, "says": self.says, "reason": reason}
+
+
+@dataclass(frozen=True, kw_only=True)
+class NextRun:
+    """The run to make next: its theta, and what it will show."""
+
+    theta: float
+    why: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object ``next``."""
+        return {"theta": self.theta, "why": self.why}
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeenRun:
+    """What was given of a run of any code with constant theta.
+
+    Attributes
+    ----------
+    theta : Fraction
+    ratio : Fraction
+        Of the residual ``|T g - g|``, absolute and before relaxation, from one step to the next.
+    """
+
+    theta: Fraction
+    ratio: Fraction
+
+    @property
+    def steps(self) -> int:
+        """Over how many steps at least the ratio must be steady, for a level to be told from a decay."""
+        return max(FEWEST_STEPS, math.ceil(5 / self.theta))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object ``run``."""
+        return {
+            "theta": float(self.theta),
+            "ratio": float(self.ratio),
+            "residual": "|Tg - g|, absolute and unrelaxed",
+            "steady_over": self.steps,
+        }
+
+
+def read_ratio(theta: Fraction, r: Fraction) -> tuple[SeenRun, tuple[Reading, ...], NextRun, Fraction | None]:
+    """Every reading of a ratio r of residuals at theta, and the run to make next.
+
+    :func:`verification.advice.advise_run` says what the readings are.
+
+    Returns
+    -------
+    run, readings, next, rho
+        rho of the only reading that is left; None where there are several.
+    """
+    high, low = (1 + r) / theta - 1, (1 - r) / theta - 1
+    readings = _readings(theta, r, high, low)
+    kinds = [reading.kind for reading in readings]
+    best = predicted_theta(high)
+    between = 2 / (high + Fraction(7, 4))  # above the best theta of mode-high, below the one at which it diverges
+    if kinds == ["mode-high"]:
+        following = min(best, LARGEST_TO_PASTE)
+        why = f"the best one if rho is {_few(high)}, and smaller than that of this run, which converges"
+    elif r > 1 + _spread(theta):
+        following = between
+        confirmed = f"a ratio of {_few(following * (1 + high) - 1)} there confirms mode-high"
+        why = f"smaller, as this run does not converge; {confirmed}, and else come back with what you see"
+    elif "level" in kinds:
+        following = theta / 2
+        why = f"half of {_few(theta)}, which does not converge, or hardly; come back with the ratio that you see there"
+    else:
+        following = min(between if between >= SHORTEST_STEP * theta else 3 * theta / 2, (1 + theta) / 2)
+        confirmed = f"a ratio of {_few(following * (1 + high) - 1)} there confirms mode-high"
+        why = f"larger; {confirmed}, a smaller one rules it out"
+        if following * (1 + high) >= 2:
+            why += f"; if the residual does not fall there, keep {_few(theta)}, which converges"
+    rho = high if kinds == ["mode-high"] else None
+    return SeenRun(theta=theta, ratio=r), readings, NextRun(theta=_rounded_down(following), why=why), rho
+
+
+def _readings(theta: Fraction, r: Fraction, high: Fraction, low: Fraction) -> tuple[Reading, ...]:
+    """What a ratio r can mean; ``high`` and ``low`` are the lambda of a mode that changes or keeps its sign."""
+    fastest = f"the stiffest mode in this run has lambda = {_few(high)} at most"
+    proved = f"without friction, or tied, rho is at least {_few(high)}, and about that if all of Gamma_c stays closed"
+    found = []
+    if r > 1:
+        says = f"the residual grows by this ratio in every step: {proved}"
+    elif r > 1 - theta:
+        says = f"the stiffest mode changes its sign in every step: {proved}"
+    else:
+        says = f"the stiffest mode changes its sign in every step and is the slowest: {proved}"
+    found.append(Reading(kind="mode-high", value=float(high), lo=_double_below(high), says=says))
+    if r <= 1 - theta:
+        bound = f"without friction, or tied, rho is at least {_few(low)}"
+        says = f"the softest mode keeps its sign and is the slowest: {bound}; {fastest}"
+        found.append(Reading(kind="mode-low", lo=_double_below(low), says=says))
+    open_too = abs(r - (1 - theta)) <= SAME * min(theta, 1 - theta)
+    if open_too:
+        says = f"nodes that are open set the pace, 1 - theta a step, whatever rho is; {fastest}"
+        found.append(Reading(kind="open", says=says))
+    if r >= 1 - _spread(theta) and r > 1 - theta and not open_too:
+        least = 2 / theta - 1
+        level = "contact opens and closes in turn, and the residual stays at a level or grows for a while only"
+        bound = f"without friction rho is at least {_few(least)}, nothing more; with friction this says nothing of rho"
+        found.append(Reading(kind="level", lo=_double_below(least), says=f"{level}: {bound}"))
+    return tuple(found)
+
+
+def _spread(theta: Fraction) -> Fraction:
+    """How far from 1 the ratio of a residual that stays at a level may come out, averaged over the steps asked for."""
+    return min(WIDEST, max(NARROWEST, theta / 2))
+
+
+def _few(value: Fraction) -> str:
+    return f"{float(value):.4g}"
+
+
+def _double_below(value: Fraction) -> float:
+    """The largest double that is not above a bound from below."""
+    near = float(value)
+    return near if Fraction(near) <= value else math.nextafter(near, -math.inf)
+
+
+def _rounded_down(theta: Fraction) -> float:
+    """A theta in four figures, not above the one meant."""
+    return float(Context(prec=4, rounding=ROUND_DOWN).divide(Decimal(theta.numerator), Decimal(theta.denominator)))
