@@ -548,6 +548,14 @@ def test_a_matrix_at_the_ends_of_the_doubles_is_judged_without_a_warning_of_nump
     assert_names(line, "S2 is indefinite", "needed a positive definite matrix")
 
 
+@pytest.mark.parametrize("entry", ["1.7e308", "1e300", "1e-300"])
+def test_a_matrix_whose_sums_would_overflow_is_read_in_any_unit(call, tmp_path, entry):
+    np.save(tmp_path / "S.npy", float(entry) * (np.eye(3) / 2 + np.ones((3, 3)) / 9))
+    answer = call("advise", "--S1", tmp_path / "S.npy", "--S2", tmp_path / "S.npy", "--json")
+    assert (answer.status, answer.err) == (0, "")
+    assert answer.document["roles"][0]["rho"]["value"] == pytest.approx(1, rel=1e-9)
+
+
 def test_a_matrix_whose_header_is_damaged_is_refused(call, tmp_path):
     np.save(tmp_path / "S.npy", np.eye(3))
     whole = (tmp_path / "S.npy").read_bytes()
