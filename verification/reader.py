@@ -26,7 +26,7 @@ DIGITS = "0123456789"
 LONGEST = 60
 
 #: Most characters of a path that a message repeats.
-LONGEST_PATH = 300
+LONGEST_PATH = 600
 
 #: How a message writes an empty key.
 QUOTED = '""'
