@@ -25,6 +25,9 @@ DIGITS = "0123456789"
 #: Most characters of a value that a message repeats.
 LONGEST = 60
 
+#: Most characters of a path that a message repeats.
+LONGEST_PATH = 600
+
 #: How a message writes an empty key.
 QUOTED = '""'
 
@@ -46,7 +49,8 @@ class ProblemError(ValueError):
 
     def __init__(self, file: str, key: str, value: Any, needed: str) -> None:
         received = "" if value is None else f" = {show(value)}"
-        message = ": ".join(part for part in (file, f"{short(key)}{received}", short(needed, 400)) if part)
+        where = file if len(file) <= LONGEST_PATH else "..." + file[3 - LONGEST_PATH :]  # its end names the file
+        message = ": ".join(part for part in (where, f"{short(key)}{received}", short(needed, 400)) if part)
         super().__init__("".join(c if c.isprintable() else " " for c in message))  # one line, whatever was received
         self.file = file
         self.key = key
