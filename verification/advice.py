@@ -22,7 +22,7 @@ from verification.measured import measure
 from verification.pair import Pair
 from verification.problem import Problem
 from verification.reader import ProblemError
-from verification.readings import NextRun, Reading, SeenRun, read_ratio
+from verification.readings import NextRun, RunReading, SeenRun, read_ratio
 from verification.threads import one_thread
 
 #: What is unknown of matrices and runs from elsewhere.
@@ -91,7 +91,7 @@ class Advice(Document):
         Why the theorem does not speak of the problem.
     run : SeenRun or None
         What was given of a run; None where the advice comes from a problem or from matrices.
-    readings : tuple of Reading
+    readings : tuple of RunReading
         What that run can mean.
     next : NextRun or None
         The run to make next.
@@ -105,7 +105,7 @@ class Advice(Document):
     friction: float | None = None
     outside: tuple[str, ...] = ()
     run: SeenRun | None = None
-    readings: tuple[Reading, ...] = ()
+    readings: tuple[RunReading, ...] = ()
     next: NextRun | None = None
 
     @property

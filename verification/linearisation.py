@@ -12,7 +12,7 @@ from scipy.linalg import schur
 from fem1d2d.mesh import Floats
 from verification.jacobian import Piece, piece_of
 from verification.pair import Pair
-from verification.rates import noise, observed_rate, rate_at_the_end, settled
+from verification.rates import CLEAR_OF_NOISE, noise, observed_rate, rate_at_the_end, settled
 from verification.state import State
 
 #: Contact nodes up to which T is linearised: eigenvalues of larger Jacobians take minutes.
@@ -202,6 +202,8 @@ def forecast(pair: Pair, states: Sequence[State], theta: float, tolerance: float
     state = states[half]
     if state.residual <= tolerance * state.scale:
         raise NotLinear("the run converged before a forecast could be made half way")
+    if tolerance * state.scale <= CLEAR_OF_NOISE * noise(pair, state):
+        raise NotLinear("the tolerance lies within rounding")
     near = _near(pair, state, theta)
     residuals = [s.residual for s in states[: half + 1]]
     floors = [noise(pair, s) for s in states[: half + 1]]

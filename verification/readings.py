@@ -29,7 +29,7 @@ SAME = Fraction(1, 20)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reading:
+class RunReading:
     """One thing that the ratio of a run can mean.
 
     Attributes
@@ -102,7 +102,7 @@ class SeenRun:
         }
 
 
-def read_ratio(theta: Fraction, r: Fraction) -> tuple[SeenRun, tuple[Reading, ...], NextRun, Fraction | None]:
+def read_ratio(theta: Fraction, r: Fraction) -> tuple[SeenRun, tuple[RunReading, ...], NextRun, Fraction | None]:
     """Every reading of a ratio r of residuals at theta, and the run to make next.
 
     :func:`verification.advice.advise_run` says what the readings are.
@@ -137,7 +137,7 @@ def read_ratio(theta: Fraction, r: Fraction) -> tuple[SeenRun, tuple[Reading, ..
     return SeenRun(theta=theta, ratio=r), readings, NextRun(theta=_rounded_down(following), why=why), rho
 
 
-def _readings(theta: Fraction, r: Fraction, high: Fraction, low: Fraction) -> tuple[Reading, ...]:
+def _readings(theta: Fraction, r: Fraction, high: Fraction, low: Fraction) -> tuple[RunReading, ...]:
     """What a ratio r can mean; ``high`` and ``low`` are the lambda of a mode that changes or keeps its sign."""
     fastest = f"the stiffest mode in this run has lambda = {_few(high)} at most"
     proved = f"without friction, or tied, rho is at least {_few(high)}, and about that if all of Gamma_c stays closed"
@@ -148,20 +148,20 @@ def _readings(theta: Fraction, r: Fraction, high: Fraction, low: Fraction) -> tu
         says = f"the stiffest mode changes its sign in every step: {proved}"
     else:
         says = f"the stiffest mode changes its sign in every step and is the slowest: {proved}"
-    found.append(Reading(kind="mode-high", value=float(high), lo=_double_below(high), says=says))
+    found.append(RunReading(kind="mode-high", value=float(high), lo=_double_below(high), says=says))
     if r <= 1 - theta:
         bound = f"without friction, or tied, rho is at least {_few(low)}"
         says = f"the softest mode keeps its sign and is the slowest: {bound}; {fastest}"
-        found.append(Reading(kind="mode-low", lo=_double_below(low), says=says))
+        found.append(RunReading(kind="mode-low", lo=_double_below(low), says=says))
     open_too = abs(r - (1 - theta)) <= SAME * min(theta, 1 - theta)
     if open_too:
         says = f"nodes that are open set the pace, 1 - theta a step, whatever rho is; {fastest}"
-        found.append(Reading(kind="open", says=says))
+        found.append(RunReading(kind="open", says=says))
     if r >= 1 - _spread(theta) and r > 1 - theta and not open_too:
         least = 2 / theta - 1
         level = "contact opens and closes in turn, and the residual stays at a level or grows for a while only"
         bound = f"without friction rho is at least {_few(least)}, nothing more; with friction this says nothing of rho"
-        found.append(Reading(kind="level", lo=_double_below(least), says=f"{level}: {bound}"))
+        found.append(RunReading(kind="level", lo=_double_below(least), says=f"{level}: {bound}"))
     return tuple(found)
 
 

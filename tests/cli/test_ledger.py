@@ -181,7 +181,8 @@ def test_the_list_of_commands_names_it(call):
 def test_an_unknown_id_is_refused_in_one_line_before_anything_is_computed(call, never, id):
     complaint = call("verify", id).complaint
     assert complaint.startswith("ndtheory verify: ")
-    assert repr(id) in complaint
+    assert repr(id) in complaint or (len(id) > 1000 and repr(id)[:60] in complaint)
+    assert len(complaint) < 500
     assert complaint.isprintable()
     offered = complaint.partition("needed one like ")[2].split(", ")
     assert offered

@@ -152,7 +152,7 @@ def test_ctrl_c_leaves_a_screen(call, endless, after, command):
     after(3, lambda: signal.raise_signal(signal.SIGINT))
     answer = call(command, endless)
     assert answer.status == INTERRUPTED
-    assert "  interrupted\n" in answer.out
+    assert "  seen: interrupted\n" in answer.out
 
 
 @pytest.mark.parametrize("judged", ["VIOLATED", "INCONCLUSIVE"])

@@ -14,7 +14,7 @@ from verification.measured import ENERGY_NAMES, NAMES, Measured
 from verification.monolithic import Solution
 from verification.plane import MOST_STEPS, Plane
 from verification.problem import Problem
-from verification.readings import NextRun, Reading, SeenRun
+from verification.readings import NextRun, RunReading, SeenRun
 from verification.runs import Run
 from verification.verdicts import Comparison
 
@@ -204,7 +204,7 @@ def advice(found: Advice, file: Path | None) -> None:
         say("Next: ndtheory advise --help")
 
 
-def _seen(run: SeenRun, readings: tuple[Reading, ...], following: NextRun) -> None:
+def _seen(run: SeenRun, readings: tuple[RunReading, ...], following: NextRun) -> None:
     """What a run says of rho, and which one is to be made next."""
     heading("WHAT DOES THE RUN SAY OF RHO?")
     given = f"theta = {float(run.theta):.4g}; the residual |Tg - g| changes by {float(run.ratio):.4g} a step"
