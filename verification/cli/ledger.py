@@ -65,7 +65,9 @@ def _named(id: str) -> list[str]:
         folded = {other.casefold(): other for other in known}
         near = [folded[name] for name in get_close_matches(id.casefold(), folded, n=3)] or list(known)[:3]
         context = click.get_current_context()
-        raise click.UsageError(f"{id!r}: no such statement; needed one like {', '.join(near)}", context)
+        from verification.reader import short
+
+        raise click.UsageError(f"{short(id)!r}: no such statement; needed one like {', '.join(near)}", context)
     return parts
 
 
