@@ -44,8 +44,8 @@ NARROW = 1e-2
 #: It is given up below this share of the threshold of the theorem in energy norms, which it should exceed.
 LEAST = 1e-2
 
-#: A value that rounding leaves undecided is moved to the safe side by these shares, from the least to 1.7 %.
-SHARES = tuple(1e-15 * 4.0**k for k in range(23))
+#: A value that rounding leaves undecided is moved to the safe side by these shares, from none to 1.7 %.
+SHARES = (0.0, *(1e-15 * 4.0**k for k in range(23)))
 
 #: Why no value of this edition is called certified.
 NOT_CERTIFIED = "checked in doubles with a bound on their rounding, for the interface matrices as computed"
