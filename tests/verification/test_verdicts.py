@@ -82,7 +82,7 @@ def test_a_factor_scaled_by_nine_tenths_is_violated_where_the_bound_is_attained(
         )
     else:
         evaluate = lmi.evaluate_lmi
-        shrink = lambda *args: replace(evaluate(*args), lipschitz=less(evaluate(*args).lipschitz))
+        shrink = lambda *args, **kw: replace(evaluate(*args, **kw), lipschitz=less(evaluate(*args, **kw).lipschitz))
         monkeypatch.setattr(lmi, "evaluate_lmi", shrink)
     found = compare(problem)
     assert found.verdicts[name].verdict == "VIOLATED"
