@@ -202,11 +202,11 @@ def forecast(pair: Pair, states: Sequence[State], theta: float, tolerance: float
     state = states[half]
     if state.residual <= tolerance * state.scale:
         raise NotLinear("the run converged before a forecast could be made half way")
-    if tolerance * state.scale <= CLEAR_OF_NOISE * noise(pair, state):
+    seen = states[: half + 1]
+    residuals, floors = [s.residual for s in seen], [noise(pair, s) for s in seen]
+    if tolerance * state.scale <= CLEAR_OF_NOISE * floors[-1]:
         raise NotLinear("the tolerance lies within rounding")
     near = _near(pair, state, theta)
-    residuals = [s.residual for s in states[: half + 1]]
-    floors = [noise(pair, s) for s in states[: half + 1]]
     error = near.error
     while residuals[-1] > tolerance * state.scale:
         if len(residuals) > most:
@@ -218,7 +218,7 @@ def forecast(pair: Pair, states: Sequence[State], theta: float, tolerance: float
         raise NotLinear("the run is too short for a rate")
     return Forecast(
         made_at_iteration=half,
-        rate=rate_at_the_end(residuals, floors, settled(states[: half + 1])).value,
+        rate=rate_at_the_end(residuals, floors, settled(seen)).value,
         iterations=len(residuals) - 1,
         tolerance=tolerance,
     )
