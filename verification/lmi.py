@@ -163,7 +163,8 @@ class SemidefiniteEdition:
             lambda value, weights: self._traces.definite(weights, square=value, step=(theta, 1 - theta)),
         )
         root = lambda square: float(np.sqrt(max(square, 0.0)))
-        return replace(found, value=root(found.value), evaluated=root(found.evaluated), proposed=root(found.proposed))
+        above = math.nextafter(root(found.value), math.inf)  # a root rounds either way; the bound must not
+        return replace(found, value=above, evaluated=root(found.evaluated), proposed=root(found.proposed))
 
     def friction_number(self) -> Certified:
         """The least c with ``<g, p> <= c |g|^2`` that multipliers prove: every small theta contracts where c < 1.
