@@ -6,11 +6,11 @@ from contextlib import AbstractContextManager
 from functools import cache
 from typing import Any
 
-from threadpoolctl import ThreadpoolController
-
 
 @cache
 def _controller() -> Any:
+    from threadpoolctl import ThreadpoolController  # the calculator starts without it
+
     return ThreadpoolController()
 
 

@@ -2,12 +2,18 @@
 
 import json
 import os
+import re
+import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
 from processes import PATIENCE, ended, running
 
-HEAVY = ["numpy", "scipy", "matplotlib", "cvxpy", "clarabel", "rich", "meshio", "jinja2", "sympy"]
+PROJECT = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text("utf-8"))["project"]
+
+#: Every dependency but the one of the command line; each is imported by the name of its distribution.
+HEAVY = [re.match(r"\w+", needed)[0] for needed in PROJECT["dependencies"] if not needed.startswith("click")]
 
 CALL = "import sys; from verification.cli import main; sys.exit(main())"
 BOUNDS = ["bounds", "--m", "3084", "--M", "153229", "--CR", "1.70", "--CK", "1e-8", "--theta", "1e-4"]
