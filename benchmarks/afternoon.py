@@ -9,7 +9,7 @@ from __future__ import annotations
 import cvxpy as cp
 import numpy as np
 
-from verification.pair import Pair
+from verification.interface.pair import Pair
 
 
 def contact_step(pair: Pair, u: np.ndarray, bound: np.ndarray) -> np.ndarray:

@@ -12,9 +12,9 @@ from decimal import Decimal
 from typing import Any
 
 import verification as vf
-from verification import lmi
-from verification.bodies import build
+from verification.bounds import semidefinite as lmi
 from verification.cli.problems import examples
+from verification.interface.assembly import build
 
 problem = vf.Problem.from_dict(tomllib.loads(examples()["section6"], parse_float=Decimal))
 coarse = replace(problem, body1=replace(problem.body1, cells=(20, 3)), body2=replace(problem.body2, cells=(12, 3)))

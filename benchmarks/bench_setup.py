@@ -13,7 +13,7 @@ from statistics import median
 from bench_step import problem
 
 import verification as vf
-from verification.bodies import build
+from verification.interface.assembly import build
 
 
 def scaled(factor: float) -> vf.Problem:

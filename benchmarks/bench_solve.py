@@ -12,7 +12,7 @@ from bench_step import problem
 
 import verification as vf
 from fem1d2d import solver
-from verification.bodies import face
+from verification.interface.assembly import face
 
 ROUNDS = 9
 

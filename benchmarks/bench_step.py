@@ -13,8 +13,8 @@ import numpy as np
 from afternoon import contact_step
 
 import verification as vf
-from verification.bodies import build
-from verification.iteration import FixedPointMap
+from verification.algorithm.fixed_point import FixedPointMap
+from verification.interface.assembly import build
 
 STEPS, ROUNDS = 15, 3
 

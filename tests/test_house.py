@@ -12,7 +12,7 @@ ROOMS = ("fem1d2d", "ndtheory", "verification")
 
 #: module: the modules and packages that alone may import it
 DOORS = {
-    "cvxpy": ("verification.contact.model", "verification.lmi_program"),
+    "cvxpy": ("verification.contact.model", "verification.bounds.program"),
     "matplotlib": ("verification.figures",),
     "click": ("verification.cli",),
     "rich": ("verification.cli",),
@@ -95,7 +95,7 @@ def test_every_room_has_been_read():
     ("module", "source"),
     [
         ("fem1d2d.mesh", "import ndtheory"),
-        ("fem1d2d.mesh", "def f():\n    if True:\n        from verification.problem import Problem"),
+        ("fem1d2d.mesh", "def f():\n    if True:\n        from verification.problem.specification import Problem"),
         ("fem1d2d.mesh", "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import ndtheory.bounds as b"),
         ("fem1d2d.mesh", "from .. import ndtheory"),
         ("ndtheory.bounds", "import fem1d2d.mesh"),
@@ -109,13 +109,13 @@ def test_every_room_has_been_read():
         ("verification.sweep", "from importlib import import_module\nimport_module(name)"),
         ("verification.sweep", "import_module(f'cv{x}')"),
         ("fem1d2d.mesh", "import_module(f'verification.{x}')"),
-        ("verification.iteration", "import cvxpy as cp"),
+        ("verification.algorithm.fixed_point", "import cvxpy as cp"),
         ("verification.contact.kkt", "from cvxpy.constraints import Zero"),
-        ("verification.report", "import matplotlib.pyplot as plt"),
+        ("verification.output.report", "import matplotlib.pyplot as plt"),
         ("fem1d2d.mesh", "def plot(self):\n    from matplotlib import pyplot"),
-        ("verification.report", "from rich.table import Table"),
+        ("verification.output.report", "from rich.table import Table"),
         ("verification.client", "import click"),
-        ("verification.iteration", "print('done')"),
+        ("verification.algorithm.fixed_point", "print('done')"),
         ("ndtheory.bounds", "def f(say=print):\n    say(1)"),
     ],
 )
@@ -132,11 +132,11 @@ def test_a_forbidden_edge_is_found(module, source):
         ("verification", "importlib.import_module(f'verification.{home}')"),
         ("verification.compare", "import ndtheory, fem1d2d, numpy"),
         ("verification.contact.model", "import cvxpy"),
-        ("verification.lmi_program", "def f():\n    import cvxpy"),
+        ("verification.bounds.program", "def f():\n    import cvxpy"),
         ("verification.figures.region", "import matplotlib"),
         ("verification.figures", "import matplotlib"),
         ("verification.cli.run", "import click\nfrom rich import print\nprint('done')"),
-        ("verification.iteration", "# print('done')\nlog.info('print')"),
+        ("verification.algorithm.fixed_point", "# print('done')\nlog.info('print')"),
     ],
 )
 def test_an_edge_of_the_plan_is_let_through(module, source):

@@ -24,37 +24,37 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from typing import Any
 
-    from verification.advice import Advice, advise
+    from verification.advice.roles import Advice, advise
+    from verification.algorithm.fixed_point import iterate
+    from verification.algorithm.iterate import State
+    from verification.algorithm.runs import Run, run
+    from verification.comparison import Comparison, compare
+    from verification.constants import Measured, measure
     from verification.contact import ContactError
-    from verification.iteration import iterate
     from verification.ledger import Ledger, verify
-    from verification.measured import Measured, measure
     from verification.monolithic import Solution, SolveError, solve
-    from verification.problem import Problem, load
-    from verification.reader import ProblemError
-    from verification.runs import Run, run
-    from verification.state import State
-    from verification.verdicts import Comparison, compare
+    from verification.problem.specification import Problem, load
+    from verification.problem.tables import ProblemError
 
-#: Where each public name lives.  No module here bears the name of a public function: it would hide it.
+#: Where each public name lives.  No module at this level bears the name of a public function: it would hide it.
 _HOME = {
-    "Advice": "advice",
-    "Comparison": "verdicts",
+    "Advice": "advice.roles",
+    "Comparison": "comparison",
     "ContactError": "contact",
     "Ledger": "ledger",
-    "Measured": "measured",
-    "Problem": "problem",
-    "ProblemError": "reader",
-    "Run": "runs",
+    "Measured": "constants",
+    "Problem": "problem.specification",
+    "ProblemError": "problem.tables",
+    "Run": "algorithm.runs",
     "Solution": "monolithic",
     "SolveError": "monolithic",
-    "State": "state",
-    "advise": "advice",
-    "compare": "verdicts",
-    "iterate": "iteration",
-    "load": "problem",
-    "measure": "measured",
-    "run": "runs",
+    "State": "algorithm.iterate",
+    "advise": "advice.roles",
+    "compare": "comparison",
+    "iterate": "algorithm.fixed_point",
+    "load": "problem.specification",
+    "measure": "constants",
+    "run": "algorithm.runs",
     "solve": "monolithic",
     "verify": "ledger",
 }

@@ -24,11 +24,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem1d2d.mesh import Floats
-from verification.bodies import face
-from verification.contact_state import ContactState
 from verification.document import Document
-from verification.pair import Body, Facing
-from verification.problem import Problem
+from verification.interface.assembly import face
+from verification.interface.fields import ContactState
+from verification.interface.pair import Body, Facing
+from verification.problem.specification import Problem
 from verification.threads import one_thread
 
 #: A solution is accepted below this relative KKT residual.

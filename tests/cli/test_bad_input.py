@@ -11,8 +11,8 @@ import pytest
 import scipy.sparse as sp
 
 from fem1d2d import rectangle
+from verification.advice.matrix_files import read_matrix
 from verification.cli.problems import examples
-from verification.matrices import read_matrix
 
 NUMBERS = {
     "body1.young": "a number > 0",
@@ -384,8 +384,8 @@ def test_an_output_folder_that_cannot_be_one_is_refused_before_anything_is_compu
     file = write()
     (tmp_path / "missing").mkdir()
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("verification.bodies.build", None)
-    monkeypatch.setattr("verification.bodies.face", None)
+    monkeypatch.setattr("verification.interface.assembly.build", None)
+    monkeypatch.setattr("verification.interface.assembly.face", None)
     assert_names(call(*([command] if command == "demo" else [command, file]), "-o", folder).complaint, folder, "folder")
 
 
@@ -703,7 +703,7 @@ def test_a_mesh_that_does_not_fit_is_refused_by_name(call, write, tmp_path, chan
 
 def test_a_mesh_file_cannot_be_halved_and_that_is_said_before_anything_is_measured(call, write, tmp_path, monkeypatch):
     mesh_file(tmp_path / "body1.msh")
-    monkeypatch.setattr("verification.measured._measure", None)
+    monkeypatch.setattr("verification.constants._measure", None)
     line = call("constants", write(MESHED), "--refine", "1").complaint
     assert_names(line, "problem.toml", "body1.mesh", "body1.msh", "halved")
 

@@ -14,9 +14,10 @@ import scipy.sparse as sp
 
 import verification as vf
 from ndtheory import PRINTED, REPAIRED, EnergyConstants, evaluate, evaluate_sharp
-from verification import plane, runs
-from verification.bodies import build
+from verification.algorithm import runs
+from verification.bounds import region as plane
 from verification.cli.problems import examples
+from verification.interface.assembly import build
 
 ROLE = {
     "neumann_body",

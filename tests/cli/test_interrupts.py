@@ -82,7 +82,7 @@ def test_ctrl_c_while_the_command_starts_is_one_line(write, moment):
         "verification.cli.main",
         "click.core",
         "ndtheory.bounds",
-        "verification.problem",
+        "verification.problem.specification",
         "numpy",
         "scipy.linalg",
         "cvxpy",
@@ -139,7 +139,7 @@ SOLVING = """
 
     def prepared(*args, **options):
         import scs
-        from verification import verdicts
+        from verification import comparison as verdicts
 
         class Solver(scs.SCS):
             def __init__(self, *args, **options):
@@ -176,7 +176,7 @@ def test_ctrl_c_while_scs_factorises_or_iterates_is_never_lost(tmp_path, moment)
 def test_what_a_c_library_writes_on_stdout_is_not_in_the_document(write):
     noisy = """
         import ctypes, os, sys
-        from verification import runs
+        from verification.algorithm import runs
         from verification.cli import main
 
         run = runs.run
@@ -199,7 +199,7 @@ def test_what_a_c_library_writes_on_stdout_is_not_in_the_document(write):
 def test_ctrl_c_that_a_finaliser_drops_comes_again(write):
     code = """
         import os, signal, sys
-        from verification import runs
+        from verification.algorithm import runs
         from verification.cli import main
 
         class Dropped:
@@ -256,7 +256,7 @@ def test_an_import_that_ctrl_c_breaks_is_no_bug(write, tmp_path, module):
 
 
 def test_constants_keep_the_meshes_that_were_measured(call, write, monkeypatch):
-    from verification import measured
+    from verification import constants as measured
 
     build, built = measured.build, []
 
@@ -275,7 +275,7 @@ def test_constants_keep_the_meshes_that_were_measured(call, write, monkeypatch):
 
 
 def test_region_draws_the_runs_that_were_made(call, write, tmp_path, monkeypatch):
-    from verification import plane
+    from verification.bounds import region as plane
 
     monkeypatch.setattr(plane, "THETAS", (0.2, 0.4))
     monkeypatch.setattr(plane, "FRICTIONS", (0.1, 0.3))

@@ -8,11 +8,12 @@ from dataclasses import replace
 import pytest
 
 import verification
-from verification import figures, verdicts
+from verification import comparison as verdicts
+from verification import figures
 from verification.cli.problems import examples
+from verification.comparison import Judgement
 from verification.contact import ContactError
 from verification.monolithic import SolveError
-from verification.verdicts import Judgement
 
 DONE, NOT_MET, BAD_INPUT, INCONCLUSIVE, INTERRUPTED, CRASH = 0, 1, 2, 3, 130, 70
 
@@ -86,8 +87,8 @@ def test_a_crash_says_that_it_is_one_and_is_no_status_of_the_interface(call, wri
     def fail(problem):
         raise error
 
-    monkeypatch.setattr("verification.bodies.build", fail)
-    monkeypatch.setattr("verification.measured.build", fail)
+    monkeypatch.setattr("verification.interface.assembly.build", fail)
+    monkeypatch.setattr("verification.constants.build", fail)
     answer = call(command, write())
     assert answer.status == CRASH
     assert answer.out == ""
@@ -167,8 +168,8 @@ def test_ctrl_c_before_anything_was_computed_says_so(call, write, monkeypatch, c
     def interrupt(problem):
         signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr("verification.bodies.build", interrupt)
-    monkeypatch.setattr("verification.measured.build", interrupt)
+    monkeypatch.setattr("verification.interface.assembly.build", interrupt)
+    monkeypatch.setattr("verification.constants.build", interrupt)
     answer = call(command, write())
     assert (answer.status, answer.out) == (INTERRUPTED, "")
     assert answer.err.strip() == "interrupted before anything was computed"

@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from verification.bodies import Pair, build
+from verification.algorithm.fixed_point import FixedPointMap
+from verification.algorithm.runs import Run, run
+from verification.constants import Measured, measure
 from verification.contact import ContactError, ContactSolution
 from verification.contact.active_set import Pattern
-from verification.iteration import FixedPointMap
+from verification.interface.assembly import Pair, build
 from verification.ledger.cases import problem, three_digits
 from verification.ledger.large_friction import loaded
-from verification.measured import Measured, measure
-from verification.runs import Run, run
 
 
 def relaxation_factor(random: np.random.Generator, rho: float) -> float:

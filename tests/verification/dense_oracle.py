@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.linalg import block_diag, eigh
 
-from verification.bodies import Pair
+from verification.interface.assembly import Pair
 
 
 def dense_stiffness(points: np.ndarray, cells: np.ndarray, young: float, poisson: float) -> np.ndarray:

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from sample_problems import changed
 
 import verification as vf
-from verification.advice import advise_run
-from verification.bodies import build
-from verification.iteration import FixedPointMap, states
-from verification.relaxation import Constant
+from verification.advice.roles import advise_run
+from verification.algorithm.fixed_point import FixedPointMap, states
+from verification.algorithm.relaxation import Constant
+from verification.interface.assembly import build
 
 #: A residual fallen to this share of its largest has converged.
 FALLEN = 1e-6

@@ -11,10 +11,10 @@ from sample_problems import changed
 
 import verification as vf
 from ndtheory import EnergyConstants, evaluate_sharp
-from verification.advice import advise_matrices
-from verification.bodies import build
-from verification.choice import automatic, choose, sharp_bounds
+from verification.advice.roles import advise_matrices
+from verification.algorithm.theta import automatic, choose, sharp_bounds
 from verification.cli.problems import examples
+from verification.interface.assembly import build
 
 
 def steps(theta, rho, tolerance=1e-9):

@@ -19,14 +19,14 @@ from hypothesis import settings
 from scipy.linalg import block_diag, eigh
 
 from ndtheory import REPAIRED, bounds, evaluate, sharp
-from verification.bodies import Pair
+from verification.algorithm.affine_piece import Piece
+from verification.algorithm.rates import largest_step_ratio
+from verification.bounds.pattern_search import largest_factor, worst_piece
+from verification.bounds.program import LMIError
+from verification.bounds.semidefinite import NARROW, SemidefiniteEdition, friction_threshold
+from verification.constants import Measured
 from verification.contact.active_set import Pattern
-from verification.jacobian import Piece
-from verification.lmi import NARROW, SemidefiniteEdition, friction_threshold
-from verification.lmi_program import LMIError
-from verification.measured import Measured
-from verification.rates import largest_step_ratio
-from verification.search import largest_factor, worst_piece
+from verification.interface.assembly import Pair
 from verification.threads import one_thread
 
 #: Random problems, the same ones each time, in batches.

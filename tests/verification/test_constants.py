@@ -17,7 +17,7 @@ from scipy.linalg import eigh
 
 import verification as vf
 from ndtheory import PRINTED, REPAIRED, evaluate
-from verification.bodies import build
+from verification.interface.assembly import build
 
 CONSTANTS = ("m", "M", "C_R", "C_s", "C_tr", "C_tr_half", "C_K", "rho_max", "rho_min", "rho_normal")
 

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from scipy.linalg import eigh
 
 import verification as vf
-from verification.bodies import build
-from verification.measured import Measured
+from verification.constants import Measured
+from verification.interface.assembly import build
 
 NAMES = ("rho_max", "rho_min", "rho_normal", "C_s_energy", "C_t1", "C_t2", "kappa_1", "kappa_2")
 

@@ -12,7 +12,7 @@ import pytest
 from problem_list import PROBLEMS, bars, plates
 
 import verification as vf
-from verification.bodies import face
+from verification.interface.assembly import face
 from verification.monolithic import ContactSystem, contact_system
 
 REFERENCE = Path(__file__).parent / "reference_local_coulomb.csv"

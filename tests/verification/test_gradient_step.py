@@ -11,8 +11,8 @@ import pytest
 from chain_problems import case, step_II, with_loads
 from scipy.linalg import eigh
 
-from verification.iteration import FixedPointMap
-from verification.measured import measure
+from verification.algorithm.fixed_point import FixedPointMap
+from verification.constants import measure
 
 SEEDS = range(6)
 

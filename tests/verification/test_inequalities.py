@@ -22,9 +22,9 @@ from scipy.linalg import eigh
 
 import verification as vf
 from ndtheory import EDITIONS, REPAIRED, evaluate
-from verification.bodies import build
+from verification.algorithm.fixed_point import FixedPointMap
 from verification.contact import ContactError
-from verification.iteration import FixedPointMap
+from verification.interface.assembly import build
 
 EPS = np.finfo(float).eps
 

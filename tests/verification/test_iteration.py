@@ -19,11 +19,11 @@ from hypothesis import strategies as st
 from sample_problems import PROBLEMS, SECTION_6, SHEARED, bars, changed
 
 import verification as vf
-from verification.bodies import build
-from verification.choice import Choice
+from verification.algorithm.fixed_point import FixedPointMap, State
+from verification.algorithm.runs import MOST_BYTES, PATIENCE, RUNAWAY, Run
+from verification.algorithm.theta import Choice
 from verification.contact import TOLERANCE, ContactError
-from verification.iteration import FixedPointMap, State
-from verification.runs import MOST_BYTES, PATIENCE, RUNAWAY, Run
+from verification.interface.assembly import build
 
 by_name = pytest.mark.parametrize("name", PROBLEMS)
 

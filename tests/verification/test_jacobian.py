@@ -16,13 +16,13 @@ from hypothesis import strategies as st
 from sample_problems import PROBLEMS
 
 import verification as vf
-from verification.bodies import Pair, build
+from verification.algorithm.affine_piece import Piece, piece_of
+from verification.algorithm.fixed_point import FixedPointMap, state_at
+from verification.algorithm.iterate import State
+from verification.algorithm.linearisation import NotLinear, linearise
 from verification.contact import ContactError
 from verification.contact.active_set import Pattern
-from verification.iteration import FixedPointMap, state_at
-from verification.jacobian import Piece, piece_of
-from verification.linearisation import NotLinear, linearise
-from verification.state import State
+from verification.interface.assembly import Pair, build
 
 seeds = st.integers(0, 2**32 - 1).map(np.random.default_rng)
 

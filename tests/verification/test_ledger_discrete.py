@@ -21,7 +21,7 @@ from verification.ledger.differences import Difference, Setting, along, between,
 from verification.ledger.evidence import Evidence
 from verification.ledger.inequalities import ALLOWANCE, INEQUALITIES, LEVELS, SHARES, Inequality, Reading
 from verification.ledger.worst import Tally, Trial, discrete, draw_cases, pairs_of
-from verification.problem import Problem
+from verification.problem.specification import Problem
 from verification.threads import one_thread
 
 #: What fails as printed, on bodies that are named.

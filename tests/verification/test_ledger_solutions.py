@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fem1d2d import Condensation
-from verification.bodies import build
+from verification.interface.assembly import build
 from verification.ledger import convergence, weak_forms
 from verification.ledger import experiments as section_6
 from verification.ledger import solutions as ledger
@@ -21,7 +21,7 @@ from verification.ledger.solutions import solutions
 from verification.ledger.sweeps import Best, Count, Model, Sweeps
 from verification.ledger.weak_forms import EXACT, Case, Fields, Weak
 from verification.monolithic import solve
-from verification.problem import Problem
+from verification.problem.specification import Problem
 
 PRINTED, STEP, REPAIRED = "printed", "step", "repaired"
 HOLDS = [(PRINTED, True)]

@@ -20,11 +20,11 @@ from scipy.linalg import eigh
 
 import verification as vf
 from ndtheory import PRINTED, REPAIRED, bounds
-from verification.bodies import Pair, build
-from verification.jacobian import Piece
-from verification.losses import Losses, locate
-from verification.measured import Measured, measure
-from verification.search import Found, worst_piece
+from verification.algorithm.affine_piece import Piece
+from verification.bounds.losses import Losses, locate
+from verification.bounds.pattern_search import Found, worst_piece
+from verification.constants import Measured, measure
+from verification.interface.assembly import Pair, build
 
 #: Labels whose worst pair is an eigenvector; of the others it is searched.
 EIGENVALUES = ("(5.18)", "(5.19)", "(5.22)", "(5.23)", "(5.29)")

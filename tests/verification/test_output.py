@@ -16,8 +16,8 @@ import pytest
 import verification as vf
 from verification import figures
 from verification.ledger.record import on_the_printed_proof
-from verification.output import LOCKS, Folder, staged
-from verification.report import report
+from verification.output.folder import LOCKS, Folder, staged
+from verification.output.report import report
 
 SMALL = {
     "title": "Small",
@@ -191,7 +191,7 @@ def test_a_report_that_fails_leaves_the_comparison_before_it(quick, comparison, 
     def fail(*arguments):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("verification.report.report", fail)
+    monkeypatch.setattr("verification.output.report.report", fail)
     with pytest.raises(vf.ProblemError, match="No space left"):
         write(tmp_path, "comparison", vf.compare(problem(iteration=ONE_STEP)))
     assert contents(tmp_path) == before
@@ -218,7 +218,7 @@ def test_a_comparison_without_losses_takes_the_waterfall_of_another_away(quick, 
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from verification.output import staged
+from verification.output.folder import staged
 
 folder, moves = Path(sys.argv[1]), int(sys.argv[2])
 replace = Path.replace

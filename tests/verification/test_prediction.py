@@ -11,12 +11,12 @@ from chain_problems import case, run_of
 from hypothesis import settings
 
 import verification as vf
-from verification.bodies import Pair, build
-from verification.iteration import iterate
-from verification.jacobian import piece_of
-from verification.linearisation import Linearisation, NotLinear, linearise
-from verification.runs import Run, run
-from verification.state import State
+from verification.algorithm.affine_piece import piece_of
+from verification.algorithm.fixed_point import iterate
+from verification.algorithm.iterate import State
+from verification.algorithm.linearisation import Linearisation, NotLinear, linearise
+from verification.algorithm.runs import Run, run
+from verification.interface.assembly import Pair, build
 
 #: Random problems, the same ones each time, in batches.
 COUNT = max(240, settings.default.max_examples)
@@ -209,9 +209,9 @@ def test_a_state_far_from_the_solution_is_not_linearised():
 def test_too_many_nodes_are_not_linearised(monkeypatch):
     pair = symmetric_blocks()
     last = linearised(pair, 0.3)[0].last
-    monkeypatch.setattr("verification.linearisation.MOST_NODES", pair.n)
+    monkeypatch.setattr("verification.algorithm.linearisation.MOST_NODES", pair.n)
     linearise(pair, last, 0.3)
-    monkeypatch.setattr("verification.linearisation.MOST_NODES", pair.n - 1)
+    monkeypatch.setattr("verification.algorithm.linearisation.MOST_NODES", pair.n - 1)
     with pytest.raises(NotLinear, match="5 contact nodes"):
         linearise(pair, last, 0.3)
 

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import verification as vf
-from verification.rates import CLEAR_OF_NOISE, largest_step_ratio, noise, observed_rate, rate_at_the_end
-from verification.runs import Run, run
+from verification.algorithm.rates import CLEAR_OF_NOISE, largest_step_ratio, noise, observed_rate, rate_at_the_end
+from verification.algorithm.runs import Run, run
 
 EPSILON = sys.float_info.epsilon
 

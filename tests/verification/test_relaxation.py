@@ -18,13 +18,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import verification as vf
-from verification.bodies import Pair, build
+from verification.algorithm.fixed_point import FixedPointMap, states
+from verification.algorithm.relaxation import Momentum, momentum_rate, momentum_step, outside, rule
+from verification.algorithm.runs import Run, run
+from verification.constants import Measured, measure
 from verification.contact import ContactError
-from verification.iteration import FixedPointMap, states
-from verification.measured import Measured, measure
-from verification.problem import RELAXATIONS
-from verification.relaxation import Momentum, momentum_rate, momentum_step, outside, rule
-from verification.runs import Run, run
+from verification.interface.assembly import Pair, build
+from verification.problem.specification import RELAXATIONS
 
 #: Who has the Neumann problem, E1, E2, and the left end of the upper body.
 COMBINATIONS = {

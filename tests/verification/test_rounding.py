@@ -9,11 +9,11 @@ import pytest
 from chain_problems import case
 
 import verification as vf
-from verification.bodies import build
-from verification.lmi import SemidefiniteEdition
-from verification.lmi_program import LMIError
-from verification.measured import measure
-from verification.rounding import UNIT, norm_bound, positive_definite
+from verification.bounds.program import LMIError
+from verification.bounds.rounding import UNIT, norm_bound, positive_definite
+from verification.bounds.semidefinite import SemidefiniteEdition
+from verification.constants import measure
+from verification.interface.assembly import build
 
 Exact = list[list[Fraction]]
 

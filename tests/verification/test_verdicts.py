@@ -9,11 +9,13 @@ from chain_problems import case, run_of
 
 import verification as vf
 from ndtheory import Number
-from verification import lmi, lmi_program, verdicts
-from verification.editions import LARGEST
-from verification.linearisation import NotLinear, forecast
-from verification.rates import StepRatio
-from verification.verdicts import TIGHT, compare, judge, judge_forecast
+from verification import comparison as verdicts
+from verification.algorithm.linearisation import NotLinear, forecast
+from verification.algorithm.rates import StepRatio
+from verification.bounds import program as lmi_program
+from verification.bounds import semidefinite as lmi
+from verification.bounds.table import LARGEST
+from verification.comparison import TIGHT, compare, judge, judge_forecast
 
 BOUND = 0.5
 SLACK = TIGHT * (1 - BOUND)

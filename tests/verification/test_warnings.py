@@ -11,9 +11,9 @@ from sample_problems import SHEARED, changed
 
 import verification as vf
 from fem1d2d import rectangle
-from verification.bodies import face
 from verification.cli.problems import examples
-from verification.pair import LOCKING, SHARE
+from verification.interface.assembly import face
+from verification.interface.pair import LOCKING, SHARE
 
 
 def warned(data):

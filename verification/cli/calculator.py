@@ -19,9 +19,9 @@ from ndtheory import (
     relaxation_factor,
 )
 from ndtheory.constants import take
+from verification.bounds.table import EditionRow, bounded, row_of
 from verification.cli.console import factor, figures, heading, note, say, table
 from verification.document import Document
-from verification.editions import EditionRow, bounded, row_of
 from verification.ledger.record import on_the_printed_proof
 
 #: The constants of Section 5 by key, and the options that give them.

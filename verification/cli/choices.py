@@ -48,14 +48,14 @@ def advise(
         raise click.UsageError(f"received {received}: needed one of {', '.join(forms)}", context)
     if any(value is None for value in forms[given[0]]):
         raise click.UsageError(f"needed both {given[0]}", context)
-    from verification import advice
+    from verification.advice import roles as advice
     from verification.cli import screens
-    from verification.problem import load
+    from verification.problem.specification import load
 
     if file is not None:
         found = advice.advise(load(file))
     elif S1 is not None and S2 is not None:
-        from verification.matrices import read_matrix
+        from verification.advice.matrix_files import read_matrix
 
         matrices = [read_matrix(path) for path in (S1, S2)]
         try:
@@ -100,11 +100,11 @@ def region(file: Path, target: Path, as_json: bool) -> None:
       ndtheory region my.toml -o plane.svg
     """
     from verification import figures
+    from verification.bounds.region import chart
     from verification.cli import screens
-    from verification.output import check_ours, staged
-    from verification.plane import chart
-    from verification.problem import load
-    from verification.reader import ProblemError
+    from verification.output.folder import check_ours, staged
+    from verification.problem.specification import load
+    from verification.problem.tables import ProblemError
 
     problem = load(file)
     if not target.parent.is_dir():

@@ -20,8 +20,8 @@ from verification.progress import Progress, silent
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from verification.algorithm.iterate import State
     from verification.document import Document
-    from verification.state import State
 
 WIDTH = 80
 

@@ -43,7 +43,7 @@ def verify(ids: tuple[str, ...], level: Any, folder: Path | None, as_json: bool)
     """
     chosen = [one for id in ids for one in _named(id)]
     from verification.ledger import verify as check
-    from verification.output import Folder
+    from verification.output.folder import Folder
 
     target = None if folder is None else Folder(folder, "verify")
     try:
@@ -65,7 +65,7 @@ def _named(id: str) -> list[str]:
         folded = {other.casefold(): other for other in known}
         near = [folded[name] for name in get_close_matches(id.casefold(), folded, n=3)] or list(known)[:3]
         context = click.get_current_context()
-        from verification.reader import short
+        from verification.problem.tables import short
 
         raise click.UsageError(f"{short(id)!r}: no such statement; needed one like {', '.join(near)}", context)
     return parts

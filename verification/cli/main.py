@@ -143,7 +143,7 @@ def _run(arguments: Sequence[str] | None, seen: Sequence[int]) -> int:
         complain(error.ctx.get_help())
         return BAD_INPUT
     except click.UsageError as error:
-        from verification.reader import short
+        from verification.problem.tables import short
 
         where = error.ctx.command_path if error.ctx else "ndtheory"
         complain(f"{where}: {short(printable(' '.join(error.format_message().split())), 600)}")
@@ -172,7 +172,7 @@ def _run(arguments: Sequence[str] | None, seen: Sequence[int]) -> int:
 
 def _explain(error: Exception) -> int:
     """Bad input in one line; anything else is a bug and says so."""
-    from verification.reader import ProblemError
+    from verification.problem.tables import ProblemError
 
     if isinstance(error, (ProblemError, HypothesisError, click.ClickException)):
         complain(f"ndtheory: {error}")

@@ -12,9 +12,9 @@ import click
 from verification.cli.console import Interrupted, complain, deliver, progress, say, stages
 
 if TYPE_CHECKING:
-    from verification.problem import Problem
-    from verification.runs import Run
-    from verification.verdicts import Comparison
+    from verification.algorithm.runs import Run
+    from verification.comparison import Comparison
+    from verification.problem.specification import Problem
 
 FILE = click.argument("file", type=click.Path(path_type=Path))
 JSON = click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout.")
@@ -91,8 +91,8 @@ def _title(text: str) -> str:
 
 
 def _load(file: Path, theta: str | None, swap: bool) -> Problem:
-    from verification.problem import load
-    from verification.reader import ProblemError
+    from verification.problem.specification import load
+    from verification.problem.tables import ProblemError
 
     problem = load(file)
     if theta is not None:
@@ -117,7 +117,7 @@ def constants(file: Path, refine: int, as_json: bool) -> None:
       ndtheory constants my.toml --refine 2
     """
     from verification.cli import screens
-    from verification.measured import measure
+    from verification.constants import measure
 
     problem = _load(file, None, False)
     with stages() as tell:
@@ -144,10 +144,10 @@ def run(file: Path, theta: str | None, solver: Any, swap_roles: bool, folder: Pa
     Example:
       ndtheory run my.toml --theta 0.6 -o results
     """
-    from verification import runs
-    from verification.bodies import build
+    from verification.algorithm import runs
     from verification.cli import screens
-    from verification.output import Folder
+    from verification.interface.assembly import build
+    from verification.output.folder import Folder
 
     problem = _load(file, theta, swap_roles)
     target = None if folder is None else Folder(folder, "run")
@@ -181,9 +181,9 @@ def solve(file: Path, folder: Path | None, as_json: bool) -> int:
       ndtheory solve my.toml -o results
     """
     from verification import monolithic
-    from verification.bodies import face
     from verification.cli import screens
-    from verification.output import Folder
+    from verification.interface.assembly import face
+    from verification.output.folder import Folder
 
     problem = _load(file, None, False)
     target = None if folder is None else Folder(folder, "solve")
@@ -238,8 +238,8 @@ def demo(folder: Path, as_json: bool) -> int:
       ndtheory demo -o section6
     """
     from verification.cli.shell import unreached
-    from verification.output import Folder
-    from verification.problem import load
+    from verification.output.folder import Folder
+    from verification.problem.specification import load
 
     written = Folder(folder, "compare").write_problem(examples()["section6"])
     status = _compare(load(written), written, folder, "auto", as_json, False)
@@ -249,10 +249,10 @@ def demo(folder: Path, as_json: bool) -> int:
 
 
 def _compare(problem: Problem, file: Path, folder: Path | None, solver: Any, as_json: bool, swapped: bool) -> int:
-    from verification import verdicts
-    from verification.bodies import build
+    from verification import comparison as verdicts
     from verification.cli import screens
-    from verification.output import Folder
+    from verification.interface.assembly import build
+    from verification.output.folder import Folder
 
     target = None if folder is None else Folder(folder, "compare")
     pair = build(problem)
@@ -289,9 +289,9 @@ def remedy(finished: Run, swapped: bool) -> str:
     swapped : bool
         Whether its roles are those of --swap-roles.
     """
+    from verification.algorithm.rates import noise
     from verification.cli.screens import worth_trying
-    from verification.measured import measure
-    from verification.rates import noise
+    from verification.constants import measure
 
     pair, theta, last = finished.pair, float(finished.theta), finished.last
     if finished.outcome == "limit":

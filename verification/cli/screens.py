@@ -6,17 +6,17 @@ import math
 from pathlib import Path
 from shlex import quote
 
-from verification.advice import Advice
+from verification.advice.readings import NextRun, RunReading, SeenRun
+from verification.advice.roles import Advice
+from verification.algorithm.runs import Run
+from verification.bounds.region import MOST_STEPS, Plane
 from verification.cli.calculator import editions_table
 from verification.cli.console import figures, heading, near_one, note, printable, say, table
-from verification.contact_state import ContactState
-from verification.measured import ENERGY_NAMES, NAMES, Measured
+from verification.comparison import Comparison
+from verification.constants import ENERGY_NAMES, NAMES, Measured
+from verification.interface.fields import ContactState
 from verification.monolithic import Solution
-from verification.plane import MOST_STEPS, Plane
-from verification.problem import Problem
-from verification.readings import NextRun, RunReading, SeenRun
-from verification.runs import Run
-from verification.verdicts import Comparison
+from verification.problem.specification import Problem
 
 
 def _setting(problem: Problem, nodes: int | None = None, interface: int | None = None) -> None:

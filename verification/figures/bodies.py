@@ -11,11 +11,11 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 
 from fem1d2d.mesh import Floats
-from verification.contact_state import ContactState
+from verification.algorithm.runs import Run
 from verification.figures.style import BODY1, BODY2, PRESSURE, SHEAR, STATES, new_figure, plain, styled
+from verification.interface.fields import ContactState
+from verification.interface.pair import Facing
 from verification.monolithic import Solution
-from verification.pair import Facing
-from verification.runs import Run
 
 #: Displacements are drawn so that the largest is about this fraction of the picture.
 SHARE = 0.06

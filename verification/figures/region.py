@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from matplotlib.figure import Figure
 
+from verification.bounds.region import Plane
 from verification.figures.style import EDITIONS, HATCHES, OUTCOMES, new_figure, plain, styled
-from verification.plane import Plane
 
 
 def draw_region(plane: Plane) -> Figure:

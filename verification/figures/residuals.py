@@ -8,10 +8,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from verification.editions import EditionRow
+from verification.algorithm.rates import noise
+from verification.algorithm.runs import Run
+from verification.bounds.table import EditionRow
 from verification.figures.style import EDITIONS, PRESSURE, new_figure, plain, styled
-from verification.rates import noise
-from verification.runs import Run
 
 
 def draw_residuals(run: Run, editions: Sequence[EditionRow] = ()) -> Figure:

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from verification.bounds.losses import Loss, Losses
 from verification.figures.style import EDITIONS, HATCHES, STATES, new_figure, styled
-from verification.losses import Loss, Losses
 
 
 def draw_waterfall(losses: Losses, unit: str) -> Figure:

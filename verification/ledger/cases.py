@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from verification.problem import Problem
+from verification.problem.specification import Problem
 
 #: Heights over lengths: a thin layer to a column.
 SHAPES = [Fraction(1, 20), Fraction(1, 6), Fraction(1, 3), Fraction(1), Fraction(2)]

@@ -14,16 +14,16 @@ import numpy as np
 from fem1d2d import solver
 from fem1d2d.mesh import Floats
 from ndtheory import EDITIONS, evaluate, evaluate_sharp
-from verification.choice import CLOSEST_TO_ONE
+from verification.algorithm.fixed_point import FixedPointMap
+from verification.algorithm.iterate import State
+from verification.algorithm.theta import CLOSEST_TO_ONE
+from verification.constants import measure
 from verification.contact import ContactError
-from verification.iteration import FixedPointMap
+from verification.interface.pair import Body
 from verification.ledger.evidence import Evidence, Level, figure
 from verification.ledger.found import Found, equations, evidence
 from verification.ledger.weak_forms import CLEAR, CONVERGENT, EXACT, LIMIT, PLANE, Case, Weak, cases, image_of
-from verification.measured import measure
-from verification.pair import Body
-from verification.problem import Problem
-from verification.state import State
+from verification.problem.specification import Problem
 
 #: Steps of (3.1) with the printed sign.
 STEPS = 200

@@ -1,8 +1,8 @@
 """What Section 5 compares: the difference of two solutions of steps I and II for two forces psi and psi~.
 
 "1" is the contact body and "2" the Neumann body, whatever their numbers in the file.  Pairs come from two sources:
-forces pushed through steps I and II, and directions on the affine pieces of T (:mod:`verification.jacobian`), each of
-which is had for suitable loads.
+forces pushed through steps I and II, and directions on the affine pieces of T
+(:mod:`verification.algorithm.affine_piece`), each of which is had for suitable loads.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from fem1d2d.mesh import Floats
+from verification.algorithm.affine_piece import Piece
+from verification.algorithm.fixed_point import FixedPointMap
+from verification.bounds.losses import Forms, square, top
+from verification.bounds.pattern_search import worst_piece
+from verification.constants import on_lifts
 from verification.contact import ContactError, ContactSolution
 from verification.contact.active_set import Pattern
-from verification.iteration import FixedPointMap
-from verification.jacobian import Piece
-from verification.losses import Forms, square, top
-from verification.measured import on_lifts
-from verification.pair import Body, Pair
-from verification.search import worst_piece
+from verification.interface.pair import Body, Pair
 
 #: Distances of two random forces, over their size.
 DISTANCES = (0.1, 0.3, 1.0, 3.0)

@@ -17,7 +17,9 @@ from typing import Any, Literal
 import numpy as np
 
 from fem1d2d.mesh import Floats
-from verification.bodies import build
+from verification.algorithm.runs import run
+from verification.interface.assembly import build
+from verification.interface.pair import Pair
 from verification.ledger.evidence import Evidence, Level, figure, gather
 from verification.ledger.sweeps import (
     GEOMETRIES,
@@ -35,8 +37,6 @@ from verification.ledger.sweeps import (
     trace,
 )
 from verification.monolithic import solve
-from verification.pair import Pair
-from verification.runs import run
 
 
 def _evidence(of: Any, holds: bool | None, text: str, **data: Any) -> Evidence:

@@ -20,9 +20,9 @@ import numpy as np
 from fem1d2d.mesh import Floats
 from ndtheory import PRINTED, sharp
 from ndtheory import bounds as formulas
+from verification.bounds.losses import top
+from verification.constants import Measured
 from verification.ledger.differences import Difference
-from verification.losses import top
-from verification.measured import Measured
 
 SEED = 2008
 

@@ -14,14 +14,14 @@ import numpy as np
 from scipy.linalg import eigh
 
 from fem1d2d.mesh import Floats
-from verification.iteration import FixedPointMap
+from verification.algorithm.fixed_point import FixedPointMap
+from verification.bounds.losses import square
+from verification.interface.pair import Pair
 from verification.ledger.cases import three_digits
 from verification.ledger.differences import Difference, Setting, along, between, uniform_piece
 from verification.ledger.evidence import Evidence, Level, figure
 from verification.ledger.inequalities import SEED, Reading
 from verification.ledger.worst import Trial, draw_cases
-from verification.losses import square
-from verification.pair import Pair
 from verification.threads import one_thread
 
 #: Random problems, beside the named ones.

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from verification.ledger.evidence import Evidence
 from verification.ledger.rows import Ledger, Row
 
-#: By this our files are known (:mod:`verification.output`).
+#: By this our files are known (:mod:`verification.output.folder`).
 MARK = "<!-- ndtheory verify -->"
 
 SECTIONS = (

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from fem1d2d.mesh import Floats
+from verification.algorithm.iterate import State
 from verification.ledger.convergence import (
     Setting,
     fields_converge,
@@ -41,7 +42,6 @@ from verification.ledger.weak_forms import (
     transfer,
     unilateral,
 )
-from verification.state import State
 
 
 def _action_and_reaction(setting: Setting) -> list[Evidence]:

@@ -13,13 +13,13 @@ from typing import Any, Literal
 import numpy as np
 
 from fem1d2d.mesh import Floats
-from verification.bodies import build
+from verification.algorithm.fixed_point import FixedPointMap
+from verification.constants import measure
 from verification.contact import ContactError
-from verification.iteration import FixedPointMap
+from verification.interface.assembly import build
+from verification.interface.pair import Pair
 from verification.ledger.evidence import Level, figure
-from verification.measured import measure
-from verification.pair import Pair
-from verification.problem import Problem, load
+from verification.problem.specification import Problem, load
 
 Neumann = Literal[1, 2]
 Top = Literal["held", "free"]

@@ -17,15 +17,15 @@ import numpy as np
 
 from fem1d2d import solver
 from fem1d2d.mesh import Floats
-from verification.bodies import build
+from verification.algorithm.fixed_point import FixedPointMap, state_at
+from verification.algorithm.iterate import State
+from verification.algorithm.runs import Run, run
 from verification.contact import ContactError
-from verification.iteration import FixedPointMap, state_at
+from verification.interface.assembly import build
+from verification.interface.pair import Body, Pair
 from verification.ledger.evidence import Level
 from verification.monolithic import solve
-from verification.pair import Body, Pair
-from verification.problem import Problem
-from verification.runs import Run, run
-from verification.state import State
+from verification.problem.specification import Problem
 
 #: Every draw of random numbers starts from it.
 SEED = 2008

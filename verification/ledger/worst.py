@@ -13,15 +13,15 @@ import numpy as np
 from scipy.linalg import eigvalsh
 
 from fem1d2d.mesh import Floats
-from verification.bodies import build
+from verification.bounds.losses import top
+from verification.constants import Measured, measure
+from verification.interface.assembly import build
+from verification.interface.pair import Body, Pair
 from verification.ledger.cases import NAMED, problem
 from verification.ledger.differences import Difference, Setting, draw_pairs
 from verification.ledger.evidence import Evidence, figure
 from verification.ledger.inequalities import ALLOWANCE, INEQUALITIES, LEVELS, SEED, SHARES, Inequality, Reading
-from verification.losses import top
-from verification.measured import Measured, measure
-from verification.pair import Body, Pair
-from verification.problem import Problem
+from verification.problem.specification import Problem
 from verification.threads import one_thread
 
 

@@ -8,23 +8,23 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from ndtheory import EDITIONS, Bounds, Number, SharpBounds, evaluate
-from verification.bodies import build
-from verification.choice import sharp_bounds
+from verification.algorithm.iterate import State
+from verification.algorithm.rates import StepRatio, largest_step_ratio
+from verification.algorithm.runs import Run, run
+from verification.algorithm.theta import sharp_bounds
+from verification.bounds.losses import Losses, locate
+from verification.bounds.table import LARGEST, EditionRow, Thresholds, row_of
+from verification.constants import Measured, measure
 from verification.contact import Solver
 from verification.document import Document
-from verification.editions import LARGEST, EditionRow, Thresholds, row_of
+from verification.interface.assembly import build
+from verification.interface.pair import Pair
 from verification.interrupts import INTERRUPTED
-from verification.losses import Losses, locate
-from verification.measured import Measured, measure
-from verification.pair import Pair
-from verification.problem import Problem
+from verification.problem.specification import Problem
 from verification.progress import Progress, silent
-from verification.rates import StepRatio, largest_step_ratio
-from verification.runs import Run, run
-from verification.state import State
 
 if TYPE_CHECKING:
-    from verification.lmi import Semidefinite
+    from verification.bounds.semidefinite import Semidefinite
 
 #: The editions whose violation is a bug or an error in a proof.
 PROVED = ("repaired", "sharp", "lmi")
@@ -310,8 +310,8 @@ def _why_not(interval: tuple[float, float] | None, threshold: Number | None, fri
 
 
 def _semidefinite(pair: Pair, theta: float, measured: Measured, progress: Progress) -> tuple[Semidefinite | None, str]:
-    from verification.lmi import evaluate_lmi
-    from verification.lmi_program import LMIError
+    from verification.bounds.program import LMIError
+    from verification.bounds.semidefinite import evaluate_lmi
 
     try:
         return evaluate_lmi(pair, measured, theta, progress=progress), ""

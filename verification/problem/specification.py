@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from ndtheory import HypothesisError, relaxation_factor
-from verification.reader import (
+from verification.problem.tables import (
     ProblemError,
     Table,
     Unfit,
@@ -126,7 +126,7 @@ class IterationSpec:
         ``auto``: the proved theta; the predicted one where nothing is proved or the proved one is more than twice as
         slow.  Momentum takes its step from rho: ``auto`` unless the file has a theta, which is then not used.
     relaxation : {'constant', 'aitken', 'anderson', 'newton', 'momentum'}
-        Beside ``constant`` outside the theorem; see :mod:`verification.relaxation`.
+        Beside ``constant`` outside the theorem; see :mod:`verification.algorithm.relaxation`.
     tolerance : float
         The run ends when ``|||T g - g||| <= tolerance |||T g|||`` in the norm (5.21), with the largest T g so far.
     max_iterations : int

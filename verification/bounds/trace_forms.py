@@ -14,8 +14,8 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from fem1d2d.mesh import Floats
-from verification.pair import Pair
-from verification.rounding import gamma, positive_definite
+from verification.bounds.rounding import gamma, positive_definite
+from verification.interface.pair import Pair
 
 
 class TraceForms:

@@ -31,12 +31,12 @@ from scipy.linalg import block_diag, cho_factor, cho_solve, eigvalsh, solve_tria
 from fem1d2d.mesh import Floats
 from ndtheory import Number
 from ndtheory.sharp import contraction_interval, turning_theta, worst_ratio
-from verification.editions import LARGEST
-from verification.lmi_program import LMIError, Program, Weights
-from verification.measured import Measured
-from verification.pair import Pair
+from verification.bounds.program import LMIError, Program, Weights
+from verification.bounds.table import LARGEST
+from verification.bounds.trace_forms import TraceForms
+from verification.constants import Measured
+from verification.interface.pair import Pair
 from verification.progress import Progress, silent
-from verification.trace_forms import TraceForms
 
 #: The friction threshold is searched until its bracket is this narrow, relatively.
 NARROW = 1e-2
@@ -79,7 +79,7 @@ class Certified:
 class SemidefiniteEdition:
     """The quadratic forms of a pair of bodies, in coordinates in which ``|g|`` and ``|d_1|`` are Euclidean norms.
 
-    What the solver proposes in them is checked in traces (:class:`verification.trace_forms.TraceForms`).
+    What the solver proposes in them is checked in traces (:class:`verification.bounds.trace_forms.TraceForms`).
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class SemidefiniteEdition:
     Raises
     ------
     ValueError
-        A contact node is held, or there are more than :data:`verification.editions.LARGEST`.
+        A contact node is held, or there are more than :data:`verification.bounds.table.LARGEST`.
     """
 
     def __init__(self, pair: Pair, measured: Measured, *, friction: float | None = None, nodewise: bool = True) -> None:

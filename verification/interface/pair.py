@@ -15,7 +15,7 @@ from scipy.linalg import cho_factor, cho_solve, cholesky, qr
 
 from fem1d2d import Condensation, Material, Mesh, Supports, solver
 from fem1d2d.mesh import Floats, Ints
-from verification.problem import Problem
+from verification.problem.specification import Problem
 from verification.threads import one_thread
 
 Name = Literal["body1", "body2"]

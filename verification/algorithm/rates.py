@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fem1d2d.mesh import Floats
-from verification.pair import Pair
-from verification.state import State
+from verification.algorithm.iterate import State
+from verification.interface.pair import Pair
 
 #: Residuals below this multiple of their noise are not used.
 CLEAR_OF_NOISE = 100.0

@@ -10,10 +10,10 @@ from typing import Any, Literal
 
 from ndtheory import SharpBounds, evaluate_sharp, exact
 from ndtheory.sharp import predicted_factor
-from verification.measured import Measured, measure
-from verification.pair import Pair
-from verification.reader import ProblemError
-from verification.relaxation import momentum_step
+from verification.algorithm.relaxation import momentum_step
+from verification.constants import Measured, measure
+from verification.interface.pair import Pair
+from verification.problem.tables import ProblemError
 
 #: A theta chosen for the user stays below 1 by this much, however soft the contact body.
 CLOSEST_TO_ONE = 1 - 1e-6

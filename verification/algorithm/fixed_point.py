@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from fem1d2d.mesh import Floats
-from verification.bodies import build
-from verification.choice import choose
+from verification.algorithm.iterate import State
+from verification.algorithm.relaxation import Rule, rule
+from verification.algorithm.theta import choose
 from verification.contact import ContactSolution, ContactStep, Solver
-from verification.pair import Pair
-from verification.problem import Problem
-from verification.relaxation import Rule, rule
-from verification.state import State
+from verification.interface.assembly import build
+from verification.interface.pair import Pair
+from verification.problem.specification import Problem
 from verification.threads import one_thread
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem1d2d.mesh import Floats
-from verification.pair import Facing
+from verification.interface.pair import Facing
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

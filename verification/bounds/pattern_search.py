@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from verification.algorithm.affine_piece import Piece
 from verification.contact.active_set import Pattern
-from verification.jacobian import Piece
-from verification.pair import Pair
+from verification.interface.pair import Pair
 from verification.threads import one_thread
 
 

@@ -16,7 +16,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fem1d2d.mesh import Floats
-from verification.reader import ProblemError, unreadable
+from verification.problem.tables import ProblemError, unreadable
 from verification.threads import one_thread
 
 #: Matrices of more rows than this do not fit a dense eigenvalue problem.

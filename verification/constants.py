@@ -14,10 +14,10 @@ from fem1d2d import largest, largest_sparse, solver
 from fem1d2d.mesh import Floats
 from ndtheory import Constants, EnergyConstants, Number, evaluate_sharp
 from ndtheory.sharp import friction_multiple
-from verification.bodies import build
 from verification.document import Document
-from verification.pair import Body, Pair
-from verification.problem import Problem
+from verification.interface.assembly import build
+from verification.interface.pair import Body, Pair
+from verification.problem.specification import Problem
 from verification.progress import Progress, silent
 from verification.threads import one_thread
 

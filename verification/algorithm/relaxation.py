@@ -13,10 +13,10 @@ from abc import ABC, abstractmethod
 import numpy as np
 
 from fem1d2d.mesh import Floats
-from verification.jacobian import piece_of
-from verification.pair import Pair
-from verification.problem import Relaxation
-from verification.state import State
+from verification.algorithm.affine_piece import piece_of
+from verification.algorithm.iterate import State
+from verification.interface.pair import Pair
+from verification.problem.specification import Relaxation
 
 #: How many earlier steps Anderson mixing remembers.
 DEPTH = 10

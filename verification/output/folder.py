@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from verification.interrupts import undisturbed
-from verification.reader import ProblemError, unreadable
+from verification.problem.tables import ProblemError, unreadable
 
 try:
     import fcntl
@@ -20,10 +20,10 @@ except ImportError:  # Windows: what a killed process leaves stays there
     LOCKS = False
 
 if TYPE_CHECKING:
+    from verification.algorithm.runs import Run
+    from verification.comparison import Comparison
     from verification.ledger import Ledger
     from verification.monolithic import Solution
-    from verification.runs import Run
-    from verification.verdicts import Comparison
 
 Kind = Literal["run", "solve", "compare", "verify"]
 
@@ -208,7 +208,7 @@ class Folder:
 
     def write_comparison(self, comparison: Comparison) -> None:
         """Write ``compare.json``, the figures and ``report.html``."""
-        from verification.report import report
+        from verification.output.report import report
 
         with staged(self.path, FILES["compare"]) as room:
             _text(room / "compare.json", comparison.to_json())
@@ -236,7 +236,7 @@ def _text(path: Path, text: str) -> None:
 def _pictures(room: Path, result: Run | Solution, comparison: Comparison | None = None) -> list[str]:
     """Draw all there is to draw; returns the names of the figures."""
     from verification import figures
-    from verification.runs import Run
+    from verification.algorithm.runs import Run
 
     drawn = {"bodies": figures.draw_bodies(result)}
     if isinstance(result, Run):

@@ -8,9 +8,9 @@ from collections.abc import Mapping
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ndtheory import Number, __version__
-from verification.editions import bounded
+from verification.bounds.table import bounded
+from verification.comparison import Comparison
 from verification.ledger.record import on_the_printed_proof
-from verification.verdicts import Comparison
 
 
 def _shown(value: float | Number | None) -> str:

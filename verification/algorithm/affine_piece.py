@@ -15,7 +15,7 @@ from scipy.linalg import cho_factor, cho_solve, null_space
 
 from fem1d2d.mesh import Floats
 from verification.contact.active_set import Pattern
-from verification.pair import Pair
+from verification.interface.pair import Pair
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

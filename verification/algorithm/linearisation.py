@@ -10,10 +10,10 @@ import numpy as np
 from scipy.linalg import schur
 
 from fem1d2d.mesh import Floats
-from verification.jacobian import Piece, piece_of
-from verification.pair import Pair
-from verification.rates import CLEAR_OF_NOISE, noise, observed_rate, rate_at_the_end, settled
-from verification.state import State
+from verification.algorithm.affine_piece import Piece, piece_of
+from verification.algorithm.iterate import State
+from verification.algorithm.rates import CLEAR_OF_NOISE, noise, observed_rate, rate_at_the_end, settled
+from verification.interface.pair import Pair
 
 #: Contact nodes up to which T is linearised: eigenvalues of larger Jacobians take minutes.
 MOST_NODES = 300

@@ -14,15 +14,15 @@ from fem1d2d.mesh import Floats
 from ndtheory import EnergyConstants, Number, evaluate_sharp
 from ndtheory.constants import take
 from ndtheory.sharp import LARGEST, SMALLEST, predicted_rate, predicted_theta
-from verification.bodies import build
-from verification.choice import Choice, automatic, sharp_bounds
+from verification.advice.matrix_files import check_matrix, size
+from verification.advice.readings import NextRun, RunReading, SeenRun, read_ratio
+from verification.algorithm.theta import Choice, automatic, sharp_bounds
+from verification.constants import measure
 from verification.document import Document
-from verification.matrices import check_matrix, size
-from verification.measured import measure
-from verification.pair import Pair
-from verification.problem import Problem
-from verification.reader import ProblemError
-from verification.readings import NextRun, RunReading, SeenRun, read_ratio
+from verification.interface.assembly import build
+from verification.interface.pair import Pair
+from verification.problem.specification import Problem
+from verification.problem.tables import ProblemError
 from verification.threads import one_thread
 
 #: What is unknown of matrices and runs from elsewhere.

@@ -9,16 +9,16 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ndtheory import EDITIONS, Constants, evaluate, evaluate_sharp, exact
-from verification.bodies import build
+from verification.algorithm.runs import Outcome, run
+from verification.bounds.table import LARGEST
+from verification.constants import Measured, measure
 from verification.document import Document
-from verification.editions import LARGEST
+from verification.interface.assembly import build
+from verification.interface.pair import Pair
 from verification.interrupts import INTERRUPTED
-from verification.measured import Measured, measure
-from verification.pair import Pair
-from verification.problem import Problem
+from verification.problem.specification import Problem
+from verification.problem.tables import ProblemError
 from verification.progress import Progress, silent
-from verification.reader import ProblemError
-from verification.runs import Outcome, run
 
 #: How many friction values trace the border of a region, and of that of the semidefinite edition.
 TRACED, TRACED_LMI = 60, 8
@@ -197,8 +197,8 @@ def _at(measured: Measured, k: float) -> Constants:
 
 
 def _semidefinite(pair: Pair, measured: Measured, start: float, progress: Progress) -> tuple[Region | None, str]:
-    from verification.lmi import SemidefiniteEdition, friction_threshold
-    from verification.lmi_program import LMIError
+    from verification.bounds.program import LMIError
+    from verification.bounds.semidefinite import SemidefiniteEdition, friction_threshold
 
     if pair.n > LARGEST:
         return None, f"{pair.n} contact nodes: worked out up to {LARGEST}"

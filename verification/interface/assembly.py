@@ -25,10 +25,10 @@ from fem1d2d import (
 )
 from fem1d2d.mesh import Floats, Ints
 from fem1d2d.trace import SAME, extent
-from verification.friction import friction_operator
-from verification.pair import Body, Facing, Name, Pair
-from verification.problem import MOST_CELLS, BodySpec, Problem
-from verification.reader import ProblemError, short, unreadable
+from verification.interface.friction import friction_operator
+from verification.interface.pair import Body, Facing, Name, Pair
+from verification.problem.specification import MOST_CELLS, BodySpec, Problem
+from verification.problem.tables import ProblemError, short, unreadable
 
 #: Interface matrices are dense; more contact nodes would fill the memory.
 MOST_NODES = 2000

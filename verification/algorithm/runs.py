@@ -12,22 +12,22 @@ import numpy as np
 
 from fem1d2d.mesh import Floats
 from ndtheory import Number
-from verification.bodies import build
-from verification.choice import Choice, choose
+from verification.algorithm.fixed_point import FixedPointMap, state_at, states
+from verification.algorithm.iterate import State
+from verification.algorithm.linearisation import Forecast, Linearisation, NotLinear, forecast, linearise
+from verification.algorithm.rates import ObservedRate, observed_rate
+from verification.algorithm.relaxation import momentum_rate, outside, rule
+from verification.algorithm.theta import Choice, choose
+from verification.constants import Measured
 from verification.contact import ContactError, Solver
-from verification.contact_state import ContactState
 from verification.document import Document
+from verification.interface.assembly import build
+from verification.interface.fields import ContactState
+from verification.interface.pair import Pair
 from verification.interrupts import INTERRUPTED
-from verification.iteration import FixedPointMap, state_at, states
-from verification.linearisation import Forecast, Linearisation, NotLinear, forecast, linearise
-from verification.measured import Measured
 from verification.monolithic import SolveError, solve
-from verification.pair import Pair
-from verification.problem import Problem, Relaxation
-from verification.rates import ObservedRate, observed_rate
-from verification.reader import ProblemError
-from verification.relaxation import momentum_rate, outside, rule
-from verification.state import State
+from verification.problem.specification import Problem, Relaxation
+from verification.problem.tables import ProblemError
 from verification.threads import one_thread
 
 Outcome = Literal["converged", "stalled", "limit", "diverged", "interrupted"]

@@ -2,7 +2,8 @@
 
 An inequality ``left <= right`` loses ``log10(right/left)`` at the pair of forces that comes closest to equality.  Where
 both sides are linear in one unknown that pair is an eigenvector; where T is involved it is the best one of a search
-over contact patterns (:mod:`verification.search`), on each of which both sides are quadratic forms in psi - psi~.
+over contact patterns (:mod:`verification.bounds.pattern_search`), on each of which both sides are quadratic forms in
+psi - psi~.
 """
 
 from __future__ import annotations
@@ -19,11 +20,11 @@ from scipy.linalg import eigvalsh
 from fem1d2d.mesh import Floats
 from ndtheory import PRINTED, REPAIRED
 from ndtheory import bounds as formulas
-from verification.jacobian import Piece
-from verification.measured import Measured, lift_gram
-from verification.pair import Pair
+from verification.algorithm.affine_piece import Piece
+from verification.bounds.pattern_search import worst_piece
+from verification.constants import Measured, lift_gram
+from verification.interface.pair import Pair
 from verification.progress import Progress, silent
-from verification.search import worst_piece
 from verification.threads import one_thread
 
 #: How often the patterns are searched for the losses of one problem.

@@ -1,0 +1,1 @@
+"""Which body gets the Neumann problem, and which theta."""

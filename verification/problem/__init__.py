@@ -1,0 +1,1 @@
+"""The problem file: what may be asked, read and checked."""
