@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
@@ -115,13 +115,11 @@ class ContactSpec:
 
 
 @dataclass(frozen=True, kw_only=True)
-class IterationSpec:
-    """How the algorithm of Section 3 is run.
+class Settings:
+    """How a run goes: its relaxation and when it ends.
 
     Attributes
     ----------
-    neumann_body : {1, 2}
-        Who gets the linear problem of step I: 2 as in Section 3, 1 as in Section 6.
     theta : Fraction or 'auto'
         ``auto``: the proved theta; the predicted one where nothing is proved or the proved one is more than twice as
         slow.  Momentum takes its step from rho: ``auto`` unless the file has a theta, which is then not used.
@@ -132,11 +130,10 @@ class IterationSpec:
     max_iterations : int
     """
 
-    neumann_body: Literal[1, 2]
-    theta: Theta
-    relaxation: Relaxation
-    tolerance: float
-    max_iterations: int
+    theta: Theta = Fraction(1, 2)
+    relaxation: Relaxation = "constant"
+    tolerance: float = 1e-9
+    max_iterations: int = 500
 
     @property
     def warnings(self) -> list[str]:
@@ -144,6 +141,24 @@ class IterationSpec:
         if self.relaxation != "momentum" or self.theta == "auto":
             return []
         return [f"iteration.theta = {float(self.theta):g} is not used: momentum takes its step from rho"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class IterationSpec(Settings):
+    """The table ``[iteration]``.
+
+    Attributes
+    ----------
+    neumann_body : {1, 2}
+        Who gets the linear problem of step I: 2 as in Section 3, 1 as in Section 6.
+    """
+
+    neumann_body: Literal[1, 2] = 2
+
+    @property
+    def settings(self) -> Settings:
+        """The table without the roles."""
+        return Settings(**{field.name: getattr(self, field.name) for field in fields(Settings)})
 
 
 @dataclass(frozen=True, kw_only=True)
