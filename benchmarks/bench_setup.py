@@ -31,7 +31,7 @@ def once(p: vf.Problem) -> tuple[float, float, int, int]:
     middle = time.perf_counter()
     vf.measure(pair)
     end = time.perf_counter()
-    return middle - begin, end - middle, len(pair.body1.free) + len(pair.body2.free), pair.n
+    return middle - begin, end - middle, len(pair.body1.body.free) + len(pair.body2.body.free), pair.contact.grid.n
 
 
 def main() -> None:

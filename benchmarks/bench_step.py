@@ -53,8 +53,10 @@ def main() -> None:
             ours.append(middle - begin)
             theirs.append(end - middle)
             apart = max(apart, float(np.abs(force - solution.force).max() / np.abs(solution.force).max()))
-    nodes = len(pair.body1.mesh.points) + len(pair.body2.mesh.points)
-    print(f"{nodes} nodes, {pair.n} on Gamma_c, {len(ours)} steps each in turn (steps I and II on our side)")
+    nodes = len(pair.body1.body.mesh.points) + len(pair.body2.body.mesh.points)
+    print(
+        f"{nodes} nodes, {pair.contact.grid.n} on Gamma_c, {len(ours)} steps each in turn (steps I and II on our side)"
+    )
     print(f"default step            {1e3 * median(ours):9.3f} ms median")
     print(f"body 1 rebuilt in cvxpy {1e3 * median(theirs):9.3f} ms median")
     ratio = median(a / b for a, b in zip(ours, theirs, strict=True))

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from verification.advice.roles import Advice, advise
     from verification.algorithm.fixed_point import iterate
-    from verification.algorithm.iterate import State
+    from verification.algorithm.iterate import Iterate
     from verification.algorithm.runs import Run, run
     from verification.comparison import Comparison, compare
     from verification.constants import Measured, measure
@@ -48,7 +48,7 @@ _HOME = {
     "Run": "algorithm.runs",
     "Solution": "monolithic",
     "SolveError": "monolithic",
-    "State": "algorithm.iterate",
+    "Iterate": "algorithm.iterate",
     "advise": "advice.roles",
     "compare": "comparison",
     "iterate": "algorithm.fixed_point",
@@ -63,6 +63,7 @@ __all__ = [
     "Advice",
     "Comparison",
     "ContactError",
+    "Iterate",
     "Ledger",
     "Measured",
     "Problem",
@@ -70,7 +71,6 @@ __all__ = [
     "Run",
     "Solution",
     "SolveError",
-    "State",
     "advise",
     "compare",
     "iterate",

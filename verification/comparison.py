@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from ndtheory import EDITIONS, Bounds, Number, SharpBounds, evaluate
-from verification.algorithm.iterate import State
+from verification.algorithm.iterate import Iterate
 from verification.algorithm.rates import StepRatio, largest_step_ratio
 from verification.algorithm.runs import Run, run
 from verification.algorithm.theta import sharp_bounds
@@ -17,10 +18,10 @@ from verification.bounds.table import LARGEST, EditionRow, Thresholds, row_of
 from verification.constants import Measured, measure
 from verification.contact import Solver
 from verification.document import Document
-from verification.interface.assembly import build
-from verification.interface.pair import Pair
+from verification.interface.build import pair_of
+from verification.interface.pair import ContactPair
 from verification.interrupts import INTERRUPTED
-from verification.problem.specification import Problem
+from verification.problem import Problem
 from verification.progress import Progress, silent
 
 if TYPE_CHECKING:
@@ -125,7 +126,7 @@ class Comparison(Document):
         editions["sharp"] = None if self.sharp is None else self.sharp.to_dict()
         why = next(iter(self.measured.reason.values()), "")
         return {
-            "title": self.run.pair.problem.title,
+            "title": self.run.pair.title,
             "constants": self.measured.content(),
             "bounds": {
                 "editions": editions,
@@ -214,11 +215,11 @@ def judge_forecast(run: Run) -> Judgement:
 
 
 def compare(
-    problem: Problem | Pair,
+    problem: Problem | ContactPair | Path | str,
     *,
     theta: Any = None,
     solver: Solver = "auto",
-    watch: Callable[[State], None] = lambda state: None,
+    watch: Callable[[Iterate], None] = lambda state: None,
     progress: Progress = silent,
 ) -> Comparison:
     """Measure the constants, evaluate the bounds, run the algorithm, and judge.
@@ -227,7 +228,7 @@ def compare(
     first state of the run leaves out what was still to come: ``run.interrupted`` is true, ``reason`` says what is
     missing.
     """
-    pair = build(problem) if isinstance(problem, Problem) else problem
+    pair = pair_of(problem)
     measured = measure(pair, progress=progress)
     progress("iterating", None)
     finished = run(pair, theta=theta, solver=solver, watch=watch, measured=measured)
@@ -236,12 +237,12 @@ def compare(
     sharp = sharp_bounds(measured, chosen)
     reason: dict[str, str] = {}
     lmi, losses = None, None
-    if pair.n > LARGEST:
-        reason |= dict.fromkeys(("lmi", "losses"), f"{pair.n} contact nodes: worked out up to {LARGEST}")
+    if pair.contact.grid.n > LARGEST:
+        reason |= dict.fromkeys(("lmi", "losses"), f"{pair.contact.grid.n} contact nodes: worked out up to {LARGEST}")
     else:
         reason |= dict.fromkeys(("lmi", "losses"), INTERRUPTED)
     try:
-        if pair.n <= LARGEST and not finished.interrupted:
+        if pair.contact.grid.n <= LARGEST and not finished.interrupted:
             losses = locate(pair, measured, progress=progress)
             reason["losses"] = next(iter(measured.reason.values()), "a contact node is held")
             lmi, reason["lmi"] = _semidefinite(pair, float(chosen), measured, progress)
@@ -253,7 +254,7 @@ def compare(
         del reason[name]
     if sharp is None:
         reason["sharp"] = next(iter(measured.reason.values()), "")
-    seen = largest_step_ratio(pair, finished.states)
+    seen = largest_step_ratio(pair, finished.iterates)
     if seen is None:
         reason["step_ratio"] = "no step stands clear of rounding"
 
@@ -277,7 +278,7 @@ def compare(
             hold(e.name, None, "", unknown)
         else:
             of = bounds[e.name]
-            unit = f" (in {pair.problem.units['stress']})" if e.name == "printed" else ""
+            unit = f" (in {pair.units['stress']})" if e.name == "printed" else ""
             hold(e.name, of.factor, _why_not(of.interval, of.C2, friction, chosen) + unit)
     if sharp is None:
         hold("sharp", None, "", unknown)
@@ -309,7 +310,9 @@ def _why_not(interval: tuple[float, float] | None, threshold: Number | None, fri
     return f"friction {friction:g} is not below {scale:.2g}"
 
 
-def _semidefinite(pair: Pair, theta: float, measured: Measured, progress: Progress) -> tuple[Semidefinite | None, str]:
+def _semidefinite(
+    pair: ContactPair, theta: float, measured: Measured, progress: Progress
+) -> tuple[Semidefinite | None, str]:
     from verification.bounds.program import LMIError
     from verification.bounds.semidefinite import evaluate_lmi
 

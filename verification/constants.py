@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-import scipy.sparse as sp
+from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from fem1d2d import largest, largest_sparse, solver
@@ -16,14 +17,20 @@ from ndtheory import Constants, EnergyConstants, Number, evaluate_sharp
 from ndtheory.sharp import friction_multiple
 from verification.document import Document
 from verification.interface.assembly import build
-from verification.interface.pair import Body, Pair
-from verification.problem.specification import Problem
+from verification.interface.body import Body, Condensed
+from verification.interface.build import pair_of
+from verification.interface.pair import ContactPair
+from verification.problem import Problem
 from verification.progress import Progress, silent
 from verification.threads import one_thread
 
 #: The constants of both bodies together, as documents and screens list them.
 NAMES = ("m", "M", "C_R", "C_s", "C_tr", "C_tr_half", "C_K", "rho_max", "rho_min", "rho_normal")
 ENERGY_NAMES = ("C_s_energy", "C_t1", "C_t2", "kappa_1", "kappa_2")
+
+#: Those that a pair made from matrices does not have, and why.
+OF_MESHES = ("body1", "body2", "m", "M", "C_R", "C_s", "C_tr", "C_tr_half", "C_K")
+FROM_MATRICES = "the pair is made from matrices: needed the meshes of both bodies"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,8 +59,9 @@ class Measured(Document):
 
     Attributes
     ----------
-    body1, body2 : BodyConstants
-    m, M : Number
+    body1, body2 : BodyConstants or None
+        None, as m and M, where only matrices are known.
+    m, M : Number or None
         Smallest m^a, sum of the M^a (4.2); stress.
     C_R : Number or None
         Lift constant, the safe maximum over both bodies' H^1/2 norms; dimensionless.
@@ -86,10 +94,10 @@ class Measured(Document):
 
     schema: ClassVar[str] = "ndtheory.constants/1"
 
-    body1: BodyConstants
-    body2: BodyConstants
-    m: Number
-    M: Number
+    body1: BodyConstants | None
+    body2: BodyConstants | None
+    m: Number | None
+    M: Number | None
     C_R: Number | None
     C_s: Number | None
     C_tr: Number | None
@@ -109,9 +117,14 @@ class Measured(Document):
     units: Mapping[str, str]
     levels: tuple[Measured, ...] = ()
 
+    @property
+    def nodes(self) -> int | None:
+        """Nodes of both bodies; None where only matrices are known."""
+        return None if self.body1 is None or self.body2 is None else self.body1.nodes + self.body2.nodes
+
     def constants(self) -> Constants | None:
         """What enters the theorem; None where C_R or C_K does not exist."""
-        if self.C_R is None or self.C_K is None:
+        if self.m is None or self.M is None or self.C_R is None or self.C_K is None:
             return None
         friction: dict[str, float] = {"C_K": 0.0}  # without a law of friction
         if self.C_s is not None and self.C_tr is not None:
@@ -160,18 +173,20 @@ class Measured(Document):
         """
         if k and not self.of_friction:
             raise ValueError(f"friction {k}: needed a law of friction")
-        values: dict[str, Any] = {"C_K": Number.of_float(0.0)}
-        if self.of_friction and self.C_s is not None and self.C_tr is not None:
-            C_s, C_t1, C_t2 = (value.value for value in self.of_friction)
-            values["C_K"] = Number.of_float(k * self.C_s.value * self.C_tr.value)
-            values |= {"kappa_1": Number.of_float(k * C_s * C_t1), "kappa_2": Number.of_float(k * C_s * C_t2)}
+        values: dict[str, Any] = {}
+        if self.C_K is not None:
+            C_s, C_tr = self.C_s, self.C_tr  # None without a law of friction
+            values["C_K"] = Number.of_float(0.0 if C_s is None or C_tr is None else k * C_s.value * C_tr.value)
+        if self.of_friction:
+            c_s, C_t1, C_t2 = (value.value for value in self.of_friction)
+            values |= {"kappa_1": Number.of_float(k * c_s * C_t1), "kappa_2": Number.of_float(k * c_s * C_t2)}
         return replace(self, friction=k, **values)
 
     def content(self) -> dict[str, Any]:
         numbers = {name: getattr(self, name) for name in (*NAMES, *ENERGY_NAMES)}
         return {
-            "body1": self.body1.to_dict(),
-            "body2": self.body2.to_dict(),
+            "body1": None if self.body1 is None else self.body1.to_dict(),
+            "body2": None if self.body2 is None else self.body2.to_dict(),
             **{name: None if number is None else number.to_dict() for name, number in numbers.items()},
             "interface_nodes": self.interface_nodes,
             "reason": dict(self.reason),
@@ -179,21 +194,27 @@ class Measured(Document):
         }
 
 
-def measure(problem: Problem | Pair, *, refine: int = 0, progress: Progress = silent) -> Measured:
+def measure(problem: Problem | ContactPair | Path | str, *, refine: int = 0, progress: Progress = silent) -> Measured:
     """Measure the constants of a problem.
 
     Parameters
     ----------
-    problem : Problem or Pair
+    problem : Problem, ContactPair or path
     refine : int
         With N > 0 the result lists the constants on meshes halved 0 to N times.
     progress : callable
         Told which mesh is measured.
 
+    Returns
+    -------
+    Measured
+
     Raises
     ------
     ProblemError
         A problem that has no bodies facing each other.
+    ValueError
+        A pair made from matrices has no mesh to halve.
     KeyboardInterrupt
         Before the given mesh was measured; later it ends the list, and ``reason["levels"]`` says so.
 
@@ -205,10 +226,10 @@ def measure(problem: Problem | Pair, *, refine: int = 0, progress: Progress = si
     >>> round(measure(Problem.from_dict(bars)).rho_max.value, 12)
     1.5
     """
-    pair = build(problem) if isinstance(problem, Problem) else problem
+    pair = pair_of(problem)
     progress("measuring the constants", None)
     with one_thread():
-        finer = [pair.problem.refined(level) for level in range(1, refine + 1)]  # refused before any is measured
+        finer = [] if not refine else _halved(pair, refine)  # refused before any is measured
         result = _measure(pair)
         if refine:
             levels, reason = [result], dict(result.reason)
@@ -222,24 +243,35 @@ def measure(problem: Problem | Pair, *, refine: int = 0, progress: Progress = si
     return result
 
 
-def _measure(pair: Pair) -> Measured:
-    friction = float(pair.problem.contact.friction)
-    body1, body2 = _body(pair.body1), _body(pair.body2)
-    m, M = min(body1.m.value, body2.m.value), body1.M.value + body2.M.value
-    values: dict[str, float | None] = dict.fromkeys((*NAMES[2:], *ENERGY_NAMES))
+def _halved(pair: ContactPair, refine: int) -> list[Problem]:
+    if pair.problem is None:
+        raise ValueError("this pair is made from matrices: needed a problem whose meshes can be halved")
+    return [pair.problem.refined(level) for level in range(1, refine + 1)]
+
+
+def _measure(pair: ContactPair) -> Measured:
+    friction = float(pair.friction)
+    values: dict[str, float | None] = dict.fromkeys((*NAMES, *ENERGY_NAMES))
     reason: dict[str, str] = {}
-    common = pair.body1.unknown
-    if not np.array_equal(common, pair.body2.unknown):
-        reason = dict.fromkeys(
-            values, "the bodies hold different tangential components of Gamma_c: their traces differ"
-        )
+    body1 = body2 = None
+    meshes = pair.contact.body is not None
+    if not meshes:
+        reason = dict.fromkeys(OF_MESHES, FROM_MATRICES)
     else:
-        tangential = np.zeros(len(common), dtype=bool)
-        tangential[pair.tangential] = True
-        values |= _interface(pair, tangential[common])
-        if values["C_s"] is None:
-            reason |= dict.fromkeys(("C_s", "C_s_energy"), "no friction and no radius: S is not defined")
-            values |= {"C_K": 0.0, "kappa_1": 0.0, "kappa_2": 0.0}
+        body1, body2 = _body(pair.body1.mesh_body), _body(pair.body2.mesh_body)
+        values |= {"m": min(body1.m.value, body2.m.value), "M": body1.M.value + body2.M.value}
+    if pair.interface.transfer is None and not np.array_equal(pair.contact.free, pair.neumann.free):
+        why = "the bodies hold different tangential components of Gamma_c: their traces differ"
+        reason |= dict.fromkeys((*NAMES[2:], *ENERGY_NAMES), why)
+    else:
+        free, grid = pair.contact.free, pair.contact.grid
+        tangential = (np.arange(grid.size) < grid.t)[free]
+        values |= _energy(pair, tangential)
+        if meshes:
+            values |= _of_section_5(pair, tangential)
+        if pair.interface.kernel is None:
+            reason = dict.fromkeys(("C_s", "C_s_energy"), "no friction and no radius: S is not defined") | reason
+            values |= {"kappa_1": 0.0, "kappa_2": 0.0} | ({"C_K": 0.0} if meshes else {})
     products = (("C_K", "C_s", "C_tr"), ("kappa_1", "C_s_energy", "C_t1"), ("kappa_2", "C_s_energy", "C_t2"))
     for name, first, second in products:
         a, b = values[first], values[second]
@@ -249,12 +281,10 @@ def _measure(pair: Pair) -> Measured:
     return Measured(
         body1=body1,
         body2=body2,
-        m=Number.of_float(m),
-        M=Number.of_float(M),
         friction=friction,
-        interface_nodes=pair.n,
+        interface_nodes=pair.contact.grid.n,
         reason=reason,
-        units=pair.problem.units,
+        units=pair.units,
         **numbers,
     )
 
@@ -272,53 +302,66 @@ def _body(body: Body) -> BodyConstants:
     )
 
 
-def lift_gram(body: Body) -> Floats:
-    """``N_a = R_a' H_a R_a``: the H1 norm squared of the elastic lift (4.5), on the interface."""
-    return on_lifts(body, body.gram_matrix)
+def _top(A: Floats, B: Floats) -> float:
+    return largest(A, B).value
 
 
-def on_lifts(body: Body, matrix: sp.csc_array) -> Floats:
-    """``R_a' X R_a``: a symmetric form on the unknowns of a body, evaluated at the lifts of interface vectors."""
-    elastic = body.elastic
-    inside, interface, lift = elastic.inside, elastic.interface, elastic.lift
-    cross = matrix[interface][:, inside] @ lift
-    product = matrix[interface][:, interface].toarray() + cross + cross.T + lift.T @ (matrix[inside][:, inside] @ lift)
-    return np.asarray((product + product.T) / 2)
-
-
-def _interface(pair: Pair, tangential: Any) -> dict[str, float | None]:
-    """Constants that live on the interface; all matrices on the components that both bodies leave free."""
-    bodies = (pair.body1, pair.body2)
-    E = [body.gram.schur for body in bodies]
-    S = [body.elastic.schur for body in bodies]
-    N = [lift_gram(body) for body in bodies]
-    top = lambda A, B: largest(A, B).value
-    values: dict[str, float | None] = {"C_R": float(np.sqrt(max(top(n, e) for n in N for e in E)))}
-    normal = ~tangential
-    contact, neumann = (S[0], S[1]) if pair.problem.iteration.neumann_body == 2 else (S[1], S[0])
-    if tangential.any():
-        columns = np.flatnonzero(pair.body1.unknown[pair.tangential])
-        weights = np.zeros(len(tangential))
-        weights[tangential] = pair.weights[columns]
-        B_T = np.diag(weights)
-        kept = [np.where(np.outer(tangential, tangential), e, 0.0) for e in E]
-        values["C_tr"] = float(np.sqrt(max(top(B_T, e) for e in E)))
-        values["C_tr_half"] = float(np.sqrt(max(min(top(k, e) for k in kept) for e in E)))
-        if pair.regularisation is not None:
-            Z = [pair.regularisation @ s[normal] for s in S]
-            squares = [z.T @ (pair.weights[:, None] * z) for z in Z]
-            values["C_s"] = float(np.sqrt(max(top((z + z.T) / 2, e) for z, e in zip(squares, E, strict=True))))
-            # sup |S g_N|^2 / g' S_2^-1 g over g = S_2 phi is the largest eigenvalue of S (S_2)_NN S' in the weights
-            root = np.sqrt(pair.weights)[:, None] * pair.regularisation
-            stress = root @ neumann[np.ix_(normal, normal)] @ root.T
-            values["C_s_energy"] = float(np.sqrt(np.linalg.eigvalsh((stress + stress.T) / 2)[-1]))
-        values["C_t1"], values["C_t2"] = (float(np.sqrt(top(B_T, s))) for s in (contact, neumann))
-    else:
-        values |= dict.fromkeys(("C_tr", "C_tr_half", "C_s", "C_s_energy", "C_t1", "C_t2"), 0.0)
-    values["rho_max"] = top(contact, neumann)
-    values["rho_min"] = 1 / top(neumann, contact)
-    values["rho_normal"] = top(_condense_tangential(contact, normal), _condense_tangential(neumann, normal))
+def _of_section_5(pair: ContactPair, tangential: NDArray[np.bool_]) -> dict[str, float | None]:
+    """C_R, C_tr and C_s: matrices on the components that both bodies leave free."""
+    sides, grid, kernel = (pair.body1, pair.body2), pair.contact.grid, pair.interface.kernel
+    E = [side.gram for side in sides]
+    values: dict[str, float | None] = {"C_R": float(np.sqrt(max(_top(side.lift_gram, e) for side in sides for e in E)))}
+    if not tangential.any():
+        return values | dict.fromkeys(("C_tr", "C_tr_half", "C_s"), 0.0)
+    B_T = _tangential_mass(pair, tangential)
+    kept = [np.where(np.outer(tangential, tangential), e, 0.0) for e in E]
+    values["C_tr"] = float(np.sqrt(max(_top(B_T, e) for e in E)))
+    values["C_tr_half"] = float(np.sqrt(max(min(_top(k, e) for k in kept) for e in E)))
+    if kernel is not None:
+        Z = [kernel @ _free(side)[~tangential] for side in sides]
+        squares = [z.T @ (grid.weights[:, None] * z) for z in Z]
+        values["C_s"] = float(np.sqrt(max(_top((z + z.T) / 2, e) for z, e in zip(squares, E, strict=True))))
     return values
+
+
+def _energy(pair: ContactPair, tangential: NDArray[np.bool_]) -> dict[str, float | None]:
+    """rho and what the theorem in energy norms knows of friction, with P between the grids."""
+    interface, grid, kernel = pair.interface, pair.contact.grid, pair.interface.kernel
+    contact, neumann = _free(pair.contact), _free(pair.neumann)
+    normal = ~tangential
+    carried = contact if interface.transfer is None else interface.carry_form(contact)
+    values: dict[str, float | None] = {
+        "rho_max": _top(carried, neumann),
+        "rho_min": None if interface.transfer is not None else 1 / _top(neumann, contact),
+    }
+    normal_contact = _condense_tangential(contact, normal)
+    if interface.transfer is not None:
+        normal_contact = interface.transfer.T @ normal_contact @ interface.transfer
+        normal = np.arange(pair.neumann.grid.size) >= pair.neumann.grid.t
+    values["rho_normal"] = _top(normal_contact, _condense_tangential(neumann, normal))
+    if not tangential.any():
+        return values | dict.fromkeys(("C_s_energy", "C_t1", "C_t2"), 0.0)
+    B_T = _tangential_mass(pair, tangential)
+    if kernel is not None:
+        # sup |S g_N|^2 / g' S_2^-1 g over g = S_2 phi is the largest eigenvalue of S (S_2)_NN S' in the weights
+        root = np.sqrt(grid.weights)[:, None] * kernel
+        stress = root @ neumann[np.ix_(normal, normal)] @ root.T
+        values["C_s_energy"] = float(np.sqrt(np.linalg.eigvalsh((stress + stress.T) / 2)[-1]))
+    values["C_t1"] = float(np.sqrt(_top(B_T, contact)))
+    values["C_t2"] = float(np.sqrt(_top(B_T if interface.transfer is None else interface.carry_form(B_T), neumann)))
+    return values
+
+
+def _free(side: Condensed) -> Floats:
+    return side.stiffness[np.ix_(side.free, side.free)]
+
+
+def _tangential_mass(pair: ContactPair, tangential: NDArray[np.bool_]) -> Floats:
+    """B_T: the quadrature of ``|v_T|^2`` on the free components of the contact grid."""
+    grid = pair.contact.grid
+    weights = np.zeros(len(tangential))
+    weights[tangential] = grid.weights[pair.contact.free[grid.tangential]]
+    return np.diag(weights)
 
 
 def _condense_tangential(S: Floats, normal: Any) -> Floats:

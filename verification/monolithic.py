@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -25,10 +26,11 @@ from numpy.typing import NDArray
 
 from fem1d2d.mesh import Floats
 from verification.document import Document
-from verification.interface.assembly import face
-from verification.interface.fields import ContactState
-from verification.interface.pair import Body, Facing
-from verification.problem.specification import Problem
+from verification.interface.assembly import discretise
+from verification.interface.body import Body
+from verification.interface.fields import ContactFields
+from verification.interface.pair import ContactPair, TwoBodies
+from verification.problem import Problem, load
 from verification.threads import one_thread
 
 #: A solution is accepted below this relative KKT residual.
@@ -273,12 +275,12 @@ class Solution(Document):
 
     Attributes
     ----------
-    facing : Facing
+    bodies : TwoBodies
     force : array
         lambda: tangential forces on body 2, then compressive normal ones; nodal forces per thickness.
     motion : array
         Coefficients of the rigid motions of body 1, then of body 2, that only contact holds.
-    contact : ContactState
+    contact : ContactFields
     kkt_residual : float
         Relative, at most 1e-11.
     linear_solves : int
@@ -287,23 +289,23 @@ class Solution(Document):
 
     schema: ClassVar[str] = "ndtheory.solve/1"
 
-    facing: Facing
+    bodies: TwoBodies
     force: Floats
     motion: Floats
-    contact: ContactState
+    contact: ContactFields
     kkt_residual: float
     linear_solves: int
 
     @property
     def units(self) -> Mapping[str, str]:  # type: ignore[override]
-        return self.facing.problem.units
+        return self.bodies.problem.units
 
     @cached_property
     def displacements(self) -> tuple[Floats | None, Floats | None]:
         """Displacement of all nodes of body 1 and body 2, shape (nodes, d), unit of length; None where rigid."""
         fields: list[Floats | None] = [None, None]
         used = 0
-        for i, (body, sign) in enumerate(((self.facing.body1, -1.0), (self.facing.body2, 1.0))):
+        for i, (body, sign) in enumerate(((self.bodies.body1, -1.0), (self.bodies.body2, 1.0))):
             if body is not None:
                 load = body.load.copy()
                 load[body.interface] += sign * self.force[body.unknown]
@@ -316,22 +318,26 @@ class Solution(Document):
 
     def content(self) -> dict[str, Any]:
         return {
-            "title": self.facing.problem.title,
+            "title": self.bodies.problem.title,
             **self.contact.to_dict(),
             "kkt_residual": self.kkt_residual,
             "linear_solves": self.linear_solves,
-            "outside_theorem": self.facing.outside,
-            "warnings": self.facing.warnings,
+            "outside_theorem": self.bodies.outside,
+            "warnings": self.bodies.warnings,
         }
 
 
-def solve(problem: Problem | Facing) -> Solution:
+def solve(problem: Problem | TwoBodies | ContactPair | Path | str) -> Solution:
     """Solve both bodies at once.
 
     Parameters
     ----------
-    problem : Problem or Facing
+    problem : Problem, TwoBodies, ContactPair or path
         One body may be rigid.
+
+    Returns
+    -------
+    Solution
 
     Raises
     ------
@@ -339,6 +345,8 @@ def solve(problem: Problem | Facing) -> Solution:
         Bad input.
     SolveError
         The KKT certificate was not reached.
+    ValueError
+        A pair made from matrices.
 
     Examples
     --------
@@ -348,32 +356,55 @@ def solve(problem: Problem | Facing) -> Solution:
     >>> round(float(solve(Problem.from_dict(bars)).contact.pressure[0]), 12)
     0.075
     """
-    facing = face(problem) if isinstance(problem, Problem) else problem
+    bodies = _bodies(problem)
     with one_thread():
-        system = contact_system(facing)
+        system = contact_system(bodies)
         found = system.solve()
         jump = system.jump(found.force, found.motion)
         residual = system.residual(found.force, found.motion)
     branches = found.branches
     return Solution(
-        facing=facing,
+        bodies=bodies,
         force=found.force,
         motion=found.motion,
-        contact=ContactState.of(
-            facing, force=found.force, jump=jump, touching=branches.touching, sliding=branches.sliding
+        contact=ContactFields.of(
+            bodies.interface.contact, force=found.force, jump=jump, touching=branches.touching, sliding=branches.sliding
         ),
         kkt_residual=residual,
         linear_solves=system.linear_solves,
     )
 
 
-def contact_system(facing: Facing) -> ContactSystem:
+def _bodies(problem: Problem | TwoBodies | ContactPair | Path | str) -> TwoBodies:
+    if isinstance(problem, TwoBodies):
+        return problem
+    if isinstance(problem, ContactPair):
+        return problem.on_meshes()
+    return discretise(problem if isinstance(problem, Problem) else load(problem))
+
+
+def solution_force(pair: ContactPair) -> Floats:
+    """g at the solution of the global method, as the iteration of the pair has it.
+
+    Raises
+    ------
+    SolveError
+    ValueError
+        A pair made from matrices.
+    """
+    found = solve(pair).contact
+    stress = np.concatenate([pair.upward * found.shear[: pair.contact.grid.t], found.pressure])
+    return np.asarray(np.tile(found.weights, pair.contact.grid.dimension) * stress)
+
+
+def contact_system(bodies: TwoBodies) -> ContactSystem:
     """Assemble W, d_0 and the friction law of a problem."""
-    t, size = facing.tangential.stop, facing.tangential.stop + facing.n
+    grid, kernel = bodies.interface.contact, bodies.interface.kernel
+    t, size = grid.t, grid.size
     W, d0 = np.zeros((size, size)), np.zeros(size)
-    d0[t:] = -facing.gap
+    d0[t:] = -bodies.interface.gap
     motions, resultant = [np.zeros((size, 0))], [np.zeros(0)]
-    for body, sign in ((facing.body1, 1.0), (facing.body2, -1.0)):
+    for body, sign in ((bodies.body1, 1.0), (bodies.body2, -1.0)):
         if body is not None:
             flexibility, trace = _flexibility(body)
             W += flexibility
@@ -382,10 +413,10 @@ def contact_system(facing: Facing) -> ContactSystem:
             traces[body.unknown] = sign * body.motions[body.interface]
             motions.append(traces)
             resultant.append(body.motions.T @ body.load)
-    friction = np.zeros((t, facing.n))
-    k = float(facing.problem.contact.friction)
-    if k and facing.regularisation is not None:
-        friction = k * facing.weights[:, None] * facing.regularisation
+    friction = np.zeros((t, grid.n))
+    k = float(bodies.friction)
+    if k and kernel is not None:
+        friction = k * grid.weights[:, None] * kernel
     return ContactSystem(W, d0, friction, motions=np.concatenate(motions, axis=1), resultant=np.concatenate(resultant))
 
 

@@ -906,15 +906,15 @@ def test_region_runs_a_constant_theta_whatever_the_file_says(call, short, write,
 
 @pytest.mark.parametrize("evaluations", [1, 40])
 def test_ctrl_c_ends_region(call, short, write, tmp_path, monkeypatch, evaluations):
-    states, seen = runs.states, itertools.count(1)
+    iterates, seen = runs.iterates, itertools.count(1)
 
     def interrupted(*args):
-        for state in states(*args):
+        for state in iterates(*args):
             if next(seen) == evaluations:
                 signal.raise_signal(signal.SIGINT)
             yield state
 
-    monkeypatch.setattr(runs, "states", interrupted)
+    monkeypatch.setattr(runs, "iterates", interrupted)
     answer = call("region", write(COARSE), "-o", tmp_path / "plane.svg")
     assert answer.status == 130
     assert answer.err.strip().startswith("interrupted")

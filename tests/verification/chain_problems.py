@@ -11,7 +11,7 @@ from verification.algorithm.runs import Run, run
 from verification.constants import Measured, measure
 from verification.contact import ContactError, ContactSolution
 from verification.contact.active_set import Pattern
-from verification.interface.assembly import Pair, build
+from verification.interface.assembly import ContactPair, build
 from verification.ledger.cases import problem, three_digits
 from verification.ledger.large_friction import loaded
 
@@ -21,7 +21,7 @@ def relaxation_factor(random: np.random.Generator, rho: float) -> float:
     return float(three_digits(min(2 / (2 + rho) * random.uniform(0.3, 1.1), 0.97)))
 
 
-def case(seed: int, friction: Any = None, **iteration: Any) -> tuple[Pair, Measured, float, np.random.Generator]:
+def case(seed: int, friction: Any = None, **iteration: Any) -> tuple[ContactPair, Measured, float, np.random.Generator]:
     """The problem of a seed with its constants, a theta, and the generator that drew them."""
     random = np.random.default_rng(seed)
     pair = build(problem(random, friction, **iteration))
@@ -29,7 +29,7 @@ def case(seed: int, friction: Any = None, **iteration: Any) -> tuple[Pair, Measu
     return pair, measured, relaxation_factor(random, measured.rho_max.value), random
 
 
-def run_of(pair: Pair, measured: Measured, theta: float) -> Run:
+def run_of(pair: ContactPair, measured: Measured, theta: float) -> Run:
     """A run, by the active set alone where that is enough."""
     try:
         return run(pair, theta=theta, measured=measured, solver="active-set")
@@ -37,7 +37,7 @@ def run_of(pair: Pair, measured: Measured, theta: float) -> Run:
         return run(pair, theta=theta, measured=measured)
 
 
-def step_II(pair: Pair, g: np.ndarray) -> ContactSolution:
+def step_II(pair: ContactPair, g: np.ndarray) -> ContactSolution:
     """Step II for one force; its reaction is T g."""
     try:
         return FixedPointMap(pair, "active-set")(g)[1]
@@ -48,15 +48,17 @@ def step_II(pair: Pair, g: np.ndarray) -> ContactSolution:
 with_loads = loaded
 
 
-def state_of(pair: Pair, pattern: Pattern, g: np.ndarray, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+def state_of(
+    pair: ContactPair, pattern: Pattern, g: np.ndarray, random: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
     """A jump and a reaction with a pattern at g, every inequality of step II strict: of size 1 in S_1 and R g_N.
 
     Open nodes are apart by 0.5 to 1, touching ones press; sliding ones slide by 0.5 to 1, sticking ones carry less than
     half of what friction could.
     """
-    t, n = pair.tangential.stop, pair.n
+    t, n = pair.contact.grid.t, pair.contact.grid.n
     contact = pair.contact.stiffness
-    bound = FixedPointMap(pair).bound(g)
+    bound = pair.bound(g)
     large = lambda size: random.uniform(0.5, 1, size)
     length = np.linalg.norm(g) / np.linalg.norm(contact, 2)
     slide, gap = pattern.sliding * large(t) * length, -large(n) * length

@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.linalg import block_diag, eigh
 
-from verification.interface.assembly import Pair
+from verification.interface.assembly import ContactPair
 
 
 def dense_stiffness(points: np.ndarray, cells: np.ndarray, young: float, poisson: float) -> np.ndarray:
@@ -131,9 +131,9 @@ def symmetric(matrix: np.ndarray) -> np.ndarray:
     return (matrix + matrix.T) / 2
 
 
-def dense_body(pair: Pair, name: str) -> DenseBody:
+def dense_body(pair: ContactPair, name: str) -> DenseBody:
     """Assemble ``body1`` or ``body2`` of a pair from its mesh and its entry in the problem file."""
-    body, spec = getattr(pair, name), getattr(pair.problem, name)
+    body, spec = getattr(pair, name).body, getattr(pair.problem, name)
     points, cells, nodes = body.mesh.points.astype(float), body.mesh.cells, body.nodes
     d = points.shape[1]
     young, poisson = float(spec.young), float(spec.poisson)
@@ -196,31 +196,31 @@ class DensePair:
     `contact` solves step II, `neumann` step I.
     """
 
-    pair: Pair
+    pair: ContactPair
     body1: DenseBody
     body2: DenseBody
 
     @classmethod
-    def of(cls, pair: Pair) -> DensePair:
+    def of(cls, pair: ContactPair) -> DensePair:
         return cls(pair=pair, body1=dense_body(pair, "body1"), body2=dense_body(pair, "body2"))
 
     @property
     def contact(self) -> DenseBody:
-        return self.body1 if self.pair.problem.iteration.neumann_body == 2 else self.body2
+        return self.body1 if self.pair.neumann_body == 2 else self.body2
 
     @property
     def neumann(self) -> DenseBody:
-        return self.body2 if self.pair.problem.iteration.neumann_body == 2 else self.body1
+        return self.body2 if self.pair.neumann_body == 2 else self.body1
 
     @cached_property
     def t(self) -> int:
         """Number of tangential components."""
-        return self.pair.n if self.pair.problem.dimension == 2 else 0
+        return self.pair.contact.grid.n if self.pair.contact.grid.dimension == 2 else 0
 
     @cached_property
     def weights(self) -> np.ndarray:
         """The trapezoid rule on Gamma_c."""
-        x = self.pair.x
+        x = self.pair.contact.grid.x
         if len(x) == 1:
             return np.ones(1)
         w = np.zeros(len(x))
@@ -234,11 +234,11 @@ class DensePair:
         spec = self.pair.problem.contact
         if spec.law == "nonlocal" and spec.radius is None:
             return np.zeros((len(self.weights), len(self.weights)))
-        return hat_operator(self.pair.x, self.weights, spec.law, float(spec.radius or 0))
+        return hat_operator(self.pair.contact.grid.x, self.weights, spec.law, float(spec.radius or 0))
 
     @cached_property
     def friction(self) -> float:
-        return float(self.pair.problem.contact.friction)
+        return float(self.pair.friction)
 
     @cached_property
     def B_T(self) -> np.ndarray:

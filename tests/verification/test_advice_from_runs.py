@@ -12,7 +12,7 @@ from sample_problems import changed
 
 import verification as vf
 from verification.advice.roles import advise_run
-from verification.algorithm.fixed_point import FixedPointMap, states
+from verification.algorithm.fixed_point import FixedPointMap, iterates
 from verification.algorithm.relaxation import Constant
 from verification.interface.assembly import build
 
@@ -145,7 +145,7 @@ def plates(E1, E2, neumann_body, friction, poisson="0.3", cells=((10, 2), (6, 2)
 def contact_run(pair, theta, norm="energy"):
     """The absolute residuals of a run, in the norm (5.21) or as a Euclidean length."""
     found = []
-    for state in islice(states(FixedPointMap(pair), Constant(pair, theta)), 60 + 2 * steps(theta)):
+    for state in islice(iterates(FixedPointMap(pair), Constant().begin(pair, theta, None)), 60 + 2 * steps(theta)):
         length = state.residual if norm == "energy" else float(np.linalg.norm(state.image - state.g))
         found.append(length)
         if not ROUNDING * max(found) < length < RUNAWAY * found[0]:
@@ -228,7 +228,7 @@ def test_a_steady_divergence_bounds_rho_and_is_no_mode():
     """A nearly incompressible Neumann body: 4.51 a step with 16 of 25 nodes open, although no mode is -4.51."""
     pair = plates(1e3, 5e4, 1, "0", poisson="0.49", cells=((40, 6), (24, 6)))
     theta, rho = 0.7, vf.measure(pair).rho_normal.value
-    seen = list(islice(states(FixedPointMap(pair), Constant(pair, theta)), 60))
+    seen = list(islice(iterates(FixedPointMap(pair), Constant().begin(pair, theta, None)), 60))
     residuals = [state.residual for state in seen]
     assert ratio(residuals, theta) == pytest.approx(4.5123, abs=1e-4)
     assert np.count_nonzero(~seen[-1].contact.pattern.touching) == 16

@@ -7,7 +7,7 @@ semidefinite edition, theorem in energy norms, repaired edition.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
 
@@ -26,7 +26,7 @@ from verification.bounds.program import LMIError
 from verification.bounds.semidefinite import NARROW, SemidefiniteEdition, friction_threshold
 from verification.constants import Measured
 from verification.contact.active_set import Pattern
-from verification.interface.assembly import Pair
+from verification.interface.assembly import ContactPair
 from verification.threads import one_thread
 
 #: Random problems, the same ones each time, in batches.
@@ -66,14 +66,14 @@ def repaired_factor(measured: Measured, theta: float) -> float:
 # --- pairs of forces --------------------------------------------------------------------------------------------------
 
 
-def quotient(pair: Pair, theta: float, g: np.ndarray, other: np.ndarray) -> float:
+def quotient(pair: ContactPair, theta: float, g: np.ndarray, other: np.ndarray) -> float:
     """``|||T_theta g - T_theta g~||| / |||g - g~|||``."""
     d, p = g - other, step_II(pair, g).force - step_II(pair, other).force
     norm = pair.neumann.dual_norm
     return norm(theta * p + (1 - theta) * d) / norm(d)
 
 
-def largest_quotient(pair: Pair, theta: float, g: np.ndarray, random: np.random.Generator) -> float:
+def largest_quotient(pair: ContactPair, theta: float, g: np.ndarray, random: np.random.Generator) -> float:
     """Of random pairs around a force: a tenth of its size away, as far as it is large, and ten times as far."""
     neumann = pair.neumann
     size = neumann.dual_norm(g) or max(neumann.dual_norm(side.load) for side in (neumann, pair.contact)) or 1.0
@@ -85,13 +85,13 @@ def largest_quotient(pair: Pair, theta: float, g: np.ndarray, random: np.random.
 
 def attained(piece: Piece, theta: float, random: np.random.Generator) -> float:
     """The quotient of two forces inside a piece, in its worst direction, for loads that bring the piece about."""
-    pair, n, t = piece.pair, piece.pair.n, piece.pair.tangential.stop
+    pair, n, t = piece.pair, piece.pair.contact.grid.n, piece.pair.contact.grid.t
     g = np.concatenate([random.uniform(-1, 1, t), random.uniform(0.5, 1, n)])  # S sigma_N > 0: S has no entry < 0
     pair = with_loads(pair, g, *state_of(pair, piece.pattern, g, random))
-    stress = lambda g: 1.0 if pair.regularisation is None else float((pair.regularisation @ g[t:]).min())
+    stress = lambda g: 1.0 if pair.interface.kernel is None else float((pair.interface.kernel @ g[t:]).min())
     inside = lambda g: step_II(pair, g).pattern == piece.pattern and stress(g) > 0
     if not inside(g):  # friction so slight that rounding decides between stick and slip
-        assert 0 < pair.problem.contact.friction < 1e-6
+        assert 0 < pair.friction < 1e-6
         return float("nan")
     step = pair.neumann.root @ np.linalg.svd(piece.relaxed(theta))[2][0] * pair.neumann.dual_norm(g)
     while not (inside(g + step) and inside(g - step)):
@@ -148,11 +148,11 @@ class Chain:
         return self.lmi <= (1 + TIGHT) * self.search
 
 
-def chain_of(pair: Pair, measured: Measured, theta: float, random: np.random.Generator) -> Chain:
+def chain_of(pair: ContactPair, measured: Measured, theta: float, random: np.random.Generator) -> Chain:
     """All numbers of a problem at one theta."""
     with one_thread():
         done, found = run_of(pair, measured, theta), largest_factor(pair, theta, random=random)
-        ratio, linear = largest_step_ratio(pair, done.states), done.linearised
+        ratio, linear = largest_step_ratio(pair, done.iterates), done.linearised
         shown = largest_quotient(pair, theta, done.last.g, random), attained(found.piece, theta, random)
     return Chain(
         step=np.nan if ratio is None else ratio.lo,
@@ -171,7 +171,7 @@ def chain_of(pair: Pair, measured: Measured, theta: float, random: np.random.Gen
 SETTINGS = {"tolerance": 1e-10, "max_iterations": 200}
 
 
-def allowed(seed: int) -> tuple[Pair, Measured, float, np.random.Generator]:
+def allowed(seed: int) -> tuple[ContactPair, Measured, float, np.random.Generator]:
     """A random problem with a friction and a theta for which the repaired edition proves a factor below 1."""
     pair, measured, _, random = case(seed, **SETTINGS)
     k = random.uniform(0, 0.99) * evaluate(REPAIRED, measured.constants()).C2.value
@@ -180,10 +180,9 @@ def allowed(seed: int) -> tuple[Pair, Measured, float, np.random.Generator]:
     return rubbing(pair, k), measured, low + random.uniform(0.01, 0.99) * (high - low), random
 
 
-def rubbing(pair: Pair, k: float) -> Pair:
+def rubbing(pair: ContactPair, k: float) -> ContactPair:
     """The same bodies at another friction."""
-    contact = replace(pair.problem.contact, friction=Fraction(k))
-    return replace(pair, problem=replace(pair.problem, contact=contact))
+    return pair.at(friction=Fraction(k))
 
 
 @pytest.mark.parametrize("batch", range(BATCHES))
@@ -235,10 +234,10 @@ def test_a_smaller_bound_is_found_out():
     assert min(above.values()) > 0, above
 
 
-def every_piece(pair: Pair) -> Iterator[Piece]:
+def every_piece(pair: ContactPair) -> Iterator[Piece]:
     """Every contact pattern; the sign of S sigma_N only turns the direction of slip."""
-    n, t = pair.n, pair.tangential.stop
-    rubs = bool(pair.problem.contact.friction)
+    n, t = pair.contact.grid.n, pair.contact.grid.t
+    rubs = bool(pair.friction)
     for choice in product(product((True, False), (0, 1, -1) if rubs else (1,)), repeat=n):
         touching, sliding = (np.array(values) for values in zip(*choice, strict=True))
         pattern = Pattern(touching=touching, sliding=sliding.astype(np.int8))
@@ -252,7 +251,7 @@ def test_the_search_finds_nearly_the_largest_norm_of_all_contact_patterns():
     ratios = []
     for seed in range(80):
         pair, measured, theta, random = case(seed)
-        if pair.n <= 3:
+        if pair.contact.grid.n <= 3:
             most = max(piece.factor(theta) for piece in every_piece(pair))
             ratios.append(largest_factor(pair, theta, random=random).value / most)
             assert most <= SemidefiniteEdition(pair, measured).factor(theta).value * (1 + RELATIVE)
@@ -317,7 +316,7 @@ class Forms:
     t: int
 
     @classmethod
-    def of(cls, pair: Pair, weight: float = 1.0) -> Forms:
+    def of(cls, pair: ContactPair, weight: float = 1.0) -> Forms:
         dense = DensePair.of(pair)
         k = weight * dense.friction * dense.weights
         return cls(S_1=dense.contact.S, S_2=dense.neumann.S, hat=dense.hat, weight=k, t=dense.t)
@@ -407,7 +406,7 @@ def test_the_form_of_the_edition_is_the_one_written_down(seed):
     pair, measured, theta, random = case(seed)
     edition, forms = SemidefiniteEdition(pair, measured), Forms.of(pair)
     count = 4 if measured.friction else 1
-    multipliers = tuple(random.standard_normal(pair.n) for _ in range(count))
+    multipliers = tuple(random.standard_normal(pair.contact.grid.n) for _ in range(count))
     basis, sizes = forms.basis(multipliers), edition.conditions(multipliers)
     x = random.standard_normal((2, len(sizes)))
     # in both coordinates |||g||| and |d_1| are Euclidean: the eigenvalues agree
@@ -424,7 +423,7 @@ def test_the_form_of_the_edition_is_the_one_written_down(seed):
 def test_two_forces_obey_the_conditions_of_step_II_node_by_node(seed):
     """So that Sigma >= 0 for any multipliers of the cone, and the quotient is below the factor they prove."""
     pair, _, _, random = case(seed)
-    forms, neumann, t = Forms.of(pair), pair.neumann, pair.tangential.stop
+    forms, neumann, t = Forms.of(pair), pair.neumann, pair.contact.grid.t
     size = max(neumann.dual_norm(side.load) for side in (neumann, pair.contact)) or 1.0
     for length in (0.1, 1.0, 10.0):
         first, second = (neumann.root @ random.standard_normal((2, neumann.root.shape[1], 1)))[..., 0] * length * size

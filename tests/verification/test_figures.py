@@ -60,7 +60,7 @@ def test_lengths_and_stresses_are_drawn_with_their_units(comparisons, name):
     run = comparisons[name].run
     length, stress = (f"[{run.units[quantity]}]" for quantity in ("length", "stress"))
     meshes, *stresses = draw_bodies(run).axes
-    if run.pair.problem.dimension == 1:
+    if run.pair.contact.grid.dimension == 1:
         assert (meshes.get_xlabel(), stresses) == (f"x {length}", [])
     else:
         assert meshes.get_ylabel() == f"y {length}"
@@ -110,7 +110,7 @@ def test_bodies_pressed_together_are_drawn_touching(comparisons):
 @pytest.mark.parametrize("name", ["inside", "two-bars"])
 def test_a_run_cut_short_can_be_drawn(comparisons, tmp_path, name, history):
     comparison = comparisons[name]
-    short = replace(comparison.run, states=comparison.run.states[:history], outcome="interrupted")
+    short = replace(comparison.run, iterates=comparison.run.iterates[:history], outcome="interrupted")
     save(draw_bodies(short), tmp_path / "bodies.svg")
     save(draw_residuals(short, comparison.editions), tmp_path / "residuals.svg")
     for figure in ("bodies", "residuals"):

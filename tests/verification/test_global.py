@@ -12,7 +12,7 @@ import pytest
 from problem_list import PROBLEMS, bars, plates
 
 import verification as vf
-from verification.interface.assembly import face
+from verification.interface.assembly import discretise
 from verification.monolithic import ContactSystem, contact_system
 
 REFERENCE = Path(__file__).parent / "reference_local_coulomb.csv"
@@ -43,7 +43,7 @@ def test_the_limit_of_the_iteration_is_the_global_solution_in_either_role(name: 
     solution = vf.solve(problem)
     assert solution.kkt_residual <= 1e-11
     agree(run, solution, 1e-8)
-    assert run.contact.state == solution.contact.state
+    assert run.contact.status == solution.contact.status
     largest = max(np.abs(u).max() for u in solution.displacements)
     for ours, theirs in zip(run.displacements, solution.displacements, strict=True):
         assert np.abs(ours - theirs).max() <= 1e-8 * largest
@@ -106,7 +106,7 @@ def test_the_half_plate_on_a_rigid_base_has_the_displacements_of_the_field_s_ben
         {"body1": {"shape": "rigid", "y": [-length, 0]}, "body2": plate, "contact": {"friction": 1, "law": "local"}}
     )
     solution = vf.solve(problem)
-    body, u = solution.facing.body2, solution.displacements[1]
+    body, u = solution.bodies.body2, solution.displacements[1]
     assert body is not None
     assert u is not None
     x, moved = body.mesh.points[body.nodes, 0] / length, u[body.nodes, 0] / length * 1e-3
@@ -224,7 +224,7 @@ def test_a_uniform_stress_passes_the_interface_to_rounding(law: str) -> None:
     solution = vf.solve(vf.Problem.from_dict(problem))
     assert np.abs(solution.contact.pressure - 7).max() <= 1e-11 * 7
     assert np.abs(solution.contact.shear).max() <= 1e-11 * 7
-    for body, u in zip(solution.facing.elastic, solution.displacements, strict=True):
+    for body, u in zip(solution.bodies.elastic, solution.displacements, strict=True):
         assert u is not None
         strain = -7 * (1 - 0.3**2) / 1000
         assert np.abs(np.ptp(u[:, 1]) - abs(strain) * np.ptp(body.mesh.points[:, 1])) <= 1e-12
@@ -292,7 +292,7 @@ def test_sweeps_lead_newton_on_where_its_branches_repeat() -> None:
 
 
 def test_each_broken_condition_raises_the_residual() -> None:
-    system = contact_system(face(vf.Problem.from_dict(PROBLEMS["Section 6, centred"])))
+    system = contact_system(discretise(vf.Problem.from_dict(PROBLEMS["Section 6, centred"])))
     found = system.solve()
     assert system.residual(found.force, found.motion) <= 1e-11
     n = len(found.force) - system.t

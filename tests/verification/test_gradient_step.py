@@ -23,7 +23,8 @@ ROUNDING = 1e-9
 def frictionless(seed):
     """A pair without friction, its rho_N, and a generator; every third one has a gap."""
     pair, _, _, random = case(seed, 0)
-    pair = replace(pair, gap=np.full(pair.n, 0.002 if seed % 3 == 0 else 0.0))
+    gap = np.full(pair.contact.grid.n, 0.002 if seed % 3 == 0 else 0.0)
+    pair = replace(pair, interface=replace(pair.interface, gap=gap), problem=None)
     return pair, measure(pair).rho_normal.value, random
 
 
@@ -31,7 +32,7 @@ def energy(pair, g):
     """E at ``u_2 = S_2^-1 (g + l_2)``, ``g - T g``, and the nodes that touch."""
     u, solution = FixedPointMap(pair, "active-set")(g)
     one = u + solution.v
-    one[pair.normal] += pair.gap
+    one[pair.contact.grid.normal] += pair.interface.gap
     two = u - pair.neumann.known
     value = two @ pair.neumann.stiffness @ two / 2 - pair.neumann.load @ two
     value += one @ pair.contact.stiffness @ one / 2 - pair.contact.load @ one
@@ -45,7 +46,7 @@ def forces(pair, random, count=8):
     for i in range(count):
         g = root @ random.standard_normal(root.shape[1]) * size
         if i % 2:
-            g[pair.normal] = np.abs(g[pair.normal])
+            g[pair.contact.grid.normal] = np.abs(g[pair.contact.grid.normal])
         yield g
 
 
@@ -90,7 +91,7 @@ def test_the_slope_of_the_energy_is_the_force_less_its_image(seed):
 
 def factors(pair, random, theta):
     """What T_theta does to two pairs of forces: all nodes open; all touching, in the worst direction."""
-    n, t = pair.n, pair.tangential.stop
+    n, t = pair.contact.grid.n, pair.contact.grid.t
     one, two = pair.contact.stiffness, pair.neumann.stiffness
     condensed = [s[t:, t:] - s[t:, :t] @ np.linalg.solve(s[:t, :t], s[:t, t:]) for s in (one, two)]
     worst = eigh(*condensed)[1][:, -1]

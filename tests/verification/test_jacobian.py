@@ -17,12 +17,12 @@ from sample_problems import PROBLEMS
 
 import verification as vf
 from verification.algorithm.affine_piece import Piece, piece_of
-from verification.algorithm.fixed_point import FixedPointMap, state_at
-from verification.algorithm.iterate import State
+from verification.algorithm.fixed_point import FixedPointMap, iterate_at
+from verification.algorithm.iterate import Iterate
 from verification.algorithm.linearisation import NotLinear, linearise
 from verification.contact import ContactError
 from verification.contact.active_set import Pattern
-from verification.interface.assembly import Pair, build
+from verification.interface.assembly import ContactPair, build
 
 seeds = st.integers(0, 2**32 - 1).map(np.random.default_rng)
 
@@ -30,32 +30,32 @@ seeds = st.integers(0, 2**32 - 1).map(np.random.default_rng)
 class Evaluated:
     """T at forces, with all that the piece around one of them decides on."""
 
-    def __init__(self, pair: Pair) -> None:
-        self.pair, self.t = pair, pair.tangential.stop
+    def __init__(self, pair: ContactPair) -> None:
+        self.pair, self.t = pair, pair.contact.grid.t
 
-    def __call__(self, g: np.ndarray) -> State:
+    def __call__(self, g: np.ndarray) -> Iterate:
         try:
-            return state_at(FixedPointMap(self.pair, "active-set"), g)
+            return iterate_at(FixedPointMap(self.pair, "active-set"), g)
         except ContactError:
-            return state_at(FixedPointMap(self.pair, "cvxpy"), g)
+            return iterate_at(FixedPointMap(self.pair, "cvxpy"), g)
 
     def stress(self, g: np.ndarray) -> np.ndarray:
         """S sigma_N; none without a law of friction, or where nothing rubs."""
-        if self.pair.regularisation is None or not self.pair.problem.contact.friction:
+        if self.pair.interface.kernel is None or not self.pair.friction:
             return np.zeros(0)
-        return self.pair.regularisation @ g[self.t :]
+        return self.pair.interface.kernel @ g[self.t :]
 
-    def same(self, g: np.ndarray, state: State) -> bool:
+    def same(self, g: np.ndarray, state: Iterate) -> bool:
         """Whether g lies on the piece of a state; where no friction can act, the direction of slip does not matter."""
         sign, one, two = np.sign(self.stress(state.g)), self(g).contact.pattern, state.contact.pattern
-        rubs = FixedPointMap(self.pair).bound(state.g) != 0
+        rubs = self.pair.bound(state.g) != 0
         return (
             np.array_equal(np.sign(self.stress(g)), sign)
             and np.array_equal(one.touching, two.touching)
             and np.array_equal(one.sliding[rubs], two.sliding[rubs])
         )
 
-    def reach(self, state: State, step: np.ndarray) -> float:
+    def reach(self, state: Iterate, step: np.ndarray) -> float:
         """The largest 2^-i for which the piece of a state contains both ends of a step; 0 beyond i = 20.
 
         The piece is convex: then it contains all between.
@@ -65,10 +65,10 @@ class Evaluated:
                 return 0.5**i
         return 0.0
 
-    def slack(self, state: State, piece: Piece) -> np.ndarray:
+    def slack(self, state: Iterate, piece: Piece) -> np.ndarray:
         """How far each inequality of step II, and each sign of S sigma_N, is from its end."""
         v, force, sliding, t = state.contact.v, state.contact.force, piece.pattern.sliding, self.t
-        bound = FixedPointMap(self.pair).bound(state.g)
+        bound = self.pair.bound(state.g)
         rubs, slips = piece.sign != 0, (sliding != 0)
         touching = np.where(piece.pattern.touching, force[t:], -v[t:])
         if not rubs.any():
@@ -79,21 +79,24 @@ class Evaluated:
         )
 
 
-def forces(pair: Pair, random: np.random.Generator) -> np.ndarray:
+def forces(pair: ContactPair, random: np.random.Generator) -> np.ndarray:
     """A random force of the size of the loads."""
     size = max(pair.neumann.dual_norm(side.load) for side in (pair.neumann, pair.contact)) or 1.0
     force = pair.neumann.root @ random.standard_normal(pair.neumann.root.shape[1])
     return 10 ** random.uniform(-1, 1) * size * force / pair.neumann.dual_norm(force)
 
 
-def along_a_run(pair: Pair, count: int) -> np.ndarray:
+def along_a_run(pair: ContactPair, count: int) -> np.ndarray:
     """The force after some steps from 0, with a theta of 0.3."""
     *_, state = islice(vf.iterate(pair, theta=0.3), count + 1)
     return state.g
 
 
 def assert_affine(
-    pair: Pair, g: np.ndarray, random: np.random.Generator, change: Callable[[Piece], Piece] = lambda piece: piece
+    pair: ContactPair,
+    g: np.ndarray,
+    random: np.random.Generator,
+    change: Callable[[Piece], Piece] = lambda piece: piece,
 ) -> bool:
     """T' d, and the derivatives of the jump and of the friction bound, are differences over a step of any length.
 
@@ -105,14 +108,14 @@ def assert_affine(
     norm, basis = pair.neumann.dual_norm, piece.basis
     size = norm(g) or norm(state.image) or 1.0
     d = basis @ random.standard_normal(basis.shape[1])
-    d[pair.normal][piece.still] = 0.0  # to the last digit
+    d[pair.contact.grid.normal][piece.still] = 0.0  # to the last digit
     d *= size / norm(d)
     length = T.reach(state, d)
     if length < 1e-4:
         return False
     step = length * d
     ahead, behind = T(g + step), T(g - step)
-    bound = FixedPointMap(pair).bound
+    bound = pair.bound
     # rounding: some units in the last place of all that is added up, over the length of the step
     u = np.abs(pair.contact.stiffness) @ (np.abs(state.displacement) + np.abs(state.contact.v))
     terms = u + np.abs(pair.contact.load) + np.abs(g)
@@ -152,7 +155,9 @@ MUTANTS: dict[str, Callable[[Piece], Piece]] = {
     "the other sign of S sigma_N": lambda piece: replace(piece, sign=-piece.sign),
     "sliding the other way": lambda piece: with_pattern(piece, sliding=-piece.pattern.sliding),
     "sticking": lambda piece: with_pattern(piece, sliding=0 * piece.pattern.sliding),
-    "one node less in touch": lambda piece: with_pattern(piece, touching=piece.pattern.touching & (piece.pair.x > 0.5)),
+    "one node less in touch": lambda piece: with_pattern(
+        piece, touching=piece.pattern.touching & (piece.pair.contact.grid.x > 0.5)
+    ),
 }
 
 
@@ -165,7 +170,7 @@ def test_the_derivative_on_another_piece_is_found_out(mutant):
         assert_affine(pair, g, random, MUTANTS[mutant])
 
 
-def held(neumann: bool) -> Pair:
+def held(neumann: bool) -> ContactPair:
     """The lower body on rollers at a side that ends at Gamma_c; it has the Neumann problem or the contact problem."""
     size = {"x": [0, 1], "cells": [4, 2], "poisson": "0.3"}
     below = {"shape": "rectangle", "y": [-1, 0], "young": 3, "fixed": ["bottom"], "prescribed": {"left": [0, "free"]}}
@@ -174,7 +179,7 @@ def held(neumann: bool) -> Pair:
     roles = {"neumann_body": 1 if neumann else 2}
     data = {"body1": below | size, "body2": above | size, "contact": contact, "iteration": roles}
     pair = build(vf.Problem.from_dict(data))
-    assert not pair.body1.unknown[0]
+    assert not pair.body1.free[0]
     return pair
 
 
@@ -226,18 +231,17 @@ def test_J_theta_is_theta_times_the_derivative_and_1_minus_theta_times_the_ident
 # --- how far a piece reaches ------------------------------------------------------------------------------------------
 
 
-def at_solution(pair: Pair) -> State | None:
+def at_solution(pair: ContactPair) -> Iterate | None:
     """T at its fixed point, to rounding; None where no rule finds it."""
-    problem = pair.problem
     for relaxation in ("newton", "anderson", "aitken"):
-        iteration = replace(problem.iteration, tolerance=1e-13, relaxation=relaxation, max_iterations=100)
-        found = vf.run(replace(pair, problem=replace(problem, iteration=iteration)), theta="1/3")
+        settings = replace(pair.settings, tolerance=1e-13, relaxation=relaxation, max_iterations=100)
+        found = vf.run(replace(pair, settings=settings), theta="1/3")
         if found.converged:
             return found.last
     return None
 
 
-def nearest_change(T: Evaluated, state: State, piece: Piece) -> tuple[float, np.ndarray]:
+def nearest_change(T: Evaluated, state: Iterate, piece: Piece) -> tuple[float, np.ndarray]:
     """How far the next change is in the norm (5.21), and the step to it, from differences of what T decides on.
 
     Every inequality is affine on the piece: its distance is its slack over the norm of its gradient.
@@ -246,7 +250,7 @@ def nearest_change(T: Evaluated, state: State, piece: Piece) -> tuple[float, np.
     rows = []
     for column in piece.basis.T:
         step = size * column
-        step[pair.normal][piece.still] = 0.0
+        step[pair.contact.grid.normal][piece.still] = 0.0
         length = T.reach(state, step)
         assert length > 0
         ahead, behind = (T.slack(T(state.g + sign * length * step), piece) for sign in (1, -1))
@@ -259,11 +263,11 @@ def nearest_change(T: Evaluated, state: State, piece: Piece) -> tuple[float, np.
     distances[moving] = slack[moving] / sizes[moving]
     least = int(np.argmin(distances))
     step = -piece.basis @ gradients[least] * (distances[least] / sizes[least])
-    step[pair.normal][piece.still] = 0.0
+    step[pair.contact.grid.normal][piece.still] = 0.0
     return float(distances[least]), step
 
 
-def assert_margin(pair: Pair, random: np.random.Generator) -> bool:
+def assert_margin(pair: ContactPair, random: np.random.Generator) -> bool:
     """Nothing changes within the margin, in any direction; in the worst one, just beyond it, something does.
 
     Returns whether there is a solution at which T is smooth.
@@ -285,7 +289,7 @@ def assert_margin(pair: Pair, random: np.random.Generator) -> bool:
     for share in (0.5, 1 - 1e-4):
         for _ in range(3):
             d = piece.basis @ random.standard_normal(piece.basis.shape[1])
-            d[pair.normal][piece.still] = 0.0
+            d[pair.contact.grid.normal][piece.still] = 0.0
             assert T.same(state.g + share * margin * d / norm(d), state)
         assert T.same(state.g + share * step, state)
         assert T.same(state.g - share * step, state)
@@ -309,16 +313,16 @@ def test_the_margin_is_that_of_the_sample_problems_too(name):
 # --- solutions that were chosen ---------------------------------------------------------------------------------------
 
 
-def with_solution(pair: Pair, g: np.ndarray, v: np.ndarray) -> Pair:
+def with_solution(pair: ContactPair, g: np.ndarray, v: np.ndarray) -> ContactPair:
     """The same bodies under loads whose solution has the contact forces g and the jump v."""
     return with_loads(pair, g, v, g)
 
 
-def chosen(pair: Pair, touching: list[bool], sliding: list[int], random: np.random.Generator) -> tuple[Any, Any]:
+def chosen(pair: ContactPair, touching: list[bool], sliding: list[int], random: np.random.Generator) -> tuple[Any, Any]:
     """Contact forces and a jump with a pattern, every inequality strict."""
-    t, n = pair.tangential.stop, pair.n
+    t, n = pair.contact.grid.t, pair.contact.grid.n
     pressure = np.where(touching, random.uniform(0.5, 1, n), 0.0)
-    bound = FixedPointMap(pair).bound(np.concatenate([np.zeros(t), pressure]))
+    bound = pair.bound(np.concatenate([np.zeros(t), pressure]))
     shear = np.where(np.array(sliding) != 0, sliding, random.uniform(-0.5, 0.5, t)) * bound
     g = np.concatenate([shear, pressure])
     length = np.linalg.norm(g) / np.linalg.norm(pair.contact.stiffness, 2)
@@ -326,7 +330,7 @@ def chosen(pair: Pair, touching: list[bool], sliding: list[int], random: np.rand
     return g, length * np.concatenate([slide, gap])
 
 
-def four_nodes(**contact: Any) -> Pair:
+def four_nodes(**contact: Any) -> ContactPair:
     return build(
         vf.Problem.from_dict(
             {
@@ -367,14 +371,14 @@ DEGENERATE = {
 def test_at_an_end_of_step_II_linearisation_does_not_apply_and_near_it_the_margin_is_proportional(end, rest):
     pair, random = four_nodes(), np.random.default_rng(1)
     node, component = DEGENERATE[end]
-    t = pair.tangential.stop
+    t = pair.contact.grid.t
     g, v = chosen(pair, *PATTERN, random)
     if component == "g_N":
         g[t + node] *= rest
-        bound = FixedPointMap(pair).bound(g)  # it has changed with the pressure
+        bound = pair.bound(g)  # it has changed with the pressure
         g[:t] = np.where(np.array(PATTERN[1]) != 0, PATTERN[1], 0.0) * bound
     elif component == "g_T":
-        g[node] = (1 - rest) * FixedPointMap(pair).bound(g)[node]
+        g[node] = (1 - rest) * pair.bound(g)[node]
     else:
         v[node + (t if component == "v_N" else 0)] *= rest
     pair = with_solution(pair, g, v)
@@ -383,7 +387,7 @@ def test_at_an_end_of_step_II_linearisation_does_not_apply_and_near_it_the_margi
         assert linear.margin < (2e-3 if smaller else 2e-1)
         assert assert_margin(pair, random)
         return
-    with pytest.raises(NotLinear, match=f"the node at x = {pair.x[node]:g} is about to change its state"):
+    with pytest.raises(NotLinear, match=f"the node at x = {pair.contact.grid.x[node]:g} is about to change its state"):
         linearise(pair, Evaluated(pair)(g), 0.5)
 
 
@@ -391,11 +395,11 @@ def test_at_an_end_of_step_II_linearisation_does_not_apply_and_near_it_the_margi
 def test_a_node_that_the_neumann_body_holds_has_a_margin_like_any_other(sliding):
     """About to slide, or to slide back, it is the next one to change."""
     pair, random = held(neumann=True), np.random.default_rng(2)
-    g, v = chosen(pair, [True] * pair.n, [sliding] + [0] * (pair.n - 1), random)
+    g, v = chosen(pair, [True] * pair.contact.grid.n, [sliding] + [0] * (pair.contact.grid.n - 1), random)
     if sliding:
         v[0] *= 1e-3
     else:
-        g[0] = 0.999 * FixedPointMap(pair).bound(g)[0]
+        g[0] = 0.999 * pair.bound(g)[0]
     assert assert_margin(with_solution(pair, g, v), random)
 
 
@@ -414,12 +418,12 @@ def test_a_node_out_of_reach_of_any_contact_force_stays_still_and_T_is_affine_be
     pair, random = four_nodes(radius="1/2"), np.random.default_rng(3)
     g, v = chosen(pair, [True, True, True, False], [0, 0, 1, 1], random)
     pair = with_solution(pair, g, v)
-    state, t = at_solution(pair), pair.tangential.stop
+    state, t = at_solution(pair), pair.contact.grid.t
     piece = piece_of(pair, state.g, state.contact.pattern)
     assert list(piece.still) == [False, False, False, True]
     assert list(piece.sign) == [1, 1, 1, 0]
-    assert piece.basis.shape == (2 * pair.n, 2 * pair.n - 1)
-    assert np.abs(piece.basis[pair.normal][3]).max() < 1e-15 * np.abs(piece.basis).max()
+    assert piece.basis.shape == (2 * pair.contact.grid.n, 2 * pair.contact.grid.n - 1)
+    assert np.abs(piece.basis[pair.contact.grid.normal][3]).max() < 1e-15 * np.abs(piece.basis).max()
     gram = piece.basis.T @ pair.neumann.flexibility(piece.basis)
     assert np.allclose(gram, np.eye(len(gram)), rtol=0, atol=1e-12)
     assert assert_affine(pair, state.g, random)

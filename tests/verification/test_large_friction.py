@@ -65,9 +65,9 @@ def test_the_two_forces_are_realised_with_all_nodes_open_and_sliding_one_way():
     for case, random in cases():
         found = witness(case, random)
         d = found.difference
-        pair, t = d.setting.pair, d.setting.pair.tangential.stop
-        assert not pair.gap.any()
+        pair, t = d.setting.pair, d.setting.pair.contact.grid.t
+        assert not pair.interface.gap.any()
         assert np.abs(d.reaction[t:]).max() <= 1e-12 * np.abs(d.reaction).max()
-        zeta = pair.regularisation @ d.force[t:]
-        assert d.reaction[:t] == pytest.approx(found.friction * pair.weights * zeta, rel=1e-3)
+        zeta = pair.interface.kernel @ d.force[t:]
+        assert d.reaction[:t] == pytest.approx(found.friction * pair.contact.grid.weights * zeta, rel=1e-3)
         assert d.friction > 0

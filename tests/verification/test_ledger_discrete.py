@@ -193,7 +193,7 @@ def test_loads_bring_about_two_forces_that_break_what_is_printed(id, name, unit)
     reading = inequality.reading(case.reading.in_unit(unit))
     candidates = [along(case.setting, piece, y) for y in directions(case.setting, piece, random)]
     expected = max(candidates, key=lambda d: inequality.ratio(d, reading))
-    n, t = case.pair.n, case.pair.tangential.stop
+    n, t = case.pair.contact.grid.n, case.pair.contact.grid.t
     g = np.concatenate([random.uniform(-1, 1, t), random.uniform(0.5, 1, n)])
     pair = with_loads(case.pair, g, *state_of(case.pair, piece.pattern, g, random))
     step = expected.force * np.linalg.norm(g) / np.linalg.norm(expected.force) / 1e4
@@ -207,7 +207,7 @@ def test_two_forces_inside_a_piece_differ_as_the_piece_says():
     """Searched pieces of random problems, for loads that bring them about."""
     compared = 0
     for case, random in islice(draw_cases(4), len(NAMED), None):
-        n, t = case.pair.n, case.pair.tangential.stop
+        n, t = case.pair.contact.grid.n, case.pair.contact.grid.t
         for piece in pieces(case.setting, random, starts=1):
             g = np.concatenate([random.uniform(-1, 1, t), random.uniform(0.5, 1, n)])
             pair = with_loads(case.pair, g, *state_of(case.pair, piece.pattern, g, random))
@@ -342,7 +342,7 @@ def test_what_cannot_be_compared_is_not_called_true(id, side):
     unknown = {side: lambda d, r, t: getattr(entry, side)(d, r, t) * np.float64(math.nan) if id != "5.12" else math.nan}
     case = next(iter(draw_cases(1)))[0]
     piece = uniform_piece(case.pair, touching=True, sliding=0)
-    pair = along(case.setting, piece, np.ones(case.pair.n * 2))
+    pair = along(case.setting, piece, np.ones(case.pair.contact.grid.n * 2))
     tally = Tally(inequality=replace(entry, **unknown))
     tally.take(case, [case] if entry.about == "bodies" else [pair])
     tally.inequality = entry  # what follows does not cover it up

@@ -138,7 +138,7 @@ def asked(statement, *cases):
 def changed(case, node, component, share):
     """A nodal force on body 2 changed by a share of the largest one; component 0 is tangential."""
     g = case.g.copy()
-    g[component * case.weak.pair.n + node] += share * np.abs(g).max()
+    g[component * case.weak.pair.contact.grid.n + node] += share * np.abs(g).max()
     return g
 
 
@@ -190,7 +190,8 @@ class OtherBody(Weak):
 
     def bound(self, two):
         g, pair = -self.force(self.one, self.u.one), self.pair
-        return float(pair.problem.contact.friction) * pair.weights * np.abs(pair.regularisation @ g[pair.normal])
+        grid = pair.contact.grid
+        return float(pair.friction) * grid.weights * np.abs(pair.interface.kernel @ g[grid.normal])
 
 
 @pytest.mark.parametrize("statement", ["2.6", "4.4", "4.9.2", "5.2", "5.3", "5.5"])
@@ -252,10 +253,10 @@ def test_the_printed_friction_term_fails_where_a_sticking_node_moves():
     case = pressed("much friction")
     defect, w = ledger.printed_defect(case.weak, case.solution)
     assert defect < -0.5
-    assert w[case.weak.pair.normal].max() <= 1e-15
+    assert w[case.weak.pair.contact.grid.normal].max() <= 1e-15
     # without displacement along Gamma_c of body 1 both forms are one
     still = case.solution.one.copy()
-    still[case.weak.one.interface[case.weak.pair.tangential]] = 0
+    still[case.weak.one.interface[case.weak.pair.contact.grid.tangential]] = 0
     assert ledger.printed_defect(case.weak, Fields(one=still, two=case.solution.two))[0] >= 0
 
 
@@ -282,7 +283,7 @@ def test_a_contraction_factor_one_per_cent_too_small_is_found_out(of):
 
 def test_the_estimate_of_proposition_5_1_is_homogeneous_in_theta_m():
     case = pressed()
-    states = case.run.states[:6]
+    states = case.run.iterates[:6]
     one, other = (convergence.strong_convergence(case.weak, states, 0.6, m) for m in (1.0, 300.0))
     assert other == pytest.approx(300 * one, rel=1e-12)
     assert other.max() > 1
@@ -293,7 +294,7 @@ def test_the_estimate_of_proposition_5_1_is_homogeneous_in_theta_m():
 
 def test_the_model_has_nearly_the_numbers_of_nodes_of_the_paper():
     pairs = [build(Model(halvings=h).problem) for h in range(4)]
-    nodes = [len(pair.body1.mesh.points) + len(pair.body2.mesh.points) for pair in pairs]
+    nodes = [len(pair.body1.body.mesh.points) + len(pair.body2.body.mesh.points) for pair in pairs]
     assert nodes == [54, 170, 594, 2210]  # 60, 190, 666, 2482 in the paper
 
 

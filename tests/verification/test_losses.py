@@ -24,7 +24,7 @@ from verification.algorithm.affine_piece import Piece
 from verification.bounds.losses import Losses, locate
 from verification.bounds.pattern_search import Found, worst_piece
 from verification.constants import Measured, measure
-from verification.interface.assembly import Pair, build
+from verification.interface.assembly import ContactPair, build
 
 #: Labels whose worst pair is an eigenvector; of the others it is searched.
 EIGENVALUES = ("(5.18)", "(5.19)", "(5.22)", "(5.23)", "(5.29)")
@@ -50,7 +50,7 @@ class Sides:
 class Case:
     """A problem, what is measured of it, and the norms of Section 5 from dense matrices of their own."""
 
-    def __init__(self, pair: Pair, measured: Measured, seed: int = 0) -> None:
+    def __init__(self, pair: ContactPair, measured: Measured, seed: int = 0) -> None:
         self.pair, self.measured, self.seed = pair, measured, seed
         dense = DensePair.of(pair)
         one, two = dense.contact, dense.neumann
@@ -100,23 +100,23 @@ class Case:
         }[label]
         return log10(right / left) if left > 0 else np.inf
 
-    def between(self, psi: np.ndarray, other: np.ndarray, pair: Pair | None = None) -> Sides:
+    def between(self, psi: np.ndarray, other: np.ndarray, pair: ContactPair | None = None) -> Sides:
         """Two forces pushed through steps I and II."""
-        pair, t = pair or self.pair, self.pair.tangential.stop
+        pair, t = pair or self.pair, self.pair.contact.grid.t
         one, two = step_II(pair, psi), step_II(pair, other)
         d_2 = self.flexibility @ (psi - other)
         F = 0.0
-        if pair.regularisation is not None:
-            stress = np.abs(pair.regularisation @ psi[t:]) - np.abs(pair.regularisation @ other[t:])
-            k = float(pair.problem.contact.friction)
-            F = -float(k * pair.weights @ (stress * (np.abs(one.v[:t]) - np.abs(two.v[:t])))) if t else 0.0
+        if pair.interface.kernel is not None:
+            stress = np.abs(pair.interface.kernel @ psi[t:]) - np.abs(pair.interface.kernel @ other[t:])
+            k = float(pair.friction)
+            F = -float(k * pair.contact.grid.weights @ (stress * (np.abs(one.v[:t]) - np.abs(two.v[:t])))) if t else 0.0
         return Sides(g=psi - other, p=one.force - two.force, d_1=d_2 + one.v - two.v, d_2=d_2, F=F)
 
     # --- on one piece, both sides are quadratic forms in g
 
     def forms(self, label: str, piece: Piece) -> tuple[np.ndarray, np.ndarray]:
         """What is compared, left over right, without the constants."""
-        t, square = self.pair.tangential.stop, lambda rows, gram: symmetric(rows.T @ gram @ rows)
+        t, square = self.pair.contact.grid.t, lambda rows, gram: symmetric(rows.T @ gram @ rows)
         d_1 = self.flexibility + piece.jump
         size_1, size_2 = square(d_1, self.N_1), square(self.flexibility, self.N_2)
         if label == "(5.11)":
@@ -134,10 +134,10 @@ class Case:
 
     def realised(self, label: str, piece: Piece, random: np.random.Generator) -> Sides:
         """Two forces in the worst direction of a piece, for loads that bring it about."""
-        n, t = self.pair.n, self.pair.tangential.stop
+        n, t = self.pair.contact.grid.n, self.pair.contact.grid.t
         g = np.concatenate([random.uniform(-1, 1, t), random.uniform(0.5, 1, n)])
         pair = with_loads(self.pair, g, *state_of(self.pair, piece.pattern, g, random))
-        stress = lambda g: 1.0 if pair.regularisation is None else float((pair.regularisation @ g[t:]).min())
+        stress = lambda g: 1.0 if pair.interface.kernel is None else float((pair.interface.kernel @ g[t:]).min())
         inside = lambda g: step_II(pair, g).pattern == piece.pattern and stress(g) > 0
         worst = eigh(*self.forms(label, piece))[1][:, -1]
         step = worst * np.linalg.norm(g) / np.linalg.norm(worst)
@@ -274,7 +274,7 @@ def test_the_chain_from_the_friction_term_to_its_bound_adds_up(seed, k):
     assert printed.decades == pytest.approx(log10(found.P(PRINTED) / found.P(REPAIRED)), abs=1e-9)
 
 
-def in_unit(pair: Pair, factor: Fraction) -> Pair:
+def in_unit(pair: ContactPair, factor: Fraction) -> ContactPair:
     """Moduli times a factor."""
     stiffer = lambda body: replace(body, young=body.young * factor)
     problem = pair.problem

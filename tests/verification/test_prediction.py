@@ -13,10 +13,10 @@ from hypothesis import settings
 import verification as vf
 from verification.algorithm.affine_piece import piece_of
 from verification.algorithm.fixed_point import iterate
-from verification.algorithm.iterate import State
+from verification.algorithm.iterate import Iterate
 from verification.algorithm.linearisation import Linearisation, NotLinear, linearise
 from verification.algorithm.runs import Run, run
-from verification.interface.assembly import Pair, build
+from verification.interface.assembly import ContactPair, build
 
 #: Random problems, the same ones each time, in batches.
 COUNT = max(240, settings.default.max_examples)
@@ -103,7 +103,7 @@ def test_near_the_solution_the_error_is_multiplied_by_J():
 # --- what is excited --------------------------------------------------------------------------------------------------
 
 
-def symmetric_blocks(shift: str = "0", cells: int = 4) -> Pair:
+def symmetric_blocks(shift: str = "0", cells: int = 4) -> ContactPair:
     """Two equal blocks with symmetric meshes; loads are symmetric if the top is not shifted."""
     below = {"shape": "rectangle", "x": [0, 2], "y": [-1, 0], "cells": [cells, 2], "young": 3, "fixed": ["bottom"]}
     above = {"shape": "rectangle", "x": [0, 2], "y": [0, 1], "cells": [cells, 2], "young": 2}
@@ -121,20 +121,20 @@ def symmetric_blocks(shift: str = "0", cells: int = 4) -> Pair:
     )
 
 
-def linearised(pair: Pair, theta: float) -> tuple[Run, Linearisation]:
+def linearised(pair: ContactPair, theta: float) -> tuple[Run, Linearisation]:
     done = run(pair, theta=theta)
     assert done.converged
     assert done.linearised is not None
     return done, done.linearised
 
 
-def mirrored(pair: Pair, g: np.ndarray) -> np.ndarray:
+def mirrored(pair: ContactPair, g: np.ndarray) -> np.ndarray:
     """Left and right exchanged: tangential forces turn round."""
-    t = pair.tangential.stop
+    t = pair.contact.grid.t
     return np.concatenate([-g[:t][::-1], g[t:][::-1]])
 
 
-def modes(pair: Pair, state: State, theta: float) -> tuple[np.ndarray, np.ndarray]:
+def modes(pair: ContactPair, state: Iterate, theta: float) -> tuple[np.ndarray, np.ndarray]:
     """Eigenvalues of J, the largest modulus first, and its modes as forces."""
     piece = piece_of(pair, state.g, state.contact.pattern)
     values, vectors = np.linalg.eig(theta * piece.force + (1 - theta) * np.eye(len(state.g)))
@@ -209,17 +209,17 @@ def test_a_state_far_from_the_solution_is_not_linearised():
 def test_too_many_nodes_are_not_linearised(monkeypatch):
     pair = symmetric_blocks()
     last = linearised(pair, 0.3)[0].last
-    monkeypatch.setattr("verification.algorithm.linearisation.MOST_NODES", pair.n)
+    monkeypatch.setattr("verification.algorithm.linearisation.MOST_NODES", pair.contact.grid.n)
     linearise(pair, last, 0.3)
-    monkeypatch.setattr("verification.algorithm.linearisation.MOST_NODES", pair.n - 1)
+    monkeypatch.setattr("verification.algorithm.linearisation.MOST_NODES", pair.contact.grid.n - 1)
     with pytest.raises(NotLinear, match="5 contact nodes"):
         linearise(pair, last, 0.3)
 
 
 def test_a_rule_that_is_no_constant_theta_is_not_linearised():
     pair = symmetric_blocks()
-    settings = replace(pair.problem.iteration, relaxation="aitken")
-    done = run(replace(pair, problem=replace(pair.problem, iteration=settings)), theta=0.3)
+    settings = replace(pair.settings, relaxation="aitken")
+    done = run(replace(pair, settings=settings), theta=0.3)
     assert done.converged
     assert done.linearised is None
     assert "aitken" in done.why_not_linearised

@@ -56,9 +56,9 @@ def diverged() -> Run:
 def test_a_run_that_diverges_shows_its_growth_and_no_rate(diverged):
     """By a factor of 65 in one step; the noise of its last state is larger than the residuals before that step."""
     assert diverged.outcome == "diverged"
-    residuals = [s.residual for s in diverged.states]
+    residuals = [s.residual for s in diverged.iterates]
     grown = [b / a for a, b in pairwise(residuals)]
-    seen = largest_step_ratio(diverged.pair, diverged.states)
+    seen = largest_step_ratio(diverged.pair, diverged.iterates)
     assert seen.value == pytest.approx(max(grown), rel=1e-12)
     assert seen.lo > 60
     assert CLEAR_OF_NOISE * noise(diverged.pair, diverged.last) > residuals[np.argmax(grown)]

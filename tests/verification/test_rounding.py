@@ -87,10 +87,10 @@ def exact_form(pair, multipliers, theta: float, square: Fraction) -> Exact:
 
     Positive definite if and only if ``square |g|^2 - |theta p + (1 - theta) g|^2 - conditions`` is.
     """
-    n, size = pair.n, pair.normal.stop
-    S_1, S_2, R = (exact(m) for m in (pair.contact.stiffness, pair.neumann.stiffness, pair.regularisation))
-    k, t = Fraction(float(pair.problem.contact.friction)), Fraction(theta)
-    w = [Fraction(float(v)) for v in pair.weights]
+    n, size = pair.contact.grid.n, pair.contact.grid.size
+    S_1, S_2, R = (exact(m) for m in (pair.contact.stiffness, pair.neumann.stiffness, pair.interface.kernel))
+    k, t = Fraction(float(pair.friction)), Fraction(theta)
+    w = [Fraction(float(v)) for v in pair.contact.grid.weights]
     lam, tau, a, b = ([Fraction(float(v)) for v in m] for m in multipliers)
     zero = [[Fraction(0)] * size for _ in range(size)]
     step = [[(1 - t) * v for v in g] + [t * v for v in p] for g, p in zip(S_2, S_1, strict=True)]
@@ -132,7 +132,7 @@ def slender(length: int) -> vf.Problem:
     )
 
 
-SMALL = [seed for seed in range(60) if 0 < (p := case(seed)[0]).n <= 3 and p.problem.contact.friction][:6]
+SMALL = [seed for seed in range(60) if 0 < (p := case(seed)[0]).n <= 3 and p.friction][:6]
 
 
 @pytest.mark.parametrize("seed", SMALL)

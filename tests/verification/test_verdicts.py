@@ -172,7 +172,7 @@ def test_forecasts_come_true():
 def test_a_forecast_looks_at_no_state_after_the_one_it_is_made_at():
     for done in forecasts(12):
         made = done.forecast
-        seen = done.states[: made.made_at_iteration + 1]
+        seen = done.iterates[: made.made_at_iteration + 1]
         again = forecast(done.pair, seen, float(done.theta), made.tolerance, SETTINGS["max_iterations"])
         assert again == made
         with pytest.raises(NotLinear, match="half way"):

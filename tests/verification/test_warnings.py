@@ -12,12 +12,12 @@ from sample_problems import SHEARED, changed
 import verification as vf
 from fem1d2d import rectangle
 from verification.cli.problems import examples
-from verification.interface.assembly import face
+from verification.interface.assembly import discretise
 from verification.interface.pair import LOCKING, SHARE
 
 
 def warned(data):
-    return face(vf.Problem.from_dict(data)).warnings
+    return discretise(vf.Problem.from_dict(data)).warnings
 
 
 # --- Poisson ratios near 1/2 ------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""Interface stiffness matrices from files, and what is no such matrix."""
+"""Interface stiffness matrices from files."""
 
 from __future__ import annotations
 
@@ -16,15 +16,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from fem1d2d.mesh import Floats
+from verification.interface.matrices import MOST_ROWS
 from verification.problem.tables import ProblemError, unreadable
-from verification.threads import one_thread
-
-#: Matrices of more rows than this do not fit a dense eigenvalue problem.
-MOST_ROWS = 4000
-
-#: Largest asymmetry of a matrix, relative to its largest entry.
-ASYMMETRY = 1e-8
-
 
 #: Largest size of a matrix file: a full matrix of MOST_ROWS rows, with the two indices of each entry.
 MOST_BYTES = 24 * MOST_ROWS**2
@@ -103,32 +96,3 @@ def _real(matrix: np.ndarray) -> Floats:
     if matrix.dtype.kind not in "fiu":
         raise ValueError("needed real numbers" + (", received complex ones" if matrix.dtype.kind == "c" else ""))
     return np.asarray(matrix, dtype=float)
-
-
-def size(matrix: Floats) -> str:
-    return " x ".join(str(n) for n in matrix.shape) or "a single number"
-
-
-def check_matrix(name: str, matrix: Floats) -> None:
-    """Refuse what is no interface stiffness matrix.
-
-    Raises
-    ------
-    ValueError
-    """
-    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not len(matrix):
-        raise ValueError(f"{name} is {size(matrix)}: needed a square matrix")
-    if len(matrix) > MOST_ROWS:
-        raise ValueError(f"{name} has {len(matrix)} rows: needed at most {MOST_ROWS}")
-    if not np.isfinite(matrix).all():
-        raise ValueError(f"{name} has entries that are not finite: needed numbers")
-    unit = float(np.abs(matrix).max()) or 1.0
-    scaled = matrix / unit  # entries of order 1, whatever the unit
-    if not float(np.abs(scaled - scaled.T).max()) <= ASYMMETRY:
-        raise ValueError(f"{name} is not symmetric: needed a Schur complement of a stiffness matrix")
-    with one_thread():
-        eigenvalues = np.linalg.eigvalsh((scaled + scaled.T) / 2)
-    least = float(eigenvalues[0])
-    if not least > len(matrix) * np.finfo(float).eps:
-        kind = "singular: the body has too little support" if least >= -1e-10 else "indefinite"
-        raise ValueError(f"{name} is {kind} (least eigenvalue {least * unit:.3g}): needed a positive definite matrix")

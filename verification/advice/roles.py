@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
+from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -14,14 +15,14 @@ from fem1d2d.mesh import Floats
 from ndtheory import EnergyConstants, Number, evaluate_sharp
 from ndtheory.constants import take
 from ndtheory.sharp import LARGEST, SMALLEST, predicted_rate, predicted_theta
-from verification.advice.matrix_files import check_matrix, size
 from verification.advice.readings import NextRun, RunReading, SeenRun, read_ratio
 from verification.algorithm.theta import Choice, automatic, sharp_bounds
 from verification.constants import measure
 from verification.document import Document
-from verification.interface.assembly import build
-from verification.interface.pair import Pair
-from verification.problem.specification import Problem
+from verification.interface.build import pair_of
+from verification.interface.matrices import check_matrix, size
+from verification.interface.pair import ContactPair
+from verification.problem import Problem
 from verification.problem.tables import ProblemError
 from verification.threads import one_thread
 
@@ -136,10 +137,18 @@ class Advice(Document):
         }
 
 
-def advise(problem: Problem) -> Advice:
+def advise(problem: Problem | ContactPair | Path | str) -> Advice:
     """Advise on the roles of the bodies and on theta.
 
     The body whose prediction ``rho/(2 + rho)`` is smaller gets the Neumann problem.
+
+    Parameters
+    ----------
+    problem : Problem, ContactPair or path
+
+    Returns
+    -------
+    Advice
 
     Raises
     ------
@@ -155,24 +164,24 @@ def advise(problem: Problem) -> Advice:
     >>> found.neumann_body, round(found.best.theta_predicted, 6)
     (1, 0.857143)
     """
-    pair = build(problem)
-    roles = tuple(_role(problem_, pair) for problem_ in (problem, problem.swapped()))
+    pair = pair_of(problem)
+    roles = tuple(_role(roles) for roles in (pair, pair.swapped()))
     best = min(roles, key=lambda role: role.rate_predicted)
     return Advice(
         neumann_body=best.neumann_body,
         roles=roles,
-        units=problem.units,
-        friction=float(problem.contact.friction),
+        units=pair.units,
+        friction=float(pair.friction),
         outside=tuple(pair.outside),
     )
 
 
-def _role(problem: Problem, pair: Pair) -> Role:
-    measured = measure(replace(pair, problem=problem))
+def _role(pair: ContactPair) -> Role:
+    measured = measure(pair)
     sharp = sharp_bounds(measured)
     if sharp is None:
         why = next(iter(measured.reason.values()))
-        raise ProblemError(problem.source, "contact", None, f"no advice: {why}")
+        raise ProblemError(pair.source, "contact", None, f"no advice: {why}")
     outside = pair.outside
     threshold = None if outside else measured.friction_threshold
     if outside:
@@ -183,7 +192,7 @@ def _role(problem: Problem, pair: Pair) -> Role:
         if threshold is None:
             reason["friction_threshold"] = "no law of friction"
     return Role(
-        neumann_body=problem.iteration.neumann_body,
+        neumann_body=pair.neumann_body,
         rho=sharp.rho,
         theta_proved=None if outside else sharp.theta_proved,
         factor_proved=None if outside else sharp.factor_proved,
@@ -192,7 +201,7 @@ def _role(problem: Problem, pair: Pair) -> Role:
         rate_predicted=sharp.rate_predicted,
         friction_threshold=threshold,
         reason=reason,
-        theta_auto=automatic(sharp, outside, problem.iteration.tolerance),
+        theta_auto=automatic(sharp, outside, pair.settings.tolerance),
     )
 
 

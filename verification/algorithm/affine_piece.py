@@ -15,7 +15,7 @@ from scipy.linalg import cho_factor, cho_solve, null_space
 
 from fem1d2d.mesh import Floats
 from verification.contact.active_set import Pattern
-from verification.interface.pair import Pair
+from verification.interface.pair import ContactPair
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -24,7 +24,7 @@ class Piece:
 
     Attributes
     ----------
-    pair : Pair
+    pair : ContactPair
     pattern : Pattern
         What each contact node does.
     sign : int array, shape (t,)
@@ -33,7 +33,7 @@ class Piece:
         Open nodes whose g_N is 0 and stays so; see ``basis``.
     """
 
-    pair: Pair
+    pair: ContactPair
     pattern: Pattern
     sign: NDArray[np.int8]
     still: NDArray[np.bool_]
@@ -42,37 +42,47 @@ class Piece:
     def bound(self) -> Floats:
         """Derivative of the friction bound ``w_j k |(S sigma_N)_j|`` by g, shape (t, 2 n)."""
         pair = self.pair
-        result = np.zeros((len(self.sign), pair.normal.stop))
-        friction = float(pair.problem.contact.friction)
-        if friction and pair.regularisation is not None:
-            result[:, pair.normal] = (friction * pair.weights * self.sign)[:, None] * pair.regularisation
+        contact, neumann, kernel = pair.contact.grid, pair.neumann.grid, pair.interface.kernel
+        result = np.zeros((len(self.sign), neumann.size))
+        if pair.rubs and kernel is not None:
+            result[:, neumann.normal] = (float(pair.friction) * contact.weights * self.sign)[:, None] * kernel
         return result
+
+    @cached_property
+    def _carried(self) -> Floats:
+        """Derivative of the trace of the Neumann body by g, as the contact grid sees it."""
+        return self.pair.interface.carry(self.pair.neumann.inverse)
 
     @cached_property
     def jump(self) -> Floats:
         """Derivative of v (slip and minus the gap) by g, shape (2 n, 2 n): 0 where a node sticks or touches."""
-        contact, t = self.pair.contact, self.pair.tangential.stop
+        contact, t, carried = self.pair.contact, self.pair.contact.grid.t, self._carried
         moves = np.concatenate([self.pattern.sliding != 0, ~self.pattern.touching])
-        rows = np.flatnonzero(moves & contact.body.unknown)
-        result = np.zeros_like(contact.stiffness)
+        rows = np.flatnonzero(moves & contact.free)
+        result = np.zeros(carried.shape)
         if len(rows):
-            load = -contact.stiffness @ self.pair.neumann.inverse
+            load = -contact.stiffness @ carried
             load[:t] -= self.pattern.sliding[:, None] * self.bound
             factor = cho_factor(contact.stiffness[np.ix_(rows, rows)], check_finite=False)
             result[rows] = cho_solve(factor, load[rows], check_finite=False)
-        held = np.flatnonzero(~contact.body.unknown)
-        result[held] = -self.pair.neumann.inverse[held]
+        held = np.flatnonzero(~contact.free)
+        result[held] = -carried[held]
         return result
 
     @cached_property
-    def force(self) -> Floats:
-        """The Jacobian T' of T, shape (2 n, 2 n)."""
-        t, sliding = self.pair.tangential.stop, self.pattern.sliding
-        result = -self.pair.contact.stiffness @ (self.pair.neumann.inverse + self.jump)
+    def reaction(self) -> Floats:
+        """Derivative of the nodal forces on the contact grid by g, shape (2 n, 2 n)."""
+        t, sliding = self.pair.contact.grid.t, self.pattern.sliding
+        result = -self.pair.contact.stiffness @ (self._carried + self.jump)
         slides = np.flatnonzero(sliding)
         result[slides] = sliding[slides, None] * self.bound[slides]
         result[t:][~self.pattern.touching] = 0.0
         return result
+
+    @property
+    def force(self) -> Floats:
+        """The Jacobian T' of T, shape (2 n, 2 n) on the Neumann grid."""
+        return self.pair.interface.carry_back(self.reaction)
 
     @cached_property
     def basis(self) -> Floats:
@@ -84,7 +94,7 @@ class Piece:
         root = self.pair.neumann.root
         if not self.still.any():
             return root
-        kept = null_space(root[self.pair.normal][self.still])
+        kept = null_space(root[self.pair.neumann.grid.normal][self.still])
         return np.asarray(root @ kept)
 
     def relaxed(self, theta: float) -> Floats:
@@ -97,12 +107,12 @@ class Piece:
         return float(np.linalg.norm(self.relaxed(theta), 2))
 
 
-def piece_of(pair: Pair, g: Floats, pattern: Pattern) -> Piece:
+def piece_of(pair: ContactPair, g: Floats, pattern: Pattern) -> Piece:
     """The affine piece around g, whose contact pattern is known."""
-    t = pair.tangential.stop
-    sign, still = np.zeros(t, dtype=np.int8), np.zeros(pair.n, dtype=bool)
-    if t and pair.regularisation is not None and pair.problem.contact.friction:
-        sign = np.sign(pair.regularisation @ g[pair.normal]).astype(np.int8)
+    neumann = pair.neumann.grid
+    sign, still = np.zeros(pair.contact.grid.t, dtype=np.int8), np.zeros(neumann.n, dtype=bool)
+    if pair.rubs:
+        sign = np.sign(pair.interface.stress(g)).astype(np.int8)
         if not sign.all():
-            still = ~pattern.touching & (g[pair.normal] == 0)
+            still = ~pair.interface.pressed(pattern.touching) & (g[neumann.normal] == 0)
     return Piece(pair=pair, pattern=pattern, sign=sign, still=still)

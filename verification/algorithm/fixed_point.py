@@ -1,4 +1,4 @@
-"""The Neumann-Dirichlet algorithm (4.9), as a generator of frozen states."""
+"""The Neumann-Dirichlet algorithm (4.9), as a generator of frozen iterates."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from fem1d2d.mesh import Floats
-from verification.algorithm.iterate import State
-from verification.algorithm.relaxation import Rule, rule
+from verification.algorithm.iterate import Iterate
+from verification.algorithm.relaxation import Rule, Step, rule_of
 from verification.algorithm.theta import choose
 from verification.contact import ContactSolution, ContactStep, Solver
-from verification.interface.assembly import build
-from verification.interface.pair import Pair
-from verification.problem.specification import Problem
+from verification.interface.build import pair_of
+from verification.interface.pair import ContactPair
+from verification.problem import Problem
 from verification.threads import one_thread
 
 
@@ -24,22 +24,14 @@ class FixedPointMap:
 
     Parameters
     ----------
-    pair : Pair
+    pair : ContactPair
     solver : {'auto', 'cvxpy', 'active-set'}
     """
 
-    def __init__(self, pair: Pair, solver: Solver = "auto") -> None:
+    def __init__(self, pair: ContactPair, solver: Solver = "auto") -> None:
         self.pair = pair
-        contact, near = pair.contact, pair.nearly_incompressible
-        self._step = ContactStep(contact.stiffness, contact.body.unknown, pair.tangential.stop, solver, near)
-
-    def bound(self, g: Floats) -> Floats:
-        """Friction bound on nodal forces, ``w_j k |(S sigma_N)_j|`` with sigma_N = g_N, shape (t,)."""
-        pair = self.pair
-        friction = float(pair.problem.contact.friction)
-        if friction == 0 or pair.regularisation is None:
-            return np.zeros(pair.tangential.stop)
-        return np.asarray(friction * pair.weights * np.abs(pair.regularisation @ g[pair.normal]))
+        contact = pair.contact
+        self._step = ContactStep(contact.stiffness, contact.free, contact.grid.t, solver, pair.nearly_incompressible)
 
     def __call__(self, g: Floats) -> tuple[Floats, ContactSolution]:
         """Steps I and II: the displacement of the Neumann body and the solved contact step.
@@ -49,24 +41,24 @@ class FixedPointMap:
         ContactError
         """
         pair = self.pair
-        neumann, contact = pair.neumann, pair.contact
+        neumann, contact, interface = pair.neumann, pair.contact, pair.interface
         # (I)   S2 u2 = g + l2
         u = neumann.known + neumann.flexibility(g + neumann.load)
-        # (II)  minimise over phi = u2 + v, phi_N <= u2_N + gap
-        obstacle = u.copy()
-        obstacle[pair.normal] += pair.gap
-        bound = self.bound(g)
+        # (II)  minimise over phi = P u2 + v, phi_N <= (P u2)_N + gap
+        obstacle = interface.carry(u).copy()
+        obstacle[contact.grid.normal] += interface.gap
+        bound = pair.bound(g)
         solution = self._step.solve(contact.load - contact.stiffness @ obstacle, bound)
-        if not contact.body.unknown.all():
+        if not contact.free.all():
             solution = self._held(solution, obstacle, bound)
         return u, solution
 
     def _held(self, solution: ContactSolution, obstacle: Floats, bound: Floats) -> ContactSolution:
         """Where the contact body is held tangentially its support takes any force: friction follows the slip alone."""
         v, force = solution.v.copy(), solution.force.copy()
-        rows = np.flatnonzero(~self.pair.contact.body.unknown)
+        rows = np.flatnonzero(~self.pair.contact.free)
         v[rows] = self.pair.contact.known[rows] - obstacle[rows]
-        passes = self.pair.neumann.body.unknown[rows]
+        passes = self.pair.neumann.free[rows]
         force[rows] = np.where(passes, bound[rows] * np.sign(v[rows]), 0.0)
         sliding = solution.pattern.sliding.copy()
         sliding[rows] = np.where(passes, np.sign(v[rows]), 0)
@@ -74,22 +66,29 @@ class FixedPointMap:
 
 
 def iterate(
-    problem: Problem | Pair, *, theta: Any = None, solver: Solver = "auto", start: Floats | None = None
-) -> Iterator[State]:
+    problem: Problem | ContactPair,
+    *,
+    theta: Any = None,
+    rule: Rule | str | None = None,
+    solver: Solver = "auto",
+    start: Floats | None = None,
+) -> Iterator[Iterate]:
     """Run the algorithm without end; the caller decides when to stop.
 
     Parameters
     ----------
-    problem : Problem or Pair
+    problem : Problem, ContactPair or path
     theta : number or 'auto', optional
         Relaxation factor, 0 < theta < 1; the problem's by default.
+    rule : Rule or str, optional
+        The relaxation rule, or the name of one; the problem's by default.
     solver : {'auto', 'cvxpy', 'active-set'}
     start : array, optional
         g_0; zero by default.
 
     Yields
     ------
-    State
+    Iterate
 
     Raises
     ------
@@ -97,34 +96,51 @@ def iterate(
         theta outside (0, 1).
     ContactError
         Step II did not reach its KKT certificate.
+
+    Examples
+    --------
+    >>> from itertools import islice
+    >>> bars = {"dimension": 1,
+    ...     "body1": {"shape": "interval", "x": [0, 1], "cells": 4, "young": 2, "fixed": ["left"]},
+    ...     "body2": {"shape": "interval", "x": [1, 2], "cells": 4, "young": 1, "prescribed": {"right": -0.1}}}
+    >>> [round(float(step.g[0]), 4) for step in islice(iterate(Problem.from_dict(bars), theta="1/2"), 3)]
+    [0.0, 0.1, 0.05]
     """
-    pair = build(problem) if isinstance(problem, Problem) else problem
-    choice = choose(pair, theta)
-    relax = rule(pair, pair.problem.iteration.relaxation, float(choice.theta), choice.rho)
-    return states(FixedPointMap(pair, solver), relax, start)
+    pair = pair_of(problem)
+    relaxation = rule_of(rule or pair.settings.relaxation)
+    choice = choose(pair, theta, rule=relaxation)
+    step = relaxation.begin(pair, float(choice.theta), choice.rho)
+    return iterates(FixedPointMap(pair, solver), step, start)
 
 
-def state_at(T: FixedPointMap, g: Floats, *, iteration: int = 0, scale: float = 0.0) -> State:
+def iterate_at(T: FixedPointMap, g: Floats, *, iteration: int = 0, scale: float = 0.0) -> Iterate:
     """Evaluate T at g."""
     neumann = T.pair.neumann
     with one_thread():
         u, solution = T(g)
-        image = solution.force
+        image = T.pair.interface.carry_back(solution.force)
         residual, size = neumann.dual_norm(image - g), neumann.dual_norm(image)
-    for array in (g, u, image, solution.v):
+    for array in (g, u, image, solution.v, solution.force):
         array.setflags(write=False)
-    return State(
-        iteration=iteration, g=g, displacement=u, contact=solution, residual=residual, size=size, scale=max(scale, size)
+    return Iterate(
+        iteration=iteration,
+        g=g,
+        image=image,
+        displacement=u,
+        contact=solution,
+        residual=residual,
+        size=size,
+        scale=max(scale, size),
     )
 
 
-def states(T: FixedPointMap, relax: Rule, start: Floats | None = None) -> Iterator[State]:
-    """The states that a rule passes through, without end."""
-    g = np.zeros(len(T.pair.neumann.load)) if start is None else np.array(start, dtype=float)
+def iterates(T: FixedPointMap, step: Step, start: Floats | None = None) -> Iterator[Iterate]:
+    """The iterates that a rule passes through, without end."""
+    g = np.zeros(T.pair.neumann.grid.size) if start is None else np.array(start, dtype=float)
     iteration, scale = 0, 0.0
     while True:
-        state = state_at(T, g, iteration=iteration, scale=scale)
-        yield state
+        found = iterate_at(T, g, iteration=iteration, scale=scale)
+        yield found
         with one_thread():
-            g = relax(state)  # (III)
-        iteration, scale = iteration + 1, state.scale
+            g = step(found)  # (III)
+        iteration, scale = iteration + 1, found.scale

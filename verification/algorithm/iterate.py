@@ -9,21 +9,24 @@ from verification.contact import ContactSolution
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class State:
+class Iterate:
     """What one evaluation of T shows.
 
-    Interface vectors: tangential components, then normal ones along n of the contact body.
+    Interface vectors list tangential components, then normal ones along n of the contact body; g and T g are nodal
+    forces on the Neumann body.
 
     Attributes
     ----------
     iteration : int
         How many relaxations led to g.
     g : array
-        Nodal forces on the Neumann body before the step.
+        Nodal forces before the step.
+    image : array
+        T g: what step II returns, on the Neumann grid.
     displacement : array
-        Interface displacement of the Neumann body, from step I.
+        Interface displacement of the Neumann body, from step I, on its own grid.
     contact : ContactSolution
-        Step II; its ``force`` is T g.
+        Step II, on the contact grid.
     residual : float
         ``|||T g - g|||`` in the norm (5.21): judged before relaxation, so that a small theta does not flatter.
     size : float
@@ -34,16 +37,12 @@ class State:
 
     iteration: int
     g: Floats
+    image: Floats
     displacement: Floats
     contact: ContactSolution
     residual: float
     size: float
     scale: float
-
-    @property
-    def image(self) -> Floats:
-        """T g."""
-        return self.contact.force
 
     @property
     def relative_residual(self) -> float:

@@ -11,9 +11,9 @@ from scipy.linalg import schur
 
 from fem1d2d.mesh import Floats
 from verification.algorithm.affine_piece import Piece, piece_of
-from verification.algorithm.iterate import State
+from verification.algorithm.iterate import Iterate
 from verification.algorithm.rates import CLEAR_OF_NOISE, noise, observed_rate, rate_at_the_end, settled
-from verification.interface.pair import Pair
+from verification.interface.pair import ContactPair
 
 #: Contact nodes up to which T is linearised: eigenvalues of larger Jacobians take minutes.
 MOST_NODES = 300
@@ -86,15 +86,15 @@ class _Near:
         return float(np.linalg.norm(self.J @ error - error))
 
 
-def _near(pair: Pair, state: State, theta: float) -> _Near:
+def _near(pair: ContactPair, state: Iterate, theta: float) -> _Near:
     """Linearise T_theta at a state close to the solution: no node may change its state in between.
 
     Raises
     ------
     NotLinear
     """
-    if pair.n > MOST_NODES:
-        raise NotLinear(f"{pair.n} contact nodes: T is linearised up to {MOST_NODES}")
+    if pair.contact.grid.n > MOST_NODES:
+        raise NotLinear(f"{pair.contact.grid.n} contact nodes: T is linearised up to {MOST_NODES}")
     piece = piece_of(pair, state.g, state.contact.pattern)
     basis, inverse = piece.basis, pair.neumann.flexibility
     J = piece.relaxed(theta)
@@ -106,20 +106,20 @@ def _near(pair: Pair, state: State, theta: float) -> _Near:
     error: Floats = np.asarray(newton, dtype=float)
     margin, node = _margin(piece, state)
     if not margin > np.linalg.norm(error):
-        raise NotLinear(f"the node at x = {pair.x[node]:g} is about to change its state")
+        raise NotLinear(f"the node at x = {pair.contact.grid.x[node]:g} is about to change its state")
     return _Near(piece=piece, J=J, error=error, margin=margin)
 
 
-def linearise(pair: Pair, state: State, theta: float, history: Sequence[State] = ()) -> Linearisation:
+def linearise(pair: ContactPair, state: Iterate, theta: float, history: Sequence[Iterate] = ()) -> Linearisation:
     """Linearise T_theta at the solution next to a state.
 
     Parameters
     ----------
-    pair : Pair
-    state : State
+    pair : ContactPair
+    state : Iterate
         Close to the solution: no node may change its state in between.
     theta : float
-    history : sequence of State
+    history : sequence of Iterate
         The run that led to the state; its error decides what is excited.
 
     Raises
@@ -174,7 +174,7 @@ class Forecast:
     tolerance: float
 
 
-def forecast(pair: Pair, states: Sequence[State], theta: float, tolerance: float, most: int) -> Forecast:
+def forecast(pair: ContactPair, states: Sequence[Iterate], theta: float, tolerance: float, most: int) -> Forecast:
     """Say of a run, half way to its tolerance, how it will end.
 
     From there on the error is taken to obey ``e <- J e`` with the Jacobian of the piece that the run is on: right if no
@@ -182,8 +182,8 @@ def forecast(pair: Pair, states: Sequence[State], theta: float, tolerance: float
 
     Parameters
     ----------
-    pair : Pair
-    states : sequence of State
+    pair : ContactPair
+    states : sequence of Iterate
         Those after the half-way state are not looked at.
     theta : float
     tolerance : float
@@ -228,23 +228,23 @@ def _same(a: Piece, b: Piece) -> bool:
     return a.pattern == b.pattern and np.array_equal(a.sign, b.sign)
 
 
-def _margin(piece: Piece, state: State) -> tuple[float, int]:
-    """Distance in the norm (5.21) from g to the next change of state, and the node it happens at."""
-    pair, t, touching = piece.pair, piece.pair.tangential.stop, piece.pattern.touching
+def _margin(piece: Piece, state: Iterate) -> tuple[float, int]:
+    """Distance in the norm (5.21) from g to the next change of state, and the contact node it happens at."""
+    pair, contact, neumann = piece.pair, piece.pair.contact.grid, piece.pair.neumann.grid
+    t, touching = contact.t, piece.pattern.touching
     v, force, basis = state.contact.v, state.contact.force, piece.basis
-    jump, reaction = piece.jump @ basis, piece.force @ basis
+    jump, reaction = piece.jump @ basis, piece.reaction @ basis
     rows = [np.where(touching[:, None], reaction[t:], -jump[t:])]
     slack = [np.where(touching, force[t:], -v[t:])]
-    nodes = [np.arange(pair.n)]
-    if t and piece.sign.any():
-        assert pair.regularisation is not None
-        stress, bound = pair.regularisation @ state.g[pair.normal], piece.bound @ basis
-        limit = float(pair.problem.contact.friction) * pair.weights * np.abs(stress)
+    nodes = [np.arange(contact.n)]
+    kernel = pair.interface.kernel
+    if piece.sign.any() and kernel is not None:
+        stress, limit, bound = pair.interface.stress(state.g), pair.bound(state.g), piece.bound @ basis
         sliding, rubs = piece.pattern.sliding, piece.sign != 0
         slips, sticks = np.flatnonzero(rubs & (sliding != 0)), np.flatnonzero(rubs & (sliding == 0))
         rows += [sliding[slips, None] * jump[slips], bound[sticks] - reaction[sticks], bound[sticks] + reaction[sticks]]
         slack += [sliding[slips] * v[slips], limit[sticks] - force[sticks], limit[sticks] + force[sticks]]
-        rows.append(piece.sign[rubs, None] * (pair.regularisation[rubs] @ basis[pair.normal]))
+        rows.append(piece.sign[rubs, None] * (kernel[rubs] @ basis[neumann.normal]))
         slack.append(np.abs(stress[rubs]))
         nodes += [slips, sticks, sticks, np.flatnonzero(rubs)]
     gradient = np.linalg.norm(np.vstack(rows), axis=1)

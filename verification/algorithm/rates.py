@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fem1d2d.mesh import Floats
-from verification.algorithm.iterate import State
-from verification.interface.pair import Pair
+from verification.algorithm.iterate import Iterate
+from verification.interface.pair import ContactPair
 
 #: Residuals below this multiple of their noise are not used.
 CLEAR_OF_NOISE = 100.0
@@ -18,14 +18,16 @@ CLEAR_OF_NOISE = 100.0
 FAR_FROM_NOISE = 1e8
 
 
-def noise(pair: Pair, state: State) -> float:
+def noise(pair: ContactPair, state: Iterate) -> float:
     """Rounding error of one evaluation of T, as a residual in the norm (5.21).
 
     Forces are differences of products ``|S1| |u|`` and of loads, each with a relative error of some units in the last
     place.
     """
     neumann, contact = pair.neumann, pair.contact
-    magnitude = np.abs(contact.stiffness) @ np.abs(state.displacement) + np.abs(contact.load) + np.abs(state.g)
+    displacement = pair.interface.carry(state.displacement)
+    reaction = np.abs(contact.stiffness) @ np.abs(displacement) + np.abs(contact.load)
+    magnitude = np.abs(pair.interface.carry_back(reaction)) + np.abs(state.g)
     return float(4 * np.finfo(float).eps * neumann.dual_norm(magnitude))
 
 
@@ -50,7 +52,7 @@ class ObservedRate:
     end: int
 
 
-def observed_rate(pair: Pair, states: Sequence[State]) -> ObservedRate | None:
+def observed_rate(pair: ContactPair, states: Sequence[Iterate]) -> ObservedRate | None:
     """The asymptotic rate, or None where fewer than two step ratios stand clear of the noise.
 
     Every residual is held against the noise of its own state; after the first one that is not clear of it nothing
@@ -64,7 +66,7 @@ def observed_rate(pair: Pair, states: Sequence[State]) -> ObservedRate | None:
     return rate_at_the_end([state.residual for state in states[:count]], floors[:count], settled(states[:count]))
 
 
-def settled(states: Sequence[State]) -> int:
+def settled(states: Sequence[Iterate]) -> int:
     """From which state on the contact pattern is the last one."""
     first = len(states) - 1
     while first > 0 and states[first - 1].contact.pattern == states[-1].contact.pattern:
@@ -123,7 +125,7 @@ class StepRatio:
     steps: int
 
 
-def largest_step_ratio(pair: Pair, states: Sequence[State]) -> StepRatio | None:
+def largest_step_ratio(pair: ContactPair, states: Sequence[Iterate]) -> StepRatio | None:
     """The largest step ratio clear of the noise, or None where there is none.
 
     A step is judged by the noise of its own two states; it may end below the noise, not begin there.  Steps far above

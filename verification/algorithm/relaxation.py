@@ -1,6 +1,6 @@
 """How the next g is chosen: constant relaxation and what may take its place.
 
-A rule sees the states one by one and answers with the next g at which T is evaluated.  Only the constant factor is
+A rule sees the iterates one by one and answers with the next g at which T is evaluated.  Only the constant factor is
 inside the theorem; momentum has a proved rate without friction; the others have none.  Inner products are those of the
 norm (5.21), so that no rule knows the units.
 """
@@ -9,14 +9,18 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import ClassVar
 
 import numpy as np
 
 from fem1d2d.mesh import Floats
 from verification.algorithm.affine_piece import piece_of
-from verification.algorithm.iterate import State
-from verification.interface.pair import Pair
-from verification.problem.specification import Relaxation
+from verification.algorithm.iterate import Iterate
+from verification.interface.pair import ContactPair
 
 #: How many earlier steps Anderson mixing remembers.
 DEPTH = 10
@@ -28,76 +32,131 @@ RANK = 1e-8
 SHORTEST, LONGEST, TOO_SHORT = 0.1, 0.7, 1e-2
 
 
-class Rule(ABC):
-    """A relaxation rule; keeps what it remembers of earlier states.
+#: What a rule does in one run: from an iterate to the next g.
+Step = Callable[[Iterate], Floats]
 
-    Parameters
+
+class Rule(ABC):
+    """A relaxation rule: a description without memory, which begins any number of runs.
+
+    A rule of one's own derives from it, and is handed to :func:`verification.run` as ``rule=``.
+
+    Attributes
     ----------
-    pair : Pair
-    theta : float
-        The constant factor, or the first one.
+    name : str
+    words : str
+        What it is called in a sentence.
+    needs_rho : bool
+        Whether :meth:`begin` needs rho; it is measured then.
     """
 
-    def __init__(self, pair: Pair, theta: float) -> None:
-        self.pair, self.theta = pair, theta
+    name: ClassVar[str]
+    words: ClassVar[str]
+    needs_rho: ClassVar[bool] = False
 
     @abstractmethod
-    def __call__(self, state: State) -> Floats:
-        """The g at which T is evaluated next."""
+    def begin(self, pair: ContactPair, theta: float, rho: float | None) -> Step:
+        """Begin a run.
 
-    def inner(self, a: Floats, b: Floats) -> float:
-        """The inner product of the norm (5.21)."""
-        return float(a @ self.pair.neumann.flexibility(b))
+        Parameters
+        ----------
+        pair : ContactPair
+            The bodies; :func:`inner` is the inner product of the norm (5.21).
+        theta : float
+            The constant factor, or the first one.
+        rho : float or None
+            rho_normal without friction, else rho; None unless ``needs_rho``.
+
+        Returns
+        -------
+        callable
+            From an iterate to the g at which T is evaluated next; called with the iterates of one run, in order.
+        """
+
+    def own_step(self, rho: float) -> float | None:
+        """The step length that takes the place of theta; None where the rule takes the theta it is given."""
+        return None
+
+    def proved_rate(self, rho: float) -> float | None:
+        """The rate that is proved of the rule where the theorem covers it; None where none is."""
+        return None
+
+    def outside(self, friction: Fraction) -> str:
+        """Why no theorem speaks of this rule; empty where one does."""
+        return f"the {self.name} relaxation: the theorem is about a constant theta"
 
 
+def inner(pair: ContactPair, a: Floats, b: Floats) -> float:
+    """The inner product of the norm (5.21)."""
+    return float(a @ pair.neumann.flexibility(b))
+
+
+@dataclass(frozen=True)
 class Constant(Rule):
     """(III): ``g <- theta T g + (1 - theta) g``."""
 
-    def __call__(self, state: State) -> Floats:
-        return self.theta * state.image + (1 - self.theta) * state.g
+    name = "constant"
+    words = "constant relaxation"
+
+    def begin(self, pair: ContactPair, theta: float, rho: float | None) -> Step:
+        return lambda iterate: theta * iterate.image + (1 - theta) * iterate.g
+
+    def outside(self, friction: Fraction) -> str:
+        return ""
 
 
+@dataclass(frozen=True)
 class Aitken(Rule):
     """Aitken's factor ``theta <- -theta <r', r - r'> / |r - r'|^2`` from the last two residuals ``r = T g - g``."""
 
-    def __init__(self, pair: Pair, theta: float) -> None:
-        super().__init__(pair, theta)
-        self._last: Floats | None = None
+    name = "aitken"
+    words = "Aitken relaxation"
 
-    def __call__(self, state: State) -> Floats:
-        r = state.image - state.g
-        if self._last is not None:
-            change = r - self._last
-            size = self.inner(change, change)
-            if size > 0:
-                self.theta *= -self.inner(self._last, change) / size
-        self._last = r
-        return state.g + self.theta * r
+    def begin(self, pair: ContactPair, theta: float, rho: float | None) -> Step:
+        last: Floats | None = None
+
+        def step(iterate: Iterate) -> Floats:
+            nonlocal theta, last
+            r = iterate.image - iterate.g
+            if last is not None:
+                change = r - last
+                size = inner(pair, change, change)
+                if size > 0:
+                    theta *= -inner(pair, last, change) / size
+            last = r
+            return iterate.g + theta * r
+
+        return step
 
 
+@dataclass(frozen=True)
 class Anderson(Rule):
     """Anderson mixing: the combination of the last g whose residuals have the least sum, relaxed by theta."""
 
-    def __init__(self, pair: Pair, theta: float) -> None:
-        super().__init__(pair, theta)
-        self._g: list[Floats] = []
-        self._r: list[Floats] = []
+    name = "anderson"
+    words = "Anderson mixing"
 
-    def __call__(self, state: State) -> Floats:
-        r = state.image - state.g
-        self._g.append(state.g)
-        self._r.append(r)
-        del self._g[: -DEPTH - 1], self._r[: -DEPTH - 1]
-        following: Floats = state.g + self.theta * r
-        if len(self._g) > 1:
-            coordinates = self.pair.neumann.root.T @ self.pair.neumann.flexibility(np.column_stack(self._r))
-            changes = np.diff(coordinates, axis=1)
-            shares = np.linalg.lstsq(changes, coordinates[:, -1], rcond=RANK)[0]
-            moved = np.diff(np.column_stack(self._g), axis=1) + self.theta * np.diff(np.column_stack(self._r), axis=1)
-            following -= moved @ shares
-        return following
+    def begin(self, pair: ContactPair, theta: float, rho: float | None) -> Step:
+        gs: deque[Floats] = deque(maxlen=DEPTH + 1)
+        rs: deque[Floats] = deque(maxlen=DEPTH + 1)
+
+        def step(iterate: Iterate) -> Floats:
+            r = iterate.image - iterate.g
+            gs.append(iterate.g)
+            rs.append(r)
+            following: Floats = iterate.g + theta * r
+            if len(gs) > 1:
+                coordinates = pair.neumann.root.T @ pair.neumann.flexibility(np.column_stack(rs))
+                changes = np.diff(coordinates, axis=1)
+                shares = np.linalg.lstsq(changes, coordinates[:, -1], rcond=RANK)[0]
+                moved = np.diff(np.column_stack(gs), axis=1) + theta * np.diff(np.column_stack(rs), axis=1)
+                following -= moved @ shares
+            return following
+
+        return step
 
 
+@dataclass(frozen=True)
 class Newton(Rule):
     """``g <- g + (1 - T')^-1 (T g - g)`` with T' on the affine piece of g, and a line search on the residual.
 
@@ -105,60 +164,78 @@ class Newton(Rule):
     each trial costs an evaluation of T.  Where that fails, one step with theta leads to another piece.
     """
 
-    def __init__(self, pair: Pair, theta: float) -> None:
-        super().__init__(pair, theta)
-        self._from: State | None = None
-        self._step: Floats
-        self._length = 1.0
+    name = "newton"
+    words = "Newton relaxation"
 
-    def __call__(self, state: State) -> Floats:
-        start = self._from
-        if start is None or state.residual < start.residual:
-            return self._set_out(state)
-        r = start.image - start.g
-        change = state.image - state.g - r
-        size = self.inner(change, change)
-        share = -self.inner(r, change) / size if 0 < size < math.inf else SHORTEST
-        self._length *= min(max(share, SHORTEST), LONGEST)
-        if self._length < TOO_SHORT:
-            self._from = None
-            return start.g + self.theta * r
-        return start.g + self._length * self._step
+    def begin(self, pair: ContactPair, theta: float, rho: float | None) -> Step:
+        start: Iterate | None = None
+        direction: Floats = np.zeros(0)
+        length = 1.0
 
-    def _set_out(self, state: State) -> Floats:
-        r = state.image - state.g
-        T = piece_of(self.pair, state.g, state.contact.pattern).force
+        def step(iterate: Iterate) -> Floats:
+            nonlocal start, direction, length
+            if start is None or iterate.residual < start.residual:
+                start, direction, length = iterate, self._direction(pair, iterate, theta), 1.0
+                return start.g + direction
+            r = start.image - start.g
+            change = iterate.image - iterate.g - r
+            size = inner(pair, change, change)
+            share = -inner(pair, r, change) / size if 0 < size < math.inf else SHORTEST
+            length *= min(max(share, SHORTEST), LONGEST)
+            if length < TOO_SHORT:
+                following: Floats = start.g + theta * r
+                start = None
+                return following
+            return start.g + length * direction
+
+        return step
+
+    @staticmethod
+    def _direction(pair: ContactPair, iterate: Iterate, theta: float) -> Floats:
+        r = iterate.image - iterate.g
+        T = piece_of(pair, iterate.g, iterate.contact.pattern).force
         try:
-            self._step = np.asarray(np.linalg.solve(np.eye(len(r)) - T, r), dtype=float)
+            return np.asarray(np.linalg.solve(np.eye(len(r)) - T, r), dtype=float)
         except np.linalg.LinAlgError:  # the solution on this piece is not isolated
-            self._step = self.theta * r
-        self._from, self._length = state, 1.0
-        return state.g + self._step
+            return theta * r
 
 
+@dataclass(frozen=True)
 class Momentum(Rule):
     """The triple momentum method of Van Scoy, Freeman and Lynch (2018), with ``mu = 1`` and ``L = 1 + rho``.
 
     Without friction T - 1 is minus the gradient of an energy that is 1-strongly convex and (1 + rho)-smooth in the norm
     (5.21), so its proved rate ``p = 1 - 1/sqrt(1 + rho)`` holds.
-
-    Parameters
-    ----------
-    rho : float
-        rho_normal without friction, else rho.
     """
 
-    def __init__(self, pair: Pair, rho: float) -> None:
-        p = momentum_rate(rho)
-        super().__init__(pair, momentum_step(rho))
-        self._beta, self._gamma = p**2 / (2 - p), p**2 / ((1 + p) * (2 - p))
-        self._last: tuple[Floats, Floats] | None = None
+    name = "momentum"
+    words = "triple momentum method"
+    needs_rho = True
 
-    def __call__(self, state: State) -> Floats:
-        xi, before = self._last or (state.g, state.g)
-        following = xi + self._beta * (xi - before) + self.theta * (state.image - state.g)
-        self._last = following, xi
-        return following + self._gamma * (following - xi)
+    def begin(self, pair: ContactPair, theta: float, rho: float | None) -> Step:
+        if rho is None:
+            raise ValueError("momentum needs rho")
+        p = momentum_rate(rho)
+        length, beta, gamma = momentum_step(rho), p**2 / (2 - p), p**2 / ((1 + p) * (2 - p))
+        last: tuple[Floats, Floats] | None = None
+
+        def step(iterate: Iterate) -> Floats:
+            nonlocal last
+            xi, before = last or (iterate.g, iterate.g)
+            following = xi + beta * (xi - before) + length * (iterate.image - iterate.g)
+            last = following, xi
+            return following + gamma * (following - xi)
+
+        return step
+
+    def own_step(self, rho: float) -> float:
+        return momentum_step(rho)
+
+    def proved_rate(self, rho: float) -> float:
+        return momentum_rate(rho)
+
+    def outside(self, friction: Fraction) -> str:
+        return "momentum with friction: its rate is proved for k = 0 alone" if friction else ""
 
 
 def momentum_rate(rho: float) -> float:
@@ -177,28 +254,20 @@ def momentum_step(rho: float) -> float:
     return (1 + momentum_rate(rho)) / (1 + rho)
 
 
-_RULES: dict[Relaxation, type[Rule]] = {"constant": Constant, "aitken": Aitken, "anderson": Anderson, "newton": Newton}
+#: The rules of problem files, by name.
+RULES: dict[str, Rule] = {rule.name: rule for rule in (Constant(), Aitken(), Anderson(), Newton(), Momentum())}
 
 
-def rule(pair: Pair, relaxation: Relaxation, theta: float, rho: float | None = None) -> Rule:
-    """The rule of a name.
+def rule_of(rule: Rule | str) -> Rule:
+    """A rule, or the one of a name.
 
-    Parameters
-    ----------
-    rho : float, optional
-        Needed by ``momentum``, which takes its factors from it.
+    Raises
+    ------
+    ValueError
+        No rule has that name.
     """
-    if relaxation == "momentum":
-        if rho is None:
-            raise ValueError("momentum needs rho")
-        return Momentum(pair, rho)
-    return _RULES[relaxation](pair, theta)
-
-
-def outside(relaxation: Relaxation, friction: float) -> str | None:
-    """Why no theorem speaks of a rule; None where one does."""
-    if relaxation == "constant" or (relaxation == "momentum" and friction == 0):
-        return None
-    if relaxation == "momentum":
-        return "momentum with friction: its rate is proved for k = 0 alone"
-    return f"the {relaxation} relaxation: the theorem is about a constant theta"
+    if isinstance(rule, Rule):
+        return rule
+    if rule not in RULES:
+        raise ValueError(f"relaxation {rule!r}: needed one of {', '.join(RULES)}, or a rule")
+    return RULES[rule]

@@ -6,27 +6,28 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
+from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from fem1d2d.mesh import Floats
 from ndtheory import Number
-from verification.algorithm.fixed_point import FixedPointMap, state_at, states
-from verification.algorithm.iterate import State
+from verification.algorithm.fixed_point import FixedPointMap, iterate_at, iterates
+from verification.algorithm.iterate import Iterate
 from verification.algorithm.linearisation import Forecast, Linearisation, NotLinear, forecast, linearise
 from verification.algorithm.rates import ObservedRate, observed_rate
-from verification.algorithm.relaxation import momentum_rate, outside, rule
+from verification.algorithm.relaxation import Constant, Rule, rule_of
 from verification.algorithm.theta import Choice, choose
 from verification.constants import Measured
 from verification.contact import ContactError, Solver
 from verification.document import Document
-from verification.interface.assembly import build
-from verification.interface.fields import ContactState
-from verification.interface.pair import Pair
+from verification.interface.build import pair_of
+from verification.interface.fields import ContactFields
+from verification.interface.pair import ContactPair, TwoBodies
 from verification.interrupts import INTERRUPTED
-from verification.monolithic import SolveError, solve
-from verification.problem.specification import Problem, Relaxation
+from verification.monolithic import SolveError, solution_force
+from verification.problem import Problem
 from verification.problem.tables import ProblemError
 from verification.threads import one_thread
 
@@ -48,10 +49,12 @@ class Run(Document):
 
     Attributes
     ----------
-    pair : Pair
+    pair : ContactPair
+    rule : Rule
+        How each next g was chosen.
     choice : Choice
         theta and where it comes from.
-    states : tuple of State
+    iterates : tuple of Iterate
         At least one.
     outcome : {'converged', 'stalled', 'limit', 'diverged', 'interrupted'}
     interrupted : bool
@@ -60,9 +63,10 @@ class Run(Document):
 
     schema: ClassVar[str] = "ndtheory.run/1"
 
-    pair: Pair
+    pair: ContactPair
+    rule: Rule
     choice: Choice
-    states: tuple[State, ...]
+    iterates: tuple[Iterate, ...]
     outcome: Outcome
     interrupted: bool = False
 
@@ -72,22 +76,21 @@ class Run(Document):
         return self.choice.theta
 
     @property
-    def relaxation(self) -> Relaxation:
-        """The rule."""
-        return self.pair.problem.iteration.relaxation
+    def relaxation(self) -> str:
+        """The name of the rule."""
+        return self.rule.name
 
     @property
     def outside(self) -> list[str]:
         """Why the theorem does not speak of this run; empty where it does."""
-        rule = outside(self.relaxation, float(self.pair.problem.contact.friction))
+        rule = self.rule.outside(self.pair.friction)
         return self.pair.outside + ([rule] if rule else [])
 
     @property
     def proved_rate(self) -> Number | None:
         """The rate that is proved of the rule itself: momentum without friction has one; None otherwise."""
-        if self.relaxation != "momentum" or self.outside or self.choice.rho is None:
-            return None
-        return Number.of_float(momentum_rate(self.choice.rho))
+        rate = None if self.outside or self.choice.rho is None else self.rule.proved_rate(self.choice.rho)
+        return None if rate is None else Number.of_float(rate)
 
     @property
     def converged(self) -> bool:
@@ -95,9 +98,9 @@ class Run(Document):
         return self.outcome == "converged"
 
     @property
-    def last(self) -> State:
-        """The last state."""
-        return self.states[-1]
+    def last(self) -> Iterate:
+        """The last iterate."""
+        return self.iterates[-1]
 
     @property
     def iterations(self) -> int:
@@ -107,11 +110,11 @@ class Run(Document):
     @property
     def evaluations(self) -> int:
         """Evaluations of T."""
-        return len(self.states)
+        return len(self.iterates)
 
     @cached_property
     def _at_the_end(self) -> ObservedRate | None:
-        return observed_rate(self.pair, self.states)
+        return observed_rate(self.pair, self.iterates)
 
     @property
     def observed_rate(self) -> ObservedRate | None:
@@ -141,12 +144,12 @@ class Run(Document):
     def _linearised(self) -> tuple[Linearisation | None, str]:
         if self.interrupted:
             return None, INTERRUPTED
-        if self.relaxation != "constant":
+        if not isinstance(self.rule, Constant):
             return None, f"the {self.relaxation} relaxation is no constant theta"
         try:
             with one_thread():
                 if self.converged:
-                    return linearise(self.pair, self.last, float(self.theta), self.states), ""
+                    return linearise(self.pair, self.last, float(self.theta), self.iterates), ""
                 return linearise(self.pair, self._solution(), float(self.theta)), ""
         except (NotLinear, SolveError, ContactError) as error:
             return None, str(error)
@@ -165,33 +168,31 @@ class Run(Document):
     def _forecast(self) -> tuple[Forecast | None, str]:
         if self.interrupted:
             return None, INTERRUPTED
-        if self.relaxation != "constant":
+        if not isinstance(self.rule, Constant):
             return None, f"the {self.relaxation} relaxation is no constant theta"
-        settings = self.pair.problem.iteration
+        settings = self.pair.settings
         try:
             with one_thread():
-                made = forecast(self.pair, self.states, float(self.theta), settings.tolerance, settings.max_iterations)
-            return made, ""
+                most = settings.max_iterations
+                return forecast(self.pair, self.iterates, float(self.theta), settings.tolerance, most), ""
         except NotLinear as error:
             return None, str(error)
 
-    def _solution(self) -> State:
+    def _solution(self) -> Iterate:
         """T at the solution of the global method."""
-        pair = self.pair
-        found = solve(pair).contact
-        g = np.concatenate([pair.upward * found.shear[: pair.tangential.stop], found.pressure])
-        weights = np.tile(found.weights, pair.problem.dimension)
-        return state_at(FixedPointMap(pair), weights * g)
+        if self.pair.problem is None:
+            raise NotLinear("the run did not arrive, and without meshes the global method has nothing to solve")
+        return iterate_at(FixedPointMap(self.pair), solution_force(self.pair))
 
     @cached_property
-    def contact(self) -> ContactState:
-        """Gamma_c at the last state."""
+    def contact(self) -> ContactFields:
+        """Gamma_c at the last iterate."""
         pair, solved = self.pair, self.last.contact
         turned = np.ones(len(solved.v))
-        turned[pair.tangential] = pair.upward  # from contact body against Neumann body to body 1 against body 2
+        turned[pair.contact.grid.tangential] = pair.upward  # to body 1 against body 2
         pattern = solved.pattern
-        return ContactState.of(
-            pair,
+        return ContactFields.of(
+            pair.contact.grid,
             force=turned * solved.force,
             jump=turned * solved.v,
             touching=pattern.touching,
@@ -199,32 +200,49 @@ class Run(Document):
         )
 
     @property
-    def facing(self) -> Pair:
-        """The bodies."""
-        return self.pair
+    def bodies(self) -> TwoBodies:
+        """The bodies on their meshes.
+
+        Raises
+        ------
+        ValueError
+            The pair is made from matrices.
+        """
+        return self.pair.on_meshes()
 
     @cached_property
     def displacements(self) -> tuple[Floats, Floats]:
-        """Displacement of all nodes of body 1 and body 2 at the last state, shape (nodes, d), unit of length."""
-        pair, state = self.pair, self.last
-        moved = state.displacement + state.contact.v
-        moved[pair.normal] += pair.gap
-        neumann, contact = pair.orient(state.displacement), pair.orient(moved)
-        first, second = (contact, neumann) if pair.problem.iteration.neumann_body == 2 else (neumann, contact)
-        return pair.body1.displacement(first), pair.body2.displacement(second)
+        """Displacement of all nodes of body 1 and body 2 at the last iterate, shape (nodes, d), unit of length.
+
+        Raises
+        ------
+        ValueError
+            The pair is made from matrices.
+        """
+        contact, neumann = self.pair.contact, self.pair.neumann
+        moved = self.pair.interface.carry(self.last.displacement) + self.last.contact.v
+        moved[contact.grid.normal] += self.pair.interface.gap
+        of_contact = contact.mesh_body.displacement(contact.orient(moved))
+        of_neumann = neumann.mesh_body.displacement(neumann.orient(self.last.displacement))
+        return (of_contact, of_neumann) if self.pair.neumann_body == 2 else (of_neumann, of_contact)
 
     @property
     def history(self) -> list[float]:
         """Relative unrelaxed residual of every evaluation."""
-        return [s.relative_residual for s in self.states]
+        return [iterate.relative_residual for iterate in self.iterates]
 
     @property
     def units(self) -> Mapping[str, str]:  # type: ignore[override]
-        return self.pair.problem.units
+        return self.pair.units
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a user should know before trusting the numbers."""
+        return self.pair.warnings + self.pair.settings.warnings
 
     def content(self) -> dict[str, Any]:
         rate = self.observed_rate
-        solvers = [s.contact.solver for s in self.states]
+        solvers = [iterate.contact.solver for iterate in self.iterates]
         linear = self.linearised
         proved = self.proved_rate
         reason: dict[str, str] = {}
@@ -247,12 +265,12 @@ class Run(Document):
         if self.forecast is None:
             reason["forecast"] = self.why_no_forecast
         return {
-            "title": self.pair.problem.title,
+            "title": self.pair.title,
             "theta": float(self.theta),
             "theta_source": self.choice.source,
             "theta_reason": self.choice.why,
             "relaxation": self.relaxation,
-            "neumann_body": self.pair.problem.iteration.neumann_body,
+            "neumann_body": self.pair.neumann_body,
             "iterations": self.iterations,
             "evaluations": self.evaluations,
             "outcome": self.outcome,
@@ -273,7 +291,7 @@ class Run(Document):
             **self.contact.to_dict(),
             "history": [_finite(r) for r in self.history],
             "outside_theorem": self.outside,
-            "warnings": self.pair.warnings + self.pair.problem.iteration.warnings,
+            "warnings": self.warnings,
             "reason": reason,
         }
 
@@ -282,36 +300,43 @@ def _finite(value: float) -> float | None:
     return value if np.isfinite(value) else None
 
 
-def _check_memory(pair: Pair) -> None:
-    """Refuse a run whose states would not fit into memory: every one is kept."""
-    problem, size = pair.problem, len(pair.neumann.load)
-    most, asked = MOST_BYTES // (STATE_BYTES + 4 * 8 * size), problem.iteration.max_iterations
+def _check_memory(pair: ContactPair) -> None:
+    """Refuse a run whose iterates would not fit into memory: every one is kept."""
+    most, asked = MOST_BYTES // (STATE_BYTES + 4 * 8 * pair.neumann.grid.size), pair.settings.max_iterations
     if asked > most:
-        needed = f"needed at most {most}: every state is kept, and so many of {pair.n} contact nodes fill 2 GB"
-        raise ProblemError(problem.source, "iteration.max_iterations", asked, needed)
+        n = pair.contact.grid.n
+        needed = f"needed at most {most}: every state is kept, and so many of {n} contact nodes fill 2 GB"
+        raise ProblemError(pair.source, "iteration.max_iterations", asked, needed)
 
 
 def run(
-    problem: Problem | Pair,
+    problem: Problem | ContactPair | Path | str,
     *,
     theta: Any = None,
+    rule: Rule | str | None = None,
     solver: Solver = "auto",
-    watch: Callable[[State], None] = lambda state: None,
+    watch: Callable[[Iterate], None] = lambda iterate: None,
     measured: Measured | None = None,
 ) -> Run:
     """Run the algorithm from g = 0 until it converges, stalls, runs away, reaches its limit or Ctrl-C.
 
     Parameters
     ----------
-    problem : Problem or Pair
+    problem : Problem, ContactPair or path
     theta : number or 'auto', optional
         Relaxation factor, 0 < theta < 1; the problem's by default.
+    rule : Rule or str, optional
+        The relaxation rule, or the name of one; the problem's by default.
     solver : {'auto', 'cvxpy', 'active-set'}
         Who solves step II.
     watch : callable
-        Called with each state, for live progress.
+        Called with each iterate, for live progress.
     measured : Measured, optional
         The constants, where they are known already; an automatic theta and momentum need them.
+
+    Returns
+    -------
+    Run
 
     Raises
     ------
@@ -320,32 +345,49 @@ def run(
     ContactError
         Step II did not reach its KKT certificate.
     KeyboardInterrupt
-        Before the first state; later it ends the run with what was computed.
+        Before the first iterate; later it ends the run with what was computed.
+
+    Examples
+    --------
+    >>> bars = {"dimension": 1,
+    ...     "body1": {"shape": "interval", "x": [0, 1], "cells": 4, "young": 2, "fixed": ["left"]},
+    ...     "body2": {"shape": "interval", "x": [1, 2], "cells": 4, "young": 1, "prescribed": {"right": -0.1}}}
+    >>> finished = run(Problem.from_dict(bars), theta="1/3")
+    >>> finished.outcome, finished.iterations
+    ('converged', 1)
     """
-    pair = build(problem) if isinstance(problem, Problem) else problem
-    settings = pair.problem.iteration
+    pair = pair_of(problem)
+    settings = pair.settings
     _check_memory(pair)
-    choice = choose(pair, theta, measured)
-    relax = rule(pair, settings.relaxation, float(choice.theta), choice.rho)
-    seen: list[State] = []
+    relaxation = rule_of(rule or settings.relaxation)
+    choice = choose(pair, theta, measured, rule=relaxation)
+    step = relaxation.begin(pair, float(choice.theta), choice.rho)
+    seen: list[Iterate] = []
     least, since = float("inf"), 0
     outcome: Outcome = "limit"
     try:
-        for state in states(FixedPointMap(pair, solver), relax):
-            seen.append(state)
-            watch(state)
-            least, since = (state.residual, 0) if state.residual < least else (least, since + 1)
-            if state.residual <= settings.tolerance * state.scale:
+        for found in iterates(FixedPointMap(pair, solver), step):
+            seen.append(found)
+            watch(found)
+            least, since = (found.residual, 0) if found.residual < least else (least, since + 1)
+            if found.residual <= settings.tolerance * found.scale:
                 outcome = "converged"
-            elif not state.residual <= RUNAWAY * seen[0].residual:
+            elif not found.residual <= RUNAWAY * seen[0].residual:
                 outcome = "diverged"
             elif since >= PATIENCE:
                 outcome = "stalled"
-            elif state.iteration < settings.max_iterations:
+            elif found.iteration < settings.max_iterations:
                 continue
             break
     except KeyboardInterrupt:
         if not seen:
             raise
         outcome = "interrupted"
-    return Run(pair=pair, choice=choice, states=tuple(seen), outcome=outcome, interrupted=outcome == "interrupted")
+    return Run(
+        pair=pair,
+        rule=relaxation,
+        choice=choice,
+        iterates=tuple(seen),
+        outcome=outcome,
+        interrupted=outcome == "interrupted",
+    )

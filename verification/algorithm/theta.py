@@ -6,13 +6,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Literal
+from typing import Any
 
 from ndtheory import SharpBounds, evaluate_sharp, exact
 from ndtheory.sharp import predicted_factor
-from verification.algorithm.relaxation import momentum_step
+from verification.algorithm.relaxation import Rule, rule_of
 from verification.constants import Measured, measure
-from verification.interface.pair import Pair
+from verification.interface.pair import ContactPair
+from verification.problem.specification import read_theta
 from verification.problem.tables import ProblemError
 
 #: A theta chosen for the user stays below 1 by this much, however soft the contact body.
@@ -35,8 +36,8 @@ class Choice:
     Attributes
     ----------
     theta : Fraction
-    source : {'given', 'proved', 'predicted', 'momentum'}
-        ``momentum``: the step that the triple momentum method takes for this rho.
+    source : {'given', 'proved', 'predicted'} or str
+        The name of a rule that takes its own step for this rho, as 'momentum' does.
     rho : float or None
         Known where it was needed.
     why : str
@@ -44,7 +45,7 @@ class Choice:
     """
 
     theta: Fraction
-    source: Literal["given", "proved", "predicted", "momentum"]
+    source: str
     rho: float | None = None
     why: str = "given by the problem or beside it"
 
@@ -53,33 +54,47 @@ class Choice:
         return {"theta": float(self.theta), "source": self.source, "why": self.why}
 
 
-def choose(pair: Pair, theta: Any = None, measured: Measured | None = None) -> Choice:
+def choose(
+    pair: ContactPair, theta: Any = None, measured: Measured | None = None, *, rule: Rule | str | None = None
+) -> Choice:
     """The theta of a run: the given one, else the problem's; for "auto" that of :func:`automatic`.
 
-    Momentum takes its step from rho, whatever theta is.
+    A rule that takes its step from rho does so whatever theta is.
+
+    Parameters
+    ----------
+    pair : ContactPair
+    theta : number or 'auto', optional
+    measured : Measured, optional
+        The constants, where they are known already.
+    rule : Rule or str, optional
+        The pair's by default.
 
     Raises
     ------
     HypothesisError
         A given theta outside (0, 1).
     ProblemError
-        "auto" or momentum where rho does not exist.
+        "auto", or a rule that needs rho, where rho does not exist.
     """
-    problem = pair.problem if theta is None else pair.problem.with_theta(theta)
-    settings = problem.iteration
-    momentum = settings.relaxation == "momentum"
-    if settings.theta != "auto" and not momentum:
-        return Choice(theta=settings.theta, source="given")
+    wanted = pair.settings.theta if theta is None else read_theta(theta)
+    relaxation = rule_of(rule or pair.settings.relaxation)
+    if wanted != "auto" and not relaxation.needs_rho:
+        return Choice(theta=wanted, source="given")
     sharp = sharp_bounds(measured or measure(pair))
     if sharp is None:
-        key, value = ("iteration.relaxation", "momentum") if momentum else ("iteration.theta", "auto")
-        needed = f"needed {'another rule' if momentum else 'a number'}: rho does not exist here"
-        raise ProblemError(problem.source, key, value, needed)
-    if momentum:
-        rho = sharp.rho.value
-        why = "the step of the triple momentum method for this rho"
-        return Choice(theta=below_one(momentum_step(rho)), source="momentum", rho=rho, why=why)
-    return automatic(sharp, pair.outside, settings.tolerance)
+        of_rule = relaxation.needs_rho
+        key, value = ("iteration.relaxation", relaxation.name) if of_rule else ("iteration.theta", "auto")
+        needed = f"needed {'another rule' if of_rule else 'a number'}: rho does not exist here"
+        raise ProblemError(pair.source, key, value, needed)
+    rho = sharp.rho.value
+    own = relaxation.own_step(rho) if relaxation.needs_rho else None
+    if own is not None:
+        why = f"the step of the {relaxation.words} for this rho"
+        return Choice(theta=below_one(own), source=relaxation.name, rho=rho, why=why)
+    if wanted != "auto":
+        return Choice(theta=wanted, source="given", rho=rho)
+    return automatic(sharp, pair.outside, pair.settings.tolerance)
 
 
 def automatic(sharp: SharpBounds, outside: Sequence[str] = (), tolerance: float = 1e-9) -> Choice:

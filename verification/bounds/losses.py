@@ -22,8 +22,8 @@ from ndtheory import PRINTED, REPAIRED
 from ndtheory import bounds as formulas
 from verification.algorithm.affine_piece import Piece
 from verification.bounds.pattern_search import worst_piece
-from verification.constants import Measured, lift_gram
-from verification.interface.pair import Pair
+from verification.constants import Measured
+from verification.interface.pair import ContactPair
 from verification.progress import Progress, silent
 from verification.threads import one_thread
 
@@ -86,16 +86,15 @@ class Forms:
 
     Parameters
     ----------
-    pair : Pair
+    pair : ContactPair
         A problem in which no contact node is held.
     """
 
-    def __init__(self, pair: Pair) -> None:
+    def __init__(self, pair: ContactPair) -> None:
         self.pair = pair
         self.root, self.inverse = pair.neumann.root, pair.neumann.inverse
-        of = lambda body: (pair.orient_form(lift_gram(body)), pair.orient_form(body.gram.schur))
-        self.N_1, self.E_1 = of(pair.contact.body)
-        self.N_2, self.E_2 = of(pair.neumann.body)
+        self.N_1, self.E_1 = pair.contact.lift_gram, pair.contact.gram
+        self.N_2, self.E_2 = pair.neumann.lift_gram, pair.neumann.gram
         self.dual: Floats = np.asarray(np.linalg.inv(self.E_2))  # of the norm of V^2'
         self.d_2 = self.inverse @ self.root
 
@@ -109,7 +108,7 @@ class Forms:
 
     def friction(self, piece: Piece) -> Floats:
         """The friction term of (5.12): nodes that slide."""
-        t = self.pair.tangential.stop
+        t = self.pair.contact.grid.t
         jump = piece.pattern.sliding[:, None] * (piece.jump[:t] @ self.root)
         form = -(piece.bound @ self.root).T @ jump
         return np.asarray(form + form.T) / 2
@@ -126,12 +125,12 @@ def square(rows: Floats, gram: Floats) -> Floats:
     return np.asarray(form + form.T) / 2
 
 
-def locate(pair: Pair, measured: Measured, *, seed: int = 0, progress: Progress = silent) -> Losses | None:
+def locate(pair: ContactPair, measured: Measured, *, seed: int = 0, progress: Progress = silent) -> Losses | None:
     """Find what each inequality gives away at the problem's friction.
 
     Parameters
     ----------
-    pair : Pair
+    pair : ContactPair
     measured : Measured
     seed : int
         Of the search.
@@ -144,7 +143,7 @@ def locate(pair: Pair, measured: Measured, *, seed: int = 0, progress: Progress 
         None where a constant does not exist or a contact node is held.
     """
     constants = measured.constants()
-    if constants is None or not all(body.unknown.all() for body in pair.elastic):
+    if constants is None or pair.held:
         return None
     m, M, C_R, x = (float(v) for v in (constants.m, constants.M, constants.C_R, constants.C_K))
     A, done = M * C_R, count()

@@ -15,7 +15,7 @@ import numpy as np
 
 from verification.algorithm.affine_piece import Piece
 from verification.contact.active_set import Pattern
-from verification.interface.pair import Pair
+from verification.interface.pair import ContactPair
 from verification.threads import one_thread
 
 
@@ -34,7 +34,7 @@ class Found:
 
 
 def worst_piece(
-    pair: Pair, measure: Callable[[Piece], float], *, random: np.random.Generator, starts: int = 4
+    pair: ContactPair, measure: Callable[[Piece], float], *, random: np.random.Generator, starts: int = 4
 ) -> Found:
     """Search the affine pieces of T for the largest value of a function.
 
@@ -42,18 +42,17 @@ def worst_piece(
 
     Parameters
     ----------
-    pair : Pair
+    pair : ContactPair
     measure : callable
         Piece -> value.
     random : Generator
     starts : int
         The starts are: all nodes stick, all are open and slide one way, and random patterns.
     """
-    n, t = pair.n, pair.tangential.stop
-    rubs = bool(t and pair.problem.contact.friction and pair.regularisation is not None)
+    n, t, rubs = pair.contact.grid.n, pair.contact.grid.t, pair.rubs
     tangential = (0, 1, -1) if rubs else (1,)  # without friction every node slides
     states = [(touching, slide) for touching in (True, False) for slide in tangential]
-    sign, still = np.full(t, int(rubs), dtype=np.int8), np.zeros(n, dtype=bool)
+    sign, still = np.full(t, int(rubs), dtype=np.int8), np.zeros(pair.neumann.grid.n, dtype=bool)
 
     def piece(state: np.ndarray) -> Piece:
         pattern = Pattern(
@@ -85,6 +84,6 @@ def worst_piece(
         return max((climb(state) for state in [*first, *others][:starts]), key=lambda found: found.value)
 
 
-def largest_factor(pair: Pair, theta: float, *, random: np.random.Generator, starts: int = 4) -> Found:
+def largest_factor(pair: ContactPair, theta: float, *, random: np.random.Generator, starts: int = 4) -> Found:
     """The largest ``|J|`` of T_theta over contact patterns, in the norm (5.21): attained by two forces."""
     return worst_piece(pair, lambda piece: piece.factor(theta), random=random, starts=starts)

@@ -8,13 +8,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ndtheory import EDITIONS, Constants, evaluate, evaluate_sharp, exact
+from ndtheory import EDITIONS, Constants, evaluate, evaluate_sharp
 from verification.algorithm.runs import Outcome, run
 from verification.bounds.table import LARGEST
 from verification.constants import Measured, measure
 from verification.document import Document
 from verification.interface.assembly import build
-from verification.interface.pair import Pair
+from verification.interface.pair import ContactPair
 from verification.interrupts import INTERRUPTED
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
@@ -158,7 +158,7 @@ def chart(problem: Problem, *, progress: Progress = silent) -> Plane:
     return Plane(title=problem.title, regions=regions, points=tuple(points), reason=reason, units=problem.units)
 
 
-def _points(pair: Pair, cells: Sequence[tuple[float, float]], progress: Progress) -> Iterator[Point]:
+def _points(pair: ContactPair, cells: Sequence[tuple[float, float]], progress: Progress) -> Iterator[Point]:
     """What runs do at each theta and k."""
     for i, (theta, k) in enumerate(cells):
         progress(f"runs: theta = {theta:g}, k = {k:g}", i / len(cells))
@@ -168,12 +168,10 @@ def _points(pair: Pair, cells: Sequence[tuple[float, float]], progress: Progress
         yield Point(theta=theta, k=k, outcome=finished.outcome, iterations=finished.iterations)
 
 
-def _rubbing(pair: Pair, k: float) -> Pair:
+def _rubbing(pair: ContactPair, k: float) -> ContactPair:
     """The same bodies at another friction, for runs of a limited length with a constant theta."""
-    problem = pair.problem
-    contact = replace(problem.contact, friction=exact(k))
-    iteration = replace(problem.iteration, relaxation="constant", max_iterations=MOST_STEPS)
-    return replace(pair, problem=replace(problem, contact=contact, iteration=iteration))
+    settings = replace(pair.settings, relaxation="constant", max_iterations=MOST_STEPS)
+    return replace(pair.at(friction=k), settings=settings)
 
 
 def _sharp_interval(measured: Measured) -> tuple[float, float] | None:
@@ -196,12 +194,12 @@ def _at(measured: Measured, k: float) -> Constants:
     return constants
 
 
-def _semidefinite(pair: Pair, measured: Measured, start: float, progress: Progress) -> tuple[Region | None, str]:
+def _semidefinite(pair: ContactPair, measured: Measured, start: float, progress: Progress) -> tuple[Region | None, str]:
     from verification.bounds.program import LMIError
     from verification.bounds.semidefinite import SemidefiniteEdition, friction_threshold
 
-    if pair.n > LARGEST:
-        return None, f"{pair.n} contact nodes: worked out up to {LARGEST}"
+    if pair.contact.grid.n > LARGEST:
+        return None, f"{pair.contact.grid.n} contact nodes: worked out up to {LARGEST}"
     try:
         last = friction_threshold(pair, measured, start, progress=progress)
         kept = []

@@ -35,7 +35,7 @@ from verification.bounds.program import LMIError, Program, Weights
 from verification.bounds.table import LARGEST
 from verification.bounds.trace_forms import TraceForms
 from verification.constants import Measured
-from verification.interface.pair import Pair
+from verification.interface.pair import ContactPair
 from verification.progress import Progress, silent
 
 #: The friction threshold is searched until its bracket is this narrow, relatively.
@@ -83,7 +83,7 @@ class SemidefiniteEdition:
 
     Parameters
     ----------
-    pair : Pair
+    pair : ContactPair
     measured : Measured
         Its constants.
     friction : float, optional
@@ -97,41 +97,45 @@ class SemidefiniteEdition:
         A contact node is held, or there are more than :data:`verification.bounds.table.LARGEST`.
     """
 
-    def __init__(self, pair: Pair, measured: Measured, *, friction: float | None = None, nodewise: bool = True) -> None:
-        if pair.n > LARGEST:
-            raise ValueError(f"{pair.n} contact nodes: worked out up to {LARGEST}")
-        if not all(body.unknown.all() for body in pair.elastic):
+    def __init__(
+        self, pair: ContactPair, measured: Measured, *, friction: float | None = None, nodewise: bool = True
+    ) -> None:
+        if pair.contact.grid.n > LARGEST:
+            raise ValueError(f"{pair.contact.grid.n} contact nodes: worked out up to {LARGEST}")
+        if pair.held:
             raise ValueError("a contact node is held: the semidefinite edition needs every one free")
         self.nodewise = nodewise
-        k = float(pair.problem.contact.friction) if friction is None else friction
+        k = float(pair.friction) if friction is None else friction
         measured = measured.with_friction(k)
         constants = measured.energy_constants()
         if constants is None:
             raise ValueError("rho does not exist: " + next(iter(measured.reason.values()), ""))
         self._measured = measured
         self._sharp = float(constants.at_work), float(constants.kappa_1), float(constants.kappa_2)
-        size, normal = pair.normal.stop, pair.normal
-        carries = slice(0, size) if k else normal  # without friction p_T = 0
+        contact, neumann, interface = pair.contact.grid, pair.neumann.grid, pair.interface
+        carries = slice(0, contact.size) if k else contact.normal  # without friction p_T = 0
         # g = L_2 y and p = B z with L_2 L_2' = S_2 and B' S_1^-1 B = 1: |y| = |||g|||, |z| = |d_1|
         L_2, flexible = pair.neumann.root, pair.contact.inverse
         inner = flexible[carries, carries]
         turn = solve_triangular(np.linalg.cholesky(inner).T, np.eye(len(inner)), lower=False)
-        B = np.zeros((size, len(inner)))
+        B = np.zeros((contact.size, len(inner)))
         B[carries] = turn
         S_1 = pair.contact.stiffness if k else cho_solve(cho_factor(inner), np.eye(len(inner)))
         near = block_diag(pair.neumann.flexibility(L_2), inner @ turn)
         self._traces = TraceForms(pair, k, S_1=S_1, carries=carries, near=near)
-        self.size = size
-        self.g = np.hstack([np.eye(size), np.zeros(B.shape)])
-        self.p = np.hstack([np.zeros((size, size)), L_2.T @ pair.neumann.flexibility(B)])
-        force = np.hstack([np.zeros((size, size)), B])
-        jump = np.hstack([-pair.neumann.flexibility(L_2), -flexible @ B])
+        self.size = neumann.size
+        self.g = np.hstack([np.eye(neumann.size), np.zeros((neumann.size, len(inner)))])
+        back = L_2.T @ pair.neumann.flexibility(interface.carry_back(B))
+        self.p = np.hstack([np.zeros((neumann.size, neumann.size)), back])
+        force = np.hstack([np.zeros((contact.size, neumann.size)), B])
+        jump = np.hstack([-interface.carry(pair.neumann.flexibility(L_2)), -flexible @ B])
+        normal = contact.normal
         families = [(force[normal], jump[normal])]
         if k:
-            assert pair.regularisation is not None
-            zeta = pair.regularisation @ np.hstack([L_2[normal], np.zeros((pair.n, B.shape[1]))])
-            weight = np.sqrt(k * pair.weights)[:, None]
-            slide = pair.tangential
+            assert interface.kernel is not None
+            zeta = interface.kernel @ np.hstack([L_2[neumann.normal], np.zeros((neumann.n, B.shape[1]))])
+            weight = np.sqrt(k * contact.weights)[:, None]
+            slide = contact.tangential
             families.append((force[slide], jump[slide]))
             families += [(rows, rows) for rows in (weight * zeta, weight * jump[slide])]
         self.families = families
@@ -284,13 +288,13 @@ def _inside(multipliers: Weights) -> Weights:
 
 
 def friction_threshold(
-    pair: Pair, measured: Measured, start: float, *, nodewise: bool = True, progress: Progress = silent
+    pair: ContactPair, measured: Measured, start: float, *, nodewise: bool = True, progress: Progress = silent
 ) -> float:
     """The friction below which every small theta is certified to contract: a bound from below, close to ``NARROW``.
 
     Parameters
     ----------
-    pair : Pair
+    pair : ContactPair
     measured : Measured
     start : float
         The threshold of the theorem in energy norms, which is below it.
@@ -386,12 +390,12 @@ class Semidefinite:
         }
 
 
-def evaluate_lmi(pair: Pair, measured: Measured, theta: float, *, progress: Progress = silent) -> Semidefinite:
+def evaluate_lmi(pair: ContactPair, measured: Measured, theta: float, *, progress: Progress = silent) -> Semidefinite:
     """The semidefinite edition for the problem's friction.
 
     Parameters
     ----------
-    pair : Pair
+    pair : ContactPair
     measured : Measured
     theta : float
     progress : callable

@@ -9,13 +9,14 @@ and has a bound.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.linalg import block_diag
 
 from fem1d2d.mesh import Floats
 from verification.bounds.rounding import gamma, positive_definite
-from verification.interface.pair import Pair
+from verification.interface.pair import ContactPair
 
 
 class TraceForms:
@@ -26,7 +27,7 @@ class TraceForms:
 
     Parameters
     ----------
-    pair : Pair
+    pair : ContactPair
     k : float
     S_1 : array, shape (m, m)
         From c to the components of p that are not 0.
@@ -36,29 +37,34 @@ class TraceForms:
         Changes of (d, c), as columns, in which the forms are of size 1: the nearer, the less is lost to rounding.
     """
 
-    def __init__(self, pair: Pair, k: float, *, S_1: Floats, carries: slice, near: Floats) -> None:
-        S_2, size = pair.neumann.stiffness, pair.normal.stop
-        still = np.zeros((size, len(S_1)))
+    def __init__(self, pair: ContactPair, k: float, *, S_1: Floats, carries: slice, near: Floats) -> None:
+        contact, neumann, interface = pair.contact.grid, pair.neumann.grid, pair.interface
+        S_2, size = pair.neumann.stiffness, neumann.size
+        still = np.zeros((contact.size, len(S_1)))
         moved, pressed = still.copy(), still.copy()
         moved[carries], pressed[carries] = np.eye(len(S_1)), S_1
         self._S_2, self._near, self._near_2 = S_2, near, near[:size, :size]
-        self._d = np.hstack([np.eye(size), still])
-        self._g = np.hstack([S_2, still])
-        self._p = np.hstack([np.zeros((size, size)), pressed])
-        jump = -np.hstack([np.eye(size), moved])
-        families = [(self._p[pair.normal], jump[pair.normal])]
+        none = np.zeros((size, len(S_1)))
+        self._d = np.hstack([np.eye(size), none])
+        self._g = np.hstack([S_2, none])
+        self._p = np.hstack([np.zeros((size, size)), interface.carry_back(pressed)])
+        moduli = interface if interface.transfer is None else replace(interface, transfer=np.abs(interface.transfer))
+        self._p_size = np.hstack([np.zeros((size, size)), moduli.carry_back(np.abs(pressed))])
+        force = np.hstack([np.zeros((contact.size, size)), pressed])
+        jump = -np.hstack([interface.carry(np.eye(size)), moved])
+        families = [(force[contact.normal], jump[contact.normal])]
         sizes = [(np.abs(a), np.abs(b)) for a, b in families]
         if k:
-            assert pair.regularisation is not None
-            weight = np.sqrt(k * pair.weights)[:, None]
-            shear, slip = self._p[pair.tangential], jump[pair.tangential]
-            zeta = weight * (pair.regularisation @ self._g[pair.normal])
-            zeta_size = weight * (np.abs(pair.regularisation) @ np.abs(self._g[pair.normal]))
+            assert interface.kernel is not None
+            weight = np.sqrt(k * contact.weights)[:, None]
+            shear, slip = force[contact.tangential], jump[contact.tangential]
+            zeta = weight * (interface.kernel @ self._g[neumann.normal])
+            zeta_size = weight * (np.abs(interface.kernel) @ np.abs(self._g[neumann.normal]))
             families += [(shear, slip), (zeta, zeta), (weight * slip, weight * slip)]
             sizes += [(np.abs(shear), np.abs(slip)), (zeta_size, zeta_size), (weight * np.abs(slip),) * 2]
         self._families, self._sizes = families, sizes
-        # inner products over nodes, over traces twice, and the scalars
-        self._error = gamma(4 * (2 * size + len(S_1)) + 2 * pair.n + 20)
+        # inner products over nodes (a transfer has them too), over traces twice, and the scalars
+        self._error = gamma(4 * (2 * size + len(S_1)) + (2 if interface.transfer is None else 4) * contact.n + 20)
 
     def definite(
         self,
@@ -83,11 +89,11 @@ class TraceForms:
             square * d.T @ g + sign * cross * d.T @ p + sign * _conditions(multipliers, families)
         )
         form = sum_of(self._g, self._p, self._d, self._families, -1)
-        size = sum_of(np.abs(self._g), np.abs(self._p), self._d, self._sizes, 1)
+        size = sum_of(np.abs(self._g), self._p_size, self._d, self._sizes, 1)
         near = self._near
         if step is not None:
             a, b = step
-            row, row_size = a * self._p + b * self._g, abs(a) * np.abs(self._p) + abs(b) * np.abs(self._g)
+            row, row_size = a * self._p + b * self._g, abs(a) * self._p_size + abs(b) * np.abs(self._g)
             form = np.block([[self._S_2 / weight, row], [row.T, form]])
             size = np.block([[np.abs(self._S_2) / weight, row_size], [row_size.T, size]])
             near = block_diag(np.sqrt(weight) * self._near_2, near)

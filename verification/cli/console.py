@@ -20,7 +20,7 @@ from verification.progress import Progress, silent
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from verification.algorithm.iterate import State
+    from verification.algorithm.iterate import Iterate
     from verification.document import Document
 
 WIDTH = 80
@@ -255,10 +255,10 @@ def stages() -> Iterator[Progress]:
 
 
 @contextlib.contextmanager
-def progress(tell: Progress, tolerance: float) -> Iterator[Callable[[State], None]]:
+def progress(tell: Progress, tolerance: float) -> Iterator[Callable[[Iterate], None]]:
     """Tell how far the residual has fallen towards its tolerance."""
 
-    def watch(state: State) -> None:
+    def watch(state: Iterate) -> None:
         residual = state.relative_residual
         fallen = math.log(residual) / math.log(tolerance) if 0 < residual < 1 else 0.0
         tell(f"iterating: step {state.iteration}, residual {residual:.2e}", min(fallen, 1.0))

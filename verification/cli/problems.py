@@ -182,16 +182,16 @@ def solve(file: Path, folder: Path | None, as_json: bool) -> int:
     """
     from verification import monolithic
     from verification.cli import screens
-    from verification.interface.assembly import face
+    from verification.interface.assembly import discretise
     from verification.output.folder import Folder
 
     problem = _load(file, None, False)
     target = None if folder is None else Folder(folder, "solve")
-    facing = face(problem)
-    _warn(facing.warnings)
+    bodies = discretise(problem)
+    _warn(bodies.warnings)
     with stages() as tell:
         tell("solving both bodies at once", None)
-        solution = monolithic.solve(facing)
+        solution = monolithic.solve(bodies)
     write = None if target is None else lambda: target.write_solution(solution)
     deliver(solution, lambda: screens.solution(solution, file), as_json, write, folder)
     return 0

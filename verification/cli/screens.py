@@ -14,7 +14,7 @@ from verification.cli.calculator import editions_table
 from verification.cli.console import figures, heading, near_one, note, printable, say, table
 from verification.comparison import Comparison
 from verification.constants import ENERGY_NAMES, NAMES, Measured
-from verification.interface.fields import ContactState
+from verification.interface.fields import ContactFields
 from verification.monolithic import Solution
 from verification.problem.specification import Problem
 
@@ -49,10 +49,10 @@ def constants(problem: Problem, measured: Measured) -> None:
     """The screen of ``constants``."""
     levels = measured.levels or (measured,)
     stress = problem.units["stress"]
-    _setting(problem, measured.body1.nodes + measured.body2.nodes, measured.interface_nodes)
+    _setting(problem, measured.nodes, measured.interface_nodes)
     heading("WHAT DOES THE THEOREM NEED TO KNOW?")
     units = {"m": stress, "M": stress, "C_K": stress}
-    rows = [["nodes", *(str(level.body1.nodes + level.body2.nodes) for level in levels), "unit"]]
+    rows = [["nodes", *(str(level.nodes) for level in levels), "unit"]]
     for name in (*NAMES, *ENERGY_NAMES):
         rows.append([name, *(figures(getattr(level, name), 6) for level in levels), units.get(name, "")])
     table(rows, right=range(1, len(levels) + 1))
@@ -66,7 +66,7 @@ def constants(problem: Problem, measured: Measured) -> None:
 
 
 def _happened(run: Run) -> None:
-    problem = run.pair.problem
+    problem = _problem(run)
     heading("WHAT HAPPENED")
     rate, linear = run.observed_rate, run.linearised
     rows = [["", "rate", "steps", ""]]
@@ -103,7 +103,7 @@ def _steps(rate: float, tolerance: float) -> str:
     return str(math.ceil(math.log(tolerance) / math.log(rate)))
 
 
-def _contact(problem: Problem, contact: ContactState) -> None:
+def _contact(problem: Problem, contact: ContactFields) -> None:
     """What happens along Gamma_c, in totals."""
     units, total = problem.units, contact.force
     normal = f"{figures(total['normal'], 6)} normal"
@@ -127,8 +127,8 @@ def _limits(outside: list[str]) -> None:
 
 def run(finished: Run, file: Path) -> None:
     """The screen of ``run``."""
-    bodies = (finished.pair.body1, finished.pair.body2)
-    _setting(_at(finished), sum(len(body.mesh.points) for body in bodies), finished.pair.n)
+    nodes = sum(len(body.mesh.points) for body in finished.bodies.elastic)
+    _setting(_problem(finished), nodes, finished.pair.contact.grid.n)
     _happened(finished)
     _limits(finished.outside)
     say(f"Next: ndtheory compare {quote(str(file))}")
@@ -136,24 +136,27 @@ def run(finished: Run, file: Path) -> None:
 
 def solution(found: Solution, file: Path) -> None:
     """The screen of ``solve``."""
-    facing = found.facing
-    _setting(facing.problem, sum(len(body.mesh.points) for body in facing.elastic), facing.n)
+    bodies = found.bodies
+    _setting(bodies.problem, sum(len(body.mesh.points) for body in bodies.elastic), bodies.interface.contact.n)
     heading("WHAT IS THE SOLUTION?")
-    _contact(facing.problem, found.contact)
+    _contact(bodies.problem, found.contact)
     say(f"  KKT residual {found.kkt_residual:.1e} after {found.linear_solves} linear systems on Gamma_c")
-    _limits(facing.outside)
-    iterates = len(facing.elastic) == 2
+    _limits(bodies.outside)
+    iterates = len(bodies.elastic) == 2
     say(f"Next: ndtheory {'run' if iterates else 'solve'} {quote(str(file))}{'' if iterates else ' -o results'}")
 
 
-def _at(run: Run) -> Problem:
-    return run.pair.problem.with_theta(run.theta)
+def _problem(run: Run) -> Problem:
+    """The problem of a run, with the theta it had."""
+    problem = run.pair.problem
+    assert problem is not None  # commands read files
+    return problem.with_theta(run.theta)
 
 
 def comparison(result: Comparison, file: Path) -> None:
     """The screen of ``compare`` and ``demo``."""
     finished, measured = result.run, result.measured
-    _setting(_at(finished), measured.body1.nodes + measured.body2.nodes, measured.interface_nodes)
+    _setting(_problem(finished), measured.nodes, measured.interface_nodes)
     heading("HOW LARGE ARE THE CONSTANTS?")
     stress = finished.units["stress"]
     m, M, C_R, C_s, C_tr, C_K, rho = (

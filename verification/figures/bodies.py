@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from fem1d2d.mesh import Floats
 from verification.algorithm.runs import Run
 from verification.figures.style import BODY1, BODY2, PRESSURE, SHEAR, STATES, new_figure, plain, styled
-from verification.interface.fields import ContactState
-from verification.interface.pair import Facing
+from verification.interface.fields import ContactFields
+from verification.interface.pair import TwoBodies
 from verification.monolithic import Solution
 
 #: Displacements are drawn so that the largest is about this fraction of the picture.
@@ -29,17 +29,17 @@ def draw_bodies(result: Run | Solution) -> Figure:
     result : Run or Solution
         Of a run the last state is drawn.
     """
-    facing = result.facing
+    bodies = result.bodies
     moved = [float(np.abs(u).max()) for u in result.displacements if u is not None]
-    size = max(float(np.ptp(body.mesh.points[:, 0])) for body in facing.elastic)
+    size = max(float(np.ptp(body.mesh.points[:, 0])) for body in bodies.elastic)
     scale = _round_down(SHARE * size / max(moved)) if max(moved) > 0 else 1.0
-    plane = facing.problem.dimension == 2
+    plane = bodies.problem.dimension == 2
     with styled():
         figure = new_figure(7.2, 5.2 if plane else 2.6)
         axes = figure.subplots(2, 1, height_ratios=[1.2, 1], sharex=True) if plane else [figure.subplots()]
-        _draw_meshes(axes[0], facing, result.displacements, scale)
+        _draw_meshes(axes[0], bodies, result.displacements, scale)
         if plane:
-            _draw_stresses(axes[1], result.contact, facing.problem.units)
+            _draw_stresses(axes[1], result.contact, bodies.problem.units)
     return figure
 
 
@@ -49,23 +49,23 @@ def _round_down(value: float) -> float:
     return float(max(factor for factor in (1.0, 2.0, 5.0) if factor * power <= value * (1 + 1e-12)) * power)
 
 
-def _lift(facing: Facing, scale: float) -> float:
+def _lift(bodies: TwoBodies, scale: float) -> float:
     """How far body 2 is drawn up: a flat gap grows with the displacements, so that bodies that touch look so."""
-    if facing.body1 is None or facing.body2 is None or np.ptp(facing.gap) > 0:
+    if bodies.body1 is None or bodies.body2 is None or np.ptp(bodies.interface.gap) > 0:
         return 0.0
-    levels = [float(body.mesh.points[body.nodes[0], -1]) for body in (facing.body1, facing.body2)]
-    return scale * float(facing.gap[0]) - (levels[1] - levels[0])
+    levels = [float(body.mesh.points[body.nodes[0], -1]) for body in (bodies.body1, bodies.body2)]
+    return scale * float(bodies.interface.gap[0]) - (levels[1] - levels[0])
 
 
-def _draw_meshes(ax: Axes, facing: Facing, displacements: tuple[Floats | None, Floats | None], scale: float) -> None:
-    length = facing.problem.units["length"]
-    colours, lifts = (BODY1, BODY2), (0.0, _lift(facing, scale))
-    for i, (body, u) in enumerate(zip((facing.body1, facing.body2), displacements, strict=True)):
+def _draw_meshes(ax: Axes, bodies: TwoBodies, displacements: tuple[Floats | None, Floats | None], scale: float) -> None:
+    length = bodies.problem.units["length"]
+    colours, lifts = (BODY1, BODY2), (0.0, _lift(bodies, scale))
+    for i, (body, u) in enumerate(zip((bodies.body1, bodies.body2), displacements, strict=True)):
         if body is None or u is None:
             continue
         points = body.mesh.points + scale * u
         points[:, -1] += lifts[i]
-        if facing.problem.dimension == 2:
+        if bodies.problem.dimension == 2:
             style: dict[str, Any] = {"facecolor": colours[i] + "30", "edgecolor": colours[i], "linewidth": 0.4}
             ax.add_collection(PolyCollection(list(points[body.mesh.cells]), label=f"body {i + 1}", **style))
         else:
@@ -73,32 +73,32 @@ def _draw_meshes(ax: Axes, facing: Facing, displacements: tuple[Floats | None, F
             bar = LineCollection([line], colors=colours[i], linewidths=6, alpha=0.5, label=f"body {i + 1}")
             ax.add_collection(bar)
             ax.plot(line[:, 0], line[:, 1], "|", color=colours[i])
-    if facing.problem.dimension == 2 and len(facing.elastic) == 1:
-        ax.axhline(_obstacle(facing), color="0.3", linewidth=2, label="obstacle")
+    if bodies.problem.dimension == 2 and len(bodies.elastic) == 1:
+        ax.axhline(_obstacle(bodies), color="0.3", linewidth=2, label="obstacle")
     ax.autoscale_view()
-    if facing.problem.dimension == 2:
+    if bodies.problem.dimension == 2:
         ax.set_aspect("equal")
         ax.set_ylabel(f"y [{plain(length)}]")
     else:
         ax.set_ylim(-0.4, 0.8)
         ax.set_yticks([])
         ax.set_xlabel(f"x [{plain(length)}]")
-    ax.set_title(f"{plain(facing.problem.title)}: deformed, displacements x {scale:g}")
+    ax.set_title(f"{plain(bodies.problem.title)}: deformed, displacements x {scale:g}")
     ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
-def _obstacle(facing: Facing) -> float:
+def _obstacle(bodies: TwoBodies) -> float:
     """Where the face of the obstacle lies."""
-    body, sign = (facing.body2, -1.0) if facing.body1 is None else (facing.body1, 1.0)
+    body, sign = (bodies.body2, -1.0) if bodies.body1 is None else (bodies.body1, 1.0)
     assert body is not None
-    return float(body.mesh.points[body.nodes[0], 1] + sign * facing.gap[0])
+    return float(body.mesh.points[body.nodes[0], 1] + sign * bodies.interface.gap[0])
 
 
-def _draw_stresses(ax: Axes, contact: ContactState, units: Mapping[str, str]) -> None:
+def _draw_stresses(ax: Axes, contact: ContactFields, units: Mapping[str, str]) -> None:
     ax.axhline(0, color="0.8", linewidth=0.8)
     ax.plot(contact.x, contact.pressure, "-", color=PRESSURE, label="pressure $-\\sigma_N$")
     ax.plot(contact.x, contact.shear, "--", color=SHEAR, label="shear $\\sigma_T$ on body 2")
-    states = np.array(contact.state)
+    states = np.array(contact.status)
     for name, marker in (("stick", "s"), ("slip", "o"), ("open", "x")):
         here = states == name
         if here.any():

@@ -42,10 +42,10 @@ def draw_residuals(run: Run, editions: Sequence[EditionRow] = ()) -> Figure:
         if run.last.scale > 0:
             floor = noise(run.pair, run.last) / run.last.scale
             ax.axhline(floor, color="0.7", linewidth=0.8, linestyle=":", label="rounding")
-        ax.axhline(run.pair.problem.iteration.tolerance, color="0.4", linewidth=0.8, linestyle=":", label="tolerance")
+        ax.axhline(run.pair.settings.tolerance, color="0.4", linewidth=0.8, linestyle=":", label="tolerance")
         ax.set_xlabel("evaluations of T")
         ax.set_ylabel("|||T g - g||| / |||T g|||")
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
-        ax.set_title(f"{plain(run.pair.problem.title)}: theta = {float(run.theta):g}")
+        ax.set_title(f"{plain(run.pair.title)}: theta = {float(run.theta):g}")
         ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure

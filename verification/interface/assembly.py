@@ -21,13 +21,15 @@ from fem1d2d import (
     stiffness,
     supports,
     surface,
-    trapezoid,
 )
 from fem1d2d.mesh import Floats, Ints
 from fem1d2d.trace import SAME, extent
-from verification.interface.friction import friction_operator
-from verification.interface.pair import Body, Facing, Name, Pair
-from verification.problem.specification import MOST_CELLS, BodySpec, Problem
+from verification.interface.body import Body, Condensed, Name
+from verification.interface.friction import Law, Local, Nonlocal
+from verification.interface.grid import Grid
+from verification.interface.interface import Interface
+from verification.interface.pair import ContactPair, TwoBodies
+from verification.problem.specification import MOST_CELLS, BodySpec, ContactSpec, Problem
 from verification.problem.tables import ProblemError, short, unreadable
 
 #: Interface matrices are dense; more contact nodes would fill the memory.
@@ -37,28 +39,36 @@ MOST_NODES = 2000
 MOST_BYTES = 200_000_000
 
 
-def build(problem: Problem) -> Pair:
-    """Two elastic bodies with roles, as the iteration and its constants need them.
+def build(problem: Problem, *, law: Law | None = None) -> ContactPair:
+    """Two condensed bodies with roles, as the iteration and its constants need them.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its ``[iteration]`` gives the roles and the pair's settings.
+    law : Law, optional
+        A law of friction in place of the problem's.
 
     Raises
     ------
     ProblemError
-        As :func:`face`, and where a body is rigid or can move rigidly.
+        As :func:`discretise`, and where a body is rigid or can move rigidly.
     """
+    iteration = problem.iteration
     for name in ("body1", "body2"):
         if getattr(problem, name).rigid:
-            role = "Neumann" if problem.iteration.neumann_body == int(name[-1]) else "contact"
+            role = "Neumann" if iteration.neumann_body == int(name[-1]) else "contact"
             raise ProblemError(
                 problem.source,
                 f"{name}.shape",
                 "rigid",
                 f"needed an elastic body: it has the {role} problem of the iteration; `ndtheory solve` takes obstacles",
             )
-    facing = face(problem)
-    for body in facing.elastic:
+    bodies = discretise(problem, law=law)
+    for body in bodies.elastic:
         k = body.motions.shape[1]
         if k:
-            neumann = problem.iteration.neumann_body == int(body.name[-1])
+            neumann = iteration.neumann_body == int(body.name[-1])
             step = "the Neumann problem of step I" if neumann else "the contact problem of step II"
             raise ProblemError(
                 problem.source,
@@ -67,11 +77,21 @@ def build(problem: Problem) -> Pair:
                 f"{body.name} can move rigidly ({k} free motion{'s' if k > 1 else ''}), so that its stiffness matrix in"
                 f" {step} is singular: fix or prescribe more of its sides, or use `ndtheory solve`",
             )
-    return Pair(**vars(facing))
+    body1, body2 = (Condensed.of(body, bodies.interface.contact) for body in bodies.elastic)
+    below = iteration.neumann_body == 1
+    return ContactPair(
+        contact=body2.turned() if below else body1,
+        neumann=body1.turned() if below else body2,
+        interface=bodies.interface,
+        friction=bodies.friction,
+        neumann_body=iteration.neumann_body,
+        settings=iteration.settings,
+        problem=problem,
+    )
 
 
-def face(problem: Problem) -> Facing:
-    """Mesh and assemble the bodies and find Gamma_c; they are condensed when first asked.
+def discretise(problem: Problem, *, law: Law | None = None) -> TwoBodies:
+    """Mesh and assemble the bodies and find Gamma_c.
 
     Raises
     ------
@@ -85,15 +105,21 @@ def face(problem: Problem) -> Facing:
         None if mesh is None else _body(problem, name, mesh, own)
         for (name, _), mesh, own in zip(_specs(problem), meshes, nodes, strict=True)
     )
-    weights = trapezoid(x)
-    contact = problem.contact
-    radius = None if contact.radius is None else float(contact.radius)
-    regularisation = None
-    if problem.dimension == 2 and (contact.law == "local" or radius is not None):
-        regularisation = friction_operator(x, weights, law=contact.law, radius=radius)
-    return Facing(
-        problem=problem, body1=body1, body2=body2, x=x, weights=weights, gap=gap, regularisation=regularisation
+    grid = Grid.on(x, problem.dimension)
+    return TwoBodies(
+        body1=body1,
+        body2=body2,
+        interface=Interface(contact=grid, neumann=grid, gap=gap, law=law or _law(problem.contact)),
+        friction=problem.contact.friction,
+        problem=problem,
     )
+
+
+def _law(contact: ContactSpec) -> Law | None:
+    """The law of a problem file; None where the non-local one has no radius, as there is no friction."""
+    if contact.law == "local":
+        return Local()
+    return None if contact.radius is None else Nonlocal(radius=float(contact.radius))
 
 
 def _specs(problem: Problem) -> list[tuple[Name, BodySpec]]:
@@ -292,6 +318,7 @@ def _body(problem: Problem, name: Name, mesh: Mesh, nodes: Ints) -> Body:
         name=name,
         mesh=mesh,
         material=material,
+        poisson=float(spec.poisson),
         known=known,
         nodes=nodes,
         free=free,

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem1d2d.mesh import Floats
-from verification.interface.pair import Facing
+from verification.interface.grid import Grid
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ContactState:
+class ContactFields:
     """Stresses and motions along Gamma_c from left to right.
 
     Attributes
@@ -30,7 +30,7 @@ class ContactState:
         Distance of the bodies, >= 0, unit of length.
     slip : array
         ``u1_T - u2_T``, unit of length; 0 in 1D.
-    state : list of {'stick', 'slip', 'open'}
+    status : tuple of {'stick', 'slip', 'open'}
         A node that touches and whose friction bound is zero slips.
     """
 
@@ -40,40 +40,44 @@ class ContactState:
     shear: Floats
     gap: Floats
     slip: Floats
-    state: list[str]
+    status: tuple[str, ...]
 
     @classmethod
     def of(
-        cls, facing: Facing, *, force: Floats, jump: Floats, touching: NDArray[np.bool_], sliding: NDArray[Any]
-    ) -> ContactState:
-        """From interface vectors, tangential components first.
+        cls, grid: Grid, *, force: Floats, jump: Floats, touching: NDArray[np.bool_], sliding: NDArray[Any]
+    ) -> ContactFields:
+        """From interface vectors on the contact grid, tangential components first.
 
         Parameters
         ----------
+        grid : Grid
+            That of the contact body.
         force : array
             Nodal forces: tangential on body 2, normal compressive.
         jump : array
             ``u1_T - u2_T`` and ``[u_N] - gap <= 0``.
         touching, sliding : array, shapes (n,) and (n,) or (0,)
         """
-        t, zero = facing.tangential, np.zeros(facing.n)
-        plane = t.stop > 0
-        slides = sliding != 0 if plane else np.ones(facing.n, dtype=bool)
+        plane, zero = grid.t > 0, np.zeros(grid.n)
+        slides = sliding != 0 if plane else np.ones(grid.n, dtype=bool)
         names = np.where(touching, np.where(slides, "slip", "stick"), "open")
-        return cls(
-            x=facing.x,
-            weights=facing.weights,
-            pressure=force[facing.normal] / facing.weights,
-            shear=force[t] / facing.weights if plane else zero,
-            gap=-jump[facing.normal] + 0.0,
-            slip=jump[t] if plane else zero,
-            state=[str(name) for name in names],
+        fields = cls(
+            x=grid.x,
+            weights=grid.weights,
+            pressure=force[grid.normal] / grid.weights,
+            shear=force[grid.tangential] / grid.weights if plane else zero,
+            gap=-jump[grid.normal] + 0.0,
+            slip=jump[grid.tangential].copy() if plane else zero,
+            status=tuple(str(name) for name in names),
         )
+        for array in (fields.pressure, fields.shear, fields.gap, fields.slip):
+            array.setflags(write=False)
+        return fields
 
     @property
     def pattern(self) -> dict[str, int]:
         """How many nodes stick, slip and are open."""
-        return {name: self.state.count(name) for name in ("stick", "slip", "open")}
+        return {name: self.status.count(name) for name in ("stick", "slip", "open")}
 
     @property
     def force(self) -> dict[str, float]:
@@ -83,4 +87,4 @@ class ContactState:
     def to_dict(self) -> dict[str, Any]:
         """The objects ``force``, ``pattern`` and ``contact`` that runs and solutions share."""
         arrays = {name: getattr(self, name).tolist() for name in ("x", "pressure", "shear", "gap", "slip")}
-        return {"force": self.force, "pattern": self.pattern, "contact": {**arrays, "state": self.state}}
+        return {"force": self.force, "pattern": self.pattern, "contact": {**arrays, "state": list(self.status)}}

@@ -1,218 +1,50 @@
-"""Two bodies facing each other along Gamma_c, and their roles."""
+"""Two bodies along Gamma_c: on their meshes as they were assembled, and condensed, with the roles of the algorithm."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Literal
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from typing import Any, Literal
 
 import numpy as np
-import scipy.sparse as sp
-from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, cholesky, qr
 
-from fem1d2d import Condensation, Material, Mesh, Supports, solver
-from fem1d2d.mesh import Floats, Ints
-from verification.problem.specification import Problem
-from verification.threads import one_thread
-
-Name = Literal["body1", "body2"]
+from fem1d2d.mesh import Floats
+from ndtheory.constants import take
+from verification.interface.body import Body, Condensed
+from verification.interface.interface import Interface
+from verification.problem import Problem, Settings
+from verification.problem.specification import MOST_FRICTION
 
 #: Poisson ratio from which on linear triangles err visibly.  Two models against a mesh that does not lock (rectangles
 #: split by both diagonals, 72 cells along Gamma_c): at 0.48 the nodal pressures of the built-in split are off by 5 and
 #: 6 % (0.7 and 2.3 % at 0.3) and the force by 2 %, 7 to 11 % with 12 cells; at 0.499 the pressures by 40 and 11 %.
 LOCKING = 0.48
 
-#: Part of the friction that the kernel may lose or add without a warning.  The share under an even pressure agrees with
-#: that of a block that slides as a whole within 0.01: 0.93 and 0.92 at radius 0.2 on a length of 1, 0.67 and 0.67 at 1.
-SHARE = 0.1
+#: What is unknown of matrices from elsewhere.
+UNITS = {"length": "any", "stress": "any"}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Body:
-    """An elastic body condensed onto its contact nodes.
-
-    Interface vectors list all tangential components from left to right, then all normal ones (along y; along x in 1D).
+class TwoBodies:
+    """Two bodies on their meshes along Gamma_c; one of them may be rigid.
 
     Attributes
     ----------
-    name : {'body1', 'body2'}
-    mesh : Mesh
-    material : Material
-    known : Supports
-        Displacements known on Gamma_u.
-    nodes : int array, shape (n,)
-        Contact nodes from left to right.
-    free : int array
-        Positions of the unknowns among all d * node + p.
-    unknown : bool array, shape (2 n,) or (n,) in 1D
-        Interface components that Gamma_u leaves free; a False one is held tangentially.
-    interface : int array
-        Positions of the unknown interface components among the unknowns.
-    stiffness, gram_matrix : sparse array
-        The stiffness matrix and the H1 Gram matrix of the unknowns.
-    load : array
-        Loads on the unknowns: body force, tractions, prescribed displacements.
-    motions : array, shape (unknowns, k)
-        Rigid motions that only contact can hold; k = 0 in the iteration.
-    """
-
-    name: Name
-    mesh: Mesh
-    material: Material
-    known: Supports
-    nodes: Ints
-    free: Ints
-    unknown: NDArray[np.bool_]
-    interface: Ints
-    stiffness: sp.csc_array
-    gram_matrix: sp.csc_array
-    load: Floats
-    motions: Floats
-
-    @cached_property
-    def solve(self) -> Callable[[Floats], Floats]:
-        """``load -> A^-1 load`` on the unknowns, for one load or columns of loads.
-
-        Where rigid motions are left, as many unknowns are pinned: exact, up to a motion, for loads in equilibrium.
-        """
-        with one_thread():
-            k = self.motions.shape[1]
-            if k == 0:
-                return solver(self.stiffness)
-            _, _, order = qr(self.motions.T, pivoting=True, mode="economic")
-            rest = np.sort(order[k:])
-            pinned = solver(self.stiffness[rest][:, rest])
-
-        def solve(load: Floats) -> Floats:
-            result = np.zeros_like(load)
-            result[rest] = pinned(load[rest])
-            return result
-
-        return solve
-
-    @cached_property
-    def elastic(self) -> Condensation:
-        """The stiffness matrix condensed onto the interface."""
-        with one_thread():
-            condensed = Condensation(self.stiffness, self.interface)
-            condensed.lift  # noqa: B018  loads need it too: once for both
-            return condensed
-
-    @cached_property
-    def gram(self) -> Condensation:
-        """The Gram matrix condensed onto the interface."""
-        with one_thread():
-            return Condensation(self.gram_matrix, self.interface)
-
-    @property
-    def known_trace(self) -> Floats:
-        """Interface displacements that Gamma_u prescribes, 0 where it does not."""
-        return np.concatenate([self.known.values[self.nodes, p] for p in range(self.mesh.dimension)])
-
-    def displacement(self, trace: Floats) -> Floats:
-        """Displacement of all nodes for given interface values, shape (nodes, d), unit of length."""
-        full = self.known.values.ravel().copy()
-        full[self.free] = self.elastic.extend(trace[self.unknown], self.load)
-        return full.reshape(self.mesh.points.shape)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Side:
-    """A body as the algorithm sees it: its interface matrices with the normal along n of the contact body.
-
-    Held components have zero rows and columns.
-
-    Attributes
-    ----------
-    body : Body
-    stiffness : array, shape (2 n, 2 n)
-        S_a, stress (times length in 1D per unit thickness).
-    load : array, shape (2 n,)
-        l_a: loads condensed onto the interface.
-    known : array, shape (2 n,)
-        Known trace of held components.
-    """
-
-    body: Body
-    stiffness: Floats
-    load: Floats
-    known: Floats
-
-    @cached_property
-    def _factor(self) -> tuple[NDArray[np.float64], bool]:
-        rows = self.body.unknown
-        factor: tuple[NDArray[np.float64], bool] = cho_factor(self.stiffness[np.ix_(rows, rows)])
-        return factor
-
-    def flexibility(self, force: Floats) -> Floats:
-        """``S_a^-1 force`` on the free components, 0 on held ones, shape (2 n,)."""
-        result = np.zeros_like(force)
-        result[self.body.unknown] = cho_solve(self._factor, force[self.body.unknown], check_finite=False)
-        return result
-
-    @cached_property
-    def inverse(self) -> Floats:
-        """``S_a^-1`` as a matrix, 0 on held components, shape (2 n, 2 n)."""
-        return self.flexibility(np.eye(len(self.load)))
-
-    @cached_property
-    def root(self) -> Floats:
-        """L with ``S_a = L L'``, shape (2 n, free components): columns orthonormal in the norm (5.21)."""
-        rows = self.body.unknown
-        result = np.zeros((len(rows), int(rows.sum())))
-        result[rows] = cholesky(self.stiffness[np.ix_(rows, rows)], lower=True)
-        return result
-
-    def dual_norm(self, force: Floats) -> float:
-        """The norm (5.21), ``sqrt(force' S_a^-1 force)``, when this is the Neumann body."""
-        return math.sqrt(max(float(force @ self.flexibility(force)), 0.0))
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Facing:
-    """Two bodies facing each other along Gamma_c; one of them may be rigid.
-
-    Attributes
-    ----------
-    problem : Problem
     body1, body2 : Body or None
         None where rigid.
-    x : array, shape (n,)
-        Positions of the contact nodes; in 1D the one point.
-    weights : array, shape (n,)
-        w_j of the trapezoid rule (length; 1 in 1D).
-    gap : array, shape (n,)
-        Initial distance.
-    regularisation : array, shape (n, n) or None
-        The operator S on normal nodal forces; None without a law of friction.
+    interface : Interface
+        What joins them, in the roles of the problem.
+    friction : Fraction
+        k, constant along Gamma_c.
+    problem : Problem
+        What they were made from.
     """
 
-    problem: Problem
     body1: Body | None
     body2: Body | None
-    x: Floats
-    weights: Floats
-    gap: Floats
-    regularisation: Floats | None
-
-    @property
-    def n(self) -> int:
-        """Number of contact nodes."""
-        return len(self.x)
-
-    @property
-    def tangential(self) -> slice:
-        """Tangential components of an interface vector; empty in 1D."""
-        return slice(0, self.n * (self.problem.dimension - 1))
-
-    @property
-    def normal(self) -> slice:
-        """Normal components of an interface vector."""
-        start = self.n * (self.problem.dimension - 1)
-        return slice(start, start + self.n)
+    interface: Interface
+    friction: Fraction
+    problem: Problem
 
     @property
     def elastic(self) -> list[Body]:
@@ -222,92 +54,193 @@ class Facing:
     @property
     def outside(self) -> list[str]:
         """Why the theorem does not speak of this problem; empty where it does."""
-        reasons = []
-        if self.problem.contact.law == "local" and self.problem.contact.friction:
-            reasons.append("the local Coulomb law: S must map into L2(Gamma_c)")
-        if not all(body.unknown.all() for body in self.elastic):
-            reasons.append("a contact node is held tangentially: Gamma_u and Gamma_c must not meet")
-        return reasons
-
-    @property
-    def nearly_incompressible(self) -> str:
-        """The keys that hold a Poisson ratio of LOCKING or more, for a message; empty where none does."""
-        ratios = {f"{body.name}.poisson": float(getattr(self.problem, body.name).poisson) for body in self.elastic}
-        return " and ".join(f"{key} = {ratio:.12g}" for key, ratio in ratios.items() if ratio >= LOCKING)
+        return _outside(self.interface, self.friction, [body.unknown for body in self.elastic])
 
     @property
     def warnings(self) -> list[str]:
         """What a user should know before trusting the numbers."""
-        found = []
-        if self.nearly_incompressible:
-            found.append(
-                f"{self.nearly_incompressible}: near 1/2 linear triangles make a body too stiff and scatter the nodal"
-                f" pressures (Section 6 at {LOCKING:g}: 5 %, at 0.499: 40 %); needed a finer mesh, or a mesh file whose"
-                " rectangles are split by both diagonals"
-            )
-        contact = self.problem.contact
-        if contact.law == "local" or not contact.friction or self.regularisation is None or contact.radius is None:
-            return found
-        r, width, length = float(contact.radius), float(np.diff(self.x).max()), float(self.x[-1] - self.x[0])
-        # What a sliding body carries under an even pressure, as a part of k times the normal force.
-        share = float(self.weights @ self.regularisation @ self.weights / self.weights.sum())
-        if r < width * (1 - 1e-9):
-            found.append(
-                f"contact.radius = {r:g} is below the mesh width {width:g}: the kernel sees single nodes and multiplies"
-                f" friction by about width/radius = {width / r:.3g}"
-            )
-        elif share < 1 - SHARE:
-            found.append(
-                f"contact.radius = {r:g} is not small against the length {length:g} of Gamma_c: the kernel is cut off"
-                f" at the ends, and a body that slides under an even pressure carries {100 * share:.0f} % of k times"
-                " the normal force"
-            )
-        elif share > 1 + SHARE:
-            found.append(
-                f"contact.radius = {r:g} is no multiple of the mesh width {width:g}: sums of the kernel multiply"
-                f" friction by about {share:.2f}"
-            )
-        return found
+        return _warnings(self.interface, self.friction, self.elastic)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Pair(Facing):
-    """Two elastic bodies facing each other, with the roles of the algorithm."""
+class ContactPair:
+    """Two condensed bodies with the roles of the algorithm, the interface that joins them, and friction.
 
-    body1: Body
-    body2: Body
+    Attributes
+    ----------
+    contact : Condensed
+        The body of step II.
+    neumann : Condensed
+        The body of step I.  Both have their normal components along n of the contact body.
+    interface : Interface
+    friction : Fraction
+        k, constant along Gamma_c.
+    neumann_body : {1, 2}
+        Who has the Neumann problem; body 1 lies below body 2.
+    settings : Settings
+        How a run goes unless it is told otherwise.
+    problem : Problem or None
+        What the pair was made from, for documents and messages; None where it was made from matrices.
+    """
+
+    contact: Condensed
+    neumann: Condensed
+    interface: Interface
+    friction: Fraction = Fraction(0)
+    neumann_body: Literal[1, 2] = 2
+    settings: Settings = field(default_factory=Settings)
+    problem: Problem | None = None
+
+    @property
+    def body1(self) -> Condensed:
+        """The lower body."""
+        return self.contact if self.neumann_body == 2 else self.neumann
+
+    @property
+    def body2(self) -> Condensed:
+        """The upper body."""
+        return self.neumann if self.neumann_body == 2 else self.contact
 
     @property
     def upward(self) -> float:
         """+1 where the outward normal of the contact body points up (body 1), -1 where it points down (body 2)."""
-        return 1.0 if self.problem.iteration.neumann_body == 2 else -1.0
+        return 1.0 if self.neumann_body == 2 else -1.0
 
     def orient(self, interface: Floats) -> Floats:
-        """Turn the normal components of interface vectors between y and n of the contact body (its own inverse)."""
-        turned = interface.copy()
-        turned[self.normal] *= self.upward
-        return turned
+        """Turn interface vectors of the contact grid between y and n of the contact body (its own inverse)."""
+        return self.contact.orient(interface)
 
-    def orient_form(self, matrix: Floats) -> Floats:
-        """The same for a symmetric matrix on interface vectors."""
-        return self.orient(self.orient(matrix).T)
+    def at(self, *, friction: Any) -> ContactPair:
+        """The same bodies at another friction; what is condensed is shared.
 
-    def _side(self, body: Body) -> Side:
-        size = len(body.unknown)
-        rows = np.flatnonzero(body.unknown)
-        matrix = np.zeros((size, size))
-        matrix[np.ix_(rows, rows)] = body.elastic.schur
-        load = np.zeros(size)
-        load[rows] = body.elastic.condense(body.load)
-        matrix = self.orient_form(matrix)
-        return Side(body=body, stiffness=matrix, load=self.orient(load), known=self.orient(body.known_trace))
+        Raises
+        ------
+        HypothesisError
+            Unless k >= 0 (and at most 1e9), or where friction has no law.
+        """
+        needed = f"a number >= 0, at most {float(MOST_FRICTION):g}"
+        if self.interface.kernel is None:
+            needed = "0: without a law of friction there is none"
+        law = self.interface.kernel is not None
+        k = take("friction", friction, needed, lambda v: v == 0 or (law and 0 <= v <= MOST_FRICTION))
+        problem = (
+            None if self.problem is None else replace(self.problem, contact=replace(self.problem.contact, friction=k))
+        )
+        return replace(self, friction=k, problem=problem)
 
-    @cached_property
-    def neumann(self) -> Side:
-        """The body of step I."""
-        return self._side(self.body2 if self.problem.iteration.neumann_body == 2 else self.body1)
+    def swapped(self) -> ContactPair:
+        """The same bodies with the roles exchanged; what is condensed is shared.
 
-    @cached_property
-    def contact(self) -> Side:
-        """The body of step II."""
-        return self._side(self.body1 if self.problem.iteration.neumann_body == 2 else self.body2)
+        Raises
+        ------
+        ValueError
+            The grids differ.
+        """
+        return replace(
+            self,
+            contact=self.neumann.turned(),
+            neumann=self.contact.turned(),
+            interface=self.interface.swapped(),
+            neumann_body=1 if self.neumann_body == 2 else 2,
+            problem=None if self.problem is None else self.problem.swapped(),
+        )
+
+    def on_meshes(self) -> TwoBodies:
+        """The bodies on their meshes, as the global method takes them.
+
+        Raises
+        ------
+        ValueError
+            The pair is made from matrices.
+        """
+        if self.problem is None:
+            raise ValueError("this pair is made from matrices: needed the meshes of both bodies")
+        return TwoBodies(
+            body1=self.body1.mesh_body,
+            body2=self.body2.mesh_body,
+            interface=self.interface,
+            friction=self.friction,
+            problem=self.problem,
+        )
+
+    @property
+    def title(self) -> str:
+        """That of the problem."""
+        return "matrices" if self.problem is None else self.problem.title
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Labels ``length`` and ``stress``."""
+        return dict(UNITS if self.problem is None else self.problem.units)
+
+    @property
+    def source(self) -> str:
+        """What errors name: a file, ``<dict>`` or ``<matrices>``."""
+        return "<matrices>" if self.problem is None else self.problem.source
+
+    @property
+    def rubs(self) -> bool:
+        """Whether friction can act."""
+        return bool(self.friction) and self.interface.kernel is not None
+
+    @property
+    def held(self) -> bool:
+        """Whether a contact node of a body is held tangentially."""
+        return not (self.contact.free.all() and self.neumann.free.all())
+
+    def bound(self, force: Floats) -> Floats:
+        """Friction bound on nodal forces at the contact nodes, ``w_j k |(S sigma_N)_j|``, shape (t,).
+
+        Parameters
+        ----------
+        force : array
+            On the Neumann grid; sigma_N are its normal components.
+        """
+        grid = self.interface.contact
+        if not self.rubs:
+            return np.zeros(grid.t)
+        return np.asarray(float(self.friction) * grid.weights * np.abs(self.interface.stress(force)))
+
+    @property
+    def outside(self) -> list[str]:
+        """Why the theorem does not speak of this pair; empty where it does."""
+        return _outside(self.interface, self.friction, [self.contact.free, self.neumann.free])
+
+    @property
+    def nearly_incompressible(self) -> str:
+        """The keys that hold a Poisson ratio of LOCKING or more, for a message; empty where none does."""
+        return _nearly_incompressible([side.body for side in (self.body1, self.body2) if side.body is not None])
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a user should know before trusting the numbers."""
+        bodies = [side.body for side in (self.body1, self.body2) if side.body is not None]
+        return _warnings(self.interface, self.friction, bodies)
+
+
+def _outside(interface: Interface, friction: Fraction, free: list[Any]) -> list[str]:
+    reasons = []
+    if friction and interface.law is not None and interface.law.outside:
+        reasons.append(interface.law.outside)
+    if not all(components.all() for components in free):
+        reasons.append("a contact node is held tangentially: Gamma_u and Gamma_c must not meet")
+    return reasons
+
+
+def _nearly_incompressible(bodies: list[Body]) -> str:
+    ratios = {f"{body.name}.poisson": body.poisson for body in bodies}
+    return " and ".join(f"{key} = {ratio:.12g}" for key, ratio in ratios.items() if ratio >= LOCKING)
+
+
+def _warnings(interface: Interface, friction: Fraction, bodies: list[Body]) -> list[str]:
+    found = []
+    near = _nearly_incompressible(bodies)
+    if near:
+        found.append(
+            f"{near}: near 1/2 linear triangles make a body too stiff and scatter the nodal"
+            f" pressures (Section 6 at {LOCKING:g}: 5 %, at 0.499: 40 %); needed a finer mesh, or a mesh file whose"
+            " rectangles are split by both diagonals"
+        )
+    if friction and interface.law is not None and interface.kernel is not None:
+        found += interface.law.warnings(interface)
+    return found

@@ -15,11 +15,11 @@ from fem1d2d import solver
 from fem1d2d.mesh import Floats
 from ndtheory import EDITIONS, evaluate, evaluate_sharp
 from verification.algorithm.fixed_point import FixedPointMap
-from verification.algorithm.iterate import State
+from verification.algorithm.iterate import Iterate
 from verification.algorithm.theta import CLOSEST_TO_ONE
 from verification.constants import measure
 from verification.contact import ContactError
-from verification.interface.pair import Body
+from verification.interface.body import Body
 from verification.ledger.evidence import Evidence, Level, figure
 from verification.ledger.found import Found, equations, evidence
 from verification.ledger.weak_forms import CLEAR, CONVERGENT, EXACT, LIMIT, PLANE, Case, Weak, cases, image_of
@@ -92,7 +92,7 @@ class Norms:
         return float(np.sqrt(max(float(load @ self._solve(load)), 0.0)))
 
 
-def strong_convergence(weak: Weak, states: Sequence[State], theta: float, m: float) -> Floats:
+def strong_convergence(weak: Weak, states: Sequence[Iterate], theta: float, m: float) -> Floats:
     """Proposition 5.1: left side of its estimate over the right side, for pairs of steps of a run."""
     norms = Norms(weak)
     fields = [weak.at(state) for state in states[:-1]]
@@ -111,10 +111,11 @@ def strong_convergence(weak: Weak, states: Sequence[State], theta: float, m: flo
 def forces_carry_displacements(setting: Setting) -> list[Evidence]:
     ratios, ends = {}, []
     for case in setting.cases:
-        clear = [s for s in case.run.states if s.relative_residual > CLEAR]
+        clear = [s for s in case.run.iterates if s.relative_residual > CLEAR]
         if len(clear) > 2:
-            m = measure(case.weak.pair).m.value
-            ratios[case.name] = float(strong_convergence(case.weak, clear[:12], float(case.run.theta), m).max())
+            m = measure(case.weak.pair).m
+            assert m is not None  # there are meshes
+            ratios[case.name] = float(strong_convergence(case.weak, clear[:12], float(case.run.theta), m.value).max())
         if case.run.converged:
             ends.append(Found(name=case.name, values=np.array([apart(case)]), limit=LIMIT))
     where = max(ratios, key=lambda name: figure(ratios[name]))
@@ -154,7 +155,7 @@ class Convergence:
         """
         weak = self.case.weak
         neumann, g = weak.pair.neumann, -weak.force(weak.one, self.case.solution.one)
-        distance = np.array([neumann.dual_norm(state.g - g) for state in self.case.run.states])
+        distance = np.array([neumann.dual_norm(state.g - g) for state in self.case.run.iterates])
         count = int((distance > CLEAR * neumann.dual_norm(g)).sum())
         return float((distance[1:count] / distance[: count - 1]).max(initial=0.0))
 

@@ -21,10 +21,10 @@ from verification.algorithm.affine_piece import Piece
 from verification.algorithm.fixed_point import FixedPointMap
 from verification.bounds.losses import Forms, square, top
 from verification.bounds.pattern_search import worst_piece
-from verification.constants import on_lifts
 from verification.contact import ContactError, ContactSolution
 from verification.contact.active_set import Pattern
-from verification.interface.pair import Body, Pair
+from verification.interface.body import Body
+from verification.interface.pair import ContactPair
 
 #: Distances of two random forces, over their size.
 DISTANCES = (0.1, 0.3, 1.0, 3.0)
@@ -38,7 +38,7 @@ def lifted_energy(body: Body) -> Floats:
 
     It equals the Schur complement because the lift is a-harmonic, which is used nowhere here.
     """
-    return on_lifts(body, body.stiffness)
+    return body.on_lifts(body.stiffness)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -47,11 +47,11 @@ class Setting:
 
     Attributes
     ----------
-    pair : Pair
+    pair : ContactPair
         No contact node is held.
     """
 
-    pair: Pair
+    pair: ContactPair
 
     @cached_property
     def forms(self) -> Forms:
@@ -61,12 +61,12 @@ class Setting:
     @cached_property
     def bilinear_1(self) -> Floats:
         """``a^1(R phi, R chi)`` from the lifted fields."""
-        return self.pair.orient_form(lifted_energy(self.pair.contact.body))
+        return self.pair.contact.orient_form(lifted_energy(self.pair.contact.mesh_body))
 
     @cached_property
     def bilinear_2(self) -> Floats:
         """``a^2(R phi, R chi)`` from the lifted fields."""
-        return self.pair.orient_form(lifted_energy(self.pair.neumann.body))
+        return self.pair.neumann.orient_form(lifted_energy(self.pair.neumann.mesh_body))
 
     @cached_property
     def coordinates(self) -> Floats:
@@ -183,18 +183,18 @@ def between(setting: Setting, psi: Floats, other: Floats) -> Difference:
     ------
     ContactError
     """
-    pair, t, forms = setting.pair, setting.pair.tangential.stop, setting.forms
+    pair, t, forms = setting.pair, setting.pair.contact.grid.t, setting.forms
     solutions, states, stress, size = [], [], [], 0.0
     for force in (psi, other):
         u, solution = _solve(pair, force)
         w_1 = u + solution.v
-        w_1[pair.normal] += pair.gap
+        w_1[pair.contact.grid.normal] += pair.interface.gap
         parts = ((w_1, pair.contact.stiffness), (force + pair.neumann.load, forms.inverse))
         size += sum(_norm(v, gram) ** 2 for v, gram in (*parts, (solution.force, forms.inverse)))
         solutions.append(solution)
         states.append(u)
         stress.append(_stress(pair, force))
-    weights = float(pair.problem.contact.friction) * pair.weights[:t]  # t = 0 in one dimension
+    weights = float(pair.friction) * pair.contact.grid.weights[:t]  # t = 0 in one dimension
     bounds = [np.abs(value)[:t] for value in stress]
     slips = [np.abs(solution.v[:t]) for solution in solutions]
     d_2 = states[0] - states[1]
@@ -209,16 +209,20 @@ def between(setting: Setting, psi: Floats, other: Floats) -> Difference:
     )
 
 
-def _solve(pair: Pair, force: Floats) -> tuple[Floats, ContactSolution]:
+def _solve(pair: ContactPair, force: Floats) -> tuple[Floats, ContactSolution]:
     try:
         return FixedPointMap(pair, "active-set")(force)
     except ContactError:
         return FixedPointMap(pair, "cvxpy")(force)
 
 
-def _stress(pair: Pair, force: Floats) -> Floats:
+def _stress(pair: ContactPair, force: Floats) -> Floats:
     """``S sigma_N`` at the nodes."""
-    return np.zeros(pair.n) if pair.regularisation is None else np.asarray(pair.regularisation @ force[pair.normal])
+    return (
+        np.zeros(pair.contact.grid.n)
+        if pair.interface.kernel is None
+        else np.asarray(pair.interface.kernel @ force[pair.contact.grid.normal])
+    )
 
 
 def random_pairs(setting: Setting, random: np.random.Generator, count: int) -> Iterator[Difference]:
@@ -239,7 +243,7 @@ def random_pairs(setting: Setting, random: np.random.Generator, count: int) -> I
         other = psi + step * DISTANCES[i % len(DISTANCES)] * pair.neumann.dual_norm(psi)
         if i % 2:
             for force in (psi, other):
-                force[pair.normal] = np.abs(force[pair.normal])
+                force[pair.contact.grid.normal] = np.abs(force[pair.contact.grid.normal])
         yield between(setting, psi, other)
 
 
@@ -249,7 +253,7 @@ def random_pairs(setting: Setting, random: np.random.Generator, count: int) -> I
 def along(setting: Setting, piece: Piece, y: Floats) -> Difference:
     """The difference on one piece of T in a direction ``psi - psi~ = L_2 y``."""
     forms = setting.forms
-    root, t = forms.root, setting.pair.tangential.stop
+    root, t = forms.root, setting.pair.contact.grid.t
     force = root @ y
     d_2 = forms.inverse @ force
     jump = piece.jump @ force
@@ -278,17 +282,17 @@ def work_form(forms: Forms, piece: Piece) -> Floats:
     return np.asarray(form + form.T) / 2
 
 
-def uniform_piece(pair: Pair, *, touching: bool, sliding: int) -> Piece:
+def uniform_piece(pair: ContactPair, *, touching: bool, sliding: int) -> Piece:
     """The piece on which every node does the same; ``S sigma_N > 0``."""
-    t = pair.tangential.stop
-    pattern = Pattern(touching=np.full(pair.n, touching), sliding=np.full(t, sliding, dtype=np.int8))
-    still: NDArray[np.bool_] = np.zeros(pair.n, dtype=bool)
+    t = pair.contact.grid.t
+    pattern = Pattern(touching=np.full(pair.contact.grid.n, touching), sliding=np.full(t, sliding, dtype=np.int8))
+    still: NDArray[np.bool_] = np.zeros(pair.contact.grid.n, dtype=bool)
     return Piece(pair=pair, pattern=pattern, sign=_signs(pair), still=still)
 
 
-def _signs(pair: Pair) -> NDArray[np.int8]:
-    rubs = bool(pair.problem.contact.friction and pair.regularisation is not None)
-    return np.full(pair.tangential.stop, int(rubs), dtype=np.int8)
+def _signs(pair: ContactPair) -> NDArray[np.int8]:
+    rubs = bool(pair.friction and pair.interface.kernel is not None)
+    return np.full(pair.contact.grid.t, int(rubs), dtype=np.int8)
 
 
 def pieces(setting: Setting, random: np.random.Generator, *, starts: int) -> list[Piece]:
@@ -305,7 +309,7 @@ def pieces(setting: Setting, random: np.random.Generator, *, starts: int) -> lis
         Of each search; 0 leaves the searches out.
     """
     pair, forms = setting.pair, setting.forms
-    friction = bool(pair.problem.contact.friction)
+    friction = bool(pair.friction)
     found = [uniform_piece(pair, touching=True, sliding=0 if friction else 1)]
     found.append(uniform_piece(pair, touching=False, sliding=1))
     objectives = [
@@ -343,7 +347,7 @@ def directions(setting: Setting, piece: Piece, random: np.random.Generator) -> l
         (work, one),
         (square_T + 2 * work, one),  # T_theta at theta = 1/2
     ]
-    if setting.pair.problem.contact.friction:
+    if setting.pair.friction:
         # 2 |x| |y| <= |x|^2/r + r |y|^2 with equality at r = |x|/|y|: (5.13) where |x|/|y| is the largest there is
         r = math.sqrt(max(top(size_1, size_2), 1e-12))
         pencils += [(F, one), (F, size_1 / (2 * r) + (1 + r / 2) * size_2)]

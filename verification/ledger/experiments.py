@@ -19,7 +19,7 @@ import numpy as np
 from fem1d2d.mesh import Floats
 from verification.algorithm.runs import run
 from verification.interface.assembly import build
-from verification.interface.pair import Pair
+from verification.interface.pair import ContactPair
 from verification.ledger.evidence import Evidence, Level, figure, gather
 from verification.ledger.sweeps import (
     GEOMETRIES,
@@ -77,7 +77,7 @@ def _same_results(sweeps: Sweeps) -> list[Evidence]:
     return [_evidence("printed", False, text, worst=figure(apart[worst], 3), where=worst, **data)]
 
 
-def difference(pair: Pair) -> float:
+def difference(pair: ContactPair) -> float:
     """Largest difference of nodal stress between run and global method, relative to the largest stress."""
     one, other = run(pair, solver="active-set").contact, solve(pair).contact
     size = float(max(np.abs(other.pressure).max(), np.abs(other.shear).max()))
@@ -117,7 +117,7 @@ def _zones(sweeps: Sweeps) -> list[Evidence]:
         for top in tops:
             problem = Model(geometry=geometry, top=top, halvings=sweeps.halvings + 1).problem
             contact = solve(problem).contact
-            found = zones(contact.x, contact.state)
+            found = zones(contact.x, contact.status)
             readings.append({"geometry": geometry, "u_x on the top": top, "zones": found})
             if as_printed(found, float(np.diff(contact.x).max())):
                 agree.append(_name(readings[-1]))

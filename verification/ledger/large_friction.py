@@ -14,9 +14,8 @@ import numpy as np
 from scipy.linalg import eigh
 
 from fem1d2d.mesh import Floats
-from verification.algorithm.fixed_point import FixedPointMap
 from verification.bounds.losses import square
-from verification.interface.pair import Pair
+from verification.interface.pair import ContactPair
 from verification.ledger.cases import three_digits
 from verification.ledger.differences import Difference, Setting, along, between, uniform_piece
 from verification.ledger.evidence import Evidence, Level, figure
@@ -87,14 +86,14 @@ class Witness:
 IDS = ("5.30", "5.31", "5.32", "5.33", "5.36", "5.39", "5.44", "x-printed-false-everywhere")
 
 
-def loaded(pair: Pair, g: Floats, v: Floats, force: Floats) -> Pair:
+def loaded(pair: ContactPair, g: Floats, v: Floats, force: Floats) -> ContactPair:
     """The same bodies, the contact body loaded so that step II answers g with the jump v and the reaction ``force``.
 
     ``l_1 = force + S_1 (u_2 + gap + v)``, applied as forces on the contact nodes: condensation leaves these alone.
 
     Parameters
     ----------
-    pair : Pair
+    pair : ContactPair
         The two bodies with any loads.
     g : array, shape (2 n,)
         Force on the Neumann body.
@@ -103,13 +102,8 @@ def loaded(pair: Pair, g: Floats, v: Floats, force: Floats) -> Pair:
     """
     neumann, contact = pair.neumann, pair.contact
     u = neumann.known + neumann.flexibility(g + neumann.load) + v
-    u[pair.normal] += pair.gap
-    more = pair.orient(force + contact.stiffness @ u - contact.load)
-    body = contact.body
-    load = body.load.copy()
-    load[body.interface] += more[body.unknown]
-    pushed = replace(body, load=load)
-    return replace(pair, body1=pushed) if body.name == "body1" else replace(pair, body2=pushed)
+    u[pair.contact.grid.normal] += pair.interface.gap
+    return replace(pair, contact=replace(contact, load=force + contact.stiffness @ u, body=None), problem=None)
 
 
 def witness(case: Trial, random: np.random.Generator) -> Witness:
@@ -126,7 +120,7 @@ def witness(case: Trial, random: np.random.Generator) -> Witness:
     steep = reading.C_K * reading.M**2 / reading.m**3  # of the printed bound in k, where the bracket is 1
     first = Setting(pair=_with_friction(case.pair, Fraction(1)))
     piece = uniform_piece(first.pair, touching=False, sliding=1)
-    T, t = first.forms.force(piece), case.pair.tangential.stop
+    T, t = first.forms.force(piece), case.pair.contact.grid.t
     y = eigh(square(T, first.forms.inverse))[1][:, -1]
     unit_step = along(first, piece, y)  # |y| = 1: e = 1; F = alpha k^2 + gamma k, W = gamma k, t^2 = beta k^2
     gamma, beta = unit_step.work, unit_step.norm_T**2
@@ -136,7 +130,7 @@ def witness(case: Trial, random: np.random.Generator) -> Witness:
     pair = _with_friction(case.pair, k)
     reading = Reading.of(case.measured.with_friction(float(k)))
     unit = BRACKET / (reading.A + 2 * reading.C_K + reading.m)  # sqrt(m x) <= m + x
-    setting, n = Setting(pair=pair), pair.n
+    setting, n = Setting(pair=pair), pair.contact.grid.n
     g = np.concatenate([random.uniform(-1, 1, t), random.uniform(0.5, 1, n)])
     length = STEP * np.abs(g[t:]).min() / np.abs(setting.forms.root @ y).max()
     change = along(setting, uniform_piece(pair, touching=False, sliding=1), length * y)
@@ -144,15 +138,15 @@ def witness(case: Trial, random: np.random.Generator) -> Witness:
     far = np.linalg.norm(g) / np.linalg.norm(pair.contact.stiffness, 2)
     far = max(far, np.abs(change.d_1 - change.d_2).max() / STEP)
     jump = far * np.concatenate([random.uniform(0.5, 1, t), -random.uniform(0.5, 1, n)])
-    pair = loaded(pair, g, jump, np.concatenate([FixedPointMap(pair).bound(g), np.zeros(n)]))
+    pair = loaded(pair, g, jump, np.concatenate([pair.bound(g), np.zeros(n)]))
     difference = between(Setting(pair=pair), g + change.force, g - change.force)
     return Witness(name=case.name, difference=difference, reading=reading.in_unit(unit), friction=float(k), unit=unit)
 
 
-def _with_friction(pair: Pair, k: Fraction) -> Pair:
+def _with_friction(pair: ContactPair, k: Fraction) -> ContactPair:
     """The same bodies at another friction, without a gap."""
-    contact = replace(pair.problem.contact, friction=k, gap=Fraction(0))
-    return replace(pair, problem=replace(pair.problem, contact=contact), gap=np.zeros(pair.n))
+    interface = replace(pair.interface, gap=np.zeros(pair.contact.grid.n))
+    return replace(pair.at(friction=k), interface=interface, problem=None)
 
 
 def large_friction(

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fem1d2d.mesh import Floats
-from verification.algorithm.iterate import State
+from verification.algorithm.iterate import Iterate
 from verification.ledger.convergence import (
     Setting,
     fields_converge,
@@ -68,7 +68,8 @@ def _signorini(setting: Setting) -> list[Evidence]:
         for c in setting.cases
     ]
     force = {
-        case.name: case.weak.force(case.weak.two, case.solution.two)[case.weak.pair.normal] for case in setting.cases
+        case.name: case.weak.force(case.weak.two, case.solution.two)[case.weak.pair.contact.grid.normal]
+        for case in setting.cases
     }
     closed = sum(int((f > EXACT * (np.abs(f).max() or 1.0)).sum()) for f in force.values())
     nodes = sum(len(f) for f in force.values())
@@ -79,7 +80,7 @@ def _signorini(setting: Setting) -> list[Evidence]:
 def _friction(setting: Setting) -> list[Evidence]:
     plane = with_friction(setting.cases)
     seen = [Found(name=c.name, values=np.array(list(coulomb(c.weak, c.solution).values())), limit=EXACT) for c in plane]
-    slips = [np.abs(c.weak.jump(c.solution.one, c.solution.two)[c.weak.pair.tangential]) for c in plane]
+    slips = [np.abs(c.weak.jump(c.solution.one, c.solution.two)[c.weak.pair.contact.grid.tangential]) for c in plane]
     sliding = sum(int((s > 1e-9 * (s.max() or 1.0)).sum()) for s in slips)
     nodes = sum(len(s) for s in slips)
     text = f"both lines at {nodes} nodes, {sliding} of them with a jump, with sigma_T that of body 1"
@@ -131,7 +132,7 @@ def _step_1(setting: Setting) -> list[Evidence]:
 
 
 def _step_2(setting: Setting) -> list[Evidence]:
-    def values(weak: Weak, step: tuple[State, State], rng: np.random.Generator) -> Floats:
+    def values(weak: Weak, step: tuple[Iterate, Iterate], rng: np.random.Generator) -> Floats:
         u = weak.at(step[0])
         return shifted_inequality(weak, u, obstacle_tests(weak, u, rng, setting.count))
 
@@ -145,7 +146,7 @@ def printed_defect(weak: Weak, u: Fields) -> tuple[float, Floats]:
 
     The test function ``w + R u^2 - u^1`` vanishes, and with it the work: only the friction terms are left.
     """
-    t, bound = weak.pair.tangential, weak.bound(u.two)
+    t, bound = weak.pair.contact.grid.tangential, weak.bound(u.two)
     w = weak.trace(weak.one, u.one - weak.lift(weak.one, weak.trace(weak.two, u.two)))
     own = float(bound @ np.abs(weak.trace(weak.one, u.one)[t]))
     return (float(bound @ np.abs(w[t])) - own) / (own or 1.0), w
@@ -155,7 +156,7 @@ def _printed_step_2(found: Sequence[Case]) -> Evidence:
     seen = {case.name: (*printed_defect(case.weak, case.solution), case) for case in with_friction(found)}
     where = min(seen, key=lambda name: figure(seen[name][0]))
     worst, w, case = seen[where]
-    t, normal, size = case.weak.pair.tangential, case.weak.pair.normal, largest(case.solution)
+    t, normal, size = case.weak.pair.contact.grid.tangential, case.weak.pair.contact.grid.normal, largest(case.solution)
     bound = case.weak.bound(case.solution.two)
     data = {
         "problems": list(seen),
@@ -175,7 +176,7 @@ def _printed_step_2(found: Sequence[Case]) -> Evidence:
 
 
 def _step_3(setting: Setting) -> list[Evidence]:
-    def values(weak: Weak, item: tuple[float, State, State], rng: np.random.Generator) -> Floats:
+    def values(weak: Weak, item: tuple[float, Iterate, Iterate], rng: np.random.Generator) -> Floats:
         theta, state, following = item
         image = (following.g - (1 - theta) * state.g) / theta
         return transfer(weak, weak.at(state), image, directions(rng, weak.two, setting.count))
@@ -221,7 +222,7 @@ def _definition_of_T(setting: Setting) -> list[Evidence]:
 
 
 def _contact_problem(setting: Setting) -> list[Evidence]:
-    def values(weak: Weak, state: State, rng: np.random.Generator) -> Floats:
+    def values(weak: Weak, state: Iterate, rng: np.random.Generator) -> Floats:
         w = weak.at(state)
         return contact_inequality(weak, w, moves_of_one(weak, w, rng, setting.count))
 

@@ -17,7 +17,7 @@ from verification.algorithm.fixed_point import FixedPointMap
 from verification.constants import measure
 from verification.contact import ContactError
 from verification.interface.assembly import build
-from verification.interface.pair import Pair
+from verification.interface.pair import ContactPair
 from verification.ledger.evidence import Level, figure
 from verification.problem.specification import Problem, load
 
@@ -139,7 +139,7 @@ class Trace:
         return None
 
 
-def trace(pair: Pair, theta: float, steps: int = MOST_STEPS, bound: float = STOP) -> Trace:
+def trace(pair: ContactPair, theta: float, steps: int = MOST_STEPS, bound: float = STOP) -> Trace:
     """Run until the relative increment and the unrelaxed residual are at most a bound, or wander about."""
     T, size = FixedPointMap(pair, "active-set"), lambda force: float(np.linalg.norm(force))
     g = np.zeros(len(pair.neumann.load))
@@ -240,7 +240,7 @@ class Sweeps:
             "E1": float(model.young[0]),
             "E2": float(model.young[1]),
             "friction": float(model.friction),
-            "nodes": sum(len(body.mesh.points) for body in (pair.body1, pair.body2)),
+            "nodes": sum(len(body.mesh.points) for body in pair.on_meshes().elastic),
             "best_theta": None if best is None else float(best.theta),
             "iterations": None if best is None else best.steps,
             "best_theta_residual": None if unrelaxed is None else float(unrelaxed.theta),
@@ -261,7 +261,7 @@ class Best:
     steps: int
 
 
-def rho_of(pair: Pair) -> float:
+def rho_of(pair: ContactPair) -> float:
     """rho of the roles."""
     rho = measure(pair).rho_max
     assert rho is not None

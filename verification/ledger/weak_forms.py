@@ -17,12 +17,13 @@ import numpy as np
 
 from fem1d2d import solver
 from fem1d2d.mesh import Floats
-from verification.algorithm.fixed_point import FixedPointMap, state_at
-from verification.algorithm.iterate import State
+from verification.algorithm.fixed_point import FixedPointMap, iterate_at
+from verification.algorithm.iterate import Iterate
 from verification.algorithm.runs import Run, run
 from verification.contact import ContactError
 from verification.interface.assembly import build
-from verification.interface.pair import Body, Pair
+from verification.interface.body import Body
+from verification.interface.pair import ContactPair
 from verification.ledger.evidence import Level
 from verification.monolithic import solve
 from verification.problem.specification import Problem
@@ -123,17 +124,17 @@ class Fields:
 class Weak:
     """The weak forms of a pair, in whole fields."""
 
-    pair: Pair
+    pair: ContactPair
 
     @property
     def one(self) -> Body:
         """The contact body."""
-        return self.pair.body1 if self.pair.problem.iteration.neumann_body == 2 else self.pair.body2
+        return self.pair.contact.mesh_body
 
     @property
     def two(self) -> Body:
         """The Neumann body."""
-        return self.pair.body2 if self.pair.problem.iteration.neumann_body == 2 else self.pair.body1
+        return self.pair.neumann.mesh_body
 
     @cached_property
     def _lifts(self) -> dict[str, Any]:
@@ -166,16 +167,12 @@ class Weak:
     def jump(self, one: Floats, two: Floats) -> Floats:
         """``v^1 - v^2`` on Gamma_c, less the initial gap in the normal components."""
         jump = self.trace(self.one, one) - self.trace(self.two, two)
-        jump[self.pair.normal] -= self.pair.gap.reshape(-1, *[1] * (jump.ndim - 1))
+        jump[self.pair.contact.grid.normal] -= self.pair.interface.gap.reshape(-1, *[1] * (jump.ndim - 1))
         return jump
 
     def bound(self, two: Floats) -> Floats:
         """``w_j k |S sigma_N|`` at the nodes, sigma_N that of body 2."""
-        pair, k = self.pair, float(self.pair.problem.contact.friction)
-        if k == 0 or pair.regularisation is None:
-            return np.zeros(pair.tangential.stop)
-        stress = pair.regularisation @ self.force(self.two, two)[pair.normal]
-        return np.asarray(k * pair.weights * np.abs(stress))
+        return self.pair.bound(self.force(self.two, two))
 
     def energy(self, fields: Fields) -> Floats:
         """``sqrt(a(v, v))`` of the unknowns, for each column."""
@@ -186,17 +183,18 @@ class Weak:
         """The unknowns of two displacement fields, the lower body's first."""
         first, second = (
             displacement.ravel()[body.free] if displacement is not None else np.zeros(len(body.free))
-            for body, displacement in zip((self.pair.body1, self.pair.body2), displacements, strict=True)
+            for body, displacement in zip(self.pair.on_meshes().elastic, displacements, strict=True)
         )
-        return Fields(one=first, two=second) if self.one is self.pair.body1 else Fields(one=second, two=first)
+        return Fields(one=first, two=second) if self.pair.neumann_body == 2 else Fields(one=second, two=first)
 
-    def at(self, state: State) -> Fields:
+    def at(self, state: Iterate) -> Fields:
         """``w^1`` and ``w^2`` of (5.5) and (5.6), steps II and I of an evaluation of T."""
         pair = self.pair
         moved = state.displacement + state.contact.v
-        moved[pair.normal] += pair.gap
+        moved[pair.contact.grid.normal] += pair.interface.gap
         traces = {self.one.name: pair.orient(moved), self.two.name: pair.orient(state.displacement)}
-        return self.of((pair.body1.displacement(traces["body1"]), pair.body2.displacement(traces["body2"])))
+        body1, body2 = pair.on_meshes().elastic
+        return self.of((body1.displacement(traces["body1"]), body2.displacement(traces["body2"])))
 
 
 def _dot(a: Floats, b: Floats) -> Floats:
@@ -231,9 +229,9 @@ class Case:
         return self.weak.of(self.run.displacements)
 
     @cached_property
-    def steps(self) -> list[tuple[State, State]]:
+    def steps(self) -> list[tuple[Iterate, Iterate]]:
         """Some of the run's steps: the first ones, one in the middle, the last one."""
-        states = self.run.states
+        states = self.run.iterates
         chosen = sorted({0, 1, 2, len(states) // 2, len(states) - 2} & set(range(len(states) - 1)))
         return [(states[i], states[i + 1]) for i in chosen]
 
@@ -243,7 +241,7 @@ class Case:
         return self.weak.force(self.weak.two, self.solution.two)
 
     @cached_property
-    def arbitrary(self) -> list[State]:
+    def arbitrary(self) -> list[Iterate]:
         """T at random forces: small and large, pressing and pulling."""
         rng = generator("arbitrary")
         size = np.abs(self.g).max() or 1.0
@@ -254,12 +252,12 @@ class Case:
         ]
 
 
-def image_of(pair: Pair, psi: Floats) -> State:
+def image_of(pair: ContactPair, psi: Floats) -> Iterate:
     """T at a force: by the active set, and by the convex program where that does not close."""
     try:
-        return state_at(FixedPointMap(pair, "active-set"), psi)
+        return iterate_at(FixedPointMap(pair, "active-set"), psi)
     except ContactError:
-        return state_at(FixedPointMap(pair), psi)
+        return iterate_at(FixedPointMap(pair), psi)
 
 
 def generator(key: str) -> np.random.Generator:
@@ -329,7 +327,7 @@ def moves_in_K(weak: Weak, u: Fields, rng: np.random.Generator, count: int) -> F
     undone = closing(weak, u)
     one = np.concatenate([sizes * columns_1, undone], axis=1)
     two = np.concatenate([sizes * columns_2, np.zeros((len(u.two), undone.shape[1]))], axis=1)
-    normal, up = weak.pair.normal, weak.pair.upward
+    normal, up = weak.pair.contact.grid.normal, weak.pair.upward
     rows_1, rows_2 = weak.one.interface[normal], weak.two.interface[normal]
     room = -weak.jump(u.one, u.two)[normal][:, None]
     first = rng.random(one.shape[1]) < 0.5
@@ -344,7 +342,7 @@ def moves_of_one(weak: Weak, u: Fields, rng: np.random.Generator, count: int) ->
     random, hat = directions(rng, weak.one, count), hats(weak.one)
     columns = np.concatenate([random, hat, hat, 100 * random], axis=1)
     d = np.concatenate([_sizes(rng, largest(u), columns.shape[1]) * columns, closing(weak, u)], axis=1)
-    normal, up = weak.pair.normal, weak.pair.upward
+    normal, up = weak.pair.contact.grid.normal, weak.pair.upward
     rows = weak.one.interface[normal]
     d[rows] = up * np.minimum(up * d[rows], -weak.jump(u.one, u.two)[normal][:, None])
     return np.asarray(d)
@@ -352,14 +350,14 @@ def moves_of_one(weak: Weak, u: Fields, rng: np.random.Generator, count: int) ->
 
 def obstacle_tests(weak: Weak, u: Fields, rng: np.random.Generator, count: int) -> Floats:
     """Columns w of V^1_-(0): random ones, and ``u^1 - R u^2`` moved as in ``moves_of_one``."""
-    body, normal, up = weak.one, weak.pair.normal, weak.pair.upward
+    body, normal, up = weak.one, weak.pair.contact.grid.normal, weak.pair.upward
     random, hat = directions(rng, body, count), hats(body)
     start = u.one - weak.lift(body, weak.trace(weak.two, u.two))
     columns = np.concatenate([random, hat, hat], axis=1)
     moves = np.concatenate([_sizes(rng, largest(u), columns.shape[1]) * columns, closing(weak, u)], axis=1)
     w = np.concatenate([start[:, None] + moves, 10 * largest(u) * random], axis=1)
     rows = body.interface[normal]
-    w[rows] = up * np.minimum(up * w[rows], weak.pair.gap[:, None])
+    w[rows] = up * np.minimum(up * w[rows], weak.pair.interface.gap[:, None])
     return w
 
 
@@ -372,7 +370,7 @@ def largest(u: Fields) -> float:
 
 def unilateral(weak: Weak, u: Fields) -> dict[str, float]:
     """(2.4): the largest violation of each condition, lengths relative to the largest displacement."""
-    normal, two = weak.pair.normal, weak.force(weak.two, u.two)
+    normal, two = weak.pair.contact.grid.normal, weak.force(weak.two, u.two)
     jump = weak.jump(u.one, u.two)[normal] / max(np.abs(u.one).max(), np.abs(u.two).max())
     pressure = two[normal] / (np.abs(two).max() or 1.0)
     worst = lambda values: float(np.max(values, initial=0.0))
@@ -385,7 +383,7 @@ def unilateral(weak: Weak, u: Fields) -> dict[str, float]:
 
 def coulomb(weak: Weak, u: Fields) -> dict[str, float]:
     """(2.6) with the tangential stress of body 1: the largest violation of each line."""
-    t = weak.pair.tangential
+    t = weak.pair.contact.grid.tangential
     force, bound, jump = weak.force(weak.one, u.one)[t], weak.bound(u.two), weak.jump(u.one, u.two)[t]
     forces = float(np.abs(weak.force(weak.two, u.two)).max()) or 1.0
     lengths = float(max(np.abs(u.one).max(), np.abs(u.two).max()))
@@ -400,7 +398,7 @@ def coulomb(weak: Weak, u: Fields) -> dict[str, float]:
 
 def reaction(weak: Weak, u: Fields) -> dict[str, float]:
     """(2.3): differences of the stress components of the two bodies, relative to the largest nodal force."""
-    t, normal = weak.pair.tangential, weak.pair.normal
+    t, normal = weak.pair.contact.grid.tangential, weak.pair.contact.grid.normal
     one, two = weak.force(weak.one, u.one), weak.force(weak.two, u.two)
     forces = float(np.abs(two).max()) or 1.0
     worst = lambda values: float(np.max(np.abs(values), initial=0.0)) / forces
@@ -428,7 +426,7 @@ def contact_inequality(weak: Weak, u: Fields, d: Floats) -> Floats:
 
 def shifted_inequality(weak: Weak, u: Fields, w: Floats) -> Floats:
     """(4.9) II with the jump, (5.2): left minus right side for columns w, relative to ``|u| |w + R u^2 - u^1|``."""
-    t = weak.pair.tangential
+    t = weak.pair.contact.grid.tangential
     d = w + (weak.lift(weak.one, weak.trace(weak.two, u.two)) - u.one)[:, None]
     slides = np.abs(weak.trace(weak.one, w)[t]) - np.abs(weak.jump(u.one, u.two)[t])[:, None]
     value = weak.excess(weak.one, u.one) @ d + weak.bound(u.two) @ slides
@@ -437,7 +435,7 @@ def shifted_inequality(weak: Weak, u: Fields, w: Floats) -> Floats:
 
 def _friction_of_move(weak: Weak, u: Fields, moved: Floats) -> Floats:
     """``j(v) - j(u)`` where the jump moves."""
-    t = weak.pair.tangential
+    t = weak.pair.contact.grid.tangential
     jump = weak.jump(u.one, u.two)[t][:, None]
     return np.asarray(weak.bound(u.two) @ (np.abs(jump + moved[t]) - np.abs(jump)))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, Literal
@@ -16,7 +16,8 @@ from fem1d2d.mesh import Floats
 from verification.bounds.losses import top
 from verification.constants import Measured, measure
 from verification.interface.assembly import build
-from verification.interface.pair import Body, Pair
+from verification.interface.body import Body
+from verification.interface.pair import ContactPair
 from verification.ledger.cases import NAMED, problem
 from verification.ledger.differences import Difference, Setting, draw_pairs
 from verification.ledger.evidence import Evidence, figure
@@ -32,13 +33,13 @@ class Trial:
     Attributes
     ----------
     name : str
-    pair : Pair
+    pair : ContactPair
     measured : Measured
         The constants of the mesh.
     """
 
     name: str
-    pair: Pair
+    pair: ContactPair
     measured: Measured
 
     @classmethod
@@ -60,7 +61,7 @@ class Trial:
     @property
     def bodies(self) -> tuple[Body, Body]:
         """The contact body and the Neumann body: the order of all that follows."""
-        return self.pair.contact.body, self.pair.neumann.body
+        return self.pair.contact.mesh_body, self.pair.neumann.mesh_body
 
     @property
     def N(self) -> tuple[Floats, Floats]:
@@ -103,9 +104,7 @@ class Trial:
         """The same bodies at a share of the friction C_2 of the repaired edition."""
         unit = self.measured.with_friction(1.0).C_K
         k = float(share) * self.reading.threshold / (math.nan if unit is None else unit.value)
-        problem = self.pair.problem
-        slight = replace(problem, contact=replace(problem.contact, friction=Fraction(k)))
-        pair = replace(self.pair, problem=slight)  # the bodies know nothing of friction
+        pair = self.pair.at(friction=Fraction(k))
         return Trial(name=self.name, pair=pair, measured=self.measured.with_friction(k))
 
 

@@ -43,7 +43,7 @@ def report(comparison: Comparison, figures: Mapping[str, str]) -> str:
         run=comparison.run,
         bounded=bounded(comparison.editions),
         problem=comparison.run.pair.problem,
-        title="".join(c if c.isprintable() else " " for c in comparison.run.pair.problem.title),
+        title="".join(c if c.isprintable() else " " for c in comparison.run.pair.title),
         measured=comparison.measured,
         figures={name: _inline(name, text) for name, text in figures.items()},
         on_the_printed_proof=on_the_printed_proof(),

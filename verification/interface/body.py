@@ -1,0 +1,261 @@
+"""An elastic body on its mesh, and the same body as its contact nodes feel it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve, cholesky, qr
+
+from fem1d2d import Condensation, Material, Mesh, Supports, solver
+from fem1d2d.mesh import Floats, Ints
+from verification.interface.grid import Grid
+from verification.threads import one_thread
+
+Name = Literal["body1", "body2"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Body:
+    """An elastic body on its mesh; interface vectors have their normal components along y (along x in 1D).
+
+    Attributes
+    ----------
+    name : {'body1', 'body2'}
+    mesh : Mesh
+    material : Material
+    poisson : float
+        Poisson's ratio; 0 for a bar.
+    known : Supports
+        Displacements known on Gamma_u.
+    nodes : int array, shape (n,)
+        Contact nodes from left to right.
+    free : int array
+        Positions of the unknowns among all d * node + p.
+    unknown : bool array, shape (2 n,) or (n,) in 1D
+        Interface components that Gamma_u leaves free; a False one is held tangentially.
+    interface : int array
+        Positions of the unknown interface components among the unknowns.
+    stiffness, gram_matrix : sparse array
+        The stiffness matrix and the H1 Gram matrix of the unknowns.
+    load : array
+        Loads on the unknowns: body force, tractions, prescribed displacements.
+    motions : array, shape (unknowns, k)
+        Rigid motions that only contact can hold; k = 0 in the iteration.
+    """
+
+    name: Name
+    mesh: Mesh
+    material: Material
+    poisson: float
+    known: Supports
+    nodes: Ints
+    free: Ints
+    unknown: NDArray[np.bool_]
+    interface: Ints
+    stiffness: sp.csc_array
+    gram_matrix: sp.csc_array
+    load: Floats
+    motions: Floats
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What is factorised stays behind: SuperLU's factors cannot travel, and are made anew when asked for."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+    @cached_property
+    def solve(self) -> Callable[[Floats], Floats]:
+        """``load -> A^-1 load`` on the unknowns, for one load or columns of loads.
+
+        Where rigid motions are left, as many unknowns are pinned: exact, up to a motion, for loads in equilibrium.
+        """
+        with one_thread():
+            k = self.motions.shape[1]
+            if k == 0:
+                return solver(self.stiffness)
+            _, _, order = qr(self.motions.T, pivoting=True, mode="economic")
+            rest = np.sort(order[k:])
+            pinned = solver(self.stiffness[rest][:, rest])
+
+        def solve(load: Floats) -> Floats:
+            result = np.zeros_like(load)
+            result[rest] = pinned(load[rest])
+            return result
+
+        return solve
+
+    @cached_property
+    def elastic(self) -> Condensation:
+        """The stiffness matrix condensed onto the interface."""
+        with one_thread():
+            condensed = Condensation(self.stiffness, self.interface)
+            condensed.lift  # noqa: B018  loads need it too: once for both
+            return condensed
+
+    @cached_property
+    def gram(self) -> Condensation:
+        """The Gram matrix condensed onto the interface."""
+        with one_thread():
+            return Condensation(self.gram_matrix, self.interface)
+
+    def on_lifts(self, matrix: sp.csc_array) -> Floats:
+        """``R_a' X R_a``: a symmetric form on the unknowns, evaluated at the lifts of interface vectors."""
+        inside, interface, lift = self.elastic.inside, self.elastic.interface, self.elastic.lift
+        cross = matrix[interface][:, inside] @ lift
+        inner = lift.T @ (matrix[inside][:, inside] @ lift)
+        product = matrix[interface][:, interface].toarray() + cross + cross.T + inner
+        return np.asarray((product + product.T) / 2)
+
+    @property
+    def known_trace(self) -> Floats:
+        """Interface displacements that Gamma_u prescribes, 0 where it does not."""
+        return np.concatenate([self.known.values[self.nodes, p] for p in range(self.mesh.dimension)])
+
+    def displacement(self, trace: Floats) -> Floats:
+        """Displacement of all nodes for given interface values, shape (nodes, d), unit of length."""
+        full = self.known.values.ravel().copy()
+        full[self.free] = self.elastic.extend(trace[self.unknown], self.load)
+        return full.reshape(self.mesh.points.shape)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Condensed:
+    """A body as its contact nodes feel it: what the algorithm and its bounds know of it.
+
+    Interface vectors have their normal components along n of the contact body.  Held components have zero rows and
+    columns.
+
+    Attributes
+    ----------
+    grid : Grid
+    stiffness : array, shape (2 n, 2 n)
+        S_a, stress (times length in 1D per unit thickness).
+    load : array, shape (2 n,)
+        l_a: loads condensed onto the interface.
+    known : array, shape (2 n,)
+        Known trace of held components.
+    free : bool array, shape (2 n,)
+        Components that Gamma_u leaves free.
+    body : Body or None
+        The body on its mesh; None where only matrices are known.
+    upward : bool
+        Whether the normal components point along y, as those of ``body`` do.
+    """
+
+    grid: Grid
+    stiffness: Floats
+    load: Floats
+    known: Floats
+    free: NDArray[np.bool_]
+    body: Body | None = None
+    upward: bool = True
+
+    def __post_init__(self) -> None:
+        for array in (self.stiffness, self.load, self.known, self.free):
+            array.setflags(write=False)
+
+    @classmethod
+    def of(cls, body: Body, grid: Grid) -> Condensed:
+        """Condense a body onto its contact nodes; normal components along y."""
+        rows = np.flatnonzero(body.unknown)
+        size = len(body.unknown)
+        matrix, load = np.zeros((size, size)), np.zeros(size)
+        matrix[np.ix_(rows, rows)] = body.elastic.schur
+        load[rows] = body.elastic.condense(body.load)
+        return cls(grid=grid, stiffness=matrix, load=load, known=body.known_trace, free=body.unknown.copy(), body=body)
+
+    def turned(self) -> Condensed:
+        """The same body with its normal components along the opposite direction."""
+        turn = self.grid.turn
+        return Condensed(
+            grid=self.grid,
+            stiffness=self.grid.turn_form(self.stiffness),
+            load=turn(self.load),
+            known=turn(self.known),
+            free=self.free,
+            body=self.body,
+            upward=not self.upward,
+        )
+
+    def orient(self, interface: Floats) -> Floats:
+        """Turn interface vectors between the directions of ``body`` and those used here (its own inverse)."""
+        return interface.copy() if self.upward else self.grid.turn(interface)
+
+    def orient_form(self, matrix: Floats) -> Floats:
+        """The same for a symmetric matrix on the free components."""
+        if self.upward:
+            return matrix
+        sign = np.where(np.arange(self.grid.size) < self.grid.t, 1.0, -1.0)[self.free]
+        return np.asarray(sign[:, None] * matrix * sign)
+
+    @property
+    def mesh_body(self) -> Body:
+        """The body on its mesh.
+
+        Raises
+        ------
+        ValueError
+            Only matrices are known.
+        """
+        if self.body is None:
+            raise ValueError("this pair is made from matrices: needed the meshes of both bodies")
+        return self.body
+
+    @cached_property
+    def _factor(self) -> tuple[NDArray[np.float64], bool]:
+        factor: tuple[NDArray[np.float64], bool] = cho_factor(self.stiffness[np.ix_(self.free, self.free)])
+        return factor
+
+    def flexibility(self, force: Floats) -> Floats:
+        """``S_a^-1 force`` on the free components, 0 on held ones, shape (2 n,)."""
+        result = np.zeros_like(force)
+        result[self.free] = cho_solve(self._factor, force[self.free], check_finite=False)
+        return result
+
+    @cached_property
+    def inverse(self) -> Floats:
+        """``S_a^-1`` as a matrix, 0 on held components, shape (2 n, 2 n)."""
+        return _frozen(self.flexibility(np.eye(len(self.load))))
+
+    @cached_property
+    def root(self) -> Floats:
+        """L with ``S_a = L L'``, shape (2 n, free components): columns orthonormal in the norm (5.21)."""
+        result = np.zeros((len(self.free), int(self.free.sum())))
+        result[self.free] = cholesky(self.stiffness[np.ix_(self.free, self.free)], lower=True)
+        return _frozen(result)
+
+    @cached_property
+    def gram(self) -> Floats:
+        """E_a: the H1 norm squared of the extension of least H1 norm, on the free components.
+
+        Raises
+        ------
+        ValueError
+            Only matrices are known.
+        """
+        return _frozen(self.orient_form(self.mesh_body.gram.schur))
+
+    @cached_property
+    def lift_gram(self) -> Floats:
+        """``N_a = R_a' H_a R_a``: the H1 norm squared of the elastic lift (4.5), on the free components.
+
+        Raises
+        ------
+        ValueError
+            Only matrices are known.
+        """
+        return _frozen(self.orient_form(self.mesh_body.on_lifts(self.mesh_body.gram_matrix)))
+
+    def dual_norm(self, force: Floats) -> float:
+        """The norm (5.21), ``sqrt(force' S_a^-1 force)``, when this is the Neumann body."""
+        return math.sqrt(max(float(force @ self.flexibility(force)), 0.0))
+
+
+def _frozen(array: Floats) -> Floats:
+    array.setflags(write=False)
+    return array

@@ -1,0 +1,161 @@
+"""A contact pair from what is at hand: a problem, its file, or matrices."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from fem1d2d import trapezoid
+from fem1d2d.mesh import Floats
+from verification.interface import assembly
+from verification.interface.body import Condensed
+from verification.interface.friction import Given, Law
+from verification.interface.grid import Grid
+from verification.interface.interface import Interface
+from verification.interface.matrices import check_matrix, size
+from verification.interface.pair import ContactPair
+from verification.problem import Problem, load
+
+
+def build(
+    problem: Problem | Path | str | None = None,
+    *,
+    law: Law | None = None,
+    S1: Floats | None = None,
+    S2: Floats | None = None,
+    load1: Floats | None = None,
+    load2: Floats | None = None,
+    x: Floats | None = None,
+    weights: Floats | None = None,
+    gap: Floats | float = 0.0,
+    kernel: Floats | None = None,
+    transfer: Floats | None = None,
+    friction: Any = 0,
+    neumann_body: Literal[1, 2] = 2,
+) -> ContactPair:
+    """A contact pair from a problem, or from the interface matrices of any code.
+
+    Interface vectors list all tangential components from left to right, then all normal ones along y, which points from
+    body 1 to body 2.
+
+    Parameters
+    ----------
+    problem : Problem or path, optional
+        Its ``[iteration]`` gives the pair's settings and roles.  A pair from matrices has theta 1/2, tolerance 1e-9, at
+        most 500 iterations.
+    law : Law, optional
+        A law of friction in place of the problem's, or of a kernel.
+    S1, S2 : array, shapes (2 n1, 2 n1), (2 n2, 2 n2)
+        Schur complements of the stiffness matrices on the contact nodes: symmetric, positive definite.
+    load1, load2 : array, shapes (2 n1,), (2 n2,), optional
+        Loads condensed onto the contact nodes; 0 by default.
+    x : array, shape (n,)
+        Positions of the contact nodes of the contact body, increasing.
+    weights : array, shape (n,), optional
+        Weights of the quadrature on them; those of the trapezoid rule by default.
+    gap : float or array, shape (n,)
+        Initial distance at them.
+    kernel : array, shape (n, nodes of the Neumann body), optional
+        The operator S: normal nodal forces on the Neumann body to normal stress at the contact nodes.
+    transfer : array, shape (n, nodes of the Neumann body), optional
+        P: from values at the nodes of the Neumann body to values at those of the contact body; the identity by default.
+    friction : number
+        k >= 0; needs a kernel or a law.
+    neumann_body : {1, 2}
+
+    Returns
+    -------
+    ContactPair
+
+    Raises
+    ------
+    ProblemError
+        A problem that has no two elastic bodies facing each other.
+    ValueError
+        Matrices that do not fit, or are no stiffness matrices.
+
+    Examples
+    --------
+    >>> pair = build(S1=np.diag([3.0, 2.0]), S2=np.eye(2), load2=np.array([0.0, -1.0]), x=np.array([0.0]))
+    >>> pair.contact.grid.n, pair.outside
+    (1, [])
+    """
+    if problem is not None:
+        if S1 is not None or S2 is not None:
+            raise ValueError("received a problem and matrices: needed one of them")
+        return assembly.build(problem if isinstance(problem, Problem) else load(problem), law=law)
+    if S1 is None or S2 is None or x is None:
+        raise ValueError("needed a problem, or S1, S2 and x")
+    if neumann_body not in (1, 2):
+        raise ValueError(f"neumann_body {neumann_body!r}: needed 1 or 2")
+    if kernel is not None and law is not None:
+        raise ValueError("received a kernel and a law: needed one of them")
+    for name, matrix in (("S1", S1), ("S2", S2)):
+        check_matrix(name, np.asarray(matrix))
+        if len(matrix) % 2:
+            raise ValueError(f"{name} is {size(matrix)}: needed two components at each contact node")
+    lower, upper = (S1, load1), (S2, load2)
+    (S_c, l_c), (S_n, l_n) = (lower, upper) if neumann_body == 2 else (upper, lower)
+    n, m = len(S_c) // 2, len(S_n) // 2
+    x = _vector("x", x, n)
+    if not np.all(np.diff(x) > 0):
+        raise ValueError("x: needed positions that increase")
+    w = trapezoid(x) if weights is None else _vector("weights", weights, n)
+    if not np.all(w > 0):
+        raise ValueError("weights: needed positive ones")
+    distance = _vector("gap", np.broadcast_to(gap, n), n)
+    if not np.all(distance >= 0):
+        raise ValueError("gap: needed numbers >= 0")
+    if transfer is None and n != m:
+        raise ValueError(f"S1 is {size(S1)}, S2 is {size(S2)}: needed the same contact nodes, or a transfer")
+    P = None if transfer is None else _matrix("transfer", transfer, (n, m))
+    grid = Grid(x=x, weights=w)
+    if P is not None and law is not None:
+        raise ValueError("law: needed a kernel, as a transfer does not tell where the nodes of the Neumann body lie")
+    other = grid if P is None else Grid(x=np.full(m, np.nan), weights=P.T @ w)
+    given = law if kernel is None else Given(matrix=_matrix("kernel", kernel, (n, m)))
+    contact, neumann = (
+        _condensed(name, matrix, load, own, upward=neumann_body == 2)
+        for name, matrix, load, own in (("contact", S_c, l_c, grid), ("neumann", S_n, l_n, other))
+    )
+    interface = Interface(contact=grid, neumann=other, gap=distance, law=given, transfer=P)
+    pair = ContactPair(contact=contact, neumann=neumann, interface=interface, neumann_body=neumann_body)
+    return pair.at(friction=friction)
+
+
+def pair_of(problem: Problem | ContactPair | Path | str) -> ContactPair:
+    """The pair that a problem, a file or a pair stands for."""
+    return problem if isinstance(problem, ContactPair) else build(problem)
+
+
+def _vector(name: str, values: Floats, n: int) -> Floats:
+    return _matrix(name, values, (n,))
+
+
+def _matrix(name: str, values: Floats, shape: tuple[int, ...]) -> Floats:
+    """A finite array of a shape.
+
+    Raises
+    ------
+    ValueError
+    """
+    array = np.array(values, dtype=float)
+    if array.shape != shape:
+        raise ValueError(f"{name} is {size(array)}: needed {' x '.join(map(str, shape))}")
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} has entries that are not finite: needed numbers")
+    return array
+
+
+def _condensed(name: str, matrix: Floats, load: Floats | None, grid: Grid, *, upward: bool) -> Condensed:
+    S = np.array(matrix, dtype=float)
+    condensed = Condensed(
+        grid=grid,
+        stiffness=(S + S.T) / 2,
+        load=np.zeros(grid.size) if load is None else _vector(f"the load of the {name} body", load, grid.size),
+        known=np.zeros(grid.size),
+        free=np.ones(grid.size, dtype=bool),
+    )
+    return condensed if upward else condensed.turned()

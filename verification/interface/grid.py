@@ -1,0 +1,77 @@
+"""The contact nodes of one body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from fem1d2d import trapezoid
+from fem1d2d.mesh import Floats
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Grid:
+    """The contact nodes of one body, from left to right, with the trapezoid rule on them.
+
+    An interface vector on it lists all tangential components first, then all normal ones.
+
+    Attributes
+    ----------
+    x : array, shape (n,)
+        Positions along Gamma_c, unit of length; in 1D the one point.
+    weights : array, shape (n,)
+        w_j of the trapezoid rule, unit of length; 1 in 1D.
+    dimension : {1, 2}
+    """
+
+    x: Floats
+    weights: Floats
+    dimension: Literal[1, 2] = 2
+
+    def __post_init__(self) -> None:
+        for name in ("x", "weights"):
+            array = np.array(getattr(self, name), dtype=float)
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+    @classmethod
+    def on(cls, x: Floats, dimension: Literal[1, 2] = 2) -> Grid:
+        """The grid of these nodes with trapezoid weights."""
+        return cls(x=x, weights=trapezoid(x), dimension=dimension)
+
+    @property
+    def n(self) -> int:
+        """Number of nodes."""
+        return len(self.x)
+
+    @property
+    def t(self) -> int:
+        """Number of tangential components: n in two dimensions, 0 in one."""
+        return self.n * (self.dimension - 1)
+
+    @property
+    def size(self) -> int:
+        """Number of components of an interface vector."""
+        return self.n * self.dimension
+
+    @property
+    def tangential(self) -> slice:
+        """Tangential components of an interface vector; empty in 1D."""
+        return slice(0, self.t)
+
+    @property
+    def normal(self) -> slice:
+        """Normal components of an interface vector."""
+        return slice(self.t, self.size)
+
+    def turn(self, vectors: Floats) -> Floats:
+        """Interface vectors, or columns of them, with the normal components turned round (its own inverse)."""
+        turned = vectors.copy()
+        turned[self.normal] *= -1.0
+        return turned
+
+    def turn_form(self, matrix: Floats) -> Floats:
+        """The same for a symmetric matrix on interface vectors."""
+        return self.turn(self.turn(matrix).T)

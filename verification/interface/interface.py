@@ -1,0 +1,90 @@
+"""What joins two bodies along Gamma_c: their grids, the transfer between them, the gap, the operator of friction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem1d2d.mesh import Floats
+from verification.interface.friction import Law
+from verification.interface.grid import Grid
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Interface:
+    """Two grids along Gamma_c and what passes between them.
+
+    Attributes
+    ----------
+    contact, neumann : Grid
+        Those of the contact body and of the Neumann body.
+    gap : array, shape (contact nodes,)
+        Initial distance, unit of length.
+    law : Law or None
+        The law of friction; None where no friction force can act.
+    transfer : array, shape (contact nodes, Neumann nodes), or None
+        P: values on the contact grid of a function given on the Neumann grid.  Its transpose and nothing else returns
+        the forces.  None where both grids are one: then P is the identity.
+    """
+
+    contact: Grid
+    neumann: Grid
+    gap: Floats
+    law: Law | None = None
+    transfer: Floats | None = None
+
+    def __post_init__(self) -> None:
+        gap = np.array(self.gap, dtype=float)
+        gap.setflags(write=False)
+        object.__setattr__(self, "gap", gap)
+
+    @cached_property
+    def kernel(self) -> Floats | None:
+        """S as a matrix: normal nodal forces on the Neumann grid to normal stress at the contact nodes."""
+        if self.law is None or self.contact.dimension == 1:
+            return None
+        kernel = self.law.operator(self)
+        kernel.setflags(write=False)
+        return kernel
+
+    def stress(self, force: Floats) -> Floats:
+        """``S sigma_N`` at the contact nodes for a force on the Neumann grid; 0 without a law of friction."""
+        kernel = self.kernel
+        return np.zeros(self.contact.n) if kernel is None else np.asarray(kernel @ force[self.neumann.normal])
+
+    def carry(self, traces: Floats) -> Floats:
+        """``P u``: traces on the Neumann grid, one or columns of them, as the contact grid sees them."""
+        if self.transfer is None:
+            return traces
+        blocks = np.split(traces, self.neumann.dimension)
+        return np.concatenate([self.transfer @ block for block in blocks])
+
+    def carry_back(self, forces: Floats) -> Floats:
+        """``P' f``: nodal forces on the contact grid, one or columns of them, as the Neumann grid receives them."""
+        if self.transfer is None:
+            return forces
+        blocks = np.split(forces, self.contact.dimension)
+        return np.concatenate([self.transfer.T @ block for block in blocks])
+
+    def pressed(self, touching: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """The Neumann nodes on which the forces of some contact nodes act."""
+        return touching if self.transfer is None else np.asarray((self.transfer != 0).T @ touching, dtype=bool)
+
+    def carry_form(self, form: Floats) -> Floats:
+        """``P' X P`` of a symmetric matrix on the contact grid."""
+        return form if self.transfer is None else self.carry_back(self.carry_back(form).T)
+
+    def swapped(self) -> Interface:
+        """The interface with the roles of the grids exchanged.
+
+        Raises
+        ------
+        ValueError
+            The grids differ: each direction has a transfer of its own.
+        """
+        if self.transfer is not None:
+            raise ValueError("the grids differ: needed a pair built for these roles, with a transfer of its own")
+        return Interface(contact=self.neumann, neumann=self.contact, gap=self.gap, law=self.law)

@@ -1,0 +1,44 @@
+"""What is an interface stiffness matrix, and what is none."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fem1d2d.mesh import Floats
+from verification.threads import one_thread
+
+#: Matrices of more rows than this do not fit a dense eigenvalue problem.
+MOST_ROWS = 4000
+
+#: Largest asymmetry of a matrix, relative to its largest entry.
+ASYMMETRY = 1e-8
+
+
+def size(matrix: Floats) -> str:
+    """The shape of a matrix in words."""
+    return " x ".join(str(n) for n in matrix.shape) or "a single number"
+
+
+def check_matrix(name: str, matrix: Floats) -> None:
+    """Refuse what is no interface stiffness matrix.
+
+    Raises
+    ------
+    ValueError
+    """
+    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not len(matrix):
+        raise ValueError(f"{name} is {size(matrix)}: needed a square matrix")
+    if len(matrix) > MOST_ROWS:
+        raise ValueError(f"{name} has {len(matrix)} rows: needed at most {MOST_ROWS}")
+    if not np.isfinite(matrix).all():
+        raise ValueError(f"{name} has entries that are not finite: needed numbers")
+    unit = float(np.abs(matrix).max()) or 1.0
+    scaled = matrix / unit  # entries of order 1, whatever the unit
+    if not float(np.abs(scaled - scaled.T).max()) <= ASYMMETRY:
+        raise ValueError(f"{name} is not symmetric: needed a Schur complement of a stiffness matrix")
+    with one_thread():
+        eigenvalues = np.linalg.eigvalsh((scaled + scaled.T) / 2)
+    least = float(eigenvalues[0])
+    if not least > len(matrix) * np.finfo(float).eps:
+        kind = "singular: the body has too little support" if least >= -1e-10 else "indefinite"
+        raise ValueError(f"{name} is {kind} (least eigenvalue {least * unit:.3g}): needed a positive definite matrix")
