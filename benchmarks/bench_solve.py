@@ -12,6 +12,7 @@ from bench_step import problem
 
 import verification as vf
 from fem1d2d import solver
+from verification.interface.assembly import discretise
 
 ROUNDS = 9
 

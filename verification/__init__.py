@@ -24,13 +24,17 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from typing import Any
 
-    from verification.advice.roles import Advice, advise
+    from verification.advice.roles import Advice, advise, advise_matrices, advise_run
     from verification.algorithm.fixed_point import iterate
     from verification.algorithm.iterate import Iterate
+    from verification.algorithm.relaxation import Rule
     from verification.algorithm.runs import Run, run
     from verification.comparison import Comparison, compare
     from verification.constants import Measured, measure
     from verification.contact import ContactError
+    from verification.interface.build import build
+    from verification.interface.friction import Law
+    from verification.interface.pair import ContactPair
     from verification.ledger import Ledger, verify
     from verification.monolithic import Solution, SolveError, solve
     from verification.problem.specification import Problem, load
@@ -41,15 +45,21 @@ _HOME = {
     "Advice": "advice.roles",
     "Comparison": "comparison",
     "ContactError": "contact",
+    "ContactPair": "interface.pair",
+    "Law": "interface.friction",
     "Ledger": "ledger",
     "Measured": "constants",
     "Problem": "problem.specification",
     "ProblemError": "problem.tables",
+    "Rule": "algorithm.relaxation",
     "Run": "algorithm.runs",
     "Solution": "monolithic",
     "SolveError": "monolithic",
     "Iterate": "algorithm.iterate",
     "advise": "advice.roles",
+    "advise_matrices": "advice.roles",
+    "advise_run": "advice.roles",
+    "build": "interface.build",
     "compare": "comparison",
     "iterate": "algorithm.fixed_point",
     "load": "problem.specification",
@@ -63,15 +73,21 @@ __all__ = [
     "Advice",
     "Comparison",
     "ContactError",
+    "ContactPair",
     "Iterate",
+    "Law",
     "Ledger",
     "Measured",
     "Problem",
     "ProblemError",
+    "Rule",
     "Run",
     "Solution",
     "SolveError",
     "advise",
+    "advise_matrices",
+    "advise_run",
+    "build",
     "compare",
     "iterate",
     "load",

@@ -99,6 +99,8 @@ def build(
     lower, upper = (S1, load1), (S2, load2)
     (S_c, l_c), (S_n, l_n) = (lower, upper) if neumann_body == 2 else (upper, lower)
     n, m = len(S_c) // 2, len(S_n) // 2
+    if transfer is None and n != m:
+        raise ValueError(f"S1 is {size(S1)}, S2 is {size(S2)}: needed the same contact nodes, or a transfer")
     x = _vector("x", x, n)
     if not np.all(np.diff(x) > 0):
         raise ValueError("x: needed positions that increase")
@@ -108,8 +110,6 @@ def build(
     distance = _vector("gap", np.broadcast_to(gap, n), n)
     if not np.all(distance >= 0):
         raise ValueError("gap: needed numbers >= 0")
-    if transfer is None and n != m:
-        raise ValueError(f"S1 is {size(S1)}, S2 is {size(S2)}: needed the same contact nodes, or a transfer")
     P = None if transfer is None else _matrix("transfer", transfer, (n, m))
     grid = Grid(x=x, weights=w)
     if P is not None and law is not None:
