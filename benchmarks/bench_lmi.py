@@ -31,7 +31,7 @@ def factor(problem: vf.Problem, small: int) -> tuple[float, float]:
     pair = build(problem)
     measured = vf.measure(pair)
     lmi.SMALL = small
-    seconds, found = timed(lambda: lmi.SemidefiniteEdition(pair, measured).factor(0.7))
+    seconds, found = timed(lambda: lmi.QuadraticForms(pair, measured).factor(0.7))
     return seconds, found.value
 
 

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
-from ndtheory import EDITIONS, Bounds, Number, SharpBounds, evaluate
+from ndtheory import EDITIONS
 from verification.algorithm.iterate import Iterate
 from verification.algorithm.rates import StepRatio, largest_step_ratio
+from verification.algorithm.relaxation import Constant
 from verification.algorithm.runs import Run, run
-from verification.algorithm.theta import sharp_bounds
+from verification.bounds.bound import LARGEST, BoundResult, Subject
 from verification.bounds.losses import Losses, locate
-from verification.bounds.table import LARGEST, EditionRow, Thresholds, row_of
+from verification.bounds.table import BOUNDS
 from verification.constants import Measured, measure
 from verification.contact import Solver
 from verification.document import Document
@@ -24,11 +24,8 @@ from verification.interrupts import INTERRUPTED
 from verification.problem import Problem
 from verification.progress import Progress, silent
 
-if TYPE_CHECKING:
-    from verification.bounds.semidefinite import Semidefinite
-
-#: The editions whose violation is a bug or an error in a proof.
-PROVED = ("repaired", "sharp", "lmi")
+#: The bounds whose violation is a bug or an error in a proof.
+NO_FINDING = tuple(bound.name for bound in BOUNDS.values() if not bound.finding)
 
 #: A bound may be attained: a ratio above it by less than this share of 1 - bound is equal to it.
 TIGHT = 1e-6
@@ -41,7 +38,7 @@ Verdict = Literal["CONSISTENT", "VIOLATED", "INCONCLUSIVE", "HYPOTHESES_NOT_MET"
 
 @dataclass(frozen=True, kw_only=True)
 class Judgement:
-    """A verdict on one edition of the theorem, with its reason in words."""
+    """A verdict on one bound, with its reason in words."""
 
     verdict: Verdict
     reason: str
@@ -54,29 +51,23 @@ class Comparison(Document):
     Attributes
     ----------
     measured : Measured
-    bounds : mapping from edition to Bounds
-        Printed and repaired; empty where a constant does not exist.
-    sharp : SharpBounds or None
-        The theorem in energy norms.
-    lmi : Semidefinite or None
-        The semidefinite edition.
+    bounds : mapping from name to BoundResult
+        From the weakest to the strongest.
     losses : Losses or None
         What each inequality of the proof gives away.
     run : Run
     step_ratio : StepRatio or None
         The largest Lipschitz quotient seen.
-    verdicts : mapping from edition to Judgement
+    verdicts : mapping from the name of a bound to Judgement
         And of ``linearised``, the forecast made half way.
     reason : mapping
-        Why sharp, lmi, losses or step_ratio is None.
+        Why a bound, losses or step_ratio is missing.
     """
 
     schema: ClassVar[str] = "ndtheory.compare/1"
 
     measured: Measured
-    bounds: Mapping[str, Bounds]
-    sharp: SharpBounds | None
-    lmi: Semidefinite | None
+    bounds: Mapping[str, BoundResult]
     losses: Losses | None
     run: Run
     step_ratio: StepRatio | None
@@ -88,32 +79,14 @@ class Comparison(Document):
         return self.run.units
 
     @property
-    def editions(self) -> list[EditionRow]:
-        """Every edition there is, from the weakest to the strongest."""
-        rows = [row_of(name, b) for name, b in self.bounds.items()]
-        if self.sharp is not None:
-            every, some = self.measured.friction_threshold, self.measured.friction_limit
-            rows.append(
-                row_of("sharp", self.sharp, Thresholds(every=every, some=some, on="any" if every is None else "k"))
-            )
-        if self.lmi is not None:
-            factor, highest, allowed = self.lmi.factor, self.lmi.theta_max, self.lmi.friction_threshold
-            rows.append(
-                EditionRow(
-                    name="lmi",
-                    friction=Thresholds(every=allowed, on="any" if allowed is None else "k"),
-                    interval=None if highest is None else (0.0, highest.value),
-                    theta=float(self.run.theta),
-                    factor=factor,
-                    one_minus_factor=None if factor is None else Number.of_float(1 - factor.value),
-                )
-            )
-        return rows
+    def computed(self) -> list[BoundResult]:
+        """The bounds that were worked out."""
+        return [result for result in self.bounds.values() if result.detail is not None]
 
     @property
     def proved_violated(self) -> bool:
         """Whether a proved claim was violated: a bug, or an error in a proof.  A printed one violated is a finding."""
-        return any(judgement.verdict == "VIOLATED" for name, judgement in self.verdicts.items() if name in PROVED)
+        return any(judgement.verdict == "VIOLATED" for name, judgement in self.verdicts.items() if name in NO_FINDING)
 
     @property
     def inconclusive(self) -> bool:
@@ -121,19 +94,16 @@ class Comparison(Document):
         return any(judgement.verdict == "INCONCLUSIVE" for judgement in self.verdicts.values())
 
     def content(self) -> dict[str, Any]:
-        editions: dict[str, Any] = {e.name: None for e in EDITIONS}
-        editions |= {name: bounds.to_dict() for name, bounds in self.bounds.items()}
-        editions["sharp"] = None if self.sharp is None else self.sharp.to_dict()
-        why = next(iter(self.measured.reason.values()), "")
+        editions = {name: self.bounds[name].to_dict() for name in (*(e.name for e in EDITIONS), "sharp")}
         return {
             "title": self.run.pair.title,
             "constants": self.measured.content(),
             "bounds": {
                 "editions": editions,
-                "reason": {name: why for name, value in editions.items() if value is None},
+                "reason": {name: self.bounds[name].not_computed for name, value in editions.items() if value is None},
             },
             "sharp": self._sharp(),
-            "lmi": None if self.lmi is None else self.lmi.to_dict(),
+            "lmi": self.bounds["lmi"].to_dict(),
             "losses": None if self.losses is None else self.losses.to_dict(),
             "run": self.run.content(),
             "step_ratio": None
@@ -145,10 +115,10 @@ class Comparison(Document):
         }
 
     def _sharp(self) -> dict[str, Any] | None:
-        """The object ``sharp``: the edition's own document with both rho and both thresholds on k."""
-        if self.sharp is None:
+        """The object ``sharp``: the bound's own document with both rho and both thresholds on k."""
+        measured, document = self.measured, self.bounds["sharp"].to_dict()
+        if document is None:
             return None
-        measured, document = self.measured, self.sharp.to_dict()
         threshold = measured.friction_threshold
         if threshold is None:
             document["reason"] |= dict.fromkeys(("friction_threshold", "friction_limit"), "no law of friction")
@@ -170,7 +140,7 @@ def judge(bound: float | None, seen: StepRatio | None, why_none: str) -> Judgeme
     Parameters
     ----------
     bound : float or None
-        None: the edition draws no conclusion; ``why_none`` says why.
+        None: the bound draws no conclusion; ``why_none`` says why.
     seen : StepRatio or None
         None: no step stands clear of rounding.
 
@@ -232,68 +202,51 @@ def compare(
     measured = measure(pair, progress=progress)
     progress("iterating", None)
     finished = run(pair, theta=theta, solver=solver, watch=watch, measured=measured)
-    chosen, constants = finished.theta, measured.constants()
-    bounds: dict[str, Bounds] = {} if constants is None else {e.name: evaluate(e, constants, chosen) for e in EDITIONS}
-    sharp = sharp_bounds(measured, chosen)
     reason: dict[str, str] = {}
-    lmi, losses = None, None
-    if pair.contact.grid.n > LARGEST:
-        reason |= dict.fromkeys(("lmi", "losses"), f"{pair.contact.grid.n} contact nodes: worked out up to {LARGEST}")
-    else:
-        reason |= dict.fromkeys(("lmi", "losses"), INTERRUPTED)
+    losses, results = None, {name: bound.absent(INTERRUPTED) for name, bound in BOUNDS.items()}
+    subject, interrupted = Subject.of(pair, measured), finished.interrupted
     try:
-        if pair.contact.grid.n <= LARGEST and not finished.interrupted:
+        if pair.contact.grid.n > LARGEST:
+            reason["losses"] = f"{pair.contact.grid.n} contact nodes: worked out up to {LARGEST}"
+        elif interrupted:
+            reason["losses"] = INTERRUPTED
+        else:
+            reason["losses"] = INTERRUPTED
             losses = locate(pair, measured, progress=progress)
             reason["losses"] = next(iter(measured.reason.values()), "a contact node is held")
-            lmi, reason["lmi"] = _semidefinite(pair, float(chosen), measured, progress)
-        progress("linearising", None)
-        _ = finished.forecast, finished.linearised  # here, where Ctrl-C keeps what there is
     except KeyboardInterrupt:
+        interrupted = True
+    for name, bound in BOUNDS.items():
+        try:
+            if bound.calculated or not interrupted:
+                results[name] = bound.evaluate(subject, finished.theta, progress=progress)
+        except KeyboardInterrupt:
+            interrupted = True
+    try:
+        if not interrupted:
+            progress("linearising", None)
+            _ = finished.forecast, finished.linearised  # here, where Ctrl-C keeps what there is
+    except KeyboardInterrupt:
+        interrupted = True
+    if interrupted:
         finished = replace(finished, interrupted=True)
-    for name in [name for name, found in (("lmi", lmi), ("losses", losses)) if found is not None]:
-        del reason[name]
-    if sharp is None:
-        reason["sharp"] = next(iter(measured.reason.values()), "")
+    if losses is not None:
+        del reason["losses"]
+    for name in ("sharp", "lmi"):
+        if results[name].detail is None:
+            reason[name] = results[name].not_computed
     seen = largest_step_ratio(pair, finished.iterates)
     if seen is None:
         reason["step_ratio"] = "no step stands clear of rounding"
 
     outside = "outside the theorem: " + "; ".join(finished.outside) if finished.outside else ""
-    if finished.relaxation != "constant" and not outside:
-        outside = f"the editions speak of a constant theta, not of {finished.relaxation}"
-    verdicts: dict[str, Judgement] = {}
-
-    def hold(name: str, factor: Number | None, why: str, absent: str = "") -> None:
-        if outside:
-            verdicts[name] = Judgement(verdict="HYPOTHESES_NOT_MET", reason=outside)
-        elif absent:
-            verdicts[name] = Judgement(verdict="NOT_COMPUTED", reason=absent)
-        else:
-            verdicts[name] = judge(None if factor is None else factor.value, seen, why)
-
-    unknown = next(iter(measured.reason.values()), "")
-    friction = measured.friction
-    for e in EDITIONS:
-        if e.name not in bounds:
-            hold(e.name, None, "", unknown)
-        else:
-            of = bounds[e.name]
-            unit = f" (in {pair.units['stress']})" if e.name == "printed" else ""
-            hold(e.name, of.factor, _why_not(of.interval, of.C2, friction, chosen) + unit)
-    if sharp is None:
-        hold("sharp", None, "", unknown)
-    else:
-        hold("sharp", sharp.factor, _why_not(sharp.interval, measured.friction_limit, friction, chosen))
-    if lmi is None:
-        hold("lmi", None, "", reason["lmi"])
-    else:
-        hold("lmi", lmi.factor, lmi.why_no_factor, lmi.gave_up if lmi.factor is None else "")
+    if not isinstance(finished.rule, Constant) and not outside:
+        outside = f"the bounds speak of a constant theta, not of {finished.relaxation}"
+    verdicts = {name: _verdict(result, seen, outside) for name, result in results.items()}
     verdicts["linearised"] = judge_forecast(finished)
     return Comparison(
         measured=measured,
-        bounds=bounds,
-        sharp=sharp,
-        lmi=lmi,
+        bounds=results,
         losses=losses,
         run=finished,
         step_ratio=seen,
@@ -302,21 +255,10 @@ def compare(
     )
 
 
-def _why_not(interval: tuple[float, float] | None, threshold: Number | None, friction: float, theta: Fraction) -> str:
-    """Why an edition draws no conclusion."""
-    if interval is not None:
-        return f"theta = {float(theta):g} is outside ({interval[0]:.2g}, {interval[1]:.2g})"
-    scale = threshold.value if threshold is not None else float("inf")
-    return f"friction {friction:g} is not below {scale:.2g}"
-
-
-def _semidefinite(
-    pair: ContactPair, theta: float, measured: Measured, progress: Progress
-) -> tuple[Semidefinite | None, str]:
-    from verification.bounds.program import LMIError
-    from verification.bounds.semidefinite import evaluate_lmi
-
-    try:
-        return evaluate_lmi(pair, measured, theta, progress=progress), ""
-    except (LMIError, ValueError) as error:
-        return None, str(error)
+def _verdict(result: BoundResult, seen: StepRatio | None, outside: str) -> Judgement:
+    """What the run says of one bound."""
+    if outside:
+        return Judgement(verdict="HYPOTHESES_NOT_MET", reason=outside)
+    if result.not_computed:
+        return Judgement(verdict="NOT_COMPUTED", reason=result.not_computed)
+    return judge(None if result.factor is None else result.factor.value, seen, result.why)

@@ -16,7 +16,6 @@ from fem1d2d.mesh import Floats
 from ndtheory import Constants, EnergyConstants, Number, evaluate_sharp
 from ndtheory.sharp import friction_multiple
 from verification.document import Document
-from verification.interface.assembly import build
 from verification.interface.body import Body, Condensed
 from verification.interface.build import pair_of
 from verification.interface.pair import ContactPair
@@ -236,7 +235,7 @@ def measure(problem: Problem | ContactPair | Path | str, *, refine: int = 0, pro
             try:
                 for halvings, halved in enumerate(finer, 1):
                     progress(f"measuring the constants, {halvings} of {refine} halvings", (halvings - 1) / refine)
-                    levels.append(_measure(build(halved)))
+                    levels.append(_measure(pair_of(halved)))
             except KeyboardInterrupt:
                 reason["levels"] = f"interrupted after {len(levels) - 1} of {refine} halvings"
             result = replace(result, levels=tuple(levels), reason=reason)

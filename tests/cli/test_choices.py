@@ -15,7 +15,10 @@ import scipy.sparse as sp
 import verification as vf
 from ndtheory import PRINTED, REPAIRED, EnergyConstants, evaluate, evaluate_sharp
 from verification.algorithm import runs
+from verification.bounds import bound
 from verification.bounds import region as plane
+from verification.bounds.bound import NotComputed
+from verification.bounds.semidefinite import SemidefiniteBound
 from verification.cli.problems import examples
 from verification.interface.assembly import build
 
@@ -789,7 +792,7 @@ def test_what_the_repaired_theorem_contracts_the_one_in_energy_norms_does(charte
         assert evaluate_sharp(measured.with_friction(k).energy_constants(), theta).verdict == "contraction"
 
 
-def test_what_the_theorem_in_energy_norms_contracts_the_semidefinite_edition_does(charted):
+def test_what_the_theorem_in_energy_norms_contracts_the_semidefinite_bound_does(charted):
     _, measured, drawn, _ = charted
     sharp, lmi = drawn.regions["sharp"], drawn.regions["lmi"]
     assert max(sharp.k) < max(lmi.k)
@@ -856,7 +859,6 @@ def test_region_refuses_what_it_cannot_draw_before_anything_is_run(
     file = write(edits)
     before = {path.name for path in tmp_path.iterdir()}
     monkeypatch.setattr(plane, "run", None)
-    monkeypatch.setattr(plane, "_semidefinite", lambda *args: (None, "made up"))
     complaint = call("region", file, "-o", tmp_path / target).complaint
     assert [fragment for fragment in fragments if fragment not in complaint] == []
     assert {path.name for path in tmp_path.iterdir()} == before
@@ -877,12 +879,16 @@ def test_region_needs_the_name_of_a_picture(call, write):
 
 @pytest.fixture
 def short(monkeypatch):
-    """Few points on the borders, no semidefinite edition: what matters is the runs."""
-    monkeypatch.setattr(plane, "TRACED", 4)
-    monkeypatch.setattr(plane, "_semidefinite", lambda *args: (None, "made up"))
+    """Few points on the borders, no semidefinite bound: what matters is the runs."""
+
+    def fail(self, subject, progress):
+        raise NotComputed("made up")
+
+    monkeypatch.setattr(bound, "TRACED", 4)
+    monkeypatch.setattr(SemidefiniteBound, "region", fail)
 
 
-def test_an_edition_without_a_region_says_why(call, short, write, tmp_path, monkeypatch):
+def test_a_bound_without_a_region_says_why(call, short, write, tmp_path, monkeypatch):
     monkeypatch.setattr(plane, "THETAS", (0.1,))
     monkeypatch.setattr(plane, "FRICTIONS", (0.1,))
     found = call("region", write(COARSE), "-o", tmp_path / "plane.svg", "--json").document

@@ -256,17 +256,17 @@ def test_an_import_that_ctrl_c_breaks_is_no_bug(write, tmp_path, module):
 
 
 def test_constants_keep_the_meshes_that_were_measured(call, write, monkeypatch):
-    from verification import constants as measured
+    from verification.interface import assembly
 
-    build, built = measured.build, []
+    build, built = assembly.build, []
 
-    def interrupt(problem):
+    def interrupt(problem, law=None):
         built.append(problem)
         if len(built) == 3:
             signal.raise_signal(signal.SIGINT)
         return build(problem)
 
-    monkeypatch.setattr(measured, "build", interrupt)
+    monkeypatch.setattr(assembly, "build", interrupt)
     answer = call("constants", write(), "--refine", "4", "--json")
     assert answer.status == 130
     assert len(answer.document["levels"]) == 2
@@ -279,7 +279,7 @@ def test_region_draws_the_runs_that_were_made(call, write, tmp_path, monkeypatch
 
     monkeypatch.setattr(plane, "THETAS", (0.2, 0.4))
     monkeypatch.setattr(plane, "FRICTIONS", (0.1, 0.3))
-    monkeypatch.setattr(plane, "LARGEST", 0)  # without the semidefinite edition
+    monkeypatch.setattr("verification.bounds.semidefinite.LARGEST", 0)  # without the semidefinite bound
     run, runs = plane.run, []
 
     def interrupt(*args, **options):

@@ -84,11 +84,10 @@ def test_bad_input_wins_over_everything(call, write, monkeypatch):
 )
 @pytest.mark.parametrize("command", ["run", "compare", "constants"])
 def test_a_crash_says_that_it_is_one_and_is_no_status_of_the_interface(call, write, monkeypatch, command, error):
-    def fail(problem):
+    def fail(problem, law=None):
         raise error
 
     monkeypatch.setattr("verification.interface.assembly.build", fail)
-    monkeypatch.setattr("verification.constants.build", fail)
     answer = call(command, write())
     assert answer.status == CRASH
     assert answer.out == ""
@@ -165,11 +164,10 @@ def test_ctrl_c_wins_over_a_verdict(call, endless, after, monkeypatch, judged):
 
 @pytest.mark.parametrize("command", ["run", "compare", "constants"])
 def test_ctrl_c_before_anything_was_computed_says_so(call, write, monkeypatch, command):
-    def interrupt(problem):
+    def interrupt(problem, law=None):
         signal.raise_signal(signal.SIGINT)
 
     monkeypatch.setattr("verification.interface.assembly.build", interrupt)
-    monkeypatch.setattr("verification.constants.build", interrupt)
     answer = call(command, write())
     assert (answer.status, answer.out) == (INTERRUPTED, "")
     assert answer.err.strip() == "interrupted before anything was computed"

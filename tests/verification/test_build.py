@@ -13,7 +13,7 @@ from verification.algorithm.affine_piece import piece_of
 from verification.algorithm.fixed_point import FixedPointMap
 from verification.algorithm.rates import largest_step_ratio
 from verification.algorithm.theta import sharp_bounds
-from verification.bounds.semidefinite import SemidefiniteEdition
+from verification.bounds.multipliers import QuadraticForms
 from verification.constants import measure
 from verification.interface.build import build
 from verification.interface.friction import Law, Nonlocal, hat
@@ -63,7 +63,7 @@ def test_a_pair_from_its_matrices_is_the_pair(neumann_body, friction):
         first, second = (getattr(b, name) for b in bounds)
         assert (first is None) == (second is None)
         assert first is None or second.value == pytest.approx(first.value, rel=1e-12)
-    factors = [SemidefiniteEdition(p, measure(p)).factor(0.1).value for p in (pair, other)]
+    factors = [QuadraticForms(p, measure(p)).factor(0.1).value for p in (pair, other)]
     assert factors[1] == pytest.approx(factors[0], rel=1e-6)
 
 
@@ -174,7 +174,7 @@ def test_across_unlike_grids_no_step_exceeds_the_bounds(seed, friction):
     T, norm = FixedPointMap(pair), pair.neumann.dual_norm
     theta = float(sharp_bounds(measured).theta_predicted) * 0.8
     sharp = sharp_bounds(measured, theta)
-    lmi = SemidefiniteEdition(pair, measured).factor(theta).value
+    lmi = QuadraticForms(pair, measured).factor(theta).value
     worst = 0.0
     for _ in range(60):
         g, d = case.random.normal(size=(2, 12)) * 10.0 ** case.random.uniform(-2, 1, (2, 1))
@@ -193,7 +193,7 @@ def test_a_run_across_unlike_grids_ends_at_the_fixed_point():
     assert done.converged
     assert done.last.image == pytest.approx(done.last.g, abs=1e-7 * np.abs(done.last.g).max())
     ratio = largest_step_ratio(pair, done.iterates)
-    assert ratio.value <= SemidefiniteEdition(pair, measure(pair)).factor(0.25).value
+    assert ratio.value <= QuadraticForms(pair, measure(pair)).factor(0.25).value
 
 
 def test_roles_across_unlike_grids_are_not_exchanged():
@@ -273,7 +273,7 @@ def test_a_law_of_ones_own_is_run_measured_and_bounded():
     assert np.all(np.abs(done.last.image[: len(x)]) <= bound * (1 + 1e-9))
     measured = measure(pair)
     assert measured.kappa_1.value != measure(problem).kappa_1.value
-    assert largest_step_ratio(pair, done.iterates).value <= SemidefiniteEdition(pair, measured).factor(0.7).value
+    assert largest_step_ratio(pair, done.iterates).value <= QuadraticForms(pair, measured).factor(0.7).value
 
 
 def test_a_law_outside_the_theorem_and_its_warnings_are_told():

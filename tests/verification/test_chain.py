@@ -21,9 +21,9 @@ from scipy.linalg import block_diag, eigh
 from ndtheory import REPAIRED, bounds, evaluate, sharp
 from verification.algorithm.affine_piece import Piece
 from verification.algorithm.rates import largest_step_ratio
+from verification.bounds.multipliers import NARROW, QuadraticForms, friction_threshold
 from verification.bounds.pattern_search import largest_factor, worst_piece
 from verification.bounds.program import LMIError
-from verification.bounds.semidefinite import NARROW, SemidefiniteEdition, friction_threshold
 from verification.constants import Measured
 from verification.contact.active_set import Pattern
 from verification.interface.assembly import ContactPair
@@ -162,7 +162,7 @@ def chain_of(pair: ContactPair, measured: Measured, theta: float, random: np.ran
         norm=np.nan if linear is None else linear.norm,
         attained=shown[1],
         search=found.value,
-        lmi=SemidefiniteEdition(pair, measured).factor(theta).value,
+        lmi=QuadraticForms(pair, measured).factor(theta).value,
         sharp=sharp_factor(measured, theta),
         repaired=repaired_factor(measured, theta),
     )
@@ -254,7 +254,7 @@ def test_the_search_finds_nearly_the_largest_norm_of_all_contact_patterns():
         if pair.contact.grid.n <= 3:
             most = max(piece.factor(theta) for piece in every_piece(pair))
             ratios.append(largest_factor(pair, theta, random=random).value / most)
-            assert most <= SemidefiniteEdition(pair, measured).factor(theta).value * (1 + RELATIVE)
+            assert most <= QuadraticForms(pair, measured).factor(theta).value * (1 + RELATIVE)
     assert len(ratios) > 10
     assert max(ratios) < 1 + RELATIVE
     assert min(ratios) > 0.95
@@ -278,7 +278,7 @@ def test_without_friction_q_is_attained_on_both_branches(share):
         assert attained(worst, theta, random) == pytest.approx(bound, rel=1e-8)
         assert largest_factor(pair, theta, random=random).value == pytest.approx(bound, rel=RELATIVE)
         # where both branches meet the block of d_1 in the optimal form is singular, which costs half the digits
-        assert SemidefiniteEdition(pair, measured).factor(theta).value == pytest.approx(bound, rel=1e-7)
+        assert QuadraticForms(pair, measured).factor(theta).value == pytest.approx(bound, rel=1e-7)
 
 
 @pytest.mark.parametrize(("k", "within"), [("1/1000", 0.9), ("1/1000000", 1.0)])
@@ -386,7 +386,7 @@ CERTIFIED = range(0, 36, 3)
 @pytest.mark.parametrize("seed", CERTIFIED)
 def test_the_multipliers_prove_the_factor_and_no_smaller_one(seed, nodewise):
     pair, measured, theta, random = case(seed)
-    found = SemidefiniteEdition(pair, measured, nodewise=nodewise).factor(theta)
+    found = QuadraticForms(pair, measured, nodewise=nodewise).factor(theta)
     forms, q = Forms.of(pair), found.value
     assert forms.prove(found.multipliers, q * (1 + 1e-6), theta)
     assert not forms.prove(found.multipliers, q * (1 - 1e-6), theta)
@@ -404,7 +404,7 @@ def test_the_multipliers_prove_the_factor_and_no_smaller_one(seed, nodewise):
 def test_the_form_of_the_edition_is_the_one_written_down(seed):
     """For multipliers of any kind."""
     pair, measured, theta, random = case(seed)
-    edition, forms = SemidefiniteEdition(pair, measured), Forms.of(pair)
+    edition, forms = QuadraticForms(pair, measured), Forms.of(pair)
     count = 4 if measured.friction else 1
     multipliers = tuple(random.standard_normal(pair.contact.grid.n) for _ in range(count))
     basis, sizes = forms.basis(multipliers), edition.conditions(multipliers)
@@ -448,7 +448,7 @@ CHEATS: dict[str, Callable[[Multipliers], Multipliers]] = {
 def test_multipliers_outside_the_cone_are_refused(cheat):
     for seed in (2, 12):
         pair, measured, theta, _ = case(seed)
-        found, forms = SemidefiniteEdition(pair, measured).factor(theta), Forms.of(pair)
+        found, forms = QuadraticForms(pair, measured).factor(theta), Forms.of(pair)
         assert len(found.multipliers) == 4
         assert forms.prove(found.multipliers, 1.01 * found.value, theta)
         assert not forms.prove(CHEATS[cheat](*found.multipliers), 1.01 * found.value, theta)
@@ -461,7 +461,7 @@ def test_a_form_with_less_weight_on_friction_is_refused(weight):
     for seed in range(0, 16, 2):
         pair, measured, theta, random = case(seed)
         if measured.friction:
-            found = SemidefiniteEdition(pair, measured).factor(theta)
+            found = QuadraticForms(pair, measured).factor(theta)
             claim = Forms.of(pair, weight).least(found.multipliers, theta)
             if claim < found.value * (1 - 1e-3):
                 below += claim < largest_factor(pair, theta, random=random).value
@@ -476,7 +476,7 @@ def test_a_form_with_less_weight_on_friction_is_refused(weight):
 def test_below_the_largest_theta_of_the_edition_its_multipliers_prove_every_theta(seed):
     """Times theta, with q = 1; above it they do not."""
     pair, measured, _, _ = case(seed)
-    found, forms = SemidefiniteEdition(pair, measured).largest_theta(), Forms.of(pair)
+    found, forms = QuadraticForms(pair, measured).largest_theta(), Forms.of(pair)
     interval = sharp.contraction_interval(*(float(v) for v in energy(measured)), 1e-12)
     assert found is not None or interval is None
     if found is None:
@@ -491,7 +491,7 @@ def test_below_the_largest_theta_of_the_edition_its_multipliers_prove_every_thet
 def test_the_friction_number_bounds_the_work_of_every_piece_and_is_at_most_that_of_the_theorem(seed):
     """``<g, p> <= c |||g|||^2``."""
     pair, measured, _, random = case(seed)
-    c = SemidefiniteEdition(pair, measured).friction_number().value
+    c = QuadraticForms(pair, measured).friction_number().value
     work = lambda piece: np.linalg.eigvalsh((piece.relaxed(1.0) + piece.relaxed(1.0).T) / 2)[-1]
     _, kappa_1, kappa_2 = (float(v) for v in energy(measured))
     assert worst_piece(pair, lambda piece: float(work(piece)), random=random).value <= c + 1e-9
@@ -504,7 +504,7 @@ def test_the_friction_threshold_lies_where_the_friction_number_reaches_1(seed):
     pair, measured, _, _ = case(seed)
     start = measured.friction_threshold.value
     found = friction_threshold(pair, measured, start)
-    number = lambda k: SemidefiniteEdition(pair, measured, friction=k).friction_number()
+    number = lambda k: QuadraticForms(pair, measured, friction=k).friction_number()
     assert number(found).value < 1
     assert number(found * (1 + 1.5 * NARROW)).evaluated >= 1
     assert found >= start * (1 - NARROW)
@@ -516,6 +516,6 @@ def test_where_no_friction_leaves_multipliers_that_prove_anything_no_threshold_i
     def fail(self):
         raise LMIError("made up")
 
-    monkeypatch.setattr(SemidefiniteEdition, "friction_number", fail)
+    monkeypatch.setattr(QuadraticForms, "friction_number", fail)
     with pytest.raises(LMIError, match="no friction above"):
         friction_threshold(pair, measured, measured.friction_threshold.value)

@@ -24,7 +24,7 @@ def comparisons(tmp_path_factory):
 
 
 def drawings(comparison):
-    return {"bodies": draw_bodies(comparison.run), "residuals": draw_residuals(comparison.run, comparison.editions)}
+    return {"bodies": draw_bodies(comparison.run), "residuals": draw_residuals(comparison.run, comparison.computed)}
 
 
 @pytest.mark.parametrize(("name", "ending"), [("inside", "svg"), ("two-bars", "svg"), ("two-bars", "png")])
@@ -81,7 +81,7 @@ def test_residuals_are_drawn_on_a_logarithmic_axis_that_says_what_it_shows(compa
 
 def test_only_an_edition_with_a_factor_draws_its_bound(comparisons):
     labels = lambda name: (
-        draw_residuals(comparisons[name].run, comparisons[name].editions).axes[0].get_legend_handles_labels()[1]
+        draw_residuals(comparisons[name].run, comparisons[name].computed).axes[0].get_legend_handles_labels()[1]
     )
     drawn = lambda name: [label for label in labels(name) if label.endswith("bound")]
     assert drawn("inside") == ["repaired bound", "sharp bound", "lmi bound"]
@@ -112,6 +112,6 @@ def test_a_run_cut_short_can_be_drawn(comparisons, tmp_path, name, history):
     comparison = comparisons[name]
     short = replace(comparison.run, iterates=comparison.run.iterates[:history], outcome="interrupted")
     save(draw_bodies(short), tmp_path / "bodies.svg")
-    save(draw_residuals(short, comparison.editions), tmp_path / "residuals.svg")
+    save(draw_residuals(short, comparison.computed), tmp_path / "residuals.svg")
     for figure in ("bodies", "residuals"):
         assert ElementTree.parse(tmp_path / f"{figure}.svg").getroot().tag.endswith("svg")

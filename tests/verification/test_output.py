@@ -101,7 +101,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 def quick(monkeypatch):
     """Figures that cost nothing: only their files matter here."""
     monkeypatch.setattr(figures, "draw_bodies", lambda result: "bodies")
-    monkeypatch.setattr(figures, "draw_residuals", lambda run, editions=(): "residuals")
+    monkeypatch.setattr(figures, "draw_residuals", lambda run, bounds=(): "residuals")
     monkeypatch.setattr(figures, "draw_waterfall", lambda losses, unit: "waterfall")
     monkeypatch.setattr(
         figures,
@@ -372,7 +372,7 @@ def page_and_figures(folder: Path, comparison) -> str:
     """The report and both figures, whose files must be well-formed; returns the report."""
     for name, figure in (
         ("bodies", figures.draw_bodies(comparison.run)),
-        ("residuals", figures.draw_residuals(comparison.run, comparison.editions)),
+        ("residuals", figures.draw_residuals(comparison.run, comparison.computed)),
     ):
         figures.save(figure, folder / f"{name}.svg")
         ElementTree.parse(folder / f"{name}.svg")

@@ -9,9 +9,9 @@ import pytest
 from chain_problems import case
 
 import verification as vf
+from verification.bounds.multipliers import QuadraticForms
 from verification.bounds.program import LMIError
 from verification.bounds.rounding import UNIT, norm_bound, positive_definite
-from verification.bounds.semidefinite import SemidefiniteEdition
 from verification.constants import measure
 from verification.interface.assembly import build
 
@@ -132,13 +132,13 @@ def slender(length: int) -> vf.Problem:
     )
 
 
-SMALL = [seed for seed in range(60) if 0 < (p := case(seed)[0]).n <= 3 and p.friction][:6]
+SMALL = [seed for seed in range(60) if 0 < (p := case(seed)[0]).contact.grid.n <= 3 and p.friction][:6]
 
 
 @pytest.mark.parametrize("seed", SMALL)
 def test_the_multipliers_prove_the_factor_in_rationals(seed):
     pair, measured, theta, _ = case(seed)
-    found = SemidefiniteEdition(pair, measured).factor(theta)
+    found = QuadraticForms(pair, measured).factor(theta)
     _, tau, a, b = found.multipliers
     assert min(m.min() for m in found.multipliers) >= 0
     assert all(4 * Fraction(x) * Fraction(y) >= Fraction(z) ** 2 for x, y, z in zip(a, b, tau, strict=True))
@@ -153,7 +153,7 @@ def test_near_singular_stiffness_makes_the_factor_larger_never_too_small(length,
     """The value that is given is proved in rationals; it gives away at most a thousandth for it."""
     pair = build(slender(length))
     assert np.linalg.cond(pair.contact.stiffness) > condition
-    found = SemidefiniteEdition(pair, measure(pair)).factor(0.5)
+    found = QuadraticForms(pair, measure(pair)).factor(0.5)
     assert found.evaluated < found.value < 1.001 * found.evaluated
     assert definite(exact_form(pair, found.multipliers, 0.5, Fraction(found.value) ** 2 * (1 + Fraction(1, 10**15))))
 
@@ -162,4 +162,4 @@ def test_where_rounding_hides_what_the_multipliers_leave_nothing_is_claimed():
     """A tower 1e5 times as high as wide: condition 1e13."""
     pair = build(slender(10**5))
     with pytest.raises(LMIError):
-        SemidefiniteEdition(pair, measure(pair)).factor(0.5)
+        QuadraticForms(pair, measure(pair)).factor(0.5)

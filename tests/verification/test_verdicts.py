@@ -9,12 +9,12 @@ from chain_problems import case, run_of
 
 import verification as vf
 from ndtheory import Number
-from verification import comparison as verdicts
 from verification.algorithm.linearisation import NotLinear, forecast
 from verification.algorithm.rates import StepRatio
 from verification.bounds import program as lmi_program
-from verification.bounds import semidefinite as lmi
-from verification.bounds.table import LARGEST
+from verification.bounds.bound import LARGEST
+from verification.bounds.multipliers import QuadraticForms
+from verification.bounds.table import BOUNDS
 from verification.comparison import TIGHT, compare, judge, judge_forecast
 
 BOUND = 0.5
@@ -76,16 +76,14 @@ def test_a_factor_scaled_by_nine_tenths_is_violated_where_the_bound_is_attained(
     whole = compare(problem)
     assert whole.verdicts[name].verdict == "CONSISTENT"
     assert "attained" in whole.verdicts["sharp"].reason
-    less = lambda number: Number.of_float(0.9 * number.value)
-    if name == "sharp":
-        sharp = verdicts.sharp_bounds
-        monkeypatch.setattr(
-            verdicts, "sharp_bounds", lambda *args: replace(sharp(*args), factor=less(sharp(*args).factor))
-        )
-    else:
-        evaluate = lmi.evaluate_lmi
-        shrink = lambda *args, **kw: replace(evaluate(*args, **kw), lipschitz=less(evaluate(*args, **kw).lipschitz))
-        monkeypatch.setattr(lmi, "evaluate_lmi", shrink)
+    kind, less = type(BOUNDS[name]), lambda number: Number.of_float(0.9 * number.value)
+    evaluate = kind.evaluate
+
+    def shrink(*args, **kw):
+        result = evaluate(*args, **kw)
+        return replace(result, factor=less(result.factor))
+
+    monkeypatch.setattr(kind, "evaluate", shrink)
     found = compare(problem)
     assert found.verdicts[name].verdict == "VIOLATED"
     assert found.proved_violated
@@ -108,14 +106,14 @@ def blocks(cells: int, **contact: object) -> vf.Problem:
     )
 
 
-def test_beyond_the_nodes_it_is_worked_out_for_the_semidefinite_edition_is_not_computed():
+def test_beyond_the_nodes_it_is_worked_out_for_the_semidefinite_bound_is_not_computed():
     """One limit: what one screen leaves out no other one computes."""
     found = compare(blocks(LARGEST))
-    assert found.lmi is None
+    assert found.bounds["lmi"].detail is None
     assert found.verdicts["lmi"].verdict == "NOT_COMPUTED"
     assert f"up to {LARGEST}" in found.verdicts["lmi"].reason
     with pytest.raises(ValueError, match=f"up to {LARGEST}"):
-        lmi.SemidefiniteEdition(found.run.pair, found.measured)
+        QuadraticForms(found.run.pair, found.measured)
 
 
 def test_a_solver_that_gives_up_is_told_from_a_bound_that_is_not_below_1(monkeypatch):
@@ -126,21 +124,21 @@ def test_a_solver_that_gives_up_is_told_from_a_bound_that_is_not_below_1(monkeyp
 
     monkeypatch.setattr(lmi_program.Program, "solve", fail)
     slight, strong = compare(blocks(4)), compare(blocks(4, friction=2))
-    assert slight.lmi.factor.value <= slight.sharp.factor.value
+    assert slight.bounds["lmi"].factor.value <= slight.bounds["sharp"].factor.value
     assert slight.verdicts["lmi"].verdict == "CONSISTENT"
-    assert strong.lmi.factor is None
+    assert strong.bounds["lmi"].factor is None
     assert strong.verdicts["lmi"].verdict == "NOT_COMPUTED"
     assert "gave up" in strong.verdicts["lmi"].reason
 
 
 def test_a_bound_that_is_not_below_1_says_so():
     found = compare(blocks(4, friction=5))
-    assert found.lmi.lipschitz.value > 1
+    assert found.bounds["lmi"].detail.lipschitz.value > 1
     assert found.verdicts["lmi"].verdict == "HYPOTHESES_NOT_MET"
     assert "not below 1" in found.verdicts["lmi"].reason
 
 
-def test_no_value_of_the_semidefinite_edition_is_called_certified_while_it_is_a_double():
+def test_no_value_of_the_semidefinite_bound_is_called_certified_while_it_is_a_double():
     document = compare(blocks(4)).to_dict()["lmi"]
     assert document["certified"] is False
     assert "doubles" in document["reason"]["certified"]

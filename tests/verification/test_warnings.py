@@ -13,7 +13,8 @@ import verification as vf
 from fem1d2d import rectangle
 from verification.cli.problems import examples
 from verification.interface.assembly import discretise
-from verification.interface.pair import LOCKING, SHARE
+from verification.interface.friction import SHARE
+from verification.interface.pair import LOCKING
 
 
 def warned(data):

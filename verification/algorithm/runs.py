@@ -247,7 +247,7 @@ class Run(Document):
         proved = self.proved_rate
         reason: dict[str, str] = {}
         if proved is None:
-            reason["proved_rate"] = "momentum without friction has one; for a constant theta see the editions"
+            reason["proved_rate"] = "momentum without friction has one; for a constant theta see the bounds"
         if linear is None:
             names = ("linearised_rate", "linearised_norm", "linearised_radius", "linearised_margin", "predicted_rate")
             reason |= dict.fromkeys(names, self.why_not_linearised)

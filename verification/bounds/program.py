@@ -1,4 +1,4 @@
-"""The program behind the semidefinite edition: cvxpy's model, the multipliers that a solver proposes."""
+"""The program behind the semidefinite bound: cvxpy's model, the multipliers that a solver proposes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The forms of the semidefinite edition in traces (d, c), and whether they are positive definite in spite of rounding.
+"""The forms of the semidefinite bound in traces (d, c), and whether they are positive definite in spite of rounding.
 
 With ``g = S_2 d`` and ``p = P c`` every term but ``|a p + b g|^2`` is a product of the interface matrices themselves.
 That term has an inverse, ``|.|^2 = .' S_2^-1 .``, which a Schur complement takes away: ``Q - weight M' S_2^-1 M`` is

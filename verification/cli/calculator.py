@@ -7,19 +7,11 @@ from typing import Any, ClassVar
 
 import click
 
-from ndtheory import (
-    EDITIONS,
-    Bounds,
-    Constants,
-    EnergyConstants,
-    HypothesisError,
-    SharpBounds,
-    evaluate,
-    evaluate_sharp,
-    relaxation_factor,
-)
+from ndtheory import Bounds, Constants, EnergyConstants, HypothesisError, SharpBounds, relaxation_factor
 from ndtheory.constants import take
-from verification.bounds.table import EditionRow, bounded, row_of
+from verification.bounds.bound import BoundResult, Subject, bounded
+from verification.bounds.section5 import Section5
+from verification.bounds.table import BOUNDS
 from verification.cli.console import factor, figures, heading, note, say, table
 from verification.document import Document
 from verification.ledger.record import on_the_printed_proof
@@ -35,18 +27,14 @@ class BoundsDocument(Document):
     schema: ClassVar[str] = "ndtheory.bounds/1"
     units: Mapping[str, str] = {"length": "any", "stress": "that of m"}
 
-    def __init__(
-        self, inputs: Mapping[str, Any], editions: Mapping[str, Bounds | SharpBounds], why: Mapping[str, str]
-    ) -> None:
-        self.inputs, self.editions, self.why = inputs, editions, why
+    def __init__(self, inputs: Mapping[str, Any], results: Mapping[str, BoundResult]) -> None:
+        self.inputs, self.results = inputs, results
 
     def content(self) -> dict[str, Any]:
-        names = (*(e.name for e in EDITIONS), "sharp")
-        absent = [name for name in names if name not in self.editions]
         return {
             "inputs": dict(self.inputs),
-            "editions": {n: self.editions[n].to_dict() if n in self.editions else None for n in names},
-            "reason": {name: self.why[name] for name in absent},
+            "editions": {name: result.to_dict() for name, result in self.results.items()},
+            "reason": {name: result.not_computed for name, result in self.results.items() if result.not_computed},
         }
 
 
@@ -66,9 +54,9 @@ class BoundsDocument(Document):
     show_default=True,
     help="Editions of Section 5.",
 )
-@click.option("--rho", metavar="NUMBER", help="Sharp edition: stiffness ratio of the bodies on Gamma_c.")
-@click.option("--kappa1", "kappa_1", metavar="NUMBER", help="Sharp edition: k C_s C_t1; 0 without friction.")
-@click.option("--kappa2", "kappa_2", metavar="NUMBER", help="Sharp edition: k C_s C_t2; 0 without friction.")
+@click.option("--rho", metavar="NUMBER", help="Sharp bound: stiffness ratio of the bodies on Gamma_c.")
+@click.option("--kappa1", "kappa_1", metavar="NUMBER", help="Sharp bound: k C_s C_t1; 0 without friction.")
+@click.option("--kappa2", "kappa_2", metavar="NUMBER", help="Sharp bound: k C_s C_t2; 0 without friction.")
 @click.option("--check", is_flag=True, help="Exit 1 unless contraction at theta is proved.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout.")
 def bounds(edition: str, theta: str | None, check: bool, as_json: bool, **given: str | None) -> int:
@@ -87,37 +75,38 @@ def bounds(edition: str, theta: str | None, check: bool, as_json: bool, **given:
     energy = {key: given[key] for key in ENERGY}
     if check and theta is None:
         raise click.UsageError("--check needs --theta", click.get_current_context())
-    editions: dict[str, Bounds | SharpBounds] = {}
-    why: dict[str, str] = {}
     alone = energy["rho"] is not None and not any(
         of_section_5[key] is not None for key in ("m", "M", "C_R", "C_K", "C_s", "C_tr")
     )
     constants = None if alone else _constants(of_section_5)
-    for e in EDITIONS:
-        if constants is not None and edition in (e.name, "both"):
-            editions[e.name] = evaluate(e, constants, theta)
-        else:
-            why[e.name] = "needs --m, --M, --CR and --CK" if alone else "not asked for"
     friction = (
         take("k", 0 if given["k"] is None else given["k"], "a number k >= 0", lambda k: k >= 0)
         if constants is None
         else constants.C_K
     )
     sharp = _energy(energy, friction > 0)
-    if sharp is None:
-        why["sharp"] = "needs --rho, and --kappa1, --kappa2 with friction"
-    else:
-        editions["sharp"] = evaluate_sharp(sharp, theta)
+    subject = Subject(constants=constants, energy=sharp)
+    results = {}
+    for name, bound in BOUNDS.items():
+        if not bound.calculated:
+            continue
+        of_paper = isinstance(bound, Section5)
+        if of_paper and (alone or edition not in (name, "both")):
+            results[name] = bound.absent("needs --m, --M, --CR and --CK" if alone else "not asked for")
+        elif not of_paper and sharp is None:
+            results[name] = bound.absent("needs --rho, and --kappa1, --kappa2 with friction")
+        else:
+            results[name] = bound.evaluate(subject, theta)
     if as_json:
         inputs: dict[str, Any] = {key: None if constants is None else getattr(constants, key) for key in CONSTANTS}
         inputs |= {key: None if sharp is None else getattr(sharp, key) for key in ENERGY}
         inputs["theta"] = None if theta is None else relaxation_factor(theta)
         absent = dict.fromkeys((key for key, value in inputs.items() if value is None), "not given")
         inputs = {key: None if value is None else float(value) for key, value in inputs.items()} | {"reason": absent}
-        say(BoundsDocument(inputs, editions, why).to_json())
+        say(BoundsDocument(inputs, results).to_json())
     else:
-        _screen(constants, editions)
-    proved = any(b.verdict == "contraction" and getattr(b, "proved", True) for b in editions.values())
+        _screen(constants, {name: result for name, result in results.items() if not result.not_computed})
+    proved = any(result.factor is not None and result.proved for result in results.values())
     return 1 if check and not proved else 0
 
 
@@ -130,12 +119,12 @@ def _constants(given: Mapping[str, str | None]) -> Constants:
 
 
 def _energy(given: Mapping[str, str | None], rubs: bool) -> EnergyConstants | None:
-    """The constants of the sharp edition; None where they were not given."""
+    """The constants of the sharp bound; None where they were not given."""
     missing = [ENERGY[key] for key in ENERGY if given[key] is None]
     if len(missing) == len(ENERGY):
         return None
     if given["rho"] is None or len(missing) == 1 or (rubs and missing):
-        needed = "the sharp edition needs --rho, and with friction --kappa1 and --kappa2"
+        needed = "the sharp bound needs --rho, and with friction --kappa1 and --kappa2"
         raise click.UsageError(f"{', '.join(missing)} missing: {needed}", click.get_current_context())
     try:
         return EnergyConstants(**{key: value for key, value in given.items() if value is not None})
@@ -143,12 +132,12 @@ def _energy(given: Mapping[str, str | None], rubs: bool) -> EnergyConstants | No
         raise HypothesisError(ENERGY[error.key], error.value, error.needed) from None
 
 
-def editions_table(rows: Sequence[EditionRow], unit: str) -> None:
-    """Print the editions, and in which unit of stress the printed one speaks.
+def bounds_table(rows: Sequence[BoundResult], unit: str) -> None:
+    """Print the bounds, and in which unit of stress the printed one speaks.
 
     Parameters
     ----------
-    rows : sequence of EditionRow
+    rows : sequence of BoundResult
     unit : str
         "MPa", or what the unit of stress is that of.
     """
@@ -156,7 +145,7 @@ def editions_table(rows: Sequence[EditionRow], unit: str) -> None:
     end = [] if theta is None else [f"theta = {theta:.4g}"]
     lines = [
         ["", "every small", "some", "", "", *([] if theta is None else [""])],
-        ["edition", f"theta {friction} <", f"theta {friction} <", "theta allowed", "factor", *end],
+        ["bound", f"theta {friction} <", f"theta {friction} <", "theta allowed", "factor", *end],
     ]
     for row in rows:
         interval = "-" if row.interval is None else f"({row.interval[0]:.3g}, {figures(row.interval[1])})"
@@ -169,7 +158,7 @@ def editions_table(rows: Sequence[EditionRow], unit: str) -> None:
         note(f"printed: with stresses in {unit}; in another unit its figures are others", "  ")
 
 
-def _allowed(row: EditionRow) -> list[str]:
+def _allowed(row: BoundResult) -> list[str]:
     """The two thresholds on friction."""
     friction = row.friction
     if friction.on == "any":
@@ -178,16 +167,17 @@ def _allowed(row: EditionRow) -> list[str]:
     return ["-" if value is None else figures(value) + times for value in (friction.every, friction.some)]
 
 
-def _screen(constants: Constants | None, editions: Mapping[str, Bounds | SharpBounds]) -> None:
+def _screen(constants: Constants | None, results: Mapping[str, BoundResult]) -> None:
     if constants is not None:
         values = ", ".join(f"{key} = {figures(float(getattr(constants, key)))}" for key in ("m", "M", "C_R", "C_K"))
         say(values + ("" if constants.k is None else f" (k = {figures(float(constants.k))})"))
-    sharp = editions.get("sharp")
+    details = {name: result.detail for name, result in results.items()}
+    sharp = details.get("sharp")
     if isinstance(sharp, SharpBounds):
         say(", ".join(f"{key} = {figures(getattr(sharp, key))}" for key in ENERGY))
     heading("DOES ONE STEP CONTRACT?")
-    editions_table([row_of(name, b) for name, b in editions.items()], "the unit of --m")
-    section_5 = {name: b for name, b in editions.items() if isinstance(b, Bounds)}
+    bounds_table(list(results.values()), "the unit of --m")
+    section_5 = {name: found for name, found in details.items() if isinstance(found, Bounds)}
     if section_5:
         heading("THE CONSTANTS OF SECTION 5")
         names = ["C_T", "C0", "C1", "C2", "C3", "C4", "C5", "C6"]

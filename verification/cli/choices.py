@@ -93,7 +93,7 @@ def region(file: Path, target: Path, as_json: bool) -> None:
     """Draw the plane of theta and k: where one step is proved to contract, and what runs do there.
 
     Both axes are logarithmic; theta and k have no unit.  The regions are those of the printed, the repaired, the sharp
-    and the semidefinite edition for the bodies of FILE; the points are runs, coloured by outcome.
+    and the semidefinite bound for the bodies of FILE; the points are runs, coloured by outcome.
 
     \b
     Example:

@@ -10,7 +10,7 @@ from verification.advice.readings import NextRun, RunReading, SeenRun
 from verification.advice.roles import Advice
 from verification.algorithm.runs import Run
 from verification.bounds.region import MOST_STEPS, Plane
-from verification.cli.calculator import editions_table
+from verification.cli.calculator import bounds_table
 from verification.cli.console import figures, heading, near_one, note, printable, say, table
 from verification.comparison import Comparison
 from verification.constants import ENERGY_NAMES, NAMES, Measured
@@ -165,10 +165,10 @@ def comparison(result: Comparison, file: Path) -> None:
     say(f"  m = {m} {stress}, M = {M} {stress}, C_R = {C_R}")
     say(f"  C_s = {C_s}, C_tr = {C_tr}, C_K = {C_K} {stress}, rho = {rho}")
     heading("DOES ONE STEP CONTRACT?")
-    if result.editions:
-        editions_table(result.editions, stress)
+    if result.computed:
+        bounds_table(result.computed, stress)
     else:
-        note("no edition applies: " + next(iter(measured.reason.values()), ""), "  ")
+        note("no bound applies: " + next(iter(measured.reason.values()), ""), "  ")
     for name in ("lmi", "losses"):
         if name in result.reason:
             note(f"{name}: {result.reason[name]}", "  ")
@@ -182,7 +182,7 @@ def comparison(result: Comparison, file: Path) -> None:
         note(f"{links}; the unit adds {unit:.1f}", "  ")
     _happened(finished)
     heading("DOES THE RUN AGREE WITH THE BOUND?")
-    table([["edition", "verdict", "why"], *([n, j.verdict, j.reason] for n, j in result.verdicts.items())])
+    table([["bound", "verdict", "why"], *([n, j.verdict, j.reason] for n, j in result.verdicts.items())])
     _limits(finished.outside)
     say(f"Next: ndtheory advise {quote(str(file))}")
 
@@ -277,7 +277,7 @@ def plane(found: Plane, target: Path) -> None:
     """The screen of ``region``."""
     say(printable(found.title))
     heading("WHERE IS ONE STEP PROVED TO CONTRACT?")
-    rows = [["edition", "every small theta: k <", "some theta: k <", "theta at most"]]
+    rows = [["bound", "every small theta: k <", "some theta: k <", "theta at most"]]
     for name, region in found.regions.items():
         if region.k:
             highest = figures(max(hi for _, hi in region.theta))

@@ -1,11 +1,12 @@
-"""The (theta, k) plane on logarithmic axes: regions by edition, runs over them."""
+"""The (theta, k) plane on logarithmic axes: regions by bound, runs over them."""
 
 from __future__ import annotations
 
 from matplotlib.figure import Figure
 
 from verification.bounds.region import Plane
-from verification.figures.style import EDITIONS, HATCHES, OUTCOMES, new_figure, plain, styled
+from verification.bounds.table import BOUNDS
+from verification.figures.style import OUTCOMES, new_figure, plain, styled
 
 
 def draw_region(plane: Plane) -> Figure:
@@ -19,7 +20,7 @@ def draw_region(plane: Plane) -> Figure:
         ax = figure.subplots()
         ax.set_xscale("log")
         ax.set_yscale("log")
-        for name in ("lmi", "sharp", "repaired", "printed"):
+        for name, bound in reversed(list(BOUNDS.items())):
             region = plane.regions.get(name)
             if region is None or not region.k:
                 continue
@@ -28,9 +29,7 @@ def draw_region(plane: Plane) -> Figure:
             high = [hi for _, hi in (region.theta[0], *region.theta)]
             unit = f" ({plane.units['stress']})" if name == "printed" else ""
             label = f"{name}{unit}: k < {max(region.k):.2g}"
-            ax.fill_betweenx(
-                k, low, high, color=EDITIONS[name], alpha=0.55, linewidth=0, label=label, hatch=HATCHES[name]
-            )
+            ax.fill_betweenx(k, low, high, color=bound.colour, alpha=0.55, linewidth=0, label=label, hatch=bound.hatch)
         for outcome, (colour, marker) in OUTCOMES.items():
             chosen = [point for point in plane.points if point.outcome == outcome]
             if chosen:

@@ -10,17 +10,18 @@ from matplotlib.ticker import MaxNLocator
 
 from verification.algorithm.rates import noise
 from verification.algorithm.runs import Run
-from verification.bounds.table import EditionRow
-from verification.figures.style import EDITIONS, PRESSURE, new_figure, plain, styled
+from verification.bounds.bound import BoundResult
+from verification.bounds.table import BOUNDS
+from verification.figures.style import PRESSURE, new_figure, plain, styled
 
 
-def draw_residuals(run: Run, editions: Sequence[EditionRow] = ()) -> Figure:
+def draw_residuals(run: Run, bounds: Sequence[BoundResult] = ()) -> Figure:
     """Unrelaxed residual over evaluations of T, the observed rate, the proved factors and the noise floor.
 
     Parameters
     ----------
     run : Run
-    editions : sequence of EditionRow, optional
+    bounds : sequence of BoundResult, optional
         Those with a factor are drawn.
     """
     history = np.array(run.history)
@@ -35,10 +36,10 @@ def draw_residuals(run: Run, editions: Sequence[EditionRow] = ()) -> Figure:
             middle = (rate.begin + rate.end) // 2
             line = history[middle] * rate.value ** (steps - middle)
             ax.semilogy(steps, line, "--", color="#D55E00", label=f"observed rate {rate.value:.4g}")
-        for row in editions:
+        for row in bounds:
             if row.factor is not None and shown.any():
                 line = history[shown][0] * row.factor.value**steps
-                ax.semilogy(steps, line, "-.", color=EDITIONS[row.name], label=f"{row.name} bound")
+                ax.semilogy(steps, line, "-.", color=BOUNDS[row.name].colour, label=f"{row.name} bound")
         if run.last.scale > 0:
             floor = noise(run.pair, run.last) / run.last.scale
             ax.axhline(floor, color="0.7", linewidth=0.8, linestyle=":", label="rounding")

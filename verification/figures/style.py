@@ -16,8 +16,6 @@ from matplotlib.figure import Figure
 BODY1, BODY2 = "#0072B2", "#D55E00"
 PRESSURE, SHEAR = "#000000", "#CC79A7"
 STATES = {"stick": "#009E73", "slip": "#E69F00", "open": "#999999"}
-EDITIONS = {"printed": "#999999", "repaired": "#56B4E9", "sharp": "#009E73", "lmi": "#F0E442"}
-HATCHES = {"printed": "xx", "repaired": "//", "sharp": "..", "lmi": ""}
 #: Colour and marker of a run by its outcome.
 OUTCOMES = {
     "converged": ("#0072B2", "o"),

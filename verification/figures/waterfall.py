@@ -8,7 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from verification.bounds.losses import Loss, Losses
-from verification.figures.style import EDITIONS, HATCHES, STATES, new_figure, styled
+from verification.bounds.table import BOUNDS
+from verification.figures.style import STATES, new_figure, styled
 
 
 def draw_waterfall(losses: Losses, unit: str) -> Figure:
@@ -42,8 +43,8 @@ def _draw(ax: Axes, title: str, chain: Sequence[Loss], *, adds_up: bool) -> None
     begin, farthest = 0.0, 0.0
     for i, loss in enumerate(chain):
         name = "printed" if loss.only_unit else "repaired"
-        hatch = HATCHES["printed"] if loss.only_unit else None
-        ax.barh(i, loss.decades, left=begin, color=EDITIONS[name], hatch=hatch, edgecolor="black", linewidth=0.5)
+        hatch = BOUNDS["printed"].hatch if loss.only_unit else None
+        ax.barh(i, loss.decades, left=begin, color=BOUNDS[name].colour, hatch=hatch, edgecolor="black", linewidth=0.5)
         end = begin + loss.decades
         farthest = max(farthest, end)
         says = f" {loss.decades:.1f}" + (", only the unit" if loss.only_unit else "")

@@ -240,7 +240,7 @@ def _pictures(room: Path, result: Run | Solution, comparison: Comparison | None 
 
     drawn = {"bodies": figures.draw_bodies(result)}
     if isinstance(result, Run):
-        drawn["residuals"] = figures.draw_residuals(result, [] if comparison is None else comparison.editions)
+        drawn["residuals"] = figures.draw_residuals(result, [] if comparison is None else comparison.computed)
     if comparison is not None and comparison.losses is not None:
         drawn["waterfall"] = figures.draw_waterfall(comparison.losses, comparison.units["stress"])
     for name, figure in drawn.items():

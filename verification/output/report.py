@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ndtheory import Number, __version__
-from verification.bounds.table import bounded
+from verification.bounds.bound import bounded
 from verification.comparison import Comparison
 from verification.ledger.record import on_the_printed_proof
 
@@ -41,7 +41,7 @@ def report(comparison: Comparison, figures: Mapping[str, str]) -> str:
     return environment.get_template("report.html.j2").render(
         comparison=comparison,
         run=comparison.run,
-        bounded=bounded(comparison.editions),
+        bounded=bounded(comparison.computed),
         problem=comparison.run.pair.problem,
         title="".join(c if c.isprintable() else " " for c in comparison.run.pair.title),
         measured=comparison.measured,

@@ -1,0 +1,245 @@
+"""What a bound on the factor of one step is, and what it answers.
+
+Every bound, from the printed theorem to the semidefinite program, derives from :class:`Bound` and answers with a
+:class:`BoundResult`; tables, verdicts, regions, figures and reports loop over :data:`verification.bounds.table.BOUNDS`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from ndtheory import Constants, EnergyConstants, Number
+
+if TYPE_CHECKING:
+    from verification.constants import Measured
+    from verification.interface.pair import ContactPair
+from verification.progress import Progress, silent
+
+#: The semidefinite bound and the losses are worked out up to this many contact nodes: some seconds.
+LARGEST = 30
+
+#: How many friction values trace the border of a region.
+TRACED = 60
+
+
+@dataclass(frozen=True, kw_only=True)
+class Thresholds:
+    """How much friction a bound allows.
+
+    Attributes
+    ----------
+    every : Number or None
+        Below it every small theta contracts; None where that was not worked out.
+    some : Number or None
+        Below it some theta contracts; None where that was not worked out.
+    on : {'k', 'C_K', 'multiple', 'any'}
+        What they bound; ``multiple``: the friction that was given may grow by this factor; ``any``: without a law of
+        friction there is nothing to bound.
+    """
+
+    every: Number | None = None
+    some: Number | None = None
+    on: str = "any"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Subject:
+    """What a bound is asked about: constants that were given, or measured of a pair.
+
+    Attributes
+    ----------
+    constants : Constants or None
+        What enters Section 5.
+    energy : EnergyConstants or None
+        What enters the theorem in energy norms.
+    pair : ContactPair or None
+    measured : Measured or None
+        The constants of the pair.
+    why : str
+        Why constants do not exist.
+    """
+
+    constants: Constants | None = None
+    energy: EnergyConstants | None = None
+    pair: ContactPair | None = None
+    measured: Measured | None = None
+    why: str = ""
+
+    @classmethod
+    def of(cls, pair: ContactPair, measured: Measured) -> Subject:
+        """A pair and its measured constants."""
+        return cls(
+            constants=measured.constants(),
+            energy=measured.energy_constants(),
+            pair=pair,
+            measured=measured,
+            why=next(iter(measured.reason.values()), ""),
+        )
+
+    def at(self, k: float) -> Subject:
+        """The same bodies at another friction."""
+        assert self.measured is not None
+        assert self.pair is not None
+        measured = self.measured.with_friction(k)
+        return Subject(
+            constants=measured.constants(),
+            energy=measured.energy_constants(),
+            pair=self.pair.at(friction=k),
+            measured=measured,
+            why=self.why,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class BoundResult:
+    """What a bound says.
+
+    Attributes
+    ----------
+    name : str
+    proved : bool
+        Whether what it says is proved; the printed theorem is, where m >= 1.
+    theta : float or None
+        Where ``factor`` holds.
+    factor, one_minus_factor : Number or None
+        No step changes the distance of two forces by more; None where there is no conclusion.
+    interval : pair of float or None
+        The thetas that contract.
+    friction : Thresholds
+    why : str
+        Why there is no factor.
+    not_computed : str
+        Why nothing was worked out; empty where it was.
+    detail : Bounds, SharpBounds, Semidefinite or None
+        All that this bound knows, for its own document.
+    """
+
+    name: str
+    proved: bool
+    theta: float | None = None
+    factor: Number | None = None
+    one_minus_factor: Number | None = None
+    interval: tuple[float, float] | None = None
+    friction: Thresholds = field(default_factory=Thresholds)
+    why: str = ""
+    not_computed: str = ""
+    detail: Any = None
+
+    def to_dict(self) -> dict[str, Any] | None:
+        """The bound's own document; None where nothing was worked out."""
+        document: dict[str, Any] | None = None if self.detail is None else self.detail.to_dict()
+        return document
+
+
+@dataclass(frozen=True, kw_only=True)
+class Region:
+    """Where a bound proves contraction.
+
+    Attributes
+    ----------
+    k : tuple of float
+        Friction, increasing; below the first value the region does not shrink.
+    theta : tuple of pairs of float
+        Contraction for lo < theta < hi.
+    every : float
+        Friction below which every small theta contracts.
+    some : float or None
+        Friction below which some theta contracts; None where that was not worked out.
+    """
+
+    k: tuple[float, ...]
+    theta: tuple[tuple[float, float], ...]
+    every: float
+    some: float | None
+
+
+class NotComputed(RuntimeError):
+    """Why a bound was not worked out."""
+
+
+class Bound(ABC):
+    """A bound on the factor of one step in the norm (5.21).
+
+    Attributes
+    ----------
+    name : str
+        In documents and tables.
+    words : str
+        What it is, for a reader.
+    colour, hatch : str
+        Of its region and its line in figures.
+    finding : bool
+        Whether a step beyond it is a finding about the paper's text, not a fault: true of the printed theorem alone.
+    calculated : bool
+        Whether it follows from a few constants, without the matrices of a pair.
+    """
+
+    name: ClassVar[str]
+    words: ClassVar[str]
+    colour: ClassVar[str]
+    hatch: ClassVar[str] = ""
+    finding: ClassVar[bool] = False
+    calculated: ClassVar[bool] = True
+
+    @abstractmethod
+    def evaluate(self, subject: Subject, theta: Any = None, *, progress: Progress = silent) -> BoundResult:
+        """Evaluate the bound at one theta.
+
+        Parameters
+        ----------
+        subject : Subject
+        theta : number, optional
+            Relaxation factor, 0 < theta < 1.
+        progress : callable
+            Told what is being done.
+
+        Raises
+        ------
+        HypothesisError
+            theta outside (0, 1).
+        """
+
+    @abstractmethod
+    def region(self, subject: Subject, *, progress: Progress = silent) -> Region:
+        """Trace where the bound proves contraction in the plane of theta and k.
+
+        Raises
+        ------
+        NotComputed
+        """
+
+    def absent(self, why: str) -> BoundResult:
+        """The result where nothing was worked out."""
+        return BoundResult(name=self.name, proved=False, not_computed=why)
+
+
+def why_not(interval: tuple[float, float] | None, threshold: Number | None, friction: float, theta: Any) -> str:
+    """Why a bound draws no conclusion at a theta."""
+    if interval is not None:
+        return f"theta = {float(theta):g} is outside ({interval[0]:.2g}, {interval[1]:.2g})"
+    scale = threshold.value if threshold is not None else float("inf")
+    return f"friction {friction:g} is not below {scale:.2g}"
+
+
+def bounded(results: Iterable[BoundResult]) -> str:
+    """What the thresholds of a table bound, ``k`` or ``C_K``."""
+    return next((result.friction.on for result in results if result.friction.on in ("k", "C_K")), "k")
+
+
+def trace(interval: Callable[[float], tuple[float, float] | None], *, every: float, some: float) -> Region:
+    """Follow the border of a region up to the last friction that allows some theta, closer where it ends."""
+    import numpy as np
+
+    ks = [some * (1 - 10.0**exponent) for exponent in np.linspace(-0.05, -6, TRACED // 2)]
+    ks = sorted({*np.geomspace(some * 1e-3, some * 0.1, TRACED - TRACED // 2), *ks})
+    found = [(float(k), interval(float(k))) for k in ks]
+    kept = [(k, ends) for k, ends in found if ends is not None]
+    return Region(k=tuple(k for k, _ in kept), theta=tuple(ends for _, ends in kept), every=every, some=some)
+
+
+def by_name(bounds: Iterable[Bound]) -> Mapping[str, Bound]:
+    """Bounds by name, in their order."""
+    return {bound.name: bound for bound in bounds}

@@ -1,0 +1,46 @@
+"""The theorem in energy norms."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ndtheory import evaluate_sharp
+from verification.bounds.bound import Bound, BoundResult, NotComputed, Region, Subject, Thresholds, trace, why_not
+from verification.progress import Progress, silent
+
+
+class Sharp(Bound):
+    """The same proof as Section 5, with no constant larger than it must be; see ``docs/sharp.md``."""
+
+    name, words = "sharp", "the theorem in energy norms"
+    colour, hatch = "#009E73", ".."
+
+    def evaluate(self, subject: Subject, theta: Any = None, *, progress: Progress = silent) -> BoundResult:
+        if subject.energy is None:
+            return self.absent(subject.why)
+        found = evaluate_sharp(subject.energy, theta)
+        friction = Thresholds(every=found.friction_multiple, some=found.friction_limit_multiple, on="multiple")
+        why = ""
+        if subject.measured is not None:  # then they are known on k
+            measured = subject.measured
+            friction = Thresholds(every=measured.friction_threshold, some=measured.friction_limit, on="k")
+            if theta is not None and found.factor is None:
+                why = why_not(found.interval, friction.some, measured.friction, theta)
+        return BoundResult(
+            name=self.name,
+            proved=True,
+            theta=found.theta,
+            factor=found.factor,
+            one_minus_factor=found.one_minus_factor,
+            interval=found.interval,
+            friction=Thresholds() if friction.every is None else friction,
+            why=why,
+            detail=found,
+        )
+
+    def region(self, subject: Subject, *, progress: Progress = silent) -> Region:
+        found = self.evaluate(subject)
+        if found.friction.some is None or found.friction.every is None:
+            raise NotComputed(found.not_computed or "needed a law of friction to vary k")
+        interval = lambda k: self.evaluate(subject.at(k)).interval
+        return trace(interval, every=found.friction.every.value, some=found.friction.some.value)

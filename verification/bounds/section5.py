@@ -1,0 +1,70 @@
+"""The theorem of Section 5, as printed and repaired."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ndtheory import PRINTED, REPAIRED, evaluate
+from ndtheory.bounds import Edition
+from verification.bounds.bound import Bound, BoundResult, NotComputed, Region, Subject, Thresholds, trace, why_not
+from verification.progress import Progress, silent
+
+
+class Section5(Bound):
+    """An edition of Proposition 5.6.
+
+    Parameters
+    ----------
+    edition : Edition
+    """
+
+    edition: Edition
+
+    def evaluate(self, subject: Subject, theta: Any = None, *, progress: Progress = silent) -> BoundResult:
+        if subject.constants is None:
+            return self.absent(subject.why)
+        found = evaluate(self.edition, subject.constants, theta)
+        why = ""
+        if theta is not None and found.factor is None:
+            friction = float(subject.constants.C_K if subject.constants.k is None else subject.constants.k)
+            why = why_not(found.interval, found.C2, friction, theta) + self._unit(subject)
+        return BoundResult(
+            name=self.name,
+            proved=found.proved,
+            theta=found.theta,
+            factor=found.factor,
+            one_minus_factor=found.one_minus_factor,
+            interval=found.interval,
+            friction=Thresholds(every=found.C4, some=found.C2, on="any" if found.C2 is None else found.threshold_on),
+            why=why,
+            detail=found,
+        )
+
+    def _unit(self, subject: Subject) -> str:
+        """What a figure of this edition must be told with."""
+        return ""
+
+    def region(self, subject: Subject, *, progress: Progress = silent) -> Region:
+        found = self.evaluate(subject)
+        if found.friction.some is None or found.friction.every is None:
+            raise NotComputed(found.not_computed or "needed a law of friction to vary k")
+        interval = lambda k: self.evaluate(subject.at(k)).interval
+        return trace(interval, every=found.friction.every.value, some=found.friction.some.value)
+
+
+class Printed(Section5):
+    """As the paper prints it: in a unit of stress in which m >= 1."""
+
+    name, words, edition = "printed", "the theorem as printed", PRINTED
+    colour, hatch = "#999999", "xx"
+    finding = True
+
+    def _unit(self, subject: Subject) -> str:
+        return "" if subject.measured is None else f" (in {subject.measured.units['stress']})"
+
+
+class Repaired(Section5):
+    """With the lost power of m put back: the same in every unit."""
+
+    name, words, edition = "repaired", "the theorem repaired", REPAIRED
+    colour, hatch = "#56B4E9", "//"
