@@ -10,13 +10,14 @@ from typing import Any, ClassVar, Literal
 from ndtheory import EDITIONS
 from verification.algorithm.iterate import Iterate
 from verification.algorithm.rates import StepRatio, largest_step_ratio
+from verification.algorithm.reference import Reference, by_cvxpy_alone
 from verification.algorithm.relaxation import Constant
-from verification.algorithm.runs import Run, run
+from verification.algorithm.runs import NOT_ASKED, Run, run
 from verification.bounds.bound import LARGEST, BoundResult, Subject
 from verification.bounds.losses import Losses, locate
 from verification.bounds.table import BOUNDS
 from verification.constants import Measured, measure
-from verification.contact import Solver
+from verification.contact import ContactError, Solver
 from verification.document import Document
 from verification.interface.build import pair_of
 from verification.interface.pair import ContactPair
@@ -58,10 +59,12 @@ class Comparison(Document):
     run : Run
     step_ratio : StepRatio or None
         The largest Lipschitz quotient seen.
+    cvxpy : Reference or None
+        The run repeated with every step taken from cvxpy's own answer.
     verdicts : mapping from the name of a bound to Judgement
         And of ``linearised``, the forecast made half way.
     reason : mapping
-        Why a bound, losses or step_ratio is missing.
+        Why a bound, losses, step_ratio or cvxpy is missing.
     """
 
     schema: ClassVar[str] = "ndtheory.compare/1"
@@ -71,6 +74,7 @@ class Comparison(Document):
     losses: Losses | None
     run: Run
     step_ratio: StepRatio | None
+    cvxpy: Reference | None
     verdicts: Mapping[str, Judgement]
     reason: Mapping[str, str]
 
@@ -109,6 +113,7 @@ class Comparison(Document):
             "step_ratio": None
             if self.step_ratio is None
             else {"value": self.step_ratio.value, "interval": [self.step_ratio.lo, self.step_ratio.hi]},
+            "cvxpy": None if self.cvxpy is None else self.cvxpy.to_dict(),
             "verdicts": {name: judgement.verdict for name, judgement in self.verdicts.items()},
             "reasons": {name: judgement.reason for name, judgement in self.verdicts.items()},
             "reason": dict(self.reason),
@@ -222,14 +227,23 @@ def compare(
                 results[name] = bound.evaluate(subject, finished.theta, progress=progress)
         except KeyboardInterrupt:
             interrupted = True
+    cvxpy, reason["cvxpy"] = None, INTERRUPTED
     try:
         if not interrupted:
             progress("linearising", None)
-            _ = finished.forecast, finished.linearised  # here, where Ctrl-C keeps what there is
+            finished = finished.linearise()
+            progress("repeating the run by cvxpy alone", None)
+            cvxpy = by_cvxpy_alone(finished)
+    except ContactError as error:
+        reason["cvxpy"] = str(error)
     except KeyboardInterrupt:
         interrupted = True
+    if cvxpy is not None:
+        del reason["cvxpy"]
     if interrupted:
         finished = replace(finished, interrupted=True)
+        if finished.why_not_linearised == NOT_ASKED:
+            finished = finished.linearise()  # which says why there is nothing
     if losses is not None:
         del reason["losses"]
     for name in ("sharp", "lmi"):
@@ -250,6 +264,7 @@ def compare(
         losses=losses,
         run=finished,
         step_ratio=seen,
+        cvxpy=cvxpy,
         verdicts=verdicts,
         reason=reason,
     )

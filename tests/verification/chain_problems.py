@@ -30,11 +30,11 @@ def case(seed: int, friction: Any = None, **iteration: Any) -> tuple[ContactPair
 
 
 def run_of(pair: ContactPair, measured: Measured, theta: float) -> Run:
-    """A run, by the active set alone where that is enough."""
+    """A run with its linearisation, by the active set alone where that is enough."""
     try:
-        return run(pair, theta=theta, measured=measured, solver="active-set")
+        return run(pair, theta=theta, measured=measured, solver="active-set").linearise()
     except ContactError:
-        return run(pair, theta=theta, measured=measured)
+        return run(pair, theta=theta, measured=measured).linearise()
 
 
 def step_II(pair: ContactPair, g: np.ndarray) -> ContactSolution:

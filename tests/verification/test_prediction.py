@@ -122,7 +122,7 @@ def symmetric_blocks(shift: str = "0", cells: int = 4) -> ContactPair:
 
 
 def linearised(pair: ContactPair, theta: float) -> tuple[Run, Linearisation]:
-    done = run(pair, theta=theta)
+    done = run(pair, theta=theta).linearise()
     assert done.converged
     assert done.linearised is not None
     return done, done.linearised
@@ -190,7 +190,7 @@ def test_without_a_history_nothing_is_said_of_what_is_excited():
 def test_a_run_that_does_not_arrive_is_linearised_at_the_solution_all_the_same():
     """At theta = 0.5 some mode grows by 1.7: rho(J) says so, and no rate was predicted of the run."""
     pair = symmetric_blocks()
-    done = run(pair, theta=0.5)
+    done = run(pair, theta=0.5).linearise()
     assert done.outcome == "stalled"
     assert done.linearised.radius > 1.5
     assert (done.linearised.excited, done.linearised.predicted) == (None, None)
@@ -219,7 +219,7 @@ def test_too_many_nodes_are_not_linearised(monkeypatch):
 def test_a_rule_that_is_no_constant_theta_is_not_linearised():
     pair = symmetric_blocks()
     settings = replace(pair.settings, relaxation="aitken")
-    done = run(replace(pair, settings=settings), theta=0.3)
+    done = run(replace(pair, settings=settings), theta=0.3).linearise()
     assert done.converged
     assert done.linearised is None
     assert "aitken" in done.why_not_linearised

@@ -209,6 +209,6 @@ class _Stands:
 
 def test_without_a_forecast_its_verdict_is_not_computed():
     problem = blocks(4)
-    done = vf.run(replace(problem, iteration=replace(problem.iteration, relaxation="aitken")))
+    done = vf.run(replace(problem, iteration=replace(problem.iteration, relaxation="aitken"))).linearise()
     found = judge_forecast(done)
     assert (found.verdict, found.reason) == ("NOT_COMPUTED", "the aitken relaxation is no constant theta")

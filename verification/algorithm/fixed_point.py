@@ -26,12 +26,14 @@ class FixedPointMap:
     ----------
     pair : ContactPair
     solver : {'auto', 'cvxpy', 'active-set'}
+    step : type, optional
+        Who takes step II.
     """
 
-    def __init__(self, pair: ContactPair, solver: Solver = "auto") -> None:
+    def __init__(self, pair: ContactPair, solver: Solver = "auto", *, step: type[ContactStep] = ContactStep) -> None:
         self.pair = pair
         contact = pair.contact
-        self._step = ContactStep(contact.stiffness, contact.free, contact.grid.t, solver, pair.nearly_incompressible)
+        self._step = step(contact.stiffness, contact.free, contact.grid.t, solver, pair.nearly_incompressible)
 
     def __call__(self, g: Floats) -> tuple[Floats, ContactSolution]:
         """Steps I and II: the displacement of the Neumann body and the solved contact step.

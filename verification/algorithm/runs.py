@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
@@ -33,6 +33,9 @@ from verification.threads import one_thread
 
 Outcome = Literal["converged", "stalled", "limit", "diverged", "interrupted"]
 
+#: Linearising takes longer than a run, and is asked for.
+NOT_ASKED = "not worked out: linearise() does"
+
 #: A run without a new least residual over so many steps has stalled.
 PATIENCE = 50
 
@@ -59,6 +62,10 @@ class Run(Document):
     outcome : {'converged', 'stalled', 'limit', 'diverged', 'interrupted'}
     interrupted : bool
         Whether Ctrl-C ended the run, or what was to be worked out after it: nothing is linearised then.
+    linearised : Linearisation or None
+        The linearisation at the solution; None where ``why_not_linearised`` says why.
+    forecast : Forecast or None
+        What could be said of the run half way; None where ``why_no_forecast`` says why.
     """
 
     schema: ClassVar[str] = "ndtheory.run/1"
@@ -69,6 +76,10 @@ class Run(Document):
     iterates: tuple[Iterate, ...]
     outcome: Outcome
     interrupted: bool = False
+    linearised: Linearisation | None = None
+    why_not_linearised: str = NOT_ASKED
+    forecast: Forecast | None = None
+    why_no_forecast: str = NOT_ASKED
 
     @property
     def theta(self) -> Fraction:
@@ -127,25 +138,23 @@ class Run(Document):
         grown = self._at_the_end if self.outcome == "diverged" else None
         return None if grown is None else grown.value
 
-    @cached_property
-    def linearised(self) -> Linearisation | None:
-        """The linearisation at the solution; None where ``why_not_linearised`` says why.
+    def linearise(self) -> Run:
+        """The same run with its linearisation at the solution, and the forecast that could be made half way.
 
         A run that did not arrive is linearised at the solution of the global method.
         """
-        return self._linearised[0]
+        linearised, why = self._linearisation()
+        made, why_none = self._forecast()
+        return replace(self, linearised=linearised, why_not_linearised=why, forecast=made, why_no_forecast=why_none)
 
-    @property
-    def why_not_linearised(self) -> str:
-        """Why there is no linearisation; empty where there is."""
-        return self._linearised[1]
-
-    @cached_property
-    def _linearised(self) -> tuple[Linearisation | None, str]:
+    def _no_constant_theta(self) -> str:
         if self.interrupted:
-            return None, INTERRUPTED
-        if not isinstance(self.rule, Constant):
-            return None, f"the {self.relaxation} relaxation is no constant theta"
+            return INTERRUPTED
+        return "" if isinstance(self.rule, Constant) else f"the {self.relaxation} relaxation is no constant theta"
+
+    def _linearisation(self) -> tuple[Linearisation | None, str]:
+        if why := self._no_constant_theta():
+            return None, why
         try:
             with one_thread():
                 if self.converged:
@@ -154,22 +163,9 @@ class Run(Document):
         except (NotLinear, SolveError, ContactError) as error:
             return None, str(error)
 
-    @property
-    def forecast(self) -> Forecast | None:
-        """What could be said of the run half way; None where ``why_no_forecast`` says why."""
-        return self._forecast[0]
-
-    @property
-    def why_no_forecast(self) -> str:
-        """Why there is no forecast; empty where there is."""
-        return self._forecast[1]
-
-    @cached_property
     def _forecast(self) -> tuple[Forecast | None, str]:
-        if self.interrupted:
-            return None, INTERRUPTED
-        if not isinstance(self.rule, Constant):
-            return None, f"the {self.relaxation} relaxation is no constant theta"
+        if why := self._no_constant_theta():
+            return None, why
         settings = self.pair.settings
         try:
             with one_thread():

@@ -157,9 +157,9 @@ def run(file: Path, theta: str | None, solver: Any, swap_roles: bool, folder: Pa
         finished = runs.run(pair, solver=solver, watch=watch)
         tell("linearising", None)
         try:
-            _ = finished.forecast, finished.linearised  # here, where Ctrl-C costs no run
-        except KeyboardInterrupt:
-            finished = replace(finished, interrupted=True)
+            finished = finished.linearise()
+        except KeyboardInterrupt:  # costs no run
+            finished = replace(finished, interrupted=True).linearise()
     _warn(problem.iteration.warnings)  # not beside a refusal
     write = None if target is None else lambda: target.write_run(finished)
     deliver(finished, lambda: screens.run(finished, file), as_json, write, folder)

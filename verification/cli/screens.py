@@ -8,6 +8,7 @@ from shlex import quote
 
 from verification.advice.readings import NextRun, RunReading, SeenRun
 from verification.advice.roles import Advice
+from verification.algorithm.reference import Reference
 from verification.algorithm.runs import Run
 from verification.bounds.region import MOST_STEPS, Plane
 from verification.cli.calculator import bounds_table
@@ -65,7 +66,7 @@ def constants(problem: Problem, measured: Measured) -> None:
         say(f"Next: ndtheory compare {quote(problem.source)}")
 
 
-def _happened(run: Run) -> None:
+def _happened(run: Run, cvxpy: Reference | None = None) -> None:
     problem = _problem(run)
     heading("WHAT HAPPENED")
     rate, linear = run.observed_rate, run.linearised
@@ -82,7 +83,13 @@ def _happened(run: Run) -> None:
     if run.observed_growth is not None:
         shown = f"grows by {run.observed_growth:.4g}"
     rows.append(["observed", shown, str(run.iterations), f"seen: {run.outcome}"])
+    if cvxpy is not None:
+        shown = "-" if cvxpy.observed_rate is None else near_one(cvxpy.observed_rate)
+        apart = f"T differs by {cvxpy.largest_difference:.0e} at most"
+        rows.append(["cvxpy alone", shown, str(cvxpy.steps - 1), apart])
     table(rows)
+    if cvxpy is not None and cvxpy.why:
+        note(f"cvxpy alone: {cvxpy.why}", "  ")
     if run.forecast is None and run.relaxation == "constant":
         note(f"no forecast: {run.why_no_forecast}", "  ")
     if linear is None:
@@ -180,7 +187,7 @@ def comparison(result: Comparison, file: Path) -> None:
         say(f"  {total:.1f} decades from the largest friction term found to (5.30), repaired:")
         links = ", ".join(f"{loss.label} {loss.decades:.1f}" for loss in estimates)
         note(f"{links}; the unit adds {unit:.1f}", "  ")
-    _happened(finished)
+    _happened(finished, result.cvxpy)
     heading("DOES THE RUN AGREE WITH THE BOUND?")
     table([["bound", "verdict", "why"], *([n, j.verdict, j.reason] for n, j in result.verdicts.items())])
     _limits(finished.outside)

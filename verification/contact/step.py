@@ -56,8 +56,8 @@ class ContactStep:
     tangential : int
         t: n in two dimensions, 0 in one.
     solver : {'auto', 'cvxpy', 'active-set'}
-        ``cvxpy``: every step by the convex program; ``active-set``: never; ``auto``: the first step, and each on
-        which the active set does not close with its certificate.
+        Who finds the active set.  ``cvxpy``: the convex program, at every step; ``active-set``: never the program;
+        ``auto``: the program where the active set does not close with its certificate.
     near : str
         What an error should name besides, as a Poisson ratio near 1/2.
     """
@@ -71,7 +71,6 @@ class ContactStep:
         self._active = ActiveSet(S, free, tangential)
         self._model: ContactModel | None = None
         self._pattern = Pattern.sticking(len(S) - tangential, tangential)
-        self._first = True
 
     def solve(self, q: Floats, bound: Floats) -> ContactSolution:
         """Solve and certify.
@@ -82,9 +81,7 @@ class ContactStep:
         ------
         ContactError
         """
-        ask_program = self._solver == "cvxpy" or (self._solver == "auto" and self._first)
-        self._first = False
-        found = None if ask_program else self._by_active_set(q, bound, self._pattern, "active-set")
+        found = None if self._solver == "cvxpy" else self._by_active_set(q, bound, self._pattern, "active-set")
         if found is None and self._solver != "active-set":
             found = self._by_program(q, bound)
         if found is None:
@@ -109,6 +106,11 @@ class ContactStep:
         return ContactSolution(v=v, force=force, pattern=pattern, kkt=kkt, solver=solver)
 
     def _by_program(self, q: Floats, bound: Floats) -> ContactSolution | None:
+        found = self._of_program(q, bound)
+        return None if found is None else self._by_active_set(q, bound, found.pattern, "cvxpy")
+
+    def _of_program(self, q: Floats, bound: Floats) -> ContactSolution | None:
+        """What the convex program itself answers; None where it gives nothing."""
         if self._model is None:
             from verification.contact.model import ContactModel
 
@@ -116,5 +118,24 @@ class ContactStep:
         v = self._model.solve(q, bound)
         if v is None:
             return None
-        start = Pattern.of(v, q - self._S @ v, bound, float(np.diag(self._S).max()))
-        return self._by_active_set(q, bound, start, "cvxpy")
+        force = q - self._S @ v
+        pattern = Pattern.of(v, force, bound, float(np.diag(self._S).max()))
+        kkt = certify(self._S, q, bound, v, force, self._free)
+        return ContactSolution(v=v, force=force, pattern=pattern, kkt=kkt, solver="cvxpy")
+
+
+class ProgramStep(ContactStep):
+    """Step II as the convex program answers it, with no active set behind it: right to its tolerance alone."""
+
+    def solve(self, q: Floats, bound: Floats) -> ContactSolution:
+        """Solve; the certificate is measured and not asked for.
+
+        Raises
+        ------
+        ContactError
+            The program gives no answer.
+        """
+        found = self._of_program(q, bound)
+        if found is None:
+            raise ContactError("cvxpy's solver gave no answer to the contact step")
+        return found

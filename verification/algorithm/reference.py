@@ -1,0 +1,104 @@
+"""The algorithm as cvxpy alone runs it: every step II taken from the program's own answer.
+
+The active set solves step II to rounding, so that two runs with its digits agree to the last one and test nothing.
+Here each T g is what the convex program answers, and the certified T at the same g says how far it is off.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from itertools import islice
+
+from verification.algorithm.fixed_point import FixedPointMap, iterate_at, iterates
+from verification.algorithm.iterate import Iterate
+from verification.algorithm.rates import CLEAR_OF_NOISE, ObservedRate, rate_at_the_end, settled
+from verification.algorithm.runs import Run
+from verification.contact.step import ProgramStep
+
+#: A longer run is compared at its first and at its last step.
+MOST_STEPS, MOST_SECONDS = 50, 2.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reference:
+    """A run by cvxpy's own answers beside the run it refers to.
+
+    Attributes
+    ----------
+    steps : int
+        Evaluations of T by the program's own answer.
+    observed_rate : float or None
+        The rate that they show; None where too few stand clear of the program's errors, or the run was not repeated.
+    largest_difference : float
+        The largest ``|||T_cvxpy g - T g|||``, relative to the largest ``|||T g|||`` so far.
+    why : str
+        Why the run was not repeated, or shows no rate; empty where it does.
+    """
+
+    steps: int
+    observed_rate: float | None
+    largest_difference: float
+    why: str = ""
+
+    def to_dict(self) -> dict[str, object]:
+        """The object ``cvxpy`` of ``ndtheory.compare/1``."""
+        return {
+            "steps": self.steps,
+            "observed_rate": self.observed_rate,
+            "largest_difference": self.largest_difference,
+            "reason": {"observed_rate": self.why} if self.why else {},
+        }
+
+
+def by_cvxpy_alone(run: Run) -> Reference:
+    """Repeat a run with every step II taken from cvxpy's own answer.
+
+    A run of more than :data:`MOST_STEPS` evaluations, or whose repetition takes more than :data:`MOST_SECONDS` of CPU,
+    is compared at its first and last iterate alone.
+
+    Raises
+    ------
+    ContactError
+        The program gave no answer.
+    """
+    pair, exact = run.pair, FixedPointMap(run.pair)
+    program = FixedPointMap(pair, step=ProgramStep)
+    if run.evaluations > MOST_STEPS:
+        return _at_the_ends(run, program, f"the run took {run.evaluations} evaluations; first and last step alone")
+    step = run.rule.begin(pair, float(run.theta), run.choice.rho)
+    seen: list[Iterate] = []
+    errors: list[float] = []
+    begin = time.process_time()
+    for found in islice(iterates(program, step), run.evaluations):
+        seen.append(found)
+        errors.append(pair.neumann.dual_norm(found.image - iterate_at(exact, found.g).image))
+        if time.process_time() - begin > MOST_SECONDS and len(seen) < run.evaluations:
+            return _at_the_ends(run, program, f"more than {MOST_SECONDS:g} s of CPU; first and last step alone")
+    rate = _rate(seen, errors)
+    return Reference(
+        steps=len(seen),
+        observed_rate=None if rate is None else rate.value,
+        largest_difference=max(_over(error, found.scale) for error, found in zip(errors, seen, strict=True)),
+        why="" if rate is not None else "fewer than two step ratios stand clear of the program's errors",
+    )
+
+
+def _at_the_ends(run: Run, program: FixedPointMap, why: str) -> Reference:
+    ends = run.iterates[:1] + run.iterates[1:][-1:]
+    norm = run.pair.neumann.dual_norm
+    errors = [_over(norm(iterate_at(program, end.g).image - end.image), end.scale) for end in ends]
+    return Reference(steps=len(ends), observed_rate=None, largest_difference=max(errors), why=why)
+
+
+def _over(error: float, scale: float) -> float:
+    return error / scale if scale > 0 else error
+
+
+def _rate(seen: list[Iterate], errors: list[float]) -> ObservedRate | None:
+    """The rate over the iterates whose residual stands clear of the error of their own T."""
+    clear = [found.residual > CLEAR_OF_NOISE * error for found, error in zip(seen, errors, strict=True)]
+    count = clear.index(False) if False in clear else len(clear)
+    if count < 3:
+        return None
+    return rate_at_the_end([found.residual for found in seen[:count]], errors[:count], settled(seen[:count]))
