@@ -226,7 +226,7 @@ def test_exchanged_roles_are_those_of_the_file_and_twice_exchanged_the_old_ones(
     assert np.array_equal(swapped.swapped().contact.stiffness, pair.contact.stiffness)
 
 
-@pytest.mark.parametrize(("friction", "why"), [("-1", ">= 0"), ("nan", ">= 0"), ("1e10", "at most")])
+@pytest.mark.parametrize(("friction", "why"), [("-1", ">= 0"), ("nan", ">= 0"), ("much", ">= 0")])
 def test_a_friction_that_is_none_is_refused(friction, why):
     with pytest.raises(HypothesisError, match=why):
         build(small()).at(friction=friction)

@@ -116,17 +116,16 @@ class ContactPair:
         Raises
         ------
         HypothesisError
-            Unless k >= 0 (and at most 1e9), or where friction has no law.
+            Unless k >= 0, or where friction has no law.
         """
-        needed = f"a number >= 0, at most {float(MOST_FRICTION):g}"
-        if self.interface.kernel is None:
-            needed = "0: without a law of friction there is none"
         law = self.interface.kernel is not None
-        k = take("friction", friction, needed, lambda v: v == 0 or (law and 0 <= v <= MOST_FRICTION))
-        problem = (
-            None if self.problem is None else replace(self.problem, contact=replace(self.problem.contact, friction=k))
-        )
-        return replace(self, friction=k, problem=problem)
+        needed = "a number >= 0" if law else "0: without a law of friction there is none"
+        k = take("friction", friction, needed, lambda v: v == 0 or (law and v > 0))
+        origin = self.problem
+        if origin is not None:  # a file may not hold every friction
+            keeps = k <= MOST_FRICTION
+            origin = replace(origin, contact=replace(origin.contact, friction=k)) if keeps else None
+        return replace(self, friction=k, problem=origin)
 
     def swapped(self) -> ContactPair:
         """The same bodies with the roles exchanged; what is condensed is shared.

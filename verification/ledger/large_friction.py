@@ -103,7 +103,7 @@ def loaded(pair: ContactPair, g: Floats, v: Floats, force: Floats) -> ContactPai
     neumann, contact = pair.neumann, pair.contact
     u = neumann.known + neumann.flexibility(g + neumann.load) + v
     u[pair.contact.grid.normal] += pair.interface.gap
-    return replace(pair, contact=replace(contact, load=force + contact.stiffness @ u, body=None), problem=None)
+    return replace(pair, contact=replace(contact, load=force + contact.stiffness @ u), problem=None)
 
 
 def witness(case: Trial, random: np.random.Generator) -> Witness:
