@@ -33,7 +33,9 @@ if TYPE_CHECKING:
     from verification.contact import ContactError
     from verification.ledger import Ledger, verify
     from verification.monolithic import Solution, SolveError, solve
-    from verification.problem.specification import Problem, load
+    from verification.problem.examples import example
+    from verification.problem.reading import load
+    from verification.problem.specification import Problem
     from verification.problem.tables import ProblemError
 
 #: Where each public name lives.  No module at this level bears the name of a public function: it would hide it.
@@ -51,8 +53,9 @@ _HOME = {
     "State": "algorithm.iterate",
     "advise": "advice.roles",
     "compare": "comparison",
+    "example": "problem.examples",
     "iterate": "algorithm.fixed_point",
-    "load": "problem.specification",
+    "load": "problem.reading",
     "measure": "constants",
     "run": "algorithm.runs",
     "solve": "monolithic",
@@ -73,6 +76,7 @@ __all__ = [
     "State",
     "advise",
     "compare",
+    "example",
     "iterate",
     "load",
     "measure",

@@ -50,7 +50,7 @@ def advise(
         raise click.UsageError(f"needed both {given[0]}", context)
     from verification.advice import roles as advice
     from verification.cli import screens
-    from verification.problem.specification import load
+    from verification.problem import load
 
     if file is not None:
         found = advice.advise(load(file))
@@ -103,7 +103,7 @@ def region(file: Path, target: Path, as_json: bool) -> None:
     from verification.bounds.region import chart
     from verification.cli import screens
     from verification.output.folder import check_ours, staged
-    from verification.problem.specification import load
+    from verification.problem import load
     from verification.problem.tables import ProblemError
 
     problem = load(file)

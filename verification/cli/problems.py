@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -39,13 +38,10 @@ FOLDER = click.option("-o", "--output", "folder", callback=_folder, metavar="DIR
 
 
 def examples() -> dict[str, str]:
-    """The built-in problem files by name."""
-    files = resources.files("verification") / "data"
-    return {
-        entry.name.removesuffix(".toml"): entry.read_text("utf-8")
-        for entry in sorted(files.iterdir(), key=lambda entry: entry.name)
-        if entry.name.endswith(".toml")
-    }
+    """The built-in problem files by name, as text."""
+    from verification.problem.examples import examples as built_in
+
+    return built_in()
 
 
 @click.command()
@@ -91,7 +87,7 @@ def _title(text: str) -> str:
 
 
 def _load(file: Path, theta: str | None, swap: bool) -> Problem:
-    from verification.problem.specification import load
+    from verification.problem import load
     from verification.problem.tables import ProblemError
 
     problem = load(file)
@@ -239,7 +235,7 @@ def demo(folder: Path, as_json: bool) -> int:
     """
     from verification.cli.shell import unreached
     from verification.output.folder import Folder
-    from verification.problem.specification import load
+    from verification.problem import load
 
     written = Folder(folder, "compare").write_problem(examples()["section6"])
     status = _compare(load(written), written, folder, "auto", as_json, False)

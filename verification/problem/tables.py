@@ -159,6 +159,15 @@ def text(value: Any) -> str:
     return value
 
 
+def label(value: Any) -> str:
+    """Read a string that a file can hold: half of a surrogate pair, which a dictionary may bring, is none."""
+    try:
+        text(value).encode()
+    except UnicodeEncodeError:
+        raise Unfit("needed a text of whole characters, this one has half a surrogate pair") from None
+    return str(value)
+
+
 def choice(*allowed: Any) -> Callable[[Any], Any]:
     """Read one of a few values."""
 
