@@ -1,8 +1,10 @@
 """Problems made from problems: values and keys set by name, read by the readers of the file, refused by their words."""
 
 import dataclasses
+import doctest
 from decimal import Decimal
 from fractions import Fraction as F
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -259,3 +261,13 @@ def test_a_built_in_problem_is_had_by_its_name():
 def test_an_unknown_name_is_answered_with_the_known_ones(name):
     with pytest.raises(ValueError, match=f"no example '{name}'; there are inside, section6, signorini, two-bars"):
         vf.example(name)
+
+
+# --- the page of the documentation ---
+
+
+def test_the_page_of_the_problem_file_shows_what_the_program_answers():
+    page = Path(__file__).parents[2] / "docs" / "problem_file.md"
+    found = doctest.testfile(str(page), module_relative=False)
+    assert found.attempted >= 5
+    assert found.failed == 0

@@ -4,8 +4,10 @@ import copy
 import dataclasses
 import hashlib
 import json
+import os
 import pickle
 import re
+import tomllib
 from fractions import Fraction as F
 
 import pytest
@@ -16,7 +18,9 @@ from hypothesis import strategies as st
 import verification as vf
 from ndtheory import exact
 from verification.cli.problems import examples
-from verification.problem.specification import RELAXATIONS, BodySpec, ReadOnly
+from verification.problem.read_only import ReadOnly
+from verification.problem.specification import RELAXATIONS, BodySpec
+from verification.problem.toml import document
 from verification.problem.writing import written_number
 
 BUILT_IN = {name: vf.example(name) for name in examples()}
@@ -171,6 +175,116 @@ def test_the_dictionary_of_section_6_is_the_one_of_its_file():
     bars = BUILT_IN["two-bars"].to_dict()
     assert (bars["body2"]["cells"], bars["body2"]["prescribed"]) == (8, {"right": -0.1})
     assert "poisson" not in bars["body1"]
+
+
+# --- problem files ---
+
+
+@given(st.data())
+def test_a_problem_is_had_back_from_its_file_wherever_that_is_kept(meshes, tmp_path_factory, data):
+    problem = data.draw(problems(meshes))
+    path = tmp_path_factory.getbasetemp() / "written.toml"
+    path.write_bytes(problem.to_toml().encode())
+    found = vf.load(path)
+    assert found == problem
+    assert found.digest == problem.digest
+    assert found.to_toml() == problem.to_toml()
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_a_written_file_has_the_tables_of_the_built_in_one_in_their_order(name):
+    headers = lambda text: re.findall(r"(?m)^\[\w+\]$", text)
+    written = headers(BUILT_IN[name].to_toml())
+    assert [header for header in written if header in headers(examples()[name])] == headers(examples()[name])
+    assert tomllib.loads(BUILT_IN[name].to_toml()) == BUILT_IN[name].to_dict()
+
+
+def test_the_file_of_two_bars_reads_as_one_written_by_hand():
+    bars = BUILT_IN["two-bars"].changed(title='Two "bars"', theta="1/3")
+    assert (
+        bars.to_toml()
+        == """\
+title = "Two \\"bars\\""
+dimension = 1
+
+[units]
+length = "m"
+stress = "Pa"
+
+[body1]
+shape = "interval"
+x = [0, 1]
+cells = 8
+young = 3
+fixed = ["left"]
+body_force = 0
+
+[body2]
+shape = "interval"
+x = [1, 2]
+cells = 8
+young = 1
+prescribed = { right = -0.1 }
+body_force = 0
+
+[contact]
+friction = 0
+law = "nonlocal"
+gap = 0
+
+[iteration]
+neumann_body = 2
+theta = "1/3"
+relaxation = "constant"
+tolerance = 1e-09
+max_iterations = 500
+
+[norm]
+length = 1
+"""
+    )
+
+
+def test_a_mesh_whose_path_is_no_text_is_written_as_json_and_not_as_toml(tmp_path):
+    folder = tmp_path / os.fsdecode(b"caf\xe9")
+    try:
+        folder.mkdir()
+    except OSError:
+        return  # a file system of texts alone has no such path
+    (folder / "body.msh").write_bytes(b"a mesh")
+    problem = vf.Problem.from_dict(BUILT_IN["section6"].to_dict() | {"body1": MESH}, str(folder / "my.toml"))
+    assert vf.Problem.from_dict(json.loads(json.dumps(problem.to_dict()))) == problem
+    with pytest.raises(vf.ProblemError, match="needed a mesh file whose path is UTF-8") as caught:
+        problem.to_toml()
+    assert caught.value.key == "mesh"
+
+
+trees = st.recursive(
+    st.one_of(texts, st.booleans(), st.integers(-(2**63), 2**63 - 1), st.floats(allow_nan=False)),
+    lambda inner: st.one_of(st.lists(inner, max_size=3), st.dictionaries(texts, inner, max_size=3)),
+    max_leaves=12,
+)
+
+
+@given(st.dictionaries(texts, trees, max_size=5))
+def test_toml_is_read_back_as_what_was_written(data):
+    written = document(data)
+    assert tomllib.loads(written) == data
+    assert json.dumps(tomllib.loads(written), sort_keys=True) == json.dumps(data, sort_keys=True)  # 1 is not 1.0
+    assert tomllib.loads(written.replace("\n", "\r\n")) == data
+
+
+@pytest.mark.parametrize("code", [*range(0x21), 0x22, 0x5C, 0x7F, 0x80, 0x85, 0xA0, 0x2028, 0xFEFF, 0xFFFF, 0x1F600])
+def test_every_character_keeps_its_place_in_a_text_and_in_a_key(code):
+    text = f"a{chr(code)}b"
+    assert tomllib.loads(document({text: {text: text}})) == {text: {text: text}}
+    assert all(c.isprintable() or ord(c) >= 0x80 for c in document({"x": text}).rstrip("\n"))
+
+
+@pytest.mark.parametrize("value", [None, {1}, F(1, 2), b"a"])
+def test_what_toml_does_not_know_is_refused(value):
+    with pytest.raises(TypeError, match=f"{type(value).__name__} is no value of TOML"):
+        document({"x": [value]})
 
 
 # --- keys ---

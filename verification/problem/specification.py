@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from decimal import Decimal
 from fractions import Fraction
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal
 
 from ndtheory import HypothesisError, relaxation_factor
 from verification.problem.meshes import MeshFile
+from verification.problem.read_only import ReadOnly
 from verification.problem.tables import ProblemError
-
-V = TypeVar("V")
 
 #: A displacement or a force by component; None leaves a displacement component free.
 Components = tuple[Fraction | None, ...]
@@ -38,34 +37,6 @@ MOST_CONTRAST = Fraction(10**30)
 
 #: Largest coefficient of friction; larger ones differ from it by nothing but overflow, as all contact sticks.
 MOST_FRICTION = Fraction(10**9)
-
-
-class ReadOnly(Mapping[str, V]):
-    """A mapping that nobody changes, in the order of its keys: equal ones are walked alike.
-
-    >>> ReadOnly({"top": 1, "left": 2})
-    {'left': 2, 'top': 1}
-    """
-
-    __slots__ = ("_values",)
-
-    def __init__(self, values: Mapping[str, V] | Iterable[tuple[str, V]] = ()) -> None:
-        self._values = dict(sorted(dict(values).items()))
-
-    def __getitem__(self, key: str) -> V:
-        return self._values[key]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._values)
-
-    def __len__(self) -> int:
-        return len(self._values)
-
-    def __hash__(self) -> int:
-        return hash(tuple(self._values.items()))
-
-    def __repr__(self) -> str:
-        return repr(self._values)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -248,6 +219,23 @@ class Problem:
         from verification.problem.writing import plain, tables
 
         written: dict[str, Any] = plain(tables(self))
+        return written
+
+    def to_toml(self) -> str:
+        """The text of a problem file (UTF-8) that reads back as an equal problem, wherever it is kept.
+
+        Raises
+        ------
+        ProblemError
+            The path of a mesh file is no text, so that no TOML can name it.
+        """
+        from verification.problem.toml import document
+
+        written = document(self.to_dict())
+        try:
+            written.encode()
+        except UnicodeEncodeError:
+            raise ProblemError(self.source, "mesh", None, "needed a mesh file whose path is UTF-8") from None
         return written
 
     @property

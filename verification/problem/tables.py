@@ -145,7 +145,7 @@ def integer(needed: str, least: int) -> Callable[[Any], int]:
     """Read a whole number, not 12.0 and not true."""
 
     def read(value: Any) -> int:
-        if isinstance(value, bool) or not isinstance(value, int) or value < least:
+        if isinstance(value, bool) or not isinstance(value, int) or value < least or value.bit_length() > 1000:
             raise Unfit(f"needed {needed}")
         return value
 
