@@ -37,7 +37,9 @@ if TYPE_CHECKING:
     from verification.interface.pair import ContactPair
     from verification.ledger import Ledger, verify
     from verification.monolithic import Solution, SolveError, solve
-    from verification.problem.specification import Problem, load
+    from verification.problem.examples import example
+    from verification.problem.reading import load
+    from verification.problem.specification import Problem
     from verification.problem.tables import ProblemError
 
 #: Where each public name lives.  No module at this level bears the name of a public function: it would hide it.
@@ -61,8 +63,9 @@ _HOME = {
     "advise_run": "advice.roles",
     "build": "interface.build",
     "compare": "comparison",
+    "example": "problem.examples",
     "iterate": "algorithm.fixed_point",
-    "load": "problem.specification",
+    "load": "problem.reading",
     "measure": "constants",
     "run": "algorithm.runs",
     "solve": "monolithic",
@@ -89,6 +92,7 @@ __all__ = [
     "advise_run",
     "build",
     "compare",
+    "example",
     "iterate",
     "load",
     "measure",

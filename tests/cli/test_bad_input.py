@@ -122,7 +122,7 @@ TOGETHER = {
     ),
     "two values at a corner": (
         {"body2.prescribed": '{ top = [0.0, -0.015], left = [0.1, "free"] }'},
-        ["body2.prescribed", "'left'", "0.1", "(0.4, 0.3)"],
+        ["body2.prescribed", "'top'", "0.1", "(0.4, 0.3)"],
     ),
     "apart along y": ({"body2.y": "[0.1, 0.4]"}, ["body2.y", "do not meet", "y = 0.1", "contact.gap"]),
     "drawn into each other": ({"body2.y": "[-0.1, 0.3]"}, ["body2.y", "do not meet", "y = -0.1"]),

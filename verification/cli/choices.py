@@ -9,11 +9,12 @@ import click
 
 from ndtheory import HypothesisError
 from verification.cli.console import Interrupted, complain, deliver, stages
-from verification.cli.problems import JSON
+from verification.cli.problems import FILE, JSON, SET, load_problem
 
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path), required=False)
+@SET
 @click.option("--S1", "S1", type=click.Path(path_type=Path), help="Interface stiffness of body 1, .npz or .npy.")
 @click.option("--S2", "S2", type=click.Path(path_type=Path), help="Interface stiffness of body 2, .npz or .npy.")
 @click.option("--theta", metavar="NUMBER", help="Relaxation factor of a run of any code, 0 < theta <= 1.")
@@ -25,7 +26,13 @@ from verification.cli.problems import JSON
 )
 @JSON
 def advise(
-    file: Path | None, S1: Path | None, S2: Path | None, theta: str | None, ratio: str | None, as_json: bool
+    file: Path | None,
+    keys: dict[str, str],
+    S1: Path | None,
+    S2: Path | None,
+    theta: str | None,
+    ratio: str | None,
+    as_json: bool,
 ) -> None:
     """Which body gets the Neumann problem, and which theta?
 
@@ -37,6 +44,7 @@ def advise(
     \b
     Examples:
       ndtheory advise my.toml
+      ndtheory advise my.toml --set contact.friction=0.4
       ndtheory advise --S1 a.npz --S2 b.npz
       ndtheory advise --theta 0.1 --ratio 1.4
     """
@@ -48,12 +56,13 @@ def advise(
         raise click.UsageError(f"received {received}: needed one of {', '.join(forms)}", context)
     if any(value is None for value in forms[given[0]]):
         raise click.UsageError(f"needed both {given[0]}", context)
+    if keys and file is None:
+        raise click.UsageError("received --set without FILE: it sets a key of a problem file", context)
     from verification.advice import roles as advice
     from verification.cli import screens
-    from verification.problem.specification import load
 
     if file is not None:
-        found = advice.advise(load(file))
+        found = advice.advise(load_problem(file, keys))
     elif S1 is not None and S2 is not None:
         from verification.advice.matrix_files import read_matrix
 
@@ -77,7 +86,8 @@ def _picture(context: click.Context, parameter: click.Parameter, value: Path) ->
 
 
 @click.command()
-@click.argument("file", type=click.Path(path_type=Path))
+@FILE
+@SET
 @click.option(
     "-o",
     "--output",
@@ -89,7 +99,7 @@ def _picture(context: click.Context, parameter: click.Parameter, value: Path) ->
     help="Where to draw it: a name ending in .svg or .png.",
 )
 @JSON
-def region(file: Path, target: Path, as_json: bool) -> None:
+def region(file: Path, keys: dict[str, str], target: Path, as_json: bool) -> None:
     """Draw the plane of theta and k: where one step is proved to contract, and what runs do there.
 
     Both axes are logarithmic; theta and k have no unit.  The regions are those of the printed, the repaired, the sharp
@@ -98,15 +108,15 @@ def region(file: Path, target: Path, as_json: bool) -> None:
     \b
     Example:
       ndtheory region my.toml -o plane.svg
+      ndtheory region my.toml --set body2.young=7e4 -o stiff.svg
     """
     from verification import figures
     from verification.bounds.region import chart
     from verification.cli import screens
     from verification.output.folder import check_ours, staged
-    from verification.problem.specification import load
     from verification.problem.tables import ProblemError
 
-    problem = load(file)
+    problem = load_problem(file, keys)
     if not target.parent.is_dir():
         raise ProblemError(str(target), "", None, "needed a name in a folder that exists (-o)")
     check_ours(target)

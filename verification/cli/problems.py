@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,8 +18,36 @@ if TYPE_CHECKING:
 
 FILE = click.argument("file", type=click.Path(path_type=Path))
 JSON = click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout.")
+
+
+def _pairs(context: click.Context, parameter: click.Parameter, given: Sequence[str]) -> dict[str, str]:
+    pairs: dict[str, str] = {}
+    for words in given:
+        key, equals, value = words.partition("=")
+        if not equals:
+            needed = f"{words!r}: needed KEY=VALUE, as contact.friction=0.4"
+            raise click.BadParameter(needed, context, parameter)
+        pairs.pop(key, None)  # the last one is set last
+        pairs[key] = value
+    return pairs
+
+
+SET = click.option(
+    "--set",
+    "keys",
+    multiple=True,
+    callback=_pairs,
+    metavar="KEY=VALUE",
+    help="Set a key of FILE, as contact.friction=0.4 or 'body1.x=[0, 3]'; may be repeated.",
+)
+#: The rules of relaxation; those of the problem file, which are not imported to show a help.
+RELAXATION = click.option(
+    "--relaxation",
+    type=click.Choice(["constant", "aitken", "anderson", "newton", "momentum"]),
+    help="Rule of relaxation, over the file's; all but constant are outside the theorem.",
+)
 THETA = click.option("--theta", metavar="NUMBER", help="Relaxation factor, 0 < theta < 1, over the file's.")
-SWAP = click.option("--swap-roles", is_flag=True, help="Give the Neumann problem to the other body.")
+SWAP = click.option("--swap-roles", "swap", is_flag=True, help="Give the Neumann problem to the other body.")
 SOLVER = click.option(
     "--solver",
     type=click.Choice(["auto", "cvxpy", "active-set"]),
@@ -39,17 +67,18 @@ FOLDER = click.option("-o", "--output", "folder", callback=_folder, metavar="DIR
 
 
 def examples() -> dict[str, str]:
-    """The built-in problem files by name."""
-    files = resources.files("verification") / "data"
-    return {
-        entry.name.removesuffix(".toml"): entry.read_text("utf-8")
-        for entry in sorted(files.iterdir(), key=lambda entry: entry.name)
-        if entry.name.endswith(".toml")
-    }
+    """The built-in problem files by name, as text."""
+    from verification.problem.examples import examples as built_in
+
+    return built_in()
+
+
+def _names(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
+    return [name for name in examples() if name.startswith(begun)]
 
 
 @click.command()
-@click.argument("name", required=False)
+@click.argument("name", required=False, shell_complete=_names)
 @JSON
 def example(name: str | None, as_json: bool) -> None:
     """List the built-in problem files, or print one to redirect and edit.
@@ -90,11 +119,19 @@ def _title(text: str) -> str:
     return str(tomllib.loads(text)["title"])
 
 
-def _load(file: Path, theta: str | None, swap: bool) -> Problem:
-    from verification.problem.specification import load
-    from verification.problem.tables import ProblemError
+def load_problem(
+    file: Path, keys: Mapping[str, str], *, theta: str | None = None, relaxation: str | None = None, swap: bool = False
+) -> Problem:
+    """The problem of a file with what the options change: first --set, then the others.
 
-    problem = load(file)
+    Raises
+    ------
+    ProblemError, HypothesisError
+    """
+    from verification.problem import ProblemError, load
+
+    chosen = {} if relaxation is None else {"iteration.relaxation": relaxation}
+    problem = load(file).with_keys({**keys, **chosen})
     if theta is not None:
         if problem.iteration.relaxation == "momentum":
             needed = 'needed no theta beside relaxation = "momentum", which takes its step from rho'
@@ -105,9 +142,10 @@ def _load(file: Path, theta: str | None, swap: bool) -> Problem:
 
 @click.command()
 @FILE
+@SET
 @click.option("--refine", type=click.IntRange(0, 8), default=0, metavar="N", help="Also on meshes halved 1 to N times.")
 @JSON
-def constants(file: Path, refine: int, as_json: bool) -> None:
+def constants(file: Path, keys: dict[str, str], refine: int, as_json: bool) -> None:
     """Measure m, M, C_R, C_s, C_tr, C_K and rho on the mesh of FILE.
 
     m, M and C_K come in the file's unit of stress.
@@ -115,11 +153,12 @@ def constants(file: Path, refine: int, as_json: bool) -> None:
     \b
     Example:
       ndtheory constants my.toml --refine 2
+      ndtheory constants my.toml --set body1.young=2e4
     """
     from verification.cli import screens
     from verification.constants import measure
 
-    problem = _load(file, None, False)
+    problem = load_problem(file, keys)
     with stages() as tell:
         measured = measure(problem, refine=refine, progress=tell)
     deliver(measured, lambda: screens.constants(problem, measured), as_json)
@@ -130,12 +169,14 @@ def constants(file: Path, refine: int, as_json: bool) -> None:
 
 @click.command()
 @FILE
+@SET
 @THETA
-@SOLVER
+@RELAXATION
 @SWAP
+@SOLVER
 @FOLDER
 @JSON
-def run(file: Path, theta: str | None, solver: Any, swap_roles: bool, folder: Path | None, as_json: bool) -> int:
+def run(file: Path, solver: Any, folder: Path | None, as_json: bool, **changes: Any) -> int:
     """Run the Neumann-Dirichlet iteration on FILE.
 
     Exit 0 where it converged, 1 where it did not, 130 after Ctrl-C (what was computed is shown and written).
@@ -143,13 +184,14 @@ def run(file: Path, theta: str | None, solver: Any, swap_roles: bool, folder: Pa
     \b
     Example:
       ndtheory run my.toml --theta 0.6 -o results
+      ndtheory run my.toml --set contact.friction=0.4 --relaxation newton
     """
     from verification.algorithm import runs
     from verification.cli import screens
     from verification.interface.assembly import build
     from verification.output.folder import Folder
 
-    problem = _load(file, theta, swap_roles)
+    problem = load_problem(file, **changes)
     target = None if folder is None else Folder(folder, "run")
     pair = build(problem)
     _warn(pair.warnings)
@@ -163,14 +205,15 @@ def run(file: Path, theta: str | None, solver: Any, swap_roles: bool, folder: Pa
     _warn(problem.iteration.warnings)  # not beside a refusal
     write = None if target is None else lambda: target.write_run(finished)
     deliver(finished, lambda: screens.run(finished, file), as_json, write, folder)
-    return _status_of_run(finished, swap_roles)
+    return _status_of_run(finished, changes["swap"])
 
 
 @click.command()
 @FILE
+@SET
 @FOLDER
 @JSON
-def solve(file: Path, folder: Path | None, as_json: bool) -> int:
+def solve(file: Path, keys: dict[str, str], folder: Path | None, as_json: bool) -> int:
     """Solve both bodies of FILE at once, without decomposition.
 
     The global method: it shares nothing with the iteration but the matrices.  One body may be rigid (shape = "rigid"),
@@ -179,13 +222,14 @@ def solve(file: Path, folder: Path | None, as_json: bool) -> int:
     \b
     Example:
       ndtheory solve my.toml -o results
+      ndtheory solve my.toml --set 'body2.prescribed.top=[0, -0.03]'
     """
     from verification import monolithic
     from verification.cli import screens
     from verification.interface.assembly import discretise
     from verification.output.folder import Folder
 
-    problem = _load(file, None, False)
+    problem = load_problem(file, keys)
     target = None if folder is None else Folder(folder, "solve")
     bodies = discretise(problem)
     _warn(bodies.warnings)
@@ -199,12 +243,14 @@ def solve(file: Path, folder: Path | None, as_json: bool) -> int:
 
 @click.command()
 @FILE
+@SET
 @THETA
-@SOLVER
+@RELAXATION
 @SWAP
+@SOLVER
 @FOLDER
 @JSON
-def compare(file: Path, theta: str | None, solver: Any, swap_roles: bool, folder: Path | None, as_json: bool) -> int:
+def compare(file: Path, solver: Any, folder: Path | None, as_json: bool, **changes: Any) -> int:
     """Constants, bounds, a run, and one verdict for each bound.
 
     Exit 1 where a proved bound is violated or the run stalls or diverges, 3 where rounding hides the answer.  Reaching
@@ -213,9 +259,10 @@ def compare(file: Path, theta: str | None, solver: Any, swap_roles: bool, folder
     \b
     Example:
       ndtheory compare my.toml -o results
+      ndtheory compare my.toml --set contact.friction=0.4
     """
-    problem = _load(file, theta, swap_roles)
-    return _compare(problem, file, folder, solver, as_json, swap_roles)
+    problem = load_problem(file, **changes)
+    return _compare(problem, file, folder, solver, as_json, changes["swap"])
 
 
 @click.command()
@@ -239,7 +286,7 @@ def demo(folder: Path, as_json: bool) -> int:
     """
     from verification.cli.shell import unreached
     from verification.output.folder import Folder
-    from verification.problem.specification import load
+    from verification.problem import load
 
     written = Folder(folder, "compare").write_problem(examples()["section6"])
     status = _compare(load(written), written, folder, "auto", as_json, False)

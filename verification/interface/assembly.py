@@ -30,13 +30,10 @@ from verification.interface.grid import Grid
 from verification.interface.interface import Interface
 from verification.interface.pair import ContactPair, TwoBodies
 from verification.problem.specification import MOST_CELLS, BodySpec, ContactSpec, Problem
-from verification.problem.tables import ProblemError, short, unreadable
+from verification.problem.tables import ProblemError, short
 
 #: Interface matrices are dense; more contact nodes would fill the memory.
 MOST_NODES = 2000
-
-#: Largest size of a mesh file: that of some MOST_CELLS rectangles as text, several times over.
-MOST_BYTES = 200_000_000
 
 
 def build(problem: Problem, *, law: Law | None = None) -> ContactPair:
@@ -129,14 +126,15 @@ def _specs(problem: Problem) -> list[tuple[Name, BodySpec]]:
 def _mesh(problem: Problem, name: Name) -> Mesh:
     spec: BodySpec = getattr(problem, name)
     if spec.mesh is not None:
-        refuse = lambda needed: ProblemError(problem.source, f"{name}.mesh", spec.mesh, needed)
-        why = unreadable(spec.mesh, MOST_BYTES)
+        path = spec.mesh.path
+        refuse = lambda needed: ProblemError(problem.source, f"{name}.mesh", path, needed)
+        why = spec.mesh.unusable()
         if why:
             raise refuse(why)
         try:
-            mesh = from_file(spec.mesh)
+            mesh = from_file(path)
         except MeshError as error:
-            raise refuse(str(error).removeprefix(f"{spec.mesh}: ")) from None
+            raise refuse(str(error).removeprefix(f"{path}: ")) from None
         if len(mesh.cells) > 2 * MOST_CELLS:
             raise refuse(f"needed at most {2 * MOST_CELLS} triangles, these are {len(mesh.cells)}")
         for key, sides in (("fixed", spec.fixed), ("prescribed", spec.prescribed), ("traction", spec.traction)):

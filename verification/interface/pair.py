@@ -123,8 +123,7 @@ class ContactPair:
         k = take("friction", friction, needed, lambda v: v == 0 or (law and v > 0))
         origin = self.problem
         if origin is not None:  # a file may not hold every friction
-            keeps = k <= MOST_FRICTION
-            origin = replace(origin, contact=replace(origin.contact, friction=k)) if keeps else None
+            origin = origin.changed(friction=k) if k <= MOST_FRICTION else None
         return replace(self, friction=k, problem=origin)
 
     def swapped(self) -> ContactPair:

@@ -19,7 +19,7 @@ from verification.contact import ContactError
 from verification.interface.assembly import build
 from verification.interface.pair import ContactPair
 from verification.ledger.evidence import Level, figure
-from verification.problem.specification import Problem, load
+from verification.problem import Problem, load
 
 Neumann = Literal[1, 2]
 Top = Literal["held", "free"]

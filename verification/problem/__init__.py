@@ -1,6 +1,9 @@
-"""The problem file: what may be asked, read and checked."""
+"""The problem file: what may be asked, read, checked, changed and written."""
 
-from verification.problem.specification import Problem, Settings, load
+from verification.problem.examples import example
+from verification.problem.meshes import MeshFile
+from verification.problem.reading import load
+from verification.problem.specification import Problem, Settings
 from verification.problem.tables import ProblemError
 
-__all__ = ["Problem", "ProblemError", "Settings", "load"]
+__all__ = ["MeshFile", "Problem", "ProblemError", "Settings", "example", "load"]

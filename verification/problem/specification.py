@@ -1,34 +1,24 @@
-"""A problem: two bodies, their contact, the iteration and the norm, read from TOML or a dictionary and validated."""
+"""A problem: two bodies, their contact, the iteration and the norm."""
 
 from __future__ import annotations
 
 import math
-import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from decimal import Decimal
 from fractions import Fraction
-from pathlib import Path
 from typing import Any, Literal
 
 from ndtheory import HypothesisError, relaxation_factor
-from verification.problem.tables import (
-    ProblemError,
-    Table,
-    Unfit,
-    choice,
-    ends,
-    integer,
-    non_negative,
-    number,
-    positive,
-    several,
-    text,
-    unreadable,
-)
+from verification.problem.meshes import MeshFile
+from verification.problem.read_only import ReadOnly
+from verification.problem.tables import ProblemError
 
 #: A displacement or a force by component; None leaves a displacement component free.
 Components = tuple[Fraction | None, ...]
+
+#: What is read as a number, exactly: a float means its shortest decimal, a text may be a fraction.
+Rational = int | float | str | Decimal | Fraction
 
 #: A relaxation factor, or the one that theory chooses.
 Theta = Fraction | Literal["auto"]
@@ -48,9 +38,6 @@ MOST_CONTRAST = Fraction(10**30)
 #: Largest coefficient of friction; larger ones differ from it by nothing but overflow, as all contact sticks.
 MOST_FRICTION = Fraction(10**9)
 
-#: Largest size of a problem file.
-MOST_BYTES = 1_000_000
-
 
 @dataclass(frozen=True, kw_only=True)
 class BodySpec:
@@ -62,11 +49,11 @@ class BodySpec:
         A rigid body is an obstacle: of the rest it has x and y at most.
     x, y : pair of Fraction or None
     cells : tuple of int or None
-    mesh : Path or None
+    mesh : MeshFile or None
     young, poisson : Fraction
         E in stress; Poisson's ratio is 0 for a bar.  Both 0 where rigid.
     fixed : tuple of str
-    prescribed, traction : mapping from side to components
+    prescribed, traction : read-only mapping from side to components
         Displacement (length; None: free) and force per area (stress).
     body_force : tuple of Fraction
         Force per volume.
@@ -76,13 +63,17 @@ class BodySpec:
     x: tuple[Fraction, Fraction] | None = None
     y: tuple[Fraction, Fraction] | None = None
     cells: tuple[int, ...] | None = None
-    mesh: Path | None = None
+    mesh: MeshFile | None = None
     young: Fraction = Fraction(0)
     poisson: Fraction = Fraction(0)
     fixed: tuple[str, ...] = ()
-    prescribed: Mapping[str, Components] = field(default_factory=dict)
-    traction: Mapping[str, tuple[Fraction, ...]] = field(default_factory=dict)
+    prescribed: Mapping[str, Components] = field(default_factory=ReadOnly)
+    traction: Mapping[str, tuple[Fraction, ...]] = field(default_factory=ReadOnly)
     body_force: tuple[Fraction, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("prescribed", "traction"):
+            object.__setattr__(self, name, ReadOnly(getattr(self, name)))
 
     @property
     def rigid(self) -> bool:
@@ -165,11 +156,13 @@ class IterationSpec(Settings):
 class Problem:
     """A validated problem; see the problem file in the documentation.
 
+    Problems are equal where all but their source is; :attr:`digest` asks only for what changes a number.
+
     Attributes
     ----------
     source : str
         The file it came from, or ``<dict>``; errors name it.
-    units : mapping
+    units : read-only mapping
         Labels ``length`` and ``stress``.
     length : Fraction
         L of the norm ``|v|^2/L^2 + |grad v|^2``.
@@ -183,6 +176,8 @@ class Problem:
     ... })
     >>> bars.iteration.neumann_body, bars.body2.prescribed["right"]
     (2, (Fraction(-1, 10),))
+    >>> bars.changed(young=(None, 4)).body2.young
+    Fraction(4, 1)
     """
 
     title: str
@@ -193,7 +188,12 @@ class Problem:
     contact: ContactSpec
     iteration: IterationSpec
     length: Fraction
-    source: str = "<dict>"
+    source: str = field(default="<dict>", compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "units", ReadOnly(self.units))
+
+    # the modules that read, write and change problems know this one, so that they are imported in the methods
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], source: str = "<dict>") -> Problem:
@@ -204,9 +204,118 @@ class Problem:
         ProblemError
             Naming source, key, value received and what is needed.
         """
-        if not isinstance(data, Mapping):
-            raise ProblemError(source, "", None, f"needed a table of keys, received {type(data).__name__}")
-        return _read_problem(Table(data, source), source)
+        from verification.problem.reading import read_problem
+
+        return read_problem(data, source)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The nested dictionary of the problem file, from which :meth:`from_dict` makes an equal problem.
+
+        It holds every key that has a value, defaults too; a key without one (no interval, no radius, no sides) is left
+        out.  Equal problems give equal dictionaries.  A number is a number where the decimal that JSON prints of it is
+        exact, a text such as ``"1/3"`` elsewhere.  A mesh file stands there by its absolute path and the SHA-256 of its
+        content, and :meth:`from_dict` refuses a file whose content is another.
+        """
+        from verification.problem.writing import plain, tables
+
+        written: dict[str, Any] = plain(tables(self))
+        return written
+
+    def to_toml(self) -> str:
+        """The text of a problem file (UTF-8) that reads back as an equal problem, wherever it is kept.
+
+        Raises
+        ------
+        ProblemError
+            The path of a mesh file is no text, so that no TOML can name it.
+        """
+        from verification.problem.toml import document
+
+        written = document(self.to_dict())
+        try:
+            written.encode()
+        except UnicodeEncodeError:
+            raise ProblemError(self.source, "mesh", None, "needed a mesh file whose path is UTF-8") from None
+        return written
+
+    @property
+    def digest(self) -> str:
+        """SHA-256, in hexadecimal digits, of what changes a number.
+
+        Left out are title, labels of units, source, the places of mesh files (their content counts) and the order of
+        sides.
+        """
+        from verification.problem.writing import fingerprint
+
+        return fingerprint(self)
+
+    def changed(
+        self,
+        *,
+        title: str | None = None,
+        young: Sequence[Rational | None] | None = None,
+        poisson: Sequence[Rational | None] | None = None,
+        cells: Sequence[int | Sequence[int] | None] | None = None,
+        friction: Rational | None = None,
+        law: str | None = None,
+        radius: Rational | None = None,
+        gap: Rational | None = None,
+        neumann_body: int | None = None,
+        theta: Rational | None = None,
+        relaxation: str | None = None,
+        tolerance: Rational | None = None,
+        max_iterations: int | None = None,
+    ) -> Problem:
+        """The same problem with other values, read as those of a file are: exactly, and refused by the same words.
+
+        Parameters
+        ----------
+        young, poisson, cells : pair
+            For body 1 and body 2; None leaves a body as it is.
+        friction, law, radius, gap, neumann_body, theta, relaxation, tolerance, max_iterations, title
+            As in the problem file.  Momentum takes its step from rho: without a theta it comes with ``"auto"``.
+
+        Raises
+        ------
+        ProblemError
+            Naming the key as the problem file has it.
+        """
+        from verification.problem.changes import with_each
+
+        contact = {"friction": friction, "law": law, "radius": radius, "gap": gap}
+        iteration = {
+            "neumann_body": neumann_body,
+            "theta": theta,
+            "relaxation": relaxation,
+            "tolerance": tolerance,
+            "max_iterations": max_iterations,
+        }
+        return with_each(
+            self,
+            {"young": young, "poisson": poisson, "cells": cells},
+            {
+                ("title",): title,
+                **{("contact", name): value for name, value in contact.items()},
+                **{("iteration", name): value for name, value in iteration.items()},
+            },
+        )
+
+    def with_keys(self, values: Mapping[str, Any]) -> Problem:
+        """The same problem with keys of its file set, as ``{"contact.friction": "0.4", "body1.cells": "[40, 6]"}``.
+
+        Parameters
+        ----------
+        values : mapping from dotted key to value
+            A text is read as a TOML value; one that is no TOML value and opens none is meant as it stands (``auto``,
+            ``1/3``).  What is no text is taken as it is.  Keys are set one after the other.
+
+        Raises
+        ------
+        ProblemError
+        """
+        from verification.problem.changes import with_keys
+
+        return with_keys(self, values)
 
     def with_theta(self, theta: Any) -> Problem:
         """The same problem at another theta.
@@ -233,14 +342,11 @@ class Problem:
         """
 
         def halved(name: str, body: BodySpec) -> BodySpec:
-            if not halvings:
-                return body
-            if body.rigid:
+            if not halvings or body.rigid:
                 return body
             if body.cells is None:
-                raise ProblemError(
-                    self.source, f"{name}.mesh", body.mesh.name if body.mesh else None, "a mesh file cannot be halved"
-                )
+                named = body.mesh.path.name if body.mesh else None
+                raise ProblemError(self.source, f"{name}.mesh", named, "a mesh file cannot be halved")
             cells = tuple(n * 2**halvings for n in body.cells)
             if math.prod(cells) > MOST_CELLS:
                 needed = f"needed at most {MOST_CELLS} cells after {halvings} halvings"
@@ -265,217 +371,3 @@ def read_theta(value: Any) -> Theta:
         return relaxation_factor(value)
     except HypothesisError as error:
         raise HypothesisError(error.key, error.value, f'{error.needed}, or "auto"') from None
-
-
-def load(path: Path | str) -> Problem:
-    """Read a problem file; decimals are read exactly.
-
-    Raises
-    ------
-    ProblemError
-        Not a file, not readable, not TOML, or a value that does not fit.
-    """
-    path = Path(path)
-    name = str(path)
-    why = unreadable(path, MOST_BYTES)
-    if why:
-        raise ProblemError(name, "", None, why)
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise ProblemError(name, "", None, f"cannot be read: {error.strerror}") from None
-    if not content.strip():
-        raise ProblemError(name, "", None, "the file is empty; `ndtheory example` prints one to start from")
-    try:
-        data = tomllib.loads(content.decode("utf-8-sig"), parse_float=Decimal)
-    except UnicodeDecodeError:
-        raise ProblemError(name, "", None, "a TOML text file is needed, this is not UTF-8 text") from None
-    except (tomllib.TOMLDecodeError, RecursionError, ArithmeticError, ValueError) as error:
-        raise ProblemError(
-            name, "", None, f"not TOML: {' '.join(str(error).split()) or type(error).__name__}"
-        ) from None
-    return _read_problem(Table(data, name), name)
-
-
-def _read_problem(top: Table, source: str) -> Problem:
-    dimension: Literal[1, 2] = top.take("dimension", choice(1, 2), 2)
-    title = top.take("title", text, "untitled")
-    units = top.table("units")
-    labels = {name: units.take(name, text, default) for name, default in (("length", "mm"), ("stress", "MPa"))}
-    units.close()
-    body1 = _read_body(top.table("body1", required=True), dimension, source)
-    body2 = _read_body(top.table("body2", required=True), dimension, source)
-    if body1.rigid and body2.rigid:
-        raise top.refuse("body2.shape", "rigid", "needed at least one elastic body")
-    if not (body1.rigid or body2.rigid or 1 / MOST_CONTRAST <= body1.young / body2.young <= MOST_CONTRAST):
-        needed = f"needed a modulus within {float(MOST_CONTRAST):g} times that of body1, {float(body1.young):g}"
-        raise top.refuse("body2.young", body2.young, f'{needed}; for `solve`, shape = "rigid" makes an obstacle')
-    contact = _read_contact(top.table("contact"), dimension)
-    iteration = _read_iteration(top.table("iteration"))
-    norm = top.table("norm")
-    length = norm.take("length", positive, Fraction(1))
-    norm.close()
-    top.close()
-    return Problem(
-        title=title,
-        dimension=dimension,
-        units=labels,
-        body1=body1,
-        body2=body2,
-        contact=contact,
-        iteration=iteration,
-        length=length,
-        source=source,
-    )
-
-
-def _read_shape(table: Table, dimension: int, source: str) -> dict[str, Any]:
-    """The geometry of a body: a mesh file, or a shape with its cells."""
-    count = integer("a whole number >= 1", 1)
-    if "mesh" in table:
-        if dimension == 1:
-            raise table.refuse("mesh", None, "in one dimension a body is an interval")
-        for name in ("shape", "x", "y", "cells"):
-            if name in table:
-                raise table.refuse(name, None, "needed either mesh or shape, x, y and cells, not both")
-        path = Path(table.take("mesh", text))
-        folder = Path(source).parent if source != "<dict>" else Path()
-        return {"shape": "mesh", "mesh": path if path.is_absolute() else folder / path}
-    natural = "interval" if dimension == 1 else "rectangle"
-    shape = table.take("shape", choice(natural, "rigid"))
-    if shape == "rigid":
-        read_rigid = {"x": table.take("x", ends, None)}
-        if dimension == 2:
-            read_rigid["y"] = table.take("y", ends, None)
-        return {"shape": shape, **read_rigid}
-    if dimension == 1:
-        read: dict[str, Any] = {"x": table.take("x", ends), "cells": (table.take("cells", count),)}
-    else:
-        pair = several(count, 2, "two whole numbers >= 1, along x and y")
-        read = {"x": table.take("x", ends), "y": table.take("y", ends), "cells": table.take("cells", pair)}
-    if math.prod(read["cells"]) > MOST_CELLS:
-        raise table.refuse("cells", list(read["cells"]), f"needed at most {MOST_CELLS} cells")
-    return {"shape": shape, **read}
-
-
-def _components(dimension: int, *, free: bool) -> Any:
-    """Read a vector by components; in 1D a bare number will do."""
-    plain = number()
-
-    def one(value: Any) -> Fraction | None:
-        if free and value == "free":
-            return None
-        return plain(value)
-
-    needed = "a number" if dimension == 1 else "two numbers, along x and y"
-    if free:
-        needed += ' ("free" leaves a component free)'
-
-    def read(value: Any) -> Components:
-        listed = [value] if dimension == 1 and not isinstance(value, (list, tuple)) else value
-        try:
-            return several(one, dimension, needed)(listed)
-        except Unfit:
-            raise Unfit(f"needed {needed}") from None
-
-    return read
-
-
-def _by_side(table: Table, sides: tuple[str, ...] | None, read: Any) -> Mapping[str, Any]:
-    """Read a sub-table keyed by side names; the sides of a mesh file are known only later."""
-    result = {}
-    for name in table.names():
-        if sides is not None and name not in sides:
-            raise table.refuse(name, None, "unknown side; known here: " + ", ".join(sides))
-        result[name] = table.take(name, read)
-    return result
-
-
-def _read_body(table: Table, dimension: int, source: str) -> BodySpec:
-    shape = _read_shape(table, dimension, source)
-    if shape["shape"] == "rigid":
-        table.close()
-        return BodySpec(**shape)
-    sides = {"rectangle": RECTANGLE_SIDES, "interval": INTERVAL_SIDES, "mesh": None}[shape["shape"]]
-
-    def side_list(value: Any) -> tuple[str, ...]:
-        if not isinstance(value, (list, tuple)) or not all(isinstance(name, str) for name in value):
-            raise Unfit('needed a list of side names, as ["bottom"]')
-        for name in value:
-            if sides is not None and name not in sides:
-                raise Unfit(f"unknown side {name!r}; known here: {', '.join(sides)}")
-        if len(set(value)) < len(value):
-            raise Unfit("needed each side once")
-        return tuple(value)
-
-    young = table.take("young", positive)
-    if dimension == 2:
-        poisson = table.take("poisson", number("a number with -1 < nu < 0.5", lambda v: -1 < v < Fraction(1, 2)))
-    else:
-        if "poisson" in table:
-            raise table.refuse("poisson", None, "a bar has no Poisson ratio; leave it out in one dimension")
-        poisson = Fraction(0)
-    fixed = table.take("fixed", side_list, ())
-    prescribed = _by_side(table.table("prescribed"), sides, _components(dimension, free=True))
-    for name in fixed:
-        if name in prescribed:
-            raise table.refuse(f"prescribed.{name}", list(prescribed[name]), f"side {name!r} is fixed already")
-    traction = _by_side(table.table("traction"), sides, _components(dimension, free=False))
-    for name, force in traction.items():
-        held = prescribed.get(name, (None,) * dimension) if name not in fixed else (Fraction(0),) * dimension
-        if any(t != 0 and h is not None for t, h in zip(force, held, strict=True)):
-            raise table.refuse(
-                f"traction.{name}", list(force), "this component of the side is held: a force there is lost"
-            )
-    body_force = table.take("body_force", _components(dimension, free=False), (Fraction(0),) * dimension)
-    table.close()
-    return BodySpec(
-        **shape,
-        young=young,
-        poisson=poisson,
-        fixed=fixed,
-        prescribed=prescribed,
-        traction=traction,
-        body_force=body_force,
-    )
-
-
-def _read_contact(table: Table, dimension: int) -> ContactSpec:
-    coefficient = number(f"a number >= 0, at most {float(MOST_FRICTION):g}", lambda v: 0 <= v <= MOST_FRICTION)
-    friction = table.take("friction", coefficient, Fraction(0))
-    law = table.take("law", choice("nonlocal", "local"), "nonlocal")
-    radius = table.take("radius", positive, None)
-    interval = table.take("interval", ends, None)
-    gap = table.take("gap", non_negative, Fraction(0))
-    table.close()
-    if dimension == 1:
-        if friction:
-            raise table.refuse("friction", friction, "needed 0: two bars have no friction")
-        if interval:
-            raise table.refuse("interval", list(interval), "two bars meet at a point; leave it out in one dimension")
-    elif friction and law == "nonlocal" and radius is None:
-        raise table.refuse(
-            "radius", None, 'this key is missing; the non-local law needs the radius of its kernel (or law = "local")'
-        )
-    return ContactSpec(interval=interval, friction=friction, law=law, radius=radius, gap=gap)
-
-
-def _read_iteration(table: Table) -> IterationSpec:
-    def theta(value: Any) -> Theta:
-        try:
-            return read_theta(value)
-        except HypothesisError as error:
-            raise Unfit(f"needed {error.needed}") from None
-
-    relaxation: Relaxation = table.take("relaxation", choice(*RELAXATIONS), "constant")
-    spec = IterationSpec(
-        neumann_body=table.take("neumann_body", choice(1, 2), 2),
-        theta=table.take("theta", theta, "auto" if relaxation == "momentum" else Fraction(1, 2)),
-        relaxation=relaxation,
-        tolerance=float(
-            table.take("tolerance", number("a number with 0 < tolerance < 1", lambda v: 0 < v < 1), Fraction(1, 10**9))
-        ),
-        max_iterations=table.take("max_iterations", integer("a whole number >= 1", 1), 500),
-    )
-    table.close()
-    return spec

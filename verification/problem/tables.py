@@ -145,7 +145,7 @@ def integer(needed: str, least: int) -> Callable[[Any], int]:
     """Read a whole number, not 12.0 and not true."""
 
     def read(value: Any) -> int:
-        if isinstance(value, bool) or not isinstance(value, int) or value < least:
+        if isinstance(value, bool) or not isinstance(value, int) or value < least or value.bit_length() > 1000:
             raise Unfit(f"needed {needed}")
         return value
 
@@ -157,6 +157,15 @@ def text(value: Any) -> str:
     if not isinstance(value, str):
         raise Unfit("needed a text in quotes")
     return value
+
+
+def label(value: Any) -> str:
+    """Read a string that a file can hold: half of a surrogate pair, which a dictionary may bring, is none."""
+    try:
+        text(value).encode()
+    except UnicodeEncodeError:
+        raise Unfit("needed a text of whole characters, this one has half a surrogate pair") from None
+    return str(value)
 
 
 def choice(*allowed: Any) -> Callable[[Any], Any]:

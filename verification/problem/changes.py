@@ -1,0 +1,105 @@
+"""Problems made from problems: keys of the problem file with other values, read by the readers of the file."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable, Mapping
+from decimal import Decimal
+from typing import Any
+
+from verification.problem.reading import read_problem
+from verification.problem.specification import Problem
+from verification.problem.tables import QUOTED, ProblemError
+from verification.problem.writing import tables
+
+#: A key by its tables and its name.
+Key = tuple[str, ...]
+
+#: Stands where a value would, while a key is read.
+_HERE = "value"
+
+
+def with_values(problem: Problem, values: Iterable[tuple[Key, Any]]) -> Problem:
+    """The problem with some keys of its file set, one after the other.
+
+    Momentum takes its step from rho: set without a theta, it comes with ``auto``.
+
+    Raises
+    ------
+    ProblemError
+    """
+    data, given = tables(problem), dict(values)
+    if given.get(("iteration", "relaxation")) == "momentum":
+        given = {("iteration", "theta"): "auto"} | given
+    for key, value in given.items():
+        *parents, name = key
+        table = data
+        for depth, parent in enumerate(parents, 1):
+            table = table.setdefault(parent, {})
+            if not isinstance(table, dict):
+                needed = f"unknown key; {'.'.join(key[:depth])} is no table"
+                raise ProblemError(problem.source, ".".join(key), None, needed)
+        table[name] = value
+    return read_problem(data, problem.source)
+
+
+def with_each(problem: Problem, pairs: Mapping[str, Any], values: Mapping[Key, Any]) -> Problem:
+    """As :func:`with_values`, also with pairs of values for a key of both bodies; None leaves a key as it is.
+
+    Raises
+    ------
+    ProblemError
+    """
+    given = {key: value for key, value in values.items() if value is not None}
+    for name, pair in pairs.items():
+        if pair is None:
+            continue
+        if not isinstance(pair, (list, tuple)) or len(pair) != 2:
+            needed = "needed two values, for body 1 and body 2 (None leaves a body as it is)"
+            raise ProblemError(problem.source, name, pair, needed)
+        given |= {(f"body{i}", name): value for i, value in enumerate(pair, 1) if value is not None}
+    return with_values(problem, given.items())
+
+
+def with_keys(problem: Problem, values: Mapping[str, Any]) -> Problem:
+    """As :func:`with_values`, with dotted keys and TOML values as they are typed.
+
+    Raises
+    ------
+    ProblemError
+    """
+    read = [(_key(name, problem.source), _value(name, value, problem.source)) for name, value in values.items()]
+    return with_values(problem, read)
+
+
+def _key(name: str, source: str) -> Key:
+    """``body2.prescribed.top`` by its parts; TOML reads it, so that a part may be quoted."""
+    refused = ProblemError(source, name or QUOTED, None, "needed the name of a key, as contact.friction")
+    try:
+        found: Any = tomllib.loads(f'{name} = "{_HERE}"') if name.isprintable() else None
+    except (tomllib.TOMLDecodeError, RecursionError):
+        raise refused from None
+    parts = []
+    while isinstance(found, dict) and len(found) == 1:
+        [(part, found)] = found.items()
+        parts.append(part)
+    if found != _HERE or not parts:
+        raise refused
+    return tuple(parts)
+
+
+def _value(name: str, value: Any, source: str) -> Any:
+    """A TOML value; a text that is none and opens none is meant as it stands."""
+    if not isinstance(value, str):
+        return value
+    if not value.strip():
+        raise ProblemError(source, name, value, 'needed a value (an empty text is "")')
+    try:
+        found = tomllib.loads(f"{_HERE} = {value}", parse_float=Decimal)
+        if len(found) == 1:
+            return found[_HERE]
+    except (ValueError, ArithmeticError, RecursionError):
+        pass
+    if value.lstrip()[0] in "\"'[{":
+        raise ProblemError(source, name, value, "this is not a TOML value: a bracket, brace or quotation mark is wrong")
+    return value

@@ -1,0 +1,299 @@
+"""Problems read from TOML or a dictionary, and validated."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from decimal import Decimal
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, Literal
+
+from ndtheory import HypothesisError
+from verification.problem.meshes import MeshFile, sha256_text
+from verification.problem.specification import (
+    INTERVAL_SIDES,
+    MOST_CELLS,
+    MOST_CONTRAST,
+    MOST_FRICTION,
+    RECTANGLE_SIDES,
+    RELAXATIONS,
+    BodySpec,
+    Components,
+    ContactSpec,
+    IterationSpec,
+    Problem,
+    Relaxation,
+    Theta,
+    read_theta,
+)
+from verification.problem.tables import (
+    ProblemError,
+    Table,
+    Unfit,
+    choice,
+    ends,
+    integer,
+    label,
+    non_negative,
+    number,
+    positive,
+    several,
+    text,
+    unreadable,
+)
+
+#: Largest size of a problem file.
+MOST_BYTES = 1_000_000
+
+
+def load(path: Path | str) -> Problem:
+    """Read a problem file; decimals are read exactly.
+
+    Raises
+    ------
+    ProblemError
+        Not a file, not readable, not TOML, or a value that does not fit.
+    """
+    path = Path(path)
+    name = str(path)
+    why = unreadable(path, MOST_BYTES)
+    if why:
+        raise ProblemError(name, "", None, why)
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise ProblemError(name, "", None, f"cannot be read: {error.strerror}") from None
+    if not content.strip():
+        raise ProblemError(name, "", None, "the file is empty; `ndtheory example` prints one to start from")
+    try:
+        data = tomllib.loads(content.decode("utf-8-sig"), parse_float=Decimal)
+    except UnicodeDecodeError:
+        raise ProblemError(name, "", None, "a TOML text file is needed, this is not UTF-8 text") from None
+    except (tomllib.TOMLDecodeError, RecursionError, ArithmeticError, ValueError) as error:
+        raise ProblemError(
+            name, "", None, f"not TOML: {' '.join(str(error).split()) or type(error).__name__}"
+        ) from None
+    return read_problem(data, name)
+
+
+def read_problem(data: Mapping[str, Any], source: str) -> Problem:
+    """Validate a nested dictionary with the keys of the problem file.
+
+    Raises
+    ------
+    ProblemError
+        Naming source, key, value received and what is needed.
+    """
+    if not isinstance(data, Mapping):
+        raise ProblemError(source, "", None, f"needed a table of keys, received {type(data).__name__}")
+    top = Table(data, source)
+    dimension: Literal[1, 2] = top.take("dimension", choice(1, 2), 2)
+    title = top.take("title", label, "untitled")
+    units = top.table("units")
+    labels = {name: units.take(name, label, default) for name, default in (("length", "mm"), ("stress", "MPa"))}
+    units.close()
+    body1 = _read_body(top.table("body1", required=True), dimension, source)
+    body2 = _read_body(top.table("body2", required=True), dimension, source)
+    if body1.rigid and body2.rigid:
+        raise top.refuse("body2.shape", "rigid", "needed at least one elastic body")
+    if not (body1.rigid or body2.rigid or 1 / MOST_CONTRAST <= body1.young / body2.young <= MOST_CONTRAST):
+        needed = f"needed a modulus within {float(MOST_CONTRAST):g} times that of body1, {float(body1.young):g}"
+        raise top.refuse("body2.young", body2.young, f'{needed}; for `solve`, shape = "rigid" makes an obstacle')
+    contact = _read_contact(top.table("contact"), dimension)
+    iteration = _read_iteration(top.table("iteration"))
+    norm = top.table("norm")
+    length = norm.take("length", positive, Fraction(1))
+    norm.close()
+    top.close()
+    return Problem(
+        title=title,
+        dimension=dimension,
+        units=labels,
+        body1=body1,
+        body2=body2,
+        contact=contact,
+        iteration=iteration,
+        length=length,
+        source=source,
+    )
+
+
+def _read_shape(table: Table, dimension: int, source: str) -> dict[str, Any]:
+    """The geometry of a body: a mesh file, or a shape with its cells."""
+    count = integer("a whole number >= 1", 1)
+    if "mesh" in table:
+        if dimension == 1:
+            raise table.refuse("mesh", None, "in one dimension a body is an interval")
+        for name in ("shape", "x", "y", "cells"):
+            if name in table:
+                raise table.refuse(name, None, "needed either mesh or shape, x, y and cells, not both")
+        return {"shape": "mesh", "mesh": _read_mesh(table, source)}
+    natural = "interval" if dimension == 1 else "rectangle"
+    shape = table.take("shape", choice(natural, "rigid"))
+    if shape == "rigid":
+        read_rigid = {"x": table.take("x", ends, None)}
+        if dimension == 2:
+            read_rigid["y"] = table.take("y", ends, None)
+        return {"shape": shape, **read_rigid}
+    if dimension == 1:
+        read: dict[str, Any] = {"x": table.take("x", ends), "cells": (table.take("cells", count),)}
+    else:
+        pair = several(count, 2, "two whole numbers >= 1, along x and y")
+        read = {"x": table.take("x", ends), "y": table.take("y", ends), "cells": table.take("cells", pair)}
+    if math.prod(read["cells"]) > MOST_CELLS:
+        raise table.refuse("cells", list(read["cells"]), f"needed at most {MOST_CELLS} cells")
+    return {"shape": shape, **read}
+
+
+def _read_mesh(table: Table, source: str) -> MeshFile:
+    """A mesh file: its name, its name and the SHA-256 it must have, or one that was read before."""
+
+    def read(value: Any) -> MeshFile | Table | str:
+        if isinstance(value, Mapping):
+            return Table(value, source, table.key("mesh"))
+        return value if isinstance(value, MeshFile) else text(value)
+
+    given = table.take("mesh", read)
+    if isinstance(given, MeshFile):
+        return given
+    if isinstance(given, Table):
+        name, sha256 = given.take("path", text), given.take("sha256", sha256_text)
+        given.close()
+    else:
+        name, sha256 = given, None
+    path = Path() if source == "<dict>" else Path(source).parent
+    path /= name
+    try:
+        return MeshFile.read(path, sha256)
+    except Unfit as error:
+        raise table.refuse("mesh", path, str(error)) from None
+
+
+def _components(dimension: int, *, free: bool) -> Any:
+    """Read a vector by components; in 1D a bare number will do."""
+    plain = number()
+
+    def one(value: Any) -> Fraction | None:
+        if free and value == "free":
+            return None
+        return plain(value)
+
+    needed = "a number" if dimension == 1 else "two numbers, along x and y"
+    if free:
+        needed += ' ("free" leaves a component free)'
+
+    def read(value: Any) -> Components:
+        listed = [value] if dimension == 1 and not isinstance(value, (list, tuple)) else value
+        try:
+            return several(one, dimension, needed)(listed)
+        except Unfit:
+            raise Unfit(f"needed {needed}") from None
+
+    return read
+
+
+def _by_side(table: Table, sides: tuple[str, ...] | None, read: Any) -> Mapping[str, Any]:
+    """Read a sub-table keyed by side names; the sides of a mesh file are known only later."""
+    result = {}
+    for name in table.names():
+        try:
+            label(name)
+        except Unfit as error:
+            raise table.refuse(str(name), None, str(error)) from None
+        if sides is not None and name not in sides:
+            raise table.refuse(name, None, "unknown side; known here: " + ", ".join(sides))
+        result[name] = table.take(name, read)
+    return result
+
+
+def _read_body(table: Table, dimension: int, source: str) -> BodySpec:
+    shape = _read_shape(table, dimension, source)
+    if shape["shape"] == "rigid":
+        table.close()
+        return BodySpec(**shape)
+    sides = {"rectangle": RECTANGLE_SIDES, "interval": INTERVAL_SIDES, "mesh": None}[shape["shape"]]
+
+    def side_list(value: Any) -> tuple[str, ...]:
+        if not isinstance(value, (list, tuple)) or not all(isinstance(name, str) for name in value):
+            raise Unfit('needed a list of side names, as ["bottom"]')
+        for name in value:
+            label(name)
+            if sides is not None and name not in sides:
+                raise Unfit(f"unknown side {name!r}; known here: {', '.join(sides)}")
+        if len(set(value)) < len(value):
+            raise Unfit("needed each side once")
+        return tuple(value)
+
+    young = table.take("young", positive)
+    if dimension == 2:
+        poisson = table.take("poisson", number("a number with -1 < nu < 0.5", lambda v: -1 < v < Fraction(1, 2)))
+    else:
+        if "poisson" in table:
+            raise table.refuse("poisson", None, "a bar has no Poisson ratio; leave it out in one dimension")
+        poisson = Fraction(0)
+    fixed = table.take("fixed", side_list, ())
+    prescribed = _by_side(table.table("prescribed"), sides, _components(dimension, free=True))
+    for name in fixed:
+        if name in prescribed:
+            raise table.refuse(f"prescribed.{name}", list(prescribed[name]), f"side {name!r} is fixed already")
+    traction = _by_side(table.table("traction"), sides, _components(dimension, free=False))
+    for name, force in traction.items():
+        held = prescribed.get(name, (None,) * dimension) if name not in fixed else (Fraction(0),) * dimension
+        if any(t != 0 and h is not None for t, h in zip(force, held, strict=True)):
+            raise table.refuse(
+                f"traction.{name}", list(force), "this component of the side is held: a force there is lost"
+            )
+    body_force = table.take("body_force", _components(dimension, free=False), (Fraction(0),) * dimension)
+    table.close()
+    return BodySpec(
+        **shape,
+        young=young,
+        poisson=poisson,
+        fixed=fixed,
+        prescribed=prescribed,
+        traction=traction,
+        body_force=body_force,
+    )
+
+
+def _read_contact(table: Table, dimension: int) -> ContactSpec:
+    coefficient = number(f"a number >= 0, at most {float(MOST_FRICTION):g}", lambda v: 0 <= v <= MOST_FRICTION)
+    friction = table.take("friction", coefficient, Fraction(0))
+    law = table.take("law", choice("nonlocal", "local"), "nonlocal")
+    radius = table.take("radius", positive, None)
+    interval = table.take("interval", ends, None)
+    gap = table.take("gap", non_negative, Fraction(0))
+    table.close()
+    if dimension == 1:
+        if friction:
+            raise table.refuse("friction", friction, "needed 0: two bars have no friction")
+        if interval:
+            raise table.refuse("interval", list(interval), "two bars meet at a point; leave it out in one dimension")
+    elif friction and law == "nonlocal" and radius is None:
+        raise table.refuse(
+            "radius", None, 'this key is missing; the non-local law needs the radius of its kernel (or law = "local")'
+        )
+    return ContactSpec(interval=interval, friction=friction, law=law, radius=radius, gap=gap)
+
+
+def _read_iteration(table: Table) -> IterationSpec:
+    def theta(value: Any) -> Theta:
+        try:
+            return read_theta(value)
+        except HypothesisError as error:
+            raise Unfit(f"needed {error.needed}") from None
+
+    relaxation: Relaxation = table.take("relaxation", choice(*RELAXATIONS), "constant")
+    spec = IterationSpec(
+        neumann_body=table.take("neumann_body", choice(1, 2), 2),
+        theta=table.take("theta", theta, "auto" if relaxation == "momentum" else Fraction(1, 2)),
+        relaxation=relaxation,
+        tolerance=float(
+            table.take("tolerance", number("a number with 0 < tolerance < 1", lambda v: 0 < v < 1), Fraction(1, 10**9))
+        ),
+        max_iterations=table.take("max_iterations", integer("a whole number >= 1", 1), 500),
+    )
+    table.close()
+    return spec
