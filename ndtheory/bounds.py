@@ -1,12 +1,25 @@
 """C_0, .., C_6, G, h_1, h_2 and the contraction interval (Section 5), printed and repaired.
 
-Every formula is written over any scalar (float, Decimal, sympy symbol) and free of the cancellation
-that the printed form suffers; docstrings give the equation, ``tests/ndtheory`` a second derivation.
+Every formula is written over any scalar (float, Decimal, Fraction where roots are rational, sympy, mpmath, an interval,
+a scalar that writes the formula down) and free of the cancellation that the printed form suffers; branches go through
+:func:`ndtheory.number.where`.  Docstrings give the equation, ``tests/ndtheory`` a second derivation.
 
 The two editions are one set of formulas.  The paper's bracket ``M C_R + C_K + sqrt(C_K m) + 1`` in (5.30)
 adds a stress to the number 1: from (5.11), (5.13), (5.19) and (5.23) it is a *stress* ``u = m`` that stands there, and
 an overall factor 1/u with it.  The printed edition is ``u = 1`` with ``m~ = min(m, 1)`` for m; the repaired one is
 ``u = m`` with m itself.  They agree in the unit of stress in which m = 1.
+
+In both editions every number is monotone in m, M, C_R and x = C_K, so an enclosure of the constants gives one of the
+results: their values where m is largest and the others least, and the other way round.
+
+* C_T, P and Q grow with M, C_R and x and fall with m, as each of their terms does (with u = 1 and with u = m; m~ does
+  not fall with m).  C0 = 1/(1 + A^2/(2 m^2)) grows with m and falls with M and C_R; C6 = 1 - 1/(2P - 1) grows with P.
+* C2 to C5 solve ``P(x) = 1 + m^2/A^2, 1/2, 1, 1 + m^2/A^2``.  P grows with x and M, C_R and falls with m, and the right
+  sides do not fall with m or grow with A: the thresholds grow with m, fall with M and C_R.
+* By ``D = Q m^2/A^2 - P``, ``K^2 = max(h1, h2)`` is
+  ``(1 - theta)^2 + 2 theta (1 - theta) P + max(0, theta^2 - 2 theta (1 - theta) m^2/A^2) Q`` for 0 < theta <= 1, which
+  grows with P, Q and A/m.  So K grows with M, C_R and x and falls with m, and the thetas with K < 1, an interval that
+  ends at C1, become fewer.
 """
 
 from __future__ import annotations
@@ -17,14 +30,30 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any, Literal
 
-from ndtheory.constants import Constants, relaxation_factor
+from ndtheory.constants import Constants, Corner, relaxation_factor
 from ndtheory.errors import HypothesisError
-from ndtheory.number import DIGITS, Number, decimal, sqrt, working_precision
+from ndtheory.number import (
+    DIGITS,
+    SLACK,
+    Number,
+    decimal,
+    maximum,
+    minimum,
+    rounded,
+    sqrt,
+    weakest,
+    where,
+    working_precision,
+)
 
 Verdict = Literal["contraction", "no conclusion"]
 
 #: The ends of the open intervals count as outside, decided with a margin far above the rounding of the evaluation.
 MARGIN = Decimal(10) ** -(DIGITS // 2)
+
+#: Newton's steps in :func:`inverse_G`: the start exceeds the root by a factor of at most sqrt(3), and the excess falls
+#: to 0.35, 0.12, 0.02 or less and then from e to at most 1.5 e^2: below 1e-400 after twelve.
+NEWTON_STEPS = 12
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,7 +80,7 @@ class Edition:
     proved: Callable[[Any], bool]
 
 
-PRINTED = Edition(name="printed", coercivity=lambda m: min(m, m / m), unit=lambda m: m / m, proved=lambda m: m >= 1)
+PRINTED = Edition(name="printed", coercivity=lambda m: minimum(m, m / m), unit=lambda m: m / m, proved=lambda m: m >= 1)
 REPAIRED = Edition(name="repaired", coercivity=lambda m: m, unit=lambda m: m, proved=lambda m: True)
 EDITIONS = (PRINTED, REPAIRED)
 
@@ -90,13 +119,23 @@ def inverse_G(y: Any, m: Any, M: Any, C_R: Any, u: Any) -> Any:
     """
     Y = y * u / M**2
     root_m, B = sqrt(m), M * C_R + u
-    t = min(sqrt(sqrt(Y)), sqrt(Y / B))
-    while True:
+    t = minimum(sqrt(sqrt(Y)), sqrt(Y / B))
+    for _ in range(NEWTON_STEPS):
         residual = t**2 * (t * (t + root_m) + B) - Y
         lower = t - residual / (t * (t * (4 * t + 3 * root_m) + 2 * B))
-        if not lower < t:  # rounding has stopped the descent
-            return t**2
-        t = lower
+        falls = lower < t
+        if falls is False:  # rounding has stopped the descent: the other steps would change nothing
+            break
+        t = where(falls, lower, t)
+    return t**2
+
+
+def thresholds(m: Any, M: Any, C_R: Any, u: Any) -> tuple[Any, Any, Any, Any]:
+    """C2 (5.43), C3, C4, C5 (Cases 2-1 to 2-3) on C_K."""
+    c0 = C0(m, M, C_R)
+    right = (m**5 / (M * C_R) ** 2 + m**3, m**3 / 2, m**3, (2 - c0) / (1 - c0) * m**3 / 2)
+    C2, C3, C4, C5 = (inverse_G(y, m, M, C_R, u) for y in right)
+    return C2, C3, C4, C5
 
 
 def P(x: Any, m: Any, M: Any, C_R: Any, u: Any) -> Any:
@@ -136,6 +175,28 @@ def one_minus_h1(theta: Any, D: Any, Q: Any) -> Any:
 def one_minus_h2(theta: Any, P: Any) -> Any:
     """1 - h_2(theta) = -theta (a' theta + b'), h_2 of (5.45), a' = 1 - 2P, b' = -1 - a'."""
     return theta * ((2 - theta) - 2 * P * (1 - theta))
+
+
+def lower_end(P: Any) -> Any:
+    """max(0, C6) with C6 counted only where a' < -1: where the thetas that contract begin, friction being below C2."""
+    return where(P > 1, lambda: maximum(0 * P, C6(P)), 0 * P)
+
+
+def one_minus_square(theta: Any, P: Any, D: Any, Q: Any) -> Any:
+    """1 - K(theta)^2, K^2 = max(h1, h2)."""
+    return minimum(one_minus_h1(theta, D, Q), one_minus_h2(theta, P))
+
+
+def factor_and_rest(gain: Any) -> tuple[Any, Any]:
+    """q and 1 - q from 1 - q^2 <= 1, the latter without cancellation.
+
+    Examples
+    --------
+    >>> factor_and_rest(0.75)
+    (0.5, 0.5)
+    """
+    q = sqrt(maximum(1 - gain, 0 * gain))
+    return q, gain / (1 + q)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -228,7 +289,11 @@ def evaluate(edition: Edition, constants: Constants, theta: Any = None) -> Bound
     Returns
     -------
     Bounds
-        Right to the last place of a double: evaluated with 200 decimal digits, comparisons included.
+        Right to the last place of a double: evaluated with 200 decimal digits, comparisons included.  Where a constant
+        was given as an enclosure, and the others as one or exactly, the numbers have enclosures too, at the weakest
+        level (``verified`` at best).  Not those that some of the constants enclosed do not have: C1, ``factor``
+        and ``one_minus_factor`` have one only if there is a contraction interval, with theta inside it, throughout.
+        ``interval``, ``verdict`` and ``proved`` are those of the values.
 
     Raises
     ------
@@ -240,62 +305,73 @@ def evaluate(edition: Edition, constants: Constants, theta: Any = None) -> Bound
     >>> b = evaluate(REPAIRED, Constants(m=1, M=2, C_R=1, C_K=0), theta="1/3")
     >>> b.C0.value, b.verdict, round(b.factor.value, 6)
     (0.3333333333333333, 'contraction', 0.666667)
+    >>> m = Number(value=1.0, lo=0.999, hi=1.001, level="verified")
+    >>> b = evaluate(REPAIRED, Constants(m=m, M=2, C_R=1, C_K=0), theta="1/3")
+    >>> b.factor.level, round(b.factor.lo, 3), round(b.factor.hi, 3)
+    ('verified', 0.667, 0.677)
     """
     chosen = None if theta is None else relaxation_factor(theta)
+    scale = constants.friction_scale
     with working_precision():
-        m, M, C_R, x = (decimal(v) for v in (constants.m, constants.M, constants.C_R, constants.C_K))
-        read, u = edition.coercivity(m), edition.unit(m)
-        shared = (read, M, C_R)
-        c0 = C0(*shared)
-        p, d, q = P(x, *shared, u), D(x, *shared, u), Q(x, *shared)
-        c1 = C1(d, q)
-        c6 = C6(p) if p > 1 else None
-        # right-hand sides of (5.43), Case 2-1, Case 2-2 and Case 2-3
-        right = (read**5 / (M * C_R) ** 2 + read**3, read**3 / 2, read**3, (2 - c0) / (1 - c0) * read**3 / 2)
-        thresholds = [inverse_G(y, *shared, u) for y in right]
-        # C1 - C0 can be 1e-22 relative: never compare those two instead.
-        below = x < thresholds[0] * (1 - MARGIN)
-        interval = (max(Decimal(0), c6 or Decimal(0)), c1) if below else None
-
-        one_minus_square = None
-        if chosen is not None and interval is not None:
-            t = decimal(chosen)
-            if interval[0] * (1 + MARGIN) < t < interval[1] * (1 - MARGIN):
-                one_minus_square = min(one_minus_h1(t, d, q), one_minus_h2(t, p))
-        verdict: Verdict | None = None
-        factor = one_minus_factor = None
-        if chosen is not None:
-            verdict = "no conclusion" if one_minus_square is None else "contraction"
-        if one_minus_square is not None:
-            root = sqrt(1 - one_minus_square)
-            factor, one_minus_factor = Number.of_float(root), Number.of_float(one_minus_square / (1 + root))
-
-        if not (math.isfinite(float(q)) and math.isfinite(float(lipschitz(read, M, C_R, x)))):
+        t = None if chosen is None else decimal(chosen)
+        here = (constants.m, constants.M, constants.C_R, constants.C_K, scale)
+        found = _figures(edition, here, t, MARGIN)
+        if not all(math.isfinite(float(found[name])) for name in ("Q", "C_T_tilde")):
+            m, M, C_R = (decimal(value) for value in here[:3])
             raise HypothesisError("M C_R / m", f"{M * C_R / m:.3g}", "constants whose bounds fit into a double")
-        scale = constants.friction_scale
-        on_k = scale is not None
-        ends: list[Number | None]
-        if scale == 0:
-            ends = [None] * 4
-        else:
-            ends = [Number.of_float(y / decimal(scale) if scale else y) for y in thresholds]
+        corners = [_figures(edition, corner, t, SLACK) for corner in constants.corners or ()]
+        level = weakest([constants.level, "verified"])
+
+        def number(name: str, end: str | None = None) -> Any:
+            return rounded(found[name], [corner[end or name] for corner in corners], level)
+
+        interval = None if found["high"] is None else (float(found["low"]), float(found["high"]))
+        verdict: Verdict | None = None
+        if chosen is not None:
+            verdict = "no conclusion" if found["factor"] is None else "contraction"
+        names = ("C_K", "C_T", "C_T_tilde", "C0", "C2", "C3", "C4", "C5", "C6", "factor", "one_minus_factor")
         return Bounds(
             edition=edition,
-            C_K=Number.of_float(x),
-            C_T=Number.of_float(lipschitz(m, M, C_R, x)),
-            C_T_tilde=Number.of_float(lipschitz(read, M, C_R, x)),
-            C0=Number.of_float(c0),
-            C1=Number.of_float(c1),
-            C2=ends[0],
-            C3=ends[1],
-            C4=ends[2],
-            C5=ends[3],
-            C6=None if c6 is None else Number.of_float(c6),
-            interval=None if interval is None else (float(interval[0]), float(interval[1])),
+            C1=number("C1", end="high"),
+            **{name: number(name) for name in names},
+            interval=interval,
             theta=None if chosen is None else float(chosen),
-            factor=factor,
-            one_minus_factor=one_minus_factor,
             verdict=verdict,
-            proved=edition.proved(m),
-            threshold_on="k" if on_k else "C_K",
+            proved=edition.proved(constants.m),
+            threshold_on="C_K" if scale is None else "k",
         )
+
+
+def _figures(edition: Edition, at: Corner, theta: Decimal | None, margin: Decimal) -> dict[str, Any]:
+    """What an edition says for m, M, C_R, C_K and C_s C_tr: decimals by name, None where there is none.
+
+    ``low`` and ``high`` are the ends of the interval; an end within the ``margin``, relatively, counts as met.
+    """
+    m, M, C_R, x = (decimal(value) for value in at[:4])
+    read, u = edition.coercivity(m), edition.unit(m)
+    shared = (read, M, C_R)
+    p, d, q = P(x, *shared, u), D(x, *shared, u), Q(x, *shared)
+    c1 = C1(d, q)
+    ends: tuple[Any, ...] = thresholds(*shared, u)
+    # C1 - C0 can be 1e-22 relative: never compare those two instead.
+    low = high = factor = rest = None
+    if x < ends[0] * (1 - margin):
+        low, high = lower_end(p), c1
+        if theta is not None and low * (1 + margin) < theta < high * (1 - margin):
+            factor, rest = factor_and_rest(one_minus_square(theta, p, d, q))
+    if at[4] is not None:
+        ends = tuple(end / decimal(at[4]) for end in ends) if at[4] else (None,) * 4
+    names = ("C2", "C3", "C4", "C5")
+    return dict(zip(names, ends, strict=True)) | {
+        "C_K": x,
+        "C_T": lipschitz(m, M, C_R, x),
+        "C_T_tilde": lipschitz(*shared, x),
+        "Q": q,
+        "C0": C0(*shared),
+        "C1": c1,
+        "C6": C6(p) if p > 1 else None,
+        "low": low,
+        "high": high,
+        "factor": factor,
+        "one_minus_factor": rest,
+    }

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any
+from typing import Any, ClassVar
 
 from ndtheory.errors import HypothesisError
-from ndtheory.number import exact
+from ndtheory.number import Level, Number, exact, weakest
+
+#: m, M, C_R, C_K and C_s C_tr, the last None where C_K alone is known.
+Corner = tuple[Fraction, Fraction, Fraction, Fraction, Fraction | None]
+
+#: Sizes between which enclosures are given; beyond them the cancellation in the bounds was not studied.
+ORDINARY = Fraction(1, 10**30), Fraction(10**30)
 
 
 def take(key: str, value: Any, needed: str, holds: Callable[[Fraction], bool]) -> Fraction:
@@ -44,10 +51,103 @@ def relaxation_factor(value: Any) -> Fraction:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Constants:
+class Given:
+    """Constants as exact rationals, with what was given in their place.
+
+    A :class:`~ndtheory.number.Number` enters the formulas as its value, read like any float; its level and its ends
+    are kept here.
+
+    Attributes
+    ----------
+    numbers : tuple of (str, Number)
+        The constants that were given as a Number, or as a float, which has level ``float``.
+    """
+
+    #: Least value that the hypotheses allow, where there is one: a lower end below it is moved there.
+    floor: ClassVar[Mapping[str, int]]
+
+    numbers: tuple[tuple[str, Number], ...] = field(init=False, repr=False, default=())
+
+    def _keep(self, key: str, value: Any, needed: str, holds: Callable[[Fraction], bool]) -> Fraction:
+        given = Number.of_float(value) if isinstance(value, float) else value
+        kept = take(key, plain(value), needed, holds)
+        if isinstance(given, Number):
+            object.__setattr__(self, "numbers", (*self.numbers, (key, given)))
+        object.__setattr__(self, key, kept)
+        return kept
+
+    def factors(self, key: str) -> tuple[str, ...]:
+        """The constants given whose product a constant is: itself alone, where it was not computed from others."""
+        return (key,)
+
+    def number(self, key: str) -> Number | None:
+        """A constant with its level and its ends; None where there is none.
+
+        What was written exactly is ``exact`` where a double is that number; elsewhere it is ``verified``, between the
+        two doubles next to it.
+
+        Examples
+        --------
+        >>> c = Constants(m=Number(value=1.0, lo=0.9, hi=1.1, level="guaranteed"), M=2, C_R="4/3", C_K=0)
+        >>> c.number("m").lo, c.number("M").level, c.number("C_R").level
+        (0.9, 'exact', 'verified')
+        """
+        given, value, ends = dict(self.numbers), getattr(self, key), self.ends(key)
+        if value is None or key in given:
+            return given.get(key)
+        level = weakest(given[factor].level for factor in self.factors(key) if factor in given)
+        return Number.of_float(value) if ends is None else Number.enclosed(value, *ends, level)
+
+    def ends(self, key: str) -> tuple[Fraction, Fraction] | None:
+        """The enclosure of a constant as rationals, its value twice where it was written exactly; or None."""
+        given, low, high = dict(self.numbers), Fraction(1), Fraction(1)
+        for factor in self.factors(key):
+            value, number = getattr(self, factor), given.get(factor)
+            lo, hi = value, value
+            if number is not None:
+                if number.lo is None or number.hi is None:
+                    return None
+                # the value may be read as a decimal just outside the doubles that enclose it
+                lo, hi = min(Fraction(number.lo), value), max(Fraction(number.hi), value)
+                if factor in self.floor:
+                    lo = max(lo, Fraction(self.floor[factor]))
+            if value is None:
+                return None
+            low, high = low * lo, high * hi
+        return low, high
+
+    def enclosures(self, *keys: str) -> list[tuple[Fraction, Fraction]] | None:
+        """The ends of some constants; None unless one of all was given as an enclosure and these are of ordinary size.
+
+        An end may be 0 only where the hypotheses allow it.
+        """
+        if not self.numbers:
+            return None
+        found = []
+        for key in keys:
+            ends = self.ends(key)
+            if ends is None or not all(ORDINARY[0] <= e <= ORDINARY[1] or e == 0 == self.floor.get(key) for e in ends):
+                return None
+            found.append(ends)
+        return found
+
+    @property
+    def level(self) -> Level:
+        """The weakest level of the constants given."""
+        return weakest(number.level for _, number in self.numbers)
+
+
+def plain(value: Any) -> Any:
+    """What is read of a constant: the value of a Number, else the constant itself."""
+    return value.value if isinstance(value, Number) else value
+
+
+@dataclass(frozen=True, kw_only=True)
+class Constants(Given):
     """m, M, C_R and C_K: all that Section 5 knows of the two bodies and of friction.
 
-    Numbers are kept exactly as written (see :func:`ndtheory.number.exact`).
+    Numbers are kept exactly as written (see :func:`ndtheory.number.exact`).  Each may be a
+    :class:`~ndtheory.number.Number` too: its level and its ends are kept (:meth:`number`) and enter the bounds.
 
     Parameters
     ----------
@@ -75,6 +175,8 @@ class Constants:
     Fraction(1, 400)
     """
 
+    floor = {"C_R": 1, "C_K": 0, "C_s": 0, "C_tr": 0, "k": 0}
+
     m: Fraction
     M: Fraction
     C_R: Fraction
@@ -86,13 +188,9 @@ class Constants:
     def __init__(
         self, *, m: Any, M: Any, C_R: Any, C_K: Any = None, C_s: Any = None, C_tr: Any = None, k: Any = None
     ) -> None:
-        def keep(key: str, value: Any, needed: str, holds: Any) -> Fraction:
-            number = take(key, value, needed, holds)
-            object.__setattr__(self, key, number)
-            return number
-
+        keep = self._keep
         smallest = keep("m", m, "a number m > 0", lambda v: v > 0)
-        keep("M", M, f"a number M >= m = {m}", lambda v: v >= smallest)
+        keep("M", M, f"a number M >= m = {plain(m)}", lambda v: v >= smallest)
         keep("C_R", C_R, "a number C_R >= 1", lambda v: v >= 1)
         friction = {"C_s": C_s, "C_tr": C_tr, "k": k}
         given = [key for key, value in friction.items() if value is not None]
@@ -106,12 +204,29 @@ class Constants:
                 raise HypothesisError("C_K", C_K, f"either C_K or C_s, C_tr and k, not C_K with {', '.join(given)}")
             keep("C_K", C_K, "a number C_K >= 0", lambda v: v >= 0)
         elif len(given) == 3:
-            object.__setattr__(self, "C_K", exact(k) * exact(C_s) * exact(C_tr))
+            object.__setattr__(self, "C_K", math.prod(getattr(self, key) for key in friction))
         else:
             missing = [key for key in friction if key not in given]
             raise HypothesisError(", ".join(missing), None, "C_s, C_tr and k, or C_K alone")
+
+    def factors(self, key: str) -> tuple[str, ...]:
+        return ("k", "C_s", "C_tr") if key == "C_K" and self.k is not None else (key,)
 
     @property
     def friction_scale(self) -> Fraction | None:
         """The product C_s C_tr, which turns a threshold on C_K into one on k; None where only C_K is known."""
         return None if self.C_s is None or self.C_tr is None else self.C_s * self.C_tr
+
+    @property
+    def corners(self) -> tuple[Corner, Corner] | None:
+        """m, M, C_R, C_K and the friction scale where the theorem says most and where it says least.
+
+        It says more the larger m and the smaller the others are (:mod:`ndtheory.bounds`).  None unless a constant was
+        given as an enclosure, all others as one or exactly, and m <= M holds throughout.
+        """
+        ends = self.enclosures("m", "M", "C_R", "C_K", *(() if self.friction_scale is None else ("C_s", "C_tr")))
+        if ends is None or ends[0][1] > ends[1][0]:
+            return None
+        m, M, C_R, C_K, *scale = ends
+        best, worst = ((m[1 - i], M[i], C_R[i], C_K[i], scale[0][i] * scale[1][i] if scale else None) for i in (0, 1))
+        return best, worst

@@ -3,22 +3,52 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from decimal import Context, Decimal, InvalidOperation, localcontext
 from fractions import Fraction
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 Level = Literal["exact", "verified", "guaranteed", "float"]
+
+#: From the strongest to the weakest.
+LEVELS: tuple[Level, ...] = get_args(Level)
 
 #: Decimal digits carried while a bound is evaluated.  With constants spread over 1e-12..1e12 the worst cancellation
 #: (C6 just below C1) costs some 75 digits, so the double that comes out is right in its last place.
 DIGITS = 200
 
+#: What an end of an enclosure evaluated with ``DIGITS`` digits is moved outward by, relatively: far above its rounding
+#: (see ``DIGITS``; an end where more cancels is given up) and far below the last place of a double.
+SLACK = Decimal(10) ** -60
+
 #: Sizes accepted from a user; beyond them a double overflows.
 LARGEST_EXPONENT = 300
 LARGEST, SMALLEST = Fraction(10**LARGEST_EXPONENT), Fraction(1, 10**LARGEST_EXPONENT)
+
+
+def weakest(levels: Iterable[Level]) -> Level:
+    """The level of what is derived from numbers of these levels; ``exact`` where there are none.
+
+    Examples
+    --------
+    >>> weakest(["exact", "guaranteed", "verified"])
+    'guaranteed'
+    """
+    return max(levels, key=LEVELS.index, default="exact")
+
+
+def below(x: Any) -> float:
+    """The largest double that is at most a rational or a decimal."""
+    nearest = float(x)
+    return nearest if nearest <= x else math.nextafter(nearest, -math.inf)
+
+
+def above(x: Any) -> float:
+    """The smallest double that is at least a rational or a decimal."""
+    nearest = float(x)
+    return nearest if nearest >= x else math.nextafter(nearest, math.inf)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,9 +60,17 @@ class Number:
     value : float
         The nearest double.
     lo, hi : float or None
-        An enclosure, or None where there is none (always at level ``float``).
+        Ends of an enclosure: the number meant is at least ``lo``, at most ``hi``.  One side alone may be known;
+        at level ``float`` neither is, at the others one at least.
     level : {'exact', 'verified', 'guaranteed', 'float'}
-        How the value was obtained; a derived value has the weakest level of its inputs.
+        How the enclosure was obtained, from the strongest: the double is the number; arithmetic that bounds all its
+        rounding errors; that and a proved estimate of what is not computed; not at all.  What is derived has the
+        weakest level of its inputs (:func:`weakest`), and ``float`` where a rounding error was not bounded.
+
+    Raises
+    ------
+    ValueError
+        Not ``lo <= value <= hi``, or ends that the level does not allow.
 
     Examples
     --------
@@ -45,10 +83,48 @@ class Number:
     hi: float | None = None
     level: Level = "float"
 
+    def __post_init__(self) -> None:
+        if self.level == "float" and self.lo is None and self.hi is None:
+            return
+        ends = [end for end in (self.lo, self.hi) if end is not None]
+        if self.level not in LEVELS:
+            raise ValueError(f"level = {self.level}: needed one of {', '.join(LEVELS)}")
+        if (self.level == "float") != (not ends):
+            raise ValueError(f"level {self.level} with lo = {self.lo}, hi = {self.hi}: ends belong to any but float")
+        if self.level == "exact" and any(end != self.value for end in ends):
+            raise ValueError(f"level exact with lo = {self.lo}, hi = {self.hi}: needed {self.value} itself")
+        lo, hi = (self.value if end is None else end for end in (self.lo, self.hi))
+        if not (lo <= self.value <= hi and all(map(math.isfinite, (lo, self.value, hi)))):
+            raise ValueError(f"value = {self.value}: needed lo = {self.lo} <= value <= hi = {self.hi}, all finite")
+
     @classmethod
     def of_float(cls, value: Any) -> Number:
         """Round any real scalar to a double; nothing is claimed about the error."""
         return cls(value=float(value))
+
+    @classmethod
+    def enclosed(cls, value: Any, lo: Any, hi: Any, level: Level) -> Number:
+        """Round a rational or decimal to the nearest double and its ends outward.
+
+        What was ``exact`` remains so where the double is the number, and is ``verified`` elsewhere.
+
+        Examples
+        --------
+        >>> Number.enclosed(Fraction(1, 4), Fraction(1, 4), Fraction(1, 4), "exact").level
+        'exact'
+        >>> third = Number.enclosed(Fraction(1, 3), Fraction(1, 3), Fraction(1, 3), "exact")
+        >>> third.level, third.lo < Fraction(1, 3) < third.hi
+        ('verified', True)
+        """
+        lo, nearest, hi = below(lo), float(value), above(hi)
+        if not (math.isfinite(lo) and math.isfinite(hi)):
+            return cls(value=nearest)
+        return cls(value=nearest, lo=lo, hi=hi, level=level if lo == hi else weakest([level, "verified"]))
+
+    @property
+    def two_sided(self) -> bool:
+        """Whether both ends of the enclosure are known."""
+        return self.lo is not None and self.hi is not None
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON object of the interface."""
@@ -104,6 +180,27 @@ def working_precision(digits: int = DIGITS) -> Iterator[None]:
         yield
 
 
+def rounded(value: Decimal | None, ends: Sequence[Decimal | None], level: Level) -> Number | None:
+    """A result of ``DIGITS`` digits as a Number.
+
+    Parameters
+    ----------
+    value : Decimal or None
+        None remains None.
+    ends : sequence of Decimal or None
+        The same result at both ends of an enclosure in which it is monotone, in any order.  The result has no enclosure
+        where one of them is missing, or smaller than ``SLACK`` but not 0: what is left may be the rounding error.
+    level : {'exact', 'verified', 'guaranteed', 'float'}
+    """
+    if value is None:
+        return None
+    known = sorted(end for end in ends if end is not None and (end == 0 or abs(end) > SLACK))
+    if not known or len(known) < len(ends) or level == "float":
+        return Number.of_float(value)
+    lo, hi = known[0], known[-1]
+    return Number.enclosed(value, lo - abs(lo) * SLACK, hi + abs(hi) * SLACK, level)
+
+
 def decimal(value: Fraction) -> Decimal:
     """A rational in the current decimal precision."""
     return Decimal(value.numerator) / Decimal(value.denominator)
@@ -138,3 +235,43 @@ def sqrt(x: Any) -> Any:
     if hasattr(x, "is_Rational"):  # a sympy expression: 0.5 would turn it into a float
         return x ** Fraction(1, 2)
     return x**0.5
+
+
+def where(condition: Any, a: Any, b: Any) -> Any:
+    """``a`` where a condition holds, else ``b``: the branch of a formula, beside :func:`sqrt`.
+
+    A formula takes no ``if`` on a scalar, so that it serves scalars whose comparisons are not decided at once.  Such a
+    comparison returns an object with a method ``where(a, b)``: that of a scalar that writes the formula down returns
+    the text of the choice, that of an interval or ball the hull of both branches.  Conditions are joined by ``&``.
+
+    Parameters
+    ----------
+    condition : bool, or an object with a method ``where(a, b)``
+        Any other (numpy, sympy) is asked for its truth.
+    a, b : scalar, or a function without arguments that returns one
+        A function is called where its branch is taken: it may divide by what vanishes in the other one.
+
+    Examples
+    --------
+    >>> where(2 > 1, 5, lambda: 1 / 0)
+    5
+    """
+    if condition is not True and condition is not False and hasattr(condition, "where"):
+        return condition.where(*(branch() if callable(branch) else branch for branch in (a, b)))
+    branch = a if condition else b
+    return branch() if callable(branch) else branch
+
+
+def minimum(a: Any, b: Any) -> Any:
+    """The smaller of two scalars."""
+    return where(b < a, b, a)
+
+
+def maximum(a: Any, b: Any) -> Any:
+    """The larger of two scalars."""
+    return where(b > a, b, a)
+
+
+def absolute(x: Any) -> Any:
+    """The modulus of a scalar."""
+    return where(x < 0, -x, x)

@@ -8,8 +8,15 @@ For two forces psi, psi~ let d_1, d_2 be the differences of the traces of the co
 * ``<T psi - T psi~, d_2> <= f(x) |d_2|^2``, with ``f(x) = kappa_2 + kappa_1 x - x^2``, that of (5.29) and (5.30).
 
 So by (5.24) ``q(theta)^2``, the largest ``(1-theta)^2 + 2 theta (1-theta) f(x) + theta^2 rho x^2`` over 0 <= x <= r,
-bounds the square of the Lipschitz constant of T_theta.  The proof, step by step, is in ``docs/sharp.md``.  Every
-formula is written over any scalar.
+bounds the square of the Lipschitz constant of T_theta.  The proof, step by step, is in ``docs/sharp.md``.
+
+Every formula is written over any scalar (float, Decimal, Fraction where roots are rational, sympy, mpmath, an interval,
+a scalar that writes the formula down); branches go through :func:`ndtheory.number.where`.
+
+r grows with rho, kappa_1 and kappa_2, and at each x in [0, r] the expression above does, as 0 < theta <= 1: so does q.
+As q grows, the thetas with q < 1, an interval, become fewer: its upper end does not grow, the least q does not fall,
+and neither multiple of friction grows, up to which every small theta and some theta has q < 1.  So an enclosure of the
+three (rho_normal in the place of rho where there is no friction) gives one of each result: its values at both ends.
 """
 
 from __future__ import annotations
@@ -20,9 +27,21 @@ from decimal import Decimal
 from fractions import Fraction
 from typing import Any
 
-from ndtheory.bounds import MARGIN, Verdict
-from ndtheory.constants import relaxation_factor, take
-from ndtheory.number import Number, decimal, sqrt, working_precision
+from ndtheory.bounds import MARGIN, Verdict, factor_and_rest
+from ndtheory.constants import Given, plain, relaxation_factor
+from ndtheory.number import (
+    SLACK,
+    Number,
+    absolute,
+    decimal,
+    maximum,
+    minimum,
+    rounded,
+    sqrt,
+    weakest,
+    where,
+    working_precision,
+)
 
 #: Halvings of an interval inside (0, 1) until theta is known to far below a double.
 HALVINGS = 80
@@ -36,8 +55,11 @@ def _friction(kappa: Fraction) -> bool:
 
 
 @dataclass(frozen=True, kw_only=True)
-class EnergyConstants:
+class EnergyConstants(Given):
     """rho, kappa_1 and kappa_2: all that the theorem in energy norms knows of the two bodies and of friction.
+
+    Numbers are kept exactly as written (see :func:`ndtheory.number.exact`).  Each may be a
+    :class:`~ndtheory.number.Number` too: its level and its ends are kept (:meth:`number`) and enter the bound.
 
     Parameters
     ----------
@@ -61,25 +83,23 @@ class EnergyConstants:
     Fraction(3, 2)
     """
 
+    floor = {"kappa_1": 0, "kappa_2": 0}
+
     rho: Fraction
     kappa_1: Fraction
     kappa_2: Fraction
     rho_normal: Fraction | None
 
     def __init__(self, *, rho: Any, kappa_1: Any = 0, kappa_2: Any = 0, rho_normal: Any = None) -> None:
-        largest = take("rho", rho, "a number rho > 0 (1e-75 to 1e75)", lambda v: SMALLEST <= v <= LARGEST)
-        normal = None
-        if rho_normal is not None:
-            needed = f"a number 0 < rho_normal <= rho = {rho}"
-            normal = take("rho_normal", rho_normal, needed, lambda v: 0 < v <= largest)
-        values = {
-            "rho": largest,
-            "kappa_1": take("kappa_1", kappa_1, "a number kappa_1 >= 0 (0, or 1e-75 to 1e75)", _friction),
-            "kappa_2": take("kappa_2", kappa_2, "a number kappa_2 >= 0 (0, or 1e-75 to 1e75)", _friction),
-            "rho_normal": normal,
-        }
-        for key, value in values.items():
-            object.__setattr__(self, key, value)
+        keep = self._keep
+        largest = keep("rho", rho, "a number rho > 0 (1e-75 to 1e75)", lambda v: SMALLEST <= v <= LARGEST)
+        if rho_normal is None:
+            object.__setattr__(self, "rho_normal", None)
+        else:
+            needed = f"a number 0 < rho_normal <= rho = {plain(rho)}"
+            keep("rho_normal", rho_normal, needed, lambda v: 0 < v <= largest)
+        keep("kappa_1", kappa_1, "a number kappa_1 >= 0 (0, or 1e-75 to 1e75)", _friction)
+        keep("kappa_2", kappa_2, "a number kappa_2 >= 0 (0, or 1e-75 to 1e75)", _friction)
 
     @property
     def frictionless(self) -> bool:
@@ -90,6 +110,21 @@ class EnergyConstants:
     def at_work(self) -> Fraction:
         """The rho that enters q: rho_normal without friction (where it is known), else rho."""
         return self.rho_normal if self.frictionless and self.rho_normal is not None else self.rho
+
+    @property
+    def corners(self) -> tuple[tuple[Fraction, ...], tuple[Fraction, ...]] | None:
+        """rho at work, kappa_1 and kappa_2 where the theorem says most, all least, and where it says least.
+
+        None unless a constant was given as an enclosure, and all others as one or exactly.
+        """
+        normal = () if self.rho_normal is None else ("rho_normal",)
+        ends = self.enclosures("kappa_1", "kappa_2", "rho", *normal)
+        if ends is None:
+            return None
+        low, high = zip(*ends, strict=True)
+        # the last is rho_normal where it is known
+        best, worst = ((at[-1] if at[0] == 0 == at[1] else at[2], at[0], at[1]) for at in (low, high))
+        return best, worst
 
 
 # The formulas: rho > 0, kappa_1, kappa_2 >= 0, 0 < theta <= 1.
@@ -131,9 +166,11 @@ def turning_theta(rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
 
 def worst_ratio(theta: Any, rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
     """The x in [0, r] at which ``square_at`` is largest."""
-    if theta >= turning_theta(rho, kappa_1, kappa_2):
-        return largest_ratio(rho, kappa_1, kappa_2)
-    return (1 - theta) * kappa_1 / (2 - (2 + rho) * theta) if kappa_1 else 0 * theta
+    return where(
+        theta >= turning_theta(rho, kappa_1, kappa_2),
+        lambda: largest_ratio(rho, kappa_1, kappa_2),
+        lambda: where(kappa_1 == 0, 0 * theta, lambda: (1 - theta) * kappa_1 / (2 - (2 + rho) * theta)),
+    )
 
 
 def one_minus_end(theta: Any, rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
@@ -144,20 +181,21 @@ def one_minus_end(theta: Any, rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
 
 def one_minus_inside(theta: Any, rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
     """1 - q^2 where the worst x lies inside: for theta below ``turning_theta``, at most 2/(2 + rho)."""
-    bend = (1 - theta) ** 2 * kappa_1**2 / (2 - (2 + rho) * theta) if kappa_1 else 0
+    bend = where(kappa_1 == 0, 0, lambda: (1 - theta) ** 2 * kappa_1**2 / (2 - (2 + rho) * theta))
     return theta * (2 - theta - 2 * (1 - theta) * kappa_2 - bend)
 
 
 def one_minus_square(theta: Any, rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
     """1 - q(theta)^2; negative where q > 1."""
-    branch = one_minus_end if theta >= turning_theta(rho, kappa_1, kappa_2) else one_minus_inside
-    return branch(theta, rho, kappa_1, kappa_2)
+    at = (theta, rho, kappa_1, kappa_2)
+    turned = theta >= turning_theta(rho, kappa_1, kappa_2)
+    return where(turned, lambda: one_minus_end(*at), lambda: one_minus_inside(*at))
 
 
 def slope_inside(theta: Any, rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
     """Derivative of ``one_minus_inside`` by theta."""
     c = 2 + rho
-    bend = 2 * (1 - theta) * (1 - 3 * theta + c * theta**2) / (2 - c * theta) ** 2 if kappa_1 else 0
+    bend = where(kappa_1 == 0, 0, lambda: 2 * (1 - theta) * (1 - 3 * theta + c * theta**2) / (2 - c * theta) ** 2)
     return 2 - 2 * theta - 2 * (1 - 2 * theta) * kappa_2 - kappa_1**2 * bend
 
 
@@ -186,9 +224,11 @@ def friction_limit(rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
     (4.0, 8.0, 2.0)
     """
     root = sqrt(rho)
-    if kappa_1 * (root - 1 / root) < 2 * kappa_2:
-        return (1 + 1 / rho) / (kappa_2 + kappa_1 / root)
-    return friction_multiple(kappa_1, kappa_2)
+    return where(
+        kappa_1 * (root - 1 / root) < 2 * kappa_2,
+        lambda: (1 + 1 / rho) / (kappa_2 + kappa_1 / root),
+        lambda: friction_multiple(kappa_1, kappa_2),
+    )
 
 
 def predicted_theta(rho: Any) -> Any:
@@ -218,11 +258,11 @@ def predicted_factor(theta: Any, rho: Any) -> Any:
     >>> predicted_factor(Fraction(1, 2), 2), predicted_factor(Fraction(1, 4), 2), predicted_factor(Fraction(3, 4), 2)
     (Fraction(1, 2), Fraction(3, 4), Fraction(5, 4))
     """
-    return max(abs(1 - theta), abs(1 - theta * (1 + rho)))
+    return maximum(absolute(1 - theta), absolute(1 - theta * (1 + rho)))
 
 
-def contraction_interval(rho: Any, kappa_1: Any, kappa_2: Any, margin: Any = 0) -> tuple[Any, Any] | None:
-    """The thetas with q < 1, an open interval inside (0, 1), or None where there are none.
+def contraction_ends(rho: Any, kappa_1: Any, kappa_2: Any, margin: Any = 0) -> tuple[Any, Any, Any]:
+    """Both ends of the interval of the thetas with q < 1, and the condition that there is one.
 
     ``q < 1`` means ``2 (f - 1) + theta (1 - 2 f + rho x^2) < 0`` for every x in [0, r].  Each is linear in theta, so
     their maximum h is convex, and ``h < 0`` on one interval.  Its ends are 0, 1, ``2/(1 + sqrt(rho) r)`` or roots of
@@ -235,43 +275,66 @@ def contraction_interval(rho: Any, kappa_1: Any, kappa_2: Any, margin: Any = 0) 
     a = (1 - 2 * spare) * (2 + rho) + kappa_1**2
     b = (8 + 2 * rho) * spare - 2 - 2 * kappa_1**2
     c = kappa_1**2 - 4 * spare
-    inner = sorted(root for root in _roots(a, b, c, margin) if margin < root < turn * (1 - margin))
-    start = [0 * end] if c <= margin else []  # h <= 0 at 0
-    stop = [min(end, end / end)] if end >= turn * (1 - margin) else []  # and at the turning theta
-    ends = start + inner + stop
-    return (ends[0], ends[1]) if len(ends) == 2 else None
+    (first, one), (second, other) = (
+        (root, there & (margin < root) & (root < turn * (1 - margin))) for root, there in _roots(a, b, c, margin)
+    )
+    from_0 = c <= margin  # h <= 0 at 0
+    beyond = end >= turn * (1 - margin)  # and at the turning theta
+    low = where(from_0, 0 * end, where(one, where(other, minimum(first, second), first), second))
+    high = where(beyond, minimum(end, end / end), where(one, where(other, maximum(first, second), first), second))
+    ends = sum(where(counts, 1, 0) for counts in (from_0, beyond, one, other))
+    return low, high, ends == 2
 
 
-def _roots(a: Any, b: Any, c: Any, margin: Any) -> list[Any]:
-    """Both real roots of ``a t^2 + b t + c`` where they differ, without cancellation."""
+def contraction_interval(rho: Any, kappa_1: Any, kappa_2: Any, margin: Any = 0) -> tuple[Any, Any] | None:
+    """The thetas with q < 1, an open interval inside (0, 1), or None where there are none.
+
+    For scalars whose comparisons are decided; :func:`contraction_ends` is the formula.
+    """
+    low, high, there = contraction_ends(rho, kappa_1, kappa_2, margin)
+    return (low, high) if there else None
+
+
+def _roots(a: Any, b: Any, c: Any, margin: Any) -> tuple[tuple[Any, Any], tuple[Any, Any]]:
+    """Both real roots of ``a t^2 + b t + c`` where they differ, without cancellation, each with whether it exists."""
     discriminant = b * b - 4 * a * c
-    if discriminant <= margin * b * b:
-        return []
-    q = -(b + sqrt(discriminant)) / 2 if b > 0 else -(b - sqrt(discriminant)) / 2
-    return [numerator / denominator for numerator, denominator in ((q, a), (c, q)) if denominator != 0]
+    real = discriminant > margin * b * b
+    root = where(real, lambda: sqrt(discriminant), 0 * b)
+    q = -(b + where(b > 0, root, -root)) / 2
+    return (where(a != 0, lambda: q / a, 0 * b), real & (a != 0)), (
+        where(q != 0, lambda: c / q, 0 * b),
+        real & (q != 0),
+    )
 
 
 def best_theta(rho: Any, kappa_1: Any, kappa_2: Any, margin: Any = 0) -> Any | None:
-    """The theta of least q, or None where q >= 1 everywhere.
+    """The theta of least q, or None where q >= 1 everywhere; for scalars whose comparisons are decided."""
+    interval = contraction_interval(rho, kappa_1, kappa_2, margin)
+    return None if interval is None else best_between(*interval, rho, kappa_1, kappa_2)
+
+
+def best_between(low: Any, high: Any, rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
+    """The theta of least q, where the interval in which q < 1 is known.
 
     q grows above :func:`turning_theta`; below it, where q < 1, it has one minimum, since ``q <= c`` holds on one
     interval for each c <= 1.
     """
-    interval = contraction_interval(rho, kappa_1, kappa_2, margin)
-    if interval is None:
-        return None
-    low, high = interval[0], min(interval[1], turning_theta(rho, kappa_1, kappa_2))
-    return _last_where(lambda theta: slope_inside(theta, rho, kappa_1, kappa_2) > 0, low, high)
+    top = minimum(high, turning_theta(rho, kappa_1, kappa_2))
+    return _last_where(lambda theta: slope_inside(theta, rho, kappa_1, kappa_2) > 0, low, top)
 
 
 def _last_where(holds: Callable[[Any], bool], low: Any, high: Any) -> Any:
     """The end of an interval (low, ..) inside (low, high) on which a condition holds, by halving."""
-    if holds(high):
-        return high
-    for _ in range(HALVINGS):
-        middle = (low + high) / 2
-        low, high = (middle, high) if holds(middle) else (low, middle)
-    return low
+
+    def halved() -> Any:
+        yes, no = low, high
+        for _ in range(HALVINGS):
+            middle = (yes + no) / 2
+            further = holds(middle)
+            yes, no = where(further, middle, yes), where(further, no, middle)
+        return yes
+
+    return where(holds(high), high, halved)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -356,6 +419,15 @@ def evaluate_sharp(constants: EnergyConstants, theta: Any = None) -> SharpBounds
     theta : number, optional
         Relaxation factor, 0 < theta < 1, read exactly.
 
+    Returns
+    -------
+    SharpBounds
+        Right to the last place of a double.  Where a constant was given as an enclosure, and the others as one or
+        exactly, the numbers have enclosures too, at the weakest level (``verified`` at best).  Not those that some of
+        the constants enclosed do not have: ``factor_proved``, ``theta_max_proved`` have one only if there is a
+        contraction interval throughout, ``factor`` and ``one_minus_factor`` if theta is inside it.
+        ``interval``, ``verdict`` and what is a plain number are those of the values.
+
     Raises
     ------
     HypothesisError
@@ -366,48 +438,67 @@ def evaluate_sharp(constants: EnergyConstants, theta: Any = None) -> SharpBounds
     >>> s = evaluate_sharp(EnergyConstants(rho=2), theta="3/5")
     >>> s.interval, s.theta_proved, s.factor_proved.value, round(s.factor.value, 12)
     ((0.0, 0.6666666666666666), 0.5, 0.5, 0.8)
+    >>> rho = Number(value=2.0, lo=1.75, hi=2.25, level="guaranteed")
+    >>> s = evaluate_sharp(EnergyConstants(rho=rho), theta="1/2")
+    >>> s.factor.level, s.factor.value, round(s.factor.lo, 12), round(s.factor.hi, 12)
+    ('guaranteed', 0.5, 0.5, 0.625)
     """
     chosen = None if theta is None else relaxation_factor(theta)
     with working_precision():
-        rho, kappa_1, kappa_2 = data = (
-            decimal(constants.at_work),
-            decimal(constants.kappa_1),
-            decimal(constants.kappa_2),
-        )
-        interval = contraction_interval(*data, MARGIN)
-        if interval is not None and float(interval[0]) == float(interval[1]):
-            interval = None  # no double lies inside
-        best = None if interval is None else best_theta(*data, MARGIN)
-        factor = one_minus = None
-        verdict: Verdict | None = None if chosen is None else "no conclusion"
-        if chosen is not None and interval is not None:
-            low, t, high = interval[0], decimal(chosen), interval[1]
-            if low * (1 + MARGIN) < t < high * (1 - MARGIN):
-                q, gain = _factor(t, data)
-                if gain > 0:
-                    factor, one_minus, verdict = Number.of_float(q), Number.of_float(gain), "contraction"
+        t = None if chosen is None else decimal(chosen)
+        here = (constants.at_work, constants.kappa_1, constants.kappa_2)
+        found = _figures(here, t, MARGIN)
+        corners = [_figures(corner, t, SLACK) for corner in constants.corners or ()]
+        level = weakest([constants.level, "verified"])
+
+        def number(name: str) -> Any:
+            return rounded(found[name], [corner[name] for corner in corners], level)
+
+        def nearest(name: str) -> float | None:
+            return None if found[name] is None else float(found[name])
+
+        names = ("rho", "kappa_1", "kappa_2", "ratio", "friction_multiple", "friction_limit_multiple")
+        proved = ("factor_proved", "theta_max_proved", "factor", "one_minus_factor")
+        verdict: Verdict | None = None
+        if chosen is not None:
+            verdict = "no conclusion" if found["factor"] is None else "contraction"
         return SharpBounds(
-            rho=Number.of_float(rho),
-            kappa_1=Number.of_float(kappa_1),
-            kappa_2=Number.of_float(kappa_2),
-            ratio=Number.of_float(largest_ratio(*data)),
-            friction_multiple=None if constants.frictionless else Number.of_float(friction_multiple(kappa_1, kappa_2)),
-            friction_limit_multiple=None if constants.frictionless else Number.of_float(friction_limit(*data)),
-            interval=None if interval is None else (float(interval[0]), float(interval[1])),
-            theta_proved=None if best is None else float(best),
-            factor_proved=None if best is None else Number.of_float(_factor(best, data)[0]),
-            theta_max_proved=None if interval is None else Number.of_float(interval[1]),
-            theta_predicted=float(predicted_theta(rho)),
-            rate_predicted=float(predicted_rate(rho)),
+            **{name: number(name) for name in (*names, *proved)},
+            interval=None if found["low"] is None else (float(found["low"]), float(found["theta_max_proved"])),
+            theta_proved=nearest("theta_proved"),
+            theta_predicted=float(predicted_theta(decimal(constants.at_work))),
+            rate_predicted=float(predicted_rate(decimal(constants.at_work))),
             theta=None if chosen is None else float(chosen),
-            factor=factor,
-            one_minus_factor=one_minus,
             verdict=verdict,
         )
 
 
-def _factor(theta: Decimal, data: tuple[Decimal, Decimal, Decimal]) -> tuple[Decimal, Decimal]:
-    """q and 1 - q."""
-    gain = one_minus_square(theta, *data)
-    q = sqrt(max(1 - gain, Decimal(0)))
-    return q, gain / (1 + q)
+def _figures(at: tuple[Fraction, ...], theta: Decimal | None, margin: Decimal) -> dict[str, Any]:
+    """What the theorem says for rho, kappa_1 and kappa_2: decimals by name, None where there is none."""
+    rho, kappa_1, kappa_2 = data = decimal(at[0]), decimal(at[1]), decimal(at[2])
+    rubs = any(at[1:])
+    interval = contraction_interval(*data, margin)
+    if interval is not None and float(interval[0]) == float(interval[1]):
+        interval = None  # no double lies inside
+    low = high = best = factor = rest = None
+    if interval is not None:
+        low, high = interval
+        best = best_theta(*data, margin)
+        if theta is not None and low * (1 + margin) < theta < high * (1 - margin):
+            gain = one_minus_square(theta, *data)
+            if gain > 0:
+                factor, rest = factor_and_rest(gain)
+    return {
+        "rho": rho,
+        "kappa_1": kappa_1,
+        "kappa_2": kappa_2,
+        "ratio": largest_ratio(*data),
+        "friction_multiple": friction_multiple(kappa_1, kappa_2) if rubs else None,
+        "friction_limit_multiple": friction_limit(*data) if rubs else None,
+        "low": low,
+        "theta_proved": best,
+        "factor_proved": None if best is None else factor_and_rest(one_minus_square(best, *data))[0],
+        "theta_max_proved": high,
+        "factor": factor,
+        "one_minus_factor": rest,
+    }
