@@ -3,6 +3,7 @@
 import os
 import signal
 
+import pytest
 from hypothesis import settings
 
 settings.register_profile("dev", deadline=None)
@@ -12,3 +13,12 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE") or ("ci" if os.enviro
 
 # A shell that runs the tests in its background lets them ignore Ctrl-C, and their children inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture
+def known_bounds(monkeypatch):
+    """Losses and semidefinite bounds of the same bodies are computed once, where a test is not about them."""
+    from known import KNOWN
+
+    for module, name, known in KNOWN:
+        monkeypatch.setattr(module, name, known)

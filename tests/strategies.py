@@ -357,9 +357,17 @@ def held_bodies(draw, most: int = 4):
     return mesh, floats, np.flatnonzero(~known.ravel())
 
 
-def fewer(share: int) -> settings:
-    """The profile's number of examples, divided: for examples that cost a dense factorisation or two."""
-    return settings(max_examples=max(1, settings.default.max_examples // share))
+#: What the profiles for every day ask of a property, at most.
+EVERY_DAY = 100
+
+
+def fewer(share: int, at_night: int | None = None) -> settings:
+    """The profile's number of examples, divided: for examples that cost a dense factorisation or two.
+
+    By `at_night`, where that is given, in profiles that ask for more than those for every day.
+    """
+    most = settings.default.max_examples
+    return settings(max_examples=max(1, most // (at_night if at_night and most > EVERY_DAY else share)))
 
 
 # --- end of elastic bodies --------------------------------------------------------------------------------------------

@@ -117,6 +117,11 @@ class Answer:
         return self.err[:-1]
 
 
+@pytest.fixture(autouse=True)
+def known(known_bounds):
+    """Commands compare the same bodies over and over."""
+
+
 @pytest.fixture
 def call(capsys):
     """``call("run", file, "--json")`` as ``ndtheory run file --json``."""

@@ -135,6 +135,7 @@ def dense_lift(A, interface):
     )
 
 
+@fewer(4, at_night=1)
 @given(condensed_bodies())
 def test_a_condensed_body_is_its_dense_schur_complement(case):
     matrix, interface = case
@@ -147,6 +148,7 @@ def test_a_condensed_body_is_its_dense_schur_complement(case):
     assert np.linalg.eigvalsh(found.schur).min() > 0
 
 
+@fewer(4, at_night=1)
 @given(condensed_bodies())
 def test_the_schur_complement_is_the_same_whether_or_not_the_lift_was_asked_for_first(case):
     matrix, interface = case
@@ -167,6 +169,7 @@ def test_an_interface_longer_than_a_block_of_right_hand_sides_is_condensed_whole
     assert norm(Condensation(matrix, interface).lift - lift) <= rounding(A, lift)
 
 
+@fewer(4, at_night=1)
 @given(condensed_bodies(), st.integers(0, 2**16))
 def test_a_solve_leaves_no_residual(case, seed):
     matrix, interface = case
@@ -182,6 +185,7 @@ def test_a_solve_leaves_no_residual(case, seed):
     )
 
 
+@fewer(4, at_night=1)
 @given(condensed_bodies(), st.integers(0, 2**16))
 def test_the_order_of_the_interface_is_the_order_of_the_schur_complement(case, seed):
     matrix, interface = case
@@ -194,6 +198,7 @@ def test_the_order_of_the_interface_is_the_order_of_the_schur_complement(case, s
     assert other.extend(phi[order])[interface].tolist() == phi.tolist()
 
 
+@fewer(4, at_night=1)
 @given(condensed_bodies(), st.integers(0, 2**16))
 def test_condensing_in_two_steps_is_condensing_at_once(case, seed):
     matrix, interface = case
@@ -204,6 +209,7 @@ def test_condensing_in_two_steps_is_condensing_at_once(case, seed):
     assert norm(second.schur - once.schur) <= (1 + norm(first.lift)) ** 2 * slack
 
 
+@fewer(4, at_night=1)
 @given(condensed_bodies())
 def test_an_interface_of_all_unknowns_leaves_the_matrix_as_it_is(case):
     matrix, interface = case
@@ -219,6 +225,7 @@ def test_an_interface_of_all_unknowns_leaves_the_matrix_as_it_is(case):
     )
 
 
+@fewer(4, at_night=1)
 @given(condensed_bodies(), powers_of_two(-20, 20))
 def test_scaling_the_matrix_scales_the_energy_and_keeps_the_lift(case, c):
     matrix, interface = case

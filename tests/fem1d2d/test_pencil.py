@@ -88,7 +88,7 @@ def test_the_eigenvector_has_norm_one_and_its_residual_is_the_one_reported(penci
         assert found.value == pytest.approx(x @ A @ x, abs=len(A) * 40 * EPS)
 
 
-@fewer(2)
+@fewer(6, at_night=2)
 @given(held_bodies(most=5))
 def test_m_and_M_of_an_elastic_body_are_those_of_a_dense_solver(body):
     mesh, material, free = body
@@ -102,7 +102,7 @@ def test_m_and_M_of_an_elastic_body_are_those_of_a_dense_solver(body):
     assert [low.value, high.value] == pytest.approx([dense[0].value, dense[1].value], rel=1e-11)
 
 
-@fewer(2)
+@fewer(6, at_night=2)
 @given(held_bodies(most=4), powers_of_two(-20, 20))
 def test_scaling_the_modulus_scales_the_eigenvalue_and_scaling_the_norm_divides_it(body, c):
     mesh, material, free = body
@@ -257,6 +257,7 @@ def test_the_residual_of_what_is_returned_bounds_its_distance_to_the_spectrum(pe
         assert np.abs(D - found.value).min() <= found.residual + 1e-13 * np.abs(D).max()
 
 
+@fewer(4, at_night=1)
 @given(plane_meshes(3), st.sampled_from([-0.9, -0.3, 0.0, 0.3, 0.45]))
 def test_no_body_exceeds_the_continuity_of_its_material(mesh, poisson):
     """M^a <= max(2 mu, 2 mu + 2 lambda), attained nowhere but approached; for positive and negative Poisson ratios."""

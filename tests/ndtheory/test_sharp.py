@@ -66,12 +66,16 @@ def halve(holds: Callable[[mpf], bool], yes: mpf, no: mpf) -> mpf:
 
 
 def summit(quadratic: Callable, end):
-    """Where a quadratic is largest on [0, end]: at an end, or at its vertex."""
+    """Where a quadratic is largest on [0, end], at an end or at its vertex, and its value there.
+
+    Three values of the quadratic, which are dear, tell all others.
+    """
     at_0, at_1, at_2 = quadratic(0), quadratic(1), quadratic(2)
     bend = at_2 - 2 * at_1 + at_0
     slope = at_1 - at_0 - bend / 2
     inside = [-slope / bend] if bend < 0 and 0 < -slope / bend < end else []
-    return max([0 * end, end, *inside], key=quadratic)
+    value = lambda x: at_0 + x * (slope + x * bend / 2)
+    return max(((x, value(x)) for x in [0 * end, end, *inside]), key=lambda found: found[1])
 
 
 def work(x, kappa_1, kappa_2):
@@ -103,12 +107,15 @@ class Energy:
         roots = mp.polyroots([1, -mp.sqrt(self.rho) - self.kappa_1, -self.kappa_2], maxsteps=500, extraprec=500)
         return max(map(mp.re, roots))
 
-    def worst(self, theta: mpf) -> mpf:
+    def summit(self, theta: mpf) -> tuple[mpf, mpf]:
         return summit(lambda x: right_side(x, theta, *self.data), self.ratio)
+
+    def worst(self, theta: mpf) -> mpf:
+        return self.summit(theta)[0]
 
     def square(self, theta: mpf) -> mpf:
         """q(theta)^2."""
-        return right_side(self.worst(theta), theta, *self.data)
+        return self.summit(theta)[1]
 
     def excess(self, theta: mpf) -> mpf:
         """(q^2 - 1)/theta: at each x a line in theta, so convex."""
@@ -119,8 +126,7 @@ class Energy:
 
     @cached_property
     def largest_work(self) -> mpf:
-        f = partial(work, kappa_1=self.kappa_1, kappa_2=self.kappa_2)
-        return f(summit(f, self.ratio))
+        return summit(partial(work, kappa_1=self.kappa_1, kappa_2=self.kappa_2), self.ratio)[1]
 
     @cached_property
     def interval(self) -> tuple[mpf, mpf] | None:
@@ -325,6 +331,7 @@ def test_every_formula_agrees_with_a_search_for_the_worst_case(case):
     assert formula_differences(*case) == []
 
 
+@strategies.fewer(2, at_night=1)
 @given(cases())
 def test_a_factor_is_reported_exactly_where_the_worst_case_shrinks(case):
     constants, theta = case
@@ -334,6 +341,7 @@ def test_a_factor_is_reported_exactly_where_the_worst_case_shrinks(case):
     assert (found.factor is not None) == (found.one_minus_factor is not None) == contracts
 
 
+@strategies.fewer(2, at_night=1)
 @given(cases())
 def test_the_interval_and_the_best_theta_do_not_depend_on_the_theta_given(case):
     constants, theta = case
@@ -341,6 +349,7 @@ def test_the_interval_and_the_best_theta_do_not_depend_on_the_theta_given(case):
     assert without == replace(with_theta, theta=None, factor=None, one_minus_factor=None, verdict=None)
 
 
+@strategies.fewer(2, at_night=1)
 @given(cases())
 def test_no_theta_has_a_smaller_factor_than_the_one_called_best(case):
     constants, theta = case
@@ -365,7 +374,8 @@ def test_q_is_the_larger_of_both_ends_and_the_vertex_in_exact_rationals(numbers,
     root, kappa_1, kappa_2, ratio = numbers
     data = (root**2, kappa_1, kappa_2)
     quadratic = lambda x: right_side(x, theta, *data)
-    worst = summit(quadratic, ratio)
+    worst, largest = summit(quadratic, ratio)
+    assert quadratic(worst) == largest
     assert quadratic(sharp.worst_ratio(theta, *data)) == quadratic(worst)
     assert 0 <= sharp.worst_ratio(theta, *data) <= ratio
     assert sharp.square_at(worst, theta, *data) == quadratic(worst)
@@ -398,6 +408,7 @@ def test_both_branches_meet_at_the_turning_theta(numbers):
     assert (turn == 2 / (2 + root**2)) == (kappa_1 == 0)
 
 
+@strategies.fewer(2, at_night=1)
 @given(energies(), st.integers(20, 60))
 def test_q_is_continuous_at_the_turning_theta(constants, digits):
     found = energy(**constants)
@@ -452,7 +463,7 @@ def test_without_friction_the_tangential_components_do_not_count(rho, share, the
     )
 
 
-@strategies.fewer(2)
+@strategies.fewer(4, at_night=2)
 @given(cases(), st.integers(1, 99).map(lambda n: F(n, 100)))
 def test_with_any_friction_the_tangential_components_count(case, share):
     constants, theta = case
@@ -474,6 +485,7 @@ def test_the_slightest_friction_makes_the_bound_jump_from_rho_normal_to_rho():
 # --- more friction, a stiffer contact body -------------------------------------------------------------------------
 
 
+@strategies.fewer(2, at_night=1)
 @given(cases(), st.sampled_from(["rho", "kappa_1", "kappa_2"]), strategies.log_uniform(-12, 2))
 def test_q_grows_with_rho_and_with_friction(case, key, growth):
     """At fixed x the quadratic grows with each of the three, and so does r."""
@@ -568,7 +580,7 @@ def test_the_interval_is_open_at_ends_whose_decimals_do_not_end(theta):
     assert evaluate_sharp(EnergyConstants(**given), theta).verdict == "no conclusion"
 
 
-@strategies.fewer(4)
+@strategies.fewer(8, at_night=4)
 @given(RHO, SHARES)
 def test_at_the_threshold_itself_the_interval_is_that_of_the_search(rho, share):
     """kappa_2 + kappa_1^2/4 = 1 exactly: q^2 = 1 + O(theta^2), so the sign of the next term decides."""
@@ -603,7 +615,7 @@ def test_at_the_threshold_it_does_not_matter_how_ninths_round(rho, kappa_1, kapp
     assert (None if found is None else found[0]) == low
 
 
-@strategies.fewer(4)
+@strategies.fewer(8, at_night=4)
 @given(st.integers(1, 60).map(lambda n: F(n, 12)), st.integers(1, 100).map(lambda n: F(n, 100)))
 def test_the_interval_may_end_at_the_turning_theta(root, share):
     """Chosen so that ``2/(1 + sqrt(rho) r)`` is the turning theta; share > 0 keeps kappa_1 > 0, <= 1 kappa_2 >= 0."""
@@ -615,7 +627,7 @@ def test_the_interval_may_end_at_the_turning_theta(root, share):
     assert differences(constants) == []
 
 
-@strategies.fewer(4)
+@strategies.fewer(8, at_night=4)
 @given(st.integers(1, 60).map(lambda n: F(n, 12)), SHARES)
 def test_where_q_only_touches_1_there_is_no_interval(root, share):
     """``sqrt(rho) kappa_1 = 1 + rho (1 - kappa_2)``: a double root of q^2 - 1 below the turning theta."""

@@ -91,6 +91,7 @@ def dense_values(dense: DensePair) -> dict[str, float]:
     }
 
 
+@strategies.fewer(3, at_night=1)
 @given(data=strategies.contact_problems(most_cells=8))
 def test_measured_constants_are_the_extremal_eigenvalues_of_dense_pencils(data):
     found, expected = values(data), dense_values(DensePair.of(build(vf.Problem.from_dict(data))))
@@ -100,7 +101,7 @@ def test_measured_constants_are_the_extremal_eigenvalues_of_dense_pencils(data):
     close(found, expected)
 
 
-@strategies.fewer(5)
+@strategies.fewer(10, at_night=5)
 @given(data=strategies.plane_problems(most_cells=14))
 def test_the_sparse_eigensolver_finds_the_same_ends_as_the_dense_one(data):
     for name in ("body1", "body2"):
@@ -111,7 +112,7 @@ def test_the_sparse_eigensolver_finds_the_same_ends_as_the_dense_one(data):
         close(found, {f"m{i}": low, f"M{i}": high}, rounding(body))
 
 
-@strategies.fewer(2)
+@strategies.fewer(6, at_night=2)
 @given(data=strategies.plane_problems(), seed=st.integers(0, 2**32 - 1))
 def test_each_constant_bounds_every_vector_and_is_attained(data, seed):
     """By its eigenvector, to 1e-9: nine tenths of it would not do."""
@@ -128,6 +129,7 @@ def test_each_constant_bounds_every_vector_and_is_attained(data, seed):
         assert attained > 0.9 * square[name]
 
 
+@strategies.fewer(3, at_night=1)
 @given(data=strategies.plane_problems())
 def test_M_of_a_plane_body_is_at_most_the_larger_of_2_mu_and_2_mu_plus_2_lambda(data):
     """``(div v)^2 <= 2 |eps|^2`` and ``|eps| <= |grad v|`` pointwise."""
@@ -152,7 +154,7 @@ def thresholds(edition, data: Mapping[str, Any]) -> dict[str, float]:
     return {name: getattr(bounds, name).value for name in ("C2", "C3", "C4", "C5")}
 
 
-@strategies.fewer(2)
+@strategies.fewer(6, at_night=2)
 @given(data=strategies.plane_problems())
 def test_another_unit_of_stress_leaves_the_repaired_thresholds_and_moves_the_printed_ones(data):
     """m goes from 1e-3 to 1e3 as both moduli are multiplied by 1e6: m~ goes from 1e-3 to 1."""
@@ -168,7 +170,7 @@ def test_another_unit_of_stress_leaves_the_repaired_thresholds_and_moves_the_pri
     assert all(printed_large[name] < 1e-3 * printed_small[name] for name in printed_small)
 
 
-@strategies.fewer(2)
+@strategies.fewer(6, at_night=2)
 @given(data=strategies.plane_problems())
 def test_the_editions_agree_in_the_unit_of_stress_in_which_m_is_1(data):
     unit = with_moduli(data, 1 / Fraction(values(data)["m"]))
@@ -179,7 +181,7 @@ def stretched(value: Any, c: Fraction) -> Any:
     return [c * v for v in value]
 
 
-@strategies.fewer(2)
+@strategies.fewer(6, at_night=2)
 @given(data=strategies.contact_problems(), c=st.sampled_from([Fraction(1, 1000), Fraction(3), Fraction(254, 10)]))
 def test_another_unit_of_length_changes_nothing_if_L_goes_with_it(data, c):
     """But C_s and C_tr, which hold a length^(1/2): their product C_K does not."""
@@ -196,7 +198,7 @@ def test_another_unit_of_length_changes_nothing_if_L_goes_with_it(data, c):
     close(after, {name: before[name] * float(c) ** powers.get(name, 0) for name in CONSTANTS})
 
 
-@strategies.fewer(2)
+@strategies.fewer(6, at_night=2)
 @given(data=strategies.contact_problems())
 def test_swapped_roles_swap_rho_max_and_the_inverse_of_rho_min(data):
     problem = vf.Problem.from_dict(data)
@@ -227,7 +229,7 @@ def mirrored(data: dict[str, Any], factor: Fraction) -> dict[str, Any]:
     return data | {"body1": below | {"traction": {}}, "body2": above, "contact": data["contact"] | {"interval": ends}}
 
 
-@strategies.fewer(2)
+@strategies.fewer(6, at_night=2)
 @given(data=strategies.plane_problems(), factor=st.sampled_from([Fraction(1), Fraction(7, 2), Fraction(1, 50)]))
 def test_mirror_images_differ_by_the_ratio_of_their_moduli_alone(data, factor):
     data = mirrored(data, factor)

@@ -18,6 +18,8 @@ def comparisons(tmp_path_factory):
     folder = tmp_path_factory.mktemp("problems")
     results = {}
     for name, text in examples().items():
+        # half as fine: what is drawn is the same
+        text = text.replace("cells = [40, 6]", "cells = [20, 3]").replace("cells = [24, 6]", "cells = [12, 3]")
         (folder / f"{name}.toml").write_text(text, encoding="utf-8")
         results[name] = vf.compare(vf.load(folder / f"{name}.toml"))
     return results

@@ -163,7 +163,7 @@ def random_sides(case: Case, random: np.random.Generator) -> Sides:
 # --- each inequality by itself ----------------------------------------------------------------------------------------
 
 
-@strategies.fewer(5)
+@strategies.fewer(10, at_night=5)
 @given(seed=seeds)
 def test_no_inequality_gives_away_less_than_nothing(seed):
     losses = case_of(seed).losses
@@ -214,7 +214,7 @@ def test_two_forces_attain_the_links_without_T(seed):
         assert found.decades(label, sides) == pytest.approx(found.links[label], abs=1e-9)
 
 
-@strategies.fewer(5)
+@strategies.fewer(10, at_night=5)
 @given(seed=seeds)
 def test_no_two_forces_come_closer_to_equality_in_a_link_without_T(seed):
     found, random = case_of(seed), np.random.default_rng(seed)
@@ -247,7 +247,7 @@ def test_the_search_comes_closer_to_equality_than_random_forces():
 # --- the chains -------------------------------------------------------------------------------------------------------
 
 
-@strategies.fewer(5)
+@strategies.fewer(10, at_night=5)
 @given(seed=seeds)
 def test_the_chain_from_T_to_its_bound_adds_up(seed):
     """From the largest ``|||T psi - T psi~||| / |||psi - psi~|||`` found to the root of (5.38)."""
@@ -261,7 +261,7 @@ def test_the_chain_from_T_to_its_bound_adds_up(seed):
     assert [loss.label for loss in found.losses.lipschitz] == ["(5.22)", "(5.18)", "(5.11)", "(5.19)", "(5.23)"]
 
 
-@strategies.fewer(5)
+@strategies.fewer(10, at_night=5)
 @given(seed=seeds, k=st.sampled_from(["1/100", "1/2", "1"]))
 def test_the_chain_from_the_friction_term_to_its_bound_adds_up(seed, k):
     """To (5.30) repaired, and from there to what is printed."""

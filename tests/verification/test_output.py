@@ -183,6 +183,7 @@ def test_a_file_is_whole_or_not_there_when_writing_fails(quick, results, tmp_pat
     assert contents(tmp_path) == before
 
 
+@pytest.mark.usefixtures("known_bounds")
 def test_a_report_that_fails_leaves_the_comparison_before_it(quick, comparison, tmp_path, monkeypatch):
     """The document of another theta beside an old report would be two runs in one folder."""
     write(tmp_path, "comparison", comparison)
@@ -380,6 +381,7 @@ def page_and_figures(folder: Path, comparison) -> str:
     return report(comparison, texts)
 
 
+@pytest.mark.usefixtures("known_bounds")
 @pytest.mark.parametrize("title", TITLES.values(), ids=TITLES)
 def test_a_title_stays_text_in_every_file(tmp_path, title):
     text = page_and_figures(tmp_path, vf.compare(problem(title=title, iteration=ONE_STEP)))
@@ -390,6 +392,7 @@ def test_a_title_stays_text_in_every_file(tmp_path, title):
     assert all(character.isprintable() or character == "\n" for character in page.heading)
 
 
+@pytest.mark.usefixtures("known_bounds")
 @pytest.mark.parametrize("unit", ["$\\bad{$", "<b>m</b>", "\u00b5m", "in$^2$"])
 def test_a_unit_is_text_in_every_file(tmp_path, unit):
     made = problem(units={"length": unit, "stress": unit}, iteration=ONE_STEP)

@@ -7,6 +7,7 @@ from itertools import islice, pairwise
 
 import numpy as np
 import pytest
+import strategies
 from chain_problems import case, run_of
 from hypothesis import settings
 
@@ -19,8 +20,8 @@ from verification.algorithm.runs import Run, run
 from verification.interface.assembly import ContactPair, build
 
 #: Random problems, the same ones each time, in batches.
-COUNT = max(240, settings.default.max_examples)
-BATCHES = 4
+COUNT = 120 if settings.default.max_examples <= strategies.EVERY_DAY else settings.default.max_examples
+BATCHES = 2
 
 #: Rates agree to this.
 AGREES = 1e-3
