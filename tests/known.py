@@ -3,27 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 from verification import comparison
-from verification.bounds import semidefinite
+from verification.bounds import multipliers, semidefinite
 from verification.constants import Measured
-from verification.interface.pair import Pair
+from verification.interface.pair import ContactPair
 
 
 def once(compute: Callable[..., Any]) -> Callable[..., Any]:
     """A function of a pair of bodies that keeps its answers.
 
-    They are kept by what they depend on: the matrices of the bodies, the problem but for its title, its units and its
-    iteration, the roles, and whatever else is given.  An exception is not kept.
+    They are kept by what they depend on: the matrices of the bodies and of the interface, friction, the roles, and
+    whatever else is given.  An exception is not kept.
     """
     answers: dict[tuple[Any, ...], Any] = {}
 
-    def answer(pair: Pair, measured: Measured, *given: Any, progress: Any = None, **options: Any) -> Any:
-        rest = repr(replace(pair.problem, title="", units={}, source="", iteration=None))
-        matrices = (body.elastic.schur.tobytes() for body in pair.elastic)
-        key = (rest, pair.problem.iteration.neumann_body, given, *options.items(), *matrices)
+    def answer(pair: ContactPair, measured: Measured, *given: Any, progress: Any = None, **options: Any) -> Any:
+        sides, interface = (pair.contact, pair.neumann), pair.interface
+        arrays = (*(side.stiffness for side in sides), interface.gap, interface.contact.weights, interface.kernel)
+        meshes = (() if side.body is None else side.gram.tobytes() for side in sides)
+        bytes_ = (b"" if array is None else array.tobytes() for array in arrays)
+        key = (pair.friction, pair.neumann_body, given, *options.items(), *bytes_, *meshes)
         if key not in answers:
             answers[key] = compute(pair, measured, *given, **options | ({"progress": progress} if progress else {}))
         return answers[key]
@@ -34,5 +35,5 @@ def once(compute: Callable[..., Any]) -> Callable[..., Any]:
 #: Most of the time of a comparison goes into these: module, name, and the function that keeps its answers.
 KNOWN = [
     (module, name, once(getattr(module, name)))
-    for module, name in [(comparison, "locate"), (semidefinite, "friction_threshold"), (semidefinite, "evaluate_lmi")]
+    for module, name in [(comparison, "locate"), (multipliers, "friction_threshold"), (semidefinite, "work_out")]
 ]

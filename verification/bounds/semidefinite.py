@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ndtheory import Number
 from ndtheory.constants import relaxation_factor
 from verification.bounds.bound import LARGEST, Bound, BoundResult, NotComputed, Region, Subject, Thresholds
 from verification.progress import Progress, silent
+
+if TYPE_CHECKING:
+    from verification.constants import Measured
+    from verification.interface.pair import ContactPair
 
 #: How many friction values trace the border of its region.
 TRACED = 8
@@ -77,6 +81,32 @@ class Semidefinite:
         }
 
 
+def work_out(pair: ContactPair, measured: Measured, theta: float, *, progress: Progress = silent) -> Semidefinite:
+    """Solve the programs of a pair of bodies at one theta.
+
+    Raises
+    ------
+    LMIError
+    ValueError
+        As :class:`verification.bounds.multipliers.QuadraticForms`.
+    """
+    from verification.bounds.multipliers import QuadraticForms, friction_threshold
+
+    progress("semidefinite bound: largest theta", None)
+    forms = QuadraticForms(pair, measured)
+    largest = forms.largest_theta()
+    sharp = measured.friction_threshold
+    allowed = None if sharp is None else friction_threshold(pair, measured, sharp.value, progress=progress)
+    progress("semidefinite bound: factor of one step", None)
+    factor = forms.factor(theta)
+    return Semidefinite(
+        lipschitz=Number.of_float(factor.value),
+        theta_max=None if largest is None else Number.of_float(largest.value),
+        friction_threshold=None if allowed is None else Number.of_float(allowed),
+        gave_up=factor.gave_up,
+    )
+
+
 class SemidefiniteBound(Bound):
     """The least constant that multipliers of the conditions of step II prove; see ``docs/sharp.md``."""
 
@@ -92,7 +122,7 @@ class SemidefiniteBound(Bound):
         from verification.bounds.program import LMIError
 
         try:
-            found = self._worked_out(subject, float(relaxation_factor(theta)), progress)
+            found = work_out(subject.pair, subject.measured, float(relaxation_factor(theta)), progress=progress)
         except (LMIError, ValueError) as error:
             return self.absent(str(error))
         factor, allowed = found.factor, found.friction_threshold
@@ -107,26 +137,6 @@ class SemidefiniteBound(Bound):
             why=found.why_no_factor,
             not_computed=found.gave_up if factor is None else "",
             detail=found,
-        )
-
-    def _worked_out(self, subject: Subject, theta: float, progress: Progress) -> Semidefinite:
-        from verification.bounds.multipliers import QuadraticForms, friction_threshold
-
-        pair, measured = subject.pair, subject.measured
-        assert pair is not None
-        assert measured is not None
-        progress("semidefinite bound: largest theta", None)
-        forms = QuadraticForms(pair, measured)
-        largest = forms.largest_theta()
-        sharp = measured.friction_threshold
-        allowed = None if sharp is None else friction_threshold(pair, measured, sharp.value, progress=progress)
-        progress("semidefinite bound: factor of one step", None)
-        factor = forms.factor(theta)
-        return Semidefinite(
-            lipschitz=Number.of_float(factor.value),
-            theta_max=None if largest is None else Number.of_float(largest.value),
-            friction_threshold=None if allowed is None else Number.of_float(allowed),
-            gave_up=factor.gave_up,
         )
 
     def region(self, subject: Subject, *, progress: Progress = silent) -> Region:
