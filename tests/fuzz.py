@@ -16,6 +16,7 @@ import signal
 import sys
 import tempfile
 import time
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -294,6 +295,26 @@ def options(draw: random.Random, folder: Path) -> list[str]:
     return words
 
 
+#: Every key of PLANE by its dotted name, and some that it has not.
+KEYS = (
+    *(f"{table}.{name}" for table, keys in tomllib.loads(PLANE).items() if isinstance(keys, dict) for name in keys),
+    *("title", "dimension", "body1", "body1.mesh", "body2.prescribed.top", "body1.traction.left", "contact.wibble", ""),
+)
+
+
+def keys(draw: random.Random, folder: Path) -> list[str]:
+    """A call with keys of the file set to what may not fit."""
+    (folder / "problem.toml").write_text(PLANE, encoding="utf-8")
+    words = [draw.choice(("run", "solve", "constants")), str(folder / "problem.toml"), "--json"]
+    for _ in range(draw.randint(1, 3)):
+        word = f"{draw.choice(KEYS)}={draw.choice(VALUES)}"
+        if draw.random() < 0.3:
+            cut = draw.randrange(len(word))
+            word = word[:cut] + draw.choice(("", "=", '"', "[", ".", "#", "\n", "\x1b", " ")) + word[cut + 1 :]
+        words += ["--set", word]
+    return words
+
+
 def matrices(draw: random.Random, folder: Path) -> list[str]:
     """Advice from two matrices, many of them none, in files that may be damaged."""
     rng = np.random.default_rng(draw.randrange(2**32))
@@ -420,7 +441,14 @@ def judge(arguments: list[str]) -> str | None:
     return None
 
 
-KINDS = {"problem": problem, "mesh": mesh_file, "arrays": check_arrays, "options": options, "matrices": matrices}
+KINDS = {
+    "problem": problem,
+    "mesh": mesh_file,
+    "arrays": check_arrays,
+    "options": options,
+    "keys": keys,
+    "matrices": matrices,
+}
 
 
 def attempt(kind: str, seed: int, folder: Path) -> str | None:
@@ -460,6 +488,7 @@ if __name__ == "__main__":
     problems, meshes, calls, *seed = map(int, sys.argv[1:])
     asked = {
         "options": calls,
+        "keys": calls,
         "matrices": calls,
         "arrays": meshes // 2,
         "mesh": meshes - meshes // 2,
