@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from ndtheory import EDITIONS
 from verification.algorithm.iterate import Iterate
@@ -24,6 +24,9 @@ from verification.interface.pair import ContactPair
 from verification.interrupts import INTERRUPTED
 from verification.problem import Problem
 from verification.progress import Progress, silent
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 #: The bounds whose violation is a bug or an error in a proof.
 NO_FINDING = tuple(bound.name for bound in BOUNDS.values() if not bound.finding)
@@ -45,7 +48,7 @@ class Judgement:
     reason: str
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Comparison(Document):
     """Constants, bounds, a run, and what the run says of each bound.
 
@@ -81,6 +84,22 @@ class Comparison(Document):
     @property
     def units(self) -> Mapping[str, str]:  # type: ignore[override]
         return self.run.units
+
+    @property
+    def problem(self) -> Problem | None:  # type: ignore[override]
+        """What was compared."""
+        return self.run.problem
+
+    @property
+    def summary(self) -> str:
+        verdicts = ", ".join(f"{name} {judgement.verdict}" for name, judgement in self.verdicts.items())
+        return f"{self.run.pair.title}, {self.run.outcome}; {verdicts}"
+
+    def plot(self) -> Figure:
+        """The residuals beside what each bound proves of them."""
+        from verification.figures import draw_residuals
+
+        return draw_residuals(self.run, self.computed)
 
     @property
     def computed(self) -> list[BoundResult]:

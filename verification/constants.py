@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,9 @@ from verification.interface.pair import ContactPair
 from verification.problem import Problem
 from verification.progress import Progress, silent
 from verification.threads import one_thread
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 #: The constants of both bodies together, as documents and screens list them.
 NAMES = ("m", "M", "C_R", "C_s", "C_tr", "C_tr_half", "C_K", "rho_max", "rho_min", "rho_normal")
@@ -50,7 +53,7 @@ class BodyConstants:
         return {"m": self.m.to_dict(), "M": self.M.to_dict(), "nodes": self.nodes}
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Measured(Document):
     """The constants of a problem on its mesh; on this mesh they are exact up to rounding.
 
@@ -89,6 +92,8 @@ class Measured(Document):
         Labels ``length`` and ``stress``.
     levels : tuple of Measured
         The same on meshes halved 0, 1, .. times, where that was asked for.
+    problem : Problem or None
+        What was measured.
     """
 
     schema: ClassVar[str] = "ndtheory.constants/1"
@@ -115,6 +120,21 @@ class Measured(Document):
     reason: Mapping[str, str]
     units: Mapping[str, str]
     levels: tuple[Measured, ...] = ()
+    problem: Problem | None = None
+
+    @property
+    def summary(self) -> str:
+        shown = {"rho": self.rho_max, "m": self.m, "M": self.M, "C_R": self.C_R}
+        return ", ".join(f"{name} = {value.value:.4g}" for name, value in shown.items() if value is not None)
+
+    def plot(self) -> Figure:
+        """The factor of one step over theta: predicted, and proved in energy norms."""
+        from verification.figures import draw_factor
+
+        energy = self.energy_constants()
+        if energy is None:
+            raise ValueError("rho does not exist: " + next(iter(self.reason.values()), ""))
+        return draw_factor({"": energy})
 
     @property
     def nodes(self) -> int | None:
@@ -179,7 +199,7 @@ class Measured(Document):
         if self.of_friction:
             c_s, C_t1, C_t2 = (value.value for value in self.of_friction)
             values |= {"kappa_1": Number.of_float(k * c_s * C_t1), "kappa_2": Number.of_float(k * c_s * C_t2)}
-        return replace(self, friction=k, **values)
+        return replace(self, friction=k, problem=None, **values)
 
     def content(self) -> dict[str, Any]:
         numbers = {name: getattr(self, name) for name in (*NAMES, *ENERGY_NAMES)}
@@ -284,6 +304,7 @@ def _measure(pair: ContactPair) -> Measured:
         interface_nodes=pair.contact.grid.n,
         reason=reason,
         units=pair.units,
+        problem=pair.problem,
         **numbers,
     )
 

@@ -1,4 +1,4 @@
-"""Results as JSON documents and notebook tables."""
+"""Results as JSON documents, as one line, as notebook views and as figures."""
 
 from __future__ import annotations
 
@@ -6,39 +6,64 @@ import html
 import json
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from ndtheory import __version__
+from verification.value import Value
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from verification.problem import Problem
 
 
-class Document(ABC):
-    """A frozen result that can be written as one JSON document; subclasses name their schema."""
+class Document(Value, ABC):
+    """A frozen result that can be written as one JSON document; subclasses name their schema.
+
+    Showing a document computes nothing: what was not asked for is null, with its reason.
+    """
 
     schema: ClassVar[str]
 
     #: Labels ``length`` and ``stress``.
     units: Mapping[str, str]
 
+    #: What the result comes from; None where that is no problem.
+    problem: Problem | None = None
+
     @abstractmethod
     def content(self) -> dict[str, Any]:
-        """What the document holds besides schema, version and units."""
+        """What the document holds besides schema, version, units and problem."""
 
     def to_dict(self) -> dict[str, Any]:
         """The document as plain dictionaries, lists and numbers."""
-        return {"schema": self.schema, "version": __version__, "units": dict(self.units), **self.content()}
+        origin = {} if self.problem is None else {"problem": self.problem.to_dict()}
+        return {"schema": self.schema, "version": __version__, "units": dict(self.units), **origin, **self.content()}
 
     def to_json(self) -> str:
         """The document as JSON text; every number is finite."""
         return json.dumps(self.to_dict(), indent=2, allow_nan=False)
 
+    @property
+    def summary(self) -> str:
+        return self.schema
+
     def _repr_html_(self) -> str:
-        """Notebook view: a table of the values that fit on a line."""
-        rows = []
-        for key, value in self.content().items():
-            if isinstance(value, Mapping) and "value" in value:
-                value = value["value"]
-            if isinstance(value, float):
-                value = f"{value:.6g}"
-            if isinstance(value, (str, int)):
-                rows.append(f"<tr><th>{html.escape(key)}</th><td>{html.escape(str(value))}</td></tr>")
-        return f"<table><caption>{html.escape(self.schema)}</caption>{''.join(rows)}</table>"
+        """Notebook view: what the screen of the command shows, or the document where there is no screen."""
+        from verification.cli.notebook import screen
+
+        return f"<pre>{html.escape(screen(self) or self.to_json())}</pre>"
+
+    def plot(self) -> Figure:
+        """The main figure of the result.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        ValueError
+            There is nothing to draw.
+        """
+        raise ValueError(f"a {type(self).__name__} has no figure")

@@ -19,7 +19,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,9 @@ from verification.interface.fields import ContactFields
 from verification.interface.pair import ContactPair, TwoBodies
 from verification.problem import Problem, load
 from verification.threads import one_thread
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 #: A solution is accepted below this relative KKT residual.
 TOLERANCE = 1e-11
@@ -269,7 +272,7 @@ class Equilibrium:
     branches: Branches
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Solution(Document):
     """The solution of the global method.
 
@@ -299,6 +302,21 @@ class Solution(Document):
     @property
     def units(self) -> Mapping[str, str]:  # type: ignore[override]
         return self.bodies.problem.units
+
+    @property
+    def problem(self) -> Problem:  # type: ignore[override]
+        """What was solved."""
+        return self.bodies.problem
+
+    @property
+    def summary(self) -> str:
+        return f"{self.problem.title}, {self.contact.summary}, KKT residual {self.kkt_residual:.1e}"
+
+    def plot(self) -> Figure:
+        """The deformed bodies, and what happens along Gamma_c."""
+        from verification.figures import draw_bodies
+
+        return draw_bodies(self)
 
     @cached_property
     def displacements(self) -> tuple[Floats | None, Floats | None]:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
@@ -25,6 +25,9 @@ from verification.interface.pair import ContactPair
 from verification.problem import Problem
 from verification.problem.tables import ProblemError
 from verification.threads import one_thread
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 #: What is unknown of matrices and runs from elsewhere.
 UNITS = {"length": "any", "stress": "any"}
@@ -53,6 +56,8 @@ class Role:
         Why a value is None.
     theta_auto : Choice or None
         What ``theta = "auto"`` takes in these roles; None where there is no problem file.
+    energy : EnergyConstants or None
+        What the proved values rest on; None where nothing is proved.
     """
 
     neumann_body: Literal[1, 2] | None
@@ -66,17 +71,18 @@ class Role:
     reason: Mapping[str, str]
     singular: bool = False
     theta_auto: Choice | None = None
+    energy: EnergyConstants | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """A member of ``roles``."""
-        values = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        values = {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "energy"}
         values["reason"] = dict(self.reason)
         if self.theta_auto is None:
             values["reason"]["theta_auto"] = "no problem file"
         return {name: v.to_dict() if isinstance(v, (Number, Choice)) else v for name, v in values.items()}
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Advice(Document):
     """The advice.
 
@@ -108,6 +114,24 @@ class Advice(Document):
     run: SeenRun | None = None
     readings: tuple[RunReading, ...] = ()
     next: NextRun | None = None
+    problem: Problem | None = None
+
+    @property
+    def summary(self) -> str:
+        if not self.roles:
+            return f"{len(self.readings)} readings of a run"
+        best = self.best
+        who = "" if self.neumann_body is None else f"Neumann problem to body {self.neumann_body}, "
+        return f"{who}theta = {best.theta_predicted:.4g} predicted, rate {best.rate_predicted:.4g}"
+
+    def plot(self) -> Figure:
+        """The factor of one step over theta, for each assignment of the roles."""
+        from verification.figures import draw_factor
+
+        if not self.roles:
+            raise ValueError("the ratio of this run has several readings: make the run that `next` names")
+        named = {f"Neumann body {role.neumann_body}" if role.neumann_body else "that run": role for role in self.roles}
+        return draw_factor({name: role.energy or EnergyConstants(rho=role.rho.value) for name, role in named.items()})
 
     @property
     def best(self) -> Role:
@@ -171,6 +195,7 @@ def advise(problem: Problem | ContactPair | Path | str) -> Advice:
         neumann_body=best.neumann_body,
         roles=roles,
         units=pair.units,
+        problem=pair.problem,
         friction=float(pair.friction),
         outside=tuple(pair.outside),
     )
@@ -202,6 +227,7 @@ def _role(pair: ContactPair) -> Role:
         friction_threshold=threshold,
         reason=reason,
         theta_auto=automatic(sharp, outside, pair.settings.tolerance),
+        energy=None if outside else measured.energy_constants(),
     )
 
 

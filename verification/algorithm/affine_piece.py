@@ -16,10 +16,11 @@ from scipy.linalg import cho_factor, cho_solve, null_space
 from fem1d2d.mesh import Floats
 from verification.contact.active_set import Pattern
 from verification.interface.pair import ContactPair
+from verification.value import Value, freeze
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Piece:
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Piece(Value):
     """An affine piece of T.
 
     Attributes
@@ -38,6 +39,10 @@ class Piece:
     sign: NDArray[np.int8]
     still: NDArray[np.bool_]
 
+    @property
+    def summary(self) -> str:
+        return f"{int(self.pattern.touching.sum())} of {len(self.pattern.touching)} nodes touch"
+
     @cached_property
     def bound(self) -> Floats:
         """Derivative of the friction bound ``w_j k |(S sigma_N)_j|`` by g, shape (t, 2 n)."""
@@ -46,6 +51,7 @@ class Piece:
         result = np.zeros((len(self.sign), neumann.size))
         if pair.rubs and kernel is not None:
             result[:, neumann.normal] = (float(pair.friction) * contact.weights * self.sign)[:, None] * kernel
+        freeze(result)
         return result
 
     @cached_property
@@ -67,6 +73,7 @@ class Piece:
             result[rows] = cho_solve(factor, load[rows], check_finite=False)
         held = np.flatnonzero(~contact.free)
         result[held] = -carried[held]
+        freeze(result)
         return result
 
     @cached_property
@@ -77,6 +84,7 @@ class Piece:
         slides = np.flatnonzero(sliding)
         result[slides] = sliding[slides, None] * self.bound[slides]
         result[t:][~self.pattern.touching] = 0.0
+        freeze(result)
         return result
 
     @property
@@ -95,7 +103,8 @@ class Piece:
         if not self.still.any():
             return root
         kept = null_space(root[self.pair.neumann.grid.normal][self.still])
-        return np.asarray(root @ kept)
+        basis: Floats = freeze(root @ kept)
+        return basis
 
     def relaxed(self, theta: float) -> Floats:
         """The Jacobian J of T_theta in the coordinates of ``basis``: there (5.21) is the Euclidean norm."""

@@ -122,8 +122,6 @@ def iterate_at(T: FixedPointMap, g: Floats, *, iteration: int = 0, scale: float 
         u, solution = T(g)
         image = T.pair.interface.carry_back(solution.force)
         residual, size = neumann.dual_norm(image - g), neumann.dual_norm(image)
-    for array in (g, u, image, solution.v, solution.force):
-        array.setflags(write=False)
     return Iterate(
         iteration=iteration,
         g=g,

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 from fem1d2d.mesh import Floats
 from verification.contact import ContactSolution
+from verification.value import Value
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Iterate:
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Iterate(Value):
     """What one evaluation of T shows.
 
     Interface vectors list tangential components, then normal ones along n of the contact body; g and T g are nodal
@@ -43,6 +44,10 @@ class Iterate:
     residual: float
     size: float
     scale: float
+
+    @property
+    def summary(self) -> str:
+        return f"step {self.iteration}, relative residual {self.relative_residual:.2e}"
 
     @property
     def relative_residual(self) -> float:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
@@ -31,6 +31,9 @@ from verification.problem import Problem
 from verification.problem.tables import ProblemError
 from verification.threads import one_thread
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 Outcome = Literal["converged", "stalled", "limit", "diverged", "interrupted"]
 
 #: Linearising takes longer than a run, and is asked for.
@@ -46,7 +49,7 @@ RUNAWAY = 1e8
 MOST_BYTES, STATE_BYTES = 2_000_000_000, 1600
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Run(Document):
     """A finished run.
 
@@ -183,7 +186,10 @@ class Run(Document):
     @cached_property
     def contact(self) -> ContactFields:
         """Gamma_c at the last iterate."""
-        pair, solved = self.pair, self.last.contact
+        return self._fields(self.last)
+
+    def _fields(self, iterate: Iterate) -> ContactFields:
+        pair, solved = self.pair, iterate.contact
         turned = np.ones(len(solved.v))
         turned[pair.contact.grid.tangential] = pair.upward  # to body 1 against body 2
         pattern = solved.pattern
@@ -230,6 +236,39 @@ class Run(Document):
     @property
     def units(self) -> Mapping[str, str]:  # type: ignore[override]
         return self.pair.units
+
+    @property
+    def problem(self) -> Problem | None:  # type: ignore[override]
+        """What the pair was made from."""
+        return self.pair.problem
+
+    @property
+    def summary(self) -> str:
+        rate = "" if self.observed_rate is None else f", observed rate {self.observed_rate.value:.4g}"
+        return f"{self.pair.title}, {self.outcome} after {self.iterations} steps at theta {float(self.theta):.4g}{rate}"
+
+    def plot(self) -> Figure:
+        """The residuals, step by step, with the rate they show."""
+        from verification.figures import draw_residuals
+
+        return draw_residuals(self)
+
+    def table(self) -> dict[str, list[Any]]:
+        """The history as plain columns, one row for each evaluation of T: ``pandas.DataFrame(run.table())`` reads it.
+
+        Columns: iteration; residual (force, in the norm (5.21)) and relative_residual; kkt_residual and solver of step
+        II; how many nodes stick, slip and are open.
+        """
+        rows = self.iterates
+        patterns = [self._fields(iterate).pattern for iterate in rows]
+        return {
+            "iteration": [iterate.iteration for iterate in rows],
+            "residual": [iterate.residual for iterate in rows],
+            "relative_residual": [iterate.relative_residual for iterate in rows],
+            "kkt_residual": [iterate.contact.kkt.residual for iterate in rows],
+            "solver": [iterate.contact.solver for iterate in rows],
+            **{name: [pattern[name] for pattern in patterns] for name in ("stick", "slip", "open")},
+        }
 
     @property
     def warnings(self) -> list[str]:

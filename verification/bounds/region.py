@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from verification.interrupts import INTERRUPTED
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
 from verification.progress import Progress, silent
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 #: Where runs are started, and how long they may take.
 THETAS = tuple(float(f"{v:.3g}") for v in np.geomspace(0.04, 0.97, 9))
@@ -36,7 +39,7 @@ class Point:
     iterations: int
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Plane(Document):
     """Regions by bound, and runs.
 
@@ -56,6 +59,17 @@ class Plane(Document):
     points: tuple[Point, ...]
     reason: Mapping[str, str]
     units: Mapping[str, str]
+    problem: Problem | None = None
+
+    @property
+    def summary(self) -> str:
+        return f"{self.title}, regions of {', '.join(self.regions)}; {len(self.points)} runs"
+
+    def plot(self) -> Figure:
+        """The regions with the runs over them."""
+        from verification.figures import draw_region
+
+        return draw_region(self)
 
     @property
     def interrupted(self) -> bool:
@@ -126,7 +140,9 @@ def chart(problem: Problem, *, progress: Progress = silent) -> Plane:
         if not regions:
             raise
         reason["points"] = f"interrupted after {len(points)} of {len(cells)} runs"
-    return Plane(title=problem.title, regions=regions, points=tuple(points), reason=reason, units=problem.units)
+    return Plane(
+        title=problem.title, regions=regions, points=tuple(points), reason=reason, units=problem.units, problem=problem
+    )
 
 
 def _points(pair: ContactPair, cells: Sequence[tuple[float, float]], progress: Progress) -> Iterator[Point]:

@@ -42,10 +42,22 @@ class _Voice:
     """Where results go, and whether one was shown."""
 
     stream: TextIO | None = None
+    lines: list[str] | None = None
     said = False
 
 
 _voice = _Voice()
+
+
+@contextlib.contextmanager
+def heard() -> Iterator[list[str]]:
+    """Collect the lines of a result instead of writing them to stdout; without the signs that make a text bold."""
+    lines: list[str] = []
+    before, _voice.lines = _voice.lines, lines
+    try:
+        yield lines
+    finally:
+        _voice.lines = before
 
 
 def say(text: str = "") -> None:
@@ -56,6 +68,9 @@ def say(text: str = "") -> None:
     ReaderGone
         The other end of a pipe was closed.
     """
+    if _voice.lines is not None:
+        _voice.lines.append(click.unstyle(text))
+        return
     _voice.said = True
     try:
         click.echo(text, file=_voice.stream)

@@ -161,7 +161,7 @@ def constants(file: Path, keys: dict[str, str], refine: int, as_json: bool) -> N
     problem = load_problem(file, keys)
     with stages() as tell:
         measured = measure(problem, refine=refine, progress=tell)
-    deliver(measured, lambda: screens.constants(problem, measured), as_json)
+    deliver(measured, lambda: screens.constants(measured, file), as_json)
     if "levels" in measured.reason:
         complain(f"{measured.reason['levels']}: what was computed is shown")
         raise Interrupted

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from shlex import quote
+from typing import Any
 
 from verification.advice.readings import NextRun, RunReading, SeenRun
 from verification.advice.roles import Advice
@@ -18,6 +20,29 @@ from verification.constants import ENERGY_NAMES, NAMES, Measured
 from verification.interface.fields import ContactFields
 from verification.monolithic import Solution
 from verification.problem.specification import Problem
+
+
+def show(result: Any) -> bool:
+    """Show a result on the screen of its command; False where it has none, as one of matrices alone."""
+    screens: dict[type, Callable[[Any], None]] = {
+        Measured: constants,
+        Run: run,
+        Solution: solution,
+        Comparison: comparison,
+        Advice: advice,
+        Plane: plane,
+    }
+    screen = screens.get(type(result))
+    if screen is None or (result.problem is None and not isinstance(result, Advice)):
+        return False
+    screen(result)
+    return True
+
+
+def _next(file: Path | None, command: str, options: str = "") -> None:
+    """What to type next, where there is a file to name."""
+    if file is not None:
+        say(f"Next: ndtheory {command} {quote(str(file))}{options}")
 
 
 def _setting(problem: Problem, nodes: int | None = None, interface: int | None = None) -> None:
@@ -46,8 +71,10 @@ def _how(problem: Problem) -> str:
     return f"theta = {theta if theta == 'auto' else f'{float(theta):.4g}'}"
 
 
-def constants(problem: Problem, measured: Measured) -> None:
+def constants(measured: Measured, file: Path | None = None) -> None:
     """The screen of ``constants``."""
+    problem = measured.problem
+    assert problem is not None  # see `show`
     levels = measured.levels or (measured,)
     stress = problem.units["stress"]
     _setting(problem, measured.nodes, measured.interface_nodes)
@@ -62,8 +89,7 @@ def constants(problem: Problem, measured: Measured) -> None:
     say()
     say("Exact for this mesh, up to rounding.  On a mesh m is above and M below its")
     say("continuous value: for the continuous theorem both err on the unsafe side.")
-    if problem.source != "<dict>":
-        say(f"Next: ndtheory compare {quote(problem.source)}")
+    _next(file, "compare")
 
 
 def _happened(run: Run, cvxpy: Reference | None = None) -> None:
@@ -132,16 +158,16 @@ def _limits(outside: list[str]) -> None:
     say("Not claimed: anything about the continuum, or the local Coulomb law.")
 
 
-def run(finished: Run, file: Path) -> None:
+def run(finished: Run, file: Path | None = None) -> None:
     """The screen of ``run``."""
     nodes = sum(len(body.mesh.points) for body in finished.bodies.elastic)
     _setting(_problem(finished), nodes, finished.pair.contact.grid.n)
     _happened(finished)
     _limits(finished.outside)
-    say(f"Next: ndtheory compare {quote(str(file))}")
+    _next(file, "compare")
 
 
-def solution(found: Solution, file: Path) -> None:
+def solution(found: Solution, file: Path | None = None) -> None:
     """The screen of ``solve``."""
     bodies = found.bodies
     _setting(bodies.problem, sum(len(body.mesh.points) for body in bodies.elastic), bodies.interface.contact.n)
@@ -150,17 +176,17 @@ def solution(found: Solution, file: Path) -> None:
     say(f"  KKT residual {found.kkt_residual:.1e} after {found.linear_solves} linear systems on Gamma_c")
     _limits(bodies.outside)
     iterates = len(bodies.elastic) == 2
-    say(f"Next: ndtheory {'run' if iterates else 'solve'} {quote(str(file))}{'' if iterates else ' -o results'}")
+    _next(file, "run" if iterates else "solve", "" if iterates else " -o results")
 
 
 def _problem(run: Run) -> Problem:
     """The problem of a run, with the theta it had."""
     problem = run.pair.problem
-    assert problem is not None  # commands read files
+    assert problem is not None  # see `show`
     return problem.with_theta(run.theta)
 
 
-def comparison(result: Comparison, file: Path) -> None:
+def comparison(result: Comparison, file: Path | None = None) -> None:
     """The screen of ``compare`` and ``demo``."""
     finished, measured = result.run, result.measured
     _setting(_problem(finished), measured.nodes, measured.interface_nodes)
@@ -191,10 +217,10 @@ def comparison(result: Comparison, file: Path) -> None:
     heading("DOES THE RUN AGREE WITH THE BOUND?")
     table([["bound", "verdict", "why"], *([n, j.verdict, j.reason] for n, j in result.verdicts.items())])
     _limits(finished.outside)
-    say(f"Next: ndtheory advise {quote(str(file))}")
+    _next(file, "advise")
 
 
-def advice(found: Advice, file: Path | None) -> None:
+def advice(found: Advice, file: Path | None = None) -> None:
     """The screen of ``advise``."""
     if found.run is not None and found.next is not None:
         _seen(found.run, found.readings, found.next)
@@ -207,9 +233,9 @@ def advice(found: Advice, file: Path | None) -> None:
         say(f"Next: ndtheory advise --theta {found.next.theta:g} --ratio R (R: the ratio of that run)")
         return
     say("Not claimed: that the predicted theta is the best one for your loads.")
-    if file is not None:
+    if found.problem is not None:
         swap = "" if found.roles[0].neumann_body == found.neumann_body else " --swap-roles"
-        say(f"Next: ndtheory run {quote(str(file))}{swap} --theta {theta}")
+        _next(file, "run", f"{swap} --theta {theta}")
     else:
         say("Next: ndtheory advise --help")
 
@@ -280,7 +306,7 @@ def _roles(found: Advice) -> str:
     return theta
 
 
-def plane(found: Plane, target: Path) -> None:
+def plane(found: Plane, target: Path | None = None) -> None:
     """The screen of ``region``."""
     say(printable(found.title))
     heading("WHERE IS ONE STEP PROVED TO CONTRACT?")
@@ -302,7 +328,8 @@ def plane(found: Plane, target: Path) -> None:
         say(f"  the largest friction with a run that converged: k = {strongest:g}")
     say()
     say("Not claimed: non-convergence outside a region, or anything on the continuum.")
-    say(f"Next: open {quote(str(target))}")
+    if target is not None:
+        say(f"Next: open {quote(str(target))}")
 
 
 def worth_trying(rho: float) -> float:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from fem1d2d.mesh import Floats
+from verification.value import Value
 
 #: Signs are read with this slack relative to the largest force, so that rounding does not flip a node for ever.
 SLACK = 1e-14
@@ -17,8 +18,8 @@ SLACK = 1e-14
 LIMIT = 60
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Pattern:
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Pattern(Value):
     """What each contact node does.
 
     Attributes
@@ -30,6 +31,10 @@ class Pattern:
 
     touching: NDArray[np.bool_]
     sliding: NDArray[np.int8]
+
+    @property
+    def summary(self) -> str:
+        return f"{int(self.touching.sum())} of {len(self.touching)} nodes touch, {int((self.sliding != 0).sum())} slide"
 
     @property
     def key(self) -> bytes:

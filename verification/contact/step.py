@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fem1d2d.mesh import Floats
 from verification.contact.active_set import ActiveSet, Pattern
 from verification.contact.kkt import KKT, TOLERANCE, certify
+from verification.value import Value
 
 if TYPE_CHECKING:
     from verification.contact.model import ContactModel
@@ -22,8 +23,8 @@ class ContactError(RuntimeError):
     """No solver reached the KKT certificate."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ContactSolution:
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class ContactSolution(Value):
     """A certified solution of step II.
 
     Attributes
@@ -43,6 +44,10 @@ class ContactSolution:
     pattern: Pattern
     kkt: KKT
     solver: Literal["cvxpy", "active-set"]
+
+    @property
+    def summary(self) -> str:
+        return f"KKT residual {self.kkt.residual:.1e}, by {self.solver}"
 
 
 class ContactStep:

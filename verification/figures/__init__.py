@@ -1,9 +1,10 @@
 """Every plot: functions from results to matplotlib figures, without global state."""
 
 from verification.figures.bodies import draw_bodies
+from verification.figures.factor import draw_factor
 from verification.figures.region import draw_region
 from verification.figures.residuals import draw_residuals
 from verification.figures.style import save
 from verification.figures.waterfall import draw_waterfall
 
-__all__ = ["draw_bodies", "draw_region", "draw_residuals", "draw_waterfall", "save"]
+__all__ = ["draw_bodies", "draw_factor", "draw_region", "draw_residuals", "draw_waterfall", "save"]

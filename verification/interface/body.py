@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import scipy.sparse as sp
@@ -17,12 +17,13 @@ from fem1d2d import Condensation, Material, Mesh, Supports, solver
 from fem1d2d.mesh import Floats, Ints
 from verification.interface.grid import Grid
 from verification.threads import one_thread
+from verification.value import Value, freeze
 
 Name = Literal["body1", "body2"]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Body:
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Body(Value):
     """An elastic body on its mesh; interface vectors have their normal components along y (along x in 1D).
 
     Attributes
@@ -64,9 +65,9 @@ class Body:
     load: Floats
     motions: Floats
 
-    def __getstate__(self) -> dict[str, Any]:
-        """What is factorised stays behind: SuperLU's factors cannot travel, and are made anew when asked for."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}
+    @property
+    def summary(self) -> str:
+        return f"{self.name}, {len(self.mesh.points)} nodes, {len(self.nodes)} on Gamma_c"
 
     @cached_property
     def solve(self) -> Callable[[Floats], Floats]:
@@ -123,8 +124,8 @@ class Body:
         return full.reshape(self.mesh.points.shape)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Condensed:
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Condensed(Value):
     """A body as its contact nodes feel it: what the algorithm and its bounds know of it.
 
     Interface vectors have their normal components along n of the contact body.  Held components have zero rows and
@@ -155,9 +156,9 @@ class Condensed:
     body: Body | None = None
     upward: bool = True
 
-    def __post_init__(self) -> None:
-        for array in (self.stiffness, self.load, self.known, self.free):
-            array.setflags(write=False)
+    @property
+    def summary(self) -> str:
+        return f"{self.grid.n} contact nodes, {'from matrices' if self.body is None else self.body.name}"
 
     @classmethod
     def of(cls, body: Body, grid: Grid) -> Condensed:
@@ -220,14 +221,16 @@ class Condensed:
     @cached_property
     def inverse(self) -> Floats:
         """``S_a^-1`` as a matrix, 0 on held components, shape (2 n, 2 n)."""
-        return _frozen(self.flexibility(np.eye(len(self.load))))
+        inverse: Floats = freeze(self.flexibility(np.eye(len(self.load))))
+        return inverse
 
     @cached_property
     def root(self) -> Floats:
         """L with ``S_a = L L'``, shape (2 n, free components): columns orthonormal in the norm (5.21)."""
         result = np.zeros((len(self.free), int(self.free.sum())))
         result[self.free] = cholesky(self.stiffness[np.ix_(self.free, self.free)], lower=True)
-        return _frozen(result)
+        freeze(result)
+        return result
 
     @cached_property
     def gram(self) -> Floats:
@@ -238,7 +241,8 @@ class Condensed:
         ValueError
             Only matrices are known.
         """
-        return _frozen(self.orient_form(self.mesh_body.gram.schur))
+        gram: Floats = freeze(self.orient_form(self.mesh_body.gram.schur))
+        return gram
 
     @cached_property
     def lift_gram(self) -> Floats:
@@ -249,13 +253,9 @@ class Condensed:
         ValueError
             Only matrices are known.
         """
-        return _frozen(self.orient_form(self.mesh_body.on_lifts(self.mesh_body.gram_matrix)))
+        gram: Floats = freeze(self.orient_form(self.mesh_body.on_lifts(self.mesh_body.gram_matrix)))
+        return gram
 
     def dual_norm(self, force: Floats) -> float:
         """The norm (5.21), ``sqrt(force' S_a^-1 force)``, when this is the Neumann body."""
         return math.sqrt(max(float(force @ self.flexibility(force)), 0.0))
-
-
-def _frozen(array: Floats) -> Floats:
-    array.setflags(write=False)
-    return array

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from fem1d2d.mesh import Floats
 from verification.interface.grid import Grid
+from verification.value import Value
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ContactFields:
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class ContactFields(Value):
     """Stresses and motions along Gamma_c from left to right.
 
     Attributes
@@ -42,6 +43,10 @@ class ContactFields:
     slip: Floats
     status: tuple[str, ...]
 
+    @property
+    def summary(self) -> str:
+        return ", ".join(f"{count} {name}" for name, count in self.pattern.items())
+
     @classmethod
     def of(
         cls, grid: Grid, *, force: Floats, jump: Floats, touching: NDArray[np.bool_], sliding: NDArray[Any]
@@ -61,7 +66,7 @@ class ContactFields:
         plane, zero = grid.t > 0, np.zeros(grid.n)
         slides = sliding != 0 if plane else np.ones(grid.n, dtype=bool)
         names = np.where(touching, np.where(slides, "slip", "stick"), "open")
-        fields = cls(
+        return cls(
             x=grid.x,
             weights=grid.weights,
             pressure=force[grid.normal] / grid.weights,
@@ -70,9 +75,6 @@ class ContactFields:
             slip=jump[grid.tangential].copy() if plane else zero,
             status=tuple(str(name) for name in names),
         )
-        for array in (fields.pressure, fields.shear, fields.gap, fields.slip):
-            array.setflags(write=False)
-        return fields
 
     @property
     def pattern(self) -> dict[str, int]:
@@ -83,6 +85,11 @@ class ContactFields:
     def force(self) -> dict[str, float]:
         """Total normal (compressive) and tangential (on body 2) force per unit thickness."""
         return {"normal": float(self.pressure @ self.weights), "tangential": float(self.shear @ self.weights)}
+
+    def table(self) -> dict[str, list[Any]]:
+        """Gamma_c as plain columns, one row for each contact node: ``pandas.DataFrame(contact.table())`` reads it."""
+        names = ("x", "weights", "pressure", "shear", "gap", "slip")
+        return {name: getattr(self, name).tolist() for name in names} | {"status": list(self.status)}
 
     def to_dict(self) -> dict[str, Any]:
         """The objects ``force``, ``pattern`` and ``contact`` that runs and solutions share."""

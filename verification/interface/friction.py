@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from fem1d2d.mesh import Floats
+from verification.value import Value
 
 if TYPE_CHECKING:
     from verification.interface.interface import Interface
@@ -33,7 +34,7 @@ class Law(ABC):
     """
 
     name: ClassVar[str]
-    outside: ClassVar[str] = ""
+    outside: str = ""
 
     @property
     @abstractmethod
@@ -135,21 +136,27 @@ class Local(Law):
         return stress if interface.transfer is None else interface.transfer @ stress
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Given(Law):
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Given(Value, Law):
     """An operator S that was given as a matrix.
 
     Attributes
     ----------
     matrix : array, shape (contact nodes, Neumann nodes)
+    words : str
+        The law it comes from, where that is known.
+    outside : str
+        Why the theorem does not speak of that law; empty where it does.
     """
 
     name = "given"
     matrix: Floats
+    words: str = "operator S given as a matrix"
+    outside: str = ""
 
     @property
-    def words(self) -> str:
-        return "operator S given as a matrix"
+    def summary(self) -> str:
+        return self.words
 
     def operator(self, interface: Interface) -> Floats:
-        return np.array(self.matrix, dtype=float)
+        return self.matrix

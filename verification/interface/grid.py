@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-
 from fem1d2d import trapezoid
 from fem1d2d.mesh import Floats
+from verification.value import Value
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Grid:
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Grid(Value):
     """The contact nodes of one body, from left to right, with the trapezoid rule on them.
 
     An interface vector on it lists all tangential components first, then all normal ones.
@@ -30,11 +29,9 @@ class Grid:
     weights: Floats
     dimension: Literal[1, 2] = 2
 
-    def __post_init__(self) -> None:
-        for name in ("x", "weights"):
-            array = np.array(getattr(self, name), dtype=float)
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
+    @property
+    def summary(self) -> str:
+        return f"{self.n} nodes from {self.x[0]:g} to {self.x[-1]:g}" if self.n else "no nodes"
 
     @classmethod
     def on(cls, x: Floats, dimension: Literal[1, 2] = 2) -> Grid:

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from fem1d2d.mesh import Floats
 from verification.interface.friction import Law
 from verification.interface.grid import Grid
+from verification.value import Value, freeze
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Interface:
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Interface(Value):
     """Two grids along Gamma_c and what passes between them.
 
     Attributes
@@ -36,18 +37,16 @@ class Interface:
     law: Law | None = None
     transfer: Floats | None = None
 
-    def __post_init__(self) -> None:
-        gap = np.array(self.gap, dtype=float)
-        gap.setflags(write=False)
-        object.__setattr__(self, "gap", gap)
+    @property
+    def summary(self) -> str:
+        return f"{self.contact.n} contact nodes, {'no law of friction' if self.law is None else self.law.words}"
 
     @cached_property
     def kernel(self) -> Floats | None:
         """S as a matrix: normal nodal forces on the Neumann grid to normal stress at the contact nodes."""
         if self.law is None or self.contact.dimension == 1:
             return None
-        kernel = self.law.operator(self)
-        kernel.setflags(write=False)
+        kernel: Floats = freeze(self.law.operator(self))
         return kernel
 
     def stress(self, force: Floats) -> Floats:

@@ -14,6 +14,7 @@ from verification.interface.body import Body, Condensed
 from verification.interface.interface import Interface
 from verification.problem import Problem, Settings
 from verification.problem.specification import MOST_FRICTION
+from verification.value import Value
 
 #: Poisson ratio from which on linear triangles err visibly.  Two models against a mesh that does not lock (rectangles
 #: split by both diagonals, 72 cells along Gamma_c): at 0.48 the nodal pressures of the built-in split are off by 5 and
@@ -24,8 +25,8 @@ LOCKING = 0.48
 UNITS = {"length": "any", "stress": "any"}
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class TwoBodies:
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class TwoBodies(Value):
     """Two bodies on their meshes along Gamma_c; one of them may be rigid.
 
     Attributes
@@ -47,6 +48,10 @@ class TwoBodies:
     problem: Problem
 
     @property
+    def summary(self) -> str:
+        return f"{self.problem.title}, {self.interface.contact.n} contact nodes"
+
+    @property
     def elastic(self) -> list[Body]:
         """The bodies that are not rigid."""
         return [body for body in (self.body1, self.body2) if body is not None]
@@ -62,8 +67,8 @@ class TwoBodies:
         return _warnings(self.interface, self.friction, self.elastic)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ContactPair:
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class ContactPair(Value):
     """Two condensed bodies with the roles of the algorithm, the interface that joins them, and friction.
 
     Attributes
@@ -90,6 +95,11 @@ class ContactPair:
     neumann_body: Literal[1, 2] = 2
     settings: Settings = field(default_factory=Settings)
     problem: Problem | None = None
+
+    @property
+    def summary(self) -> str:
+        k = f"k = {float(self.friction):g}"
+        return f"{self.title}, {self.contact.grid.n} contact nodes, {k}, Neumann body {self.neumann_body}"
 
     @property
     def body1(self) -> Condensed:

@@ -63,7 +63,7 @@ class Row:
         }
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Ledger(Document):
     """Rows in the order of the paper."""
 
@@ -82,6 +82,10 @@ class Ledger(Document):
     def changed(self) -> tuple[Row, ...]:
         """The rows whose verdict differs from the recorded one."""
         return tuple(row for row in self.rows if row.changed)
+
+    @property
+    def summary(self) -> str:
+        return ", ".join(f"{count} {verdict}" for verdict, count in self.counts().items())
 
     def counts(self) -> dict[str, int]:
         """How many rows have each verdict."""

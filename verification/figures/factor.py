@@ -1,0 +1,47 @@
+"""The factor of one step over theta: what is predicted from rho, and what is proved with friction."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ndtheory import EnergyConstants, evaluate_sharp
+from ndtheory.sharp import predicted_factor
+from verification.figures.style import BODY1, BODY2, new_figure, styled
+
+#: How many thetas a curve has.
+POINTS = 80
+
+
+def draw_factor(roles: Mapping[str, EnergyConstants]) -> Figure:
+    """One pair of curves for each assignment of the roles; the least proved factor is marked.
+
+    Parameters
+    ----------
+    roles : mapping from a label to EnergyConstants
+    """
+    thetas = np.linspace(0.01, 0.99, POINTS)
+    with styled():
+        figure = new_figure(7.2, 3.4)
+        ax = figure.subplots()
+        for (label, energy), colour in zip(roles.items(), (BODY1, BODY2), strict=False):
+            name, rho = f"{label}: " if label else "", float(energy.at_work)
+            predicted = [predicted_factor(theta, rho) for theta in thetas]
+            ax.plot(thetas, predicted, "--", color=colour, label=f"{name}predicted, rho = {rho:.3g}")
+            found = [evaluate_sharp(energy, float(theta)).factor for theta in thetas]
+            proved = [(theta, q.value) for theta, q in zip(thetas, found, strict=True) if q is not None]
+            if proved:
+                ax.plot(*zip(*proved, strict=True), "-", color=colour, label=f"{name}proved")
+            best = evaluate_sharp(energy)
+            if best.theta_proved is not None and best.factor_proved is not None:
+                ax.plot([best.theta_proved], [best.factor_proved.value], "o", color=colour, markersize=5)
+        ax.axhline(1.0, color="0.4", linewidth=0.8, linestyle=":")
+        ax.set_xlim(0, 1)
+        ax.set_ylim(0, 1.5)
+        ax.set_xlabel("relaxation factor theta")
+        ax.set_ylabel("factor of one step")
+        ax.set_title("How much one step changes the distance of two forces")
+        ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure
