@@ -181,7 +181,7 @@ def working_precision(digits: int = DIGITS) -> Iterator[None]:
 
 
 def rounded(value: Decimal | None, ends: Sequence[Decimal | None], level: Level) -> Number | None:
-    """A result of ``DIGITS`` digits as a Number.
+    """A result of ``DIGITS`` digits as a Number, inside :func:`working_precision`.
 
     Parameters
     ----------
