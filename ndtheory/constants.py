@@ -119,14 +119,14 @@ class Given:
     def enclosures(self, *keys: str) -> list[tuple[Fraction, Fraction]] | None:
         """The ends of some constants; None unless one of all was given as an enclosure and these are of ordinary size.
 
-        An end may be 0 only where the hypotheses allow it.
+        Friction may be as small as it likes: nothing cancels more for it.
         """
         if not self.numbers:
             return None
         found = []
         for key in keys:
-            ends = self.ends(key)
-            if ends is None or not all(ORDINARY[0] <= e <= ORDINARY[1] or e == 0 == self.floor.get(key) for e in ends):
+            ends, least = self.ends(key), 0 if self.floor.get(key) == 0 else ORDINARY[0]
+            if ends is None or not least <= ends[0] <= ends[1] <= ORDINARY[1]:
                 return None
             found.append(ends)
         return found

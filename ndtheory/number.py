@@ -121,11 +121,6 @@ class Number:
             return cls(value=nearest)
         return cls(value=nearest, lo=lo, hi=hi, level=level if lo == hi else weakest([level, "verified"]))
 
-    @property
-    def two_sided(self) -> bool:
-        """Whether both ends of the enclosure are known."""
-        return self.lo is not None and self.hi is not None
-
     def to_dict(self) -> dict[str, Any]:
         """The JSON object of the interface."""
         return {"value": self.value, "lo": self.lo, "hi": self.hi, "level": self.level}
@@ -181,7 +176,7 @@ def working_precision(digits: int = DIGITS) -> Iterator[None]:
 
 
 def rounded(value: Decimal | None, ends: Sequence[Decimal | None], level: Level) -> Number | None:
-    """A result of ``DIGITS`` digits as a Number.
+    """A result of ``DIGITS`` digits as a Number, inside :func:`working_precision`.
 
     Parameters
     ----------

@@ -79,7 +79,7 @@ class Written:
     where = lambda self, a, b: self.line(self, "?", a, ":", b)
 
     def __pow__(self, power):
-        return self.line("Math.sqrt", self) if power == 0.5 else self.line(self, "**", power)
+        return Written(self.script, f"Math.sqrt({self.name})") if power == 0.5 else self.line(self, "**", power)
 
 
 def _infix(name, sign, mirrored=None):
@@ -112,12 +112,13 @@ def run(script, given):
     read = lambda word: known[word] if word in known else float(word)
     for line in script:
         _, name, _, *words = line.removesuffix(";").split()
-        if len(words) == 1:
+        if words[0].startswith("Math.sqrt("):
+            square = read(words[0][len("Math.sqrt(") : -1])
+            known[name] = math.sqrt(square) if square >= 0 else math.nan
+        elif len(words) == 1:
             known[name] = given[words[0]] if words[0] in given else read(words[0])
         elif words[0] == "-":
             known[name] = -read(words[1])
-        elif words[0] == "Math.sqrt":
-            known[name] = math.sqrt(read(words[1])) if read(words[1]) >= 0 else math.nan
         elif words[1] == "?":
             known[name] = read(words[2]) if read(words[0]) else read(words[4])
         else:
