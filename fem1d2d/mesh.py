@@ -32,7 +32,7 @@ LARGEST_NUMBER = 10**8
 LARGEST = 1e30
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Mesh:
     """A simplicial mesh in one or two dimensions, whose cells meet in common facets and nowhere else.
 
@@ -112,10 +112,21 @@ class Mesh:
         object.__setattr__(self, "sides", MappingProxyType(sides))
         object.__setattr__(self, "boundary", boundary)
 
+    def __repr__(self) -> str:
+        return f"<Mesh: {len(self.points)} nodes, {len(self.cells)} cells, sides {', '.join(self.sides) or 'none'}>"
+
+    def __reduce__(self) -> tuple[Any, ...]:  # a mapping that nobody can write cannot travel as it is
+        return remade, (Mesh, {"points": self.points, "cells": self.cells, "sides": dict(self.sides)})
+
     @property
     def dimension(self) -> int:
         """1 or 2."""
         return int(self.points.shape[1])
+
+
+def remade(kind: type[Any], values: Mapping[str, Any]) -> Any:
+    """What was pickled, made anew: checked, and read-only as numpy does not give arrays back."""
+    return kind(**values)
 
 
 def _whole(what: str, values: Any, columns: int) -> Ints:

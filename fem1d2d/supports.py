@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from fem1d2d.mesh import Floats, Mesh, MeshError
+from fem1d2d.mesh import Floats, Mesh, MeshError, remade
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,6 +27,13 @@ class Supports:
 
     known: NDArray[np.bool_]
     values: Floats
+
+    def __post_init__(self) -> None:
+        for array in (self.known, self.values):
+            array.setflags(write=False)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return remade, (Supports, {"known": self.known, "values": self.values})
 
 
 def supports(mesh: Mesh, sides: Mapping[str, Sequence[float | None]]) -> Supports:
@@ -63,8 +71,6 @@ def supports(mesh: Mesh, sides: Mapping[str, Sequence[float | None]]) -> Support
                 )
             known[nodes, p] = True
             values[nodes, p] = value
-    for array in (known, values):
-        array.setflags(write=False)
     return Supports(known=known, values=values)
 
 

@@ -79,6 +79,9 @@ class Edition:
     unit: Callable[[Any], Any]
     proved: Callable[[Any], bool]
 
+    def __reduce__(self) -> str:  # pickled by its name, as functions are
+        return self.name.upper()
+
 
 PRINTED = Edition(name="printed", coercivity=lambda m: minimum(m, m / m), unit=lambda m: m / m, proved=lambda m: m >= 1)
 REPAIRED = Edition(name="repaired", coercivity=lambda m: m, unit=lambda m: m, proved=lambda m: True)

@@ -152,7 +152,7 @@ class IterationSpec(Settings):
         return Settings(**{field.name: getattr(self, field.name) for field in fields(Settings)})
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Problem:
     """A validated problem; see the problem file in the documentation.
 
@@ -192,6 +192,10 @@ class Problem:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "units", ReadOnly(self.units))
+
+    def __repr__(self) -> str:
+        bodies = " / ".join("rigid" if body.rigid else f"E {float(body.young):g}" for body in (self.body1, self.body2))
+        return f"<Problem: {self.title}, {self.dimension}D, {bodies}, k = {float(self.contact.friction):g}>"
 
     # the modules that read, write and change problems know this one, so that they are imported in the methods
 

@@ -1,0 +1,215 @@
+"""Results travel: pickled and copied, one line long, read-only, with figures, tables and the view of a screen."""
+
+import copy
+import json
+import pickle
+from dataclasses import fields, is_dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+from problem_list import PROBLEMS
+
+import verification as vf
+from verification.algorithm.affine_piece import piece_of
+from verification.bounds.bound import Region
+from verification.bounds.region import Plane, Point
+from verification.document import Document
+
+SMALL = {"body1.cells": "[10, 2]", "body2.cells": "[6, 2]"}
+
+
+@pytest.fixture(scope="module")
+def problem() -> vf.Problem:
+    """Section 6 with 7 contact nodes."""
+    return vf.Problem.from_dict(PROBLEMS["Section 6, centred"]).with_keys(SMALL)
+
+
+@pytest.fixture(scope="module")
+def results(problem) -> dict[str, Document]:
+    region = Region(k=(0.1, 0.2), theta=((0.0, 0.5), (0.0, 0.4)), every=0.3, some=0.4)
+    point = Point(theta=0.4, k=0.1, outcome="converged", iterations=12)
+    return {
+        "Measured": vf.measure(problem),
+        "Run": vf.run(problem).linearise(),
+        "Solution": vf.solve(problem),
+        "Comparison": vf.compare(problem),
+        "Advice": vf.advise(problem),
+        "Plane": Plane(
+            title="a plane",
+            regions={"sharp": region},
+            points=(point,),
+            reason={"lmi": "made up"},
+            units=problem.units,
+            problem=problem,
+        ),
+    }
+
+
+NAMES = ["Measured", "Run", "Solution", "Comparison", "Advice", "Plane"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_result_that_was_pickled_or_copied_tells_the_same(results, name):
+    result = results[name]
+    for other in (pickle.loads(pickle.dumps(result)), copy.copy(result), copy.deepcopy(result)):
+        assert type(other) is type(result)
+        assert other.to_json() == result.to_json()
+        assert repr(other) == repr(result)
+
+
+def test_a_problem_and_a_pair_are_pickled_and_run_to_the_same_result(problem):
+    pair = vf.build(problem)
+    expected = vf.run(pair).to_json()
+    for other in (pickle.loads(pickle.dumps(problem)), pickle.loads(pickle.dumps(pair))):
+        assert vf.run(other).to_json() == expected
+
+
+def test_a_run_that_was_pickled_still_has_its_displacements_and_is_linearised_alike(results):
+    run = results["Run"]
+    other = pickle.loads(pickle.dumps(run))
+    for here, there in zip(run.displacements, other.displacements, strict=True):
+        assert np.array_equal(here, there)
+    assert other.linearise().linearised == run.linearised
+
+
+def arrays(value: Any, seen: set[int], path: str = "") -> list[tuple[str, np.ndarray]]:
+    """Every array that can be reached from a result by its fields, and by what is worked out from them and kept."""
+    if id(value) in seen:
+        return []
+    seen.add(id(value))
+    if isinstance(value, np.ndarray):
+        return [(path, value)]
+    if isinstance(value, dict) or hasattr(value, "items"):
+        return [found for key, member in dict(value).items() for found in arrays(member, seen, f"{path}[{key}]")]
+    if isinstance(value, (tuple, list)):
+        return [found for i, member in enumerate(value) for found in arrays(member, seen, f"{path}[{i}]")]
+    if hasattr(value, "indptr"):
+        return [(f"{path}.{name}", getattr(value, name)) for name in ("data", "indices", "indptr")]
+    if is_dataclass(value):
+        names = [field.name for field in fields(value)]
+        return [found for name in names for found in arrays(getattr(value, name), seen, f"{path}.{name}")]
+    return []
+
+
+def test_no_array_that_is_handed_on_can_be_written(results, problem):
+    pair = vf.build(problem)
+    run = results["Run"]
+    piece = piece_of(pair, run.last.g, run.last.contact.pattern)
+    worked_out = {
+        "neumann": {name: getattr(pair.neumann, name) for name in ("inverse", "root", "gram", "lift_gram")},
+        "piece": {name: getattr(piece, name) for name in ("bound", "jump", "reaction", "basis")},
+        "kernel": pair.interface.kernel,
+        "contact": [run.contact, results["Solution"].contact],
+    }
+    given = [results, worked_out, pickle.loads(pickle.dumps(run)), pair, next(vf.iterate(pair, start=run.last.g))]
+    found = arrays(given, set())
+    assert len(found) > 80
+    assert [path for path, array in found if array.flags.writeable] == []
+    with pytest.raises(ValueError, match="read-only"):
+        run.last.g[0] = 1.0
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_result_is_shown_on_one_line(results, name):
+    shown = repr(results[name])
+    assert shown.startswith(f"<{name}: ")
+    assert "\n" not in shown
+    assert len(shown) < 300
+
+
+def test_what_a_result_holds_is_shown_on_one_line_too(results, problem):
+    pair, run = vf.build(problem), results["Run"]
+    shown = [repr(each) for each in (pair, pair.contact, pair.contact.grid, pair.contact.body, pair.interface)]
+    shown += [repr(each) for each in (pair.on_meshes(), run.last, run.last.contact, run.contact, problem)]
+    assert [text for text in shown if len(text) > 200 or "\n" in text] == []
+    assert "7 contact nodes" in repr(pair)
+
+
+def test_showing_a_result_computes_nothing(problem, monkeypatch):
+    """A run is linearised when that is asked for, not by whoever looks at it."""
+    run = vf.run(problem)
+    monkeypatch.setattr("verification.algorithm.runs.linearise", None)
+    monkeypatch.setattr("verification.algorithm.runs.forecast", None)
+    document = run.to_dict()
+    assert document["linearised_rate"] is None
+    assert "linearise()" in document["reason"]["linearised_rate"]
+    assert repr(run)
+    assert "WHAT HAPPENED" in run._repr_html_()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_notebook_shows_what_the_screen_shows(results, name):
+    questions = {
+        "Measured": "WHAT DOES THE THEOREM NEED TO KNOW?",
+        "Run": "WHAT HAPPENED",
+        "Solution": "WHAT IS THE SOLUTION?",
+        "Comparison": "DOES THE RUN AGREE WITH THE BOUND?",
+        "Advice": "WHICH BODY GETS THE NEUMANN PROBLEM?",
+        "Plane": "WHERE IS ONE STEP PROVED TO CONTRACT?",
+    }
+    view = results[name]._repr_html_()
+    assert questions[name] in view
+    assert "Next: ndtheory" not in view  # there is no file to name
+    assert "\x1b" not in view
+
+
+def test_what_has_no_screen_is_shown_as_its_document():
+    S = np.diag([2.0, 3.0])
+    run = vf.run(vf.build(S1=S, S2=np.eye(2), load2=np.array([0.0, -1.0]), x=np.array([0.0])))
+    assert "ndtheory.run/1" in run._repr_html_()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_result_has_a_figure(results, name):
+    figure = results[name].plot()
+    drawn = figure.axes[0]
+    assert drawn.get_xlabel() or drawn.get_title() or len(figure.axes) > 1
+    assert drawn.lines or drawn.collections
+
+
+def test_what_has_nothing_to_draw_says_so(problem):
+    with pytest.raises(ValueError, match="next"):
+        vf.advise_run("0.1", "1.4").plot()
+
+
+def test_tables_are_plain_columns_of_one_length(results):
+    run = results["Run"]
+    table, contact = run.table(), run.contact.table()
+    assert {len(column) for column in table.values()} == {run.evaluations}
+    assert table["relative_residual"] == run.history
+    assert [sum(row) for row in zip(table["stick"], table["slip"], table["open"], strict=True)] == [7] * run.evaluations
+    assert {len(column) for column in contact.values()} == {7}
+    assert contact["pressure"] == run.contact.pressure.tolist()
+    json.dumps([table, contact])  # nothing but numbers and texts
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_document_carries_its_problem(results, problem, name):
+    document = json.loads(results[name].to_json())
+    assert vf.Problem.from_dict(document["problem"]) == problem
+
+
+def test_at_another_friction_a_document_carries_that_friction(problem):
+    document = vf.run(vf.build(problem).at(friction="1/3")).to_dict()
+    assert document["problem"]["contact"]["friction"] == "1/3"
+    assert vf.Problem.from_dict(document["problem"]) == problem.changed(friction="1/3")
+
+
+def test_a_file_a_problem_and_a_pair_are_taken_alike(problem, tmp_path):
+    path = tmp_path / "problem.toml"
+    path.write_text(problem.to_toml(), encoding="utf-8")
+    pair = vf.build(problem)
+    for function in (vf.run, vf.measure, vf.advise, vf.solve):
+        answers = [replace_problem(function(given).to_dict()) for given in (problem, path, str(path), pair)]
+        assert all(answer == answers[0] for answer in answers)
+
+
+def replace_problem(document: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in document.items() if key != "problem"}
+
+
+def test_with_other_settings_a_pair_runs_by_them(problem):
+    pair = vf.build(problem)
+    short = replace(pair, settings=replace(pair.settings, max_iterations=2))
+    assert vf.run(short).iterations == 2
