@@ -6,6 +6,9 @@ import signal
 import pytest
 from hypothesis import settings
 
+# Read when sympy is imported: with its 1000 entries the algebra of the paper is expanded again and again.
+os.environ.setdefault("SYMPY_CACHE_SIZE", "100000")
+
 settings.register_profile("dev", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True)
 settings.register_profile("nightly", deadline=None, max_examples=2000)

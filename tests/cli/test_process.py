@@ -87,7 +87,7 @@ def test_ctrl_c_ends_the_process_with_130_and_a_document(write, command):
 def test_a_reader_that_goes_away_is_neither_a_crash_nor_a_failed_run(write, arguments):
     reader, writer = os.pipe()
     os.close(reader)
-    file = write()
+    file = write("without friction")
     found = start(*(file if a == "FILE" else a for a in arguments), stdout=writer)
     os.close(writer)
     assert found.stderr == ""
@@ -97,7 +97,7 @@ def test_a_reader_that_goes_away_is_neither_a_crash_nor_a_failed_run(write, argu
 @pytest.mark.parametrize("stream", ["sys.stdout", "sys.stderr"])
 @pytest.mark.parametrize("arguments", [BOUNDS, ["compare", "FILE"]])
 def test_a_stream_that_is_closed_is_no_crash(write, arguments, stream):
-    file = write()
+    file = write("without friction")
     code = f"import sys; {stream} = None; from verification.cli import main; sys.exit(main())"
     found = start(*(file if a == "FILE" else a for a in arguments), code=code)
     assert "Traceback" not in found.stderr
@@ -158,7 +158,7 @@ def test_a_folder_that_was_removed_underneath_is_no_crash(write, tmp_path):
 
 
 def test_two_comparisons_at_once_in_one_folder_leave_whole_files(write, tmp_path):
-    command = ["compare", write(), "-o", tmp_path / "results"]
+    command = ["compare", write("without friction"), "-o", tmp_path / "results"]
     with running(CALL, *command) as one, running(CALL, *command) as other:
         said = [process.communicate(timeout=PATIENCE)[1] for process in (one, other)]
     assert said == [f"written: {tmp_path / 'results'}\n"] * 2

@@ -64,7 +64,7 @@ def on_a_terminal(*arguments):
 
 
 def test_a_terminal_shows_what_compare_is_doing(write, tmp_path):
-    shown = on_a_terminal("compare", write(), "-o", tmp_path / "results")
+    shown = on_a_terminal("compare", write("without friction"), "-o", tmp_path / "results")
     found = [shown.find(stage) for stage in [*STAGES, "drawing and writing"]]
     assert -1 not in found
     assert found == sorted(found)
