@@ -36,15 +36,16 @@ def advise(
 ) -> None:
     """Which body gets the Neumann problem, and which theta?
 
-    Give a problem FILE; or the Schur complements of both bodies on the same interface unknowns (dimension: force per
-    displacement, any units); or one run of any other code with constant theta: what the ratio of its residuals can
-    mean, and which theta to run next.  Read its absolute residual |Tg - g|, not the relative one of coupling
-    libraries.
+    Give a problem FILE, or the interface.npz that a run has written; or the Schur complements of both bodies on the
+    same interface unknowns (dimension: force per displacement, any units); or one run of any other code with constant
+    theta: what the ratio of its residuals can mean, and which theta to run next.  Read its absolute residual |Tg - g|,
+    not the relative one of coupling libraries.
 
     \b
     Examples:
       ndtheory advise my.toml
       ndtheory advise my.toml --set contact.friction=0.4
+      ndtheory advise results/interface.npz
       ndtheory advise --S1 a.npz --S2 b.npz
       ndtheory advise --theta 0.1 --ratio 1.4
     """
@@ -62,7 +63,9 @@ def advise(
     from verification.cli import screens
 
     if file is not None:
-        found = advice.advise(load_problem(file, keys))
+        if file.suffix == ".npz" and keys:
+            raise click.UsageError(f"received --set with {file}: it sets a key of a problem file", context)
+        found = advice.advise(file if file.suffix == ".npz" else load_problem(file, keys))
     elif S1 is not None and S2 is not None:
         from verification.advice.matrix_files import read_matrix
 

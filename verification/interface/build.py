@@ -11,6 +11,7 @@ from fem1d2d import trapezoid
 from fem1d2d.mesh import Floats
 from verification.interface import assembly
 from verification.interface.body import Condensed
+from verification.interface.files import read_interface
 from verification.interface.friction import Given, Law
 from verification.interface.grid import Grid
 from verification.interface.interface import Interface
@@ -43,8 +44,8 @@ def build(
     Parameters
     ----------
     problem : Problem or path, optional
-        Its ``[iteration]`` gives the pair's settings and roles.  A pair from matrices has theta 1/2, tolerance 1e-9, at
-        most 500 iterations.
+        A problem, its file, or an ``interface.npz``.  Its ``[iteration]`` gives the pair's settings and roles.  A pair
+        from matrices has theta 1/2, tolerance 1e-9, at most 500 iterations.
     law : Law, optional
         A law of friction in place of the problem's, or of a kernel.
     S1, S2 : array, shapes (2 n1, 2 n1), (2 n2, 2 n2)
@@ -85,7 +86,13 @@ def build(
     if problem is not None:
         if S1 is not None or S2 is not None:
             raise ValueError("received a problem and matrices: needed one of them")
-        return assembly.build(problem if isinstance(problem, Problem) else load(problem), law=law)
+        if isinstance(problem, Problem):
+            return assembly.build(problem, law=law)
+        if Path(problem).suffix != ".npz":
+            return assembly.build(load(problem), law=law)
+        if law is not None:
+            raise ValueError("received a law and an interface file: its operator S is a matrix already")
+        return read_interface(Path(problem))
     if S1 is None or S2 is None or x is None:
         raise ValueError("needed a problem, or S1, S2 and x")
     if neumann_body not in (1, 2):

@@ -5,10 +5,11 @@ from __future__ import annotations
 import contextlib
 import os
 import tempfile
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
+from ndtheory import __version__
 from verification.interrupts import undisturbed
 from verification.problem.tables import ProblemError, unreadable
 
@@ -29,11 +30,13 @@ Kind = Literal["run", "solve", "compare", "verify"]
 
 _PICTURES = ("bodies.svg", "bodies.png", "residuals.svg", "residuals.png")
 
-#: What each command writes.
+_TABLES = ("contact.csv", "history.csv")
+
+#: What each command writes, beside the problem.
 FILES: dict[Kind, tuple[str, ...]] = {
-    "run": ("run.json", *_PICTURES),
-    "solve": ("solve.json", *_PICTURES[:2]),
-    "compare": ("compare.json", *_PICTURES, "waterfall.svg", "waterfall.png", "report.html"),
+    "run": ("run.json", *_TABLES, "interface.npz", *_PICTURES),
+    "solve": ("solve.json", *_TABLES[:1], *_PICTURES[:2]),
+    "compare": ("compare.json", *_TABLES, "interface.npz", *_PICTURES, "waterfall.svg", "waterfall.png", "report.html"),
     "verify": ("ledger.json", "ledger.md", "errata.md", "verdicts.json"),
 }
 
@@ -44,6 +47,9 @@ MARKS = {
     ".png": b"Software\x00ndtheory",
     ".html": b'name="generator" content="ndtheory ',
     ".md": b"<!-- ndtheory verify -->",
+    ".csv": b"# ndtheory ",
+    ".npz": b"ndtheory.npy",
+    ".toml": b"# ndtheory: the problem as it was computed",
 }
 
 
@@ -138,7 +144,7 @@ def _sweep(folder: Path) -> None:
             number = os.open(room, os.O_RDONLY | os.O_DIRECTORY)
             try:
                 fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                if all(path.is_file() and path.suffix in (*MARKS, ".toml") for path in room.iterdir()):
+                if all(path.is_file() and path.suffix in MARKS for path in room.iterdir()):
                     _remove(room)
             finally:
                 os.close(number)
@@ -187,7 +193,7 @@ class Folder:
             A different problem.toml is there: an edited one is not overwritten.
         """
         target = self.path / "problem.toml"
-        if target.exists() and (target.is_dir() or target.read_bytes() != text.encode()):
+        if target.exists() and (target.is_dir() or not _may_go(target.read_bytes(), text)):
             needed = "differs from the built-in problem: needed another folder (-o), or run compare on this file"
             raise ProblemError(str(target), "", None, needed)
         with staged(self.path, shown=target) as room:
@@ -195,26 +201,45 @@ class Folder:
         return target
 
     def write_run(self, run: Run) -> None:
-        """Write ``run.json`` and the figures."""
+        """Write ``run.json``, the tables, the interface, the problem and the figures."""
         with staged(self.path, FILES["run"]) as room:
             _text(room / "run.json", run.to_json())
+            self._tables(room, run)
             _pictures(room, run)
 
     def write_solution(self, solution: Solution) -> None:
-        """Write ``solve.json`` and the figure of the bodies."""
+        """Write ``solve.json``, the table of Gamma_c, the problem and the figure of the bodies."""
         with staged(self.path, FILES["solve"]) as room:
             _text(room / "solve.json", solution.to_json())
+            self._tables(room, solution)
             _pictures(room, solution)
 
     def write_comparison(self, comparison: Comparison) -> None:
-        """Write ``compare.json``, the figures and ``report.html``."""
+        """Write ``compare.json``, the tables, the interface, the problem, the figures and ``report.html``."""
         from verification.output.report import report
 
         with staged(self.path, FILES["compare"]) as room:
             _text(room / "compare.json", comparison.to_json())
+            self._tables(room, comparison.run)
             names = _pictures(room, comparison.run, comparison)
             figures = {name: (room / f"{name}.svg").read_text("utf-8") for name in names}
             _text(room / "report.html", report(comparison, figures))
+
+    def _tables(self, room: Path, result: Run | Solution) -> None:
+        """Gamma_c and the history as CSV, the interface as matrices, and the problem where a user has none there."""
+        from verification.algorithm.runs import Run
+        from verification.interface.files import write_interface
+
+        length, stress = result.units["length"], result.units["stress"]
+        units = f"x, gap, slip in {length}; pressure, shear in {stress}"
+        _csv(room / "contact.csv", units, result.contact.table())
+        if isinstance(result, Run):
+            _csv(room / "history.csv", "residuals in the norm (5.21), relative ones without unit", result.table())
+            write_interface(result.pair, room / "interface.npz")
+        there = self.path / "problem.toml"
+        ours = not there.exists() or (not unreadable(there, MOST_BYTES) and MARKS[".toml"] in there.read_bytes())
+        if result.problem is not None and ours:
+            _text(room / "problem.toml", f"{MARKS['.toml'].decode()}\n{result.problem.to_toml()}")
 
     def write_ledger(self, ledger: Ledger) -> None:
         """Write ``ledger.json``, ``ledger.md``, and of a whole ledger ``errata.md`` and ``verdicts.json``."""
@@ -228,9 +253,22 @@ class Folder:
                 _text(room / "verdicts.json", sheets.verdicts(ledger))
 
 
+def _may_go(there: bytes, text: str) -> bool:
+    """Whether a problem file may be replaced by a text: it is the same, or was written beside a result."""
+    return there == text.encode() or MARKS[".toml"] in there
+
+
 def _text(path: Path, text: str) -> None:
     with undisturbed():  # whole or not there
         path.write_text(text + "\n", encoding="utf-8")
+
+
+def _csv(path: Path, says: str, table: Mapping[str, Sequence[Any]]) -> None:
+    """A table with a line of words above it, which readers of CSV take for a comment."""
+    says = "".join(c if c.isprintable() else " " for c in says)
+    lines = [f"# ndtheory {__version__}: {says}", ",".join(table)]
+    lines += [",".join(str(value) for value in row) for row in zip(*table.values(), strict=True)]
+    _text(path, "\n".join(lines))
 
 
 def _pictures(room: Path, result: Run | Solution, comparison: Comparison | None = None) -> list[str]:

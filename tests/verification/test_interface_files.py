@@ -1,0 +1,133 @@
+"""Interface files: a pair as matrices, written and read back with the same answers; and what is no such file."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from problem_list import PROBLEMS
+
+import verification as vf
+from verification.interface.files import NEEDED, read_interface, write_interface
+from verification.output.folder import Folder
+from verification.problem import ProblemError
+
+#: All kinds: two bars, laws of both kinds, no friction, a held node, roles of both kinds.
+COARSE = {
+    name: problem
+    for name, problem in PROBLEMS.items()
+    if all(body.get("shape") != "rigid" for body in (problem["body1"], problem["body2"])) and "mesh" not in str(problem)
+}
+
+
+@pytest.fixture(params=sorted(COARSE))
+def pair(request):
+    return vf.build(vf.Problem.from_dict(COARSE[request.param]))
+
+
+def roles(advice):
+    return [role.to_dict() for role in advice.roles]
+
+
+def test_a_pair_that_was_written_gives_the_same_advice_and_the_same_run(pair, tmp_path):
+    path = tmp_path / "interface.npz"
+    write_interface(pair, path)
+    other = vf.build(path)
+    assert other.outside == pair.outside
+    assert (other.friction, other.neumann_body) == (pair.friction, pair.neumann_body)
+    if vf.measure(pair).rho_max is not None:
+        assert roles(vf.advise(other)) == roles(vf.advise(pair))
+    if pair.settings.relaxation == "constant":
+        one, two = vf.run(pair), vf.run(path)
+        assert two.history == one.history
+        assert two.contact.status == one.contact.status
+
+
+@pytest.fixture
+def arrays(tmp_path):
+    """What an interface file holds."""
+    problem = vf.Problem.from_dict(PROBLEMS["Section 6, centred"])
+    pair = vf.build(problem.with_keys({"body1.cells": "[10, 2]", "body2.cells": "[6, 2]"}))
+    path = tmp_path / "whole.npz"
+    write_interface(pair, path)
+    with np.load(path) as found:
+        return dict(found)
+
+
+@pytest.mark.parametrize("name", NEEDED)
+def test_an_interface_file_without_one_of_its_arrays_is_refused(arrays, tmp_path, name):
+    del arrays[name]
+    np.savez(tmp_path / "part.npz", **arrays)
+    with pytest.raises(ProblemError, match=f"part.npz: {name}"):
+        read_interface(tmp_path / "part.npz")
+
+
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [
+        ({"S1": np.eye(3)}, "S1: needed 14 x 14 real numbers, received 3 x 3"),
+        ({"S1": -np.eye(14)}, "positive definite"),
+        ({"S1": np.full((14, 14), np.inf)}, "S1: needed finite"),
+        ({"gap": np.array(["a"] * 7)}, "gap: needed 7 real"),
+        ({"kernel": np.eye(6)}, "kernel: needed 7 x 7"),
+        ({"transfer": np.eye(6)}, "transfer: needed 7 x 6"),
+        ({"friction": "-1"}, "friction"),
+        ({"friction": "much"}, "friction"),
+        ({"theta": "2"}, "theta"),
+        ({"tolerance": "x"}, "x"),
+        ({"free1": np.ones(3, dtype=bool)}, "free1"),
+    ],
+)
+def test_an_interface_file_whose_arrays_do_not_fit_is_refused(arrays, tmp_path, changes, why):
+    np.savez(tmp_path / "wrong.npz", **arrays | changes)
+    with pytest.raises(ProblemError, match=why):
+        read_interface(tmp_path / "wrong.npz")
+
+
+@pytest.mark.parametrize("content", [b"", b"no archive", b"PK\x03\x04 nearly one"])
+def test_what_is_no_interface_file_is_refused(tmp_path, content):
+    path = tmp_path / "none.npz"
+    path.write_bytes(content)
+    with pytest.raises(ProblemError, match=r"none\.npz"):
+        vf.build(path)
+
+
+# --- what a folder holds ----------------------------------------------------------------------------------------------
+
+
+def rows(path):
+    lines = path.read_text("utf-8").splitlines()
+    assert lines[0].startswith("# ndtheory ")
+    return list(csv.DictReader(lines[1:]))
+
+
+def test_a_folder_holds_the_problem_the_tables_and_the_interface(arrays, tmp_path):
+    problem = vf.Problem.from_dict(PROBLEMS["Section 6, centred"])
+    problem = problem.with_keys({"body1.cells": "[10, 2]", "body2.cells": "[6, 2]"})
+    run = vf.run(problem)
+    Folder(tmp_path / "run", "run").write_run(run)
+    folder = tmp_path / "run"
+    assert vf.load(folder / "problem.toml") == problem
+    contact, history = rows(folder / "contact.csv"), rows(folder / "history.csv")
+    assert [float(row["pressure"]) for row in contact] == run.contact.pressure.tolist()
+    assert [row["status"] for row in contact] == list(run.contact.status)
+    assert [float(row["relative_residual"]) for row in history] == run.history
+    assert vf.run(folder / "interface.npz").history == run.history
+    assert json.loads((folder / "run.json").read_text("utf-8"))["problem"] == problem.to_dict()
+
+
+def test_a_problem_file_of_a_user_stays_as_it_is_and_ours_is_replaced(tmp_path):
+    problem = vf.Problem.from_dict(PROBLEMS["Section 6, centred"])
+    problem = problem.with_keys({"body1.cells": "[10, 2]", "body2.cells": "[6, 2]"})
+    there = tmp_path / "problem.toml"
+    there.write_text("# mine\n" + problem.to_toml(), encoding="utf-8")
+    solution = vf.solve(problem.changed(friction="1/3"))
+    Folder(tmp_path, "solve").write_solution(solution)
+    assert there.read_text("utf-8").startswith("# mine")
+    there.unlink()
+    for k in ("1/3", "1/4"):
+        Folder(tmp_path, "solve").write_solution(vf.solve(problem.changed(friction=k)))
+        assert (
+            vf.load(there).contact.friction
+            == vf.Problem.from_dict(problem.to_dict()).changed(friction=k).contact.friction
+        )

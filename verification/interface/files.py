@@ -1,0 +1,154 @@
+"""A contact pair as one file of matrices, ``interface.npz``, which any code can write or read.
+
+Arrays: S1, S2, load1, load2, x, weights, gap; kernel and transfer where there are such; known1, known2, free1, free2
+(which interface components Gamma_u leaves free, and the displacement of the others).  Numbers: friction, neumann_body,
+dimension, theta, tolerance, max_iterations as texts.  Interface vectors list all tangential components from left to
+right, then all normal ones along y.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from ndtheory import HypothesisError, __version__
+from verification.interface.body import Condensed
+from verification.interface.friction import Given
+from verification.interface.grid import Grid
+from verification.interface.interface import Interface
+from verification.interface.matrices import check_matrix
+from verification.interface.pair import ContactPair
+from verification.problem import ProblemError, Settings
+from verification.problem.specification import read_theta
+from verification.problem.tables import unreadable
+
+#: Largest size of an interface file: two matrices of 4000 rows, and what else there is.
+MOST_BYTES = 600_000_000
+
+#: What every interface file has.
+NEEDED = ("S1", "S2", "load1", "load2", "x", "weights", "gap", "friction", "neumann_body", "dimension")
+
+
+def write_interface(pair: ContactPair, path: Path) -> None:
+    """Write a pair as an interface file."""
+    interface, settings = pair.interface, pair.settings
+    lower, upper = (side if side.upward else side.turned() for side in (pair.body1, pair.body2))
+    arrays: dict[str, Any] = {}
+    for i, side in enumerate((lower, upper), 1):
+        arrays |= {f"S{i}": side.stiffness, f"load{i}": side.load, f"known{i}": side.known, f"free{i}": side.free}
+    arrays |= {
+        "x": interface.contact.x,
+        "weights": interface.contact.weights,
+        "x_neumann": interface.neumann.x,
+        "weights_neumann": interface.neumann.weights,
+        "gap": interface.gap,
+        "friction": str(pair.friction),
+        "neumann_body": str(pair.neumann_body),
+        "dimension": str(interface.contact.dimension),
+        "theta": str(settings.theta),
+        "tolerance": repr(settings.tolerance),
+        "max_iterations": str(settings.max_iterations),
+        "ndtheory": __version__,
+    }
+    if interface.kernel is not None and interface.law is not None:
+        arrays |= {"kernel": interface.kernel, "law": interface.law.words, "outside": interface.law.outside}
+    if interface.transfer is not None:
+        arrays["transfer"] = interface.transfer
+    with path.open("wb") as file:
+        np.savez(file, **arrays)
+
+
+def read_interface(path: Path) -> ContactPair:
+    """Read a pair from an interface file.
+
+    Raises
+    ------
+    ProblemError
+        Not such a file, or one whose arrays do not fit.
+    """
+    refuse = lambda key, needed: ProblemError(str(path), key, None, needed)
+    if why := unreadable(path, MOST_BYTES):
+        raise refuse("", why)
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as found:
+            arrays = {name: np.array(found[name]) for name in found.files}
+    except Exception:  # numpy and zipfile raise a dozen kinds on a file that is none of theirs
+        raise refuse("", "needed an interface file, as `ndtheory run FILE -o DIR` writes it") from None
+    if missing := [name for name in NEEDED if name not in arrays]:
+        raise refuse(missing[0], f"needed an interface file with {', '.join(NEEDED)}")
+    try:
+        return _pair(arrays)
+    except HypothesisError as error:
+        raise refuse(error.key, f"needed {error.needed}") from None
+    except (ValueError, TypeError) as error:
+        raise refuse("", str(error)) from None
+
+
+def _pair(arrays: dict[str, np.ndarray]) -> ContactPair:
+    text = lambda name, default: str(arrays[name]) if name in arrays else default
+    dimension: Literal[1, 2] = 1 if text("dimension", "2") == "1" else 2
+    neumann_body: Literal[1, 2] = 1 if text("neumann_body", "2") == "1" else 2
+    x, n = arrays["x"], len(arrays["x"])
+    transfer = arrays.get("transfer")
+    grid = Grid(x=_real("x", x, (n,)), weights=_real("weights", arrays["weights"], (n,)), dimension=dimension)
+    other = grid
+    if transfer is not None:
+        m = transfer.shape[-1]
+        transfer = _real("transfer", transfer, (n, m))
+        unknown = np.full(m, np.nan)
+        weights = _real("weights_neumann", arrays.get("weights_neumann", transfer.T @ grid.weights), (m,))
+        other = Grid(x=np.array(arrays.get("x_neumann", unknown), dtype=float), weights=weights, dimension=dimension)
+    law = None
+    if "kernel" in arrays:
+        kernel = _real("kernel", arrays["kernel"], (n, other.n))
+        law = Given(matrix=kernel, words=text("law", "operator S given as a matrix"), outside=text("outside", ""))
+    grids = (grid, other) if neumann_body == 2 else (other, grid)
+    lower, upper = (_side(arrays, i, own) for i, own in enumerate(grids, 1))
+    contact, neumann = (lower, upper) if neumann_body == 2 else (upper.turned(), lower.turned())
+    settings = Settings(
+        theta=read_theta(text("theta", "1/2")),
+        tolerance=float(Fraction(text("tolerance", "1e-9"))),
+        max_iterations=int(text("max_iterations", "500")),
+    )
+    interface = Interface(
+        contact=grid, neumann=other, gap=_real("gap", arrays["gap"], (n,)), law=law, transfer=transfer
+    )
+    pair = ContactPair(
+        contact=contact, neumann=neumann, interface=interface, neumann_body=neumann_body, settings=settings
+    )
+    return pair.at(friction=text("friction", "0"))
+
+
+def _side(arrays: dict[str, np.ndarray], i: int, grid: Grid) -> Condensed:
+    size = (grid.size,)
+    free = np.array(arrays.get(f"free{i}", np.ones(size)), dtype=bool)
+    if free.shape != size:
+        raise ValueError(f"free{i}: needed {grid.size} truth values")
+    stiffness = _real(f"S{i}", arrays[f"S{i}"], (grid.size, grid.size))
+    check_matrix(f"S{i}", stiffness[np.ix_(free, free)])
+    return Condensed(
+        grid=grid,
+        stiffness=stiffness,
+        load=_real(f"load{i}", arrays[f"load{i}"], size),
+        known=_real(f"known{i}", arrays.get(f"known{i}", np.zeros(size)), size),
+        free=free,
+    )
+
+
+def _real(name: str, values: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """A finite array of a shape.
+
+    Raises
+    ------
+    ValueError
+    """
+    if values.dtype.kind not in "fiub" or values.shape != shape:
+        received = " x ".join(map(str, values.shape)) or "a single value"
+        raise ValueError(f"{name}: needed {' x '.join(map(str, shape))} real numbers, received {received}")
+    array = np.array(values, dtype=float)
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name}: needed finite numbers")
+    return array
