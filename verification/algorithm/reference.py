@@ -28,6 +28,8 @@ class Reference:
     ----------
     steps : int
         Evaluations of T by the program's own answer.
+    whole : bool
+        Whether the run was repeated; else its first and last step alone were.
     observed_rate : float or None
         The rate that they show; None where too few stand clear of the program's errors, or the run was not repeated.
     largest_difference : float
@@ -37,6 +39,7 @@ class Reference:
     """
 
     steps: int
+    whole: bool
     observed_rate: float | None
     largest_difference: float
     why: str = ""
@@ -45,6 +48,7 @@ class Reference:
         """The object ``cvxpy`` of ``ndtheory.compare/1``."""
         return {
             "steps": self.steps,
+            "whole": self.whole,
             "observed_rate": self.observed_rate,
             "largest_difference": self.largest_difference,
             "reason": {"observed_rate": self.why} if self.why else {},
@@ -78,6 +82,7 @@ def by_cvxpy_alone(run: Run) -> Reference:
     rate = _rate(seen, errors)
     return Reference(
         steps=len(seen),
+        whole=True,
         observed_rate=None if rate is None else rate.value,
         largest_difference=max(_over(error, found.scale) for error, found in zip(errors, seen, strict=True)),
         why="" if rate is not None else "fewer than two step ratios stand clear of the program's errors",
@@ -88,7 +93,7 @@ def _at_the_ends(run: Run, program: FixedPointMap, why: str) -> Reference:
     ends = run.iterates[:1] + run.iterates[1:][-1:]
     norm = run.pair.neumann.dual_norm
     errors = [_over(norm(iterate_at(program, end.g).image - end.image), end.scale) for end in ends]
-    return Reference(steps=len(ends), observed_rate=None, largest_difference=max(errors), why=why)
+    return Reference(steps=len(ends), whole=False, observed_rate=None, largest_difference=max(errors), why=why)
 
 
 def _over(error: float, scale: float) -> float:

@@ -10,7 +10,6 @@ from typing import Any
 
 from verification.advice.readings import NextRun, RunReading, SeenRun
 from verification.advice.roles import Advice
-from verification.algorithm.reference import Reference
 from verification.algorithm.runs import Run
 from verification.bounds.region import MOST_STEPS, Plane
 from verification.cli.calculator import bounds_table
@@ -92,7 +91,7 @@ def constants(measured: Measured, file: Path | None = None) -> None:
     _next(file, "compare")
 
 
-def _happened(run: Run, cvxpy: Reference | None = None) -> None:
+def _happened(run: Run, comparison: Comparison | None = None) -> None:
     problem = _problem(run)
     heading("WHAT HAPPENED")
     rate, linear = run.observed_rate, run.linearised
@@ -109,14 +108,14 @@ def _happened(run: Run, cvxpy: Reference | None = None) -> None:
     if run.observed_growth is not None:
         shown = f"grows by {run.observed_growth:.4g}"
     rows.append(["observed", shown, str(run.iterations), f"seen: {run.outcome}"])
+    cvxpy = None if comparison is None else comparison.cvxpy
     if cvxpy is not None:
         shown = "-" if cvxpy.observed_rate is None else near_one(cvxpy.observed_rate)
         apart = f"T differs by {cvxpy.largest_difference:.0e} at most"
-        rows.append(["cvxpy alone", shown, str(cvxpy.steps - 1), apart])
+        name = "cvxpy alone" if cvxpy.whole else "cvxpy alone, first and last"
+        rows.append([name, shown, str(cvxpy.steps - 1) if cvxpy.whole else "-", apart])
     table(rows)
-    if cvxpy is not None and cvxpy.why:
-        note(f"cvxpy alone: {cvxpy.why}", "  ")
-    if run.forecast is None and run.relaxation == "constant":
+    if run.forecast is None and run.relaxation == "constant" and comparison is None:  # there the verdict tells why
         note(f"no forecast: {run.why_no_forecast}", "  ")
     if linear is None:
         note(f"not linearised: {run.why_not_linearised}", "  ")
@@ -202,7 +201,7 @@ def comparison(result: Comparison, file: Path | None = None) -> None:
         bounds_table(result.computed, stress)
     else:
         note("no bound applies: " + next(iter(measured.reason.values()), ""), "  ")
-    for name in ("lmi", "losses"):
+    for name in ("lmi", "losses", "cvxpy"):
         if name in result.reason:
             note(f"{name}: {result.reason[name]}", "  ")
     if result.losses is not None and result.losses.friction:
@@ -213,7 +212,7 @@ def comparison(result: Comparison, file: Path | None = None) -> None:
         say(f"  {total:.1f} decades from the largest friction term found to (5.30), repaired:")
         links = ", ".join(f"{loss.label} {loss.decades:.1f}" for loss in estimates)
         note(f"{links}; the unit adds {unit:.1f}", "  ")
-    _happened(finished, result.cvxpy)
+    _happened(finished, result)
     heading("DOES THE RUN AGREE WITH THE BOUND?")
     table([["bound", "verdict", "why"], *([n, j.verdict, j.reason] for n, j in result.verdicts.items())])
     _limits(finished.outside)
