@@ -50,6 +50,7 @@ def size(mesh):
 # --- assembly in floats -----------------------------------------------------------------------------------------------
 
 
+@fewer(3, at_night=1)
 @given(meshes(), materials(binary=True))
 def test_the_stiffness_matrix_is_the_rational_one_up_to_summation(mesh, material):
     exact = fem_oracle.stiffness(mesh, material)
@@ -86,7 +87,7 @@ def test_a_norm_of_no_length_is_refused(length):
 # --- patch tests, in rationals ----------------------------------------------------------------------------------------
 
 
-@fewer(2)
+@fewer(6, at_night=2)
 @given(plane_meshes(), materials(), vectors(), vectors(), vectors())
 def test_linear_displacements_have_their_exact_energy(mesh, material, row1, row2, shift):
     G = np.array([row1, row2])
@@ -101,13 +102,14 @@ def test_a_bar_stretched_linearly_has_its_exact_energy(mesh, young, slope, shift
     assert u @ dense(mesh, element.stiffness(mesh, bar(young))) @ u == young * slope**2 * size(mesh)
 
 
+@fewer(3, at_night=1)
 @given(plane_meshes(), materials(), vectors(), numbers(-4, 4))
 def test_rigid_motions_cost_no_energy_and_meet_no_force(mesh, material, shift, turn):
     spin = np.array([[0, -turn], [turn, 0]], dtype=object)
     assert not (dense(mesh, element.stiffness(mesh, material)) @ linear(mesh, spin, shift)).any()
 
 
-@fewer(2)
+@fewer(6, at_night=2)
 @given(plane_meshes(), materials(), vectors(), vectors())
 def test_a_constant_stress_meets_forces_only_on_the_boundary_where_they_are_its_tractions(mesh, material, row1, row2):
     G = np.array([row1, row2])
@@ -123,6 +125,7 @@ def test_a_constant_stress_meets_forces_only_on_the_boundary_where_they_are_its_
     assert not forces[inside].any()
 
 
+@fewer(3, at_night=1)
 @given(meshes(), numbers(Fraction(1, 4), 3, 12), st.data())
 def test_the_norm_of_a_constant_is_its_mean_square_over_length_squared(mesh, length, data):
     c = data.draw(vectors(size=mesh.dimension))
@@ -163,6 +166,7 @@ def moved(mesh, Q, shift=0, reverse=False):
     return Mesh(points=mesh.points @ Q.T + shift, cells=cells, sides=mesh.sides)
 
 
+@fewer(3, at_night=1)
 @given(meshes(), materials(binary=True), powers_of_two(), powers_of_two(), powers_of_two())
 def test_stretching_the_unit_of_length_by_s_multiplies_both_matrices_by_s_to_the_d_minus_2(mesh, material, s, c, L):
     mesh, d = in_floats(mesh), mesh.dimension
@@ -178,7 +182,7 @@ def test_stretching_the_unit_of_length_by_s_multiplies_both_matrices_by_s_to_the
     assert np.array_equal(scaled, factor * H)
 
 
-@fewer(2)
+@fewer(6, at_night=2)
 @given(plane_meshes(exact=True), materials(binary=True), st.randoms(use_true_random=False))
 def test_renumbering_nodes_permutes_both_matrices(mesh, material, random):
     order = np.array(random.sample(range(len(mesh.points)), len(mesh.points)))
@@ -190,6 +194,7 @@ def test_renumbering_nodes_permutes_both_matrices(mesh, material, random):
     assert fem_oracle.is_rounded(gram(again), H, roundings=8)
 
 
+@fewer(3, at_night=1)
 @given(meshes(), st.randoms(use_true_random=False))
 def test_the_order_of_the_cells_does_not_matter(mesh, random):
     cells = mesh.cells[random.sample(range(len(mesh.cells)), len(mesh.cells))]
@@ -200,7 +205,7 @@ def test_the_order_of_the_cells_does_not_matter(mesh, random):
 TURNS = [np.array(q, dtype=object) / Fraction(r) for q, r in [([[3, -4], [4, 3]], 5), ([[5, 12], [-12, 5]], 13)]]
 
 
-@fewer(2)
+@fewer(6, at_night=2)
 @given(plane_meshes(), materials(), st.sampled_from(TURNS), vectors(), st.booleans(), st.randoms(use_true_random=False))
 def test_energy_and_norm_do_not_change_when_body_and_displacement_turn_shift_or_reflect(
     mesh, material, Q, shift, mirror, random
@@ -229,6 +234,7 @@ def work(load, u):
     return fem_oracle.exactly(load).ravel() @ u
 
 
+@fewer(3, at_night=1)
 @given(plane_meshes(exact=True), vectors(), vectors(), vectors(), vectors())
 def test_a_body_force_works_on_a_linear_displacement_as_on_the_centroid(mesh, force, row1, row2, shift):
     G, areas = np.array([row1, row2]), measures(mesh.points, mesh.cells)
@@ -253,6 +259,7 @@ def test_the_total_of_a_body_force_is_force_times_area(nx, ny, width, force):
     assert np.array_equal(body_load(mesh, force.astype(float)).sum(axis=0), (force * 3 * width * nx * ny).astype(float))
 
 
+@fewer(3, at_night=1)
 @given(st.integers(1, 4), st.integers(1, 4), powers_of_two(), vectors(), vectors(size=2))
 def test_a_traction_on_a_side_works_on_a_linear_displacement_as_at_its_middle(nx, ny, width, force, v):
     mesh = rectangle((Fraction(0), width * nx), (Fraction(0), Fraction(ny)), (nx, ny))
@@ -276,11 +283,13 @@ def test_in_one_dimension_a_facet_is_a_point_that_takes_the_whole_force():
     assert side_load(mesh, mesh.sides["right"], [7.0]).tolist() == [[0], [0], [0], [7]]
 
 
+@fewer(3, at_night=1)
 @given(plane_meshes())
 def test_no_facets_carry_no_load(mesh):
     assert not side_load(in_floats(mesh), np.empty((0, 2), dtype=int), [1.0, 1.0]).any()
 
 
+@fewer(3, at_night=1)
 @given(plane_meshes())
 def test_the_weights_of_the_sides_add_up_to_those_of_the_boundary(mesh):
     mesh = in_floats(mesh)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from strategies import in_floats, lines, materials, numbers, plane_meshes, triangles, vectors
+from strategies import fewer, in_floats, lines, materials, numbers, plane_meshes, triangles, vectors
 
 from fem1d2d import Material, Mesh, bar, element
 from fem1d2d.mesh import measures
@@ -61,6 +61,7 @@ def test_a_bar_element_is_a_spring_of_stiffness_young_over_length(mesh, young):
     assert matrices(element.stiffness(mesh, bar(young)))[0].tolist() == [[spring, -spring], [-spring, spring]]
 
 
+@fewer(3, at_night=1)
 @given(plane_meshes(exact=True), materials(binary=True))
 def test_stiffness_in_floats_is_the_rational_one_to_the_bit_where_areas_are_powers_of_two(mesh, material):
     floats = Material(lame_lambda=float(material.lame_lambda), lame_mu=float(material.lame_mu))
@@ -70,6 +71,7 @@ def test_stiffness_in_floats_is_the_rational_one_to_the_bit_where_areas_are_powe
     assert np.array_equal(matrices(fem_oracle.exactly(computed)), expected)
 
 
+@fewer(3, at_night=1)
 @given(plane_meshes(exact=True))
 def test_mass_and_laplace_in_floats_are_the_rational_ones_rounded_once_where_areas_are_powers_of_two(mesh):
     floats = in_floats(mesh)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from strategies import in_floats, lines, meshes, numbers, plane_meshes, renumbered
+from strategies import fewer, in_floats, lines, meshes, numbers, plane_meshes, renumbered
 
 from fem1d2d import Mesh, MeshError, interval, rectangle
 from fem1d2d.mesh import measures
@@ -53,6 +53,7 @@ def test_the_boundary_of_a_line_is_its_two_ends(mesh):
 # --- rectangles -------------------------------------------------------------------------------------------------------
 
 
+@fewer(3, at_night=1)
 @given(numbers(-3, 3, 12), sizes, numbers(-3, 3, 12), sizes, counts, counts)
 def test_a_rectangle_numbers_its_grid_upwards_first(a, width, b, height, nx, ny):
     mesh = rectangle((a, a + width), (b, b + height), (nx, ny))
@@ -91,6 +92,7 @@ def test_the_boundary_of_a_rectangle_is_the_disjoint_union_of_its_sides(nx, ny):
     assert set().union(*[edges(facets) for facets in mesh.sides.values()]) == edges(mesh.boundary)
 
 
+@fewer(3, at_night=1)
 @given(sizes, sizes, counts, counts)
 def test_each_side_of_a_rectangle_lies_where_its_name_says(width, height, nx, ny):
     mesh = rectangle((Fraction(0), width), (Fraction(0), height), (nx, ny))
@@ -98,6 +100,7 @@ def test_each_side_of_a_rectangle_lies_where_its_name_says(width, height, nx, ny
         assert (mesh.points[mesh.sides[side]][..., axis] == level).all()
 
 
+@fewer(3, at_night=1)
 @given(plane_meshes(most=3))
 def test_a_mesh_of_a_disc_is_conforming_and_obeys_euler(mesh):
     count = {edge: all_edges(mesh).count(edge) for edge in all_edges(mesh)}
@@ -106,6 +109,7 @@ def test_a_mesh_of_a_disc_is_conforming_and_obeys_euler(mesh):
     assert len(mesh.points) - len(count) + len(mesh.cells) == 1
 
 
+@fewer(3, at_night=1)
 @given(plane_meshes(most=3))
 def test_the_body_lies_to_the_left_of_its_boundary(mesh):
     start, end = (mesh.points[mesh.boundary[:, i]] for i in range(2))
@@ -117,6 +121,7 @@ def test_the_body_lies_to_the_left_of_its_boundary(mesh):
         assert measures(mesh.points, np.array([[a, b, inner]]))[0] > 0
 
 
+@fewer(3, at_night=1)
 @given(meshes(), st.randoms(use_true_random=False))
 def test_renumbering_nodes_renames_the_boundary(mesh, random):
     order = random.sample(range(len(mesh.points)), len(mesh.points))
@@ -234,6 +239,7 @@ def test_an_interval_too_short_for_its_floats_is_refused():
         interval((1.0, float(np.nextafter(1.0, 2.0))), 3)
 
 
+@fewer(3, at_night=1)
 @given(plane_meshes())
 def test_a_mesh_with_one_cell_turned_over_is_refused(mesh):
     cells = mesh.cells.copy()

@@ -95,7 +95,7 @@ def dense_values(dense: DensePair) -> dict[str, float]:
     return found | {f"kappa_{i}": k * found["C_s_energy"] * found[f"C_t{i}"] for i in (1, 2)}
 
 
-@strategies.fewer(3)
+@strategies.fewer(6, at_night=3)
 @given(data=strategies.contact_problems(most_cells=8))
 def test_the_energy_constants_are_the_extremal_eigenvalues_of_pencils_of_whole_bodies(data):
     found, dense = values(measured_of(data)), DensePair.of(build(vf.Problem.from_dict(data)))
@@ -106,7 +106,7 @@ def test_the_energy_constants_are_the_extremal_eigenvalues_of_pencils_of_whole_b
     close(found, expected, rounding(dense))
 
 
-@strategies.fewer(3)
+@strategies.fewer(6, at_night=3)
 @given(data=strategies.plane_problems(), seed=seeds)
 def test_each_energy_constant_bounds_every_vector_and_is_attained(data, seed):
     """By its eigenvector, to rounding: 0.99 of it would not do."""
@@ -122,7 +122,7 @@ def test_each_energy_constant_bounds_every_vector_and_is_attained(data, seed):
         assert attained > 0.99**2 * square
 
 
-@strategies.fewer(3)
+@strategies.fewer(6, at_night=3)
 @given(data=strategies.plane_problems(), seed=seeds)
 def test_rho_bounds_the_reaction_by_the_energy_of_the_contact_body(data, seed):
     """``|||S_1 d_1|||^2 <= rho |d_1|^2``; without friction, where only normal forces act, with rho_normal."""
@@ -138,7 +138,7 @@ def test_rho_bounds_the_reaction_by_the_energy_of_the_contact_body(data, seed):
     assert found["rho_min"] * (1 - near) <= found["rho_normal"] <= found["rho_max"] * (1 + near)
 
 
-@strategies.fewer(3)
+@strategies.fewer(6, at_night=3)
 @given(data=strategies.plane_problems(), seed=seeds)
 def test_the_kappas_bound_the_friction_term(data, seed):
     """``sum_j w_j k |zeta_j| |(d_1 - d_2)_Tj| <= kappa_1 |d_1| |d_2| + kappa_2 |d_2|^2``, zeta = R (S_2 d_2)_N."""
@@ -178,7 +178,7 @@ CHANGES: dict[str, tuple[Callable[[Mapping[str, Any], Fraction], dict[str, Any]]
 
 
 @pytest.mark.parametrize("unit", CHANGES)
-@strategies.fewer(4)
+@strategies.fewer(8, at_night=4)
 @given(data=strategies.contact_problems(), c=st.sampled_from([Fraction(1, 1000), Fraction(254, 10), Fraction(10) ** 6]))
 def test_rho_and_the_kappas_know_no_units(unit, data, c):
     """C_s goes with the root of stress over length, C_t1 and C_t2 with its inverse."""
@@ -189,7 +189,7 @@ def test_rho_and_the_kappas_know_no_units(unit, data, c):
     close(after, expected, 10 * rounding(dense))
 
 
-@strategies.fewer(4)
+@strategies.fewer(8, at_night=4)
 @given(data=strategies.contact_problems(), c=st.sampled_from([Fraction(1, 50), Fraction(1, 3), Fraction(40)]))
 def test_rho_goes_with_the_ratio_of_the_moduli(data, c):
     """One body c times as stiff: rho c times as large or small, C_s and C_t of that body by its root."""
@@ -203,7 +203,7 @@ def test_rho_goes_with_the_ratio_of_the_moduli(data, c):
     close(after, {name: before[name] * factors.get(name, 1.0) for name in NAMES}, 10 * rounding(dense))
 
 
-@strategies.fewer(4)
+@strategies.fewer(8, at_night=4)
 @given(data=strategies.contact_problems())
 def test_swapped_roles_turn_rho_over_and_exchange_the_traces(data):
     """C_s becomes that of the other body: from its own pencil."""
@@ -223,7 +223,7 @@ def test_swapped_roles_turn_rho_over_and_exchange_the_traces(data):
 frictions = st.integers(1, 400).map(lambda n: Fraction(n, 100))
 
 
-@strategies.fewer(3)
+@strategies.fewer(6, at_night=3)
 @given(data=strategies.plane_problems(), k=frictions)
 def test_with_friction_gives_what_measuring_at_that_friction_gives(data, k):
     other = data | {"contact": data["contact"] | {"friction": k}}
@@ -258,6 +258,7 @@ def test_without_a_law_of_friction_there_is_no_threshold_and_no_other_friction(d
         measured.with_friction(float(k))
 
 
+@strategies.fewer(2, at_night=1)
 @given(data=strategies.bar_problems())
 def test_rho_of_two_bars_is_the_ratio_of_their_stiffnesses(data):
     """``E/L``, contact bar over Neumann bar; no friction, no threshold."""

@@ -323,7 +323,7 @@ def case_at_friction(data: dict[str, Any], share: float | None) -> Case:
 
 
 @pytest.mark.parametrize("kind", PAIRS)
-@strategies.fewer(2)
+@strategies.fewer(4, at_night=2)
 @given(data=strategies.contact_problems(), share=frictions, random=seeds)
 def test_section_5_holds_for_two_forces(kind, data, share, random):
     case = case_at_friction(data, share)

@@ -99,6 +99,7 @@ class ExactBars:
         return float(self.terms[0] + self.rho * (abs(g) + self.terms[1]) + self.S1 * self.gap)
 
 
+@strategies.fewer(2, at_night=1)
 @given(data=strategies.bar_problems(), multiple=st.fractions(-4, 4, max_denominator=50))
 def test_T_of_two_bars_is_a_broken_line(data, multiple):
     T = ExactBars(data)
@@ -108,6 +109,7 @@ def test_T_of_two_bars_is_a_broken_line(data, multiple):
     assert u[0] == pytest.approx(float((g + T.l2) / T.S2), rel=0, abs=1e-13 * T.size(g) / float(T.S1))
 
 
+@strategies.fewer(2, at_night=1)
 @given(data=strategies.bar_problems())
 def test_the_fixed_point_of_two_bars_is_where_the_broken_line_meets_the_diagonal(data):
     T = ExactBars(data)
@@ -117,6 +119,7 @@ def test_the_fixed_point_of_two_bars_is_where_the_broken_line_meets_the_diagonal
     assert solution.force[0] == pytest.approx(float(exact), rel=0, abs=1e-13 * T.size(exact))
 
 
+@strategies.fewer(2, at_night=1)
 @given(data=strategies.bar_problems())
 def test_the_iterates_of_two_bars_are_those_in_rationals(data):
     """Eight steps; rounding grows at most by the slope of T_theta."""
@@ -545,7 +548,7 @@ factors = st.sampled_from([Fraction(1, 10**6), Fraction(1, 3), Fraction(7), Frac
 few = strategies.contact_problems()
 
 
-@strategies.fewer(2)
+@strategies.fewer(4, at_night=2)
 @given(data=few, c=factors)
 def test_moduli_and_loads_times_c_multiply_the_forces_and_leave_the_displacements(data, c):
     other = dict(data)
@@ -554,7 +557,7 @@ def test_moduli_and_loads_times_c_multiply_the_forces_and_leave_the_displacement
     assert_same_steps(data, other, force=float(c))
 
 
-@strategies.fewer(2)
+@strategies.fewer(4, at_night=2)
 @given(data=few, c=factors)
 def test_loads_and_gap_times_c_multiply_everything(data, c):
     other = {name: scaled_loads(data[name], c, c) if name in ("body1", "body2") else data[name] for name in data}
@@ -587,7 +590,7 @@ def reflected(body: Mapping[str, Any], axis: int) -> dict[str, Any]:
     return result
 
 
-@strategies.fewer(2)
+@strategies.fewer(4, at_night=2)
 @given(data=strategies.plane_problems(most_cells=3))
 def test_left_and_right_exchanged_reverse_everything_and_turn_the_shear(data):
     data = even(data, 0)
@@ -596,7 +599,7 @@ def test_left_and_right_exchanged_reverse_everything_and_turn_the_shear(data):
     assert_same_steps(data, other, reverse=True, shear=-1)
 
 
-@strategies.fewer(2)
+@strategies.fewer(4, at_night=2)
 @given(data=strategies.plane_problems(most_cells=4))
 def test_above_and_below_exchanged_change_the_names_alone(data):
     """Body 1 becomes body 2 and the other way round: shear on body 2 and slip of body 1 change their sign."""
