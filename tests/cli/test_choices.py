@@ -460,7 +460,9 @@ def test_advise_needs_exactly_one_of_its_forms_and_that_whole(call, write, tmp_p
     assert all(name in complaint for name in given)
 
 
-@pytest.mark.parametrize(("name", "fragment"), [("missing.toml", "no such file"), ("", "folder"), ("a.npz", "UTF-8")])
+@pytest.mark.parametrize(
+    ("name", "fragment"), [("missing.toml", "no such file"), ("", "folder"), ("a.npz", "interface file")]
+)
 def test_advise_names_a_file_that_is_no_problem(call, tmp_path, name, fragment):
     saved(tmp_path, "a", GOOD)
     complaint = call("advise", tmp_path / name).complaint

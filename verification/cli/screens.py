@@ -124,8 +124,7 @@ def _happened(run: Run, comparison: Comparison | None = None) -> None:
         say(f"  {run.evaluations} evaluations of T, with the {run.relaxation} relaxation{proved}")
     elif run.choice.source != "given":
         note(f"theta = {float(run.theta):.4g} is the {run.choice.source} one: {run.choice.why}", "  ")
-    _contact(problem, run.contact)
-    say(f"  contact step solved to a KKT residual of {run.last.contact.kkt.residual:.1e}")
+    _contact(problem, run.contact, f"; KKT residual of the contact step {run.last.contact.kkt.residual:.1e}")
 
 
 def _steps(rate: float, tolerance: float) -> str:
@@ -135,19 +134,19 @@ def _steps(rate: float, tolerance: float) -> str:
     return str(math.ceil(math.log(tolerance) / math.log(rate)))
 
 
-def _contact(problem: Problem, contact: ContactFields) -> None:
-    """What happens along Gamma_c, in totals."""
+def _contact(problem: Problem, contact: ContactFields, solved: str = "") -> None:
+    """What happens along Gamma_c, in totals, and how well it was solved."""
     units, total = problem.units, contact.force
     normal = f"{figures(total['normal'], 6)} normal"
     say("  nodes               " + ", ".join(f"{count} {name}" for name, count in contact.pattern.items()))
     if problem.dimension == 1:
-        say(f"  force               {normal}, {units['stress']}")
+        say(f"  force               {normal}, {units['stress']}{solved}")
         return
     rounding = 1e-12 * max(abs(total["normal"]), abs(total["tangential"]))
     tangential = total["tangential"] if abs(total["tangential"]) > rounding else 0.0
     unit = f"{units['stress']} {units['length']} (per unit thickness)"
     note(f"force               {normal}, {figures(tangential)} tangential, {unit}", "  ")
-    say(f"  largest pressure    {figures(float(contact.pressure.max()), 4)} {units['stress']}")
+    note(f"largest pressure    {figures(float(contact.pressure.max()), 4)} {units['stress']}{solved}", "  ")
 
 
 def _limits(outside: list[str]) -> None:
