@@ -13,7 +13,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from fem1d2d import largest, largest_sparse, solver
 from fem1d2d.mesh import Floats
-from ndtheory import Constants, EnergyConstants, Number, evaluate_sharp
+from ndtheory import Constants, EnergyConstants, Number, evaluate_sharp, exact
 from ndtheory.sharp import friction_multiple
 from verification.document import Document
 from verification.interface.body import Body, Condensed
@@ -145,21 +145,23 @@ class Measured(Document):
         """What enters the theorem; None where C_R or C_K does not exist."""
         if self.m is None or self.M is None or self.C_R is None or self.C_K is None:
             return None
-        friction: dict[str, float] = {"C_K": 0.0}  # without a law of friction
+        friction: dict[str, Any] = {"C_K": 0}  # without a law of friction
         if self.C_s is not None and self.C_tr is not None:
-            friction = {"C_s": self.C_s.value, "C_tr": self.C_tr.value, "k": self.friction}
-        C_R = max(self.C_R.value, 1.0)  # C_R >= 1 by definition; two identical bodies reach it up to rounding
-        return Constants(m=self.m.value, M=self.M.value, C_R=C_R, **friction)
+            friction = {"C_s": self.C_s, "C_tr": self.C_tr, "k": exact(self.friction)}
+        # C_R >= 1 by definition; two identical bodies reach it up to rounding
+        C_R = self.C_R if self.C_R.value >= 1 else Number.of_float(1.0)
+        return Constants(m=self.m, M=self.M, C_R=C_R, **friction)
 
     def energy_constants(self) -> EnergyConstants | None:
         """What enters the theorem in energy norms; None where rho or the kappas do not exist."""
         if self.rho_max is None or self.rho_normal is None or self.kappa_1 is None or self.kappa_2 is None:
             return None
         return EnergyConstants(
-            rho=self.rho_max.value,
-            rho_normal=min(self.rho_normal.value, self.rho_max.value),  # equal up to rounding where nothing slides
-            kappa_1=self.kappa_1.value,
-            kappa_2=self.kappa_2.value,
+            rho=self.rho_max,
+            # equal up to rounding where nothing slides
+            rho_normal=self.rho_normal if self.rho_normal.value <= self.rho_max.value else self.rho_max,
+            kappa_1=self.kappa_1,
+            kappa_2=self.kappa_2,
         )
 
     @property
