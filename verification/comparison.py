@@ -26,7 +26,7 @@ from verification.problem import Problem
 from verification.progress import Progress, silent
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from verification.figures import Figure
 
 #: The bounds whose violation is a bug or an error in a proof.
 NO_FINDING = tuple(bound.name for bound in BOUNDS.values() if not bound.finding)

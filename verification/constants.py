@@ -24,7 +24,7 @@ from verification.progress import Progress, silent
 from verification.threads import one_thread
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from verification.figures import Figure
 
 #: The constants of both bodies together, as documents and screens list them.
 NAMES = ("m", "M", "C_R", "C_s", "C_tr", "C_tr_half", "C_K", "rho_max", "rho_min", "rho_normal")

@@ -12,8 +12,7 @@ from ndtheory import __version__
 from verification.value import Value
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
+    from verification.figures import Figure
     from verification.problem import Problem
 
 

@@ -34,7 +34,7 @@ from verification.problem import Problem, load
 from verification.threads import one_thread
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from verification.figures import Figure
 
 #: A solution is accepted below this relative KKT residual.
 TOLERANCE = 1e-11

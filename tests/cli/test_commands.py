@@ -365,6 +365,9 @@ def test_the_demo_compares_section_6_and_leaves_problem_report_figures_and_json(
     assert {path.name for path in folder.iterdir()} == {
         "problem.toml",
         "report.html",
+        "contact.csv",
+        "history.csv",
+        "interface.npz",
         "compare.json",
         *(f"{figure}.{ending}" for figure in ("bodies", "residuals", "waterfall") for ending in ("svg", "png")),
     }

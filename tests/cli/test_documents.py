@@ -268,7 +268,7 @@ def test_the_bounds_of_a_comparison_grow_sharper_from_edition_to_edition(documen
 
 @pytest.mark.parametrize("edits", [None, "local law", "held tangentially"], ids=str)
 def test_a_comparison_holds_the_documents_of_the_single_commands(document, edits):
-    common = {"schema", "version", "units"}
+    common = {"schema", "version", "units", "problem"}
     found = document(("compare", edits))
     for part in ("constants", "run"):
         alone = document((part, edits))
@@ -288,13 +288,13 @@ def test_an_example_as_a_document_is_its_text(call, name):
 
 @pytest.mark.parametrize("function", [vf.measure, vf.run, vf.solve, vf.compare])
 @pytest.mark.parametrize("edits", [None, "unloaded", "held tangentially"], ids=str)
-def test_a_result_shows_as_a_table_in_a_notebook(write, function, edits):
-    result = function(vf.load(write(edits)))
-    shown = result._repr_html_()
-    assert shown.startswith("<table>")
-    assert shown.endswith("</table>")
-    assert result.schema in shown
-    assert shown.count("<tr>") == shown.count("</tr>") > 0
+def test_a_result_shows_as_its_screen_in_a_notebook(write, function, edits):
+    problem = vf.load(write(edits))
+    shown = function(problem)._repr_html_()
+    assert shown.startswith("<pre>")
+    assert shown.endswith("</pre>")
+    assert problem.title in html.unescape(shown)
+    assert max(len(line) for line in html.unescape(shown)[5:-6].splitlines()) <= 80
 
 
 def test_a_title_is_text_in_a_notebook(write):

@@ -101,7 +101,7 @@ def test_ctrl_c_while_a_module_is_imported_is_one_line(write, module):
         from verification.cli import main
         sys.exit(main())
     """
-    with started("run", write(), "--json", code=code, mark=None) as process:
+    with started("run", write(), "--solver", "cvxpy", "--json", code=code, mark=None) as process:
         out, err = process.communicate(timeout=MINUTES)
     assert (process.returncode, out) == (130, "")
     assert err == "interrupted before anything was computed\n"
@@ -246,7 +246,8 @@ def test_an_import_that_ctrl_c_breaks_is_no_bug(write, tmp_path, module):
         sys.meta_path.insert(0, Breaks())
         sys.exit(main())
     """
-    with started("run", write(), "-o", tmp_path / "results", "--json", code=code, mark=None) as process:
+    command = ["run", write(), "--solver", "cvxpy", "-o", tmp_path / "results", "--json"]
+    with started(*command, code=code, mark=None) as process:
         out, err = process.communicate(timeout=MINUTES)
     assert process.returncode == 130
     assert "Traceback" not in err

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from processes import PATIENCE, ended, running
 
+from verification.output.folder import FILES
+
 PROJECT = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text("utf-8"))["project"]
 
 #: Every dependency but the one of the command line; each is imported by the name of its distribution.
@@ -165,4 +167,4 @@ def test_two_comparisons_at_once_in_one_folder_leave_whole_files(write, tmp_path
     assert (one.returncode, other.returncode) == (0, 0)
     assert json.loads((tmp_path / "results" / "compare.json").read_text("utf-8"))["run"]["converged"]
     assert (tmp_path / "results" / "report.html").read_text("utf-8").rstrip().endswith("</html>")
-    assert len(list((tmp_path / "results").iterdir())) == 8
+    assert len(list((tmp_path / "results").iterdir())) == len(FILES["compare"]) + 1  # and the problem

@@ -27,7 +27,7 @@ from verification.problem.tables import ProblemError
 from verification.threads import one_thread
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from verification.figures import Figure
 
 #: What is unknown of matrices and runs from elsewhere.
 UNITS = {"length": "any", "stress": "any"}

@@ -32,7 +32,7 @@ from verification.problem.tables import ProblemError
 from verification.threads import one_thread
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from verification.figures import Figure
 
 Outcome = Literal["converged", "stalled", "limit", "diverged", "interrupted"]
 

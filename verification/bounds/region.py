@@ -21,7 +21,7 @@ from verification.problem.tables import ProblemError
 from verification.progress import Progress, silent
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from verification.figures import Figure
 
 #: Where runs are started, and how long they may take.
 THETAS = tuple(float(f"{v:.3g}") for v in np.geomspace(0.04, 0.97, 9))

@@ -121,15 +121,16 @@ class SemidefiniteBound(Bound):
             return self.absent(f"{subject.pair.contact.grid.n} contact nodes: worked out up to {LARGEST}")
         from verification.bounds.program import LMIError
 
+        theta = float(relaxation_factor(theta))
         try:
-            found = work_out(subject.pair, subject.measured, float(relaxation_factor(theta)), progress=progress)
+            found = work_out(subject.pair, subject.measured, theta, progress=progress)
         except (LMIError, ValueError) as error:
             return self.absent(str(error))
         factor, allowed = found.factor, found.friction_threshold
         return BoundResult(
             name=self.name,
             proved=True,
-            theta=float(theta),
+            theta=theta,
             factor=factor,
             one_minus_factor=None if factor is None else Number.of_float(1 - factor.value),
             interval=None if found.theta_max is None else (0.0, found.theta_max.value),

@@ -1,5 +1,7 @@
 """Every plot: functions from results to matplotlib figures, without global state."""
 
+from matplotlib.figure import Figure
+
 from verification.figures.bodies import draw_bodies
 from verification.figures.factor import draw_factor
 from verification.figures.region import draw_region
@@ -7,4 +9,4 @@ from verification.figures.residuals import draw_residuals
 from verification.figures.style import save
 from verification.figures.waterfall import draw_waterfall
 
-__all__ = ["draw_bodies", "draw_factor", "draw_region", "draw_residuals", "draw_waterfall", "save"]
+__all__ = ["Figure", "draw_bodies", "draw_factor", "draw_region", "draw_residuals", "draw_waterfall", "save"]
