@@ -1,5 +1,6 @@
 """The JSON documents: keys and schemas as fixed, certified numbers as objects, null only with a reason."""
 
+import html
 import math
 
 import pytest
