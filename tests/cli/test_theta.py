@@ -52,6 +52,7 @@ def test_a_theta_of_the_file_beside_momentum_is_one_line_of_warning(call, write)
     assert answers['"auto"'].err == answers[None].err == ""
     runs = [answer.document for answer in answers.values()]
     assert [run.pop("warnings") for run in runs] == [[warning], [], []]
+    assert [run.pop("problem")["iteration"]["theta"] for run in runs] == [0.7, "auto", "auto"]
     assert runs[0] == runs[1] == runs[2]
 
 
