@@ -7,7 +7,7 @@ are those of problem files; another one derives from :class:`Law` and is handed 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, ClassVar
 
@@ -111,7 +111,7 @@ class Nonlocal(Law):
         return None if radius is None else cls(radius=float(radius))
 
     def scaled(self, length: float) -> Nonlocal:
-        return Nonlocal(radius=self.radius * length)
+        return replace(self, radius=self.radius * length)
 
     @property
     def words(self) -> str:
