@@ -194,7 +194,7 @@ def _line_fault(points: NDArray[Any], cells: Ints) -> str | None:
 
 
 def edges(cells: Ints) -> Ints:
-    """The edges of plane cells, each with its cell to the left, shape (k c, 2): of all cells that after the first corner, .."""
+    """The edges of plane cells, each with its cell to the left, shape (k c, 2): one edge of all cells, the next, .."""
     return np.concatenate([np.roll(cells, -i, axis=1)[:, :2] for i in range(1, cells.shape[1] + 1)])
 
 
