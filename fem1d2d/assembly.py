@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fem1d2d import element
 from fem1d2d.material import Material
-from fem1d2d.mesh import Floats, Ints, Mesh, measures
+from fem1d2d.mesh import Floats, Ints, Mesh
 
 
 def _assemble(nodes: Ints, entries: NDArray[np.float64], size: int) -> sp.csc_array:
@@ -50,8 +50,8 @@ def gram(mesh: Mesh, length: float = 1.0) -> sp.csc_array:
 
 def body_load(mesh: Mesh, force: Sequence[float]) -> Floats:
     """``int f . v`` of a constant force per volume, shape (n, d)."""
-    share = np.repeat(measures(mesh.points, mesh.cells).astype(float) / mesh.cells.shape[1], mesh.cells.shape[1])
-    weights = np.bincount(mesh.cells.ravel(), share, minlength=len(mesh.points))
+    volumes = element.element_of(mesh).volumes(mesh).astype(float)
+    weights = np.bincount(mesh.cells.ravel(), volumes.ravel(), minlength=len(mesh.points))
     return np.asarray(weights[:, None] * np.asarray(force, dtype=float))
 
 

@@ -1,17 +1,73 @@
-"""Closed-form P1 element matrices, one formula for floats and for exact rationals.
+"""Element matrices: P1 in closed form, one formula for floats and for exact rationals; others by quadrature.
 
-All arrays have the cells first.  d is the dimension, a cell has d + 1 vertices.
+All arrays have the cells first.  d is the dimension, k the number of nodes of a cell.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fem1d2d.material import Material
-from fem1d2d.mesh import Mesh, measures
+from fem1d2d.mesh import Mesh, MeshError, measures
+
+
+class Element(ABC):
+    """Shape functions on the cells of a mesh, and how to integrate them.
+
+    One of one's own is put into :data:`ELEMENTS`, and meshes of such cells then have matrices and loads.
+    """
+
+    @abstractmethod
+    def points(self, mesh: Mesh) -> Sequence[tuple[NDArray[Any], NDArray[Any]]]:
+        """For each quadrature point its share of the measure of each cell, (c,), and the gradients there, (c, k, d)."""
+
+    @abstractmethod
+    def mass(self, mesh: Mesh) -> NDArray[Any]:
+        """``int u v`` of the shape functions, shape (c, k, k), unit length^d."""
+
+    def volumes(self, mesh: Mesh) -> NDArray[Any]:
+        """``int v`` of the shape functions, shape (c, k), unit length^d."""
+        return np.asarray(self.mass(mesh).sum(axis=2))
+
+
+class P1(Element):
+    """Hat functions on simplices: their gradients are constant on a cell."""
+
+    def points(self, mesh: Mesh) -> Sequence[tuple[NDArray[Any], NDArray[Any]]]:
+        return [(measures(mesh.points, mesh.cells), gradients(mesh))]
+
+    def mass(self, mesh: Mesh) -> NDArray[Any]:
+        d, size = mesh.dimension, measures(mesh.points, mesh.cells)
+        pattern = np.ones((d + 1, d + 1), dtype=int) + np.eye(d + 1, dtype=int)
+        return np.asarray(size[:, None, None] * pattern / ((d + 1) * (d + 2)))
+
+    def volumes(self, mesh: Mesh) -> NDArray[Any]:
+        d, size = mesh.dimension, measures(mesh.points, mesh.cells)
+        return np.repeat(size[:, None] / (d + 1), d + 1, axis=1)
+
+
+#: The element of a cell, by dimension and number of nodes.
+ELEMENTS: dict[tuple[int, int], Element] = {(1, 2): P1(), (2, 3): P1()}
+
+
+def element_of(mesh: Mesh) -> Element:
+    """The element of the cells of a mesh.
+
+    Raises
+    ------
+    MeshError
+        There is none for so many nodes.
+    """
+    nodes = mesh.cells.shape[1]
+    if (mesh.dimension, nodes) not in ELEMENTS:
+        known = " or ".join(str(k) for d, k in ELEMENTS if d == mesh.dimension)
+        raise MeshError(f"cells of {nodes} nodes: there are elements of {known}")
+    return ELEMENTS[mesh.dimension, nodes]
 
 
 def gradients(mesh: Mesh) -> NDArray[Any]:
@@ -27,26 +83,29 @@ def gradients(mesh: Mesh) -> NDArray[Any]:
 
 
 def stiffness(mesh: Mesh, material: Material) -> NDArray[Any]:
-    """``int lame_lambda div u div v + 2 lame_mu eps(u) : eps(v)``, shape (c, d + 1, d, d + 1, d).
+    """``int lame_lambda div u div v + 2 lame_mu eps(u) : eps(v)``, shape (c, k, d, k, d).
 
-    Unit: stress x length^(d - 2).  Entry (c, i, p, j, q) belongs to component p at vertex i and q at vertex j.
+    Unit: stress x length^(d - 2).  Entry (c, i, p, j, q) belongs to component p at node i and q at node j.
     """
-    g, size = gradients(mesh), measures(mesh.points, mesh.cells)
+    first, *others = (_stiffness(size, g, material) for size, g in element_of(mesh).points(mesh))
+    return np.asarray(sum(others, start=first))
+
+
+def _stiffness(size: NDArray[Any], g: NDArray[Any], material: Material) -> NDArray[Any]:
     outer = np.einsum("cip,cjq->cipjq", g, g)
     dot = np.einsum("cip,cjp->cij", g, g)
-    unit = np.eye(mesh.dimension, dtype=int)
+    unit = np.eye(g.shape[2], dtype=int)
     shear = np.einsum("cij,pq->cipjq", dot, unit) + outer.transpose(0, 1, 4, 3, 2)
     return np.asarray((material.lame_lambda * outer + material.lame_mu * shear) * size[:, None, None, None, None])
 
 
 def laplace(mesh: Mesh) -> NDArray[Any]:
-    """``int grad u . grad v`` of scalar functions, shape (c, d + 1, d + 1), unit length^(d - 2)."""
-    g, size = gradients(mesh), measures(mesh.points, mesh.cells)
-    return np.asarray(np.einsum("cip,cjp->cij", g, g) * size[:, None, None])
+    """``int grad u . grad v`` of scalar functions, shape (c, k, k), unit length^(d - 2)."""
+    points = element_of(mesh).points(mesh)
+    first, *others = (np.einsum("cip,cjp->cij", g, g) * size[:, None, None] for size, g in points)
+    return np.asarray(sum(others, start=first))
 
 
 def mass(mesh: Mesh) -> NDArray[Any]:
-    """``int u v`` of scalar functions, shape (c, d + 1, d + 1), unit length^d."""
-    d, size = mesh.dimension, measures(mesh.points, mesh.cells)
-    pattern = np.ones((d + 1, d + 1), dtype=int) + np.eye(d + 1, dtype=int)
-    return np.asarray(size[:, None, None] * pattern / ((d + 1) * (d + 2)))
+    """``int u v`` of scalar functions, shape (c, k, k), unit length^d."""
+    return element_of(mesh).mass(mesh)

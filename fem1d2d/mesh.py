@@ -1,4 +1,4 @@
-"""Meshes of intervals and triangles with named sides."""
+"""Meshes of intervals, triangles and convex polygons with named sides."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import re
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -34,7 +35,7 @@ LARGEST = 1e30
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Mesh:
-    """A simplicial mesh in one or two dimensions, whose cells meet in common facets and nowhere else.
+    """A mesh of intervals or convex polygons of one kind, whose cells meet in common facets and nowhere else.
 
     It may have holes, and pieces that share single nodes or nothing.
 
@@ -42,8 +43,8 @@ class Mesh:
     ----------
     points : array, shape (n, d)
         Coordinates in the file's unit of length; floats, or rationals in an object array.
-    cells : int array, shape (c, d + 1)
-        Vertices of each cell; positively oriented.
+    cells : int array, shape (c, k)
+        Corners of each cell, anticlockwise in 2D; k = 2 in 1D, 3 or more in 2D.
     sides : mapping from name to int array, shape (s, d)
         Boundary facets of each named side: end points in 1D, edges in 2D, each listed once.
 
@@ -76,7 +77,8 @@ class Mesh:
                 raise MeshError("a coordinate is not finite")
             if not (np.abs(points) <= LARGEST).all():
                 raise MeshError(f"a coordinate is {np.abs(points).max():g}: at most {LARGEST:g} is needed")
-        cells = _whole("cells", self.cells, points.shape[1] + 1)
+        corners = np.shape(self.cells)[1:2] if points.shape[1] == 2 else ()
+        cells = _whole("cells", self.cells, max((points.shape[1] + 1, *corners)))
         if len(cells) == 0:
             raise MeshError(f"cells of shape {cells.shape}: (c, {points.shape[1] + 1}) with c >= 1 is needed")
         sides = {name: _whole(f"side {name!r}", facets, points.shape[1]) for name, facets in self.sides.items()}
@@ -87,6 +89,10 @@ class Mesh:
         positive = measures(points, cells) > 0
         if not positive.all():
             raise MeshError(f"cell {int(np.argmin(positive))} has no positive measure")
+        if cells.shape[1] > 3:
+            convex = np.all([measures(points, np.roll(cells, i, axis=1)[:, :3]) > 0 for i in range(cells.shape[1])], 0)
+            if not convex.all():
+                raise MeshError(f"cell {int(np.argmin(convex))} is not convex")
         loose = int((np.bincount(cells.ravel(), minlength=len(points)) == 0).sum())
         if loose:
             raise MeshError(f"{loose} nodes belong to no cell")
@@ -166,7 +172,7 @@ def _boundary(points: NDArray[Any], cells: Ints) -> Ints:
         facets = np.concatenate([cells[:, 1:], cells[:, :1]])
         forwards = np.repeat([1, 0], len(cells))
     else:
-        facets = np.concatenate([cells[:, [1, 2]], cells[:, [2, 0]], cells[:, [0, 1]]])
+        facets = edges(cells)
         forwards = (facets[:, 0] < facets[:, 1]).astype(np.int64)
     directed = np.sort(2 * _undirected(facets, n) + forwards)
     if (directed[1:] == directed[:-1]).any():
@@ -198,13 +204,19 @@ def _line_fault(points: NDArray[Any], cells: Ints) -> str | None:
     return f"cells {order[k]} and {order[k + 1]} lie on each other or touch without a common node"
 
 
+def edges(cells: Ints) -> Ints:
+    """The edges of plane cells, each with its cell to the left, shape (k c, 2): one edge of all cells, the next, .."""
+    return np.concatenate([np.roll(cells, -i, axis=1)[:, :2] for i in range(1, cells.shape[1] + 1)])
+
+
 def measures(points: NDArray[Any], cells: Ints) -> NDArray[Any]:
     """Signed lengths or areas of the cells, shape (c,); rational for rational points."""
     p = points[cells]
     if points.shape[1] == 1:
         return np.asarray(p[:, 1, 0] - p[:, 0, 0])
-    u, v = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
-    return np.asarray((u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2)
+    spokes = [p[:, i] - p[:, 0] for i in range(1, p.shape[1])]
+    first, *others = ((u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2 for u, v in pairwise(spokes))
+    return np.asarray(sum(others, start=first))
 
 
 def _grid(ends: Sequence[Any], cells: int) -> NDArray[Any]:

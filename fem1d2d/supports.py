@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from fem1d2d.mesh import Floats, Mesh, MeshError, remade
+from fem1d2d.mesh import Floats, Mesh, MeshError, edges, remade
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,7 +100,7 @@ def rigid_motions(mesh: Mesh, known: NDArray[np.bool_]) -> Floats:
         size = np.abs(centred).max()
         modes[:, 0, 2], modes[:, 1, 2] = -centred[:, 1] / size, centred[:, 0] / size
     per_piece = modes.shape[2]
-    pairs = np.unique(np.column_stack([mesh.cells.ravel(), np.repeat(piece, d + 1)]), axis=0)
+    pairs = np.unique(np.column_stack([mesh.cells.ravel(), np.repeat(piece, mesh.cells.shape[1])]), axis=0)
     home = np.full(n, -1)  # one piece of each node; the others must agree with it there
     home[pairs[::-1, 0]] = pairs[::-1, 1]
     conditions = []
@@ -129,7 +129,7 @@ def rigid_motions(mesh: Mesh, known: NDArray[np.bool_]) -> Floats:
 def _pieces(mesh: Mesh) -> NDArray[np.int64]:
     """The piece of each cell, shape (c,): cells that share a facet lie in the same one."""
     c, corners = mesh.cells.shape
-    facets = np.concatenate([np.delete(mesh.cells, i, axis=1) for i in range(corners)])
+    facets = mesh.cells.T.reshape(-1, 1) if mesh.dimension == 1 else edges(mesh.cells)
     _, facet = np.unique(np.sort(facets, axis=1), axis=0, return_inverse=True)
     touches = sp.coo_array((np.ones(c * corners), (np.tile(np.arange(c), corners), facet.ravel())))
     _, piece = connected_components(touches @ touches.T, directed=False)

@@ -8,17 +8,20 @@ from hypothesis import settings
 from hypothesis import strategies as st
 
 from fem1d2d import Material, Mesh, plane_strain, rectangle, supports
+from verification.testing.strategies import (  # noqa: F401  part of what this module offers
+    bar_problems,
+    contact_problems,
+    decimals,
+    log_uniform,
+    plane_problems,
+    thetas,
+)
 
 # --- the theory: constants m, M, C_R, C_K and the relaxation factor, all rational ------------------------------------
 
 
 #: Relative width of the layer between C4 and C5 below which no case is drawn; 1e-12..1e12 gives 1e-60 at the least.
 THINNEST = Fraction(1, 10**70)
-
-
-def log_uniform(low: float, high: float, digits: int = 7) -> st.SearchStrategy[Fraction]:
-    """Rationals of a few digits between 10^low and 10^high, even in the exponent."""
-    return st.floats(low, high).map(lambda exponent: Fraction(f"{10**exponent:.{digits - 1}e}"))
 
 
 #: Stresses, whatever the unit.
@@ -79,12 +82,6 @@ def square_constants(draw, edition: str = "repaired"):
     return {**body, "C_K": oracle.rational(oracle.square_root(draw(frictions(body, (edition,)))), 60) ** 2}
 
 
-def thetas() -> st.SearchStrategy[Fraction]:
-    """0 < theta < 1, also next to 0 and 1."""
-    small = log_uniform(-12, -0.01)
-    return st.one_of(st.integers(1, 99).map(lambda n: Fraction(n, 100)), small, small.map(lambda t: 1 - t))
-
-
 @st.composite
 def thetas_near_ends(draw, paper: oracle.Paper):
     """0 < theta < 1 next to C0, C1 or C6 of one edition at one set of constants, but not at it."""
@@ -99,156 +96,6 @@ def theory_cases(draw, edition: str, m=ANY_STRESS, thinnest=THINNEST):
     """Constants, and 0 < theta < 1 anywhere or near an end of the interval of `edition`."""
     given = draw(constants(m, (edition,), thinnest))
     return given, draw(st.one_of(thetas_near_ends(oracle.EDITIONS[edition](**given)), thetas()))
-
-
-# --- problems: dictionaries for `verification.Problem.from_dict`; nothing is held on Gamma_c --------------------------
-
-THICKNESS = ["1/50", "1/20", "1/6", "1/3", "1", "2"]
-
-
-def decimals(low: float, high: float) -> st.SearchStrategy[Fraction]:
-    """Rationals of three digits between 10^low and 10^high, even in the exponent."""
-    return log_uniform(low, high, digits=3)
-
-
-def strains(largest: str = "1/20") -> st.SearchStrategy[Fraction]:
-    """Small numbers of either sign, often zero."""
-    return st.one_of(st.just(Fraction(0)), st.integers(-20, 20).map(lambda i: Fraction(i, 20) * Fraction(largest)))
-
-
-def youngs() -> st.SearchStrategy[tuple[Fraction, Fraction]]:
-    """E1, E2 between 1e-2 and 1e10, ratio within 1/50 to 50; equal moduli are common."""
-    ratio = st.one_of(st.just(Fraction(1)), st.sampled_from([Fraction(1, 50), Fraction(50)]), decimals(-1.69, 1.69))
-    return st.tuples(decimals(-0.3, 8.3), ratio).map(lambda pair: (pair[0], pair[0] * pair[1]))
-
-
-@st.composite
-def supports_and_loads(draw, far: str, clear: list[str], young: Fraction, height: Fraction, length: Fraction):
-    """Gamma_u and the loads of a rectangle: `far` lies opposite Gamma_c, the sides `clear` do not touch it.
-
-    Every choice leaves no rigid motion: a whole side held, or rollers on two.
-    """
-    kinds = ["clamped", "clamped", "moved"]
-    if clear:
-        kinds += ["side", "corner", "rollers"]
-    if len(clear) == 2:
-        kinds.append("both sides")
-    kind = draw(st.sampled_from(kinds))
-    side = draw(st.sampled_from(clear)) if clear else None
-    slip, push = draw(strains()) * height, draw(strains()) * height
-    fixed, prescribed = [], {}
-    if kind == "clamped":
-        fixed = [far]
-    elif kind == "moved":
-        prescribed = {far: [slip, push]}
-    elif kind == "side":
-        fixed = [side]
-    elif kind == "corner":
-        fixed = [side, far]
-    elif kind == "both sides":
-        fixed = ["left", "right"]
-    else:
-        prescribed = {far: ["free", push], side: [slip, "free"]}
-    held = dict.fromkeys(fixed, (True, True))
-    held |= {name: tuple(v != "free" for v in values) for name, values in prescribed.items()}
-    traction = {}
-    loaded = ["left", "right", *(["bottom", "top"] if clear else [far])]  # a side that is all Gamma_c takes no traction
-    for name in draw(st.lists(st.sampled_from(loaded), max_size=2, unique=True)):
-        force = [Fraction(0) if h else young * draw(strains()) for h in held.get(name, (False, False))]
-        traction[name] = force
-    body_force = [young / length * draw(strains()) for _ in range(2)]
-    return {"fixed": fixed, "prescribed": prescribed, "traction": traction, "body_force": body_force}
-
-
-@st.composite
-def plane_problems(draw, friction=None, law=None, theta=None, most_cells: int = 6):
-    """Two rectangles whose grids match; body 1 wider, equal or narrower, offset by whole cells.
-
-    Parameters
-    ----------
-    friction : strategy of rationals, optional
-        By default 0 to 1.
-    law : str, optional
-        By default mostly the non-local one; of the local one the discrete inequalities hold as well.
-    """
-    h = draw(st.sampled_from([Fraction(1, 20), Fraction(1, 4), Fraction(1), Fraction(30)]))
-    n1, n2 = draw(st.integers(1, most_cells)), draw(st.integers(1, most_cells))
-    shift = draw(st.one_of(st.just(0), st.integers(1 - n2, n1 - 1)))  # left end of body 2, in cells of body 1
-    low, high = max(0, shift), min(n1, shift + n2)
-    begin = draw(st.integers(low, high - 1))
-    end = draw(st.integers(begin + 1, high))
-    if draw(st.booleans()):
-        begin, end = low, high
-    origin = draw(st.sampled_from([Fraction(0), Fraction(-3, 7)]))
-    x = lambda i: origin + h * i
-    young = draw(youngs())
-    bodies = []
-    for first, cells, far, E in ((0, n1, "bottom", young[0]), (shift, n2, "top", young[1])):
-        clear = [s for s, apart in (("left", begin > first), ("right", end < first + cells)) if apart]
-        length = h * cells
-        height = length * Fraction(draw(st.sampled_from(THICKNESS)))
-        bodies.append(
-            {
-                "shape": "rectangle",
-                "x": [x(first), x(first + cells)],
-                "y": [-height, 0] if far == "bottom" else [0, height],
-                "cells": [cells, draw(st.integers(1, 3))],
-                "young": E,
-                "poisson": Fraction(draw(st.sampled_from(["-0.5", "0", "0.3", "0.3", "0.45"]))),
-                **draw(supports_and_loads(far, clear, E, height, length)),
-            }
-        )
-    span = h * (end - begin)
-    return {
-        "dimension": 2,
-        "body1": bodies[0],
-        "body2": bodies[1],
-        "contact": {
-            "interval": [x(begin), x(end)],
-            "friction": draw(st.integers(0, 10).map(lambda i: Fraction(i, 10)) if friction is None else friction),
-            "law": draw(st.sampled_from(["nonlocal", "nonlocal", "nonlocal", "local"])) if law is None else law,
-            "radius": draw(st.sampled_from([h / 2, h * Fraction(3, 2), span])),
-            "gap": draw(st.sampled_from([Fraction(0), h / 1000, h / 30])),
-        },
-        "iteration": {
-            "neumann_body": draw(st.sampled_from([1, 2])),
-            "theta": draw(thetas() if theta is None else theta),
-        },
-        "norm": {"length": h * draw(st.sampled_from([Fraction(1, 2), Fraction(4), Fraction(100)]))},
-    }
-
-
-@st.composite
-def bar_problems(draw, theta=None):
-    """Two bars that meet at a point, both ends held, with body forces."""
-    a, b = draw(decimals(-1.5, 1)), draw(decimals(-1.5, 1))
-    origin = draw(st.sampled_from([Fraction(0), Fraction(-5, 3)]))
-    young = draw(youngs())
-    bodies = []
-    for ends, side, E in (([origin - a, origin], "left", young[0]), ([origin, origin + b], "right", young[1])):
-        length = ends[1] - ends[0]
-        body = {"shape": "interval", "x": ends, "cells": draw(st.integers(1, 5)), "young": E}
-        body |= draw(st.sampled_from([{"fixed": [side]}, {"prescribed": {side: length * draw(strains("1/5"))}}]))
-        bodies.append(body | {"body_force": E / length * draw(strains("1/5"))})
-    return {
-        "dimension": 1,
-        "body1": bodies[0],
-        "body2": bodies[1],
-        "contact": {"gap": draw(st.sampled_from([Fraction(0), a / 100]))},
-        "iteration": {
-            "neumann_body": draw(st.sampled_from([1, 2])),
-            "theta": draw(thetas() if theta is None else theta),
-        },
-        "norm": {"length": draw(decimals(-1, 2))},
-    }
-
-
-def contact_problems(**plane) -> st.SearchStrategy[dict]:
-    """Mostly in two dimensions."""
-    return st.integers(0, 5).flatmap(lambda i: bar_problems() if i == 5 else plane_problems(**plane))
-
-
-# --- end of problems --------------------------------------------------------------------------------------------------
 
 
 # --- elastic bodies: triangles, meshes, materials and supports, all with rational data --------------------------------

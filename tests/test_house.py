@@ -16,6 +16,7 @@ DOORS = {
     "matplotlib": ("verification.figures",),
     "click": ("verification.cli",),
     "rich": ("verification.cli",),
+    "hypothesis": ("verification.testing",),
 }
 #: what the theory may know beside the standard library and itself
 THEORY = {"ndtheory.symbolic": "sympy"}
@@ -115,6 +116,7 @@ def test_every_room_has_been_read():
         ("fem1d2d.mesh", "def plot(self):\n    from matplotlib import pyplot"),
         ("verification.output.report", "from rich.table import Table"),
         ("verification.client", "import click"),
+        ("verification.algorithm.relaxation", "from hypothesis import strategies"),
         ("verification.algorithm.fixed_point", "print('done')"),
         ("ndtheory.bounds", "def f(say=print):\n    say(1)"),
     ],
@@ -135,6 +137,7 @@ def test_a_forbidden_edge_is_found(module, source):
         ("verification.bounds.program", "def f():\n    import cvxpy"),
         ("verification.figures.region", "import matplotlib"),
         ("verification.figures", "import matplotlib"),
+        ("verification.testing.rules", "from hypothesis import strategies"),
         ("verification.cli.run", "import click\nfrom rich import print\nprint('done')"),
         ("verification.algorithm.fixed_point", "# print('done')\nlog.info('print')"),
     ],

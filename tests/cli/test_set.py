@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from verification.problem.specification import RELAXATIONS
+from verification.algorithm.relaxation import RULES
 
 #: Commands that take a problem file, and what else they need.
 COMMANDS = {"constants": [], "run": [], "compare": [], "solve": [], "advise": [], "region": ["-o", "plane.svg"]}
@@ -107,7 +107,7 @@ def test_the_file_is_left_as_it_was(call, write):
 
 
 @pytest.mark.parametrize("command", ["run", "compare"])
-@pytest.mark.parametrize("rule", RELAXATIONS)
+@pytest.mark.parametrize("rule", RULES)
 def test_a_rule_of_the_call_is_a_rule_of_the_file(call, write, command, rule):
     without = {"contact.friction": "0", "iteration.theta": '"auto"', "body1.cells": "[5, 1]", "body2.cells": "[3, 1]"}
     expected = call(command, write(without | {"iteration.relaxation": f'"{rule}"'}), "--json")
@@ -131,7 +131,7 @@ def test_momentum_of_the_call_takes_no_notice_of_the_theta_of_the_file(call, wri
 @pytest.mark.parametrize("rule", ["", "Newton", "faster"])
 def test_an_unknown_rule_is_refused_with_the_known_ones(call, write, rule):
     line = call("run", write(), "--relaxation", rule).complaint
-    assert all(known in line for known in RELAXATIONS)
+    assert all(known in line for known in RULES)
     assert f"'{rule}'" in line
 
 
@@ -167,7 +167,7 @@ def test_a_shell_is_given_its_script(call, monkeypatch, shell, needed):
 def test_names_that_the_program_knows_are_completed(complete):
     assert complete("example", "") == ["inside", "section6", "signorini", "two-bars"]
     assert complete("example", "s") == ["section6", "signorini"]
-    assert complete("run", "my.toml", "--relaxation", "") == list(RELAXATIONS)
+    assert complete("run", "my.toml", "--relaxation", "") == list(RULES)
     assert complete("compare", "--relaxation", "an") == ["anderson"]
     assert complete("con") == ["constants"]
     assert complete("run", "--sw") == ["--swap-roles"]

@@ -17,9 +17,10 @@ from hypothesis import strategies as st
 
 import verification as vf
 from ndtheory import exact
+from verification.algorithm.relaxation import RULES
 from verification.cli.problems import examples
 from verification.problem.read_only import ReadOnly
-from verification.problem.specification import RELAXATIONS, BodySpec
+from verification.problem.specification import BodySpec
 from verification.problem.toml import document
 from verification.problem.writing import written_number
 
@@ -67,7 +68,7 @@ def documents(draw, folder):
     if draw(st.booleans()):
         data["norm"] = {"length": draw(ratios)}
         data["contact"] = data["contact"] | {"radius": draw(ratios), "gap": draw(ratios)}
-    relaxation = draw(st.sampled_from(RELAXATIONS))
+    relaxation = draw(st.sampled_from(sorted(RULES)))
     data["iteration"] |= {"relaxation": relaxation, "tolerance": draw(st.floats(1e-30, 0.99))}
     if draw(st.booleans()):
         del data["iteration"]["theta"]

@@ -24,7 +24,6 @@ from verification.algorithm.runs import Run, run
 from verification.constants import Measured, measure
 from verification.contact import ContactError
 from verification.interface.assembly import ContactPair, build
-from verification.problem.specification import RELAXATIONS
 
 #: Who has the Neumann problem, E1, E2, and the left end of the upper body.
 COMBINATIONS = {
@@ -99,7 +98,7 @@ def test_aitken_and_anderson_need_about_as_many_evaluations_as_elsewhere(relaxat
 def test_every_rule_reaches_the_same_forces(name):
     expected = finished(name, "newton").last
     norm = finished(name, "newton").pair.neumann.dual_norm
-    for relaxation in RELAXATIONS:
+    for relaxation in RULES:
         last = finished(name, relaxation).last
         assert norm(last.image - expected.image) < 1e-7 * norm(expected.image)
         assert last.contact.pattern == expected.contact.pattern
@@ -111,7 +110,7 @@ def test_a_rule_with_memory_is_no_slower_than_constant_theta(name):
     assert all(finished(name, relaxation).evaluations <= constant for relaxation in ("aitken", "anderson", "newton"))
 
 
-@pytest.mark.parametrize("relaxation", RELAXATIONS)
+@pytest.mark.parametrize("relaxation", RULES)
 def test_every_evaluation_of_T_is_counted(relaxation, monkeypatch):
     """A state for each, those of Newton's line search among them; the last is not relaxed any more."""
     calls, evaluate = [], FixedPointMap.__call__
@@ -301,7 +300,7 @@ def in_units(problem: vf.Problem, stress: Fraction, length: Fraction) -> vf.Prob
 UNITS = [(Fraction(4) ** 9, Fraction(1)), (Fraction(1), Fraction(4) ** -5), (Fraction(10) ** 6, Fraction(254, 10))]
 
 
-@pytest.mark.parametrize("relaxation", RELAXATIONS)
+@pytest.mark.parametrize("relaxation", RULES)
 @pytest.mark.parametrize(("stress", "length"), UNITS)
 def test_no_rule_knows_the_units(relaxation, stress, length):
     """Forces go with stress times length (per thickness), and nothing else changes."""
@@ -329,7 +328,7 @@ def test_in_other_units_every_rule_needs_as_many_evaluations(name):
     pair, measured, theta = section_6(name)
     other = build(in_units(pair.problem, Fraction(4) ** -8, Fraction(1)))
     assert measure(other).rho_max.value == pytest.approx(measured.rho_max.value, rel=1e-12)
-    for relaxation in RELAXATIONS:
+    for relaxation in RULES:
         done = run(with_rule(other, relaxation), theta=theta, measured=measured)
         assert abs(done.evaluations - finished(name, relaxation).evaluations) <= 1
 
@@ -338,7 +337,7 @@ def test_in_other_units_every_rule_needs_as_many_evaluations(name):
 
 
 def test_the_theorem_is_about_a_constant_theta_and_about_momentum_without_friction():
-    for relaxation in RELAXATIONS:
+    for relaxation in RULES:
         rule = RULES[relaxation]
         assert (rule.outside(Fraction(1, 10)) == "") == (relaxation == "constant")
         assert (rule.outside(Fraction(0)) == "") == (relaxation in ("constant", "momentum"))

@@ -175,6 +175,8 @@ class Bound(ABC):
         Whether a step beyond it is a finding about the paper's text, not a fault: true of the printed theorem alone.
     calculated : bool
         Whether it follows from a few constants, without the matrices of a pair.
+    attained : bool
+        Whether there are pairs with a step as long as it says: :mod:`verification.testing` then looks for one.
     """
 
     name: ClassVar[str]
@@ -183,6 +185,7 @@ class Bound(ABC):
     hatch: ClassVar[str] = ""
     finding: ClassVar[bool] = False
     calculated: ClassVar[bool] = True
+    attained: ClassVar[bool] = False
 
     @abstractmethod
     def evaluate(self, subject: Subject, theta: Any = None, *, progress: Progress = silent) -> BoundResult:

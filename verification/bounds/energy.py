@@ -14,6 +14,7 @@ class Sharp(Bound):
 
     name, words = "sharp", "the theorem in energy norms"
     colour, hatch = "#009E73", ".."
+    attained = True  # without friction
 
     def evaluate(self, subject: Subject, theta: Any = None, *, progress: Progress = silent) -> BoundResult:
         if subject.energy is None:

@@ -14,6 +14,7 @@ from verification.bounds.table import BOUNDS
 from verification.constants import measure
 from verification.document import Document
 from verification.interface.assembly import build
+from verification.interface.friction import LAWS
 from verification.interface.pair import ContactPair
 from verification.interrupts import INTERRUPTED
 from verification.problem.specification import Problem
@@ -111,8 +112,9 @@ def chart(problem: Problem, *, progress: Progress = silent) -> Plane:
     """
     progress("tracing the regions", None)
     pair = build(problem)
-    if problem.contact.law == "local":
-        raise ProblemError(problem.source, "contact.law", "local", 'no region is proved of it; needed "nonlocal"')
+    law = problem.contact.law
+    if LAWS[law].outside:
+        raise ProblemError(problem.source, "contact.law", law, 'no region is proved of it; needed "nonlocal"')
     if pair.outside:
         raise ProblemError(problem.source, "contact", None, f"no region is proved: {pair.outside[0]}")
     measured = measure(pair)

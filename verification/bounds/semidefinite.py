@@ -113,6 +113,7 @@ class SemidefiniteBound(Bound):
     name, words = "lmi", "the semidefinite bound"
     colour = "#F0E442"
     calculated = False
+    attained = True  # without friction
 
     def evaluate(self, subject: Subject, theta: Any = None, *, progress: Progress = silent) -> BoundResult:
         if theta is None or subject.pair is None or subject.measured is None:

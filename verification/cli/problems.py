@@ -40,10 +40,25 @@ SET = click.option(
     metavar="KEY=VALUE",
     help="Set a key of FILE, as contact.friction=0.4 or 'body1.x=[0, 3]'; may be repeated.",
 )
-#: The rules of relaxation; those of the problem file, which are not imported to show a help.
+
+
+class RuleName(click.Choice[str]):
+    """The name of a relaxation rule; the rules are imported when their names are asked for."""
+
+    def __init__(self) -> None:
+        self.case_sensitive = True
+
+    @property
+    def choices(self) -> Sequence[str]:  # type: ignore[override]
+        """The registered rules."""
+        from verification.algorithm.relaxation import RULES
+
+        return tuple(RULES)
+
+
 RELAXATION = click.option(
     "--relaxation",
-    type=click.Choice(["constant", "aitken", "anderson", "newton", "momentum"]),
+    type=RuleName(),
     help="Rule of relaxation, over the file's; all but constant are outside the theorem.",
 )
 THETA = click.option("--theta", metavar="NUMBER", help="Relaxation factor, 0 < theta < 1, over the file's.")

@@ -17,6 +17,7 @@ from verification.cli.console import figures, heading, near_one, note, printable
 from verification.comparison import Comparison
 from verification.constants import ENERGY_NAMES, NAMES, Measured
 from verification.interface.fields import ContactFields
+from verification.interface.friction import LAWS
 from verification.monolithic import Solution
 from verification.problem.specification import Problem
 
@@ -52,9 +53,9 @@ def _setting(problem: Problem, nodes: int | None = None, interface: int | None =
     moduli = " / ".join("rigid" if body.rigid else f"{float(body.young):g}" for body in bodies)
     say(f"{printable(problem.title)}{counts} | E {moduli} {units['stress']}")
     body = {1: "lower", 2: "upper"}[problem.iteration.neumann_body]
-    law = {"nonlocal": "non-local", "local": "local law"}[contact.law]
+    law = LAWS[contact.law].label if LAWS[contact.law].needs_radius else f"{LAWS[contact.law].label} law"
     friction = "no friction" if not contact.friction else f"k = {figures(float(contact.friction), 2)}, {law}"
-    if contact.friction and contact.radius is not None and contact.law == "nonlocal":
+    if contact.friction and contact.radius is not None and LAWS[contact.law].needs_radius:
         friction += f", r = {float(contact.radius):g} {units['length']}"
     if any(body.rigid for body in bodies):
         say(f"Obstacle: {'lower' if problem.body1.rigid else 'upper'} body | {friction}")

@@ -25,11 +25,11 @@ from fem1d2d import (
 from fem1d2d.mesh import Floats, Ints
 from fem1d2d.trace import SAME, extent
 from verification.interface.body import Body, Condensed, Name
-from verification.interface.friction import Law, Local, Nonlocal
+from verification.interface.friction import LAWS, Law
 from verification.interface.grid import Grid
 from verification.interface.interface import Interface
 from verification.interface.pair import ContactPair, TwoBodies
-from verification.problem.specification import MOST_CELLS, BodySpec, ContactSpec, Problem
+from verification.problem.specification import MOST_CELLS, BodySpec, Problem
 from verification.problem.tables import ProblemError, short
 
 #: Interface matrices are dense; more contact nodes would fill the memory.
@@ -106,17 +106,12 @@ def discretise(problem: Problem, *, law: Law | None = None) -> TwoBodies:
     return TwoBodies(
         body1=body1,
         body2=body2,
-        interface=Interface(contact=grid, neumann=grid, gap=gap, law=law or _law(problem.contact)),
+        interface=Interface(
+            contact=grid, neumann=grid, gap=gap, law=law or LAWS[problem.contact.law].of(problem.contact.radius)
+        ),
         friction=problem.contact.friction,
         problem=problem,
     )
-
-
-def _law(contact: ContactSpec) -> Law | None:
-    """The law of a problem file; None where the non-local one has no radius, as there is no friction."""
-    if contact.law == "local":
-        return Local()
-    return None if contact.radius is None else Nonlocal(radius=float(contact.radius))
 
 
 def _specs(problem: Problem) -> list[tuple[Name, BodySpec]]:

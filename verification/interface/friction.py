@@ -7,7 +7,8 @@ are those of problem files; another one derives from :class:`Law` and is handed 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from fractions import Fraction
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -29,12 +30,30 @@ class Law(ABC):
     Attributes
     ----------
     name : str
+    label : str
+        What it is called in front of "law".
     outside : str
         Why the theorem does not speak of this law; empty where it does.
+    needs_radius : bool
+        Whether a problem file with friction must give a radius.
     """
 
     name: ClassVar[str]
+    label: ClassVar[str]
     outside: str = ""
+    needs_radius: ClassVar[bool] = False
+
+    @classmethod
+    def of(cls, radius: Fraction | None) -> Law | None:
+        """The law of a problem file with that radius; None where it needs one and has none, as there is no friction."""
+        return cls()
+
+    def scaled(self, length: float) -> Law:
+        """The same law in a unit of length in which lengths are ``length`` times as large numbers.
+
+        Its operator must then be ``operator / length``; a law that holds a length multiplies it.
+        """
+        return self
 
     @property
     @abstractmethod
@@ -81,12 +100,19 @@ class Nonlocal(Law):
         A radius that is not positive.
     """
 
-    name = "nonlocal"
+    name, label, needs_radius = "nonlocal", "non-local", True
     radius: float
 
     def __post_init__(self) -> None:
         if not self.radius > 0:
             raise ValueError(f"radius {self.radius}: the non-local law needs a positive radius")
+
+    @classmethod
+    def of(cls, radius: Fraction | None) -> Nonlocal | None:
+        return None if radius is None else cls(radius=float(radius))
+
+    def scaled(self, length: float) -> Nonlocal:
+        return replace(self, radius=self.radius * length)
 
     @property
     def words(self) -> str:
@@ -124,7 +150,7 @@ class Nonlocal(Law):
 class Local(Law):
     """Coulomb's law itself: ``(S f)_j = f_j / w_j``, carried to the contact grid where the grids differ."""
 
-    name = "local"
+    name, label = "local", "local"
     outside = "the local Coulomb law: S must map into L2(Gamma_c)"
 
     @property
@@ -149,10 +175,13 @@ class Given(Value, Law):
         Why the theorem does not speak of that law; empty where it does.
     """
 
-    name = "given"
+    name, label = "given", "given"
     matrix: Floats
     words: str = "operator S given as a matrix"
     outside: str = ""
+
+    def scaled(self, length: float) -> Given:
+        return replace(self, matrix=self.matrix / length)
 
     @property
     def summary(self) -> str:
@@ -160,3 +189,7 @@ class Given(Value, Law):
 
     def operator(self, interface: Interface) -> Floats:
         return self.matrix
+
+
+#: The laws of problem files, by name.
+LAWS: dict[str, type[Law]] = {law.name: law for law in (Nonlocal, Local)}

@@ -18,13 +18,11 @@ from verification.problem.specification import (
     MOST_CONTRAST,
     MOST_FRICTION,
     RECTANGLE_SIDES,
-    RELAXATIONS,
     BodySpec,
     Components,
     ContactSpec,
     IterationSpec,
     Problem,
-    Relaxation,
     Theta,
     read_theta,
 )
@@ -259,9 +257,11 @@ def _read_body(table: Table, dimension: int, source: str) -> BodySpec:
 
 
 def _read_contact(table: Table, dimension: int) -> ContactSpec:
+    from verification.interface.friction import LAWS  # the laws know problems, not the other way round
+
     coefficient = number(f"a number >= 0, at most {float(MOST_FRICTION):g}", lambda v: 0 <= v <= MOST_FRICTION)
     friction = table.take("friction", coefficient, Fraction(0))
-    law = table.take("law", choice("nonlocal", "local"), "nonlocal")
+    law = table.take("law", choice(*LAWS), "nonlocal")
     radius = table.take("radius", positive, None)
     interval = table.take("interval", ends, None)
     gap = table.take("gap", non_negative, Fraction(0))
@@ -271,24 +271,28 @@ def _read_contact(table: Table, dimension: int) -> ContactSpec:
             raise table.refuse("friction", friction, "needed 0: two bars have no friction")
         if interval:
             raise table.refuse("interval", list(interval), "two bars meet at a point; leave it out in one dimension")
-    elif friction and law == "nonlocal" and radius is None:
+    elif friction and LAWS[law].needs_radius and radius is None:
         raise table.refuse(
-            "radius", None, 'this key is missing; the non-local law needs the radius of its kernel (or law = "local")'
+            "radius",
+            None,
+            f'this key is missing; the {LAWS[law].label} law needs the radius of its kernel (or law = "local")',
         )
     return ContactSpec(interval=interval, friction=friction, law=law, radius=radius, gap=gap)
 
 
 def _read_iteration(table: Table) -> IterationSpec:
+    from verification.algorithm.relaxation import RULES
+
     def theta(value: Any) -> Theta:
         try:
             return read_theta(value)
         except HypothesisError as error:
             raise Unfit(f"needed {error.needed}") from None
 
-    relaxation: Relaxation = table.take("relaxation", choice(*RELAXATIONS), "constant")
+    relaxation: str = table.take("relaxation", choice(*RULES), "constant")
     spec = IterationSpec(
         neumann_body=table.take("neumann_body", choice(1, 2), 2),
-        theta=table.take("theta", theta, "auto" if relaxation == "momentum" else Fraction(1, 2)),
+        theta=table.take("theta", theta, "auto" if RULES[relaxation].needs_rho else Fraction(1, 2)),
         relaxation=relaxation,
         tolerance=float(
             table.take("tolerance", number("a number with 0 < tolerance < 1", lambda v: 0 < v < 1), Fraction(1, 10**9))

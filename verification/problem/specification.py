@@ -23,9 +23,6 @@ Rational = int | float | str | Decimal | Fraction
 #: A relaxation factor, or the one that theory chooses.
 Theta = Fraction | Literal["auto"]
 
-Relaxation = Literal["constant", "aitken", "anderson", "newton", "momentum"]
-RELAXATIONS: tuple[Relaxation, ...] = ("constant", "aitken", "anderson", "newton", "momentum")
-
 RECTANGLE_SIDES = ("left", "right", "bottom", "top")
 INTERVAL_SIDES = ("left", "right")
 
@@ -91,16 +88,17 @@ class ContactSpec:
         Ends of Gamma_c along x; None: the overlap of the two surfaces.
     friction : Fraction
         k, constant along Gamma_c.
-    law : {'nonlocal', 'local'}
+    law : str
+        One of :data:`verification.interface.friction.LAWS`.
     radius : Fraction or None
-        Radius r of the hat kernel (length); None with the local law or without friction.
+        Radius r of the hat kernel (length); None with a law that has none or without friction.
     gap : Fraction
         Initial distance (length).
     """
 
     interval: tuple[Fraction, Fraction] | None
     friction: Fraction
-    law: Literal["nonlocal", "local"]
+    law: str
     radius: Fraction | None
     gap: Fraction
 
@@ -114,15 +112,15 @@ class Settings:
     theta : Fraction or 'auto'
         ``auto``: the proved theta; the predicted one where nothing is proved or the proved one is more than twice as
         slow.  Momentum takes its step from rho: ``auto`` unless the file has a theta, which is then not used.
-    relaxation : {'constant', 'aitken', 'anderson', 'newton', 'momentum'}
-        Beside ``constant`` outside the theorem; see :mod:`verification.algorithm.relaxation`.
+    relaxation : str
+        One of :data:`verification.algorithm.relaxation.RULES`; beside ``constant`` outside the theorem.
     tolerance : float
         The run ends when ``|||T g - g||| <= tolerance |||T g|||`` in the norm (5.21), with the largest T g so far.
     max_iterations : int
     """
 
     theta: Theta = Fraction(1, 2)
-    relaxation: Relaxation = "constant"
+    relaxation: str = "constant"
     tolerance: float = 1e-9
     max_iterations: int = 500
 

@@ -1,0 +1,43 @@
+"""A conformance kit: the property tests of this project for a rule, a law, a bound or a step of one's own.
+
+Each ``check_`` function draws random pairs of bodies and forces, holds what it is given against what must be true of
+it, and raises :class:`Refused`, an ``AssertionError`` that names the property and the counterexample.  What passes
+comes back as a :class:`Report`.  The strategies that draw the cases are public too.
+
+The kit needs hypothesis, which ``pip install 'ndtheory[test]'`` installs; nothing else in the package does.
+
+>>> from verification.algorithm.relaxation import Aitken
+>>> print(check_rule(Aitken(), examples=5))  # doctest: +ELLIPSIS
+rule 'aitken'
+  stays at the solution      holds ...
+"""
+
+from __future__ import annotations
+
+try:
+    import hypothesis as _hypothesis  # noqa: F401  asked for first, so that its absence is told in words
+except ImportError:
+    raise ImportError("verification.testing needs hypothesis: pip install 'ndtheory[test]'") from None
+
+from verification.testing.bounds import check_bound
+from verification.testing.laws import check_law
+from verification.testing.properties import Finding, Refused, Report
+from verification.testing.rules import check_rule
+from verification.testing.steps import check_step
+from verification.testing.strategies import forces, matrix_pairs, mesh_pairs, pairs, problems, thetas
+
+__all__ = [
+    "Finding",
+    "Refused",
+    "Report",
+    "check_bound",
+    "check_law",
+    "check_rule",
+    "check_step",
+    "forces",
+    "matrix_pairs",
+    "mesh_pairs",
+    "pairs",
+    "problems",
+    "thetas",
+]

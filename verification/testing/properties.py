@@ -1,0 +1,173 @@
+"""What a property test says: a report of what holds, or a refusal with its counterexample."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+from hypothesis.errors import Flaky
+
+from verification.interface.pair import ContactPair
+from verification.problem import Problem
+
+#: Cases are drawn, and the first that fails is made simpler.
+PHASES = (Phase.generate, Phase.shrink)
+
+#: A counterexample is made simpler with at most so many more cases: they cost as much as the others.
+SIMPLER = 10
+
+
+class Fails(Exception):
+    """What a test of one case raises where a property fails: how, in words."""
+
+
+class _Enough(BaseException):
+    """The counterexample is simple enough; hypothesis stops at what is no ``Exception``."""
+
+
+class Refused(AssertionError):
+    """A property that does not hold, and a case in which it does not.
+
+    Attributes
+    ----------
+    subject, property, how : str
+        What was checked, what it must do, and what it did instead.
+    counterexample : mapping
+        The case by name: a pair, forces, a theta.
+    """
+
+    def __init__(self, subject: str, property: str, how: str, counterexample: Mapping[str, Any]) -> None:
+        self.subject, self.property, self.how = subject, property, how
+        self.counterexample: Mapping[str, Any] = MappingProxyType(dict(counterexample))
+        shown = "".join(f"\n  {name} = {describe(value)}" for name, value in counterexample.items())
+        super().__init__(f"{subject}: {property}: {how}" + (f"\ncounterexample:{shown}" if shown else ""))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """What became of one property.
+
+    Attributes
+    ----------
+    property : str
+    verdict : {'holds', 'attained', 'not attained', 'not asked'}
+    detail : str
+        Over how many cases, by how much, or why it was not asked.
+    """
+
+    property: str
+    verdict: str
+    detail: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Report:
+    """What holds of a subject.
+
+    Attributes
+    ----------
+    subject : str
+    findings : tuple of Finding
+    """
+
+    subject: str
+    findings: tuple[Finding, ...]
+
+    def __getitem__(self, property: str) -> Finding:
+        return next(finding for finding in self.findings if finding.property == property)
+
+    def __str__(self) -> str:
+        width = max(len(finding.property) for finding in self.findings)
+        lines = [f"  {f.property:{width}}  {f.verdict:12}  {f.detail}".rstrip() for f in self.findings]
+        return "\n".join([self.subject, *lines])
+
+
+def over(cases: int) -> str:
+    """How many cases a property was held against."""
+    return f"{cases} case{'s' if cases != 1 else ''}"
+
+
+def examine(
+    subject: str, property: str, cases: st.SearchStrategy[dict[str, Any]], test: Callable[..., None], *, examples: int
+) -> Finding:
+    """Hold a property against drawn cases.
+
+    Parameters
+    ----------
+    cases : strategy of dict
+        The keywords of ``test``.
+    test : callable
+        Raises :class:`Fails` where the property does not hold.
+    examples : int
+        How many cases are drawn.
+
+    Raises
+    ------
+    Refused
+        With the simplest case found.
+    """
+    seen: list[Refused] = []
+    tried = simpler = 0
+
+    @settings(
+        max_examples=examples,
+        deadline=None,
+        database=None,
+        phases=PHASES,
+        report_multiple_bugs=False,
+        suppress_health_check=list(HealthCheck),
+    )
+    @given(case=cases)
+    def run(case: dict[str, Any]) -> None:
+        nonlocal tried, simpler
+        tried += 1
+        if seen and tried > simpler:
+            raise _Enough
+        try:
+            test(**case)
+        except Fails as failure:
+            simpler = simpler or tried + SIMPLER
+            seen.append(Refused(subject, property, str(failure), case))
+            raise seen[-1] from None
+
+    try:
+        run()
+    except _Enough:
+        raise seen[-1] from None
+    except Flaky:  # what remembers earlier cases does not fail the same way twice
+        if not seen:
+            raise
+        raise seen[-1] from None
+    return Finding(property=property, verdict="holds", detail=over(tried))
+
+
+def describe(value: Any) -> str:
+    """A value of a counterexample, so that it can be made again."""
+    if isinstance(value, np.ndarray):
+        return np.array2string(value, separator=", ", threshold=64, precision=6).replace("\n", "")
+    if isinstance(value, Problem):
+        return repr(value.to_dict())
+    if not isinstance(value, ContactPair):
+        return str(value)
+    if value.problem is not None:
+        return f"build(Problem.from_dict({value.problem.to_dict()!r}))"
+    lower, upper = (side if side.upward else side.turned() for side in (value.body1, value.body2))
+    interface = value.interface
+    given = {
+        "S1": lower.stiffness,
+        "S2": upper.stiffness,
+        "load1": lower.load,
+        "load2": upper.load,
+        "x": value.contact.grid.x,
+        "gap": interface.gap,
+        "kernel": interface.kernel,
+        "transfer": interface.transfer,
+        "friction": value.friction,
+        "neumann_body": value.neumann_body,
+    }
+    return f"build({', '.join(f'{name}={describe(entry)}' for name, entry in given.items() if entry is not None)})"

@@ -1,0 +1,192 @@
+"""The same pair or problem seen otherwise: in another unit, in a mirror, from below.
+
+Nothing that is true of the theorem may change with any of these.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from fem1d2d.mesh import Floats
+from verification.interface.body import Condensed
+from verification.interface.friction import Given
+from verification.interface.grid import Grid
+from verification.interface.interface import Interface
+from verification.interface.pair import ContactPair
+from verification.problem import Problem
+from verification.problem.specification import BodySpec
+
+
+def _on(grid: Grid, side: Condensed, **arrays: Floats) -> Condensed:
+    own = {"stiffness": side.stiffness, "load": side.load, "known": side.known}
+    given: dict[str, Any] = {name: np.array(array) for name, array in (own | arrays).items()}
+    return Condensed(grid=grid, upward=side.upward, **({"free": np.array(side.free)} | given))
+
+
+def _of_matrices(pair: ContactPair, contact: Condensed, neumann: Condensed, **changes: Any) -> ContactPair:
+    interface = pair.interface
+    kernel, transfer = interface.kernel, interface.transfer
+    given = {"gap": interface.gap, "law": None if kernel is None else Given(matrix=kernel), "transfer": transfer}
+    joined = Interface(contact=contact.grid, neumann=neumann.grid, **(given | changes))
+    return replace(pair, contact=contact, neumann=neumann, interface=joined, problem=None)
+
+
+def in_units(pair: ContactPair, *, force: float = 1.0, stress: float = 1.0, length: float = 1.0) -> ContactPair:
+    """A pair whose numbers are those of other units, as a pair of matrices.
+
+    Stresses are ``stress`` times as large numbers, lengths ``length`` times.  ``force`` is no unit: loads, prescribed
+    displacements and gaps are that many times as large, and so are forces and displacements of the solution.
+
+    Interface forces, per unit thickness, are then ``force * stress * length`` times as large (``force * stress`` in one
+    dimension).
+    """
+    plane = pair.contact.grid.dimension == 2
+    of_forces = force * stress * (length if plane else 1.0)
+    of_stiffness = stress if plane else stress / length
+
+    def side(given: Condensed) -> Condensed:
+        grid = given.grid
+        scaled = Grid(x=length * grid.x, weights=(length if plane else 1.0) * grid.weights, dimension=grid.dimension)
+        return _on(
+            scaled,
+            given,
+            stiffness=of_stiffness * given.stiffness,
+            load=of_forces * given.load,
+            known=force * length * given.known,
+        )
+
+    kernel = pair.interface.kernel
+    law = None if kernel is None else Given(matrix=kernel / length)
+    gap = force * length * pair.interface.gap
+    return _of_matrices(pair, side(pair.contact), side(pair.neumann), gap=gap, law=law)
+
+
+def reflect(pair: ContactPair, force: Floats) -> Floats:
+    """Forces on the Neumann grid, or columns of them, as a mirror across Gamma_c shows them: x becomes -x."""
+    return _reflected(pair.neumann.grid, force)
+
+
+def _reflected(grid: Grid, vector: Floats) -> Floats:
+    if grid.dimension == 1:
+        return vector.copy()
+    return np.concatenate([-vector[grid.tangential][::-1], vector[grid.normal][::-1]])
+
+
+def mirrored(pair: ContactPair) -> ContactPair:
+    """The mirror image of a pair, x to -x, as a pair of matrices; bars are their own."""
+    if pair.contact.grid.dimension == 1:
+        return _of_matrices(pair, _on(pair.contact.grid, pair.contact), _on(pair.neumann.grid, pair.neumann))
+
+    def side(given: Condensed) -> Condensed:
+        grid = given.grid
+        image = Grid(x=-grid.x[::-1], weights=grid.weights[::-1])
+        return _on(
+            image,
+            given,
+            stiffness=_reflected(grid, _reflected(grid, given.stiffness).T),
+            load=_reflected(grid, given.load),
+            known=_reflected(grid, given.known),
+            free=np.concatenate([given.free[grid.tangential][::-1], given.free[grid.normal][::-1]]),
+        )
+
+    interface = pair.interface
+    turn = lambda matrix: None if matrix is None else matrix[::-1, ::-1].copy()
+    kernel = turn(interface.kernel)
+    return _of_matrices(
+        pair,
+        side(pair.contact),
+        side(pair.neumann),
+        gap=interface.gap[::-1],
+        transfer=turn(interface.transfer),
+        law=None if kernel is None else Given(matrix=kernel),
+    )
+
+
+def upside_down(pair: ContactPair) -> ContactPair:
+    """The pair seen from behind: body 1 is called body 2, and the roles stay with their bodies, as a pair of matrices.
+
+    Forces, in the direction of the contact body's normal, keep their numbers.
+    """
+    sides = (
+        Condensed(
+            grid=side.grid,
+            stiffness=np.array(side.stiffness),
+            load=np.array(side.load),
+            known=np.array(side.known),
+            free=np.array(side.free),
+            upward=not side.upward,
+        )
+        for side in (pair.contact, pair.neumann)
+    )
+    return replace(_of_matrices(pair, *sides), neumann_body=1 if pair.neumann_body == 2 else 2)
+
+
+# --- problems ---------------------------------------------------------------------------------------------------------
+
+
+def _times(values: tuple[Any, ...] | None, factor: Fraction) -> Any:
+    return None if values is None else tuple(None if v is None else v * factor for v in values)
+
+
+def problem_in_units(problem: Problem, *, stress: Fraction = Fraction(1), length: Fraction = Fraction(1)) -> Problem:
+    """A problem whose stresses and lengths are so many times as large numbers; what it describes is the same."""
+
+    def body(given: BodySpec) -> BodySpec:
+        each = lambda sides, factor: {name: _times(values, factor) for name, values in sides.items()}
+        return replace(
+            given,
+            x=_times(given.x, length),
+            y=_times(given.y, length),
+            young=given.young * stress,
+            prescribed=each(given.prescribed, length),
+            traction=each(given.traction, stress),
+            body_force=_times(given.body_force, stress / length),
+        )
+
+    contact = problem.contact
+    radius = None if contact.radius is None else contact.radius * length
+    interval = _times(contact.interval, length)
+    return replace(
+        problem,
+        body1=body(problem.body1),
+        body2=body(problem.body2),
+        contact=replace(contact, interval=interval, radius=radius, gap=contact.gap * length),
+        length=problem.length * length,
+    )
+
+
+def problem_mirrored(problem: Problem) -> Problem:
+    """The mirror image of a plane problem whose rectangles have an even number of cells along x.
+
+    With an odd number the image of a mesh is split along the other diagonals, and is another mesh.
+    """
+    if problem.dimension == 1:
+        return problem
+    names = {"left": "right", "right": "left"}
+    turned = lambda v: (None if v[0] is None else -v[0], *v[1:])
+
+    def sides(given: Mapping[str, Any]) -> dict[str, Any]:
+        return {names.get(name, name): turned(values) for name, values in given.items()}
+
+    def body(given: BodySpec) -> BodySpec:
+        if given.x is None or given.cells is None or given.cells[0] % 2:
+            raise ValueError(f"cells {given.cells}: needed a rectangle with an even number of cells along x")
+        return replace(
+            given,
+            x=(-given.x[1], -given.x[0]),
+            fixed=tuple(names.get(name, name) for name in given.fixed),
+            prescribed=sides(given.prescribed),
+            traction=sides(given.traction),
+            body_force=turned(given.body_force) if given.body_force else (),
+        )
+
+    interval = problem.contact.interval
+    ends = None if interval is None else (-interval[1], -interval[0])
+    return replace(
+        problem, body1=body(problem.body1), body2=body(problem.body2), contact=replace(problem.contact, interval=ends)
+    )
