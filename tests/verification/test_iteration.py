@@ -181,7 +181,6 @@ def test_all_solvers_give_the_same_iterates_and_certify_each(name):
     runs = {s: vf.run(problem(PROBLEMS[name], max_iterations=12), solver=s) for s in ("active-set", "auto", "cvxpy")}
     reference = runs["active-set"]
     assert {s.contact.solver for s in runs["cvxpy"].iterates} == {"cvxpy"}
-    assert runs["auto"].iterates[0].contact.solver == "cvxpy"
     for run in runs.values():
         assert run.iterations == reference.iterations
         for state, expected in zip(run.iterates, reference.iterates, strict=True):

@@ -1,0 +1,264 @@
+"""The page of documents lists every key of every document, and no other; its tables of files list what is written."""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import io
+import json
+import re
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import meshio
+import numpy as np
+import pytest
+
+import verification as vf
+from verification.cli import main
+
+PAGE = (Path(__file__).parents[2] / "docs" / "json.md").read_text("utf-8")
+
+BARS = {
+    "dimension": 1,
+    "body1": {"shape": "interval", "x": [0, 1], "cells": 2, "young": 3, "fixed": ["left"]},
+    "body2": {"shape": "interval", "x": [1, 2], "cells": 2, "young": 2, "prescribed": {"right": "-0.1"}},
+}
+GIVEN = "bounds --m 3084 --M 153229 --CR 1.7"
+
+#: How a value of each type is told.
+TYPES: Mapping[str, Callable[[Any], bool]] = {
+    "text": lambda v: isinstance(v, str),
+    "truth": lambda v: isinstance(v, bool),
+    "integer": lambda v: isinstance(v, int) and not isinstance(v, bool),
+    "number": lambda v: isinstance(v, (int, float)) and not isinstance(v, bool),
+    "exact": lambda v: isinstance(v, (int, float, str)) and not isinstance(v, bool),
+    "vector": lambda v: isinstance(v, (int, float, str, list)),
+    "free": lambda v: v is not None,
+}
+
+Row = tuple[str, str]  # type and meaning
+Table = dict[str, Row]
+
+
+def tables(page: str) -> dict[str, Table]:
+    """Heading -> path -> type and meaning; what is included from a part stands under the empty type."""
+    result: dict[str, Table] = {}
+    for heading, body in re.findall(r"^##+ ([^\n]+)\n(.*?)(?=^##|\Z)", page, re.M | re.S):
+        rows: Table = {}
+        for line in body.splitlines():
+            cells = [cell.strip() for cell in line.strip().strip("|").split("|")]
+            if not line.startswith("|") or len(cells) != 4:
+                continue
+            keys, kind, _, meaning = cells
+            if included := re.fullmatch(r"all keys of \*\*(.+)\*\*", keys):
+                rows[included[1]] = ("", meaning)
+            for key in re.findall("`([^`]+)`", keys):
+                assert key not in rows, f"{heading} lists {key} twice"
+                rows[key] = (kind, meaning)
+        if rows:
+            result[heading.strip("`")] = rows
+    return result
+
+
+class Reader:
+    """Holds documents against the tables of a page.
+
+    Attributes
+    ----------
+    wrong : list of str
+        Where a document and the page differ.
+    seen : set of pairs
+        Heading and key of the rows that some document has.
+    """
+
+    def __init__(self, page: str) -> None:
+        self.tables, self.wrong, self.seen = tables(page), [], set()
+
+    def read(self, document: Mapping[str, Any]) -> None:
+        self.object(document["schema"], "", document, document["schema"])
+
+    def rows(self, name: str) -> Iterator[tuple[str, str, Row]]:
+        """The rows of a table with those it includes: which table has the row, its path, its type and meaning."""
+        for key, row in self.tables[name].items():
+            if row[0]:
+                yield name, key, row
+            else:
+                yield from self.rows(key)
+
+    def object(self, name: str, path: str, value: Mapping[str, Any], where: str) -> None:
+        """Compare an object with the rows of a table whose paths begin with ``path``."""
+        rows = {key: (home, row) for home, key, row in self.rows(name) if key.startswith(path)}
+        first = {key[len(path) :].split(".")[0] for key in rows}
+        for key, member in value.items():
+            step = key if key in first else "*"
+            if step not in first:
+                self.wrong.append(f"{where}: the page has no {path}{key}")
+            elif (full := path + step) in rows:
+                home, row = rows[full]
+                self.seen.add((home, full))
+                self.value(name, full, row, member, f"{where}.{key}")
+            else:
+                self.object(name, f"{full}.", member, f"{where}.{key}")
+        for key in first - {*value, "*"}:
+            below = [row for full, (_, row) in rows.items() if full[len(path) :].split(".")[0] == key]
+            if not all("left out" in meaning for _, meaning in below):
+                self.wrong.append(f"{where}: the document has no {path}{key}")
+
+    def value(self, name: str, path: str, row: Row, value: Any, where: str) -> None:
+        kind, meaning = row
+        if value is None:
+            if "null" not in meaning:
+                self.wrong.append(f"{where} is null, and the page does not say when")
+        elif kind.startswith(("list of ", "map of ")):
+            if type(value) is not (list if kind.startswith("list") else dict):
+                self.wrong.append(f"{where} is no {kind}")
+                return
+            for member in value if isinstance(value, list) else value.values():
+                self.value(name, path, (kind.partition(" of ")[2], meaning), member, where)
+        elif kind.startswith("**"):
+            self.object(kind.strip("*"), "", value, where)
+        elif kind == "object":
+            self.object(name, f"{path}.", value, where)
+        elif not TYPES[kind](value):
+            self.wrong.append(f"{where} = {value!r} is no {kind}")
+
+    @property
+    def unseen(self) -> set[str]:
+        """Rows of the page that no document has."""
+        everything = {(heading, key) for heading, rows in self.tables.items() for key, row in rows.items() if row[0]}
+        objects = {(heading, key) for heading, key in everything if self.tables[heading][key][0] == "object"}
+        return {f"{heading}: {key}" for heading, key in everything - objects - self.seen}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("documents")
+
+
+@pytest.fixture(scope="module")
+def small(folder: Path) -> vf.Problem:
+    problem = vf.example("section6").changed(cells=((10, 2), (6, 2)))
+    (folder / "small.toml").write_text(problem.to_toml(), "utf-8")
+    return problem
+
+
+def triangles(path: Path) -> None:
+    """A unit square of two triangles below the x axis, with a named bottom."""
+    points = [(0, -1, 0), (1, -1, 0), (1, 0, 0), (0, 0, 0)]
+    cells = [("line", [[0, 1]]), ("triangle", [[0, 1, 2], [0, 2, 3]])]
+    tags = [np.array([1]), np.array([9, 9])]
+    data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
+    mesh = meshio.Mesh(np.array(points, float), cells, cell_data=data, field_data={"bottom": np.array([1, 1])})
+    meshio.write(path, mesh, file_format="gmsh22", binary=False)
+
+
+@pytest.fixture(scope="module")
+def documents(folder: Path, small: vf.Problem) -> list[dict[str, Any]]:
+    """Documents of every schema: with and without friction, in one dimension, from matrices, of mesh files, of runs."""
+    triangles(folder / "square.msh")
+    above = {"shape": "rectangle", "x": [0, 1], "y": [0, 1], "cells": [1, 1], "young": 1, "poisson": "0.3"}
+    of_mesh = vf.Problem.from_dict(
+        {
+            "body1": {"mesh": str(folder / "square.msh"), "young": 1, "poisson": "0.3", "fixed": ["bottom"]},
+            "body2": {**above, "prescribed": {"top": [0, "-0.1"]}, "traction": {"right": [0, 1]}},
+            "contact": {"interval": [0, 1]},
+            "iteration": {"theta": "auto"},
+        }
+    )
+    bars = vf.Problem.from_dict(BARS)
+    matrices = vf.build(S1=np.diag([2.0, 3.0]), S2=np.eye(2), x=np.zeros(1))
+    results = [
+        vf.compare(bars),
+        *(vf.run(problem) for problem in (small, bars, of_mesh, matrices)),
+        vf.run(bars.changed(theta="0.99"), rule="momentum"),
+        vf.run(vf.Problem.from_dict({**BARS, "body1": {**BARS["body1"], "young": "0.1"}}), theta="0.9"),  # diverges
+        *(vf.solve(problem) for problem in (small, bars, of_mesh, vf.example("signorini"))),
+        *(vf.measure(problem) for problem in (bars, matrices)),
+        vf.measure(small, refine=1),
+        *(vf.advise(problem) for problem in (small, bars)),
+        vf.advise_matrices(np.diag([2.0, 3.0]), np.eye(2)),
+        *(vf.advise_run(theta, ratio) for theta, ratio in (("0.1", "1.4"), ("0.6", "0.7"), ("0.2", "0.5"))),
+        vf.verify(["5.30", "2.1", "thm-5.9"]),
+    ]
+    return [result.to_dict() for result in results]
+
+
+@pytest.fixture(scope="module")
+def printed() -> Callable[[str], dict[str, Any]]:
+    def document(arguments: str) -> dict[str, Any]:
+        with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()):
+            main([*arguments.split(), "--json"])
+        found: dict[str, Any] = json.loads(out.getvalue())
+        return found
+
+    return document
+
+
+@pytest.fixture(scope="module")
+def compared(folder: Path, small: vf.Problem, printed: Callable[[str], dict[str, Any]]) -> dict[str, Any]:
+    return printed(f"compare {folder / 'small.toml'} -o {folder / 'results'}")
+
+
+def test_the_page_lists_every_key_of_every_document_and_no_other(documents, compared, printed, folder):
+    reader = Reader(PAGE)
+    for arguments in (
+        f"{GIVEN} --CK 1e-8 --rho 0.475 --kappa1 0.9 --kappa2 0.4 --theta 1e-4",
+        f"{GIVEN} --k 0.1 --Cs 1 --Ctr 1",
+        f"{GIVEN} --CK 0 --edition printed",
+        "bounds --rho 2",
+        "example",
+        "example section6",
+        f"region {folder / 'small.toml'} -o {folder / 'plane.svg'}",
+    ):
+        documents = [*documents, printed(arguments)]
+    for document in (*documents, compared):
+        reader.read(document)
+    assert sorted(set(reader.wrong)) == []
+    assert sorted(reader.unseen) == []
+
+
+def test_a_key_that_is_not_on_the_page_is_found(small):
+    document = vf.measure(small).to_dict()
+    less = Reader(PAGE.replace("| `rho_min` |", "| `rho_least` |"))
+    less.read(document)
+    assert less.wrong == [
+        "ndtheory.constants/1: the page has no rho_min",
+        "ndtheory.constants/1: the document has no rho_least",
+    ]
+    assert "Constants: rho_least" in less.unseen
+
+
+def test_a_type_or_a_null_that_the_page_does_not_tell_is_found():
+    document = vf.measure(vf.build(S1=np.eye(2), S2=np.eye(2), x=np.zeros(1))).to_dict()
+    page = PAGE.replace("| `interface_nodes` | integer |", "| `interface_nodes` | text |").replace(
+        "lift constant; null of a pair made from matrices", "lift constant"
+    )
+    reader = Reader(page)
+    reader.read(document)
+    assert any("interface_nodes = " in line and "is no text" in line for line in reader.wrong)
+    assert any("C_R is null" in line for line in reader.wrong)
+
+
+# --- files ---
+
+
+def listed(heading: str) -> dict[str, list[str]]:
+    """What the page says of files or arrays: names in the first column -> the other cells of their row."""
+    part = PAGE[PAGE.index(heading) :]
+    rows = [[cell.strip() for cell in line.strip().strip("|").split("|")] for line in part.splitlines() if "| " in line]
+    return {name: row[1:] for row in rows for name in re.findall("`([^`]+)`", row[0])}
+
+
+def test_the_page_lists_every_file_that_a_comparison_writes(folder, compared):
+    files = listed("## Files")
+    written = {path.name for path in (folder / "results").iterdir()}
+    assert written == {name for name, row in files.items() if "compare" in row[0]} - {"run.json", "solve.json"} - {
+        "ledger.json"
+    }
+    for name in ("contact.csv", "history.csv"):
+        lines = (folder / "results" / name).read_text("utf-8").splitlines()
+        assert files[name][1].endswith(": " + ", ".join(next(csv.reader(lines[1:]))))
+    with np.load(folder / "results" / "interface.npz") as arrays:
+        assert set(arrays.files) == set(listed("| array |")) - {"transfer"}
