@@ -46,7 +46,8 @@ SMALL = {
 ONE_STEP = {"theta": "0.7", "max_iterations": 1}
 FIGURES = {f"{figure}.{ending}" for figure in ("bodies", "residuals") for ending in ("svg", "png")}
 DRAWN = {"compare.json", "report.html", "waterfall.svg", "waterfall.png"}
-WRITTEN = {"run": FIGURES | {"run.json"}, "comparison": FIGURES | DRAWN}
+TABLES = {"problem.toml", "contact.csv", "history.csv", "interface.npz"}
+WRITTEN = {"run": FIGURES | TABLES | {"run.json"}, "comparison": FIGURES | TABLES | DRAWN}
 
 #: Titles that could leave their place in a file.
 TITLES = {

@@ -18,7 +18,9 @@ from verification.algorithm.runs import Run, run
 EPSILON = sys.float_info.epsilon
 
 #: A pair whose noise at a state is 4 eps |g|.
+SAME = lambda values: values
 PAIR = SimpleNamespace(
+    interface=SimpleNamespace(carry=SAME, carry_back=SAME),
     neumann=SimpleNamespace(dual_norm=lambda v: float(np.linalg.norm(v))),
     contact=SimpleNamespace(stiffness=np.zeros((1, 1)), load=np.zeros(1)),
 )
