@@ -13,7 +13,7 @@ import verification as vf
 CALL = "import sys; from verification.cli import main; sys.exit(main())"
 
 #: What a comparison does, in its order.
-STAGES = ["measuring", "iterating", "searching", "semidefinite edition", "linearising"]
+STAGES = ["measuring", "iterating", "searching", "semidefinite bound", "linearising", "repeating the run by cvxpy"]
 
 
 @pytest.fixture
@@ -32,7 +32,7 @@ def test_a_comparison_names_everything_it_does_in_its_order(write):
     assert stages(what for what, _ in told) == STAGES
     assert all(any(what.startswith(stage) for stage in STAGES) for what, _ in told)
     assert all(share is None or 0 <= share <= 1 for _, share in told)
-    programs = {what for what, _ in told if what.startswith("semidefinite edition")}
+    programs = {what for what, _ in told if what.startswith("semidefinite bound")}
     assert len(programs) > 3  # the largest theta, the threshold at several frictions, the factor
 
 

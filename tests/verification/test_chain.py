@@ -1,7 +1,7 @@
 """One problem after another, from what a run shows to what the theorem proves: each number at most the next.
 
 Observed step ratio, spectral radius and norm of the Jacobian at the solution, largest norm over contact patterns,
-semidefinite edition, theorem in energy norms, repaired edition.
+semidefinite bound, theorem in energy norms, repaired theorem.
 """
 
 from __future__ import annotations
@@ -145,7 +145,7 @@ class Chain:
 
     @property
     def tight(self) -> bool:
-        """Whether the semidefinite edition has found the least Lipschitz constant."""
+        """Whether the semidefinite bound has found the least Lipschitz constant."""
         return self.lmi <= (1 + TIGHT) * self.search
 
 
@@ -173,7 +173,7 @@ SETTINGS = {"tolerance": 1e-10, "max_iterations": 200}
 
 
 def allowed(seed: int) -> tuple[ContactPair, Measured, float, np.random.Generator]:
-    """A random problem with a friction and a theta for which the repaired edition proves a factor below 1."""
+    """A random problem with a friction and a theta for which the repaired theorem proves a factor below 1."""
     pair, measured, _, random = case(seed, **SETTINGS)
     k = random.uniform(0, 0.99) * evaluate(REPAIRED, measured.constants()).C2.value
     measured = measured.with_friction(k)
@@ -190,7 +190,7 @@ def rubbing(pair: ContactPair, k: float) -> ContactPair:
 def test_each_number_is_at_most_the_next_and_the_semidefinite_edition_mostly_the_least_of_the_bounds(batch):
     """The worst piece of the search is attained by two forces, so the least Lipschitz constant lies above it.
 
-    Of the first 300 problems the semidefinite edition lies within 1 % of it in 72 %; of the 150 for which it proves a
+    Of the first 300 problems the semidefinite bound lies within 1 % of it in 72 %; of the 150 for which it proves a
     factor below 1, in 88 %.
     """
     chains = {seed: chain_of(*case(seed, **SETTINGS)) for seed in range(batch, COUNT, BATCHES)}
@@ -305,7 +305,7 @@ def test_with_little_friction_q_jumps_to_rho_and_is_nearly_attained(k, within):
 
 @dataclass(frozen=True, kw_only=True)
 class Forms:
-    """The quadratic forms of the semidefinite edition, from dense matrices of their own.
+    """The quadratic forms of the semidefinite bound, from dense matrices of their own.
 
     In the vectors (g, p) of a pair: ``p = -S_1 d_1``, ``d_2 = S_2^-1 g``.  Without friction p has no tangential part.
     """

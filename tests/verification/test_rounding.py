@@ -67,7 +67,7 @@ def test_a_matrix_that_is_not_finite_is_not_definite():
     assert not positive_definite(np.array([[np.nan]]), np.zeros((1, 1)))
 
 
-# --- the semidefinite edition -----------------------------------------------------------------------------------------
+# --- the semidefinite bound -----------------------------------------------------------------------------------------
 
 
 def product(a: Exact, b: Exact) -> Exact:
