@@ -1,4 +1,4 @@
-"""Bounds against observation: one honest verdict for each."""
+"""Bounds against observation: a verdict on each bound, with its reason."""
 
 from __future__ import annotations
 
@@ -218,9 +218,41 @@ def compare(
 ) -> Comparison:
     """Measure the constants, evaluate the bounds, run the algorithm, and judge.
 
-    Parameters and errors as for :func:`verification.run`; ``progress`` is told what is being done.  Ctrl-C after the
-    first state of the run leaves out what was still to come: ``run.interrupted`` is true, ``reason`` says what is
-    missing.
+    Ctrl-C after the first iterate of the run leaves out what was still to come: ``run.interrupted`` is true, ``reason``
+    says what is missing.
+
+    Parameters
+    ----------
+    problem : Problem, ContactPair or path
+    theta : number or 'auto', optional
+        Relaxation factor, 0 < theta < 1; the problem's by default.
+    solver : {'auto', 'cvxpy', 'active-set'}
+        Who takes step II.
+    watch : callable
+        Called with every iterate.
+    progress : callable
+        Told what is being done.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    ProblemError
+        Bad input.
+    HypothesisError
+        theta outside (0, 1).
+    ContactError
+        Step II did not reach its KKT certificate at the first iterate.
+
+    Examples
+    --------
+    >>> bars = {"dimension": 1,
+    ...     "body1": {"shape": "interval", "x": [0, 1], "cells": 2, "young": 1, "fixed": ["left"]},
+    ...     "body2": {"shape": "interval", "x": [1, 2], "cells": 2, "young": 3, "prescribed": {"right": -0.1}}}
+    >>> compare(Problem.from_dict(bars)).verdicts["sharp"].verdict
+    'CONSISTENT'
     """
     pair = pair_of(problem)
     measured = measure(pair, progress=progress)

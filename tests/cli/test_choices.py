@@ -1,4 +1,4 @@
-"""`advise`, `region`, `--theta auto`, the sharp edition of `bounds`, and the relaxation rules from a file."""
+"""`advise`, `region`, `--theta auto`, the sharp bound of `bounds`, and the relaxation rules from a file."""
 
 import itertools
 import json
@@ -470,7 +470,7 @@ def test_advise_names_a_file_that_is_no_problem(call, tmp_path, name, fragment):
     assert fragment in complaint
 
 
-# --- the sharp edition of bounds -------------------------------------------------------------------------------------
+# --- the sharp bound of bounds -------------------------------------------------------------------------------------
 
 KAPPAS = ["--rho", "0.475", "--kappa1", "0.986", "--kappa2", "0.427"]
 SECTION_5 = ["--m", "3084", "--M", "153229", "--CR", "1.70", "--CK", "1e-8"]

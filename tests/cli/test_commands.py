@@ -247,7 +247,7 @@ def test_thresholds_are_on_k_where_C_s_and_C_tr_are_known_and_on_C_K_otherwise(c
         ("--rho 3 --theta 0.49", 0),  # 2/(1 + rho) = 1/2
         ("--rho 3 --theta 0.5", 1),
         ("--rho 1 --kappa1 2 --kappa2 1 --theta 0.1", 1),  # kappa_2 + kappa_1^2/4 = 2
-        ("--m 3084 --M 153229 --CR 1.7 --CK 0 --theta 1/2 --rho 1", 0),  # one edition proves it
+        ("--m 3084 --M 153229 --CR 1.7 --CK 0 --theta 1/2 --rho 1", 0),  # one bound proves it
         ("--m 3084 --M 153229 --CR 1.7 --CK 0 --theta 1e-10 --rho 1e20", 0),
     ],
 )

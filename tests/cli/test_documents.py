@@ -34,7 +34,7 @@ CALCULATIONS = {
     "bounds without friction": [*GIVEN, "--k", "0", "--Cs", "0", "--Ctr", "0", "--theta", "1e-4"],
     "bounds without theta": [*GIVEN, "--CK", "1e-8"],
     "bounds of one edition": [*GIVEN, "--CK", "1e-8", "--edition", "printed"],
-    "bounds of every edition": [*GIVEN, "--CK", "1e-8", *ON_ENERGY, "--theta", "1e-4"],
+    "every bound": [*GIVEN, "--CK", "1e-8", *ON_ENERGY, "--theta", "1e-4"],
     "bounds in energy norms": [*ON_ENERGY, "--theta", "1/2"],
     "bounds in energy norms without friction": ["--rho", "3", "--theta", "1/3"],
     "bounds in energy norms without theta": ON_ENERGY,
@@ -248,7 +248,7 @@ def test_a_comparison_holds_constants_bounds_run_and_verdicts(document, edits):
     assert set(found["verdicts"].values()) <= VERDICTS | {None}
 
 
-def test_a_comparison_has_a_verdict_for_every_edition_and_for_the_prediction(document):
+def test_a_comparison_has_a_verdict_for_every_bound_and_for_the_forecast(document):
     found = document(("compare", None))
     assert set(found["verdicts"]) == {"printed", "repaired", "sharp", "lmi", "linearised"}
     names = {"rho", "rho_normal", "kappa_1", "kappa_2", "factor", "theta_proved", "theta_max_proved"}
@@ -256,7 +256,7 @@ def test_a_comparison_has_a_verdict_for_every_edition_and_for_the_prediction(doc
     assert {"factor", "friction_threshold", "certified"} <= set(found["lmi"])
 
 
-def test_the_bounds_of_a_comparison_grow_sharper_from_edition_to_edition(document):
+def test_the_bounds_of_a_comparison_grow_sharper_from_one_to_the_next(document):
     """|J| at most the semidefinite factor, at most the sharp one; thresholds the other way round."""
     found = document(("compare", None))
     assert found["run"]["linearised_norm"] <= found["lmi"]["lipschitz"]["value"]

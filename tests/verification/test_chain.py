@@ -1,7 +1,7 @@
 """One problem after another, from what a run shows to what the theorem proves: each number at most the next.
 
 Observed step ratio, spectral radius and norm of the Jacobian at the solution, largest norm over contact patterns,
-semidefinite bound, theorem in energy norms, repaired edition.
+semidefinite bound, theorem in energy norms, repaired theorem.
 """
 
 from __future__ import annotations
@@ -173,7 +173,7 @@ SETTINGS = {"tolerance": 1e-10, "max_iterations": 200}
 
 
 def allowed(seed: int) -> tuple[ContactPair, Measured, float, np.random.Generator]:
-    """A random problem with a friction and a theta for which the repaired edition proves a factor below 1."""
+    """A random problem with a friction and a theta for which the repaired theorem proves a factor below 1."""
     pair, measured, _, random = case(seed, **SETTINGS)
     k = random.uniform(0, 0.99) * evaluate(REPAIRED, measured.constants()).C2.value
     measured = measured.with_friction(k)

@@ -1,4 +1,4 @@
-"""Interface stiffness matrices from files."""
+"""Reading an interface stiffness matrix from a file of numpy or scipy, which may be damaged or too large."""
 
 from __future__ import annotations
 

@@ -239,10 +239,21 @@ def advise_matrices(S1: Floats, S2: Floats) -> Advice:
     S1, S2 : array, shape (n, n)
         Schur complements of bodies 1 and 2 on the same interface unknowns; symmetric positive definite.
 
+    Returns
+    -------
+    Advice
+
     Raises
     ------
     ValueError
         Matrices that are not square, finite, symmetric or positive definite, or do not fit.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> found = advise_matrices(np.diag([3.0, 2.0]), np.eye(2))
+    >>> found.neumann_body, round(found.best.theta_predicted, 3)
+    (1, 0.8)
     """
     for name, matrix in (("S1", S1), ("S2", S2)):
         check_matrix(name, matrix)
@@ -297,9 +308,15 @@ def advise_run(theta: Any, ratio: Any) -> Advice:
         steps or more, and over ``5/theta`` where these are more; above 1 where the run diverged, and 1 where the
         residual rises and falls and has no steady ratio.
 
+    Returns
+    -------
+    Advice
+        Without roles while several readings are left.
+
     Raises
     ------
     HypothesisError
+        theta or the ratio is no number of its range.
 
     Examples
     --------

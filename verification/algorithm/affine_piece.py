@@ -1,4 +1,4 @@
-"""T near a state: the affine piece of a contact pattern, its Jacobian, and how far it reaches.
+"""T near an iterate: the affine piece of a contact pattern, and its Jacobian there.
 
 T is piecewise affine.  While each node keeps what it does (sticks, slips one way, is open) and S sigma_N keeps its
 sign, steps I and II are linear systems, and the derivatives of their results by g are matrices.
@@ -26,6 +26,7 @@ class Piece(Value):
     Attributes
     ----------
     pair : ContactPair
+        The bodies and the law of friction.
     pattern : Pattern
         What each contact node does.
     sign : int array, shape (t,)

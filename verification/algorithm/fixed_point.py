@@ -25,6 +25,7 @@ class FixedPointMap:
     Parameters
     ----------
     pair : ContactPair
+        The bodies with their loads; its roles say who has step I and who has step II.
     solver : {'auto', 'cvxpy', 'active-set'}
     step : type, optional
         Who takes step II.

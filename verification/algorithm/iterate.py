@@ -29,7 +29,7 @@ class Iterate(Value):
     contact : ContactSolution
         Step II, on the contact grid.
     residual : float
-        ``|||T g - g|||`` in the norm (5.21): judged before relaxation, so that a small theta does not flatter.
+        ``|||T g - g|||`` in the norm (5.21): taken before relaxation, so that it does not become small with theta.
     size : float
         ``|||T g|||``.
     scale : float

@@ -63,7 +63,7 @@ class NotLinear(ValueError):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Near:
-    """T_theta on the affine piece of a state: its Jacobian, and how far the state lies from the piece's fixed point.
+    """T_theta on the affine piece of an iterate: its Jacobian, and how far the iterate lies from its fixed point.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ class _Near:
 
 
 def _near(pair: ContactPair, state: Iterate, theta: float) -> _Near:
-    """Linearise T_theta at a state close to the solution: no node may change its state in between.
+    """Linearise T_theta at an iterate close to the solution: no node may change its state in between.
 
     Raises
     ------
@@ -111,16 +111,17 @@ def _near(pair: ContactPair, state: Iterate, theta: float) -> _Near:
 
 
 def linearise(pair: ContactPair, state: Iterate, theta: float, history: Sequence[Iterate] = ()) -> Linearisation:
-    """Linearise T_theta at the solution next to a state.
+    """Linearise T_theta at the solution next to an iterate.
 
     Parameters
     ----------
     pair : ContactPair
+        What was run.
     state : Iterate
         Close to the solution: no node may change its state in between.
     theta : float
     history : sequence of Iterate
-        The run that led to the state; its error decides what is excited.
+        The run that led there; its error decides what is excited.
 
     Raises
     ------
@@ -154,7 +155,7 @@ def linearise(pair: ContactPair, state: Iterate, theta: float, history: Sequence
 
 @dataclass(frozen=True, kw_only=True)
 class Forecast:
-    """What could be said of the rest of a run half way, from the states up to there alone.
+    """What could be said of the rest of a run half way, from the iterates up to there alone.
 
     Attributes
     ----------
@@ -183,8 +184,9 @@ def forecast(pair: ContactPair, states: Sequence[Iterate], theta: float, toleran
     Parameters
     ----------
     pair : ContactPair
+        What was run.
     states : sequence of Iterate
-        Those after the half-way state are not looked at.
+        The run; those after the one half way are not looked at.
     theta : float
     tolerance : float
         Of the relative residual.

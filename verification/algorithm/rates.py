@@ -1,4 +1,4 @@
-"""The rate a run shows in the norm (5.21), and the largest factor of a single step, with the noise of each state."""
+"""The rate a run shows in the norm (5.21), and the largest factor of a single step, with the noise of each iterate."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class ObservedRate:
     lo, hi : float
         Hull of the rates over that quarter and over the one before it, widened by the noise.
     begin, end : int
-        The states whose residuals it compares.
+        The iterates whose residuals it compares.
     """
 
     value: float
@@ -55,8 +55,8 @@ class ObservedRate:
 def observed_rate(pair: ContactPair, states: Sequence[Iterate]) -> ObservedRate | None:
     """The asymptotic rate, or None where fewer than two step ratios stand clear of the noise.
 
-    Every residual is held against the noise of its own state; after the first one that is not clear of it nothing
-    counts.
+    Every residual is held against the noise of its own iterate; after the first one that is not clear of it
+    nothing counts.
     """
     floors = [noise(pair, state) for state in states]
     clear = [state.residual > CLEAR_OF_NOISE * floor for state, floor in zip(states, floors, strict=True)]
@@ -67,7 +67,7 @@ def observed_rate(pair: ContactPair, states: Sequence[Iterate]) -> ObservedRate 
 
 
 def settled(states: Sequence[Iterate]) -> int:
-    """From which state on the contact pattern is the last one."""
+    """From which iterate on the contact pattern is the last one."""
     first = len(states) - 1
     while first > 0 and states[first - 1].contact.pattern == states[-1].contact.pattern:
         first -= 1
@@ -82,7 +82,7 @@ def rate_at_the_end(residuals: Sequence[float], floors: Sequence[float], since: 
     residuals, floors : sequence of float
         At least three residuals and the noise of each.
     since : int
-        The first state of the final pattern.
+        The first iterate with the final pattern.
     """
     end = len(residuals) - 1
     begin = min(since, end - 2)
@@ -128,7 +128,7 @@ class StepRatio:
 def largest_step_ratio(pair: ContactPair, states: Sequence[Iterate]) -> StepRatio | None:
     """The largest step ratio clear of the noise, or None where there is none.
 
-    A step is judged by the noise of its own two states; it may end below the noise, not begin there.  Steps far above
+    A step is judged by the noise of its own two iterates; it may end below the noise, not begin there.  Steps far above
     it count alone, where there are any.
     """
     if not states:

@@ -239,7 +239,7 @@ class Momentum(Rule):
 
 
 def momentum_rate(rho: float) -> float:
-    """``1 - 1/sqrt(1 + rho)``, what the triple momentum method gains a step.
+    """``1 - 1/sqrt(1 + rho)``, the factor by which the triple momentum method reduces the error in a step.
 
     Examples
     --------

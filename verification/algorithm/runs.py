@@ -45,7 +45,7 @@ PATIENCE = 50
 #: A residual grown by this factor over the first one has diverged.
 RUNAWAY = 1e8
 
-#: What the states of a run may fill, and what each of them takes beside its four arrays: measured.
+#: What the iterates of a run may fill, in bytes, and what each takes beside its four arrays, as measured.
 MOST_BYTES, STATE_BYTES = 2_000_000_000, 1600
 
 
@@ -56,6 +56,7 @@ class Run(Document):
     Attributes
     ----------
     pair : ContactPair
+        What was run, with the settings that ended it.
     rule : Rule
         How each next g was chosen.
     choice : Choice

@@ -64,6 +64,7 @@ def choose(
     Parameters
     ----------
     pair : ContactPair
+        Its settings hold the theta and the rule of the problem.
     theta : number or 'auto', optional
     measured : Measured, optional
         The constants, where they are known already.

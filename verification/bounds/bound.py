@@ -56,6 +56,7 @@ class Subject:
     energy : EnergyConstants or None
         What enters the theorem in energy norms.
     pair : ContactPair or None
+        The bodies; None where constants alone were given.
     measured : Measured or None
         The constants of the pair.
     why : str

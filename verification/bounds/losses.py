@@ -131,7 +131,9 @@ def locate(pair: ContactPair, measured: Measured, *, seed: int = 0, progress: Pr
     Parameters
     ----------
     pair : ContactPair
+        The bodies on whose forces the inequalities are tried.
     measured : Measured
+        Their constants.
     seed : int
         Of the search.
     progress : callable

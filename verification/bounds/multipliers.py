@@ -79,8 +79,9 @@ class QuadraticForms:
     Parameters
     ----------
     pair : ContactPair
+        The bodies whose conditions of step II are multiplied.
     measured : Measured
-        Its constants.
+        Their constants.
     friction : float, optional
         k; the problem's by default.
     nodewise : bool
@@ -290,7 +291,9 @@ def friction_threshold(
     Parameters
     ----------
     pair : ContactPair
+        The bodies, at any friction.
     measured : Measured
+        Their constants.
     start : float
         The threshold of the theorem in energy norms, which is below it.
     progress : callable

@@ -38,11 +38,12 @@ def worst_piece(
 ) -> Found:
     """Search the affine pieces of T for the largest value of a function.
 
-    From each start the state of one node at a time is changed, as long as that helps.
+    From each start what one node does at a time is changed, as long as that helps.
 
     Parameters
     ----------
     pair : ContactPair
+        The bodies; their loads do not matter, as each piece is had for suitable ones.
     measure : callable
         Piece -> value.
     random : Generator

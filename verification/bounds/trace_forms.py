@@ -28,7 +28,9 @@ class TraceForms:
     Parameters
     ----------
     pair : ContactPair
+        The bodies.
     k : float
+        Friction, in place of the pair's.
     S_1 : array, shape (m, m)
         From c to the components of p that are not 0.
     carries : slice

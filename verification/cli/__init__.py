@@ -1,4 +1,4 @@
-"""The command ``ndtheory``: the one door, and the only room that prints."""
+"""The command ``ndtheory``, and the only package that prints."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""Commands for who has to choose: advise, region."""
+"""The commands advise and region: which roles and theta, and where contraction is proved."""
 
 from __future__ import annotations
 

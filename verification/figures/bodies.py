@@ -22,12 +22,12 @@ SHARE = 0.06
 
 
 def draw_bodies(result: Run | Solution) -> Figure:
-    """Deformed meshes above, pressure and shear along Gamma_c below, with the state of each node.
+    """Deformed meshes above, pressure and shear along Gamma_c below, with what each node does.
 
     Parameters
     ----------
     result : Run or Solution
-        Of a run the last state is drawn.
+        Of a run the last iterate is drawn.
     """
     bodies = result.bodies
     moved = [float(np.abs(u).max()) for u in result.displacements if u is not None]

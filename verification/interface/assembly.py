@@ -1,4 +1,4 @@
-"""Problem -> two condensed bodies facing each other along Gamma_c."""
+"""From a problem to its two bodies: meshes, supports, stiffness matrices, Gamma_c, and their condensation onto it."""
 
 from __future__ import annotations
 

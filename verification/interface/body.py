@@ -1,4 +1,4 @@
-"""An elastic body on its mesh, and the same body as its contact nodes feel it."""
+"""An elastic body on its mesh, and the same body condensed onto its contact nodes."""
 
 from __future__ import annotations
 

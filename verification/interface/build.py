@@ -1,4 +1,4 @@
-"""A contact pair from what is at hand: a problem, its file, or matrices."""
+"""A contact pair from a problem, a problem file, an interface file, or matrices."""
 
 from __future__ import annotations
 

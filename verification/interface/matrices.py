@@ -1,4 +1,4 @@
-"""What is an interface stiffness matrix, and what is none."""
+"""Checks of interface stiffness matrices: square, finite, symmetric, positive definite."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ def check_matrix(name: str, matrix: Floats) -> None:
     Raises
     ------
     ValueError
+        Not square, too large, or not finite, symmetric and positive definite.
     """
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not len(matrix):
         raise ValueError(f"{name} is {size(matrix)}: needed a square matrix")

@@ -1,4 +1,4 @@
-"""Problems to test a statement on: random ones with real loads, and bodies on which a printed bound is false."""
+"""Problems to test inequalities on: random ones with loads, and named ones on which a printed bound is false."""
 
 from __future__ import annotations
 

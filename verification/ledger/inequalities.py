@@ -1,4 +1,4 @@
-"""The inequalities of Sections 4 and 5, each with both of its sides, and the search for a pair that breaks one.
+"""The inequalities of Sections 4 and 5, each with both of its sides; :mod:`verification.ledger.worst` searches.
 
 Both sides are functions of a :class:`Difference` and of the constants as an edition reads them; formulas come from
 :mod:`ndtheory.bounds`.  C_tr is the constant into L2(Gamma_c), but in (5.13) ``of="printed"``, which takes (5.8) at its
@@ -209,8 +209,8 @@ class Inequality:
         Of the statement in the ledger.
     of : {'printed', 'step', 'repaired'}
     left, right : callable
-        Difference (or :class:`Trial`), constants, theta -> a number; several numbers are added, or compared one by one
-        where ``about`` is 'bodies'.
+        Difference (or :class:`verification.ledger.worst.Trial`), constants, theta -> a number; several numbers are
+        added, or compared one by one where ``about`` is 'bodies'.
     equality : bool
         Then both sides may be vectors whose Euclidean norm is (5.21).
     about : {'pairs', 'contraction', 'bodies'}

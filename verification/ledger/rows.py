@@ -65,7 +65,14 @@ class Row:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Ledger(Document):
-    """Rows in the order of the paper."""
+    """Rows in the order of the paper.
+
+    Attributes
+    ----------
+    rows : tuple of Row
+    level : {'quick', 'full'}
+        How many problems the discrete evidence took.
+    """
 
     schema: ClassVar[str] = "ndtheory.ledger/1"
 
@@ -112,6 +119,10 @@ def verify(
         How many problems the discrete evidence takes.
     watch : callable
         Receives what is checked and the share of it that is done.
+
+    Returns
+    -------
+    Ledger
 
     Raises
     ------

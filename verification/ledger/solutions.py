@@ -1,4 +1,4 @@
-"""Statements about solutions and iterates, held against whole displacement fields (:mod:`.weak_forms`)."""
+"""Statements about solutions and iterates, held against the weak forms (:mod:`verification.ledger.weak_forms`)."""
 
 from __future__ import annotations
 

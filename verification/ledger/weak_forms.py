@@ -1,10 +1,10 @@
-"""Displacement fields of whole bodies, and the problems of the paper as numbers that vanish or are not negative.
+"""The weak forms of the paper on whole bodies: each equation as a residual, each inequality as left minus right side.
 
 The algorithm works on the interface alone, with condensed matrices.  Here a displacement is the field of a whole body,
 ``a`` and ``L`` are its stiffness matrix and its load, and lifts are solved for anew: a second path to the same numbers.
 
 Indices are the paper's: body 1 is the contact body, body 2 the Neumann body.  Normal components are along n^1, and an
-initial gap d, which the paper has not, makes ``[v_N] <= d`` of ``[v_N] <= 0``.
+initial gap d, which the paper does not have, turns ``[v_N] <= 0`` into ``[v_N] <= d``.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ CONVERGENT: dict[str, dict[str, Any]] = {
         "iteration": {**RUN},
     },
 }
-#: Plane bodies, for the friction of which see ``small_friction``.
+#: Plane bodies; :func:`verification.ledger.convergence.inside` gives them a friction below their C_2.
 PLANE: dict[str, dict[str, Any]] = {
     "squares": {
         "body1": {**SQUARE, "x": [0, 1], "y": [-1, 0], "fixed": ["bottom"]},
@@ -122,7 +122,7 @@ class Fields:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Weak:
-    """The weak forms of a pair, in whole fields."""
+    """The weak forms of a pair of bodies, in displacements of all their nodes."""
 
     pair: ContactPair
 
@@ -466,7 +466,7 @@ def norm(body: Body, field: Floats) -> Floats:
 
 
 def _moved(d: Floats, u: Floats) -> Floats:
-    """The size of v - u; less than any test function moves is what rounding left of one that K did not allow."""
+    """The size of ``v - u``, at least a small share of u: a v cut back to u differs by rounding alone."""
     return np.maximum(d, 1e-5 * u)
 
 

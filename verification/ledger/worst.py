@@ -1,4 +1,4 @@
-"""The worst ratio of each inequality on random problems: the search for a pair that breaks it."""
+"""The search on random problems for a pair of forces that breaks an inequality: the worst ratio of its two sides."""
 
 from __future__ import annotations
 
@@ -34,6 +34,7 @@ class Trial:
     ----------
     name : str
     pair : ContactPair
+        Its bodies.
     measured : Measured
         The constants of the mesh.
     """
@@ -101,7 +102,7 @@ class Trial:
         return np.array([top(one, other), top(other, one)])
 
     def at_share(self, share: Fraction) -> Trial:
-        """The same bodies at a share of the friction C_2 of the repaired edition."""
+        """The same bodies at a share of the friction C_2 of the repaired bound."""
         unit = self.measured.with_friction(1.0).C_K
         k = float(share) * self.reading.threshold / (math.nan if unit is None else unit.value)
         pair = self.pair.at(friction=Fraction(k))

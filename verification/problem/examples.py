@@ -22,6 +22,15 @@ def examples() -> dict[str, str]:
 def example(name: str) -> Problem:
     """A built-in problem.
 
+    Parameters
+    ----------
+    name : str
+        As ``ndtheory example`` lists them.
+
+    Returns
+    -------
+    Problem
+
     Raises
     ------
     ValueError

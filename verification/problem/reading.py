@@ -49,10 +49,25 @@ MOST_BYTES = 1_000_000
 def load(path: Path | str) -> Problem:
     """Read a problem file; decimals are read exactly.
 
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    Problem
+
     Raises
     ------
     ProblemError
         Not a file, not readable, not TOML, or a value that does not fit.
+
+    Examples
+    --------
+    >>> load("nowhere.toml")
+    Traceback (most recent call last):
+        ...
+    verification.problem.tables.ProblemError: nowhere.toml: no such file
     """
     path = Path(path)
     name = str(path)
