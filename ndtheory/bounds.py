@@ -46,7 +46,7 @@ from ndtheory.number import (
     working_precision,
 )
 
-Verdict = Literal["contraction", "no conclusion"]
+Conclusion = Literal["contraction", "no conclusion"]
 
 #: The ends of the open intervals count as outside, decided with a margin far above the rounding of the evaluation.
 MARGIN = Decimal(10) ** -(DIGITS // 2)
@@ -244,7 +244,7 @@ class Bounds:
     theta: float | None
     factor: Number | None
     one_minus_factor: Number | None
-    verdict: Verdict | None
+    verdict: Conclusion | None
     proved: bool
     threshold_on: Literal["k", "C_K"]
 
@@ -329,7 +329,7 @@ def evaluate(edition: Edition, constants: Constants, theta: Any = None) -> Bound
             return rounded(found[name], [corner[end or name] for corner in corners], level)
 
         interval = None if found["high"] is None else (float(found["low"]), float(found["high"]))
-        verdict: Verdict | None = None
+        verdict: Conclusion | None = None
         if chosen is not None:
             verdict = "no conclusion" if found["factor"] is None else "contraction"
         names = ("C_K", "C_T", "C_T_tilde", "C0", "C2", "C3", "C4", "C5", "C6", "factor", "one_minus_factor")

@@ -27,7 +27,7 @@ from decimal import Decimal
 from fractions import Fraction
 from typing import Any
 
-from ndtheory.bounds import MARGIN, Verdict, factor_and_rest
+from ndtheory.bounds import MARGIN, Conclusion, factor_and_rest
 from ndtheory.constants import Given, plain, relaxation_factor
 from ndtheory.number import (
     SLACK,
@@ -383,7 +383,7 @@ class SharpBounds:
     theta: float | None
     factor: Number | None
     one_minus_factor: Number | None
-    verdict: Verdict | None
+    verdict: Conclusion | None
 
     @property
     def reason(self) -> dict[str, str]:
@@ -459,7 +459,7 @@ def evaluate_sharp(constants: EnergyConstants, theta: Any = None) -> SharpBounds
 
         names = ("rho", "kappa_1", "kappa_2", "ratio", "friction_multiple", "friction_limit_multiple")
         proved = ("factor_proved", "theta_max_proved", "factor", "one_minus_factor")
-        verdict: Verdict | None = None
+        verdict: Conclusion | None = None
         if chosen is not None:
             verdict = "no conclusion" if found["factor"] is None else "contraction"
         return SharpBounds(

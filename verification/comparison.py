@@ -37,14 +37,14 @@ TIGHT = 1e-6
 #: A forecast comes true where its rate is the observed one to this, and its steps to one.
 AGREES = 1e-3
 
-Verdict = Literal["CONSISTENT", "VIOLATED", "INCONCLUSIVE", "HYPOTHESES_NOT_MET", "NOT_COMPUTED"]
+RunVerdict = Literal["CONSISTENT", "VIOLATED", "INCONCLUSIVE", "HYPOTHESES_NOT_MET", "NOT_COMPUTED"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Judgement:
     """A verdict on one bound, with its reason in words."""
 
-    verdict: Verdict
+    verdict: RunVerdict
     reason: str
 
 

@@ -33,7 +33,7 @@ from verification.problem.specification import MOST_CELLS, BodySpec, Problem
 from verification.problem.tables import ProblemError, short
 
 #: Interface matrices are dense; more contact nodes would fill the memory.
-MOST_NODES = 2000
+MOST_CONTACT_NODES = 2000
 
 
 def build(problem: Problem, *, law: Law | None = None) -> ContactPair:
@@ -246,8 +246,8 @@ def _check_matching(
                 f" and body 2 has {len(x2)}, which must lie at the same x",
             )
     x = positions[0]
-    if len(x) > MOST_NODES:
-        raise refuse("contact", None, f"needed at most {MOST_NODES} contact nodes, these are {len(x)}")
+    if len(x) > MOST_CONTACT_NODES:
+        raise refuse("contact", None, f"needed at most {MOST_CONTACT_NODES} contact nodes, these are {len(x)}")
     if len(x) < 2 or max(x[0] - ends[0], ends[1] - x[-1]) > SAME * size:
         near = f"from {x[0]:g} to {x[-1]:g}" if len(x) else "nowhere"
         raise refuse(
