@@ -15,6 +15,7 @@ from verification.testing.strategies import (  # noqa: F401  part of what this m
     log_uniform,
     plane_problems,
     thetas,
+    youngs,
 )
 
 # --- the theory: constants m, M, C_R, C_K and the relaxation factor, all rational ------------------------------------
