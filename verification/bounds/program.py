@@ -47,7 +47,8 @@ class Program:
         lengths = [np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1) for a, b in families]
         if not nodewise:
             lengths = [np.full_like(scale, scale.mean()) for scale in lengths]
-        self._scales = lengths  # the solver sees numbers near one in any unit
+        # The solver sees numbers near one in any unit.  A node that no force reaches has the product 0 and no scale.
+        self._scales = [np.where(scale > 0, scale, scale.mean() or 1.0) for scale in lengths]
         self._nodewise = nodewise
         self._variables = [cp.Variable(len(s) if nodewise else 1, nonneg=True) for s in lengths]
 

@@ -48,6 +48,7 @@ def check_bound(bound: Bound, *, examples: int = 20) -> Report:
         The factor is the same with both moduli and all loads 4096 times as large.  Not asked of a bound whose
         violation is a finding (``finding``): that may depend on the unit, and is proved only where m >= 1.
     ``knows no unit of length``
+        The factor is the same with all lengths 1024 times as small, that of the norm too.
     ``sees no left or right``
         The factor is that of the mirror image.
 

@@ -18,8 +18,8 @@ from verification.problem import Problem
 #: Cases are drawn, and the first that fails is made simpler.
 PHASES = (Phase.generate, Phase.shrink)
 
-#: A counterexample is made simpler with at most so many more cases: they cost as much as the others.
-SIMPLER = 10
+#: A counterexample is made simpler with at most so many more draws: they cost as much as the others.
+SIMPLER = 40
 
 
 class Fails(Exception):
@@ -112,7 +112,15 @@ def examine(
         With the simplest case found.
     """
     seen: list[Refused] = []
-    tried = simpler = 0
+    tried = more = 0
+
+    @st.composite
+    def counted(draw: st.DrawFn) -> dict[str, Any]:
+        nonlocal more
+        more += bool(seen)
+        if more > SIMPLER:
+            raise _Enough
+        return draw(cases)
 
     @settings(
         max_examples=examples,
@@ -122,16 +130,13 @@ def examine(
         report_multiple_bugs=False,
         suppress_health_check=list(HealthCheck),
     )
-    @given(case=cases)
+    @given(case=counted())
     def run(case: dict[str, Any]) -> None:
-        nonlocal tried, simpler
+        nonlocal tried
         tried += 1
-        if seen and tried > simpler:
-            raise _Enough
         try:
             test(**case)
         except Fails as failure:
-            simpler = simpler or tried + SIMPLER
             seen.append(Refused(subject, property, str(failure), case))
             raise seen[-1] from None
 
