@@ -1,4 +1,4 @@
-"""The semidefinite edition by SCS and by Clarabel, in turn, and what it adds to `compare` on the model of Section 6.
+"""The semidefinite bound by SCS and by Clarabel, in turn, and what it adds to `compare` on the model of Section 6.
 
 Wanted: the certified factors agree to 1e-3, and SCS at 13 contact nodes is no slower than Clarabel.
 """

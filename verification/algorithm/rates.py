@@ -53,7 +53,7 @@ class ObservedRate:
 
 
 def observed_rate(pair: ContactPair, states: Sequence[Iterate]) -> ObservedRate | None:
-    """The asymptotic rate, or None where fewer than two step ratios stand clear of the noise.
+    """The rate that a run shows at its end, or None where fewer than two step ratios stand clear of the noise.
 
     Every residual is held against the noise of its own iterate; after the first one that is not clear of it
     nothing counts.

@@ -239,7 +239,7 @@ class Momentum(Rule):
 
 
 def momentum_rate(rho: float) -> float:
-    """``1 - 1/sqrt(1 + rho)``, the factor by which the triple momentum method reduces the error in a step.
+    """``1 - 1/sqrt(1 + rho)``, the proved rate of the triple momentum method without friction.
 
     Examples
     --------

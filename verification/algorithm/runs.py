@@ -133,7 +133,7 @@ class Run(Document):
 
     @property
     def observed_rate(self) -> ObservedRate | None:
-        """The asymptotic rate; None where too few steps stand clear of the noise, or the run diverged."""
+        """The rate at the end of the run; None where too few steps stand clear of the noise, or the run diverged."""
         return None if self.outcome == "diverged" else self._at_the_end
 
     @property

@@ -43,7 +43,7 @@ def worst_piece(
     Parameters
     ----------
     pair : ContactPair
-        The bodies; their loads do not matter, as each piece is had for suitable ones.
+        The bodies; their loads do not matter, as each piece occurs for suitable ones.
     measure : callable
         Piece -> value.
     random : Generator

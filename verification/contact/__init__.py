@@ -1,6 +1,6 @@
 """Step II: the contact problem of one body against a given displacement, with a given friction bound.
 
-In v = u1 - u2 (tangential) and v = u1_N - u2_N - gap (normal) it reads
+In v = u1 - u2 (tangential) and v = u1_N - u2_N - gap (normal) it reads::
 
     minimise  1/2 v' S v - q' v + sum_j bound_j |v_T,j|   subject to  v_N <= 0,   q = l1 - S1 (u2 + gap n),
 

@@ -1,4 +1,4 @@
-"""Step II solved: the exact active set, the convex program behind it, one certificate for both."""
+"""Who solves step II: the exact active set first, the convex program where it fails, one certificate for both."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class ContactError(RuntimeError):
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ContactSolution(Value):
-    """A certified solution of step II.
+    """A solution of step II with its KKT residuals; but for :class:`ProgramStep` they are below the tolerance.
 
     Attributes
     ----------

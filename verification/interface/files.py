@@ -1,9 +1,10 @@
 """A contact pair as one file of matrices, ``interface.npz``, which any code can write or read.
 
-Arrays: S1, S2, load1, load2, x, weights, gap; kernel and transfer where there are such; known1, known2, free1, free2
-(which interface components Gamma_u leaves free, and the displacement of the others).  Numbers: friction, neumann_body,
-dimension, theta, tolerance, max_iterations as texts.  Interface vectors list all tangential components from left to
-right, then all normal ones along y.
+Arrays: S1, S2, load1, load2, x, weights, gap; x_neumann and weights_neumann, the nodes of the Neumann body; kernel and
+transfer where there are such; known1, known2, free1, free2 (which interface components Gamma_u leaves free, and the
+displacement of the others).  Texts: friction, neumann_body, dimension, theta, tolerance, max_iterations as numbers are
+written; law and outside, the words of a law of friction; ndtheory, the version.  Interface vectors list all tangential
+components from left to right, then all normal ones along y.
 """
 
 from __future__ import annotations

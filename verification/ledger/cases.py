@@ -97,8 +97,8 @@ def _clamped_plate(thickness: str) -> Mapping[str, Any]:
     }
 
 
-#: Problems on which a bound is false as printed, as the problem file reads them.  Loads do not matter: a pair of forces
-#: in one piece of T is had for suitable loads.
+#: Problems on which a bound is false as printed, as the problem file reads them.  Loads do not matter: every pair of
+#: forces in one piece of T occurs for suitable loads.
 NAMED: Mapping[str, Mapping[str, Any]] = {
     **{f"plate of thickness {t} clamped at one end": _clamped_plate(t) for t in ("0.05", "0.02", "0.01")},
     # the bound (5.30) grows as k for m -> 0, its left side as k^2

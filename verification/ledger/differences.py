@@ -2,7 +2,7 @@
 
 "1" is the contact body and "2" the Neumann body, whatever their numbers in the file.  Pairs come from two sources:
 forces pushed through steps I and II, and directions on the affine pieces of T
-(:mod:`verification.algorithm.affine_piece`), each of which is had for suitable loads.
+(:mod:`verification.algorithm.affine_piece`), each of which occurs for suitable loads.
 """
 
 from __future__ import annotations

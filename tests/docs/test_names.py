@@ -1,0 +1,66 @@
+"""What docstrings refer to exists, and what users call tells its parameters, results, errors and an example."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import inspect
+import pkgutil
+import re
+from types import ModuleType
+
+import pytest
+
+import verification as vf
+
+ROLE = re.compile(r":(?:mod|class|func|data|meth|attr|exc):`~?([\w.]+)`")
+
+
+def modules() -> dict[str, ModuleType]:
+    """Every module of the three packages by name."""
+    tops = [importlib.import_module(name) for name in ("fem1d2d", "ndtheory", "verification")]
+    inside = [found.name for top in tops for found in pkgutil.walk_packages(top.__path__, f"{top.__name__}.")]
+    return {top.__name__: top for top in tops} | {name: importlib.import_module(name) for name in inside}
+
+
+def exists(name: str, module: str) -> bool:
+    """Whether a dotted name is that of a module, of an object or of a field, seen from inside a module."""
+    for full in (name, f"{module}.{name}"):
+        parts = full.split(".")
+        for count in range(len(parts), 0, -1):
+            try:
+                here = importlib.import_module(".".join(parts[:count]))
+            except ImportError:
+                continue
+            for part in parts[count:]:
+                here = getattr(here, part, getattr(here, "__annotations__", {}).get(part))
+            if here is not None:
+                return True
+            break
+    return False
+
+
+def missing(module: str, source: str) -> list[str]:
+    """References of the docstrings and comments of a module to what does not exist."""
+    classes = [node.name for node in ast.walk(ast.parse(source)) if isinstance(node, ast.ClassDef)]
+    seen_from = [module, *(f"{module}.{name}" for name in classes)]  # a method may be named inside its class
+    return [name for name in ROLE.findall(source) if not any(exists(name, place) for place in seen_from)]
+
+
+def test_what_docstrings_refer_to_exists():
+    found = {name: missing(name, inspect.getsource(module)) for name, module in modules().items()}
+    assert {name: names for name, names in found.items() if names} == {}
+
+
+def test_a_reference_to_nothing_is_found():
+    text = '"""See :func:`ndtheory.bounds.evaluate`, :mod:`verification.jacobian`, :class:`Bounds`, :func:`small`."""'
+    assert missing("ndtheory.bounds", text) == ["verification.jacobian", "small"]
+
+
+@pytest.mark.parametrize("name", [name for name in vf.__all__ if inspect.isfunction(getattr(vf, name))])
+def test_a_public_function_tells_its_parameters_results_errors_and_an_example(name):
+    told = inspect.getdoc(getattr(vf, name)) or ""
+    sections = set(re.findall(r"^(\w+)\n-+$", told, re.MULTILINE))
+    assert sections >= {"Parameters", "Raises", "Examples"}
+    assert sections & {"Returns", "Yields"}
+    assert ">>> " in told
