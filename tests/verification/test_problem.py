@@ -14,39 +14,15 @@ import pytest
 import strategies
 from hypothesis import given
 from hypothesis import strategies as st
+from problem_list import bars, small
 
 import verification as vf
 from fem1d2d import rectangle
 from ndtheory import HypothesisError
 from verification.cli.problems import examples
 
-PLANE = {
-    "body1": {
-        "shape": "rectangle",
-        "x": [0, 2],
-        "y": ["-0.3", 0],
-        "cells": [10, 2],
-        "young": 70000,
-        "poisson": "0.3",
-        "fixed": ["bottom"],
-    },
-    "body2": {
-        "shape": "rectangle",
-        "x": ["0.4", "1.6"],
-        "y": [0, "0.3"],
-        "cells": [6, 2],
-        "young": 20000,
-        "poisson": "0.3",
-        "prescribed": {"top": [0, "-0.015"]},
-    },
-    "contact": {"friction": "0.2", "radius": "0.3"},
-    "iteration": {"neumann_body": 1, "theta": "0.7"},
-}
-BARS = {
-    "dimension": 1,
-    "body1": {"shape": "interval", "x": [0, 1], "cells": 8, "young": 3, "fixed": ["left"]},
-    "body2": {"shape": "interval", "x": [1, 2], "cells": 8, "young": 1, "prescribed": {"right": "-0.1"}},
-}
+PLANE = small()
+BARS = bars((1, 1), (3, 1), (8, 8))
 
 
 def changed(data, key, value):
@@ -139,10 +115,15 @@ def test_what_is_left_out_takes_its_default():
     assert iteration.tolerance == 1e-9
 
 
+def numbers(result):
+    """The document of a result without the problem, which tells how it was given."""
+    return {key: value for key, value in result.to_dict().items() if key != "problem"}
+
+
 def test_contact_reaches_as_far_as_the_bodies_overlap():
     whole = vf.measure(plane())
     assert whole.interface_nodes == 7
-    assert vf.measure(plane("contact.interval", ["0.4", "1.6"])).to_dict() == whole.to_dict()
+    assert numbers(vf.measure(plane("contact.interval", ["0.4", "1.6"]))) == numbers(whole)
     assert vf.measure(plane("contact.interval", ["0.8", "1.2"])).interface_nodes == 3
 
 
@@ -401,7 +382,7 @@ def meshed(folder, version="2.2", order=None):
 @pytest.mark.parametrize("version", ["2.2", "4.1"])
 def test_a_rectangle_from_a_mesh_file_is_the_built_in_one(tmp_path, version):
     from_file, built_in = vf.compare(meshed(tmp_path, version)), vf.compare(plane())
-    assert from_file.to_dict() == built_in.to_dict()
+    assert numbers(from_file) == numbers(built_in)
 
 
 def test_the_numbering_of_a_mesh_file_does_not_matter(tmp_path):
@@ -419,7 +400,7 @@ def test_the_numbering_of_a_mesh_file_does_not_matter(tmp_path):
 def test_one_body_from_a_file_meets_a_built_in_one(tmp_path):
     both = meshed(tmp_path)
     mixed = dataclasses.replace(both, body2=plane().body2)
-    assert vf.run(mixed).to_dict() == vf.run(plane()).to_dict()
+    assert numbers(vf.run(mixed)) == numbers(vf.run(plane()))
 
 
 def test_a_mesh_is_looked_for_beside_its_problem_file(tmp_path, monkeypatch):
