@@ -23,7 +23,10 @@ from verification.output.report import report
 ONE_STEP = {"theta": "0.7", "max_iterations": 1}
 FIGURES = {f"{figure}.{ending}" for figure in ("bodies", "residuals") for ending in ("svg", "png")}
 DRAWN = {"compare.json", "report.html", "waterfall.svg", "waterfall.png"}
-WRITTEN = {"run": FIGURES | {"run.json"}, "comparison": FIGURES | DRAWN}
+TABLES = {"problem.toml", "history.csv", "contact.csv", "interface.npz"}
+WRITTEN = {"run": FIGURES | TABLES | {"run.json"}, "comparison": FIGURES | TABLES | DRAWN}
+#: A problem.toml of a user stays as it is, and nothing is refused.
+REFUSED = sorted(WRITTEN["comparison"] - {"problem.toml"})
 
 #: Titles that could leave their place in a file.
 TITLES = {
@@ -112,7 +115,7 @@ def test_a_comparison_takes_the_place_of_the_run_before_it(quick, results, tmp_p
 @pytest.mark.parametrize(
     ("name", "foreign"),
     [
-        *((name, b"my own") for name in sorted(WRITTEN["comparison"])),
+        *((name, b"my own") for name in REFUSED),
         ("report.html", b""),
         ("report.html", b"measured with ndtheory, by hand"),
         ("compare.json", b'{"note": "beside ndtheory"}'),
@@ -127,7 +130,7 @@ def test_a_file_of_somebody_else_is_kept_and_nothing_is_written_beside_it(quick,
     assert contents(tmp_path) == {name: foreign}
 
 
-@pytest.mark.parametrize("name", sorted(WRITTEN["comparison"]))
+@pytest.mark.parametrize("name", REFUSED)
 def test_a_folder_in_the_place_of_a_file_is_refused(quick, results, tmp_path, name):
     (tmp_path / name).mkdir()
     with pytest.raises(vf.ProblemError, match=re.escape(name)):
