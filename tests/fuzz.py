@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from problem_list import SMALL, edited
 
 from fem1d2d import Mesh, MeshError, from_file, rectangle
 from fem1d2d.mesh import measures
@@ -32,48 +33,21 @@ from verification.cli.problems import examples
 #: Seconds of computing for an answer, whatever else the machine does.
 LIMIT = 30
 
-PLANE = """title = "small"
-dimension = 2
-[units]
-length = "mm"
-stress = "MPa"
-[body1]
-shape = "rectangle"
-x = [0.0, 2.0]
-y = [-0.3, 0.0]
-cells = [10, 2]
-young = 7.0e4
-poisson = 0.3
-fixed = ["bottom"]
-prescribed = {}
-traction = { right = [0.0, 0.0] }
-body_force = [0.0, 0.0]
-[body2]
-shape = "rectangle"
-x = [0.4, 1.6]
-y = [0.0, 0.3]
-cells = [6, 2]
-young = 2.0e4
-poisson = 0.3
-fixed = []
-prescribed = { top = [0.0, -0.015] }
-traction = {}
-body_force = [0.0, 0.0]
-[contact]
-interval = [0.4, 1.6]
-friction = 0.2
-law = "nonlocal"
-radius = 0.2
-gap = 0.0
-[iteration]
-neumann_body = 1
-theta = 0.7
-relaxation = "constant"
-tolerance = 1e-9
-max_iterations = 60
-[norm]
-length = 1.0
-"""
+#: `SMALL` with nearly every key that a file may have.
+PLANE = edited(
+    SMALL.replace("\n\n", "\n"),
+    {
+        "body1.prescribed": "{}",
+        "body1.traction": "{ right = [0.0, 0.0] }",
+        "body2.fixed": "[]",
+        "body2.traction": "{}",
+        "body2.body_force": "[0.0, 0.0]",
+        "contact.interval": "[0.4, 1.6]",
+        "contact.gap": "0.0",
+        "iteration.relaxation": '"constant"',
+        "iteration.max_iterations": "60",
+    },
+)
 MESHED = re.sub(r'shape = "rectangle"\nx = \[0.0, 2.0\]\ny = .*\ncells = .*\n', 'mesh = "body.msh"\n', PLANE, count=1)
 BASES = (PLANE, PLANE, examples()["two-bars"])
 

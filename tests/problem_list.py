@@ -1,74 +1,219 @@
-"""Named problems of many kinds as dictionaries of the problem file: both sides of a comparison solve them all."""
+"""The problems of the tests, by name, and small builders of more: dictionaries of the problem file, and one file.
+
+Numbers are whole or decimals in quotes, so that they are exact.
+"""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-
-def plates(**changes: Any) -> dict[str, Any]:
-    """A small Section 6; keyword ``body1_young`` changes ``body1.young``, and so on."""
-    problem: dict[str, Any] = {
-        "body1": {
-            "shape": "rectangle", "x": [0, 2], "y": ["-0.3", 0], "cells": [20, 3], "young": 70000, "poisson": "0.3",
-            "fixed": ["bottom"],
-        },
-        "body2": {
-            "shape": "rectangle", "x": ["0.4", "1.6"], "y": [0, "0.3"], "cells": [12, 3], "young": 20000,
-            "poisson": "0.3", "prescribed": {"top": [0, "-0.015"]},
-        },
-        "contact": {"friction": "0.2", "radius": "0.2"},
-        "iteration": {"neumann_body": 1, "theta": "0.7", "tolerance": 1e-12, "max_iterations": 3000},
-    }  # fmt: skip
-    for key, value in changes.items():
-        table, name = key.split("_", 1)
-        if value is None:
-            problem[table].pop(name, None)
-        else:
-            problem[table][name] = value
-    return problem
+LOWER = {"shape": "rectangle", "x": [0, 2], "y": ["-0.3", 0], "cells": [10, 2], "young": 70000, "poisson": "0.3"}
+UPPER = {"shape": "rectangle", "x": ["0.4", "1.6"], "y": [0, "0.3"], "cells": [6, 2], "young": 20000, "poisson": "0.3"}
+#: The Section 6 model on its coarsest mesh, with 7 contact nodes.
+SECTION_6 = {
+    "body1": LOWER | {"fixed": ["bottom"]},
+    "body2": UPPER | {"prescribed": {"top": [0, "-0.015"]}},
+    "contact": {"friction": "0.2", "radius": "0.2"},
+    "iteration": {"neumann_body": 1, "theta": "0.7"},
+}
+SHEARED = {"top": ["0.006", "-0.015"]}
 
 
-def bars(**changes: Any) -> dict[str, Any]:
-    """Two bars."""
-    problem: dict[str, Any] = {
-        "dimension": 1,
-        "body1": {"shape": "interval", "x": [0, 1], "cells": 3, "young": 3, "fixed": ["left"]},
-        "body2": {"shape": "interval", "x": [1, 3], "cells": 5, "young": 2, "prescribed": {"right": "-0.1"}},
-        "contact": {},
-        "iteration": {"neumann_body": 2, "theta": "0.3", "tolerance": 1e-12, "max_iterations": 3000},
-    }
-    for key, value in changes.items():
-        table, name = key.split("_", 1)
-        problem[table][name] = value
-    return problem
+def changed(base: Mapping[str, Any] = SECTION_6, **tables: Mapping[str, Any]) -> dict[str, Any]:
+    """The problem with some keys of some tables replaced, or taken out where they are None."""
+    merged = {name: {**base.get(name, {}), **keys} for name, keys in tables.items()}
+    return {**base, **{name: {k: v for k, v in table.items() if v is not None} for name, table in merged.items()}}
 
 
+def small(**tables: Mapping[str, Any]) -> dict[str, Any]:
+    """Section 6 on its coarsest mesh, the kernel wider than a cell by half."""
+    return changed(changed(contact={"radius": "0.3"}), **tables)
+
+
+def plates(**tables: Mapping[str, Any]) -> dict[str, Any]:
+    """Section 6 with 13 contact nodes, iterated to rounding."""
+    finer = changed(
+        body1={"cells": [20, 3]}, body2={"cells": [12, 3]}, iteration={"tolerance": 1e-12, "max_iterations": 3000}
+    )
+    return changed(finer, **tables)
+
+
+def blocks(
+    width: Any = 1,
+    heights: Sequence[Any] = (1, 1),
+    cells: Sequence[Sequence[int]] = ((4, 2), (4, 2)),
+    young: Sequence[Any] = (3, 2),
+    poisson: Sequence[Any] = ("0.3", "0.3"),
+    **tables: Any,
+) -> dict[str, Any]:
+    """Two rectangles of equal width, the lower one clamped below, the upper one pressed down at its top."""
+    y = ([f"-{heights[0]}", 0], [0, heights[1]])
+    body1, body2 = (
+        {"shape": "rectangle", "x": [0, width], "y": y[i], "cells": list(cells[i])}
+        | {"young": young[i], "poisson": poisson[i]}
+        for i in range(2)
+    )
+    held = {"body1": body1 | {"fixed": ["bottom"]}, "body2": body2 | {"prescribed": {"top": [0, "-1/50"]}}}
+    return changed(held, **tables)
+
+
+def bars(
+    lengths: Sequence[Any] = (1, 2),
+    young: Sequence[Any] = (3, 2),
+    cells: Sequence[int] = (3, 5),
+    start: Any = 0,
+    **tables: Mapping[str, Any],
+) -> dict[str, Any]:
+    """Two bars in a row, the first held at its left end, the second pushed at its right end."""
+    ends = [start, start + lengths[0], start + lengths[0] + lengths[1]]
+    one, two = ({"shape": "interval", "x": ends[i : i + 2], "cells": cells[i], "young": young[i]} for i in range(2))
+    pushed = {"body1": one | {"fixed": ["left"]}, "body2": two | {"prescribed": {"right": "-0.1"}}}
+    return changed({"dimension": 1, **pushed}, **tables)
+
+
+def loaded_bars(lengths: Sequence[Any], young: Sequence[Any], theta: Any, **contact: Any) -> dict[str, Any]:
+    """Two bars with body forces, the second pushed against the first."""
+    one, two = {"body_force": "0.1"}, {"body_force": "-0.2", "prescribed": {"right": "-0.2"}}
+    return bars(lengths, young, (3, 2), body1=one, body2=two, contact=contact, iteration={"theta": theta})
+
+
+BARS = bars(iteration={"neumann_body": 2, "theta": "0.3", "tolerance": 1e-12, "max_iterations": 3000})
+
+#: Problems that one solve answers in either role: at 0.9 or the theta of rho the run converges.
 PROBLEMS: dict[str, dict[str, Any]] = {
     "Section 6, centred": plates(),
-    "local law": plates(contact_law="local", contact_radius=None),
-    "no friction": plates(contact_friction=0),
-    "much friction": plates(contact_friction="0.8"),
-    "left edges aligned": plates(body2_x=[0, "1.2"]),
+    "local law": plates(contact={"law": "local", "radius": None}),
+    "no friction": plates(contact={"friction": 0}),
+    "much friction": plates(contact={"friction": "0.8"}),
+    "left edges aligned": plates(body2={"x": [0, "1.2"]}),
     "part of the top moved, so that it opens": plates(
-        body2_prescribed={"left": ["0", "free"], "top": [0, "-0.01"]}, body2_x=[0, "1.2"],
-        contact_interval=["0.1", "1.2"],
+        body2={"prescribed": {"left": ["0", "free"], "top": [0, "-0.01"]}, "x": [0, "1.2"]},
+        contact={"interval": ["0.1", "1.2"]},
     ),
-    "pushed sideways": plates(body2_prescribed={"top": ["0.01", "-0.01"]}, contact_friction="0.4"),
+    "pushed sideways": plates(body2={"prescribed": {"top": ["0.01", "-0.01"]}}, contact={"friction": "0.4"}),
     "a gap that closes in part": plates(
-        body2_prescribed={"top": ["0", "-0.02"]}, contact_gap="0.012", body2_body_force=[0, -3000]
+        body2={"prescribed": {"top": ["0", "-0.02"]}, "body_force": [0, -3000]}, contact={"gap": "0.012"}
     ),
-    "a gap that never closes": plates(contact_gap="0.1"),
+    "a gap that never closes": plates(contact={"gap": "0.1"}),
     "a bent plate": plates(
-        body2_prescribed=None, body2_fixed=["left"], body2_traction={"right": [0, -40]},
-        contact_interval=["0.8", "1.6"],
-        contact_friction="0.3", body2_young=200000, body2_y=[0, "0.6"],
+        body2={
+            "prescribed": None, "fixed": ["left"], "traction": {"right": [0, -40]}, "young": 200000, "y": [0, "0.6"]
+        },
+        contact={"interval": ["0.8", "1.6"], "friction": "0.3"},
     ),
-    "narrow below": plates(body1_x=["0.8", "1.2"], body1_cells=[4, 3]),
-    "soft below": plates(body1_young=20000, body2_young=20000, iteration_theta="0.5"),
-    "other units": plates(body1_young="7e-2", body2_young="2e-2"),
-    "thin and long": plates(body1_y=["-0.1", 0], body1_cells=[20, 2], body2_y=[0, "0.05"], body2_cells=[12, 1]),
-    "bars": bars(),
-    "bars with a gap": bars(contact_gap="0.04"),
-    "bars that part": bars(body2_prescribed={"right": "0.1"}),
-    "bars under load": bars(body1_body_force=["0.2"], body2_prescribed={"right": "-0.01"}),
+    "narrow below": plates(body1={"x": ["0.8", "1.2"], "cells": [4, 3]}),
+    "soft below": plates(body1={"young": 20000}, body2={"young": 20000}, iteration={"theta": "0.5"}),
+    "other units": plates(body1={"young": "7e-2"}, body2={"young": "2e-2"}),
+    "thin and long": plates(body1={"y": ["-0.1", 0], "cells": [20, 2]}, body2={"y": [0, "0.05"], "cells": [12, 1]}),
+    "bars": BARS,
+    "bars with a gap": changed(BARS, contact={"gap": "0.04"}),
+    "bars that part": changed(BARS, body2={"prescribed": {"right": "0.1"}}),
+    "bars under load": changed(BARS, body1={"body_force": ["0.2"]}, body2={"prescribed": {"right": "-0.01"}}),
 }  # fmt: skip
+
+#: Problems on coarse meshes whose states are followed one by one, with forces at their limit and a theta for the role.
+FOLLOWED: dict[str, dict[str, Any]] = {
+    "section 6": changed(),
+    "roles of section 3": changed(
+        body1={"young": 20000}, body2={"young": 70000}, iteration={"neumann_body": 2, "theta": "0.6"}
+    ),
+    "without friction": changed(contact={"friction": 0}),
+    "all stick": changed(contact={"friction": 1}),
+    "sheared until it slips": changed(body2={"prescribed": SHEARED}, contact={"friction": "0.1"}),
+    "local law": changed(body2={"prescribed": SHEARED}, contact={"law": "local"}),
+    "wide kernel": changed(body2={"prescribed": SHEARED}, contact={"radius": "1.2", "friction": "0.3"}),
+    "kernel narrower than a cell": changed(contact={"radius": "0.05", "friction": "0.02"}),
+    "initial gap, lifted on one side": changed(
+        body2={"prescribed": {"top": [0, "-0.006"]}, "traction": {"right": [0, 9000]}}, contact={"gap": "0.005"}
+    ),
+    "soft unit of stress": changed(body1={"young": "0.07"}, body2={"young": "0.02"}),
+    "hard unit of stress": changed(body1={"young": 7 * 10**10}, body2={"young": 2 * 10**10}),
+    "thin layer": changed(
+        body2={"y": [0, "0.02"], "prescribed": {"top": ["0.001", "-0.001"]}}, iteration={"theta": "0.3"}
+    ),
+    "narrow lower body": changed(
+        body1={"x": ["0.8", "1.4"], "cells": [3, 2]}, body2={"prescribed": SHEARED}, iteration={"theta": "0.4"}
+    ),
+    "nearly incompressible": changed(body1={"poisson": "0.49"}, body2={"poisson": "0.45", "prescribed": SHEARED}),
+    "auxetic": changed(body1={"poisson": "-0.5"}, body2={"poisson": "-0.4", "prescribed": SHEARED}),
+    "held by a side": changed(
+        body1={"fixed": ["left"], "body_force": [0, -30]}, contact={"interval": ["0.4", "1.6"]}
+    ),
+    "on rollers": changed(
+        body1={"fixed": [], "prescribed": {"bottom": ["free", 0], "left": [0, "free"]}}, body2={"prescribed": SHEARED}
+    ),
+    "contact nodes held tangentially": changed(
+        body1={
+            "x": ["0.4", "1.6"], "cells": [6, 2], "fixed": [], "prescribed": {"bottom": [0, 0], "left": [0, "free"]}
+        },
+        body2={"prescribed": SHEARED},
+    ),
+    "bars": loaded_bars((1, 2), (3, 2), "0.2"),
+    "bars with a gap": loaded_bars((2, 1), (1, 4), "0.6", gap="0.05"),
+}  # fmt: skip
+
+#: `small` as a user may write it, every default in it.
+SMALL = """\
+title = "Small"
+dimension = 2
+
+[units]
+length = "mm"
+stress = "MPa"
+
+[body1]
+shape = "rectangle"
+x = [0.0, 2.0]
+y = [-0.3, 0.0]
+cells = [10, 2]
+young = 7.0e4
+poisson = 0.3
+fixed = ["bottom"]
+body_force = [0.0, 0.0]
+
+[body2]
+shape = "rectangle"
+x = [0.4, 1.6]
+y = [0.0, 0.3]
+cells = [6, 2]
+young = 2.0e4
+poisson = 0.3
+prescribed = { top = [0.0, -0.015] }
+
+[contact]
+friction = 0.2
+law = "nonlocal"
+radius = 0.3
+
+[iteration]
+neumann_body = 1
+theta = 0.7
+tolerance = 1e-9
+max_iterations = 500
+
+[norm]
+length = 1.0
+"""
+
+
+def put(text: str, key: str, value: str | None) -> str:
+    """A problem file with one key set, added or, for None, taken out; a dotless key stands at the top."""
+    table, _, name = key.rpartition(".")
+    parts = re.split(r"^(?=\[)", text, flags=re.M)
+    index = next((i for i, part in enumerate(parts) if part.startswith(f"[{table}]")), 0 if not table else len(parts))
+    if index == len(parts):
+        parts.append(f"[{table}]\n")
+    lines = [line for line in parts[index].splitlines() if line.partition("=")[0].strip() != name]
+    if value is not None:
+        lines.insert(1 if table else 0, f"{name} = {value}")
+    parts[index] = "\n".join(lines) + "\n"
+    return "".join(parts)
+
+
+def edited(text: str, edits: Mapping[str, str | None]) -> str:
+    """A problem file with several keys put."""
+    for key, value in edits.items():
+        text = put(text, key, value)
+    return text

@@ -1,56 +1,14 @@
 """The command in process: what a user types, and what comes back."""
 
 import json
-import re
 from contextlib import contextmanager
 from dataclasses import dataclass
 
 import pytest
+from problem_list import SMALL, edited
 
 from verification import figures
 from verification.cli import main, problems
-
-SMALL = """\
-title = "Small"
-dimension = 2
-
-[units]
-length = "mm"
-stress = "MPa"
-
-[body1]
-shape = "rectangle"
-x = [0.0, 2.0]
-y = [-0.3, 0.0]
-cells = [10, 2]
-young = 7.0e4
-poisson = 0.3
-fixed = ["bottom"]
-body_force = [0.0, 0.0]
-
-[body2]
-shape = "rectangle"
-x = [0.4, 1.6]
-y = [0.0, 0.3]
-cells = [6, 2]
-young = 2.0e4
-poisson = 0.3
-prescribed = { top = [0.0, -0.015] }
-
-[contact]
-friction = 0.2
-law = "nonlocal"
-radius = 0.3
-
-[iteration]
-neumann_body = 1
-theta = 0.7
-tolerance = 1e-9
-max_iterations = 500
-
-[norm]
-length = 1.0
-"""
 
 #: Edits that open the file's gap so far that the bodies never meet, or all but meet, that load nothing, that end inside
 #: the theorem.
@@ -72,20 +30,6 @@ EDITS = {
     "stiff upper body": {"body2.young": "2e10"},
     "below rounding": {"iteration.tolerance": "1e-20"},
 }
-
-
-def put(text: str, key: str, value: str | None) -> str:
-    """A problem file with one key set, added or, for None, taken out; a dotless key stands at the top."""
-    table, _, name = key.rpartition(".")
-    parts = re.split(r"^(?=\[)", text, flags=re.M)
-    index = next((i for i, part in enumerate(parts) if part.startswith(f"[{table}]")), 0 if not table else len(parts))
-    if index == len(parts):
-        parts.append(f"[{table}]\n")
-    lines = [line for line in parts[index].splitlines() if line.partition("=")[0].strip() != name]
-    if value is not None:
-        lines.insert(1 if table else 0, f"{name} = {value}")
-    parts[index] = "\n".join(lines) + "\n"
-    return "".join(parts)
 
 
 @dataclass(frozen=True)
@@ -139,10 +83,8 @@ def write(tmp_path):
     """Write a problem, the small one, with keys changed by name of `EDITS` or as a dictionary; returns its path."""
 
     def write(edits: str | dict[str, str | None] | None = None, name: str = "problem.toml", text: str = SMALL):
-        for key, value in (EDITS[edits] if isinstance(edits, str) else edits or {}).items():
-            text = put(text, key, value)
         path = tmp_path / name
-        path.write_text(text, encoding="utf-8")
+        path.write_text(edited(text, EDITS[edits] if isinstance(edits, str) else edits or {}), encoding="utf-8")
         return path
 
     return write

@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from problem_list import SMALL, edited
 
 import verification as vf
 from ndtheory import PRINTED, REPAIRED, EnergyConstants, evaluate, evaluate_sharp
@@ -690,13 +691,8 @@ def test_an_unknown_rule_is_refused_with_the_known_ones(call, write, word):
 @pytest.fixture(scope="module")
 def charted(tmp_path_factory):
     """The plane of a coarse mesh, drawn once."""
-    from conftest import SMALL, put
-
-    text = SMALL
-    for key, value in COARSE.items():
-        text = put(text, key, value)
     file = tmp_path_factory.mktemp("plane") / "problem.toml"
-    file.write_text(text, encoding="utf-8")
+    file.write_text(edited(SMALL, COARSE), encoding="utf-8")
     problem = vf.load(file)
     shares = []
     told = lambda what, share: shares.append(share) if what.startswith("runs") else None

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from sample_problems import changed
+from problem_list import changed
 
 import verification as vf
 from verification.advice.roles import advise_run

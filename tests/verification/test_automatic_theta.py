@@ -7,7 +7,7 @@ from fractions import Fraction as F
 
 import numpy as np
 import pytest
-from sample_problems import changed
+from problem_list import changed
 
 import verification as vf
 from ndtheory import EnergyConstants, evaluate_sharp

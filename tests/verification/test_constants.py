@@ -13,6 +13,7 @@ import strategies
 from dense_oracle import DenseBody, DensePair, top
 from hypothesis import given
 from hypothesis import strategies as st
+from problem_list import bars, changed
 from scipy.linalg import eigh
 
 import verification as vf
@@ -241,22 +242,14 @@ def test_mirror_images_differ_by_the_ratio_of_their_moduli_alone(data, factor):
     assert found["C_R"] >= 1 - 1e-9
 
 
-SECTION_6 = {
-    "body1": {"shape": "rectangle", "x": [0, 2], "y": ["-0.3", 0], "young": 70000, "poisson": "0.3"}
-    | {"fixed": ["bottom"]},
-    "body2": {"shape": "rectangle", "y": [0, "0.3"], "young": 20000, "poisson": "0.3"}
-    | {"prescribed": {"top": [0, "-0.015"]}},
-    "contact": {"friction": "0.2", "radius": "0.1"},
-    "iteration": {"neumann_body": 1},
-}
-
-
 def section_6(rows: int, per_length: int, left: str = "0.4") -> dict[str, Any]:
     """Square or flat cells: `per_length` of them in a length of 1, `rows` in the thickness."""
     ends = [Fraction(left), Fraction(left) + Fraction(6, 5)]
-    below = SECTION_6["body1"] | {"cells": [2 * per_length, rows]}
-    above = SECTION_6["body2"] | {"x": ends, "cells": [per_length * 6 // 5, rows]}
-    return SECTION_6 | {"body1": below, "body2": above}
+    return changed(
+        body1={"cells": [2 * per_length, rows]},
+        body2={"x": ends, "cells": [per_length * 6 // 5, rows]},
+        contact={"radius": "0.1"},
+    )
 
 
 @pytest.mark.parametrize(("rows", "per_length", "left"), [(2, 10, "0.4"), (2, 10, "0"), (4, 20, "0.2"), (6, 20, "0.4")])
@@ -293,11 +286,10 @@ def test_rho_normal_may_exceed_the_ratio_of_the_moduli_where_the_diagonals_of_th
 # --- two bars ---------------------------------------------------------------------------------------------------------
 
 
-def bars(length1, length2, young1, young2, cells: int = 1, neumann_body: int = 2) -> dict[str, float]:
-    """The constants of two bars."""
-    one = {"shape": "interval", "x": [-length1, 0], "cells": cells, "young": young1, "fixed": ["left"]}
-    two = {"shape": "interval", "x": [0, length2], "cells": cells, "young": young2, "fixed": ["right"]}
-    return values({"dimension": 1, "body1": one, "body2": two, "iteration": {"neumann_body": neumann_body}})
+def of_bars(lengths, young, cells: int = 1, neumann_body: int = 2) -> dict[str, float]:
+    """The constants of two bars that meet at 0."""
+    role = {"neumann_body": neumann_body}
+    return values(bars(lengths, young, (cells, cells), -lengths[0], iteration=role))
 
 
 lengths = strategies.decimals(-1.5, 1)
@@ -309,7 +301,7 @@ def test_two_bars_on_a_mesh_have_closed_forms(L1, L2, young, cells):
 
     So ``a/|.|^2 = E l/(l + 1)``, least at j = 1, largest at j = n. S_a = E_a/L_a; the lift is linear.
     """
-    found = bars(L1, L2, *young, cells)
+    found = of_bars((L1, L2), young, cells)
     expected = {}
     for i, (L, E) in enumerate(zip((float(L1), float(L2)), map(float, young), strict=True), 1):
         for name, j in (("m", 1), ("M", cells)):
@@ -321,7 +313,7 @@ def test_two_bars_on_a_mesh_have_closed_forms(L1, L2, young, cells):
     rho = float(young[0] / L1 / (young[1] / L2))
     close(found, expected)
     close(found, {"rho_max": rho, "rho_min": rho, "rho_normal": rho}, 1e-12)
-    close(bars(L1, L2, *young, cells, neumann_body=1), {"rho_max": 1 / rho}, 1e-12)
+    close(of_bars((L1, L2), young, cells, neumann_body=1), {"rho_max": 1 / rho}, 1e-12)
 
 
 @pytest.mark.parametrize(("L1", "L2", "young"), [(1, 1, (1, 1)), (Fraction(1, 3), 2, (70000, 20000)), (3, 2, (1, 40))])
@@ -334,7 +326,7 @@ def test_refined_bars_reach_the_closed_forms_of_the_continuum_by_a_quarter_each_
     limits["C_R"] = np.sqrt(max((a / 3 + 1 / a) * np.tanh(b) for a in both for b in both))
     errors = {name: [] for name in limits}
     for cells in (8, 16, 32, 64):
-        found = bars(L1, L2, *young, cells)
+        found = of_bars((L1, L2), young, cells)
         for name, limit in limits.items():
             errors[name].append(found[name] - limit)
     for name, error in errors.items():

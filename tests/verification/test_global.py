@@ -62,7 +62,9 @@ def section6_local(level: int) -> vf.Problem:
     """Matching grids with a node at every tabulated position, 2^level times as fine."""
     n = 2**level
     return vf.Problem.from_dict(
-        plates(contact_law="local", contact_radius=None, body1_cells=[40 * n, 6 * n], body2_cells=[24 * n, 6 * n])
+        plates(
+            body1={"cells": [40 * n, 6 * n]}, body2={"cells": [24 * n, 6 * n]}, contact={"law": "local", "radius": None}
+        )
     )
 
 
@@ -231,9 +233,7 @@ def test_a_uniform_stress_passes_the_interface_to_rounding(law: str) -> None:
 
 
 def test_a_bar_on_an_obstacle_is_its_closed_form() -> None:
-    problem = bars(body1_shape="rigid", body1_x=[0, 1])
-    for key in ("cells", "young", "fixed"):
-        del problem["body1"][key]
+    problem = bars() | {"body1": {"shape": "rigid", "x": [0, 1]}}
     contact = vf.solve(vf.Problem.from_dict(problem)).contact
     assert contact.pressure[0] == pytest.approx(2 / 2 * 0.1, rel=1e-14)
 
@@ -313,20 +313,19 @@ def test_each_broken_condition_raises_the_residual() -> None:
 
 
 def test_a_rigid_body_in_the_iteration_is_refused_in_words() -> None:
-    problem = plates()
-    problem["body1"] = {"shape": "rigid"}
+    problem = plates() | {"body1": {"shape": "rigid"}}
     with pytest.raises(vf.ProblemError, match=r"body1\.shape = \"rigid\".*Neumann problem"):
         vf.run(vf.Problem.from_dict(problem))
 
 
 def test_a_body_held_by_nothing_but_contact_is_refused_by_name() -> None:
     with pytest.raises(vf.ProblemError, match="body2 can move rigidly, held by nothing but contact"):
-        vf.solve(vf.Problem.from_dict(plates(body2_prescribed=None, body2_traction={"top": [0, -1]})))
+        vf.solve(vf.Problem.from_dict(plates(body2={"prescribed": None, "traction": {"top": [0, -1]}})))
 
 
 def test_a_body_that_contact_alone_holds_and_the_load_pulls_off_has_no_certificate() -> None:
     problem = plates(
-        body2_prescribed={"left": [0, "free"]}, body2_traction={"top": [0, 5]}, contact_interval=["0.5", "1.6"]
+        body2={"prescribed": {"left": [0, "free"]}, "traction": {"top": [0, 5]}}, contact={"interval": ["0.5", "1.6"]}
     )
     with pytest.raises(vf.SolveError, match="contact alone holds a body"):
         vf.solve(vf.Problem.from_dict(problem))
@@ -335,7 +334,6 @@ def test_a_body_that_contact_alone_holds_and_the_load_pulls_off_has_no_certifica
 
 
 def test_two_obstacles_are_no_problem_to_solve() -> None:
-    problem = plates()
-    problem["body1"] = problem["body2"] = {"shape": "rigid"}
+    problem = plates() | {name: {"shape": "rigid"} for name in ("body1", "body2")}
     with pytest.raises(vf.ProblemError, match="at least one elastic body"):
         vf.Problem.from_dict(problem)

@@ -6,7 +6,7 @@ solves step II and body "2" the one of step I, whatever their numbers in the fil
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -18,6 +18,7 @@ import strategies
 from dense_oracle import DensePair, top
 from hypothesis import given
 from hypothesis import strategies as st
+from problem_list import bars, blocks
 from scipy.linalg import eigh
 
 import verification as vf
@@ -359,34 +360,18 @@ def test_T_theta_contracts_by_the_proved_factor_wherever_it_is_proved(data, shar
 # --- a search for the worst pair --------------------------------------------------------------------------------------
 
 
-def plates(
-    width="1", heights=("1/4", "1/4"), cells=((4, 2), (4, 2)), young=(1, 1), poisson=("0.3", "0.3"), **settings: Any
-) -> Case:
-    """Two plates of equal width, the lower one clamped below, the upper one moved at its top."""
-    (h1, h2), x = (Fraction(h) for h in heights), [0, Fraction(width)]
-    contact = {"friction": "0.3", "radius": "1/2"} | settings.pop("contact", {})
-    moved = settings.pop("moved", (0, "-1/100"))
-    first = {"x": x, "y": [-h1, 0], "cells": list(cells[0]), "young": young[0], "poisson": poisson[0]}
-    second = {"x": x, "y": [0, h2], "cells": list(cells[1]), "young": young[1], "poisson": poisson[1]}
-    return Case(
-        vf.Problem.from_dict(
-            {
-                "body1": {"shape": "rectangle", "fixed": ["bottom"]} | first,
-                "body2": {"shape": "rectangle", "prescribed": {"top": list(moved)}} | second,
-                "contact": contact,
-                **settings,
-            }
-        )
-    )
+def plates(moved: Sequence[Any] = (0, "-1/100"), contact: Mapping[str, Any] | None = None, **given: Any) -> Case:
+    """Two plates of equal width, the upper one moved at its top."""
+    shape = {"heights": ("1/4", "1/4"), "young": (1, 1)} | given
+    contact = {"friction": "0.3", "radius": "1/2"} | (contact or {})
+    return Case(vf.Problem.from_dict(blocks(**shape, body2={"prescribed": {"top": list(moved)}}, contact=contact)))
 
 
-def bars(length1, length2, young1, young2) -> Case:
+def short_bars(young1: int = 1, young2: int = 1) -> Case:
     """Two bars pressed together."""
-    first, second = Fraction(length1), Fraction(length2)
-    one = {"x": [-first, 0], "cells": 1, "young": young1, "fixed": ["left"]}
-    two = {"x": [0, second], "cells": 1, "young": young2, "prescribed": {"right": -second / 100}}
-    bodies = {"body1": {"shape": "interval"} | one, "body2": {"shape": "interval"} | two}
-    return Case(vf.Problem.from_dict({"dimension": 1, **bodies}))
+    lengths, pushed = (Fraction(1, 100), Fraction(1, 20)), {"prescribed": {"right": Fraction(-1, 2000)}}
+    start = -lengths[0]
+    return Case(vf.Problem.from_dict(bars(lengths, (young1, young2), (1, 1), start, body2=pushed)))
 
 
 SEARCHED = {
@@ -491,8 +476,6 @@ def equal_plates() -> Case:
     given = {"heights": ("1/5", "1/8"), "cells": ((1, 4), (1, 3)), "poisson": ("-0.5", "-0.5"), "norm": {"length": 9}}
     return plates(**given, **APART)
 
-
-short_bars = lambda young1=1, young2=1: bars("1/100", "1/20", young1, young2)
 
 #: What is done to the constants; "1" is the body of step II, body 1 of these files.
 MUTANTS: dict[str, Callable[[Case, Constants], Constants]] = {

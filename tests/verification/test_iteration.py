@@ -16,7 +16,7 @@ import strategies
 from dense_oracle import DenseBody, dense_body
 from hypothesis import given
 from hypothesis import strategies as st
-from sample_problems import PROBLEMS, SECTION_6, SHEARED, bars, changed
+from problem_list import FOLLOWED, SECTION_6, SHEARED, changed, loaded_bars
 
 import verification as vf
 from verification.algorithm.fixed_point import FixedPointMap, Iterate
@@ -26,7 +26,7 @@ from verification.algorithm.theta import Choice
 from verification.contact import TOLERANCE, ContactError
 from verification.interface.assembly import build
 
-by_name = pytest.mark.parametrize("name", PROBLEMS)
+by_name = pytest.mark.parametrize("name", FOLLOWED)
 
 
 def problem(data: Mapping[str, Any], **iteration: Any) -> vf.Problem:
@@ -36,7 +36,7 @@ def problem(data: Mapping[str, Any], **iteration: Any) -> vf.Problem:
 @cache
 def converged(name: str, swapped: bool = False) -> Run:
     """Run a sample problem to 1e-12; with swapped roles at a theta that suits them."""
-    given = problem(PROBLEMS[name], tolerance="1e-12", max_iterations=3000)
+    given = problem(FOLLOWED[name], tolerance="1e-12", max_iterations=3000)
     if swapped:
         given = given.swapped()
         rho = vf.measure(given).rho_max
@@ -135,7 +135,7 @@ def test_the_iterates_of_two_bars_are_those_in_rationals(data):
 @pytest.mark.parametrize("moduli", [(1, 1), (3, 2), (1, 4)])
 def test_while_two_bars_touch_the_error_is_multiplied_by_1_minus_theta_minus_theta_rho(moduli, theta):
     """The cobweb: started beside the fixed point it never leaves the branch in contact."""
-    data = bars(1, 2, *moduli, theta)
+    data = loaded_bars((1, 2), moduli, theta)
     T, theta = ExactBars(data), Fraction(theta)
     exact = float(T.fixed_point)
     assert exact > 0
@@ -149,7 +149,7 @@ def test_while_two_bars_touch_the_error_is_multiplied_by_1_minus_theta_minus_the
 
 
 def test_two_bars_converge_in_one_step_at_theta_1_over_1_plus_rho():
-    data = bars(1, 2, 3, 2, 0.5)
+    data = loaded_bars((1, 2), (3, 2), 0.5)
     T = ExactBars(data)
     run = vf.run(vf.Problem.from_dict(data), theta=1 / (1 + T.rho), solver="active-set")
     assert (run.outcome, run.iterations) == ("converged", 1)
@@ -172,15 +172,16 @@ def same_states(one: Run, other: Run) -> bool:
 @by_name
 @pytest.mark.parametrize("solver", ["active-set", "auto"])
 def test_a_run_repeats_to_the_digit(name, solver):
-    one, other = (vf.run(problem(PROBLEMS[name], max_iterations=8), solver=solver) for _ in range(2))
+    one, other = (vf.run(problem(FOLLOWED[name], max_iterations=8), solver=solver) for _ in range(2))
     assert same_states(one, other)
 
 
 @by_name
 def test_all_solvers_give_the_same_iterates_and_certify_each(name):
-    runs = {s: vf.run(problem(PROBLEMS[name], max_iterations=12), solver=s) for s in ("active-set", "auto", "cvxpy")}
+    runs = {s: vf.run(problem(FOLLOWED[name], max_iterations=12), solver=s) for s in ("active-set", "auto", "cvxpy")}
     reference = runs["active-set"]
     assert {s.contact.solver for s in runs["cvxpy"].iterates} == {"cvxpy"}
+    assert runs["auto"].iterates[0].contact.solver == "active-set"
     for run in runs.values():
         assert run.iterations == reference.iterations
         for state, expected in zip(run.iterates, reference.iterates, strict=True):
@@ -260,9 +261,9 @@ def test_both_roles_call_the_states_of_the_limit_alike(name):
     assert converged(name).contact.status == converged(name, swapped=True).contact.status
 
 
-@pytest.mark.parametrize("name", PROBLEMS)
+@pytest.mark.parametrize("name", FOLLOWED)
 def test_the_global_method_finds_the_fixed_point(name):
-    run, solution = converged(name), vf.solve(problem(PROBLEMS[name]))
+    run, solution = converged(name), vf.solve(problem(FOLLOWED[name]))
     for quantity in ("pressure", "shear"):
         found, expected = getattr(run.contact, quantity), getattr(solution.contact, quantity)
         assert np.abs(found - expected).max() < 1e-9 * np.abs(solution.contact.pressure).max()
@@ -616,6 +617,6 @@ def test_a_symmetric_problem_has_a_symmetric_answer():
 
 
 def test_the_samples_show_every_state():
-    states = {name: set(converged(name).contact.status) for name in PROBLEMS}
+    states = {name: set(converged(name).contact.status) for name in FOLLOWED}
     assert set().union(*states.values()) == {"stick", "slip", "open"}
     assert SHEARED["top"][0] != 0

@@ -13,7 +13,7 @@ import strategies
 from chain_problems import case, step_II, with_loads
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from sample_problems import PROBLEMS
+from problem_list import FOLLOWED, bars, blocks
 
 import verification as vf
 from verification.algorithm.affine_piece import Piece, piece_of
@@ -138,10 +138,10 @@ def test_the_derivatives_of_a_piece_are_differences_of_T_over_a_step_inside_it(d
 
 
 @pytest.mark.parametrize("count", [0, 1, 5])
-@pytest.mark.parametrize("name", PROBLEMS)
+@pytest.mark.parametrize("name", FOLLOWED)
 def test_T_is_affine_around_the_iterates_of_a_run(name, count):
     """With the local law, with contact nodes held, at a kernel that sees single nodes, for bars."""
-    pair = build(vf.Problem.from_dict(PROBLEMS[name]))
+    pair = build(vf.Problem.from_dict(FOLLOWED[name]))
     g, random = along_a_run(pair, count), np.random.default_rng(count)
     assert assert_affine(pair, g, random) or count == 0  # 0 itself lies on an edge: no friction bound is smooth there
 
@@ -163,7 +163,7 @@ MUTANTS: dict[str, Callable[[Piece], Piece]] = {
 
 @pytest.mark.parametrize("mutant", MUTANTS)
 def test_the_derivative_on_another_piece_is_found_out(mutant):
-    pair = build(vf.Problem.from_dict(PROBLEMS["sheared until it slips"]))
+    pair = build(vf.Problem.from_dict(FOLLOWED["sheared until it slips"]))
     g, random = along_a_run(pair, 5), np.random.default_rng(0)
     assert assert_affine(pair, g, random)
     with pytest.raises(AssertionError):
@@ -172,12 +172,12 @@ def test_the_derivative_on_another_piece_is_found_out(mutant):
 
 def held(neumann: bool) -> ContactPair:
     """The lower body on rollers at a side that ends at Gamma_c; it has the Neumann problem or the contact problem."""
-    size = {"x": [0, 1], "cells": [4, 2], "poisson": "0.3"}
-    below = {"shape": "rectangle", "y": [-1, 0], "young": 3, "fixed": ["bottom"], "prescribed": {"left": [0, "free"]}}
-    above = {"shape": "rectangle", "y": [0, 1], "young": 2, "prescribed": {"top": ["1/50", "-1/50"]}}
-    contact = {"friction": "1/2", "radius": "1/3"}
-    roles = {"neumann_body": 1 if neumann else 2}
-    data = {"body1": below | size, "body2": above | size, "contact": contact, "iteration": roles}
+    data = blocks(
+        body1={"prescribed": {"left": [0, "free"]}},
+        body2={"prescribed": {"top": ["1/50", "-1/50"]}},
+        contact={"friction": "1/2", "radius": "1/3"},
+        iteration={"neumann_body": 1 if neumann else 2},
+    )
     pair = build(vf.Problem.from_dict(data))
     assert not pair.body1.free[0]
     return pair
@@ -304,10 +304,10 @@ def test_within_the_margin_no_node_changes_its_state_and_just_beyond_it_one_does
     assume(assert_margin(pair, random))
 
 
-@pytest.mark.parametrize("name", PROBLEMS)
+@pytest.mark.parametrize("name", FOLLOWED)
 def test_the_margin_is_that_of_the_sample_problems_too(name):
     """With the local law, with contact nodes held, for bars."""
-    assert assert_margin(build(vf.Problem.from_dict(PROBLEMS[name])), np.random.default_rng(0))
+    assert assert_margin(build(vf.Problem.from_dict(FOLLOWED[name])), np.random.default_rng(0))
 
 
 # --- solutions that were chosen ---------------------------------------------------------------------------------------
@@ -331,17 +331,9 @@ def chosen(pair: ContactPair, touching: list[bool], sliding: list[int], random: 
 
 
 def four_nodes(**contact: Any) -> ContactPair:
-    return build(
-        vf.Problem.from_dict(
-            {
-                "body1": {"shape": "rectangle", "x": [0, 3], "y": [-1, 0], "cells": [3, 2], "young": 3}
-                | {"fixed": ["bottom"], "poisson": "0.3"},
-                "body2": {"shape": "rectangle", "x": [0, 3], "y": [0, 2], "cells": [3, 1], "young": 2}
-                | {"fixed": ["top"], "poisson": "0.3"},
-                "contact": {"friction": "1/2", "radius": "3/2"} | contact,
-            }
-        )
-    )
+    contact = {"friction": "1/2", "radius": "3/2"} | contact
+    data = blocks(3, (1, 2), ((3, 2), (3, 1)), body2={"prescribed": None, "fixed": ["top"]}, contact=contact)
+    return build(vf.Problem.from_dict(data))
 
 
 PATTERN = ([True, True, True, False], [0, 1, -1, 1])
@@ -474,9 +466,7 @@ def test_between_two_bars_the_derivative_is_minus_rho_in_contact_and_0_apart(dat
 
 
 def test_bars_that_just_touch_are_not_linearised():
-    bars = {"x": [0, 1], "cells": 1, "young": 2, "fixed": ["left"]}
-    data = {"dimension": 1, "body1": {"shape": "interval"} | bars}
-    data["body2"] = {"shape": "interval", "x": [1, 2], "cells": 1, "young": 1, "fixed": ["right"]}
+    data = bars((1, 1), (2, 1), (1, 1), body2={"prescribed": {"right": 0}})
     pair = build(vf.Problem.from_dict(data))
     with pytest.raises(NotLinear, match="the node at x = 1 is about to change its state"):
         linearise(pair, Evaluated(pair)(np.zeros(1)), 0.5)

@@ -15,7 +15,7 @@ from chain_problems import case, state_of, step_II, with_loads
 from dense_oracle import DensePair, symmetric, top
 from hypothesis import given
 from hypothesis import strategies as st
-from sample_problems import PROBLEMS, bars
+from problem_list import FOLLOWED, loaded_bars
 from scipy.linalg import eigh
 
 import verification as vf
@@ -308,7 +308,7 @@ def test_without_friction_nothing_is_lost_on_friction():
 
 def test_between_two_bars_only_the_constants_lose():
     """T is ``-rho`` times g: every quotient in closed form, and d_1 = d_2 in contact."""
-    pair = build(vf.Problem.from_dict(bars(1, 2, 3, 2, "0.2")))
+    pair = build(vf.Problem.from_dict(loaded_bars((1, 2), (3, 2), "0.2")))
     found = Case(pair, measure(pair))
     rho = float(found.S_1[0, 0] / found.S_2[0, 0])
     C_T = found.M * found.C_R / found.m * found.X
@@ -318,5 +318,5 @@ def test_between_two_bars_only_the_constants_lose():
 
 
 def test_where_a_contact_node_is_held_no_losses_are_located():
-    pair = build(vf.Problem.from_dict(PROBLEMS["contact nodes held tangentially"]))
+    pair = build(vf.Problem.from_dict(FOLLOWED["contact nodes held tangentially"]))
     assert locate(pair, measure(pair)) is None

@@ -12,6 +12,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from problem_list import small
 
 import verification as vf
 from verification import figures
@@ -19,30 +20,6 @@ from verification.ledger.record import on_the_printed_proof
 from verification.output.folder import LOCKS, Folder, staged
 from verification.output.report import report
 
-SMALL = {
-    "title": "Small",
-    "dimension": 2,
-    "body1": {
-        "shape": "rectangle",
-        "x": [0, 2],
-        "y": ["-0.3", 0],
-        "cells": [10, 2],
-        "young": 70000,
-        "poisson": "0.3",
-        "fixed": ["bottom"],
-    },
-    "body2": {
-        "shape": "rectangle",
-        "x": ["0.4", "1.6"],
-        "y": [0, "0.3"],
-        "cells": [6, 2],
-        "young": 20000,
-        "poisson": "0.3",
-        "prescribed": {"top": [0, "-0.015"]},
-    },
-    "contact": {"friction": "0.2", "radius": "0.3"},
-    "iteration": {"neumann_body": 1, "theta": "0.7"},
-}
 ONE_STEP = {"theta": "0.7", "max_iterations": 1}
 FIGURES = {f"{figure}.{ending}" for figure in ("bodies", "residuals") for ending in ("svg", "png")}
 DRAWN = {"compare.json", "report.html", "waterfall.svg", "waterfall.png"}
@@ -67,7 +44,7 @@ TITLES = {
 
 
 def problem(**changes):
-    return vf.Problem.from_dict(SMALL | changes)
+    return vf.Problem.from_dict(small() | {"title": "Small"} | changes)
 
 
 @pytest.fixture(scope="module")

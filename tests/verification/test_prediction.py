@@ -10,6 +10,7 @@ import pytest
 import strategies
 from chain_problems import case, run_of
 from hypothesis import settings
+from problem_list import blocks
 
 import verification as vf
 from verification.algorithm.affine_piece import piece_of
@@ -106,20 +107,15 @@ def test_near_the_solution_the_error_is_multiplied_by_J():
 
 def symmetric_blocks(shift: str = "0", cells: int = 4) -> ContactPair:
     """Two equal blocks with symmetric meshes; loads are symmetric if the top is not shifted."""
-    below = {"shape": "rectangle", "x": [0, 2], "y": [-1, 0], "cells": [cells, 2], "young": 3, "fixed": ["bottom"]}
-    above = {"shape": "rectangle", "x": [0, 2], "y": [0, 1], "cells": [cells, 2], "young": 2}
-    moved = {"poisson": "0.3", "prescribed": {"top": [shift, "-1/50"]}}
-    contact = {"friction": 1, "radius": "3/4"}
-    return build(
-        vf.Problem.from_dict(
-            {
-                "body1": below | {"poisson": "0.1"},
-                "body2": above | moved,
-                "contact": contact,
-                "iteration": {"neumann_body": 2, "tolerance": 1e-13},
-            }
-        )
+    data = blocks(
+        2,
+        cells=[(cells, 2)] * 2,
+        poisson=("0.1", "0.3"),
+        body2={"prescribed": {"top": [shift, "-1/50"]}},
+        contact={"friction": 1, "radius": "3/4"},
+        iteration={"neumann_body": 2, "tolerance": 1e-13},
     )
+    return build(vf.Problem.from_dict(data))
 
 
 def linearised(pair: ContactPair, theta: float) -> tuple[Run, Linearisation]:

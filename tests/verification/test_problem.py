@@ -14,39 +14,15 @@ import pytest
 import strategies
 from hypothesis import given
 from hypothesis import strategies as st
+from problem_list import bars, small
 
 import verification as vf
 from fem1d2d import rectangle
 from ndtheory import HypothesisError
 from verification.cli.problems import examples
 
-PLANE = {
-    "body1": {
-        "shape": "rectangle",
-        "x": [0, 2],
-        "y": ["-0.3", 0],
-        "cells": [10, 2],
-        "young": 70000,
-        "poisson": "0.3",
-        "fixed": ["bottom"],
-    },
-    "body2": {
-        "shape": "rectangle",
-        "x": ["0.4", "1.6"],
-        "y": [0, "0.3"],
-        "cells": [6, 2],
-        "young": 20000,
-        "poisson": "0.3",
-        "prescribed": {"top": [0, "-0.015"]},
-    },
-    "contact": {"friction": "0.2", "radius": "0.3"},
-    "iteration": {"neumann_body": 1, "theta": "0.7"},
-}
-BARS = {
-    "dimension": 1,
-    "body1": {"shape": "interval", "x": [0, 1], "cells": 8, "young": 3, "fixed": ["left"]},
-    "body2": {"shape": "interval", "x": [1, 2], "cells": 8, "young": 1, "prescribed": {"right": "-0.1"}},
-}
+PLANE = small()
+BARS = bars((1, 1), (3, 1), (8, 8))
 
 
 def changed(data, key, value):
@@ -137,6 +113,11 @@ def test_what_is_left_out_takes_its_default():
     )
     assert (iteration.neumann_body, iteration.theta, iteration.max_iterations) == (2, F(1, 2), 500)
     assert iteration.tolerance == 1e-9
+
+
+def numbers(result):
+    """The document of a result without the problem, which tells how it was given."""
+    return {key: value for key, value in result.to_dict().items() if key != "problem"}
 
 
 def test_contact_reaches_as_far_as_the_bodies_overlap():

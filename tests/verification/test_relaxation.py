@@ -16,6 +16,7 @@ import strategies
 from chain_problems import case
 from hypothesis import given
 from hypothesis import strategies as st
+from problem_list import bars
 
 import verification as vf
 from verification.algorithm.fixed_point import FixedPointMap, iterates
@@ -253,18 +254,16 @@ def test_aitken_finds_the_force_between_two_bars_from_two_residuals_without_a_ch
             assert arrives(i + 2)
 
 
-def bars(rho: int) -> ContactPair:
+def pressed(rho: int) -> ContactPair:
     """Two bars pressed together."""
-    one = {"shape": "interval", "x": [0, 1], "cells": 2, "young": rho, "fixed": ["left"]}
-    two = {"shape": "interval", "x": [1, 2], "cells": 2, "young": 1, "prescribed": {"right": "-1/10"}}
-    return build(vf.Problem.from_dict({"dimension": 1, "body1": one, "body2": two}))
+    return build(vf.Problem.from_dict(bars((1, 1), (rho, 1))))
 
 
 @pytest.mark.parametrize("share", ["1/100", "2/5", "9/10"])
 @pytest.mark.parametrize("rho", [1, 7])
 def test_between_pressed_bars_aitken_arrives_after_two_steps_and_newton_after_one(rho, share):
     """Aitken for theta < 1/rho, where the first step does not part them."""
-    pair, theta = bars(rho), Fraction(share) / rho
+    pair, theta = pressed(rho), Fraction(share) / rho
     for relaxation, count in (("aitken", 2), ("newton", 1)):
         done = run(with_rule(pair, relaxation), theta=theta)
         assert (done.outcome, done.iterations) == ("converged", count)
@@ -274,7 +273,7 @@ def test_between_pressed_bars_aitken_arrives_after_two_steps_and_newton_after_on
 @pytest.mark.parametrize("rho", [7, 40])
 def test_where_the_first_step_parts_the_bars_aitken_still_arrives(rho):
     for theta in (Fraction(11, 10) / rho, 2 / Fraction(2 + rho), Fraction(9, 10)):
-        done = run(with_rule(bars(rho), "aitken"), theta=theta)
+        done = run(with_rule(pressed(rho), "aitken"), theta=theta)
         assert done.converged
         assert done.last.g[0] == pytest.approx(rho / 10 / (1 + rho), rel=1e-9)
 
@@ -345,4 +344,4 @@ def test_the_theorem_is_about_a_constant_theta_and_about_momentum_without_fricti
 
 def test_momentum_needs_rho():
     with pytest.raises(ValueError, match="rho"):
-        RULES["momentum"].begin(bars(1), 0.5, None)
+        RULES["momentum"].begin(pressed(1), 0.5, None)

@@ -7,6 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from chain_problems import case
+from problem_list import blocks
 
 import verification as vf
 from verification.bounds.multipliers import QuadraticForms
@@ -120,16 +121,14 @@ def exact_form(pair, multipliers, theta: float, square: Fraction) -> Exact:
 
 def slender(length: int) -> vf.Problem:
     """A tower on a block: the longer, the closer to singular its stiffness on Gamma_c."""
-    below = {"shape": "rectangle", "x": [0, 1], "y": [-1, 0], "cells": [2, 2], "young": 3, "poisson": "0.3"}
-    above = {"shape": "rectangle", "x": [0, 1], "y": [0, length], "cells": [2, 40], "young": 2, "poisson": "0.3"}
-    return vf.Problem.from_dict(
-        {
-            "body1": below | {"fixed": ["bottom"]},
-            "body2": above | {"prescribed": {"top": [0, -1]}},
-            "contact": {"friction": "1/5", "radius": 1},
-            "iteration": {"theta": "1/2", "neumann_body": 1},
-        }
+    data = blocks(
+        heights=(1, length),
+        cells=((2, 2), (2, 40)),
+        body2={"prescribed": {"top": [0, -1]}},
+        contact={"friction": "1/5", "radius": 1},
+        iteration={"theta": "1/2", "neumann_body": 1},
     )
+    return vf.Problem.from_dict(data)
 
 
 SMALL = [seed for seed in range(60) if 0 < (p := case(seed)[0]).contact.grid.n <= 3 and p.friction][:6]

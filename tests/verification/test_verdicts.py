@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 from chain_problems import case, run_of
+from problem_list import bars, blocks
 
 import verification as vf
 from ndtheory import Number
@@ -61,12 +62,13 @@ def test_what_was_not_computed_is_not_called_consistent():
     assert (silent.verdict, silent.reason) == ("HYPOTHESES_NOT_MET", "friction is too large")
 
 
-BARS = {
-    "dimension": 1,
-    "body1": {"shape": "interval", "x": [0, 1], "cells": 2, "young": 3, "fixed": ["left"]},
-    "body2": {"shape": "interval", "x": [1, 2], "cells": 2, "young": 1, "fixed": ["right"], "body_force": [-1]},
-    "iteration": {"neumann_body": 2, "theta": "9/20"},
-}
+BARS = bars(
+    (1, 1),
+    (3, 1),
+    (2, 2),
+    body2={"prescribed": None, "fixed": ["right"], "body_force": [-1]},
+    iteration={"neumann_body": 2, "theta": "9/20"},
+)
 
 
 @pytest.mark.parametrize("name", ["sharp", "lmi"])
@@ -92,23 +94,15 @@ def test_a_factor_scaled_by_nine_tenths_is_violated_where_the_bound_is_attained(
 # --- what was not computed --------------------------------------------------------------------------------------------
 
 
-def blocks(cells: int, **contact: object) -> vf.Problem:
+def square_blocks(cells: int, **contact: object) -> vf.Problem:
     """Two blocks of so many cells along Gamma_c."""
-    below = {"shape": "rectangle", "x": [0, 1], "y": [-1, 0], "cells": [cells, 1], "young": 3, "poisson": "0.3"}
-    above = {"shape": "rectangle", "x": [0, 1], "y": [0, 1], "cells": [cells, 1], "young": 2, "poisson": "0.3"}
-    return vf.Problem.from_dict(
-        {
-            "body1": below | {"fixed": ["bottom"]},
-            "body2": above | {"prescribed": {"top": [0, "-1/50"]}},
-            "contact": {"friction": "1/10", "radius": "3/10", **contact},
-            "iteration": {"theta": "1/5"},
-        }
-    )
+    contact = {"friction": "1/10", "radius": "3/10", **contact}
+    return vf.Problem.from_dict(blocks(cells=[(cells, 1)] * 2, contact=contact, iteration={"theta": "1/5"}))
 
 
 def test_beyond_the_nodes_it_is_worked_out_for_the_semidefinite_bound_is_not_computed():
     """One limit: what one screen leaves out no other one computes."""
-    found = compare(blocks(LARGEST))
+    found = compare(square_blocks(LARGEST))
     assert found.bounds["lmi"].detail is None
     assert found.verdicts["lmi"].verdict == "NOT_COMPUTED"
     assert f"up to {LARGEST}" in found.verdicts["lmi"].reason
@@ -123,7 +117,7 @@ def test_a_solver_that_gives_up_is_told_from_a_bound_that_is_not_below_1(monkeyp
         raise lmi_program.LMIError("the solver gave up: made up")
 
     monkeypatch.setattr(lmi_program.Program, "solve", fail)
-    slight, strong = compare(blocks(4)), compare(blocks(4, friction=2))
+    slight, strong = compare(square_blocks(4)), compare(square_blocks(4, friction=2))
     assert slight.bounds["lmi"].factor.value <= slight.bounds["sharp"].factor.value
     assert slight.verdicts["lmi"].verdict == "CONSISTENT"
     assert strong.bounds["lmi"].factor is None
@@ -132,14 +126,14 @@ def test_a_solver_that_gives_up_is_told_from_a_bound_that_is_not_below_1(monkeyp
 
 
 def test_a_bound_that_is_not_below_1_says_so():
-    found = compare(blocks(4, friction=5))
+    found = compare(square_blocks(4, friction=5))
     assert found.bounds["lmi"].detail.lipschitz.value > 1
     assert found.verdicts["lmi"].verdict == "HYPOTHESES_NOT_MET"
     assert "not below 1" in found.verdicts["lmi"].reason
 
 
 def test_no_value_of_the_semidefinite_bound_is_called_certified_while_it_is_a_double():
-    document = compare(blocks(4)).to_dict()["lmi"]
+    document = compare(square_blocks(4)).to_dict()["lmi"]
     assert document["certified"] is False
     assert "doubles" in document["reason"]["certified"]
     assert document["factor"]["level"] == "float"
@@ -208,7 +202,7 @@ class _Stands:
 
 
 def test_without_a_forecast_its_verdict_is_not_computed():
-    problem = blocks(4)
+    problem = square_blocks(4)
     done = vf.run(replace(problem, iteration=replace(problem.iteration, relaxation="aitken"))).linearise()
     found = judge_forecast(done)
     assert (found.verdict, found.reason) == ("NOT_COMPUTED", "the aitken relaxation is no constant theta")

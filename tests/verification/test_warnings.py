@@ -6,8 +6,7 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
-from problem_list import plates
-from sample_problems import SHEARED, changed
+from problem_list import SHEARED, changed, plates
 
 import verification as vf
 from fem1d2d import rectangle
@@ -35,7 +34,7 @@ def warned(data):
     ],
 )
 def test_a_poisson_ratio_of_048_or_more_is_warned_of_by_its_key(lower, upper, named):
-    warnings = warned(plates(body1_poisson=lower, body2_poisson=upper))
+    warnings = warned(plates(body1={"poisson": lower}, body2={"poisson": upper}))
     assert warnings == [] if named is None else warnings[0].startswith(f"{named}: near 1/2 linear triangles ")
     assert len(warnings) == (named is not None)
 
@@ -71,7 +70,7 @@ def test_near_one_half_one_diagonal_multiplies_the_force_and_both_diagonals_do_n
     """The figures of the page: 20 x 3 and 12 x 3 rectangles, nu = 0.499, against both diagonals twice as fine."""
 
     def force(halvings, diagonals):
-        data = plates(body1_poisson="0.499", body2_poisson="0.499", contact_radius="0.1")
+        data = plates(body1={"poisson": "0.499"}, body2={"poisson": "0.499"}, contact={"radius": "0.1"})
         for name, x, y, cells in (
             ("body1", (0.0, 2.0), (-0.3, 0.0), (20, 3)),
             ("body2", (0.4, 1.6), (0.0, 0.3), (12, 3)),
