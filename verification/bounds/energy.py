@@ -25,7 +25,7 @@ class Sharp(Bound):
             measured = subject.measured
             friction = Thresholds(every=measured.friction_threshold, some=measured.friction_limit, on="k")
             if theta is not None and found.factor is None:
-                why = why_not(found.interval, friction.some, measured.friction, theta)
+                why = why_not(found.interval, friction.some, measured.friction, found.theta)
         return BoundResult(
             name=self.name,
             proved=True,

@@ -27,7 +27,7 @@ class Section5(Bound):
         why = ""
         if theta is not None and found.factor is None:
             friction = float(subject.constants.C_K if subject.constants.k is None else subject.constants.k)
-            why = why_not(found.interval, found.C2, friction, theta) + self._unit(subject)
+            why = why_not(found.interval, found.C2, friction, found.theta) + self._unit(subject)
         return BoundResult(
             name=self.name,
             proved=found.proved,

@@ -129,7 +129,7 @@ class SemidefiniteBound(Bound):
         return BoundResult(
             name=self.name,
             proved=True,
-            theta=float(theta),
+            theta=float(relaxation_factor(theta)),
             factor=factor,
             one_minus_factor=None if factor is None else Number.of_float(1 - factor.value),
             interval=None if found.theta_max is None else (0.0, found.theta_max.value),
