@@ -34,7 +34,7 @@ CALCULATIONS = {
     "bounds without friction": [*GIVEN, "--k", "0", "--Cs", "0", "--Ctr", "0", "--theta", "1e-4"],
     "bounds without theta": [*GIVEN, "--CK", "1e-8"],
     "bounds of one edition": [*GIVEN, "--CK", "1e-8", "--edition", "printed"],
-    "every bound": [*GIVEN, "--CK", "1e-8", *ON_ENERGY, "--theta", "1e-4"],
+    "bounds of every kind": [*GIVEN, "--CK", "1e-8", *ON_ENERGY, "--theta", "1e-4"],
     "bounds in energy norms": [*ON_ENERGY, "--theta", "1/2"],
     "bounds in energy norms without friction": ["--rho", "3", "--theta", "1/3"],
     "bounds in energy norms without theta": ON_ENERGY,

@@ -21,8 +21,8 @@ def test_the_first_screen_is_the_output_of_demo(
     monkeypatch.chdir(tmp_path)
     assert main(["demo"]) == 0
     printed = capsys.readouterr().out
-    # the KKT residual is rounding itself and may differ from machine to machine
-    steady = lambda text: re.sub(r"contact step \S+", "contact step", text).split("\n")
+    # the KKT residual is rounding itself, the difference the error of a solver: they may differ between machines
+    steady = lambda text: re.sub(r"(contact step|T differs by) \S+", r"\1", text).split("\n")
     assert steady(shown[1].rstrip()) == steady(printed.rstrip())
 
 
