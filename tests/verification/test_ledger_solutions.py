@@ -228,9 +228,7 @@ def test_the_sign_of_step_III_is_found_out(sign):
 @pytest.mark.parametrize("statement", ["4.9.1", "4.9.3", "5.4", "5.6"])
 def test_a_force_off_by_a_millionth_is_found_out_in_the_weak_form(statement):
     case = pressed()
-    spoil = lambda state: replace(
-        state, g=state.g * (1 + 1e-6), contact=replace(state.contact, force=1.000001 * state.image)
-    )
+    spoil = lambda state: replace(state, g=state.g * (1 + 1e-6), image=state.image * (1 + 1e-6))
     steps, arbitrary = [(spoil(a), b) for a, b in case.steps], [spoil(state) for state in case.arbitrary]
     assert holds(asked(statement, given(case, steps=steps, arbitrary=arbitrary)))[0] == (PRINTED, False)
 
