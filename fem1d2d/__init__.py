@@ -6,7 +6,8 @@ A small core in which every matrix is exact for its mesh.  It knows nothing of c
 from fem1d2d.assembly import body_load, gram, side_load, stiffness
 from fem1d2d.condense import Condensation, solver
 from fem1d2d.material import Material, bar, plane_strain
-from fem1d2d.mesh import Mesh, MeshError, from_file, interval, rectangle
+from fem1d2d.mesh import Mesh, MeshError, interval, rectangle
+from fem1d2d.mesh_files import from_file
 from fem1d2d.pencil import Eigenvalue, largest, largest_sparse
 from fem1d2d.supports import Supports, rigid_motions, supports
 from fem1d2d.trace import facing, nodes_between, surface, trapezoid

@@ -11,9 +11,11 @@ finite elements and needs the standard library alone.
 
 from ndtheory.bounds import EDITIONS, PRINTED, REPAIRED, Bounds, Edition, evaluate
 from ndtheory.constants import Constants, relaxation_factor
+from ndtheory.energy import EnergyConstants
 from ndtheory.errors import HypothesisError
 from ndtheory.number import Number, exact
-from ndtheory.sharp import EnergyConstants, SharpBounds, evaluate_sharp
+from ndtheory.sharp import evaluate_sharp
+from ndtheory.sharp_bounds import SharpBounds
 
 __version__ = "0.1.0"
 

@@ -22,110 +22,18 @@ three (rho_normal in the place of rho where there is no friction) gives one of e
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
 from typing import Any
 
 from ndtheory.bounds import MARGIN, Conclusion, factor_and_rest
-from ndtheory.constants import Given, plain, relaxation_factor
-from ndtheory.number import (
-    SLACK,
-    Number,
-    absolute,
-    decimal,
-    maximum,
-    minimum,
-    rounded,
-    sqrt,
-    weakest,
-    where,
-    working_precision,
-)
+from ndtheory.constants import relaxation_factor
+from ndtheory.energy import EnergyConstants
+from ndtheory.number import SLACK, absolute, decimal, maximum, minimum, rounded, sqrt, weakest, where, working_precision
+from ndtheory.sharp_bounds import SharpBounds
 
 #: Halvings of an interval inside (0, 1) until theta is known to far below a double.
 HALVINGS = 80
-
-#: Sizes whose squares and quotients fit into a double.
-SMALLEST, LARGEST = Fraction(1, 10**75), Fraction(10**75)
-
-
-def _friction(kappa: Fraction) -> bool:
-    return kappa == 0 or SMALLEST <= kappa <= LARGEST
-
-
-@dataclass(frozen=True, kw_only=True)
-class EnergyConstants(Given):
-    """rho, kappa_1 and kappa_2: all that the theorem in energy norms knows of the two bodies and of friction.
-
-    Numbers are kept exactly as written (see :func:`ndtheory.number.exact`).  Each may be a
-    :class:`~ndtheory.number.Number` too: its level and its ends are kept (:meth:`number`) and enter the bound.
-
-    Parameters
-    ----------
-    rho : dimensionless
-        Largest eigenvalue of ``S_1 phi = rho S_2 phi``, contact body over Neumann body.  Hypothesis: rho > 0.
-    kappa_1, kappa_2 : dimensionless, optional
-        ``k C_s C_t1`` and ``k C_s C_t2`` with ``C_s = sup |S sigma_N(w)|_L2 / |w|_a2`` and
-        ``C_ta = sup |v_T|_L2 / |v|_aa``; 0 by default.  Hypothesis: both >= 0.
-    rho_normal : dimensionless, optional
-        rho with the tangential components condensed out; takes the place of rho where kappa_1 = kappa_2 = 0.
-        Hypothesis: 0 < rho_normal <= rho.
-
-    Raises
-    ------
-    HypothesisError
-        Naming the constant, the value received and what was needed.
-
-    Examples
-    --------
-    >>> EnergyConstants(rho="3/2").at_work
-    Fraction(3, 2)
-    """
-
-    floor = {"kappa_1": 0, "kappa_2": 0}
-
-    rho: Fraction
-    kappa_1: Fraction
-    kappa_2: Fraction
-    rho_normal: Fraction | None
-
-    def __init__(self, *, rho: Any, kappa_1: Any = 0, kappa_2: Any = 0, rho_normal: Any = None) -> None:
-        keep = self._keep
-        largest = keep("rho", rho, "a number rho > 0 (1e-75 to 1e75)", lambda v: SMALLEST <= v <= LARGEST)
-        if rho_normal is None:
-            object.__setattr__(self, "rho_normal", None)
-        else:
-            needed = f"a number 0 < rho_normal <= rho = {plain(rho)}"
-            keep("rho_normal", rho_normal, needed, lambda v: 0 < v <= largest)
-        keep("kappa_1", kappa_1, "a number kappa_1 >= 0 (0, or 1e-75 to 1e75)", _friction)
-        keep("kappa_2", kappa_2, "a number kappa_2 >= 0 (0, or 1e-75 to 1e75)", _friction)
-
-    @property
-    def frictionless(self) -> bool:
-        """Whether kappa_1 = kappa_2 = 0: no node sticks, and tangential components carry no force."""
-        return self.kappa_1 == 0 == self.kappa_2
-
-    @property
-    def at_work(self) -> Fraction:
-        """The rho that enters q: rho_normal without friction (where it is known), else rho."""
-        return self.rho_normal if self.frictionless and self.rho_normal is not None else self.rho
-
-    @property
-    def corners(self) -> tuple[tuple[Fraction, ...], tuple[Fraction, ...]] | None:
-        """rho at work, kappa_1 and kappa_2 where the theorem says most, all least, and where it says least.
-
-        None unless a constant was given as an enclosure, and all others as one or exactly.
-        """
-        normal = () if self.rho_normal is None else ("rho_normal",)
-        ends = self.enclosures("kappa_1", "kappa_2", "rho", *normal)
-        if ends is None:
-            return None
-        low, high = zip(*ends, strict=True)
-        # the last is rho_normal where it is known
-        best, worst = ((at[-1] if at[0] == 0 == at[1] else at[2], at[0], at[1]) for at in (low, high))
-        return best, worst
-
 
 # The formulas: rho > 0, kappa_1, kappa_2 >= 0, 0 < theta <= 1.
 
@@ -337,79 +245,6 @@ def _last_where(holds: Callable[[Any], bool], low: Any, high: Any) -> Any:
     return where(holds(high), high, halved)
 
 
-@dataclass(frozen=True, kw_only=True)
-class SharpBounds:
-    """What the theorem in energy norms says.
-
-    Attributes
-    ----------
-    rho : Number
-        The one at work: rho_normal without friction, where it is known.
-    kappa_1, kappa_2 : Number
-    ratio : Number
-        r, the largest ``|d_1|/|d_2|``.
-    friction_multiple : Number or None
-        The factor by which friction may grow until no small theta is proved; None without friction.
-    friction_limit_multiple : Number or None
-        The factor by which it may grow until no theta at all is proved; None without friction.
-    interval : tuple of float or None
-        q < 1 for lo < theta < hi, capped at 1; None where q >= 1 everywhere.
-    theta_proved : float or None
-        The theta of least q.
-    factor_proved : Number or None
-        q there.
-    theta_max_proved : Number or None
-        The upper end of the interval.
-    theta_predicted, rate_predicted : float
-        ``2/(2 + rho)`` and ``rho/(2 + rho)``: proved without friction, a prediction with it.
-    theta : float or None
-    factor, one_minus_factor : Number or None
-        q(theta) < 1 and 1 - q; None outside the interval.
-    verdict : {'contraction', 'no conclusion'} or None
-    """
-
-    rho: Number
-    kappa_1: Number
-    kappa_2: Number
-    ratio: Number
-    friction_multiple: Number | None
-    friction_limit_multiple: Number | None
-    interval: tuple[float, float] | None
-    theta_proved: float | None
-    factor_proved: Number | None
-    theta_max_proved: Number | None
-    theta_predicted: float
-    rate_predicted: float
-    theta: float | None
-    factor: Number | None
-    one_minus_factor: Number | None
-    verdict: Conclusion | None
-
-    @property
-    def reason(self) -> dict[str, str]:
-        """Why a value is None."""
-        reasons: dict[str, str] = {}
-        if self.friction_multiple is None:
-            reasons |= dict.fromkeys(("friction_multiple", "friction_limit_multiple"), "no friction")
-        if self.interval is None:
-            names = ("interval", "theta_proved", "factor_proved", "theta_max_proved")
-            reasons |= dict.fromkeys(names, "q >= 1 for every theta")
-        if self.theta is None:
-            reasons |= dict.fromkeys(("theta", "factor", "one_minus_factor", "verdict"), "no theta given")
-        elif self.factor is None:
-            reasons |= dict.fromkeys(("factor", "one_minus_factor"), "theta outside the interval: no conclusion")
-        return reasons
-
-    def to_dict(self) -> dict[str, Any]:
-        """The object ``editions.sharp`` of ``ndtheory.bounds/1``; what is null has a reason beside it."""
-        result: dict[str, Any] = {}
-        for name in self.__dataclass_fields__:
-            value = getattr(self, name)
-            result[name] = value.to_dict() if isinstance(value, Number) else value
-        result["interval"] = None if self.interval is None else list(self.interval)
-        return {**result, "reason": self.reason}
-
-
 def evaluate_sharp(constants: EnergyConstants, theta: Any = None) -> SharpBounds:
     """Evaluate the theorem in energy norms.
 
@@ -438,6 +273,7 @@ def evaluate_sharp(constants: EnergyConstants, theta: Any = None) -> SharpBounds
     >>> s = evaluate_sharp(EnergyConstants(rho=2), theta="3/5")
     >>> s.interval, s.theta_proved, s.factor_proved.value, round(s.factor.value, 12)
     ((0.0, 0.6666666666666666), 0.5, 0.5, 0.8)
+    >>> from ndtheory import Number
     >>> rho = Number(value=2.0, lo=1.75, hi=2.25, level="guaranteed")
     >>> s = evaluate_sharp(EnergyConstants(rho=rho), theta="1/2")
     >>> s.factor.level, s.factor.value, round(s.factor.lo, 12), round(s.factor.hi, 12)

@@ -10,7 +10,7 @@ import pytest
 
 from fem1d2d import Condensation
 from verification.interface.assembly import build
-from verification.ledger import convergence, weak_forms
+from verification.ledger import convergence, field_problems, weak_forms
 from verification.ledger import experiments as section_6
 from verification.ledger import solutions as ledger
 from verification.ledger import sweeps as sweeps_of
@@ -106,7 +106,7 @@ def test_only_what_is_asked_is_answered_and_the_share_done_is_told():
 
 
 def pressed(name="sheared, body 2 Neumann"):
-    return Case(name=name, problem=Problem.from_dict(weak_forms.PROBLEMS[name]))
+    return Case(name=name, problem=Problem.from_dict(field_problems.PROBLEMS[name]))
 
 
 def loaded(case, force):
@@ -260,7 +260,7 @@ def test_the_printed_friction_term_fails_where_a_sticking_node_moves():
 
 def test_on_two_bars_the_printed_sign_gives_the_factor_of_the_cobweb():
     bars = Case(
-        name="bars", problem=Problem.from_dict(weak_forms.CONVERGENT["two bars"] | {"iteration": {"theta": "0.3"}})
+        name="bars", problem=Problem.from_dict(field_problems.CONVERGENT["two bars"] | {"iteration": {"theta": "0.3"}})
     )
     distance = convergence.distances(bars, -1, 4)
     rho, theta = 1.0, 0.3

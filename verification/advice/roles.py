@@ -14,7 +14,8 @@ from fem1d2d import largest
 from fem1d2d.mesh import Floats
 from ndtheory import EnergyConstants, Number, evaluate_sharp
 from ndtheory.constants import take
-from ndtheory.sharp import LARGEST, SMALLEST, predicted_rate, predicted_theta
+from ndtheory.energy import LARGEST, SMALLEST
+from ndtheory.sharp import predicted_rate, predicted_theta
 from verification.advice.readings import NextRun, RunReading, SeenRun, read_ratio
 from verification.algorithm.theta import Choice, automatic, sharp_bounds
 from verification.constants import measure

@@ -21,8 +21,9 @@ from verification.constants import measure
 from verification.contact import ContactError
 from verification.interface.body import Body
 from verification.ledger.evidence import Evidence, Level, figure
+from verification.ledger.field_problems import CONVERGENT, PLANE
 from verification.ledger.found import Found, equations, evidence
-from verification.ledger.weak_forms import CLEAR, CONVERGENT, EXACT, LIMIT, PLANE, Case, Weak, cases, image_of
+from verification.ledger.weak_forms import CLEAR, EXACT, LIMIT, Case, Weak, cases, image_of
 from verification.problem.specification import Problem
 
 #: Steps of (3.1) with the printed sign.

@@ -25,6 +25,7 @@ from verification.interface.assembly import build
 from verification.interface.body import Body
 from verification.interface.pair import ContactPair
 from verification.ledger.evidence import Level
+from verification.ledger.field_problems import PROBLEMS, drawn
 from verification.monolithic import solve
 from verification.problem.specification import Problem
 
@@ -34,82 +35,11 @@ SEED = 2008
 #: An equation holds below this relative residual, and an inequality above minus it.
 EXACT = 1e-10
 
-#: The same at the limit of a run, whose residual is at most TOLERANCE.
-LIMIT, TOLERANCE = 1e-9, 1e-13
+#: The same at the limit of a run, whose residual is at most :data:`.field_problems.TOLERANCE`.
+LIMIT = 1e-9
 
 #: Distances to the solution below this share of its norm are not compared step by step: rounding stands behind them.
 CLEAR = 1e-4
-
-LOWER = {"shape": "rectangle", "x": [0, 2], "y": ["-0.3", 0], "cells": [10, 2], "young": 7, "poisson": "0.3"}
-UPPER = {"shape": "rectangle", "x": ["0.4", "1.6"], "y": [0, "0.3"], "cells": [6, 2], "young": 2, "poisson": "0.3"}
-RUN = {"tolerance": TOLERANCE, "max_iterations": 3000}
-
-
-def _plates(lower: Any = None, upper: Any = None, **tables: Any) -> dict[str, Any]:
-    """Two plates, the upper one pressed down."""
-    return {
-        "body1": {**LOWER, "fixed": ["bottom"], **(lower or {})},
-        "body2": {**UPPER, "prescribed": {"top": [0, "-0.015"]}, **(upper or {})},
-        "contact": {"friction": "0.2", "radius": "0.2", **tables.get("contact", {})},
-        "iteration": {"neumann_body": 1, "theta": "0.7", **RUN, **tables.get("iteration", {})},
-    }
-
-
-#: Both roles; nodes that stick, slip and are open; an initial gap; no friction; one dimension.
-PROBLEMS: dict[str, dict[str, Any]] = {
-    "pressed": _plates(),
-    "sheared, body 2 Neumann": _plates(
-        {"young": 2},
-        {"young": 7, "prescribed": {"top": ["0.006", "-0.015"]}},
-        contact={"friction": "0.1"},
-        iteration={"neumann_body": 2, "theta": "0.6"},
-    ),
-    "much friction": _plates(upper={"prescribed": {"top": ["0.004", "-0.015"]}}, contact={"friction": "0.6"}),
-    "open in part, with a gap": _plates(
-        upper={"prescribed": {"top": [0, "-0.006"]}, "traction": {"right": [0, "0.9"]}}, contact={"gap": "0.005"}
-    ),
-    "bent over an edge, body 2 Neumann": _plates(
-        {"fixed": ["left"], "body_force": [0, "-0.003"]},
-        contact={"interval": ["0.4", "1.6"]},
-        iteration={"neumann_body": 2, "theta": "0.7"},
-    ),
-    "without friction": _plates(contact={"friction": 0}),
-    "bars with a gap": {
-        "dimension": 1,
-        "body1": {"shape": "interval", "x": [0, 2], "cells": 3, "young": 1, "fixed": ["left"], "body_force": "0.1"},
-        "body2": {"shape": "interval", "x": [2, 3], "cells": 2, "young": 4, "prescribed": {"right": "-0.2"}},
-        "contact": {"gap": "0.05"},
-        "iteration": {"theta": "0.6", **RUN},
-    },
-}
-
-SQUARE = {"shape": "rectangle", "cells": [3, 3], "poisson": 0, "young": 1}
-#: Where Proposition 5.6 has an interval in which a run ends within some hundred steps.
-CONVERGENT: dict[str, dict[str, Any]] = {
-    "two bars": {
-        "dimension": 1,
-        "body1": {"shape": "interval", "x": [0, 1], "cells": 6, "young": 2, "fixed": ["left"], "body_force": "0.1"},
-        "body2": {"shape": "interval", "x": [1, 2], "cells": 6, "young": 2, "prescribed": {"right": "-0.1"}},
-        "iteration": {**RUN},
-    },
-    "two short bars": {
-        "dimension": 1,
-        "body1": {"shape": "interval", "x": [0, "0.5"], "cells": 4, "young": 1, "fixed": ["left"]},
-        "body2": {"shape": "interval", "x": ["0.5", 1], "cells": 4, "young": 2, "prescribed": {"right": "-0.1"}},
-        "contact": {"gap": "0.02"},
-        "iteration": {**RUN},
-    },
-}
-#: Plane bodies; :func:`verification.ledger.convergence.inside` gives them a friction below their C_2.
-PLANE: dict[str, dict[str, Any]] = {
-    "squares": {
-        "body1": {**SQUARE, "x": [0, 1], "y": [-1, 0], "fixed": ["bottom"]},
-        "body2": {**SQUARE, "x": [0, 1], "y": [0, 1], "prescribed": {"top": ["0.01", "-0.05"]}},
-        "contact": {"friction": 0, "radius": "0.4"},
-        "iteration": {**RUN},
-    },
-    "plates": _plates({"young": 1}, {"young": 1, "prescribed": {"top": ["0.004", "-0.015"]}}, contact={"friction": 0}),
-}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -269,20 +199,8 @@ def cases(level: Level) -> list[Case]:
     named = {name: Problem.from_dict(data) for name, data in PROBLEMS.items()}
     if level == "full":
         named |= {f"{name}, halved": problem.refined(1) for name, problem in list(named.items())}
-        named |= {f"random {i}": Problem.from_dict(_drawn(generator(f"problem {i}"))) for i in range(24)}
+        named |= {f"random {i}": Problem.from_dict(drawn(generator(f"problem {i}"))) for i in range(24)}
     return [Case(name=name, problem=problem) for name, problem in named.items()]
-
-
-def _drawn(rng: np.random.Generator) -> dict[str, Any]:
-    """Two plates with everything drawn at random."""
-    pick = lambda low, high: round(float(rng.uniform(low, high)), 3)
-    lower: dict[str, Any] = {"young": round(10 ** rng.uniform(-1, 1), 3), "poisson": pick(-0.3, 0.45)}
-    upper: dict[str, Any] = {"young": round(10 ** rng.uniform(-1, 1), 3), "poisson": pick(-0.3, 0.45)}
-    upper["prescribed"] = {"top": [pick(-0.01, 0.01), pick(-0.02, -0.005)]}
-    if rng.random() < 0.5:
-        upper["traction"] = {"right": [0, pick(0, 0.3) * upper["young"]]}
-    contact = {"friction": pick(0, 0.5), "radius": pick(0.2, 0.8), "gap": pick(0, 0.004)}
-    return _plates(lower, upper, contact=contact, iteration={"neumann_body": int(rng.integers(1, 3)), "theta": "auto"})
 
 
 # Test functions.
