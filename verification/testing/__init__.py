@@ -7,9 +7,9 @@ comes back as a :class:`Report`.  The strategies that draw the cases are public 
 The kit needs hypothesis, which ``pip install 'ndtheory[test]'`` installs; nothing else in the package does.
 
 >>> from verification.algorithm.relaxation import Aitken
->>> print(check_rule(Aitken(), examples=5))  # doctest: +ELLIPSIS
+>>> print(check_rule(Aitken(), examples=5))  # doctest: +ELLIPSIS, +NORMALIZE_WHITESPACE
 rule 'aitken'
-  stays at the solution      holds ...
+  stays at the solution holds ...
 """
 
 from __future__ import annotations
