@@ -59,7 +59,8 @@ class RuleName(click.Choice[str]):
 RELAXATION = click.option(
     "--relaxation",
     type=RuleName(),
-    help="Rule of relaxation, over the file's; all but constant are outside the theorem.",
+    metavar="RULE",  # a list of the names would import the rules, and arrays with them
+    help="Rule of relaxation, over the file's; all but constant are outside the theorem.  A wrong name lists them.",
 )
 THETA = click.option("--theta", metavar="NUMBER", help="Relaxation factor, 0 < theta < 1, over the file's.")
 SWAP = click.option("--swap-roles", "swap", is_flag=True, help="Give the Neumann problem to the other body.")

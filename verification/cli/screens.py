@@ -125,7 +125,7 @@ def _happened(run: Run, comparison: Comparison | None = None) -> None:
         say(f"  {run.evaluations} evaluations of T, with the {run.relaxation} relaxation{proved}")
     elif run.choice.source != "given":
         note(f"theta = {float(run.theta):.4g} is the {run.choice.source} one: {run.choice.why}", "  ")
-    _contact(problem, run.contact, f"; KKT residual of the contact step {run.last.contact.kkt.residual:.1e}")
+    _contact(problem, run.contact, f"; KKT residual of step II {run.last.contact.kkt.residual:.1e}")
 
 
 def _steps(rate: float, tolerance: float) -> str:
@@ -141,7 +141,7 @@ def _contact(problem: Problem, contact: ContactFields, solved: str = "") -> None
     normal = f"{figures(total['normal'], 6)} normal"
     say("  nodes               " + ", ".join(f"{count} {name}" for name, count in contact.pattern.items()))
     if problem.dimension == 1:
-        say(f"  force               {normal}, {units['stress']}{solved}")
+        note(f"force               {normal}, {units['stress']}{solved}", "  ")
         return
     rounding = 1e-12 * max(abs(total["normal"]), abs(total["tangential"]))
     tangential = total["tangential"] if abs(total["tangential"]) > rounding else 0.0
