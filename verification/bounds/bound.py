@@ -12,11 +12,11 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ndtheory import Constants, EnergyConstants, Number
+from verification.progress import Progress, silent
 
 if TYPE_CHECKING:
     from verification.constants import Measured
     from verification.interface.pair import ContactPair
-from verification.progress import Progress, silent
 
 #: The semidefinite bound and the losses are worked out up to this many contact nodes: some seconds.
 LARGEST = 30

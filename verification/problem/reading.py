@@ -296,7 +296,7 @@ def _read_contact(table: Table, dimension: int) -> ContactSpec:
 
 
 def _read_iteration(table: Table) -> IterationSpec:
-    from verification.algorithm.relaxation import RULES
+    from verification.algorithm.relaxation import RULES  # the one list of rules; it lies above, and is only asked
 
     def theta(value: Any) -> Theta:
         try:
