@@ -19,7 +19,8 @@ from verification.interface.pair import ContactPair
 from verification.ledger.cases import three_digits
 from verification.ledger.differences import Difference, Setting, along, between, uniform_piece
 from verification.ledger.evidence import Evidence, Level, figure
-from verification.ledger.inequalities import SEED, Reading
+from verification.ledger.inequalities import SEED
+from verification.ledger.reading import Reading
 from verification.ledger.worst import Trial, draw_cases
 from verification.threads import one_thread
 

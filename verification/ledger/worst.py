@@ -21,7 +21,8 @@ from verification.interface.pair import ContactPair
 from verification.ledger.cases import NAMED, problem
 from verification.ledger.differences import Difference, Setting, draw_pairs
 from verification.ledger.evidence import Evidence, figure
-from verification.ledger.inequalities import ALLOWANCE, INEQUALITIES, LEVELS, SEED, SHARES, Inequality, Reading
+from verification.ledger.inequalities import ALLOWANCE, INEQUALITIES, LEVELS, SEED, SHARES, Inequality
+from verification.ledger.reading import Reading
 from verification.problem.specification import Problem
 from verification.threads import one_thread
 
