@@ -35,7 +35,7 @@ SEED = 2008
 #: An equation holds below this relative residual, and an inequality above minus it.
 EXACT = 1e-10
 
-#: The same at the limit of a run, whose residual is at most :data:`.field_problems.TOLERANCE`.
+#: The same at the limit of a run, whose residual is at most :data:`verification.ledger.field_problems.TOLERANCE`.
 LIMIT = 1e-9
 
 #: Distances to the solution below this share of its norm are not compared step by step: rounding stands behind them.
