@@ -330,9 +330,12 @@ def _top(A: Floats, B: Floats) -> float:
 
 def _of_section_5(pair: ContactPair, tangential: NDArray[np.bool_]) -> dict[str, float | None]:
     """C_R, C_tr and C_s: matrices on the components that both bodies leave free."""
-    sides, grid, kernel = (pair.body1, pair.body2), pair.contact.grid, pair.interface.kernel
-    E = [side.gram for side in sides]
-    values: dict[str, float | None] = {"C_R": float(np.sqrt(max(_top(side.lift_gram, e) for side in sides for e in E)))}
+    # along y, so that the constants do not depend on the roles, to the last digit
+    bodies, grid, kernel = (pair.body1.mesh_body, pair.body2.mesh_body), pair.contact.grid, pair.interface.kernel
+    E = [body.gram.schur for body in bodies]
+    values: dict[str, float | None] = {
+        "C_R": float(np.sqrt(max(_top(body.lift_gram, e) for body in bodies for e in E)))
+    }
     if not tangential.any():
         return values | dict.fromkeys(("C_tr", "C_tr_half", "C_s"), 0.0)
     B_T = _tangential_mass(pair, tangential)
@@ -340,7 +343,7 @@ def _of_section_5(pair: ContactPair, tangential: NDArray[np.bool_]) -> dict[str,
     values["C_tr"] = float(np.sqrt(max(_top(B_T, e) for e in E)))
     values["C_tr_half"] = float(np.sqrt(max(min(_top(k, e) for k in kept) for e in E)))
     if kernel is not None:
-        Z = [kernel @ _free(side)[~tangential] for side in sides]
+        Z = [kernel @ body.elastic.schur[~tangential] for body in bodies]
         squares = [z.T @ (grid.weights[:, None] * z) for z in Z]
         values["C_s"] = float(np.sqrt(max(_top((z + z.T) / 2, e) for z, e in zip(squares, E, strict=True))))
     return values

@@ -112,6 +112,13 @@ class Body(Value):
         product = matrix[interface][:, interface].toarray() + cross + cross.T + inner
         return np.asarray((product + product.T) / 2)
 
+    @cached_property
+    def lift_gram(self) -> Floats:
+        """``N_a = R_a' H_a R_a``: the H1 norm squared of the elastic lift (4.5), on the free components."""
+        with one_thread():
+            gram: Floats = freeze(self.on_lifts(self.gram_matrix))
+        return gram
+
     @property
     def known_trace(self) -> Floats:
         """Interface displacements that Gamma_u prescribes, 0 where it does not."""
@@ -253,7 +260,7 @@ class Condensed(Value):
         ValueError
             Only matrices are known.
         """
-        gram: Floats = freeze(self.orient_form(self.mesh_body.on_lifts(self.mesh_body.gram_matrix)))
+        gram: Floats = freeze(self.orient_form(self.mesh_body.lift_gram))
         return gram
 
     def dual_norm(self, force: Floats) -> float:
