@@ -22,7 +22,7 @@ from verification.interface.pair import ContactPair
 
 def as_matrices(pair: ContactPair) -> dict[str, object]:
     """What `build` takes to make the same pair from matrices: normal components along y."""
-    lower, upper = (side if side.upward else side.turned() for side in (pair.body1, pair.body2))
+    lower, upper = pair.along_y
     return {
         "S1": lower.stiffness,
         "S2": upper.stiffness,

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import math
-import struct
-import tokenize
 import warnings
 import zipfile
-import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, BinaryIO
@@ -16,17 +13,11 @@ import numpy as np
 import scipy.sparse as sp
 
 from fem1d2d.mesh import Floats
-from verification.interface.matrices import MOST_ROWS
+from verification.interface.matrices import MOST_ROWS, UNREADABLE
 from verification.problem.tables import ProblemError, unreadable
 
 #: Largest size of a matrix file: a full matrix of MOST_ROWS rows, with the two indices of each entry.
 MOST_BYTES = 24 * MOST_ROWS**2
-
-#: What numpy, scipy and zipfile raise on a file that is no matrix.
-UNREADABLE = (
-    ArithmeticError, AttributeError, EOFError, LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError,
-    struct.error, tokenize.TokenError, SyntaxError, zipfile.BadZipFile, zlib.error,
-)  # fmt: skip
 
 
 def read_matrix(path: Path) -> Floats:

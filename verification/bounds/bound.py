@@ -206,14 +206,18 @@ class Bound(ABC):
             theta outside (0, 1).
         """
 
-    @abstractmethod
     def region(self, subject: Subject, *, progress: Progress = silent) -> Region:
-        """Trace where the bound proves contraction in the plane of theta and k.
+        """Trace where the bound proves contraction in the plane of theta and k: by its interval at each friction.
 
         Raises
         ------
         NotComputed
         """
+        found = self.evaluate(subject)
+        if found.friction.some is None or found.friction.every is None:
+            raise NotComputed(found.not_computed or "needed a law of friction to vary k")
+        interval = lambda k: self.evaluate(subject.at(k)).interval
+        return trace(interval, every=found.friction.every.value, some=found.friction.some.value)
 
     def absent(self, why: str) -> BoundResult:
         """The result where nothing was worked out."""

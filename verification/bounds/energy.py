@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ndtheory import evaluate_sharp
-from verification.bounds.bound import Bound, BoundResult, NotComputed, Region, Subject, Thresholds, trace, why_not
+from verification.bounds.bound import Bound, BoundResult, Subject, Thresholds, why_not
 from verification.progress import Progress, silent
 
 
@@ -38,10 +38,3 @@ class Sharp(Bound):
             why=why,
             detail=found,
         )
-
-    def region(self, subject: Subject, *, progress: Progress = silent) -> Region:
-        found = self.evaluate(subject)
-        if found.friction.some is None or found.friction.every is None:
-            raise NotComputed(found.not_computed or "needed a law of friction to vary k")
-        interval = lambda k: self.evaluate(subject.at(k)).interval
-        return trace(interval, every=found.friction.every.value, some=found.friction.some.value)

@@ -6,7 +6,7 @@ from typing import Any
 
 from ndtheory import PRINTED, REPAIRED, evaluate
 from ndtheory.bounds import Edition
-from verification.bounds.bound import Bound, BoundResult, NotComputed, Region, Subject, Thresholds, trace, why_not
+from verification.bounds.bound import Bound, BoundResult, Subject, Thresholds, why_not
 from verification.progress import Progress, silent
 
 
@@ -43,13 +43,6 @@ class Section5(Bound):
     def _unit(self, subject: Subject) -> str:
         """What a figure of this edition must be told with."""
         return ""
-
-    def region(self, subject: Subject, *, progress: Progress = silent) -> Region:
-        found = self.evaluate(subject)
-        if found.friction.some is None or found.friction.every is None:
-            raise NotComputed(found.not_computed or "needed a law of friction to vary k")
-        interval = lambda k: self.evaluate(subject.at(k)).interval
-        return trace(interval, every=found.friction.every.value, some=found.friction.some.value)
 
 
 class Printed(Section5):

@@ -20,7 +20,7 @@ from verification.interface.body import Condensed
 from verification.interface.friction import Given
 from verification.interface.grid import Grid
 from verification.interface.interface import Interface
-from verification.interface.matrices import check_matrix
+from verification.interface.matrices import UNREADABLE, check_matrix
 from verification.interface.pair import ContactPair
 from verification.problem import ProblemError, Settings
 from verification.problem.specification import read_theta
@@ -36,9 +36,8 @@ NEEDED = ("S1", "S2", "load1", "load2", "x", "weights", "gap", "friction", "neum
 def write_interface(pair: ContactPair, path: Path) -> None:
     """Write a pair as an interface file."""
     interface, settings = pair.interface, pair.settings
-    lower, upper = (side if side.upward else side.turned() for side in (pair.body1, pair.body2))
     arrays: dict[str, Any] = {}
-    for i, side in enumerate((lower, upper), 1):
+    for i, side in enumerate(pair.along_y, 1):
         arrays |= {f"S{i}": side.stiffness, f"load{i}": side.load, f"known{i}": side.known, f"free{i}": side.free}
     arrays |= {
         "x": interface.contact.x,
@@ -76,7 +75,7 @@ def read_interface(path: Path) -> ContactPair:
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as found:
             arrays = {name: np.array(found[name]) for name in found.files}
-    except Exception:  # numpy and zipfile raise a dozen kinds on a file that is none of theirs
+    except UNREADABLE:
         raise refuse("", "needed an interface file, as `ndtheory run FILE -o DIR` writes it") from None
     if missing := [name for name in NEEDED if name not in arrays]:
         raise refuse(missing[0], f"needed an interface file with {', '.join(NEEDED)}")

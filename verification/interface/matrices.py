@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import struct
+import tokenize
+import zipfile
+import zlib
+
 import numpy as np
 
 from fem1d2d.mesh import Floats
@@ -12,6 +17,12 @@ MOST_ROWS = 4000
 
 #: Largest asymmetry of a matrix, relative to its largest entry.
 ASYMMETRY = 1e-8
+
+#: What numpy, scipy and zipfile raise on a file that is no matrix.
+UNREADABLE = (
+    ArithmeticError, AttributeError, EOFError, LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError,
+    struct.error, tokenize.TokenError, SyntaxError, zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
 
 
 def size(matrix: Floats) -> str:

@@ -112,6 +112,12 @@ class ContactPair(Value):
         return self.neumann if self.neumann_body == 2 else self.contact
 
     @property
+    def along_y(self) -> tuple[Condensed, Condensed]:
+        """The lower body and the upper one with their normal components along y, as matrices are written and read."""
+        lower, upper = (side if side.upward else side.turned() for side in (self.body1, self.body2))
+        return lower, upper
+
+    @property
     def upward(self) -> float:
         """+1 where the outward normal of the contact body points up (body 1), -1 where it points down (body 2)."""
         return 1.0 if self.neumann_body == 2 else -1.0

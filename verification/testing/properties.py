@@ -161,14 +161,14 @@ def describe(value: Any) -> str:
         return str(value)
     if value.problem is not None:
         return f"build(Problem.from_dict({value.problem.to_dict()!r}))"
-    lower, upper = (side if side.upward else side.turned() for side in (value.body1, value.body2))
-    interface = value.interface
+    (lower, upper), interface = value.along_y, value.interface
     given = {
         "S1": lower.stiffness,
         "S2": upper.stiffness,
         "load1": lower.load,
         "load2": upper.load,
         "x": value.contact.grid.x,
+        "weights": value.contact.grid.weights,
         "gap": interface.gap,
         "kernel": interface.kernel,
         "transfer": interface.transfer,
