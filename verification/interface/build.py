@@ -15,7 +15,7 @@ from verification.interface.files import read_interface
 from verification.interface.friction import Given, Law
 from verification.interface.grid import Grid
 from verification.interface.interface import Interface
-from verification.interface.matrices import check_matrix, size
+from verification.interface.matrices import check_matrix, check_nodes, size
 from verification.interface.pair import ContactPair
 from verification.problem import Problem, load
 
@@ -109,14 +109,9 @@ def build(
     if transfer is None and n != m:
         raise ValueError(f"S1 is {size(S1)}, S2 is {size(S2)}: needed the same contact nodes, or a transfer")
     x = _vector("x", x, n)
-    if not np.all(np.diff(x) > 0):
-        raise ValueError("x: needed positions that increase")
     w = trapezoid(x) if weights is None else _vector("weights", weights, n)
-    if not np.all(w > 0):
-        raise ValueError("weights: needed positive ones")
     distance = _vector("gap", np.broadcast_to(gap, n), n)
-    if not np.all(distance >= 0):
-        raise ValueError("gap: needed numbers >= 0")
+    check_nodes(x, w, distance)
     P = None if transfer is None else _matrix("transfer", transfer, (n, m))
     grid = Grid(x=x, weights=w)
     if P is not None and law is not None:

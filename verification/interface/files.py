@@ -20,7 +20,7 @@ from verification.interface.body import Condensed
 from verification.interface.friction import Given
 from verification.interface.grid import Grid
 from verification.interface.interface import Interface
-from verification.interface.matrices import UNREADABLE, check_matrix
+from verification.interface.matrices import UNREADABLE, check_matrix, check_nodes
 from verification.interface.pair import ContactPair
 from verification.problem import ProblemError, Settings
 from verification.problem.specification import read_theta
@@ -113,6 +113,7 @@ def _pair(arrays: dict[str, np.ndarray]) -> ContactPair:
         tolerance=float(Fraction(text("tolerance", "1e-9"))),
         max_iterations=int(text("max_iterations", "500")),
     )
+    check_nodes(grid.x, grid.weights, _real("gap", arrays["gap"], (n,)))
     interface = Interface(
         contact=grid, neumann=other, gap=_real("gap", arrays["gap"], (n,)), law=law, transfer=transfer
     )

@@ -54,3 +54,18 @@ def check_matrix(name: str, matrix: Floats) -> None:
     if not least > len(matrix) * np.finfo(float).eps:
         kind = "singular: the body has too little support" if least >= -1e-10 else "indefinite"
         raise ValueError(f"{name} is {kind} (least eigenvalue {least * unit:.3g}): needed a positive definite matrix")
+
+
+def check_nodes(x: Floats, weights: Floats, gap: Floats) -> None:
+    """Refuse what are no contact nodes from left to right, no quadrature on them, or no initial distance.
+
+    Raises
+    ------
+    ValueError
+    """
+    if not np.all(np.diff(x) > 0):
+        raise ValueError("x: needed positions that increase")
+    if not np.all(weights > 0):
+        raise ValueError("weights: needed positive ones")
+    if not np.all(gap >= 0):
+        raise ValueError("gap: needed numbers >= 0")
