@@ -17,9 +17,9 @@ from verification.algorithm.fixed_point import FixedPointMap, iterate_at, iterat
 from verification.algorithm.iterate import Iterate
 from verification.algorithm.linearisation import Forecast, Linearisation, NotLinear, forecast, linearise
 from verification.algorithm.rates import ObservedRate, observed_rate
-from verification.algorithm.relaxation import Constant, Rule, rule_of
+from verification.algorithm.relaxation import Constant, Rule
 from verification.algorithm.run_document import run_document
-from verification.algorithm.theta import Choice, choose
+from verification.algorithm.theta import Choice, begin
 from verification.constants import Measured
 from verification.contact import ContactError, Solver
 from verification.document import Document
@@ -340,9 +340,7 @@ def run(
     pair = pair_of(problem)
     settings = pair.settings
     _check_memory(pair)
-    relaxation = rule_of(rule or settings.relaxation)
-    choice = choose(pair, theta, measured, rule=relaxation)
-    step = relaxation.begin(pair, float(choice.theta), choice.rho)
+    relaxation, choice, step = begin(pair, theta, rule, measured)
     seen: list[Iterate] = []
     least, since = float("inf"), 0
     outcome: Outcome = "limit"

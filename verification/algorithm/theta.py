@@ -10,7 +10,7 @@ from typing import Any
 
 from ndtheory import SharpBounds, evaluate_sharp, exact
 from ndtheory.sharp import predicted_factor
-from verification.algorithm.relaxation import Rule, rule_of
+from verification.algorithm.relaxation import Rule, Step, rule_of
 from verification.constants import Measured, measure
 from verification.interface.pair import ContactPair
 from verification.problem.specification import read_theta
@@ -96,6 +96,23 @@ def choose(
     if wanted != "auto":
         return Choice(theta=wanted, source="given", rho=rho)
     return automatic(sharp, pair.outside, pair.settings.tolerance)
+
+
+def begin(
+    pair: ContactPair, theta: Any = None, rule: Rule | str | None = None, measured: Measured | None = None
+) -> tuple[Rule, Choice, Step]:
+    """The rule and the theta of a run, as :func:`choose` has them, and what the rule does in it.
+
+    Raises
+    ------
+    HypothesisError, ProblemError
+        As for :func:`choose`.
+    ValueError
+        No rule has that name.
+    """
+    relaxation = rule_of(rule or pair.settings.relaxation)
+    choice = choose(pair, theta, measured, rule=relaxation)
+    return relaxation, choice, relaxation.begin(pair, float(choice.theta), choice.rho)
 
 
 def automatic(sharp: SharpBounds, outside: Sequence[str] = (), tolerance: float = 1e-9) -> Choice:
