@@ -145,12 +145,14 @@ def load_problem(
     ProblemError, HypothesisError
     """
     from verification.problem import ProblemError, load
+    from verification.problem.reading import takes_theta
 
     chosen = {} if relaxation is None else {"iteration.relaxation": relaxation}
     problem = load(file).with_keys({**keys, **chosen})
     if theta is not None:
-        if problem.iteration.relaxation == "momentum":
-            needed = 'needed no theta beside relaxation = "momentum", which takes its step from rho'
+        rule = problem.iteration.relaxation
+        if not takes_theta(rule):
+            needed = f'needed no theta beside relaxation = "{rule}", which takes its step from rho'
             raise ProblemError(str(file), "--theta", theta, needed)
         problem = problem.with_theta(theta)
     return problem.swapped() if swap else problem
@@ -218,7 +220,7 @@ def run(file: Path, solver: Any, folder: Path | None, as_json: bool, **changes: 
             finished = finished.linearise()
         except KeyboardInterrupt:  # costs no run
             finished = replace(finished, interrupted=True).linearise()
-    _warn(problem.iteration.warnings)  # not beside a refusal
+    _warn(finished.choice.warnings)
     write = None if target is None else lambda: target.write_run(finished)
     deliver(finished, lambda: screens.run(finished, file), as_json, write, folder)
     return _status_of_run(finished, changes["swap"])
@@ -322,7 +324,7 @@ def _compare(problem: Problem, file: Path, folder: Path | None, solver: Any, as_
     _warn(pair.warnings)
     with stages() as tell, progress(tell, problem.iteration.tolerance) as watch:
         comparison = verdicts.compare(pair, solver=solver, watch=watch, progress=tell)
-    _warn(problem.iteration.warnings)
+    _warn(comparison.run.choice.warnings)
     write = None if target is None else lambda: target.write_comparison(comparison)
     deliver(comparison, lambda: screens.comparison(comparison, file), as_json, write, folder)
     return _status_of_comparison(comparison, swapped)
