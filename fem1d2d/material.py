@@ -32,6 +32,13 @@ def plane_strain(young: Any, poisson: Any) -> Material:
 
     ``lame_lambda = E nu / ((1 - 2 nu)(1 + nu))``, ``lame_mu = E / (2 (1 + nu))``; any scalar.
 
+    Parameters
+    ----------
+    young : scalar
+        E > 0, in the unit of stress that the parameters are to have.
+    poisson : scalar
+        -1 < nu < 1/2.
+
     Raises
     ------
     ValueError
@@ -53,6 +60,11 @@ def plane_strain(young: Any, poisson: Any) -> Material:
 
 def bar(young: Any) -> Material:
     """A bar of unit cross-section: ``sigma = E eps``, that is lame_lambda = E and lame_mu = 0 in one dimension.
+
+    Parameters
+    ----------
+    young : scalar
+        E > 0, in the unit of stress that the parameters are to have.
 
     Raises
     ------

@@ -38,6 +38,11 @@ def fault(points: NDArray[Any], edges: Ints) -> str | None:
     edges : int array, shape (b, 2)
         The boundary, the body to the left of each edge.
 
+    Returns
+    -------
+    str or None
+        Where it is, in words.
+
     Examples
     --------
     >>> square, triangle = [(0, 0), (2, 0), (2, 2), (0, 2)], [(1, 0.5), (1.5, 1), (1, 1.5)]

@@ -13,7 +13,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from fem1d2d.condense import solver
 from fem1d2d.mesh import Floats
 
-#: Below this size a pencil is solved densely.
+#: Up to this size a pencil is solved densely.
 DENSE = 40
 
 #: The relative residual asked of Lanczos.
@@ -66,6 +66,8 @@ def largest_sparse(
 
     Parameters
     ----------
+    A, B : sparse array, shape (n, n)
+        A symmetric, B symmetric positive definite.
     solve_B : callable
         ``r -> B^-1 r``.
     above : float, optional

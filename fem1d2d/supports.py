@@ -42,7 +42,7 @@ def supports(mesh: Mesh, sides: Mapping[str, Sequence[float | None]]) -> Support
     Parameters
     ----------
     sides : mapping from side name to d numbers
-        None leaves a component free.
+        Displacements in the mesh's unit of length; None leaves a component free.  The names are those of the mesh.
 
     Raises
     ------

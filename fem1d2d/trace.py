@@ -53,7 +53,7 @@ def facing(mesh: Mesh, *, upper: bool, ends: tuple[float, float]) -> Ints:
     upper : bool
         True for what faces up.
     ends : pair of float
-        Part of the x axis.
+        Part of the x axis, in the mesh's unit of length.
 
     Raises
     ------

@@ -1,8 +1,9 @@
 """C_0, .., C_6, G, h_1, h_2 and the contraction interval (Section 5), printed and repaired.
 
 Every formula is written over any scalar (float, Decimal, Fraction where roots are rational, sympy, mpmath, an interval,
-a scalar that writes the formula down) and free of the cancellation that the printed form suffers; branches go through
-:func:`ndtheory.number.where`.  Docstrings give the equation, ``tests/ndtheory`` a second derivation.
+an object that records the operations made with it) and free of the cancellation that the printed form suffers; branches
+go through :func:`ndtheory.number.where`.  Docstrings give the equation, ``tests/ndtheory`` a second derivation.  With
+u = m all m, M, u and x = C_K are stresses and G is a stress cubed; C_R, theta, C_T, P, D, Q, C_0, C_1, C_6 are numbers.
 
 The two editions are one set of formulas.  The paper's bracket ``M C_R + C_K + sqrt(C_K m) + 1`` in (5.30)
 adds a stress to the number 1: from (5.11), (5.13), (5.19) and (5.23) it is a *stress* ``u = m`` that stands there, and
@@ -114,7 +115,7 @@ def G(x: Any, m: Any, M: Any, C_R: Any, u: Any) -> Any:
 
 
 def inverse_G(y: Any, m: Any, M: Any, C_R: Any, u: Any) -> Any:
-    """The x >= 0 with G(x) = y, for y > 0.
+    """The x >= 0 with G(x) = y, for y > 0: a friction constant C_K (stress) from a stress cubed.
 
     In t = sqrt(x) this is ``t^4 + sqrt(m) t^3 + (M C_R + u) t^2 = Y``: increasing and convex, so Newton's method
     falls monotonically from any start above the root.  The smaller of the roots of the first and of the last
@@ -134,7 +135,7 @@ def inverse_G(y: Any, m: Any, M: Any, C_R: Any, u: Any) -> Any:
 
 
 def thresholds(m: Any, M: Any, C_R: Any, u: Any) -> tuple[Any, Any, Any, Any]:
-    """C2 (5.43), C3, C4, C5 (Cases 2-1 to 2-3) on C_K."""
+    """C2 (5.43), C3, C4, C5 (Cases 2-1 to 2-3), each as the C_K (stress) below which a case holds."""
     c0 = C0(m, M, C_R)
     right = (m**5 / (M * C_R) ** 2 + m**3, m**3 / 2, m**3, (2 - c0) / (1 - c0) * m**3 / 2)
     C2, C3, C4, C5 = (inverse_G(y, m, M, C_R, u) for y in right)
@@ -221,12 +222,16 @@ class Bounds:
     interval : tuple of float or None
         Contraction for lo < theta < hi, the four cases of Proposition 5.6 in one; None when k is at or above C2.
     theta : float or None
+        The one asked about; None where none was given.
     factor, one_minus_factor : Number or None
         K(theta) < 1 in the norm (5.21), and 1 - K computed without cancellation.
         None outside the interval: nothing is bounded there.
     verdict : {'contraction', 'no conclusion'} or None
+        Whether theta lies in the interval; None without theta.
     proved : bool
         Whether the proof behind this edition holds for these constants.
+    threshold_on : {'k', 'C_K'}
+        What C2 to C5 are thresholds of.
     """
 
     edition: Edition

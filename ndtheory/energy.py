@@ -26,10 +26,12 @@ class EnergyConstants(Given):
     Parameters
     ----------
     rho : dimensionless
-        Largest eigenvalue of ``S_1 phi = rho S_2 phi``, contact body over Neumann body.  Hypothesis: rho > 0.
+        Largest eigenvalue of ``S_1 phi = rho S_2 phi``, contact body over Neumann body.  Hypothesis: rho > 0;
+        from 1e-75 to 1e75, so that its square fits into a double.
     kappa_1, kappa_2 : dimensionless, optional
         ``k C_s C_t1`` and ``k C_s C_t2`` with ``C_s = sup |S sigma_N(w)|_L2 / |w|_a2`` and
-        ``C_ta = sup |v_T|_L2 / |v|_aa``; 0 by default.  Hypothesis: both >= 0.
+        ``C_ta = sup |v_T|_L2 / |v|_aa``; 0 by default.  Hypothesis: both >= 0, of
+        sizes as rho where they are not 0.
     rho_normal : dimensionless, optional
         rho with the tangential components condensed out; takes the place of rho where kappa_1 = kappa_2 = 0.
         Hypothesis: 0 < rho_normal <= rho.

@@ -236,8 +236,8 @@ def where(condition: Any, a: Any, b: Any) -> Any:
     """``a`` where a condition holds, else ``b``: the branch of a formula, beside :func:`sqrt`.
 
     A formula takes no ``if`` on a scalar, so that it serves scalars whose comparisons are not decided at once.  Such a
-    comparison returns an object with a method ``where(a, b)``: that of a scalar that writes the formula down returns
-    the text of the choice, that of an interval or ball the hull of both branches.  Conditions are joined by ``&``.
+    comparison returns an object with a method ``where(a, b)``: that of a scalar that records its operations records
+    the choice, that of an interval or ball the hull of both branches.  Conditions are joined by ``&``.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """The theorem in energy norms: the same proof as Section 5, with no constant larger than it must be.
 
 For two forces psi, psi~ let d_1, d_2 be the differences of the traces of the contact body and of the Neumann body, with
-``|d_a|^2 = a^a(R d_a, R d_a)``, and ``x = |d_1| / |d_2|``; ``|d_2|`` is the norm (5.21) of psi - psi~. Then
+``|d_a|^2 = a^a(R d_a, R d_a)``, and ``x = |d_1| / |d_2|``; ``|d_2|`` is the norm (5.21) of psi - psi~.  Then
 
 * ``|||T psi - T psi~|||^2 <= rho x^2 |d_2|^2`` takes the place of (5.18), (5.22), (5.38),
 * ``x <= r``, with ``r^2 = (sqrt(rho) + kappa_1) r + kappa_2``, that of (5.11),
@@ -11,7 +11,8 @@ So by (5.24) ``q(theta)^2``, the largest ``(1-theta)^2 + 2 theta (1-theta) f(x) 
 bounds the square of the Lipschitz constant of T_theta.  The proof, step by step, is in ``docs/sharp.md``.
 
 Every formula is written over any scalar (float, Decimal, Fraction where roots are rational, sympy, mpmath, an interval,
-a scalar that writes the formula down); branches go through :func:`ndtheory.number.where`.
+an object that records the operations made with it); branches go through :func:`ndtheory.number.where`.  All arguments
+and results are numbers without unit.
 
 r grows with rho, kappa_1 and kappa_2, and at each x in [0, r] the expression above does, as 0 < theta <= 1: so does q.
 As q grows, the thetas with q < 1, an interval, become fewer: its upper end does not grow, the least q does not fall,
@@ -125,6 +126,9 @@ def friction_multiple(kappa_1: Any, kappa_2: Any) -> Any:
 
 def friction_limit(rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
     """The factor t by which friction may grow until no theta at all is proved; never below :func:`friction_multiple`.
+
+    ``(1 + 1/rho) / (kappa_2 + kappa_1/sqrt(rho))`` where ``kappa_1 (sqrt(rho) - 1/sqrt(rho)) < 2 kappa_2``;
+    elsewhere it is :func:`friction_multiple`, and the two thresholds are one.
 
     Examples
     --------

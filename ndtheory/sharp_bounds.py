@@ -21,13 +21,15 @@ class SharpBounds:
     ratio : Number
         r, the largest ``|d_1|/|d_2|``.
     friction_multiple : Number or None
-        The factor by which friction may grow until no small theta is proved; None without friction.
+        The factor by which friction may grow until no small theta is proved: times k it is the threshold k_s.  None
+        without friction.
     friction_limit_multiple : Number or None
-        The factor by which it may grow until no theta at all is proved; None without friction.
+        The factor by which it may grow until no theta at all is proved: times k it is k_e >= k_s.  None without
+        friction.
     interval : tuple of float or None
         q < 1 for lo < theta < hi, capped at 1; None where q >= 1 everywhere.
     theta_proved : float or None
-        The theta of least q.
+        The theta of least q; None where q >= 1 everywhere.
     factor_proved : Number or None
         q there.
     theta_max_proved : Number or None
@@ -35,9 +37,11 @@ class SharpBounds:
     theta_predicted, rate_predicted : float
         ``2/(2 + rho)`` and ``rho/(2 + rho)``: proved without friction, a prediction with it.
     theta : float or None
+        The one asked about; None where none was given.
     factor, one_minus_factor : Number or None
         q(theta) < 1 and 1 - q; None outside the interval.
     verdict : {'contraction', 'no conclusion'} or None
+        Whether theta lies in the interval; None without theta.
     """
 
     rho: Number

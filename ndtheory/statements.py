@@ -29,6 +29,7 @@ class Statement:
         definition, law, algorithm, equation, inequality, constant, case, lemma, proposition, theorem, remark,
         experiment or own.
     title, claims : str
+        What it is about, in a few words; what it says.
     leans_on : tuple of str
         Statements that its proof uses.
     fault : {'false as printed', 'does not follow', 'gap', 'typo'} or None
@@ -41,6 +42,7 @@ class Statement:
     reading : str
         What a definition or a cited result rests on.
     note : str
+        What else a reader should know; mostly empty.
     """
 
     id: str

@@ -20,6 +20,8 @@ DOORS = {
 }
 #: what the theory may know beside the standard library and itself
 THEORY = {"ndtheory.symbolic": "sympy"}
+#: lines of a module at most
+LONGEST = 400
 COMPUTED = "a name computed at run time"
 
 
@@ -86,6 +88,11 @@ def test_no_edge_leaves_the_plan_of_the_house(path):
     is_package = path.name == "__init__.py"
     parts = path.parent.parts if is_package else path.with_suffix("").parts
     assert violations(".".join(parts), (ROOT / path).read_text(encoding="utf-8"), is_package) == []
+
+
+@pytest.mark.parametrize("path", FILES, ids=str)
+def test_a_module_is_short_enough_to_be_read_in_one_go(path):
+    assert len((ROOT / path).read_text(encoding="utf-8").splitlines()) <= LONGEST
 
 
 def test_every_room_has_been_read():

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import sympy as sp
 
 from ndtheory import bounds
-from ndtheory.symbolic.engine import Check, Goal, Relation, add, equal, less
+from ndtheory.symbolic.engine import Checks, Goal, Relation, equal, less
 from ndtheory.symbolic.intervals import ADMISSIBLE, C0, P_, Q_, a_, b_, of_36, of_edition, repaired_G, tilde_G, tilde_P
 from ndtheory.symbolic.symbols import (
     C_R,
@@ -38,8 +37,8 @@ from ndtheory.symbolic.symbols import (
     y,
 )
 
-CHECKS: list[Check] = []
-check = partial(add, CHECKS)
+CHECKS = Checks()
+check = CHECKS.add
 
 # --- Cases 5.7 and 5.8 ----------------------------------------------------------------------------------------------
 
@@ -222,8 +221,7 @@ check(
 check(
     id="prop-5.1",
     text="n_1 + (n_2 + n_3)/theta <= (n_1 + n_2 + n_3)/theta for 0 < theta <= 1.  For all theta >= theta_min"
-    " convergence"
-    " is never supplied: h_1 > 1 on all of (C_1, 1).",
+    " convergence is never supplied: h_1 > 1 on all of (C_1, 1).",
     goals=lambda form: [
         at_most((p + q + r) / theta, (p + (q + r) / theta), {theta: 1 / (1 + o)}),
         form(of_h1(m, P_, Q_).subs(theta, 1 - (1 + b_ / a_) / (1 + y))),

@@ -49,6 +49,7 @@ def of(expression: Any, table: Mapping[str, Dimension]) -> Dimension:
     Raises
     ------
     UnitsDiffer
+        A sum, a minimum or a maximum of things with different units.
     """
     expression = sp.sympify(expression)
     if expression.is_Symbol:

@@ -1,37 +1,24 @@
 """The theorem in energy norms from its premises on, and what it is without friction: gradient descent.
 
-``D`` is |d_1|^2 in the energy of body 1, ``e`` = |d_2| the norm (5.21) of psi - psi~, ``t`` that of p = T psi - T psi~.
+``D`` is |d_1|^2 in the energy of body 1 and ``d1`` its root, ``e`` = |d_2| the norm (5.21) of psi - psi~, ``t`` that of
+p = T psi - T psi~.
 The Cauchy-Schwarz inequality of an inner product is used freely; its slack is a parameter.
 """
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import sympy as sp
 
 from ndtheory import sharp
 from ndtheory.symbolic.contraction import any_theta
-from ndtheory.symbolic.engine import (
-    Check,
-    Goal,
-    Vector,
-    add,
-    at_most,
-    bilinear,
-    equal,
-    functional,
-    less,
-    linear,
-    nonnegative,
-    positive,
-)
+from ndtheory.symbolic.engine import Checks, Goal, Vector, at_most, equal, less, linear, nonnegative, positive
 from ndtheory.symbolic.intervals import C0
-from ndtheory.symbolic.symbols import C_R, CONSTANTS, A, M, e, m, o, p, q, r, theta, y
+from ndtheory.symbolic.symbols import C_R, CONSTANTS, L1, L2, A, C_s, M, a1, a2, d1, e, k, m, o, p, psi, q, r, theta, y
 
-CHECKS: list[Check] = []
-check = partial(add, CHECKS)
+CHECKS = Checks()
+check = CHECKS.add
 
 rho, size = positive("rho E")
 D, work = nonnegative("D Y")
@@ -73,15 +60,14 @@ check(
     mutants={"half of rho_N": rho / 2, "twice rho_N": 2 * rho},
 )
 
-k, C_s, C_t1, C_t2 = nonnegative("k C_s C_t1 C_t2")
-d = nonnegative("d_1")  # the root of D
+C_t1, C_t2 = nonnegative("C_t1 C_t2")
 
 check(
     id="x-friction-energy",
     text="Cauchy-Schwarz: F <= k |zeta| |(d_1 - d_2)_T| in L2(Gamma_c), with |zeta| <= C_s e and"
     " |(d_1 - d_2)_T| <= C_t1 |d_1| + C_t2 e; kappa_a = k C_s C_ta.",
     goals=lambda form: at_most(
-        form[0] * d * e + form[1] * e**2, k * (C_s * e / (1 + p)) * (C_t1 * d / (1 + q) + C_t2 * e / (1 + r)) - o
+        form[0] * d1 * e + form[1] * e**2, k * (C_s * e / (1 + p)) * (C_t1 * d1 / (1 + q) + C_t2 * e / (1 + r)) - o
     ),
     forms={"repaired": (k * C_s * C_t1, k * C_s * C_t2)},
     mutants={"without kappa_2": (k * C_s * C_t1, 0), "without kappa_1": (0, k * C_s * C_t2)},
@@ -202,8 +188,7 @@ check(
 # --- without friction -------------------------------------------------------------------------------------------------
 
 u, v, u_1, v_1 = Vector("u2"), Vector("u~2"), Vector("u1"), Vector("u~1")
-psi, image, loads = Vector("psi"), Vector("T psi"), Vector("l2")
-a1, a2, L1, L2 = bilinear("a1"), bilinear("a2"), functional("L1"), functional("L2")
+image, loads = Vector("T psi"), Vector("l2")
 solve = linear("S2^-1")
 c_N = nonnegative("c_N")
 gap_, u_N, below = sp.symbols("gap u_2N u~_2N", real=True)
@@ -226,7 +211,10 @@ def _descent(form: Any) -> list[Goal]:
         # E(u~2) >= E(u2) + <psi - T psi, d> + e^2/2 + D/2, and the same from u~2 to u2: E above and below its tangent
         at_most(e**2 / 2 + D / 2 + q, convex * e**2 / 2),
         at_most(
-            smooth * e**2 / 2, e**2 / 2 + s_ * d * e / (1 + p) - d**2 / 2, {rho: s_**2}, squares=[(s_ * e - d) ** 2 / 2]
+            smooth * e**2 / 2,
+            e**2 / 2 + s_ * d1 * e / (1 + p) - d1**2 / 2,
+            {rho: s_**2},
+            squares=[(s_ * e - d1) ** 2 / 2],
         ),
         # -<p, d_2> >= D >= t^2/rho_N
         at_most(D + q, (smooth - 1) * D / ((1 + p) * rho)),

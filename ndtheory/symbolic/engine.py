@@ -295,14 +295,15 @@ class Check:
         return decide(self.goals(form))
 
 
-def add(
-    checks: list[Check], *, states: Callable[[Any], Relation | Sequence[Relation]] | None = None, **fields: Any
-) -> None:
-    """Add a check to a list; ``states`` turns a form into the relations whose units are compared."""
-    if states is not None:
-        printed = lambda name: "printed" if name == "step" else name
-        fields["units"] = {printed(name): states(form) for name, form in fields["forms"].items()}
-    checks.append(Check(**fields))
+class Checks(list[Check]):
+    """The checks of one module, in the order of the paper."""
+
+    def add(self, *, states: Callable[[Any], Relation | Sequence[Relation]] | None = None, **fields: Any) -> None:
+        """Append a check; ``states`` turns a form into the relations whose units are compared."""
+        if states is not None:
+            printed = lambda name: "printed" if name == "step" else name
+            fields["units"] = {printed(name): states(form) for name, form in fields["forms"].items()}
+        self.append(Check(**fields))
 
 
 def equal(left: Any, right: Any, *charts: Any) -> Goal:

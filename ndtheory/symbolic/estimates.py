@@ -1,4 +1,4 @@
-"""Section 5 from Lemma 5.3 to (5.33), derived a second time.
+"""Lemma 5.3 and Propositions 5.4 and 5.5, (5.11) to (5.23), derived a second time.
 
 Each inequality is proved from those before it: a quantity known to be at most b is written b/(1+p) or b - p with a free
 parameter, so that what is proved holds for every value the premises allow.  Inner products enter through the
@@ -7,83 +7,64 @@ Cauchy-Schwarz inequality and the definitions of the constants alone; what is us
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import sympy as sp
 
 from ndtheory import bounds
-from ndtheory.symbolic.engine import (
-    Check,
-    Goal,
-    Relation,
-    Vector,
-    add,
-    bilinear,
-    equal,
-    functional,
-    linear,
-    nonnegative,
-    positive,
-)
+from ndtheory.symbolic.engine import Checks, Goal, Relation, Vector, equal, nonnegative
 from ndtheory.symbolic.symbols import (
     C_R,
     CONSTANTS,
-    LARGE_M,
+    L1,
+    L2,
     ROOTS,
-    WITH_THETA,
     A,
     C_s,
     C_tr,
     C_tr_half,
     F,
     M,
-    P,
-    W,
     X,
+    a1,
+    a2,
     at_most,
-    below,
     d1,
     d2,
+    delta1,
+    delta2,
     e,
     k,
+    lift,
+    lift2,
     m,
-    mu,
     n,
-    of_h2,
     p,
-    printed_P,
+    psi,
+    psi2,
     q,
-    q1,
     r,
-    s,
-    t,
-    t_,
-    theta,
+    test,
     tn,
+    v1,
+    v2,
+    w1,
+    w2,
     x,
-    xi,
     y,
 )
 
-CHECKS: list[Check] = []
-check = partial(add, CHECKS)
+CHECKS = Checks()
+check = CHECKS.add
 
 # --- Lemma 5.3 ------------------------------------------------------------------------------------------------------
-
-w1, v1, w2, v2 = Vector("w1"), Vector("w~1"), Vector("w2"), Vector("w~2")
-psi, psi2, test = Vector("psi"), Vector("psi~"), Vector("v")
-a1, a2, energy = bilinear("a1"), bilinear("a2"), bilinear("b")
-lift, lift2, L1, L2 = linear("R1"), linear("R2"), functional("L1"), functional("L2")
-delta1, delta2 = w1 - v1, w2 - v2
 
 S, S2, J1, J2 = nonnegative("S S~ J J~")
 
 check(
     id="5.12",
-    text="The sum of (5.9) and (5.10) for the two test functions: elastic terms, loads, friction (S, S~ the bounds,"
-    " J, J~"
-    " the sizes of the jumps), and that each test function has the jump of the other solution.",
+    text="The sum of (5.9) and (5.10) for the two test functions: elastic terms, loads, friction (S, S~ the bounds, J,"
+    " J~ the sizes of the jumps), and that each test function has the jump of the other solution.",
     goals=lambda form: [
         equal(a1(w1, form[0] - w1) + a1(v1, form[1] - v1), -a1(delta1, delta1) + a1(delta1, lift(delta2))),
         equal(L1(form[0] - w1) + L1(form[1] - v1), 0),
@@ -263,170 +244,4 @@ check(
     forms={"printed": (sp.sqrt(m), M / sp.sqrt(m))},
     mutants={"constants exchanged": (M / sp.sqrt(m), sp.sqrt(m))},
     states=lambda form: [Relation(form[0] * e, "<=", n), Relation(n, "<=", form[1] * e)],
-)
-
-# --- Proposition 5.6, first step ------------------------------------------------------------------------------------
-
-chi, rest = Vector("T psi - T psi~"), Vector("psi - psi~")
-
-check(
-    id="5.24",
-    text="The square of the norm (5.21) of theta chi + (1-theta) eta, expanded.",
-    goals=lambda form: equal(
-        energy(theta * chi + (1 - theta) * rest, theta * chi + (1 - theta) * rest),
-        theta**2 * energy(chi, chi) + (1 - theta) ** 2 * energy(rest, rest) + form * energy(chi, rest),
-        {theta: t_ / (1 + t_)},
-    ),
-    forms={"printed": 2 * theta * (1 - theta)},
-    mutants={"the factor 2 dropped": theta * (1 - theta), "1 + theta": 2 * theta * (1 + theta)},
-    states=lambda form: Relation(t**2, "=", theta**2 * t**2 + (1 - theta) ** 2 * e**2 + form * W),
-)
-
-check(
-    id="5.25",
-    text="(5.6) for psi and psi~, subtracted: a_2(w2-w~2, v) = <psi-psi~, v>, the equation of R2(psi-psi~).",
-    goals=lambda form: equal((L2(test) + functional("psi")(test)) - (L2(test) + functional("psi~")(test)), form),
-    forms={"printed": functional("psi")(test) - functional("psi~")(test)},
-    mutants={"the sum": functional("psi")(test) + functional("psi~")(test)},
-)
-
-a1R = sp.Symbol("a_1R", real=True)  # a1(w1-w~1, R_D(w2-w~2))
-
-Tpsi = functional("T psi - T psi~")
-riesz = {a2(lift2(chi), v): Tpsi(v) for v in (w2, v2)}  # (5.20) for w2 and for w~2
-
-check(
-    id="5.26",
-    text="The definition (5.20) of R2 for v = w2 and v = w~2, subtracted: a_2(R2 chi, w2-w~2) = <chi, w2-w~2>.",
-    goals=lambda form: equal(a2(lift2(chi), delta2).subs(riesz), form),
-    forms={"printed": Tpsi(delta2)},
-    mutants={"the sign": -Tpsi(delta2), "w2 for the difference": Tpsi(w2)},
-)
-
-
-check(
-    id="5.27",
-    text="(5.17) with v = w2-w~2.",
-    goals=lambda form: equal(
-        (-a1(w1, lift(delta2)) + L1(lift(delta2))) - (-a1(v1, lift(delta2)) + L1(lift(delta2))), form
-    ),
-    forms={"printed": -a1(delta1, lift(delta2))},
-    mutants={"the sign": a1(delta1, lift(delta2)), "the lift of w1": -a1(delta1, lift(delta1))},
-)
-
-check(
-    id="5.28",
-    text="(5.12), a_11 = a_1R + F - p with p >= 0, rearranged.",
-    goals=lambda form: at_most(form.subs(q1, a1R + F - p), -a1R, {}),
-    forms={"printed": -q1 + F},
-    mutants={"the sign of F": -q1 - F, "the sign of the energy": q1 + F},
-    states=lambda form: Relation(W, "<=", form),
-)
-
-check(
-    id="5.29",
-    text="a_11 >= m d_1^2 by coercivity, d_1 >= t_n/(M C_R) by (5.18), t_n^2 >= m t^2 by (5.22).",
-    goals=lambda form: at_most(m * (1 + p) * ((1 + q) / A) ** 2 * m * t**2 * (1 + r), form * t**2),
-    forms={"printed": m**2 / A**2},
-    mutants={"C_R^2 dropped": m**2 / M**2, "m for m^2": m / A**2, "C_R for C_R^2": m**2 / (M**2 * C_R)},
-    states=lambda form: Relation(form * t**2, "<=", q1),
-)
-
-check(
-    id="5.30",
-    text="F <= C_K (d_1 d_2 + d_2^2), d_1 <= X d_2, d_2 <= n/m, n <= M/sqrt(m) e, one after the other.",
-    goals=lambda form: at_most(form, P),
-    forms={"step": printed_P(m), "repaired": x / m**2 * ((A + x + s) / m + 1) * M**2 / m},
-    mutants={
-        "the bracket as printed": printed_P(m),
-        "1 dropped from the bracket": x / m**2 * ((A + x + s) / m) * M**2 / m,
-        "M for M^2": x / m**2 * ((A + x + s) / m + 1) * M / m,
-        "1/m for 1/m^2": x / m * ((A + x + s) / m + 1) * M**2 / m,
-    },
-    states=lambda form: Relation(F, "<=", form * e**2),
-)
-
-kappa, lam = nonnegative("kappa"), positive("lambda")
-#: One open node that slides under the friction of its own g_N: S_1 = S_2 = lambda I, the norm of R^2.  For
-#: psi = (0, psi_N) step I gives w2 = psi/lambda; in step II friction moves body 1 by -kappa psi_N/lambda, and
-#: T psi = (kappa psi_N, 0).
-#: Hence F = kappa^2 e^2, t = kappa e, W = 0 with e^2 = psi_N^2/lambda.
-ONE_NODE = {m: lam, M: 2 * lam, C_R: 1, x: kappa * lam, F: kappa**2 * e**2, t: kappa * e, W: 0}
-
-
-AT_THE_NODE = {lam: mu**2, kappa: xi**2, theta: t_ / (1 + t_)}
-
-
-def one_node(id: str, value: Any, printed: Any, repaired: Any, chart: Any = AT_THE_NODE, more: str = "") -> Check:
-    """The printed bound of a quantity is exceeded in the one-node problem: small m, much friction."""
-    at_the_node = lambda expression: sp.sympify(expression).subs(ONE_NODE, simultaneous=True)
-    return Check(
-        id=id,
-        text="One open node that slides, S_1 = S_2 = m I, M = 2 m, C_R = 1, C_K = kappa m: exactly F = kappa^2 e^2,"
-        f" t = kappa e, W = 0.{more}",
-        goals=lambda form: at_most(at_the_node(form), at_the_node(value), chart),
-        forms={"printed": printed, "repaired": repaired},
-        mutants={"without friction": repaired.subs(x, 0)},
-    )
-
-
-CHECKS.append(one_node("5.30", F, printed_P(m) * e**2, P * e**2))
-
-check(
-    id="x-printed-at-large-m",
-    text="For m >= 1 the bracket printed in (5.30) is at least the one that the proof supplies.",
-    goals=lambda form: at_most(form, P, LARGE_M),
-    forms={"printed": printed_P(m)},
-    mutants={
-        "1 dropped from the bracket": x / m**2 * (A + x + s) * M**2 / m / (1 + x),
-        "m^2 for m": printed_P(m) / m**2,
-    },
-)
-
-check(
-    id="5.31",
-    text="(5.25) to (5.29), and the friction term of (5.30): W <= -(m/A)^2 t^2 + P e^2.",
-    goals=lambda form: at_most(form, -(m**2) / A**2 * t**2 * (1 + q) + P * e**2 - r),
-    forms={"step": -(m**2) / A**2 * t**2 + printed_P(m) * e**2, "repaired": -(m**2) / A**2 * t**2 + P * e**2},
-    mutants={
-        "the sign of the first term, no friction": -(m**2) / A**2 * t**2,
-        "C_R dropped": -(m**2) / M**2 * t**2 + P * e**2,
-    },
-    states=lambda form: Relation(W, "<=", form),
-)
-
-CHECKS.append(one_node("5.31", W, -(m**2) / A**2 * t**2 + printed_P(m) * e**2, -(m**2) / A**2 * t**2 + P * e**2))
-
-relaxed = lambda P: (theta**2 - below) * t**2 + of_h2(P) * e**2
-
-check(
-    id="5.32",
-    text="(5.31) in (5.24).",
-    goals=lambda form: at_most(
-        form,
-        theta**2 * t**2 + (1 - theta) ** 2 * e**2 + 2 * theta * (1 - theta) * (-(m**2) / A**2 * t**2 + P * e**2 - r),
-        WITH_THETA,
-    ),
-    forms={"step": relaxed(printed_P(m)), "repaired": relaxed(P)},
-    mutants={
-        "the factor 2 dropped": (theta**2 - below) * t**2 + ((1 - theta) ** 2 + theta * (1 - theta) * P) * e**2,
-        "C_R dropped": (theta**2 - below * C_R**2) * t**2 + of_h2(P) * e**2,
-    },
-    states=lambda form: Relation(t**2, "<=", form),
-)
-
-expanded = theta**2 * t**2 + (1 - theta) ** 2 * e**2 + 2 * theta * (1 - theta) * W
-for label in ("5.32", "5.33", "5.36"):
-    CHECKS.append(one_node(label, expanded, relaxed(printed_P(m)), relaxed(P)))
-
-check(
-    id="5.33",
-    text="(5.32) with the friction term written by means of C_T = A X/m.",
-    goals=lambda form: equal(form, P, CONSTANTS),
-    forms={
-        "step": M**2 / m * (x * (A * X / m) / A + x / m**2),
-        "repaired": M**2 / m * (x * (A * X / m) / (A * m) + x / m**2),
-    },
-    mutants={"1/m^2 dropped": M**2 / m * (x * (A * X / m) / (A * m)), "M for M^2": M / m * (x * X / m**2 + x / m**2)},
-    states=lambda form: Relation(W, "<=", form * e**2),
 )

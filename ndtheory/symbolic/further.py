@@ -2,19 +2,46 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import sympy as sp
 
 from ndtheory import bounds
 from ndtheory.symbolic.contraction import above_C6, any_theta, inside
-from ndtheory.symbolic.engine import Check, add, at_most, equal, less, nonnegative, positive
+from ndtheory.symbolic.engine import Checks, at_most, equal, less, nonnegative, positive
 from ndtheory.symbolic.intervals import C0, P_, Q_, end_of_43
-from ndtheory.symbolic.symbols import C_R, CONSTANTS, A, M, P, Q, m, o, of_h1, of_h2, p, printed_P, q, r, theta, x, y
+from ndtheory.symbolic.symbols import (
+    C_R,
+    CONSTANTS,
+    M_1,
+    A,
+    M,
+    P,
+    Q,
+    exx,
+    exy,
+    eyy,
+    lame_mu,
+    m,
+    o,
+    of_h1,
+    of_h2,
+    p,
+    printed_P,
+    q,
+    r,
+    strain_energy,
+    theta,
+    u_1,
+    u_2,
+    v_1,
+    v_2,
+    x,
+    y,
+)
 
-CHECKS: list[Check] = []
-check = partial(add, CHECKS)
+CHECKS = Checks()
+check = CHECKS.add
 
 check(
     id="x-c5-is-c2",
@@ -67,8 +94,6 @@ check(
     mutants={"as long as P < 1 + 3 m^2/A^2": sp.Integer(3)},
 )
 
-M_1 = positive("M_1")
-u1, u2, v1, v2 = nonnegative("u_1 u_2 v_1 v_2")
 scale = positive("lambda")
 scaled = lambda expression: expression.subs({m: scale * m, M: scale * M, x: scale * x}, simultaneous=True)
 
@@ -94,9 +119,9 @@ check(
     text="|a(u, v)| <= M_1 u_1 v_1 + M_2 u_2 v_2 <= max(M_1, M_2) |u| |v|: (4.2) could take the maximum for M.",
     goals=lambda form: [
         at_most(
-            form(big, less_) ** 2 * (u1**2 + u2**2) * (v1**2 + v2**2),
-            (first * u1 * v1 + second * u2 * v2) ** 2,
-            squares=[big**2 * (u1 * v2 - u2 * v1) ** 2],
+            form(big, less_) ** 2 * (u_1**2 + u_2**2) * (v_1**2 + v_2**2),
+            (first * u_1 * v_1 + second * u_2 * v_2) ** 2,
+            squares=[big**2 * (u_1 * v_2 - u_2 * v_1) ** 2],
         )
         for first, second, big, less_ in ((M_1, M_1 + o, M_1 + o, M_1), (M_1 + o, M_1, M_1 + o, M_1))
     ],
@@ -113,17 +138,13 @@ check(
     mutants={"m/M": m / M * y**2, "1": y**2},
 )
 
-lame_mu = positive("lame_mu")
-exx, eyy, exy, w = sp.symbols("e_xx e_yy e_xy omega", real=True)
-lame_lambda = sp.Symbol("lame_lambda", real=True)
-strain_energy = lambda lam: 2 * lame_mu * (exx**2 + eyy**2 + 2 * exy**2) + lam * (exx + eyy) ** 2
+w = sp.Symbol("omega", real=True)
 gradient = exx**2 + eyy**2 + 2 * exy**2 + 2 * w**2
 
 check(
     id="x-continuity",
     text="sigma : e = 2 mu |e|^2 + lambda (tr e)^2 with |grad v|^2 = |e|^2 + 2 omega^2 and (tr e)^2 <= 2 |e|^2, in"
-    " plane"
-    " strain: M^a <= max(2 mu, 2 mu + 2 lambda) for the norm of the gradient, hence for that of V^a.",
+    " plane strain: M^a <= max(2 mu, 2 mu + 2 lambda) for the norm of the gradient, hence for that of V^a.",
     goals=lambda form: [
         at_most(
             (2 * lame_mu + form * o) * gradient,

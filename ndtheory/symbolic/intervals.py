@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import sympy as sp
 
 from ndtheory import bounds
-from ndtheory.symbolic.engine import Check, Goal, Relation, add, equal, less, nonnegative
+from ndtheory.symbolic.engine import Checks, Goal, Relation, equal, less, nonnegative
 from ndtheory.symbolic.symbols import (
     C_R,
     C_T,
@@ -41,8 +40,8 @@ from ndtheory.symbolic.symbols import (
     y,
 )
 
-CHECKS: list[Check] = []
-check = partial(add, CHECKS)
+CHECKS = Checks()
+check = CHECKS.add
 
 # --- second step ----------------------------------------------------------------------------------------------------
 
@@ -281,8 +280,7 @@ right_of_43 = 2 * m**2 + 2 * A**2
 check(
     id="5.43",
     text="C_0 < C_1 exactly for G(C_K) below m^5/A^2 + m^3: there the numerator of (5.41) is negative, from there on"
-    " it is"
-    " not.  The interval is half open.",
+    " it is not.  The interval is half open.",
     goals=lambda form: [
         less(2 * A**2 / m**3 * form[0], right_of_43, CONSTANTS),
         at_most(2 * A**2 / m**3 * form[1], right_of_43),

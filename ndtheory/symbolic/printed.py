@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import sympy as sp
 
 from ndtheory import bounds
-from ndtheory.symbolic.engine import Check, Goal, add, at_most, equal, less, nonnegative, positive
-from ndtheory.symbolic.estimates import AT_THE_NODE, expanded, one_node
+from ndtheory.symbolic.engine import Checks, Goal, at_most, equal, less, positive
 from ndtheory.symbolic.intervals import of_36
+from ndtheory.symbolic.one_node import AT_THE_NODE, expanded, kappa, one_node
 from ndtheory.symbolic.symbols import (
     C_R,
     CONSTANTS,
@@ -47,8 +46,8 @@ from ndtheory.symbolic.symbols import (
     y,
 )
 
-CHECKS: list[Check] = []
-check = partial(add, CHECKS)
+CHECKS = Checks()
+check = CHECKS.add
 
 # --- (5.39) and (5.44) at the one sliding node: there C_0 = 1/3 ------------------------------------------------------
 
@@ -153,7 +152,6 @@ check(
 
 # --- Proposition 5.6 with the printed constants ----------------------------------------------------------------------
 
-kappa = nonnegative("kappa")
 M_sum = {M: (2 + o) * m}
 
 check(

@@ -1,4 +1,4 @@
-"""Symbols, units and charts of Section 5, and the bounds that its proof supplies."""
+"""Symbols, units and charts that the checks share, and the bounds that the proof of Section 5 supplies."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import sympy as sp
 
 from ndtheory.symbolic import engine
 from ndtheory.symbolic.dimension import Dimension
-from ndtheory.symbolic.engine import Goal, nonnegative, positive
+from ndtheory.symbolic.engine import Goal, Vector, bilinear, functional, linear, nonnegative, positive
 
 # --- symbols: the constants, and the norms of the differences of two solutions --------------------------------------
 
@@ -19,6 +19,7 @@ d1, d2, n, e, tn, t = nonnegative("d_1 d_2 n e t_n t")  # |w1-w~1|_1, |w2-w~2|_2
 F, q1, W = sp.symbols("F a_11 W", real=True)  # (5.13) left, a1(w1-w~1, w1-w~1), a2(R2(T psi-T psi~), R2(psi-psi~))
 k, C_s, C_tr, C_tr_half = nonnegative("k C_s C_tr C_tr_half")
 C_T, C_T_tilde = positive("C_T C_T_tilde")
+C = positive("C")  # any constant
 
 #: Exponents of stress and length.  Energies and forces are per unit thickness.
 DIMENSIONS: dict[str, Dimension] = {
@@ -49,6 +50,22 @@ SMALL_M = {m: 1 / (1 + o) ** 2, m_tilde: 1 / (1 + o) ** 2, M: (2 + b) / (1 + o) 
 LARGE_M = {m: (1 + o) ** 2, m_tilde: 1, M: (2 + b) * (1 + o) ** 2, C_R: 1 + c, x: xi**2}
 
 with_theta = lambda chart: {**chart, theta: t_ / (1 + t_)}
+
+# --- fields, of which linearity is all that is known -----------------------------------------------------------------
+
+w1, v1, w2, v2, test = map(Vector, ("w1", "w~1", "w2", "w~2", "v"))
+psi, psi2 = Vector("psi"), Vector("psi~")
+a1, a2, L1, L2 = bilinear("a1"), bilinear("a2"), functional("L1"), functional("L2")  # forms and loads of the bodies
+lift, lift2 = linear("R1"), linear("R2")
+delta1, delta2 = w1 - v1, w2 - v2
+
+# --- norms and strains of one field ----------------------------------------------------------------------------------
+
+M_1 = positive("M_1")
+u_1, u_2, v_1, v_2 = nonnegative("u_1 u_2 v_1 v_2")  # norms of two fields on body 1 and on body 2
+lame_mu = positive("lame_mu")
+exx, eyy, exy = sp.symbols("e_xx e_yy e_xy", real=True)
+strain_energy = lambda lam: 2 * lame_mu * (exx**2 + eyy**2 + 2 * exy**2) + lam * (exx + eyy) ** 2  # sigma : e
 
 # --- what the proof supplies ----------------------------------------------------------------------------------------
 

@@ -172,3 +172,37 @@ if __name__ == "__main__":
     requests = external_requests(Path(sys.argv[1]))
     print("\n".join(requests) or "the site asks no other host")
     sys.exit(bool(requests))
+
+
+WIDEST = 83
+BLOCK = re.compile(r"^```(\S*)[^\n]*\n(.*?)^```", re.DOTALL | re.MULTILINE)
+
+
+def too_wide(text: str) -> list[str]:
+    """Lines of screens and files that leave the column of a page; Python folds there (`site.css`)."""
+    blocks = [(kind, block) for kind, block in BLOCK.findall(text) if kind in ("text", "console", "toml", "")]
+    return [line for _, block in blocks for line in block.splitlines() if len(line) > WIDEST]
+
+
+@pytest.mark.parametrize(
+    "page",
+    sorted(path for path in DOCS.rglob("*.md") if "_build" not in path.parts),
+    ids=lambda path: str(path.relative_to(DOCS)),
+)
+def test_no_screen_or_diagram_leaves_the_column_of_a_page(page):
+    assert too_wide(page.read_text(encoding="utf-8")) == []
+
+
+def test_a_line_that_leaves_the_column_is_found_in_screens_and_files_alone():
+    wide = "x" * (WIDEST + 1)
+    assert too_wide(f"```text\n{wide}\nshort\n```\n") == [wide]
+    assert too_wide(f"```toml\n{wide}\n```\n") == [wide]
+    assert too_wide(f"```{{code-cell}} python\n{wide}\n```\n{wide}\n") == []
+    assert too_wide(f"```text\n{'─' * WIDEST}\n```\n") == []  # counted in characters, not in bytes
+
+
+def test_the_choice_of_theta_needs_no_folding():
+    page = (DOCS / "examples" / "choosing_theta.md").read_text(encoding="utf-8")
+    cells = [block for kind, block in BLOCK.findall(page) if kind == "{code-cell}"]
+    assert cells
+    assert max(len(line) for cell in cells for line in cell.splitlines()) <= WIDEST

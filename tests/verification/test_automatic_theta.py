@@ -12,9 +12,11 @@ from problem_list import changed
 import verification as vf
 from ndtheory import EnergyConstants, evaluate_sharp
 from verification.advice.roles import advise_matrices
+from verification.algorithm.relaxation import RULES, Constant
 from verification.algorithm.theta import automatic, choose, sharp_bounds
-from verification.cli.problems import examples
+from verification.cli.problems import examples, load_problem
 from verification.interface.assembly import build
+from verification.problem import ProblemError
 
 
 def steps(theta, rho, tolerance=1e-9):
@@ -103,11 +105,58 @@ def test_where_there_is_no_file_there_is_no_automatic_theta():
 @pytest.mark.parametrize("relaxation", ["constant", "aitken", "anderson", "newton"])
 def test_the_other_rules_take_a_theta_without_a_word(relaxation):
     problem = vf.Problem.from_dict(changed(iteration={"relaxation": relaxation}))
-    assert problem.iteration.warnings == []
-    assert choose(build(problem), "0.3").theta == F(3, 10)
+    choice = choose(build(problem), "0.3")
+    assert (choice.theta, choice.warnings) == (F(3, 10), [])
 
 
 def test_the_step_of_momentum_is_that_of_rho_whatever_theta_is():
     pair = build(vf.Problem.from_dict(changed(contact={"friction": 0}, iteration={"relaxation": "momentum"})))
-    assert choose(pair, 0.5) == choose(pair, "auto") == choose(pair)
-    assert choose(pair).source == "momentum"
+    choices = [choose(pair, theta) for theta in (0.5, "auto", None)]
+    assert len({(choice.theta, choice.rho, choice.source) for choice in choices}) == 1
+    assert choices[0].source == "momentum"
+    assert choose(pair, 0.5).warnings == ["theta = 0.5 is not used: momentum takes its step from rho"]
+
+
+class Descent(Constant):
+    """Another rule that takes its step from rho: a gradient step of length 1/(1 + rho)."""
+
+    name = "descent"
+    words = "gradient descent"
+    needs_rho = True
+    takes_theta = False
+
+    def own_step(self, rho):
+        return 1 / (1 + rho)
+
+
+@pytest.fixture
+def descent(monkeypatch):
+    monkeypatch.setitem(RULES, "descent", Descent())
+
+
+def test_a_rule_says_itself_that_it_takes_its_step_from_rho(descent):
+    problem = vf.Problem.from_dict(changed(contact={"friction": 0}, iteration={"theta": 0.7}))
+    assert problem.changed(relaxation="descent").iteration.theta == "auto"
+    without = problem.to_dict() | {"iteration": {"relaxation": "descent"}}
+    assert vf.Problem.from_dict(without).iteration.theta == "auto"
+    kept = vf.run(problem.changed(relaxation="descent", theta=0.7))
+    assert kept.choice.source == "descent"
+    assert float(kept.theta) == pytest.approx(1 / (1 + kept.choice.rho), rel=1e-15)
+    assert kept.warnings == ["iteration.theta = 0.7 is not used: descent takes its step from rho"]
+
+
+def test_the_command_line_refuses_a_theta_beside_any_such_rule(descent, tmp_path):
+    path = tmp_path / "problem.toml"
+    path.write_text(vf.Problem.from_dict(changed(contact={"friction": 0})).to_toml(), encoding="utf-8")
+    with pytest.raises(ProblemError, match='needed no theta beside relaxation = "descent"'):
+        load_problem(path, {}, theta="0.5", relaxation="descent")
+
+
+def test_a_warning_names_the_theta_of_the_rule_that_ran():
+    """A rule of the call replaces the file's: its theta is not meant for it, and that of the call is."""
+    problem = vf.Problem.from_dict(changed(contact={"friction": 0}, iteration={"theta": 0.7, "relaxation": "momentum"}))
+    assert vf.run(problem, rule="constant").warnings == []
+    constant = vf.Problem.from_dict(changed(contact={"friction": 0}, iteration={"theta": 0.7}))
+    assert vf.run(constant, rule="momentum").warnings == []
+    told = vf.run(constant, rule="momentum", theta=0.5).warnings
+    assert told == ["theta = 0.5 is not used: momentum takes its step from rho"]

@@ -1,7 +1,9 @@
 """Interface files: a pair as matrices, written and read back with the same answers; and what is no such file."""
 
 import csv
+import io
 import json
+import zipfile
 
 import numpy as np
 import pytest
@@ -65,12 +67,12 @@ def test_an_interface_file_without_one_of_its_arrays_is_refused(arrays, tmp_path
 @pytest.mark.parametrize(
     ("changes", "why"),
     [
-        ({"S1": np.eye(3)}, "S1: needed 14 x 14 real numbers, received 3 x 3"),
+        ({"S1": np.eye(3)}, "S1 is 3 x 3: needed 14 x 14 real numbers"),
         ({"S1": -np.eye(14)}, "positive definite"),
-        ({"S1": np.full((14, 14), np.inf)}, "S1: needed finite"),
-        ({"gap": np.array(["a"] * 7)}, "gap: needed 7 real"),
-        ({"kernel": np.eye(6)}, "kernel: needed 7 x 7"),
-        ({"transfer": np.eye(6)}, "transfer: needed 7 x 6"),
+        ({"S1": np.full((14, 14), np.inf)}, "S1 has entries that are not finite"),
+        ({"gap": np.array(["a"] * 7)}, "gap has no real numbers"),
+        ({"kernel": np.eye(6)}, "kernel is 6 x 6: needed 7 x 7"),
+        ({"transfer": np.eye(6)}, "transfer is 6 x 6: needed 7 x 6"),
         ({"x": np.zeros(7)}, "increase"),
         ({"weights": -np.ones(7)}, "positive"),
         ({"gap": -np.ones(7)}, ">= 0"),
@@ -93,6 +95,27 @@ def test_what_is_no_interface_file_is_refused(tmp_path, content):
     path.write_bytes(content)
     with pytest.raises(ProblemError, match=r"none\.npz"):
         vf.build(path)
+
+
+def test_an_interface_file_that_would_fill_the_memory_is_refused_by_its_headers(arrays, tmp_path):
+    bomb = tmp_path / "bomb.npz"
+    np.savez(bomb, **arrays)
+    head = io.BytesIO()
+    np.lib.format.write_array_header_1_0(head, {"shape": (10**6, 10**6), "fortran_order": False, "descr": "<f8"})
+    with zipfile.ZipFile(bomb, "a", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("unused.npy", head.getvalue() + bytes(1000))
+    with pytest.raises(ProblemError, match=r"bomb\.npz: needed arrays of at most 600000000 bytes together, received 8"):
+        read_interface(bomb)
+
+
+@pytest.mark.parametrize(("values", "why"), [(np.eye(7) * 1j, "kernel has no real numbers"), ([["1"]], "no real")])
+def test_matrices_in_memory_and_in_a_file_are_refused_in_the_same_words(arrays, tmp_path, values, why):
+    np.savez(tmp_path / "wrong.npz", **arrays | {"kernel": np.array(values)})
+    with pytest.raises(ProblemError, match=why) as read:
+        read_interface(tmp_path / "wrong.npz")
+    with pytest.raises(ValueError, match=why) as built:
+        vf.build(S1=np.eye(14), S2=np.eye(14), x=np.arange(7.0), kernel=values)
+    assert str(read.value).endswith(str(built.value))
 
 
 # --- what a folder holds ----------------------------------------------------------------------------------------------

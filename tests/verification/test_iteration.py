@@ -411,7 +411,7 @@ def test_a_run_ends_at_max_iterations():
 
 def test_a_run_whose_states_would_fill_the_memory_is_refused_before_its_first_step():
     given = problem(SECTION_6, max_iterations=10**9)
-    with pytest.raises(vf.ProblemError, match="every state is kept") as error:
+    with pytest.raises(vf.ProblemError, match="every iterate is kept") as error:
         vf.run(given, watch=lambda state: pytest.fail("a step was taken"))
     assert error.value.key == "iteration.max_iterations"
     most = int(re.search(r"at most (\d+)", error.value.needed)[1])

@@ -129,7 +129,7 @@ def test_a_file_of_somebody_else_is_kept_and_nothing_is_written_beside_it(quick,
     assert contents(tmp_path) == {name: foreign}
 
 
-@pytest.mark.parametrize("name", sorted(OURS))
+@pytest.mark.parametrize("name", sorted({*OURS, "problem.toml"}))
 def test_a_folder_in_the_place_of_a_file_is_refused(quick, results, tmp_path, name):
     (tmp_path / name).mkdir()
     with pytest.raises(vf.ProblemError, match=re.escape(name)):

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 import warnings
-import zipfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import IO, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
 import scipy.sparse as sp
 
 from fem1d2d.mesh import Floats
+from verification.interface.array_headers import headers
 from verification.interface.matrices import MOST_ROWS, UNREADABLE
 from verification.problem.tables import ProblemError, unreadable
 
@@ -64,23 +64,10 @@ def read_matrix(path: Path) -> Floats:
 
 def _rows(file: BinaryIO) -> Iterator[int]:
     """For each array of a file how many rows a square matrix of as many entries has, from its header alone."""
-    if not zipfile.is_zipfile(file):
-        file.seek(0)
-        yield _square(file)
-        return
-    with zipfile.ZipFile(file) as archive:
-        for name in archive.namelist():
-            with archive.open(name) as member:
-                yield _square(member)
-
-
-def _square(stream: IO[bytes]) -> int:
-    version = np.lib.format.read_magic(stream)
-    read = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}[version]
-    shape, _, dtype = read(stream)
-    if dtype.itemsize > np.dtype(np.clongdouble).itemsize:
-        raise ValueError("needed real numbers")
-    return math.isqrt(math.prod(shape))
+    for header in headers(file):
+        if header.entry_bytes > np.dtype(np.clongdouble).itemsize:
+            raise ValueError("needed real numbers")
+        yield math.isqrt(header.entries)
 
 
 def _real(matrix: np.ndarray) -> Floats:

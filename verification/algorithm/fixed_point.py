@@ -10,8 +10,8 @@ import numpy as np
 
 from fem1d2d.mesh import Floats
 from verification.algorithm.iterate import Iterate
-from verification.algorithm.relaxation import Rule, Step, rule_of
-from verification.algorithm.theta import choose
+from verification.algorithm.relaxation import Rule, Step
+from verification.algorithm.theta import begin
 from verification.contact import ContactSolution, ContactStep, Solver
 from verification.interface.build import pair_of
 from verification.interface.pair import ContactPair
@@ -110,9 +110,7 @@ def iterate(
     [0.0, 0.1, 0.05]
     """
     pair = pair_of(problem)
-    relaxation = rule_of(rule or pair.settings.relaxation)
-    choice = choose(pair, theta, rule=relaxation)
-    step = relaxation.begin(pair, float(choice.theta), choice.rho)
+    _, _, step = begin(pair, theta, rule)
     return iterates(FixedPointMap(pair, solver), step, start)
 
 

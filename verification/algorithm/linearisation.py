@@ -86,7 +86,7 @@ class _Near:
         return float(np.linalg.norm(self.J @ error - error))
 
 
-def _near(pair: ContactPair, state: Iterate, theta: float) -> _Near:
+def _near(pair: ContactPair, iterate: Iterate, theta: float) -> _Near:
     """Linearise T_theta at an iterate close to the solution: no node may change its state in between.
 
     Raises
@@ -95,29 +95,29 @@ def _near(pair: ContactPair, state: Iterate, theta: float) -> _Near:
     """
     if pair.contact.grid.n > MOST_NODES:
         raise NotLinear(f"{pair.contact.grid.n} contact nodes: T is linearised up to {MOST_NODES}")
-    piece = piece_of(pair, state.g, state.contact.pattern)
+    piece = piece_of(pair, iterate.g, iterate.contact.pattern)
     basis, inverse = piece.basis, pair.neumann.flexibility
     J = piece.relaxed(theta)
     try:
         # one Newton step: exact on an affine piece
-        newton = np.linalg.solve(np.eye(len(J)) - J, theta * basis.T @ inverse(state.g - state.image))
+        newton = np.linalg.solve(np.eye(len(J)) - J, theta * basis.T @ inverse(iterate.g - iterate.image))
     except np.linalg.LinAlgError:
         raise NotLinear("1 is an eigenvalue of the Jacobian: the solution is not isolated") from None
     error: Floats = np.asarray(newton, dtype=float)
-    margin, node = _margin(piece, state)
+    margin, node = _margin(piece, iterate)
     if not margin > np.linalg.norm(error):
         raise NotLinear(f"the node at x = {pair.contact.grid.x[node]:g} is about to change its state")
     return _Near(piece=piece, J=J, error=error, margin=margin)
 
 
-def linearise(pair: ContactPair, state: Iterate, theta: float, history: Sequence[Iterate] = ()) -> Linearisation:
+def linearise(pair: ContactPair, iterate: Iterate, theta: float, history: Sequence[Iterate] = ()) -> Linearisation:
     """Linearise T_theta at the solution next to an iterate.
 
     Parameters
     ----------
     pair : ContactPair
         What was run.
-    state : Iterate
+    iterate : Iterate
         Close to the solution: no node may change its state in between.
     theta : float
     history : sequence of Iterate
@@ -128,7 +128,7 @@ def linearise(pair: ContactPair, state: Iterate, theta: float, history: Sequence
     NotLinear
         A node about to change its state (strict complementarity fails), or too many nodes.
     """
-    near = _near(pair, state, theta)
+    near = _near(pair, iterate, theta)
     piece, J = near.piece, near.J
     excited = predicted = None
     if history:
@@ -136,14 +136,14 @@ def linearise(pair: ContactPair, state: Iterate, theta: float, history: Sequence
         first = len(history) - 1
         while first > 0 and _same(piece, piece_of(pair, history[first - 1].g, history[first - 1].contact.pattern)):
             first -= 1
-        start = near.error + piece.basis.T @ pair.neumann.flexibility(history[first].g - state.g)
+        start = near.error + piece.basis.T @ pair.neumann.flexibility(history[first].g - iterate.g)
         excited = _excited(J, start)
         if observed is not None and first <= observed.begin:
             e = np.linalg.matrix_power(J, observed.begin - first) @ start
             steps = observed.end - observed.begin
             after = near.step(np.linalg.matrix_power(J, steps) @ e)
             predicted = (after / near.step(e)) ** (1 / steps) if near.step(e) > 0 else None
-    size = pair.neumann.dual_norm(state.g)
+    size = pair.neumann.dual_norm(iterate.g)
     return Linearisation(
         radius=float(np.abs(np.linalg.eigvals(J)).max(initial=0.0)),
         excited=excited,
@@ -175,7 +175,7 @@ class Forecast:
     tolerance: float
 
 
-def forecast(pair: ContactPair, states: Sequence[Iterate], theta: float, tolerance: float, most: int) -> Forecast:
+def forecast(pair: ContactPair, iterates: Sequence[Iterate], theta: float, tolerance: float, most: int) -> Forecast:
     """Say of a run, half way to its tolerance, how it will end.
 
     From there on the error is taken to obey ``e <- J e`` with the Jacobian of the piece that the run is on: right if no
@@ -185,7 +185,7 @@ def forecast(pair: ContactPair, states: Sequence[Iterate], theta: float, toleran
     ----------
     pair : ContactPair
         What was run.
-    states : sequence of Iterate
+    iterates : sequence of Iterate
         The run; those after the one half way are not looked at.
     theta : float
     tolerance : float
@@ -198,19 +198,19 @@ def forecast(pair: ContactPair, states: Sequence[Iterate], theta: float, toleran
     NotLinear
         Why nothing can be said.
     """
-    half = next((i for i, s in enumerate(states) if s.residual <= math.sqrt(tolerance) * s.scale), None)
+    half = next((i for i, s in enumerate(iterates) if s.residual <= math.sqrt(tolerance) * s.scale), None)
     if half is None:
         raise NotLinear("the run never got half way to the tolerance")
-    state = states[half]
-    if state.residual <= tolerance * state.scale:
+    iterate = iterates[half]
+    if iterate.residual <= tolerance * iterate.scale:
         raise NotLinear("the run converged before a forecast could be made half way")
-    seen = states[: half + 1]
+    seen = iterates[: half + 1]
     residuals, floors = [s.residual for s in seen], [noise(pair, s) for s in seen]
-    if tolerance * state.scale <= CLEAR_OF_NOISE * floors[-1]:
+    if tolerance * iterate.scale <= CLEAR_OF_NOISE * floors[-1]:
         raise NotLinear("the tolerance lies within rounding")
-    near = _near(pair, state, theta)
+    near = _near(pair, iterate, theta)
     error = near.error
-    while residuals[-1] > tolerance * state.scale:
+    while residuals[-1] > tolerance * iterate.scale:
         if len(residuals) > most:
             raise NotLinear(f"the forecast at iteration {half} is that {most} iterations do not suffice")
         error = near.J @ error
@@ -230,18 +230,18 @@ def _same(a: Piece, b: Piece) -> bool:
     return a.pattern == b.pattern and np.array_equal(a.sign, b.sign)
 
 
-def _margin(piece: Piece, state: Iterate) -> tuple[float, int]:
+def _margin(piece: Piece, iterate: Iterate) -> tuple[float, int]:
     """Distance in the norm (5.21) from g to the next change of state, and the contact node it happens at."""
     pair, contact, neumann = piece.pair, piece.pair.contact.grid, piece.pair.neumann.grid
     t, touching = contact.t, piece.pattern.touching
-    v, force, basis = state.contact.v, state.contact.force, piece.basis
+    v, force, basis = iterate.contact.v, iterate.contact.force, piece.basis
     jump, reaction = piece.jump @ basis, piece.reaction @ basis
     rows = [np.where(touching[:, None], reaction[t:], -jump[t:])]
     slack = [np.where(touching, force[t:], -v[t:])]
     nodes = [np.arange(contact.n)]
     kernel = pair.interface.kernel
     if piece.sign.any() and kernel is not None:
-        stress, limit, bound = pair.interface.stress(state.g), pair.bound(state.g), piece.bound @ basis
+        stress, limit, bound = pair.interface.stress(iterate.g), pair.bound(iterate.g), piece.bound @ basis
         sliding, rubs = piece.pattern.sliding, piece.sign != 0
         slips, sticks = np.flatnonzero(rubs & (sliding != 0)), np.flatnonzero(rubs & (sliding == 0))
         rows += [sliding[slips, None] * jump[slips], bound[sticks] - reaction[sticks], bound[sticks] + reaction[sticks]]

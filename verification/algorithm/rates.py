@@ -18,16 +18,16 @@ CLEAR_OF_NOISE = 100.0
 FAR_FROM_NOISE = 1e8
 
 
-def noise(pair: ContactPair, state: Iterate) -> float:
+def noise(pair: ContactPair, iterate: Iterate) -> float:
     """Rounding error of one evaluation of T, as a residual in the norm (5.21).
 
     Forces are differences of products ``|S1| |u|`` and of loads, each with a relative error of some units in the last
     place.
     """
     neumann, contact = pair.neumann, pair.contact
-    displacement = pair.interface.carry(state.displacement)
+    displacement = pair.interface.carry(iterate.displacement)
     reaction = np.abs(contact.stiffness) @ np.abs(displacement) + np.abs(contact.load)
-    magnitude = np.abs(pair.interface.carry_back(reaction)) + np.abs(state.g)
+    magnitude = np.abs(pair.interface.carry_back(reaction)) + np.abs(iterate.g)
     return float(4 * np.finfo(float).eps * neumann.dual_norm(magnitude))
 
 
@@ -52,24 +52,26 @@ class ObservedRate:
     end: int
 
 
-def observed_rate(pair: ContactPair, states: Sequence[Iterate]) -> ObservedRate | None:
+def observed_rate(pair: ContactPair, iterates: Sequence[Iterate]) -> ObservedRate | None:
     """The rate that a run shows at its end, or None where fewer than two step ratios stand clear of the noise.
 
     Every residual is held against the noise of its own iterate; after the first one that is not clear of it
     nothing counts.
     """
-    floors = [noise(pair, state) for state in states]
-    clear = [state.residual > CLEAR_OF_NOISE * floor for state, floor in zip(states, floors, strict=True)]
+    floors = [noise(pair, iterate) for iterate in iterates]
+    clear = [iterate.residual > CLEAR_OF_NOISE * floor for iterate, floor in zip(iterates, floors, strict=True)]
     count = clear.index(False) if False in clear else len(clear)
     if count < 3:
         return None
-    return rate_at_the_end([state.residual for state in states[:count]], floors[:count], settled(states[:count]))
+    return rate_at_the_end(
+        [iterate.residual for iterate in iterates[:count]], floors[:count], settled(iterates[:count])
+    )
 
 
-def settled(states: Sequence[Iterate]) -> int:
+def settled(iterates: Sequence[Iterate]) -> int:
     """From which iterate on the contact pattern is the last one."""
-    first = len(states) - 1
-    while first > 0 and states[first - 1].contact.pattern == states[-1].contact.pattern:
+    first = len(iterates) - 1
+    while first > 0 and iterates[first - 1].contact.pattern == iterates[-1].contact.pattern:
         first -= 1
     return first
 
@@ -125,18 +127,18 @@ class StepRatio:
     steps: int
 
 
-def largest_step_ratio(pair: ContactPair, states: Sequence[Iterate]) -> StepRatio | None:
+def largest_step_ratio(pair: ContactPair, iterates: Sequence[Iterate]) -> StepRatio | None:
     """The largest step ratio clear of the noise, or None where there is none.
 
     A step is judged by the noise of its own two iterates; it may end below the noise, not begin there.  Steps far above
     it count alone, where there are any.
     """
-    if not states:
+    if not iterates:
         return None
-    if states[0].residual == 0:
+    if iterates[0].residual == 0:
         return StepRatio(value=0.0, lo=0.0, hi=0.0, steps=0)
-    residual: Floats = np.array([state.residual for state in states])
-    floor: Floats = np.array([noise(pair, state) for state in states])
+    residual: Floats = np.array([iterate.residual for iterate in iterates])
+    floor: Floats = np.array([noise(pair, iterate) for iterate in iterates])
     for multiple in (FAR_FROM_NOISE, CLEAR_OF_NOISE):
         begins = np.flatnonzero((residual[:-1] > multiple * floor[:-1]) & np.isfinite(residual[1:]))
         if len(begins):

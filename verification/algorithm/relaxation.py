@@ -48,11 +48,14 @@ class Rule(ABC):
         What it is called in a sentence.
     needs_rho : bool
         Whether :meth:`begin` needs rho; it is measured then.
+    takes_theta : bool
+        Whether a given theta is used.  A rule without it needs rho, and :meth:`own_step` takes the place of theta.
     """
 
     name: ClassVar[str]
     words: ClassVar[str]
     needs_rho: ClassVar[bool] = False
+    takes_theta: ClassVar[bool] = True
 
     @abstractmethod
     def begin(self, pair: ContactPair, theta: float, rho: float | None) -> Step:
@@ -211,6 +214,7 @@ class Momentum(Rule):
     name = "momentum"
     words = "triple momentum method"
     needs_rho = True
+    takes_theta = False
 
     def begin(self, pair: ContactPair, theta: float, rho: float | None) -> Step:
         if rho is None:

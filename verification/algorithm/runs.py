@@ -17,9 +17,9 @@ from verification.algorithm.fixed_point import FixedPointMap, iterate_at, iterat
 from verification.algorithm.iterate import Iterate
 from verification.algorithm.linearisation import Forecast, Linearisation, NotLinear, forecast, linearise
 from verification.algorithm.rates import ObservedRate, observed_rate
-from verification.algorithm.relaxation import Constant, Rule, rule_of
+from verification.algorithm.relaxation import Constant, Rule
 from verification.algorithm.run_document import run_document
-from verification.algorithm.theta import Choice, choose
+from verification.algorithm.theta import Choice, begin
 from verification.constants import Measured
 from verification.contact import ContactError, Solver
 from verification.document import Document
@@ -47,7 +47,7 @@ PATIENCE = 50
 RUNAWAY = 1e8
 
 #: What the iterates of a run may fill, in bytes, and what each takes beside its four arrays, as measured.
-MOST_BYTES, STATE_BYTES = 2_000_000_000, 1600
+MOST_BYTES, ITERATE_BYTES = 2_000_000_000, 1600
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -275,7 +275,7 @@ class Run(Document):
     @property
     def warnings(self) -> list[str]:
         """What a user should know before trusting the numbers."""
-        return self.pair.warnings + self.pair.settings.warnings
+        return self.pair.warnings + self.choice.warnings
 
     def content(self) -> dict[str, Any]:
         return run_document(self)
@@ -283,10 +283,10 @@ class Run(Document):
 
 def _check_memory(pair: ContactPair) -> None:
     """Refuse a run whose iterates would not fit into memory: every one is kept."""
-    most, asked = MOST_BYTES // (STATE_BYTES + 4 * 8 * pair.neumann.grid.size), pair.settings.max_iterations
+    most, asked = MOST_BYTES // (ITERATE_BYTES + 4 * 8 * pair.neumann.grid.size), pair.settings.max_iterations
     if asked > most:
         n = pair.contact.grid.n
-        needed = f"needed at most {most}: every state is kept, and so many of {n} contact nodes fill 2 GB"
+        needed = f"needed at most {most}: every iterate is kept, and so many of {n} contact nodes fill 2 GB"
         raise ProblemError(pair.source, "iteration.max_iterations", asked, needed)
 
 
@@ -340,9 +340,7 @@ def run(
     pair = pair_of(problem)
     settings = pair.settings
     _check_memory(pair)
-    relaxation = rule_of(rule or settings.relaxation)
-    choice = choose(pair, theta, measured, rule=relaxation)
-    step = relaxation.begin(pair, float(choice.theta), choice.rho)
+    relaxation, choice, step = begin(pair, theta, rule, measured)
     seen: list[Iterate] = []
     least, since = float("inf"), 0
     outcome: Outcome = "limit"

@@ -10,7 +10,7 @@ from typing import Any
 
 from ndtheory import SharpBounds, evaluate_sharp, exact
 from ndtheory.sharp import predicted_factor
-from verification.algorithm.relaxation import Rule, rule_of
+from verification.algorithm.relaxation import Rule, Step, rule_of
 from verification.constants import Measured, measure
 from verification.interface.pair import ContactPair
 from verification.problem.specification import read_theta
@@ -42,12 +42,20 @@ class Choice:
         Known where it was needed.
     why : str
         Why this theta, in words.
+    unused : str
+        The theta that was given to a rule which takes its own step, with its key; empty where there is none.
     """
 
     theta: Fraction
     source: str
     rho: float | None = None
     why: str = "given by the problem or beside it"
+    unused: str = ""
+
+    @property
+    def warnings(self) -> list[str]:
+        """What is set and has no effect."""
+        return [f"{self.unused} is not used: {self.source} takes its step from rho"] if self.unused else []
 
     def to_dict(self) -> dict[str, Any]:
         """The object ``theta_auto`` of a role."""
@@ -92,10 +100,31 @@ def choose(
     own = relaxation.own_step(rho) if relaxation.needs_rho else None
     if own is not None:
         why = f"the step of the {relaxation.words} for this rho"
-        return Choice(theta=below_one(own), source=relaxation.name, rho=rho, why=why)
+        # a rule named in the call replaces the file's, and with it the theta that was meant for that one
+        meant = theta is not None or pair.settings.relaxation == relaxation.name
+        key = "iteration.theta" if theta is None else "theta"
+        unused = f"{key} = {float(wanted):g}" if meant and wanted != "auto" else ""
+        return Choice(theta=below_one(own), source=relaxation.name, rho=rho, why=why, unused=unused)
     if wanted != "auto":
         return Choice(theta=wanted, source="given", rho=rho)
     return automatic(sharp, pair.outside, pair.settings.tolerance)
+
+
+def begin(
+    pair: ContactPair, theta: Any = None, rule: Rule | str | None = None, measured: Measured | None = None
+) -> tuple[Rule, Choice, Step]:
+    """The rule and the theta of a run, as :func:`choose` has them, and what the rule does in it.
+
+    Raises
+    ------
+    HypothesisError, ProblemError
+        As for :func:`choose`.
+    ValueError
+        No rule has that name.
+    """
+    relaxation = rule_of(rule or pair.settings.relaxation)
+    choice = choose(pair, theta, measured, rule=relaxation)
+    return relaxation, choice, relaxation.begin(pair, float(choice.theta), choice.rho)
 
 
 def automatic(sharp: SharpBounds, outside: Sequence[str] = (), tolerance: float = 1e-9) -> Choice:

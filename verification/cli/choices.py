@@ -10,6 +10,7 @@ import click
 from ndtheory import HypothesisError
 from verification.cli.console import Interrupted, complain, deliver, stages
 from verification.cli.problems import FILE, JSON, SET, load_problem
+from verification.cli.typed import Typed
 
 
 @click.command()
@@ -79,7 +80,7 @@ def advise(
             found = advice.advise_run(theta, ratio)
         except HypothesisError as error:
             raise click.UsageError(f"--{error}", context) from None
-    deliver(found, lambda: screens.advice(found, file), as_json)
+    deliver(found, lambda: screens.advice(found, None if file is None else Typed(file=file, keys=keys)), as_json)
 
 
 def _picture(context: click.Context, parameter: click.Parameter, value: Path) -> Path:

@@ -273,9 +273,9 @@ def stages() -> Iterator[Progress]:
 def progress(tell: Progress, tolerance: float) -> Iterator[Callable[[Iterate], None]]:
     """Tell how far the residual has fallen towards its tolerance."""
 
-    def watch(state: Iterate) -> None:
-        residual = state.relative_residual
+    def watch(iterate: Iterate) -> None:
+        residual = iterate.relative_residual
         fallen = math.log(residual) / math.log(tolerance) if 0 < residual < 1 else 0.0
-        tell(f"iterating: step {state.iteration}, residual {residual:.2e}", min(fallen, 1.0))
+        tell(f"iterating: step {iterate.iteration}, residual {residual:.2e}", min(fallen, 1.0))
 
     yield watch

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from verification.cli.console import Interrupted, complain, deliver, progress, say, stages
+from verification.cli.typed import Typed
 
 if TYPE_CHECKING:
     from verification.algorithm.runs import Run
@@ -145,12 +146,14 @@ def load_problem(
     ProblemError, HypothesisError
     """
     from verification.problem import ProblemError, load
+    from verification.problem.reading import takes_theta
 
     chosen = {} if relaxation is None else {"iteration.relaxation": relaxation}
     problem = load(file).with_keys({**keys, **chosen})
     if theta is not None:
-        if problem.iteration.relaxation == "momentum":
-            needed = 'needed no theta beside relaxation = "momentum", which takes its step from rho'
+        rule = problem.iteration.relaxation
+        if not takes_theta(rule):
+            needed = f'needed no theta beside relaxation = "{rule}", which takes its step from rho'
             raise ProblemError(str(file), "--theta", theta, needed)
         problem = problem.with_theta(theta)
     return problem.swapped() if swap else problem
@@ -177,7 +180,7 @@ def constants(file: Path, keys: dict[str, str], refine: int, as_json: bool) -> N
     problem = load_problem(file, keys)
     with stages() as tell:
         measured = measure(problem, refine=refine, progress=tell)
-    deliver(measured, lambda: screens.constants(measured, file), as_json)
+    deliver(measured, lambda: screens.constants(measured, Typed(file=file, keys=keys)), as_json)
     if "levels" in measured.reason:
         complain(f"{measured.reason['levels']}: what was computed is shown")
         raise Interrupted
@@ -218,9 +221,9 @@ def run(file: Path, solver: Any, folder: Path | None, as_json: bool, **changes: 
             finished = finished.linearise()
         except KeyboardInterrupt:  # costs no run
             finished = replace(finished, interrupted=True).linearise()
-    _warn(problem.iteration.warnings)  # not beside a refusal
+    _warn(finished.choice.warnings)
     write = None if target is None else lambda: target.write_run(finished)
-    deliver(finished, lambda: screens.run(finished, file), as_json, write, folder)
+    deliver(finished, lambda: screens.run(finished, Typed(file=file, **changes)), as_json, write, folder)
     return _status_of_run(finished, changes["swap"])
 
 
@@ -253,7 +256,7 @@ def solve(file: Path, keys: dict[str, str], folder: Path | None, as_json: bool) 
         tell("solving both bodies at once", None)
         solution = monolithic.solve(bodies)
     write = None if target is None else lambda: target.write_solution(solution)
-    deliver(solution, lambda: screens.solution(solution, file), as_json, write, folder)
+    deliver(solution, lambda: screens.solution(solution, Typed(file=file, keys=keys)), as_json, write, folder)
     return 0
 
 
@@ -278,7 +281,7 @@ def compare(file: Path, solver: Any, folder: Path | None, as_json: bool, **chang
       ndtheory compare my.toml --set contact.friction=0.4
     """
     problem = load_problem(file, **changes)
-    return _compare(problem, file, folder, solver, as_json, changes["swap"])
+    return _compare(problem, Typed(file=file, **changes), folder, solver, as_json)
 
 
 @click.command()
@@ -305,13 +308,13 @@ def demo(folder: Path, as_json: bool) -> int:
     from verification.problem import load
 
     written = Folder(folder, "compare").write_problem(examples()["section6"])
-    status = _compare(load(written), written, folder, "auto", as_json, False)
+    status = _compare(load(written), Typed(file=written), folder, "auto", as_json)
     for line in [] if as_json else unreached():
         complain(line)
     return status
 
 
-def _compare(problem: Problem, file: Path, folder: Path | None, solver: Any, as_json: bool, swapped: bool) -> int:
+def _compare(problem: Problem, typed: Typed, folder: Path | None, solver: Any, as_json: bool) -> int:
     from verification import comparison as verdicts
     from verification.cli import screens
     from verification.interface.assembly import build
@@ -322,10 +325,10 @@ def _compare(problem: Problem, file: Path, folder: Path | None, solver: Any, as_
     _warn(pair.warnings)
     with stages() as tell, progress(tell, problem.iteration.tolerance) as watch:
         comparison = verdicts.compare(pair, solver=solver, watch=watch, progress=tell)
-    _warn(problem.iteration.warnings)
+    _warn(comparison.run.choice.warnings)
     write = None if target is None else lambda: target.write_comparison(comparison)
-    deliver(comparison, lambda: screens.comparison(comparison, file), as_json, write, folder)
-    return _status_of_comparison(comparison, swapped)
+    deliver(comparison, lambda: screens.comparison(comparison, typed), as_json, write, folder)
+    return _status_of_comparison(comparison, typed.swap)
 
 
 def _warn(warnings: list[str]) -> None:

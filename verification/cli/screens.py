@@ -14,11 +14,13 @@ from verification.algorithm.runs import Run
 from verification.bounds.region import MOST_STEPS, Plane
 from verification.cli.calculator import bounds_table
 from verification.cli.console import figures, heading, near_one, note, printable, say, table
+from verification.cli.typed import Typed
 from verification.comparison import Comparison
 from verification.constants import ENERGY_NAMES, NAMES, Measured
 from verification.interface.fields import ContactFields
 from verification.interface.friction import LAWS
 from verification.monolithic import Solution
+from verification.problem.reading import takes_theta
 from verification.problem.specification import Problem
 
 
@@ -37,12 +39,6 @@ def show(result: Any) -> bool:
         return False
     screen(result)
     return True
-
-
-def _next(file: Path | None, command: str, options: str = "") -> None:
-    """What to type next, where there is a file to name."""
-    if file is not None:
-        say(f"Next: ndtheory {command} {quote(str(file))}{options}")
 
 
 def _setting(problem: Problem, nodes: int | None = None, interface: int | None = None) -> None:
@@ -71,7 +67,7 @@ def _how(problem: Problem) -> str:
     return f"theta = {theta if theta == 'auto' else f'{float(theta):.4g}'}"
 
 
-def constants(measured: Measured, file: Path | None = None) -> None:
+def constants(measured: Measured, typed: Typed | None = None) -> None:
     """The screen of ``constants``."""
     problem = measured.problem
     assert problem is not None  # see `show`
@@ -89,7 +85,8 @@ def constants(measured: Measured, file: Path | None = None) -> None:
     say()
     say("Exact for this mesh, up to rounding.  On a mesh m is above and M below its")
     say("continuous value: for the continuous theorem both err on the unsafe side.")
-    _next(file, "compare")
+    if typed is not None:
+        typed.suggest("compare")
 
 
 def _happened(run: Run, comparison: Comparison | None = None) -> None:
@@ -157,16 +154,17 @@ def _limits(outside: list[str]) -> None:
     say("Not claimed: anything about the continuum, or the local Coulomb law.")
 
 
-def run(finished: Run, file: Path | None = None) -> None:
+def run(finished: Run, typed: Typed | None = None) -> None:
     """The screen of ``run``."""
     nodes = sum(len(body.mesh.points) for body in finished.bodies.elastic)
     _setting(_problem(finished), nodes, finished.pair.contact.grid.n)
     _happened(finished)
     _limits(finished.outside)
-    _next(file, "compare")
+    if typed is not None:
+        typed.suggest("compare", iteration=True)
 
 
-def solution(found: Solution, file: Path | None = None) -> None:
+def solution(found: Solution, typed: Typed | None = None) -> None:
     """The screen of ``solve``."""
     bodies = found.bodies
     _setting(bodies.problem, sum(len(body.mesh.points) for body in bodies.elastic), bodies.interface.contact.n)
@@ -174,8 +172,8 @@ def solution(found: Solution, file: Path | None = None) -> None:
     _contact(bodies.problem, found.contact)
     say(f"  KKT residual {found.kkt_residual:.1e} after {found.linear_solves} linear systems on Gamma_c")
     _limits(bodies.outside)
-    iterates = len(bodies.elastic) == 2
-    _next(file, "run" if iterates else "solve", "" if iterates else " -o results")
+    if typed is not None:
+        typed.suggest(*(["run"] if len(bodies.elastic) == 2 else ["solve", "-o", "results"]))
 
 
 def _problem(run: Run) -> Problem:
@@ -185,7 +183,7 @@ def _problem(run: Run) -> Problem:
     return problem.with_theta(run.theta)
 
 
-def comparison(result: Comparison, file: Path | None = None) -> None:
+def comparison(result: Comparison, typed: Typed | None = None) -> None:
     """The screen of ``compare`` and ``demo``."""
     finished, measured = result.run, result.measured
     _setting(_problem(finished), measured.nodes, measured.interface_nodes)
@@ -216,10 +214,11 @@ def comparison(result: Comparison, file: Path | None = None) -> None:
     heading("DOES THE RUN AGREE WITH THE BOUND?")
     table([["bound", "verdict", "why"], *([n, j.verdict, j.reason] for n, j in result.verdicts.items())])
     _limits(finished.outside)
-    _next(file, "advise")
+    if typed is not None:
+        typed.suggest("advise")
 
 
-def advice(found: Advice, file: Path | None = None) -> None:
+def advice(found: Advice, typed: Typed | None = None) -> None:
     """The screen of ``advise``."""
     if found.run is not None and found.next is not None:
         _seen(found.run, found.readings, found.next)
@@ -233,8 +232,11 @@ def advice(found: Advice, file: Path | None = None) -> None:
         return
     say("Not claimed: that the predicted theta is the best one for your loads.")
     if found.problem is not None:
-        swap = "" if found.roles[0].neumann_body == found.neumann_body else " --swap-roles"
-        _next(file, "run", f"{swap} --theta {theta}")
+        if typed is not None:
+            options = [] if found.roles[0].neumann_body == found.neumann_body else ["--swap-roles"]
+            if theta is not None and takes_theta(found.problem.iteration.relaxation):
+                options += ["--theta", theta]
+            typed.suggest("run", *options)
     else:
         say("Next: ndtheory advise --help")
 

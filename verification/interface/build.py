@@ -15,7 +15,7 @@ from verification.interface.files import read_interface
 from verification.interface.friction import Given, Law
 from verification.interface.grid import Grid
 from verification.interface.interface import Interface
-from verification.interface.matrices import check_matrix, check_nodes, size
+from verification.interface.matrices import check_matrix, check_nodes, real_array, size
 from verification.interface.pair import ContactPair
 from verification.problem import Problem, load
 
@@ -108,16 +108,16 @@ def build(
     n, m = len(S_c) // 2, len(S_n) // 2
     if transfer is None and n != m:
         raise ValueError(f"S1 is {size(S1)}, S2 is {size(S2)}: needed the same contact nodes, or a transfer")
-    x = _vector("x", x, n)
-    w = trapezoid(x) if weights is None else _vector("weights", weights, n)
-    distance = _vector("gap", np.broadcast_to(gap, n), n)
+    x = real_array("x", x, (n,))
+    w = trapezoid(x) if weights is None else real_array("weights", weights, (n,))
+    distance = real_array("gap", np.broadcast_to(gap, n), (n,))
     check_nodes(x, w, distance)
-    P = None if transfer is None else _matrix("transfer", transfer, (n, m))
+    P = None if transfer is None else real_array("transfer", transfer, (n, m))
     grid = Grid(x=x, weights=w)
     if P is not None and law is not None:
         raise ValueError("law: needed a kernel, as a transfer does not tell where the nodes of the Neumann body lie")
     other = grid if P is None else Grid(x=np.full(m, np.nan), weights=P.T @ w)
-    given = law if kernel is None else Given(matrix=_matrix("kernel", kernel, (n, m)))
+    given = law if kernel is None else Given(matrix=real_array("kernel", kernel, (n, m)))
     contact, neumann = (
         _condensed(name, matrix, load, own, upward=neumann_body == 2)
         for name, matrix, load, own in (("contact", S_c, l_c, grid), ("neumann", S_n, l_n, other))
@@ -132,31 +132,12 @@ def pair_of(problem: Problem | ContactPair | Path | str) -> ContactPair:
     return problem if isinstance(problem, ContactPair) else build(problem)
 
 
-def _vector(name: str, values: Floats, n: int) -> Floats:
-    return _matrix(name, values, (n,))
-
-
-def _matrix(name: str, values: Floats, shape: tuple[int, ...]) -> Floats:
-    """A finite array of a shape.
-
-    Raises
-    ------
-    ValueError
-    """
-    array = np.array(values, dtype=float)
-    if array.shape != shape:
-        raise ValueError(f"{name} is {size(array)}: needed {' x '.join(map(str, shape))}")
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name} has entries that are not finite: needed numbers")
-    return array
-
-
 def _condensed(name: str, matrix: Floats, load: Floats | None, grid: Grid, *, upward: bool) -> Condensed:
     S = np.array(matrix, dtype=float)
     condensed = Condensed(
         grid=grid,
         stiffness=(S + S.T) / 2,
-        load=np.zeros(grid.size) if load is None else _vector(f"the load of the {name} body", load, grid.size),
+        load=np.zeros(grid.size) if load is None else real_array(f"the load of the {name} body", load, (grid.size,)),
         known=np.zeros(grid.size),
         free=np.ones(grid.size, dtype=bool),
     )

@@ -16,17 +16,18 @@ from typing import Any, Literal
 import numpy as np
 
 from ndtheory import HypothesisError, __version__
+from verification.interface.array_headers import headers
 from verification.interface.body import Condensed
 from verification.interface.friction import Given
 from verification.interface.grid import Grid
 from verification.interface.interface import Interface
-from verification.interface.matrices import UNREADABLE, check_matrix, check_nodes
+from verification.interface.matrices import UNREADABLE, check_matrix, check_nodes, real_array
 from verification.interface.pair import ContactPair
 from verification.problem import ProblemError, Settings
 from verification.problem.specification import read_theta
 from verification.problem.tables import unreadable
 
-#: Largest size of an interface file: two matrices of 4000 rows, and what else there is.
+#: Largest size of an interface file, and of what it unpacks to: two matrices of 4000 rows, and what else there is.
 MOST_BYTES = 600_000_000
 
 #: What every interface file has.
@@ -67,15 +68,22 @@ def read_interface(path: Path) -> ContactPair:
     Raises
     ------
     ProblemError
-        Not such a file, or one whose arrays do not fit.
+        Not such a file, or one whose arrays do not fit each other or the memory.
     """
     refuse = lambda key, needed: ProblemError(str(path), key, None, needed)
     if why := unreadable(path, MOST_BYTES):
         raise refuse("", why)
     try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as found:
-            arrays = {name: np.array(found[name]) for name in found.files}
-    except UNREADABLE:
+        with path.open("rb") as file:
+            unpacked = sum(header.bytes for header in headers(file))
+            if unpacked > MOST_BYTES:
+                raise refuse("", f"needed arrays of at most {MOST_BYTES} bytes together, received {unpacked}")
+            file.seek(0)
+            with np.load(file, allow_pickle=False) as found:
+                arrays = {name: np.array(found[name]) for name in found.files}
+    except UNREADABLE as error:
+        if isinstance(error, ProblemError):
+            raise
         raise refuse("", "needed an interface file, as `ndtheory run FILE -o DIR` writes it") from None
     if missing := [name for name in NEEDED if name not in arrays]:
         raise refuse(missing[0], f"needed an interface file with {', '.join(NEEDED)}")
@@ -93,17 +101,17 @@ def _pair(arrays: dict[str, np.ndarray]) -> ContactPair:
     neumann_body: Literal[1, 2] = 1 if text("neumann_body", "2") == "1" else 2
     x, n = arrays["x"], len(arrays["x"])
     transfer = arrays.get("transfer")
-    grid = Grid(x=_real("x", x, (n,)), weights=_real("weights", arrays["weights"], (n,)), dimension=dimension)
+    grid = Grid(x=real_array("x", x, (n,)), weights=real_array("weights", arrays["weights"], (n,)), dimension=dimension)
     other = grid
     if transfer is not None:
         m = transfer.shape[-1]
-        transfer = _real("transfer", transfer, (n, m))
+        transfer = real_array("transfer", transfer, (n, m))
         unknown = np.full(m, np.nan)
-        weights = _real("weights_neumann", arrays.get("weights_neumann", transfer.T @ grid.weights), (m,))
+        weights = real_array("weights_neumann", arrays.get("weights_neumann", transfer.T @ grid.weights), (m,))
         other = Grid(x=np.array(arrays.get("x_neumann", unknown), dtype=float), weights=weights, dimension=dimension)
     law = None
     if "kernel" in arrays:
-        kernel = _real("kernel", arrays["kernel"], (n, other.n))
+        kernel = real_array("kernel", arrays["kernel"], (n, other.n))
         law = Given(matrix=kernel, words=text("law", "operator S given as a matrix"), outside=text("outside", ""))
     grids = (grid, other) if neumann_body == 2 else (other, grid)
     lower, upper = (_side(arrays, i, own) for i, own in enumerate(grids, 1))
@@ -113,9 +121,9 @@ def _pair(arrays: dict[str, np.ndarray]) -> ContactPair:
         tolerance=float(Fraction(text("tolerance", "1e-9"))),
         max_iterations=int(text("max_iterations", "500")),
     )
-    check_nodes(grid.x, grid.weights, _real("gap", arrays["gap"], (n,)))
+    check_nodes(grid.x, grid.weights, real_array("gap", arrays["gap"], (n,)))
     interface = Interface(
-        contact=grid, neumann=other, gap=_real("gap", arrays["gap"], (n,)), law=law, transfer=transfer
+        contact=grid, neumann=other, gap=real_array("gap", arrays["gap"], (n,)), law=law, transfer=transfer
     )
     pair = ContactPair(
         contact=contact, neumann=neumann, interface=interface, neumann_body=neumann_body, settings=settings
@@ -128,28 +136,12 @@ def _side(arrays: dict[str, np.ndarray], i: int, grid: Grid) -> Condensed:
     free = np.array(arrays.get(f"free{i}", np.ones(size)), dtype=bool)
     if free.shape != size:
         raise ValueError(f"free{i}: needed {grid.size} truth values")
-    stiffness = _real(f"S{i}", arrays[f"S{i}"], (grid.size, grid.size))
+    stiffness = real_array(f"S{i}", arrays[f"S{i}"], (grid.size, grid.size))
     check_matrix(f"S{i}", stiffness[np.ix_(free, free)])
     return Condensed(
         grid=grid,
         stiffness=stiffness,
-        load=_real(f"load{i}", arrays[f"load{i}"], size),
-        known=_real(f"known{i}", arrays.get(f"known{i}", np.zeros(size)), size),
+        load=real_array(f"load{i}", arrays[f"load{i}"], size),
+        known=real_array(f"known{i}", arrays.get(f"known{i}", np.zeros(size)), size),
         free=free,
     )
-
-
-def _real(name: str, values: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """A finite array of a shape.
-
-    Raises
-    ------
-    ValueError
-    """
-    if values.dtype.kind not in "fiub" or values.shape != shape:
-        received = " x ".join(map(str, values.shape)) or "a single value"
-        raise ValueError(f"{name}: needed {' x '.join(map(str, shape))} real numbers, received {received}")
-    array = np.array(values, dtype=float)
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name}: needed finite numbers")
-    return array

@@ -1,4 +1,4 @@
-"""Checks of interface stiffness matrices: square, finite, symmetric, positive definite."""
+"""Checks of arrays: finite and of one shape; of interface matrices: symmetric, positive definite too."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import struct
 import tokenize
 import zipfile
 import zlib
+from typing import Any
 
 import numpy as np
 
@@ -25,9 +26,28 @@ UNREADABLE = (
 )  # fmt: skip
 
 
-def size(matrix: Floats) -> str:
-    """The shape of a matrix in words."""
-    return " x ".join(str(n) for n in matrix.shape) or "a single number"
+def size(matrix: np.ndarray) -> str:
+    """The shape of an array in words."""
+    return " x ".join(map(str, matrix.shape)) or "a single number"
+
+
+def real_array(name: str, values: Any, shape: tuple[int, ...]) -> Floats:
+    """Finite real numbers of a shape.
+
+    Raises
+    ------
+    ValueError
+        Another shape, texts or complex numbers, or what is not finite.
+    """
+    received, needed = np.asarray(values), " x ".join(map(str, shape))
+    if received.dtype.kind not in "fiubO":
+        raise ValueError(f"{name} has no real numbers (numpy type {received.dtype}): needed {needed} of them")
+    if received.shape != shape:
+        raise ValueError(f"{name} is {size(received)}: needed {needed} real numbers")
+    array = np.array(received, dtype=float)
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} has entries that are not finite: needed numbers")
+    return array
 
 
 def check_matrix(name: str, matrix: Floats) -> None:

@@ -20,7 +20,7 @@ from fem1d2d.mesh import Floats
 from verification.algorithm.affine_piece import Piece
 from verification.algorithm.fixed_point import FixedPointMap
 from verification.bounds.losses import Forms, square, top
-from verification.bounds.pattern_search import worst_piece
+from verification.bounds.pattern_search import signs, worst_piece
 from verification.contact import ContactError, ContactSolution
 from verification.contact.active_set import Pattern
 from verification.interface.body import Body
@@ -283,16 +283,11 @@ def work_form(forms: Forms, piece: Piece) -> Floats:
 
 
 def uniform_piece(pair: ContactPair, *, touching: bool, sliding: int) -> Piece:
-    """The piece on which every node does the same; ``S sigma_N > 0``."""
+    """The piece on which every node does the same."""
     t = pair.contact.grid.t
     pattern = Pattern(touching=np.full(pair.contact.grid.n, touching), sliding=np.full(t, sliding, dtype=np.int8))
     still: NDArray[np.bool_] = np.zeros(pair.contact.grid.n, dtype=bool)
-    return Piece(pair=pair, pattern=pattern, sign=_signs(pair), still=still)
-
-
-def _signs(pair: ContactPair) -> NDArray[np.int8]:
-    rubs = bool(pair.friction and pair.interface.kernel is not None)
-    return np.full(pair.contact.grid.t, int(rubs), dtype=np.int8)
+    return Piece(pair=pair, pattern=pattern, sign=signs(pair), still=still)
 
 
 def pieces(setting: Setting, random: np.random.Generator, *, starts: int) -> list[Piece]:

@@ -64,8 +64,15 @@ def check_ours(target: Path) -> None:
     ------
     ProblemError
     """
+    _check_place(target)
     if target.exists() and (unreadable(target, MOST_BYTES) or MARKS[target.suffix] not in target.read_bytes()):
         raise ProblemError(str(target), "", None, "not written by this program; needed another folder or name (-o)")
+
+
+def _check_place(target: Path) -> None:
+    """Refuse a name that a folder has."""
+    if target.is_dir():
+        raise ProblemError(str(target), "", None, "this is a folder: needed another folder or name (-o)")
 
 
 #: Files are written into a folder of such a name before they take their places.
@@ -183,6 +190,8 @@ class Folder:
             raise ProblemError(str(path), "", None, f"needed a folder to write to: {why}") from None
         for name in FILES[kind]:
             check_ours(path / name)
+        if kind != "verify":
+            _check_place(path / "problem.toml")  # a file of a user's stays as it is
 
     def write_problem(self, text: str) -> Path:
         """Write ``problem.toml``.

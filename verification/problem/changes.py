@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from decimal import Decimal
 from typing import Any
 
-from verification.problem.reading import read_problem
+from verification.problem.reading import read_problem, takes_theta
 from verification.problem.specification import Problem
 from verification.problem.tables import QUOTED, ProblemError
 from verification.problem.writing import tables
@@ -22,14 +22,14 @@ _HERE = "value"
 def with_values(problem: Problem, values: Iterable[tuple[Key, Any]]) -> Problem:
     """The problem with some keys of its file set, one after the other.
 
-    Momentum takes its step from rho: set without a theta, it comes with ``auto``.
+    A rule that takes its step from rho, set without a theta, comes with ``auto``.
 
     Raises
     ------
     ProblemError
     """
     data, given = tables(problem), dict(values)
-    if given.get(("iteration", "relaxation")) == "momentum":
+    if not takes_theta(given.get(("iteration", "relaxation"))):
         given = {("iteration", "theta"): "auto"} | given
     for key, value in given.items():
         *parents, name = key

@@ -295,8 +295,16 @@ def _read_contact(table: Table, dimension: int) -> ContactSpec:
     return ContactSpec(interval=interval, friction=friction, law=law, radius=radius, gap=gap)
 
 
-def _read_iteration(table: Table) -> IterationSpec:
+def takes_theta(relaxation: Any) -> bool:
+    """Whether a given theta is used by the rule of a name; what is no name of a rule is refused elsewhere."""
     from verification.algorithm.relaxation import RULES  # the one list of rules; it lies above, and is only asked
+
+    rule = RULES.get(relaxation) if isinstance(relaxation, str) else None
+    return rule is None or rule.takes_theta
+
+
+def _read_iteration(table: Table) -> IterationSpec:
+    from verification.algorithm.relaxation import RULES
 
     def theta(value: Any) -> Theta:
         try:
@@ -307,7 +315,7 @@ def _read_iteration(table: Table) -> IterationSpec:
     relaxation: str = table.take("relaxation", choice(*RULES), "constant")
     spec = IterationSpec(
         neumann_body=table.take("neumann_body", choice(1, 2), 2),
-        theta=table.take("theta", theta, "auto" if RULES[relaxation].needs_rho else Fraction(1, 2)),
+        theta=table.take("theta", theta, Fraction(1, 2) if takes_theta(relaxation) else "auto"),
         relaxation=relaxation,
         tolerance=float(
             table.take("tolerance", number("a number with 0 < tolerance < 1", lambda v: 0 < v < 1), Fraction(1, 10**9))

@@ -124,13 +124,6 @@ class Settings:
     tolerance: float = 1e-9
     max_iterations: int = 500
 
-    @property
-    def warnings(self) -> list[str]:
-        """What is set and has no effect."""
-        if self.relaxation != "momentum" or self.theta == "auto":
-            return []
-        return [f"iteration.theta = {float(self.theta):g} is not used: momentum takes its step from rho"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class IterationSpec(Settings):

@@ -1,0 +1,59 @@
+"""The command that a screen suggests next names the problem that was typed."""
+
+import shlex
+
+import pytest
+
+SMALL = {"body1.cells": "[10, 2]", "body2.cells": "[6, 2]"}
+SETS = ("--set", "contact.friction=0.3", "--set", "body1.y=[-0.4, 0]", "--set", 'title="a b"')
+
+
+def suggested(answer):
+    last = answer.out.splitlines()[-1]
+    assert last.startswith("Next: ndtheory ")
+    return shlex.split(last.removeprefix("Next: ndtheory "))
+
+
+@pytest.mark.parametrize("command", ["constants", "run", "solve", "compare", "advise"])
+def test_keys_that_were_set_are_set_again(call, write, command):
+    file = write(SMALL)
+    asked = call(command, file, *SETS, "--json").document["problem"]
+    assert asked["contact"]["friction"] == 0.3
+    words = suggested(call(command, file, *SETS))
+    answer = call(*words, "--json").document["problem"]
+    changed = {"theta", "neumann_body"} if command == "advise" else set()  # which advice is about
+    for problem in (asked, answer):
+        problem["iteration"] = {key: value for key, value in problem["iteration"].items() if key not in changed}
+    assert answer == asked
+
+
+def test_a_comparison_is_suggested_with_the_theta_the_rule_and_the_roles_of_the_run(call, write):
+    options = ("--theta", "0.3", "--relaxation", "aitken", "--swap-roles")
+    file = write(SMALL)
+    run = call("run", file, *options, "--json").document["problem"]
+    words = suggested(call("run", file, *options))
+    assert words == ["compare", str(file), *options]
+    assert call(*words, "--json").document["problem"] == run
+
+
+def test_the_advice_suggests_no_theta_to_a_rule_that_takes_its_own_step(call, write):
+    file = write(SMALL | {"contact.friction": "0", "iteration.relaxation": '"momentum"', "iteration.theta": None})
+    words = suggested(call("advise", file))
+    assert words[:2] == ["run", str(file)]
+    assert "--theta" not in words
+    assert call(*words).status == 0
+
+
+def test_what_cannot_be_pasted_from_a_screen_is_not_suggested(call, write):
+    file = write(SMALL)
+    assert "Next:" not in call("run", file, "--set", "contact.friction=\n0.3").out
+    assert "Next:" in call("run", file, "--set", "contact.friction=0.3").out
+
+
+@pytest.mark.parametrize("command", ["run", "solve", "compare"])
+@pytest.mark.parametrize("name", ["problem.toml", "contact.csv"])
+def test_a_folder_where_a_result_belongs_is_refused_before_anything_is_computed(call, write, tmp_path, command, name):
+    (tmp_path / "results" / name).mkdir(parents=True)
+    line = call(command, write(SMALL), "-o", tmp_path / "results").complaint
+    assert f"{name}: this is a folder: needed another folder or name (-o)" in line
+    assert [path.name for path in (tmp_path / "results").iterdir()] == [name]
