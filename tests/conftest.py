@@ -14,6 +14,9 @@ settings.register_profile("ci", deadline=None, derandomize=True)
 settings.register_profile("nightly", deadline=None, max_examples=2000)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE") or ("ci" if os.environ.get("CI") else "dev"))
 
+# Helpers that assert, so that a failure shows the values as it does in a test.
+pytest.register_assert_rewrite("complaints", "section_5", "pieces")
+
 # A shell that runs the tests in its background lets them ignore Ctrl-C, and their children inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
