@@ -1,6 +1,5 @@
 """The algebra of the theorem in energy norms: where q is below 1, and the theta where it is least."""
 
-import pytest
 import sympy as sp
 from sharp_symbols import (
     DATA,
@@ -55,25 +54,8 @@ def test_small_thetas_contract_if_the_friction_number_is_below_1():
     assert zero(2 * (highest - 1) - line(x, 0) - 2 * (x - kappa_1 / 2) ** 2)
 
 
-class Asked(Exception):
-    """The coefficients of a polynomial whose roots were wanted."""
-
-
-@pytest.fixture
-def coefficients(monkeypatch):
-    """a, b, c of the quadratic that `contraction_interval` solves."""
-
-    def ask(a, b, c, *options):
-        raise Asked(a, b, c)
-
-    monkeypatch.setattr(sharp, "_roots", ask)
-    with pytest.raises(Asked) as asked:
-        sharp.contraction_interval(*DATA)
-    return asked.value.args
-
-
-def test_the_quadratic_solved_for_the_interval_is_the_highest_line_times_2_minus_2_plus_rho_theta(coefficients):
-    a, b, c = coefficients
+def test_the_quadratic_solved_for_the_interval_is_the_highest_line_times_2_minus_2_plus_rho_theta():
+    a, b, c = sharp.end_quadratic(*DATA)
     solved = a * theta**2 + b * theta + c
     highest = -sharp.one_minus_inside(theta, *DATA) / theta
     assert zero(solved - highest * (2 - (2 + rho) * theta))
@@ -86,24 +68,24 @@ def test_the_quadratic_solved_for_the_interval_is_the_highest_line_times_2_minus
 def test_the_quadratic_solved_for_the_interval_tells_the_friction_number_at_0_and_has_a_short_discriminant(
     coefficients,
 ):
-    a, b, c = coefficients
+    a, b, c = sharp.end_quadratic(*DATA)
     assert zero(c - 4 * (sharp.friction_number(*FRICTION) - 1))
     assert not zero(c - 2 * (sharp.friction_number(*FRICTION) - 1))
     assert zero(b**2 - 4 * a * c - 4 * ((1 + rho * (1 - kappa_2)) ** 2 - rho * kappa_1**2))
     assert not zero(b**2 - 4 * a * c - 4 * ((1 + rho * (1 - kappa_2)) ** 2 + rho * kappa_1**2))
 
 
-def test_at_the_friction_threshold_small_thetas_contract_if_sqrt_rho_kappa_1_is_below_2(coefficients):
+def test_at_the_friction_threshold_small_thetas_contract_if_sqrt_rho_kappa_1_is_below_2():
     """c = 0 leaves theta (a theta + b), and then 1 - kappa_2 = kappa_1^2/4."""
-    _, b, c = coefficients
+    _, b, c = sharp.end_quadratic(*DATA)
     assert zero(b + 2 * c - 2 * (rho * (1 - kappa_2) - 1))
     assert not zero(b - 2 * c - 2 * (rho * (1 - kappa_2) - 1))
     assert zero(rho * (1 - kappa_2) - 1 + rho * c / 4 - (rho * kappa_1**2 / 4 - 1))
 
 
-def test_without_kappa_1_the_quadratic_solved_for_the_interval_has_the_turning_theta_as_a_second_root(coefficients):
+def test_without_kappa_1_the_quadratic_solved_for_the_interval_has_the_turning_theta_as_a_second_root():
     """There h (2 - (2 + rho) theta) vanishes, but h in general does not."""
-    a, b, c = (value.subs(kappa_1, 0) for value in coefficients)
+    a, b, c = (value.subs(kappa_1, 0) for value in sharp.end_quadratic(*DATA))
     at = 2 / (2 + rho)
     assert zero(a * at**2 + b * at + c)
     assert not zero((1 - 2 * (1 - kappa_2.subs(kappa_1, 0))) * at + 2 * (1 - kappa_2.subs(kappa_1, 0)))

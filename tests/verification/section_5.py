@@ -92,7 +92,7 @@ class Case:
         self.flexibility, self.dual = np.linalg.inv(two.S), np.linalg.inv(two.E)
         gap = float(problem.contact.gap)
         self.gap = np.concatenate([np.zeros(self.dense.t), np.full(len(self.S1) - self.dense.t, gap)])
-        self._step = FixedPointMap(self.pair, "active-set")
+        self.step_from = FixedPointMap(self.pair, "active-set")
 
     @cached_property
     def constants(self) -> Constants:
@@ -110,7 +110,7 @@ class Case:
     def T(self, psi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """T psi, and w^1 - w^2 - gap on Gamma_c."""
         try:
-            _, solution = self._step(psi)
+            _, solution = self.step_from(psi)
         except ContactError:
             _, solution = FixedPointMap(self.pair, "cvxpy")(psi)
         return solution.force, solution.v

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cached_property
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from fem1d2d import Condensation
 from verification.interface.assembly import build
 from verification.ledger import convergence, field_problems, weak_forms
 from verification.ledger import solutions as ledger
-from verification.ledger.convergence import Convergence, Setting
+from verification.ledger.convergence import Setting
 from verification.ledger.weak_forms import EXACT, Case, Fields, Weak
 from verification.problem.specification import Problem
 
@@ -186,10 +187,11 @@ def test_on_two_bars_the_printed_sign_gives_the_factor_of_the_cobweb():
 
 @pytest.mark.parametrize("of", [PRINTED, REPAIRED])
 def test_a_contraction_factor_one_per_cent_too_small_is_found_out(of):
-    runs = convergence.inside("quick") if of == PRINTED else convergence.sharp("quick")
-    assert convergence._falling(of, "", runs).holds is True
-    short = [Convergence(case=run.case, factor=0.99 * run.factor) for run in runs]
-    assert convergence._falling(of, "", short).holds is False
+    runs = {PRINTED: convergence.inside("quick"), REPAIRED: convergence.sharp("quick")}
+    verdict = lambda: holds(convergence.forces_converge(SimpleNamespace(inside=runs[PRINTED], sharp=runs[REPAIRED])))
+    assert verdict() == [(PRINTED, True), (REPAIRED, True)]
+    runs[of] = [replace(run, factor=0.99 * run.factor) for run in runs[of]]
+    assert verdict() == [(PRINTED, of != PRINTED), (REPAIRED, of != REPAIRED)]
 
 
 def test_the_estimate_of_proposition_5_1_is_homogeneous_in_theta_m():

@@ -20,7 +20,7 @@ def found(monkeypatch):
                 id: [Evidence(method="symbolic", of="printed", holds=holds.get(id, True), text="decided")] for id in ids
             }
 
-        monkeypatch.setattr(rows, "_sources", lambda: {"exact arithmetic": gather})
+        monkeypatch.setattr(rows, "sources", lambda: {"exact arithmetic": gather})
 
     return use
 
