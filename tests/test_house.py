@@ -161,7 +161,7 @@ TESTS = sorted((ROOT / "tests").rglob("*.py"))
 
 
 def private_names(source: str) -> Iterator[str]:
-    """Every private name that a test reads, imports or replaces, ``__dict__`` too; ``_a_`` and ``__a__`` are special."""
+    """Every private name that a test reads, imports or replaces, ``__dict__`` too; ``_a_`` and ``__a__`` are none."""
     for node in ast.walk(ast.parse(source)):
         names = [node.attr] if isinstance(node, ast.Attribute) else []
         if isinstance(node, ast.ImportFrom):

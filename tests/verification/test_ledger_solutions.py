@@ -52,13 +52,13 @@ OF_SECTION_6 = {
 
 
 @pytest.fixture(scope="module")
-def found():
-    return solutions()
+def found(evidence):
+    return evidence("solutions")[0]
 
 
 @pytest.fixture(scope="module")
-def seen():
-    return experiments()
+def seen(evidence):
+    return evidence("experiments of Section 6")[0]
 
 
 @pytest.mark.parametrize("statement", EXPECTED)

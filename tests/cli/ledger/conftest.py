@@ -7,12 +7,27 @@ import pytest
 from ledger_calls import Whole
 
 from verification import ledger
+from verification.ledger import rows
 
 
-@pytest.fixture(scope="module")
-def whole():
-    told = []
-    return Whole(ledger.verify(watch=lambda what, share: told.append((what, share))), told)
+@pytest.fixture(scope="session")
+def whole(evidence):
+    """Made of the evidence of all sources, each asked once in the session."""
+
+    def source(name):
+        found, shares = evidence(name)
+
+        def again(ids, level, watch):
+            for share in shares:
+                watch(share)
+            return found
+
+        return again
+
+    told, sources = [], {name: source(name) for name in rows.sources()}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(rows, "sources", lambda: sources)
+        return Whole(ledger.verify(watch=lambda what, share: told.append((what, share))), told)
 
 
 @pytest.fixture
@@ -30,7 +45,7 @@ def kept(whole, monkeypatch):
     return use
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def document(whole):
     """The document of the whole ledger."""
 
