@@ -39,9 +39,10 @@ class Eigenvalue:
     residual: float
 
 
-def _certify(
+def rayleigh_quotient(
     A: Floats | sp.csc_array, B: Floats | sp.csc_array, x: Floats, solve_B: Callable[[Floats], Floats]
 ) -> Eigenvalue:
+    """The Rayleigh quotient of any vector x; some eigenvalue lies within its ``residual``."""
     x = x / np.sqrt(x @ (B @ x))
     value = float(x @ (A @ x))
     r = A @ x - value * (B @ x)
@@ -56,7 +57,7 @@ def largest(A: Floats, B: Floats) -> Eigenvalue:
     _, vectors = eigh(A, B, subset_by_index=[n - 1, n - 1], driver="gvx")
     if vectors.shape[1] == 0:  # LAPACK's subsets miss an eigenvalue of high multiplicity
         _, vectors = eigh(A, B, driver="gvd")
-    return _certify(A, B, vectors[:, -1], lambda r: np.asarray(cho_solve(factor, r)))
+    return rayleigh_quotient(A, B, vectors[:, -1], lambda r: np.asarray(cho_solve(factor, r)))
 
 
 def largest_sparse(
@@ -87,7 +88,7 @@ def largest_sparse(
     start = np.random.default_rng(0).standard_normal(n)
     for _ in range(3):  # ARPACK's own estimate of the residual fails at some multiple eigenvalues; a restart mends it
         _, vectors = eigsh(A, v0=start, **options)
-        found = _certify(A, B, vectors[:, 0], solve_B)
+        found = rayleigh_quotient(A, B, vectors[:, 0], solve_B)
         if found.residual <= LANCZOS * abs(found.value):
             break
         start = found.vector

@@ -173,20 +173,34 @@ def predicted_factor(theta: Any, rho: Any) -> Any:
     return maximum(absolute(1 - theta), absolute(1 - theta * (1 + rho)))
 
 
+def end_quadratic(rho: Any, kappa_1: Any, kappa_2: Any) -> tuple[Any, Any, Any]:
+    """a, b and c of ``a theta^2 + b theta + c = h (2 - (2 + rho) theta)``, with h = (q^2 - 1)/theta.
+
+    Below :func:`turning_theta`, where the second factor is positive, it has the sign of q - 1.
+
+    Examples
+    --------
+    >>> end_quadratic(2, 0, 0)
+    (-4, 10, -4)
+    """
+    spare = 1 - kappa_2
+    a = (1 - 2 * spare) * (2 + rho) + kappa_1**2
+    b = (8 + 2 * rho) * spare - 2 - 2 * kappa_1**2
+    c = kappa_1**2 - 4 * spare
+    return a, b, c
+
+
 def contraction_ends(rho: Any, kappa_1: Any, kappa_2: Any, margin: Any = 0) -> tuple[Any, Any, Any]:
     """Both ends of the interval of the thetas with q < 1, and the condition that there is one.
 
     ``q < 1`` means ``2 (f - 1) + theta (1 - 2 f + rho x^2) < 0`` for every x in [0, r].  Each is linear in theta, so
     their maximum h is convex, and ``h < 0`` on one interval.  Its ends are 0, 1, ``2/(1 + sqrt(rho) r)`` or roots of
-    the quadratic ``h (2 - (2 + rho) theta)`` below :func:`turning_theta`.  Scalars that round need a
-    ``margin`` well above their relative rounding, within which an end counts as met.
+    :func:`end_quadratic` below :func:`turning_theta`.  Scalars that round need a ``margin`` well above their relative
+    rounding, within which an end counts as met.
     """
     turn = turning_theta(rho, kappa_1, kappa_2)
     end = 2 / (1 + sqrt(rho) * largest_ratio(rho, kappa_1, kappa_2))
-    spare = 1 - kappa_2
-    a = (1 - 2 * spare) * (2 + rho) + kappa_1**2
-    b = (8 + 2 * rho) * spare - 2 - 2 * kappa_1**2
-    c = kappa_1**2 - 4 * spare
+    a, b, c = end_quadratic(rho, kappa_1, kappa_2)
     (first, one), (second, other) = (
         (root, there & (margin < root) & (root < turn * (1 - margin))) for root, there in _roots(a, b, c, margin)
     )

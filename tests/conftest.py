@@ -14,14 +14,53 @@ settings.register_profile("ci", deadline=None, derandomize=True)
 settings.register_profile("nightly", deadline=None, max_examples=2000)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE") or ("ci" if os.environ.get("CI") else "dev"))
 
+# Helpers that assert, so that a failure shows the values as it does in a test.
+pytest.register_assert_rewrite("complaints", "section_5", "pieces")
+
 # A shell that runs the tests in its background lets them ignore Ctrl-C, and their children inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-@pytest.fixture
-def known_bounds(monkeypatch):
-    """Losses and semidefinite bounds of the same bodies are computed once, where a test is not about them."""
-    from known import KNOWN
+@pytest.fixture(scope="session")
+def shared(tmp_path_factory):
+    """``shared(key, compute)``: a value computed once in the session, for all its processes."""
+    folder = tmp_path_factory.getbasetemp()
+    folder = (folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder) / "shared"
+    folder.mkdir(exist_ok=True)
+    from shared import Shared
 
-    for module, name, known in KNOWN:
-        monkeypatch.setattr(module, name, known)
+    return Shared(folder)
+
+
+@pytest.fixture
+def decided_once(monkeypatch, shared):
+    """Each form of a check is decided once in the session."""
+    from shared import deciding_once
+
+    from ndtheory.symbolic.engine import Check
+
+    monkeypatch.setattr(Check, "decide", deciding_once(shared))
+
+
+@pytest.fixture(scope="session")
+def evidence(shared):
+    """``evidence(source)``: what a source of the ledger finds of all statements, and the shares it told on the way."""
+    from shared import deciding_once, gathered
+
+    from ndtheory.symbolic.engine import Check
+
+    def find(source):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(Check, "decide", deciding_once(shared))
+            return shared(("evidence", source), lambda: gathered(source))
+
+    return find
+
+
+@pytest.fixture
+def known_bounds(monkeypatch, shared):
+    """Losses and semidefinite bounds of the same bodies are computed once, where a test is not about them."""
+    from known import DEAR, once
+
+    for module, name in DEAR:
+        monkeypatch.setattr(module, name, once(getattr(module, name), shared))

@@ -1,39 +1,35 @@
-"""What does not depend on a run is computed once: the bounds of one pair of bodies, for all tests of one process."""
+"""What does not depend on a run is computed once: the bounds of one pair of bodies, for all processes of a session."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
 
+from shared import Shared
+
 from verification import comparison
 from verification.bounds import multipliers, semidefinite
 from verification.constants import Measured
 from verification.interface.pair import ContactPair
 
+#: Most of the time of a comparison goes into these: module and name.
+DEAR = [(comparison, "locate"), (multipliers, "friction_threshold"), (semidefinite, "work_out")]
 
-def once(compute: Callable[..., Any]) -> Callable[..., Any]:
+
+def once(compute: Callable[..., Any], shared: Shared) -> Callable[..., Any]:
     """A function of a pair of bodies that keeps its answers.
 
     They are kept by what they depend on: the matrices of the bodies and of the interface, friction, the roles, and
     whatever else is given.  An exception is not kept.
     """
-    answers: dict[tuple[Any, ...], Any] = {}
 
     def answer(pair: ContactPair, measured: Measured, *given: Any, progress: Any = None, **options: Any) -> Any:
         sides, interface = (pair.contact, pair.neumann), pair.interface
         arrays = (*(side.stiffness for side in sides), interface.gap, interface.contact.weights, interface.kernel)
         meshes = (() if side.body is None else side.gram.tobytes() for side in sides)
         bytes_ = (b"" if array is None else array.tobytes() for array in arrays)
-        key = (pair.friction, pair.neumann_body, given, *options.items(), *bytes_, *meshes)
-        if key not in answers:
-            answers[key] = compute(pair, measured, *given, **options | ({"progress": progress} if progress else {}))
-        return answers[key]
+        key = (compute.__name__, pair.friction, pair.neumann_body, given, *options.items(), *bytes_, *meshes)
+        told = {"progress": progress} if progress else {}
+        return shared(key, lambda: compute(pair, measured, *given, **options | told))
 
     return answer
-
-
-#: Most of the time of a comparison goes into these: module, name, and the function that keeps its answers.
-KNOWN = [
-    (module, name, once(getattr(module, name)))
-    for module, name in [(comparison, "locate"), (multipliers, "friction_threshold"), (semidefinite, "work_out")]
-]

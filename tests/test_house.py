@@ -1,6 +1,7 @@
 """The house: which room may know which, read from every import statement, wherever it is indented."""
 
 import ast
+import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -159,3 +160,45 @@ def test_relative_imports_are_resolved_from_packages_and_from_modules():
         "a.e",
     ]
     assert [name for _, name in imports("a.b", "from .c import d\nfrom . import e")] == ["a.c.d", "a.e"]
+
+
+# --- the tests themselves ---
+
+TESTS = sorted((ROOT / "tests").rglob("*.py"))
+
+
+def private_names(source: str) -> Iterator[str]:
+    """Every private name that a test reads, imports or replaces, ``__dict__`` too; ``_a_`` and ``__a__`` are none."""
+    for node in ast.walk(ast.parse(source)):
+        names = [node.attr] if isinstance(node, ast.Attribute) else []
+        if isinstance(node, ast.ImportFrom):
+            names = [part for alias in node.names for part in [*(node.module or "").split("."), alias.name]]
+        elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith("attr"):
+            names = [part for a in node.args[:2] if isinstance(a, ast.Constant) for part in str(a.value).split(".")]
+        yield from (name for name in names if re.fullmatch(r"_(?!_).*(?<!_)|__dict__", name))
+
+
+def test_tests_use_no_private_names():
+    found = [(path.name, name) for path in TESTS for name in private_names(path.read_text(encoding="utf-8"))]
+    assert found == []
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        *("sharp._roots(1)", "from a import _b", "from a._b import c", "self._x = 1", "vars(x), x.__dict__"),
+        *('monkeypatch.setattr(rows, "_sources", f)', 'monkeypatch.setattr("a.b._c", None)', 'getattr(x, "_y")'),
+    ],
+)
+def test_a_private_name_is_found(source):
+    assert len(list(private_names(source))) == 1
+
+
+def test_a_special_name_is_no_private_one():
+    assert (
+        list(private_names("from __future__ import annotations\nf.__name__, a.b_, _, x._repr_html_ = 1, 2, 3, 4")) == []
+    )
+
+
+def test_no_file_of_tests_is_longer_than_450_lines():
+    assert [path.name for path in TESTS if path.read_text(encoding="utf-8").count("\n") > 450] == []

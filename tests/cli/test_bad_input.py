@@ -1,17 +1,10 @@
 """Bad input: status 2, nothing on stdout, one line that names file, key, value received and what is needed."""
 
-import io
-import os
 import re
-import zipfile
 
-import meshio
-import numpy as np
 import pytest
-import scipy.sparse as sp
+from complaints import assert_names
 
-from fem1d2d import rectangle
-from verification.advice.matrix_files import read_matrix
 from verification.cli.problems import examples
 
 NUMBERS = {
@@ -186,16 +179,6 @@ CONTENTS = {
 }
 
 
-def spoken(value: str) -> str:
-    """A value as a line may show it: the spelling of numbers is free."""
-    return value.lower().replace("+", "").replace("infinity", "inf").replace(".0", "").replace('"', "'")
-
-
-def assert_names(line: str, *fragments: str) -> None:
-    said = spoken(line)
-    assert [fragment for fragment in fragments if spoken(fragment) not in said] == []
-
-
 @pytest.mark.parametrize("value", NO_NUMBERS)
 @pytest.mark.parametrize(("key", "needed"), NUMBERS.items(), ids=NUMBERS)
 def test_what_is_no_number_is_refused_where_a_number_is_needed(call, write, key, needed, value):
@@ -302,94 +285,6 @@ def test_a_line_break_in_what_was_received_does_not_break_the_line(call, write, 
 
 
 @pytest.mark.parametrize(
-    ("arguments", "fragments"),
-    [
-        ("run", ["FILE"]),
-        ("run FILE FILE", ["extra argument"]),
-        ("run FILE --bogus", ["--bogus"]),
-        ("run FILE --refine 1", ["--refine"]),
-        ("run FILE --theta", ["--theta"]),
-        ("run FILE --theta nan", ["theta = nan", "0 < theta < 1"]),
-        ("run FILE --theta 1/0", ["theta = 1/0", "0 < theta < 1"]),
-        ("run FILE --theta -1", ["theta = -1", "0 < theta < 1"]),
-        ("run FILE --theta 0", ["theta = 0", "0 < theta < 1"]),
-        ("run FILE --theta 1", ["theta = 1", "0 < theta < 1"]),
-        ("run FILE --theta 1e400", ["theta = 1e400", "0 < theta < 1"]),
-        ("run FILE --theta=", ["theta = ", "0 < theta < 1"]),
-        ("compare FILE --theta x", ["theta = x", "0 < theta < 1"]),
-        ("run FILE --solver Auto", ["--solver", "Auto", "active-set"]),
-        ("run FILE --swap-roles=1", ["--swap-roles"]),
-        ("constants FILE --refine 9", ["--refine", "9", "8"]),
-        ("constants FILE --refine -1", ["--refine", "-1"]),
-        ("constants FILE --refine 1.5", ["--refine", "1.5"]),
-        ("constants FILE --theta 0.5", ["--theta"]),
-        ("example nothing", ["nothing", "section6", "two-bars"]),
-        ("example section6.toml", ["section6.toml", "section6"]),
-        ("example ../section6", ["../section6"]),
-        ("demo FILE", ["extra argument"]),
-        ("demo -o", ["-o"]),
-        ("Run FILE", ["Run"]),
-        ("bogus", ["bogus"]),
-        ("--bogus", ["--bogus"]),
-        ("bounds", ["--m"]),
-        ("bounds --m 1 --M 2", ["--CR"]),
-        ("bounds --m 1 --M 2 --CR 1", ["C_K"]),
-        ("bounds --m 1 --M 2 --CR 1 --k 1 --Cs 1", ["C_tr"]),
-        ("bounds --m 1 --M 2 --CR 1 --CK 0 --k 1", ["C_K", "k"]),
-        ("bounds --m 0 --M 2 --CR 1 --CK 0", ["m = 0", "m > 0"]),
-        ("bounds --m nan --M 2 --CR 1 --CK 0", ["m = nan", "m > 0"]),
-        ("bounds --m 1e-400 --M 2 --CR 1 --CK 0", ["m = 1e-400", "m > 0"]),
-        ("bounds --m= --M 2 --CR 1 --CK 0", ["m = ", "m > 0"]),
-        ("bounds --m 3 --M 2 --CR 1 --CK 0", ["M = 2", "M >= m = 3"]),
-        ("bounds --m 1 --M inf --CR 1 --CK 0", ["M = inf", "M >= m = 1"]),
-        ("bounds --m 1 --M 2 --CR 0.99 --CK 0", ["C_R = 0.99", "C_R >= 1"]),
-        ("bounds --m 1 --M 2 --CR 1 --CK -1", ["C_K = -1", "C_K >= 0"]),
-        ("bounds --m 1 --M 2 --CR 1 --k -1 --Cs 1 --Ctr 1", ["k = -1", "k >= 0"]),
-        ("bounds --m 1 --M 2 --CR 1 --CK 0 --theta 1", ["theta = 1", "0 < theta < 1"]),
-        ("bounds --m 1 --M 2 --cr 1 --CK 0", ["--cr"]),
-        ("bounds --m 1 --M 2 --CR 1 --CK 0 --check", ["--check", "--theta"]),
-        ("bounds --m 1 --M 2 --CR 1 --CK 0 --edition Printed", ["--edition", "Printed", "repaired"]),
-        ("bounds --m 1 --M 2 --CR 1 --CK 0 extra", ["extra"]),
-    ],
-)
-def test_a_bad_call_is_refused_by_name(call, write, arguments, fragments):
-    file = write()
-    assert_names(call(*(str(file) if a == "FILE" else a for a in arguments.split(" "))).complaint, *fragments)
-
-
-@pytest.mark.parametrize(
-    ("options", "fragments"),
-    [
-        ("--kappa1 1", ["--m", "or --rho"]),
-        ("--rho 1 --kappa1 1", ["--kappa2 missing"]),
-        ("--rho 1 --k 0.2", ["--kappa1", "--kappa2", "with friction"]),
-        ("--m 1 --M 2 --CR 1 --CK 1 --rho 1", ["--kappa1", "--kappa2", "with friction"]),
-        ("--rho 0", ["--rho", "0", "rho > 0"]),
-        ("--rho -1", ["--rho", "-1", "rho > 0"]),
-        ("--rho nan", ["--rho", "nan"]),
-        ("--rho 1 --kappa1 -1 --kappa2 1", ["--kappa1", "-1", ">= 0"]),
-        ("--rho 1 --kappa1 1 --kappa2 nan", ["--kappa2", "nan", ">= 0"]),
-        ("--rho 1 --theta 1", ["theta", "0 < theta < 1"]),
-    ],
-)
-def test_the_sharp_edition_needs_rho_and_with_friction_both_kappas(call, options, fragments):
-    assert_names(call("bounds", *options.split()).complaint, *fragments)
-
-
-@pytest.mark.parametrize("folder", ["problem.toml", "problem.toml/results", "missing/../problem.toml", ""])
-@pytest.mark.parametrize("command", ["run", "compare", "demo", "solve"])
-def test_an_output_folder_that_cannot_be_one_is_refused_before_anything_is_computed(
-    call, write, tmp_path, monkeypatch, command, folder
-):
-    file = write()
-    (tmp_path / "missing").mkdir()
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("verification.interface.assembly.build", None)
-    monkeypatch.setattr("verification.interface.assembly.discretise", None)
-    assert_names(call(*([command] if command == "demo" else [command, file]), "-o", folder).complaint, folder, "folder")
-
-
-@pytest.mark.parametrize(
     ("neumann", "body2"), [(2, "the Neumann problem of step I"), (1, "the contact problem of step II")]
 )
 def test_a_body_that_can_move_is_named_with_the_problem_it_has(call, write, neumann, body2):
@@ -433,21 +328,6 @@ def test_what_was_received_is_not_repeated_at_length(call, write, tmp_path, edit
     assert len(line.replace(str(tmp_path), "")) < 700
 
 
-@pytest.mark.parametrize("command", ["run", "solve", "constants", "advise"])
-def test_a_path_is_not_repeated_at_length(call, command):
-    line = call(command, "9" * 5000 + ".toml").complaint
-    assert_names(line, "9.toml", "too long")
-    assert len(line) < 700
-
-
-@pytest.mark.parametrize("value", ["0.5\nx", "0.5\x1b[2Jx", "9" * 5000, "0." + "3" * 5000 + "x"], ids=lambda v: v[:8])
-def test_a_theta_of_the_command_line_is_refused_on_one_short_line(call, write, value):
-    line = call("run", write(), "--theta", value).complaint
-    assert line.isprintable()
-    assert len(line) < 700
-    assert_names(line, "theta = ", "0 < theta < 1")
-
-
 @pytest.mark.parametrize("command", ["constants", "compare", "run", "advise"])
 def test_moduli_that_doubles_cannot_hold_side_by_side_are_refused(call, write, command):
     line = call(command, write({"body1.young": "1e30", "body2.young": "1e-30"})).complaint
@@ -459,124 +339,6 @@ def test_moduli_that_doubles_cannot_hold_side_by_side_are_refused(call, write, c
         "needed a modulus within 1e30 times that of body1, 1e30",
         "rigid",
     )
-
-
-# --- files without an end ---
-
-
-def endless(path, kind):
-    """A pipe nobody writes to, a device, or a file of 3 GB that takes no room."""
-    if kind == "pipe":
-        os.mkfifo(path)
-    elif kind == "device":
-        path.symlink_to("/dev/zero")
-    else:
-        with path.open("wb") as file:
-            file.truncate(3 * 10**9)
-    return path
-
-
-ENDLESS = {"pipe": "this is a pipe or a device", "device": "this is a pipe or a device", "large": "this one has 3000"}
-
-
-@pytest.mark.parametrize(("kind", "says"), ENDLESS.items())
-@pytest.mark.parametrize("command", ["run", "compare", "constants", "solve", "advise"])
-def test_a_problem_file_without_an_end_is_refused_unread(call, tmp_path, command, kind, says):
-    assert_names(call(command, endless(tmp_path / "problem.toml", kind)).complaint, "problem.toml", says)
-
-
-@pytest.mark.parametrize(("kind", "says"), ENDLESS.items())
-def test_a_mesh_file_without_an_end_is_refused_unread(call, write, tmp_path, kind, says):
-    endless(tmp_path / "body1.msh", kind)
-    assert_names(call("run", write(MESHED)).complaint, "problem.toml", "body1.mesh", "body1.msh", says)
-
-
-@pytest.mark.parametrize(("kind", "says"), ENDLESS.items())
-def test_a_matrix_without_an_end_is_refused_unread(call, tmp_path, kind, says):
-    bad = endless(tmp_path / "bad.npz", kind)
-    np.save(tmp_path / "good.npy", np.eye(2))
-    assert_names(call("advise", "--S1", bad, "--S2", tmp_path / "good.npy").complaint, "bad.npz", says)
-
-
-@pytest.mark.parametrize("kind", ["pipe", "device"])
-@pytest.mark.parametrize(
-    ("command", "name"), [("run", "run.json"), ("compare", "report.html"), ("solve", "bodies.svg")]
-)
-def test_a_result_without_an_end_is_somebody_elses(call, write, tmp_path, kind, command, name):
-    (tmp_path / "results").mkdir()
-    endless(tmp_path / "results" / name, kind)
-    line = call(command, write(), "-o", tmp_path / "results").complaint
-    assert_names(line, name, "not written by this program")
-
-
-def packed(path, **headers):
-    """An archive of arrays whose headers promise more than their data hold."""
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, (shape, kind) in headers.items():
-            head = io.BytesIO()
-            np.lib.format.write_array_header_1_0(head, {"shape": shape, "fortran_order": False, "descr": kind})
-            archive.writestr(f"{name}.npy", head.getvalue() + bytes(10_000_000))
-    return path
-
-
-@pytest.mark.parametrize(
-    ("headers", "says"),
-    [
-        ({"S": ((100_000, 100_000), "<f8")}, "needed at most 4000 rows, received 100000"),
-        ({"S": ((10**12,), "<f8")}, "needed at most 4000 rows, received 1000000"),
-        ({"S": ((3,), "<U300000000")}, "not a matrix"),
-        ({"format": ((), "|S3"), "shape": ((2,), "<i8"), "data": ((10**11,), "<f8")}, "needed at most 4000 rows"),
-    ],
-)
-def test_a_matrix_that_would_fill_the_memory_is_refused_by_its_header(call, tmp_path, headers, says):
-    bomb = packed(tmp_path / "bomb.npz", **headers)
-    assert bomb.stat().st_size < 100_000
-    assert_names(call("advise", "--S1", bomb, "--S2", bomb).complaint, "bomb.npz", says)
-
-
-@pytest.mark.parametrize("blocks", [((0, 0), (0, 0, 0)), ((2, 2), (1, 0, 0)), ((2, 2), (1, 0, 2))])
-def test_a_matrix_of_empty_blocks_is_refused(call, tmp_path, blocks):
-    shape, data = blocks
-    np.savez(
-        tmp_path / "S.npz", format=np.array(b"bsr"), shape=np.array(shape), data=np.zeros(data),
-        indices=np.zeros(len(np.zeros(data)), dtype=int), indptr=np.array([0, len(np.zeros(data))]),
-    )  # fmt: skip
-    answer = call("advise", "--S1", tmp_path / "S.npz", "--S2", tmp_path / "S.npz")
-    assert_names(answer.complaint, "S.npz", "not a matrix")
-
-
-@pytest.mark.parametrize("entry", ["1.7e308", "1e300", "5e-324"])
-def test_a_matrix_at_the_ends_of_the_doubles_is_judged_without_a_warning_of_numpy(call, tmp_path, entry):
-    np.save(tmp_path / "S.npy", float(entry) * np.eye(3))
-    np.save(tmp_path / "bad.npy", float(entry) * (np.eye(3) - 1))
-    answer = call("advise", "--S1", tmp_path / "S.npy", "--S2", tmp_path / "S.npy")
-    assert (answer.status, answer.err) == (0, "")
-    line = call("advise", "--S1", tmp_path / "S.npy", "--S2", tmp_path / "bad.npy").complaint
-    assert_names(line, "S2 is indefinite", "needed a positive definite matrix")
-
-
-@pytest.mark.parametrize("entry", ["1.7e308", "1e300", "1e-300"])
-def test_a_matrix_whose_sums_would_overflow_is_read_in_any_unit(call, tmp_path, entry):
-    np.save(tmp_path / "S.npy", float(entry) * (np.eye(3) / 2 + np.ones((3, 3)) / 9))
-    answer = call("advise", "--S1", tmp_path / "S.npy", "--S2", tmp_path / "S.npy", "--json")
-    assert (answer.status, answer.err) == (0, "")
-    assert answer.document["roles"][0]["rho"]["value"] == pytest.approx(1, rel=1e-9)
-
-
-def test_a_matrix_whose_header_is_damaged_is_refused(call, tmp_path):
-    np.save(tmp_path / "S.npy", np.eye(3))
-    whole = (tmp_path / "S.npy").read_bytes()
-    (tmp_path / "S.npy").write_bytes(whole.replace(b"}", b"{", 1))
-    assert_names(
-        call("advise", "--S1", tmp_path / "S.npy", "--S2", tmp_path / "S.npy").complaint, "S.npy", "not a matrix"
-    )
-
-
-@pytest.mark.parametrize("kind", ["csr", "csc", "coo", "dia", "bsr"])
-def test_a_sparse_matrix_of_every_kind_is_read(tmp_path, kind):
-    full = np.diag([2.0, 3.0, 4.0, 5.0]) + np.eye(4, k=1) + np.eye(4, k=-1)
-    sp.save_npz(tmp_path / "S.npz", sp.coo_array(full).asformat(kind))
-    assert np.array_equal(read_matrix(tmp_path / "S.npz"), full)
 
 
 # --- numbers that a file may hold and arithmetic may not ---
@@ -627,121 +389,3 @@ def test_what_is_distinct_in_decimals_and_not_in_doubles_is_refused_by_name(call
 @pytest.mark.parametrize("key", ["body1.young", "iteration.theta", "iteration.neumann_body", "title", "body1.cells"])
 def test_a_hexadecimal_number_of_5000_digits_is_refused(call, write, key):
     assert_names(call("run", write({key: "0x" + "F" * 5000})).complaint, "problem.toml", key)
-
-
-# --- mesh files ---
-
-
-def mesh_file(
-    path, x=(0.0, 2.0), y=(-0.3, 0.0), cells=(10, 2), names=("left", "right", "bottom", "top"), lift=None, twice=False
-):
-    """The built-in rectangle as a Gmsh file; ``lift`` moves its upper side, ``twice`` doubles its cells."""
-    mesh = rectangle(x, y, cells)
-    listed = np.tile(mesh.cells, (2 if twice else 1, 1))
-    points = np.column_stack([mesh.points, np.zeros(len(mesh.points))])
-    if lift is not None:
-        upper = points[:, 1] == y[1]
-        points[upper, 1] += lift(points[upper, 0])
-    sides = ("left", "right", "bottom", "top")
-    tags = np.concatenate([np.full(len(mesh.sides[side]), i) for i, side in enumerate(sides, 1)])
-    inside = np.full(len(listed), 9)
-    meshio.write(
-        path,
-        meshio.Mesh(
-            points,
-            [("line", np.concatenate([mesh.sides[side] for side in sides])), ("triangle", listed)],
-            cell_data={"gmsh:physical": [tags, inside], "gmsh:geometrical": [tags, inside]},
-            field_data={name: np.array([i, 1]) for i, name in enumerate(names, 1)},
-        ),
-        file_format="gmsh22",
-        binary=False,
-    )
-
-
-MESHED = {"body1.mesh": '"body1.msh"'} | dict.fromkeys(f"body1.{key}" for key in ("shape", "x", "y", "cells"))
-
-
-@pytest.mark.parametrize(
-    ("name", "content"),
-    [
-        ("missing.msh", None),
-        ("folder.msh", "folder"),
-        ("rubbish.msh", bytes(range(256))),
-        ("text.msh", b"hello\nworld\n"),
-        ("empty.msh", b""),
-        ("text.vtu", b"<xml"),
-        ("text.unheard", b"hello"),
-        ("noending", b"hello"),
-        ("line\nbreak.msh", b""),
-    ],
-    ids=lambda v: str(v)[:12],
-)
-def test_an_unreadable_mesh_is_refused_by_name(call, write, tmp_path, name, content):
-    if content == "folder":
-        (tmp_path / name).mkdir()
-    elif content is not None:
-        (tmp_path / name).write_bytes(content)
-    escaped = name.replace("\n", "\\n")
-    line = call("run", write(MESHED | {"body1.mesh": f'"{escaped}"'})).complaint
-    assert_names(line, "problem.toml", "body1.mesh", name.partition("\n")[0])
-
-
-@pytest.mark.parametrize(
-    ("changes", "fragments"),
-    [
-        ({"names": ("left", "right", "under", "top")}, ["body1.fixed", '"bottom"', "left, right, under, top"]),
-        ({"cells": (20, 2)}, ["non-matching grids", "13", "7"]),
-        ({"lift": lambda x: 0.1 * x}, ["contact", "top"]),
-        ({"y": (-0.4, -0.1)}, ["do not meet", "y = -0.1"]),
-    ],
-    ids=["unknown side", "other grid", "slope", "apart"],
-)
-def test_a_mesh_that_does_not_fit_is_refused_by_name(call, write, tmp_path, changes, fragments):
-    mesh_file(tmp_path / "body1.msh", **changes)
-    assert_names(call("run", write(MESHED)).complaint, "problem.toml", *fragments)
-
-
-def test_a_mesh_file_cannot_be_halved_and_that_is_said_before_anything_is_measured(call, write, tmp_path, monkeypatch):
-    mesh_file(tmp_path / "body1.msh")
-    monkeypatch.setattr("verification.constants._measure", None)
-    line = call("constants", write(MESHED), "--refine", "1").complaint
-    assert_names(line, "problem.toml", "body1.mesh", "body1.msh", "halved")
-
-
-@pytest.mark.parametrize(
-    ("fault", "says"),
-    [
-        (lambda lines: [*lines, lines[0]], "listed twice|2 times"),
-        (lambda lines: [*lines, [*lines[0][:-1], "12"]], "none of the boundary"),
-        (lambda lines: [*lines, lines[-1]], "have the same nodes"),
-    ],
-    ids=["a line twice", "a line inside", "a cell twice"],
-)
-@pytest.mark.parametrize("command", ["run", "compare", "constants", "solve"])
-def test_a_malformed_mesh_is_refused_by_its_fault(call, write, tmp_path, command, fault, says):
-    mesh_file(tmp_path / "body1.msh")
-    head, _, rest = (tmp_path / "body1.msh").read_text().partition("$Elements\n")
-    _count, *lines = rest.partition("\n$EndElements")[0].splitlines()
-    lines = fault([line.split() for line in lines])
-    listed = "\n".join(" ".join([str(i), *line[1:]]) for i, line in enumerate(lines, 1))
-    (tmp_path / "body1.msh").write_text(f"{head}$Elements\n{len(lines)}\n{listed}\n$EndElements\n")
-    line = call(command, write(MESHED)).complaint
-    assert_names(line, "problem.toml: body1.mesh", "body1.msh")
-    assert re.search(says, line)
-    assert "matching" not in line
-
-
-def test_a_mesh_with_every_cell_twice_is_refused_as_that(call, write, tmp_path):
-    """Not for its grid on Gamma_c: no edge would be left on the boundary."""
-    mesh_file(tmp_path / "body1.msh", twice=True)
-    line = call("run", write(MESHED)).complaint
-    assert_names(line, "body1.mesh", "have the same nodes: each cell is needed once")
-    assert "matching" not in line
-
-
-@pytest.mark.parametrize("command", ["run", "compare", "constants", "solve"])
-def test_reading_a_mesh_prints_nothing_beside_the_document(call, write, tmp_path, command):
-    mesh_file(tmp_path / "body1.msh")
-    answer = call(command, write(MESHED), "--json")
-    assert (answer.status, answer.err) == (0, "")
-    assert answer.document

@@ -1,8 +1,10 @@
 """What screens and documents say of an automatic theta, of a theta beside momentum, and of the run of another code."""
 
 import pytest
+from advice_calls import by_body
 
 import verification as vf
+from ndtheory import evaluate_sharp
 
 MOMENTUM = {"iteration.relaxation": '"momentum"'}
 
@@ -30,6 +32,69 @@ def test_a_given_theta_is_called_given(call, write):
     run = call("run", write(), "--json").document
     assert run["theta_source"] == "given"
     assert "given" in run["theta_reason"]
+
+
+@pytest.mark.parametrize(
+    ("edits", "source"),
+    [
+        ({"contact.friction": "0.05"}, "proved"),
+        ({"contact.friction": "3"}, "predicted"),  # q >= 1 for every theta
+        ({"contact.friction": "0"}, "proved"),
+        ({"contact.law": '"local"', "contact.radius": None}, "predicted"),  # outside the theorem
+        ({"iteration.neumann_body": "2"}, "proved"),
+    ],
+    ids=["little friction", "much friction", "no friction", "local law", "other roles"],
+)
+def test_an_automatic_theta_says_where_it_comes_from(call, write, edits, source):
+    file = write(edits | {"iteration.theta": '"auto"'}, "auto.toml")
+    found = call("run", file, "--json").document
+    sharp = evaluate_sharp(vf.measure(vf.load(file)).energy_constants())
+    assert (found["theta_source"], found["converged"]) == (source, True)
+    assert found["theta"] == pytest.approx(sharp.theta_proved if source == "proved" else sharp.theta_predicted)
+    assert f"is the {source} one" in call("run", file).out
+    over = call("run", write(edits, "given.toml"), "--theta", "auto", "--json").document
+    assert over == found
+    again = call("run", write(edits, "given.toml"), "--theta", repr(found["theta"]), "--json").document
+    assert (again["theta_source"], again["history"]) == ("given", found["history"])
+    role = by_body(call("advise", file, "--json").document)[found["neumann_body"]]
+    assert found["theta"] == role[f"theta_{source}"]
+
+
+def test_an_automatic_theta_is_that_of_the_roles_that_run(call, write):
+    file = write({"iteration.theta": '"auto"'})
+    roles = by_body(call("advise", file, "--json").document)
+    for options, body in (([], 1), (["--swap-roles"], 2)):
+        found = call("run", file, *options, "--json").document
+        assert (found["neumann_body"], found["theta"]) == (body, roles[body]["theta_proved"])
+
+
+def test_a_comparison_at_the_proved_theta_is_consistent(call, write):
+    answer = call("compare", write({"contact.friction": "0.05"}), "--theta", "auto", "--json")
+    found = answer.document
+    assert (answer.status, found["run"]["theta_source"]) == (0, "proved")
+    assert found["verdicts"]["sharp"] == found["verdicts"]["lmi"] == "CONSISTENT"
+    assert found["sharp"]["factor"]["value"] == pytest.approx(found["sharp"]["factor_proved"]["value"], rel=1e-9)
+
+
+def test_an_automatic_theta_stays_below_1_however_soft_the_contact_body(call, write):
+    found = call("run", write({"body2.young": "7e-20", "contact.friction": "0"}), "--theta", "auto", "--json").document
+    assert 0.999 < found["theta"] < 1
+
+
+@pytest.mark.parametrize("word", ["Auto", "AUTO", "auto ", "automatic", "predicted"])
+def test_auto_is_one_word(call, write, word):
+    line = call("run", write(), "--theta", word).complaint
+    assert f"theta = {word}: needed a number with 0 < theta < 1, or" in line
+    assert "iteration.theta" in call("run", write({"iteration.theta": f'"{word}"'})).complaint
+
+
+@pytest.mark.parametrize("command", ["run", "compare"])
+@pytest.mark.parametrize(("key", "word"), [("theta", "auto"), ("relaxation", "momentum")])
+def test_what_needs_rho_is_refused_by_its_key_where_rho_does_not_exist(call, write, command, key, word):
+    held = write("held tangentially").read_text(encoding="utf-8")
+    complaint = call(command, write({f"iteration.{key}": f'"{word}"'}, text=held)).complaint
+    assert f'problem.toml: iteration.{key} = "{word}": needed' in complaint
+    assert "rho" in complaint
 
 
 # --- momentum takes its step from rho --------------------------------------------------------------------------------

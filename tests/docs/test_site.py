@@ -31,10 +31,10 @@ class References(HTMLParser):
     def __init__(self) -> None:
         super().__init__()
         self.found: list[str] = []
-        self._inside: str | None = None
+        self.inside: str | None = None
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self._inside = tag if tag in ("script", "style") else None
+        self.inside = tag if tag in ("script", "style") else None
         given = {name: value for name, value in attrs if value}
         fetched = ["src", "poster", "data", "xlink:href", *(["href"] if tag in ("link", "image", "use") else [])]
         self.found += [given[name] for name in fetched if name in given]
@@ -42,12 +42,12 @@ class References(HTMLParser):
         self.found += CSS_REFERENCE.findall(given.get("style", ""))
 
     def handle_endtag(self, tag: str) -> None:
-        self._inside = None
+        self.inside = None
 
     def handle_data(self, data: str) -> None:
-        if self._inside == "style":
+        if self.inside == "style":
             self.found += CSS_REFERENCE.findall(data)
-        elif self._inside == "script":
+        elif self.inside == "script":
             self.found += JS_REFERENCE.findall(data)
 
 

@@ -25,12 +25,12 @@ class Bilinear(Element):
     CORNERS = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
 
     def points(self, mesh):
-        return [(size, g) for size, g, _ in self._at(mesh)]
+        return [(size, g) for size, g, _ in self.gauss_points(mesh)]
 
     def mass(self, mesh):
-        return sum(size[:, None, None] * np.outer(values, values) for size, _, values in self._at(mesh))
+        return sum(size[:, None, None] * np.outer(values, values) for size, _, values in self.gauss_points(mesh))
 
-    def _at(self, mesh):
+    def gauss_points(self, mesh):
         p = mesh.points[mesh.cells].astype(float)
         for s, t in self.CORNERS / np.sqrt(3):
             x, y = self.CORNERS.T

@@ -153,6 +153,7 @@ def fails_at(goal, counterexample):
     return {"=": abs(left - right) > tiny, "<=": left > right + tiny, "<": left >= right - tiny}[goal.relation.sign]
 
 
+@pytest.mark.usefixtures("decided_once")
 @pytest.mark.parametrize("index", range(len(CHECKS)), ids=NAMES)
 def test_a_statement_is_decided_and_each_mutant_of_it_refuted(index):
     check = CHECKS[index]
@@ -168,12 +169,14 @@ def test_a_statement_is_decided_and_each_mutant_of_it_refuted(index):
         assert any(fails_at(goal, found.counterexample) for goal in goals_of(check, form))
 
 
+@pytest.mark.usefixtures("decided_once")
 @pytest.mark.parametrize("id", [id for id, s in statements().items() if s.fault == "false as printed"])
 def test_what_is_called_false_has_an_exact_counterexample_or_a_problem_that_breaks_it(id):
     exact = [c for c in CHECKS if c.id == id and "printed" in c.forms and c.decide(c.forms["printed"]).holds is False]
     assert exact or id in ("5.13", "fig-12")  # broken by a thin body, and by runs
 
 
+@pytest.mark.usefixtures("decided_once")
 @pytest.mark.parametrize("id", [id for id, s in statements().items() if s.fault == "does not follow"])
 def test_of_what_merely_does_not_follow_no_counterexample_is_known(id):
     assert all(c.decide(c.forms["printed"]).holds for c in CHECKS if c.id == id and "printed" in c.forms)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,12 @@ def case(seed: int, friction: Any = None, **iteration: Any) -> tuple[ContactPair
     pair = build(problem(random, friction, **iteration))
     measured = measure(pair)
     return pair, measured, relaxation_factor(random, measured.rho_max.value), random
+
+
+def energy(measured: Measured) -> tuple[Fraction, Fraction, Fraction]:
+    """rho at work, kappa_1, kappa_2."""
+    constants = measured.energy_constants()
+    return constants.at_work, constants.kappa_1, constants.kappa_2
 
 
 def run_of(pair: ContactPair, measured: Measured, theta: float) -> Run:

@@ -38,13 +38,13 @@ ENTRY = {key(inequality): inequality for inequality in INEQUALITIES}
 
 
 @pytest.fixture(scope="module")
-def quick() -> dict[str, list[Evidence]]:
-    return discrete()
+def quick(evidence) -> dict[str, list[Evidence]]:
+    return evidence("inequalities on random problems")[0]
 
 
 @pytest.fixture(scope="module")
 def found(quick) -> dict[tuple[str, str], Evidence]:
-    return {(id, evidence.of): evidence for id, several in quick.items() for evidence in several}
+    return {(id, one.of): one for id, several in quick.items() for one in several}
 
 
 Subjects = list[tuple[Trial, list[Any]]]

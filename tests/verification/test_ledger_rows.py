@@ -87,10 +87,10 @@ def test_every_fault_has_a_verdict_that_says_so():
         assert (recorded()[id] in ("REPAIRED", "REFUTED")) == bool(statement.fault), id
 
 
-def test_every_row_recorded_as_proved_rests_on_exact_arithmetic():
+def test_every_row_recorded_as_proved_rests_on_exact_arithmetic(evidence):
     proved = {id for id, verdict in recorded().items() if verdict == "PROVED"}
     assert proved <= {check.id for check in checks()}
-    found = exact(proved, "quick", lambda share: None)
+    found, _ = evidence("exact arithmetic and units")
     for id in proved:
         assert all(e.holds for e in found[id]), id
         assert any(e.method == "symbolic" for e in found[id]), id

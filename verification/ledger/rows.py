@@ -144,7 +144,7 @@ def verify(
     chosen = [s for s in known.values() if not asked or s.id in asked]
     wanted = {s.id for s in chosen}
     evidence: dict[str, list[Evidence]] = {id: [] for id in wanted}
-    for source, gather in _sources().items():
+    for source, gather in sources().items():
         found = gather(wanted, level, partial(watch, source))
         for id, entries in found.items():
             evidence.setdefault(id, []).extend(entries)
@@ -161,7 +161,8 @@ def verify(
 Source = Callable[[Collection[str], Level, Callable[[float], None]], Mapping[str, Sequence[Evidence]]]
 
 
-def _sources() -> dict[str, Source]:
+def sources() -> dict[str, Source]:
+    """What gathers evidence, by the name that a watcher is told."""
     from verification.ledger.experiments import experiments
     from verification.ledger.large_friction import large_friction
     from verification.ledger.solutions import solutions

@@ -1,0 +1,134 @@
+"""The screens of the ledger: 80 columns, no raw value, and formulas that keep their meaning."""
+
+import re
+import shlex
+from dataclasses import replace
+
+import pytest
+from ledger_calls import EXACT, RAW, STATEMENTS, TEXTS, VERDICTS, one_line, wide
+
+from verification.cli.tex import plain
+
+# --- screens ---
+
+
+@pytest.mark.parametrize("id", STATEMENTS)
+def test_the_screen_of_a_statement_fits_80_columns_and_shows_no_raw_value(call, kept, id):
+    answer = call("verify", id)
+    assert (answer.status, answer.err) == (0, "")
+    assert wide(answer) == []
+    assert RAW.findall(answer.out) == []
+    assert not set("\\$") & set(answer.out)
+    assert answer.out.splitlines()[1].startswith(f"{id}  ")
+
+
+@pytest.mark.parametrize("id", STATEMENTS)
+def test_the_screen_of_a_changed_statement_fits_80_columns(call, kept, id):
+    kept(lambda row: replace(row, recorded="REPAIRED" if row.verdict == "INCONCLUSIVE" else "INCONCLUSIVE"))
+    answer = call("verify", id)
+    assert answer.status == 1
+    assert "recorded: " in one_line(answer.out)
+    assert wide(answer) == []
+
+
+def test_the_screen_shows_what_is_claimed_what_is_wrong_and_what_was_found(call, kept, whole):
+    screen = one_line(call("verify", "5.30").out)
+    row = next(row for row in whole.ledger.rows if row.statement.id == "5.30")
+    s = row.statement
+    for text in (s.title, s.claims, s.wrong, s.repair, s.proof, *(e.text for e in row.evidence)):
+        assert one_line(plain(text)) in screen
+    assert f"leans on {', '.join(s.leans_on)}" in screen
+    assert screen.count("kappa = 10000") == 1
+
+
+@pytest.mark.parametrize("id", [s.id for s in STATEMENTS.values() if s.fault])
+def test_no_label_on_the_screen_of_a_fault_stands_without_its_text(call, kept, id):
+    assert re.findall(r"(?m)^ +(?:repaired|because|leans on):?$", call("verify", id).out) == []
+
+
+@pytest.mark.parametrize("id", [EXACT, "5.30", "2.1", "sec-6.3"])
+def test_the_screen_of_a_statement_ends_with_what_to_type_next(call, kept, id):
+    lines = call("verify", id).out.splitlines()
+    assert lines[-1].startswith("Next: ndtheory ")
+    assert call(*shlex.split(lines[-1])[2:]).status == 0
+
+
+def test_the_summary_is_one_screen_that_counts_every_row(call, kept, whole):
+    answer = call("verify")
+    lines = answer.out.splitlines()
+    assert (answer.status, answer.err) == (0, "")
+    assert wide(answer) == []
+    assert len(lines) <= 40
+    assert RAW.findall(answer.out) == []
+    assert [line for line in lines if line.isupper() and line.endswith("?")] == [
+        "WHAT STANDS?",
+        "WHAT IS WRONG IN THE PAPER?",
+    ]
+    counts = {line.split()[0]: int(line.split()[1]) for line in lines if line[2:].split(" ")[0] in VERDICTS}
+    assert counts == whole.ledger.counts()
+    assert sum(counts.values()) == len(STATEMENTS)
+
+
+def test_the_summary_names_every_faulty_statement_once(call, kept):
+    section = call("verify").out.partition("WHAT IS WRONG IN THE PAPER?\n")[2].partition("\n\n")[0]
+    named = [id for part in re.split(r"(?m)^  (?=\w)", section)[1:] for id in part.partition(":")[2].split()]
+    assert sorted(id.rstrip(",") for id in named) == sorted(s.id for s in STATEMENTS.values() if s.fault)
+
+
+def test_the_last_line_of_the_summary_is_a_command_that_is_accepted(call, kept):
+    last = call("verify").out.splitlines()[-1]
+    assert last.startswith("Next: ndtheory verify ")
+    assert call(*shlex.split(last)[2:]).status == 0
+
+
+def test_the_level_reaches_the_checks_and_the_screen(call, kept):
+    assert call("verify").out.splitlines()[0].endswith("| quick")
+    assert call("verify", "--level", "full").out.splitlines()[0].endswith("| full")
+    assert call("verify", "--level", "full", "--json").document["level"] == "full"
+
+
+# --- formulas on a terminal ---
+
+
+@pytest.mark.parametrize("id", STATEMENTS)
+def test_no_text_of_a_statement_leaves_tex_on_a_terminal(id):
+    for text in (plain(getattr(STATEMENTS[id], name)) for name in TEXTS):
+        assert re.findall(r"[\\${}]", text) == []
+        assert re.findall(r"\b(?:frac|arrow|leftarrow|rightarrow|tilde|mathrm|cdot|ldots)\b", text) == [], text
+
+
+@pytest.mark.parametrize("id", STATEMENTS)
+def test_no_text_of_a_statement_loses_an_argument_on_a_terminal(id):
+    for text in (plain(getattr(STATEMENTS[id], name)) for name in TEXTS):
+        assert re.findall(r",\)|\(\)|\(,", text) == [], text
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        (r"$m^{3/2}$", r"$\frac{m^3}{2}$"),
+        (r"$\frac{a+b}{2m}d$", r"$\frac{a+b}{2md}$"),
+        (r"$\frac{C_KC_T}{MC_R}$", r"$\frac{C_KC_T}{M}C_R$"),
+        (r"$\frac{C_K}{m^2}(a+b)$", r"$\frac{C_K}{m^2(a+b)}$"),
+        (r"$\frac{x+\sqrt m y}{m}$", r"$x+\sqrt m ym$"),
+        (r"$\frac{a+\frac{b}{c}}{d}$", r"$a+\frac{b}{c}d$"),
+    ],
+)
+def test_two_formulas_that_differ_are_not_shown_alike(one, other):
+    assert re.sub(r"\s", "", plain(one)) != re.sub(r"\s", "", plain(other))
+
+
+@pytest.mark.parametrize(
+    ("tex", "shown"),
+    [
+        (r"$\sqrt{\frac{C_K}{m}}$", "sqrt(C_K/m)"),
+        (r"$u \leftarrow u - v$", "u <- u - v"),
+        (r"$v \mapsto v_T$", "v -> v_T"),
+        (r"$\theta \le \frac12$", "theta <= 1/2"),
+        (r"$\langle g, v\rangle$", "<g, v>"),
+        (r"plain words, (5.30).", "plain words, (5.30)."),
+        ("", ""),
+    ],
+)
+def test_a_formula_keeps_its_meaning_on_a_terminal(tex, shown):
+    assert plain(tex) == shown

@@ -1,0 +1,260 @@
+"""`advise` from a problem and from one run: which body, which theta, and which of the two is proved."""
+
+import itertools
+import math
+import shlex
+
+import pytest
+from advice_calls import GOOD, PROVED, ROLE, by_body, pasted, saved
+
+import verification as vf
+from ndtheory import evaluate_sharp
+from verification.cli.problems import examples
+
+# --- advise, from a problem ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "edits", [None, "without friction", "wrong roles", "local law", "soft upper body", "stiff upper body"], ids=str
+)
+def test_advice_follows_rho_of_both_roles_and_names_the_smaller_rate(call, write, edits):
+    file = write(edits)
+    found = call("advise", file, "--json").document
+    assert found["schema"] == "ndtheory.advice/1"
+    problem = vf.load(file)
+    for role, roles in zip(found["roles"], (problem, problem.swapped()), strict=True):
+        assert set(role) >= ROLE
+        assert role["neumann_body"] == roles.iteration.neumann_body
+        measured = vf.measure(roles)
+        rho = (measured.rho_normal if edits == "without friction" else measured.rho_max).value
+        assert role["rho"]["value"] == pytest.approx(rho, rel=1e-12)
+        assert role["theta_predicted"] == pytest.approx(2 / (2 + rho), rel=1e-12)
+        assert role["rate_predicted"] == pytest.approx(rho / (2 + rho), rel=1e-12)
+        assert role["singular"] is False
+        assert {name for name in ROLE if role[name] is None} <= set(role["reason"])
+    best = min(found["roles"], key=lambda role: role["rate_predicted"])
+    assert found["neumann_body"] == best["neumann_body"] == (2 if edits == "stiff upper body" else 1)
+
+
+@pytest.mark.parametrize("edits", [None, "without friction", "local law", "stiff upper body"], ids=str)
+def test_the_advice_does_not_depend_on_the_role_that_the_file_gives(call, write, edits):
+    file = write(edits)
+    text = file.read_text(encoding="utf-8")
+    other = write({"iteration.neumann_body": "2"}, "other.toml", text)
+    a, b = call("advise", file, "--json").document, call("advise", other, "--json").document
+    assert a["neumann_body"] == b["neumann_body"]
+    assert by_body(a) == by_body(b)
+    assert a["roles"] == b["roles"][::-1]
+
+
+@pytest.mark.parametrize("neumann_body", [1, 2])
+def test_where_both_roles_are_the_same_the_file_keeps_its_own(call, write, neumann_body):
+    same = {"body1.x": "[0.4, 1.6]", "body1.cells": "[6, 2]", "body2.young": "7.0e4", "body2.cells": "[6, 2]"}
+    file = write(same | {"iteration.neumann_body": str(neumann_body)})
+    found = call("advise", file, "--json").document
+    one, two = (role["rho"]["value"] for role in found["roles"])
+    assert one == pytest.approx(two, rel=1e-9)
+    assert found["neumann_body"] in (1, 2)
+    if one == two:
+        assert found["neumann_body"] == neumann_body
+
+
+def test_advice_on_two_bars_is_that_of_their_stiffnesses(call, write):
+    found = by_body(call("advise", write(text=examples()["two-bars"]), "--json").document)
+    for body, rho in ((2, 3), (1, 1 / 3)):  # S = E/L is 3 and 1
+        assert found[body]["rho"]["value"] == pytest.approx(rho, rel=1e-12)
+        assert found[body]["theta_proved"] == pytest.approx(2 / (2 + rho), rel=1e-12)
+        assert found[body]["factor_proved"]["value"] == pytest.approx(rho / (2 + rho), rel=1e-12)
+        assert found[body]["theta_max_proved"]["value"] == pytest.approx(min(2 / (1 + rho), 1), rel=1e-12)
+
+
+def test_without_friction_the_prediction_is_proved(call, write):
+    for role in call("advise", write("without friction"), "--json").document["roles"]:
+        assert role["theta_proved"] == pytest.approx(role["theta_predicted"], rel=1e-9)
+        assert role["factor_proved"]["value"] == pytest.approx(role["rate_predicted"], rel=1e-9)
+        assert role["friction_threshold"] is None
+        assert "friction_threshold" in role["reason"]
+
+
+@pytest.mark.parametrize("friction", ["0.05", "0.2", "0.4"])
+def test_the_proved_theta_is_that_of_the_theorem_in_energy_norms(call, write, friction):
+    file = write({"contact.friction": friction})
+    problem = vf.load(file)
+    for role, roles in zip(call("advise", file, "--json").document["roles"], (problem, problem.swapped()), strict=True):
+        measured = vf.measure(roles)
+        sharp = evaluate_sharp(measured.energy_constants())
+        assert role["friction_threshold"]["value"] == measured.friction_threshold.value
+        if sharp.interval is None:
+            assert {role[name] for name in PROVED - {"friction_threshold"}} == {None}
+            continue
+        assert role["theta_proved"] == sharp.theta_proved
+        assert role["factor_proved"]["value"] == sharp.factor_proved.value < 1
+        assert role["theta_max_proved"]["value"] == sharp.interval[1]
+        for theta in (0.9 * sharp.theta_proved, min(1.1 * sharp.theta_proved, 0.999)):
+            beside = evaluate_sharp(measured.energy_constants(), theta).factor
+            assert beside is None or beside.value > sharp.factor_proved.value
+
+
+def test_nothing_is_proved_of_the_local_law(call, write):
+    found = call("advise", write("local law"), "--json").document
+    for role in found["roles"]:
+        assert {role[name] for name in PROVED} == {None}
+        assert all("local" in role["reason"][name] for name in PROVED)
+    assert any("local" in reason for reason in found["outside_theorem"])
+    screen = call("advise", write("local law")).out
+    assert "Outside the theorem: the local Coulomb law" in screen
+    assert "proved     -" in screen
+
+
+def test_bodies_that_hold_different_components_get_no_advice_and_are_told_why(call, write):
+    complaint = call("advise", write("held tangentially")).complaint
+    assert "problem.toml: contact" in complaint
+    assert "different tangential components" in complaint
+
+
+@pytest.mark.parametrize("edits", [None, "wrong roles", "without friction"], ids=str)
+def test_what_is_pasted_is_the_advice_and_the_next_line_runs_it(call, write, edits):
+    file = write(edits)
+    answer = call("advise", file)
+    found = call("advise", file, "--json").document
+    best = by_body(found)[found["neumann_body"]]
+    assert pasted(answer.out) == f"{best['theta_predicted']:.3g}"
+    assert f"  neumann_body = {found['neumann_body']}\n" in answer.out
+    assert ("--swap-roles" in answer.out) == (edits == "wrong roles")
+    following = answer.out.splitlines()[-1].removeprefix("Next: ndtheory ")
+    run = call(*shlex.split(following), "--json").document
+    assert run["neumann_body"] == found["neumann_body"]
+    assert run["theta"] == float(pasted(answer.out))
+    assert run["converged"]
+
+
+@pytest.mark.parametrize("edits", ["soft upper body", "stiff upper body", {"body2.young": "7e-20"}], ids=str)
+def test_however_soft_a_body_what_is_pasted_is_a_theta(call, write, edits):
+    assert 0 < float(pasted(call("advise", write(edits)).out)) < 1
+
+
+def test_a_body_without_support_is_named_singular(call, write):
+    complaint = call("advise", write({"body2.prescribed": '{ top = ["free", -0.01] }'})).complaint
+    assert "body2" in complaint
+    assert "singular" in complaint
+
+
+# --- advise, from one run --------------------------------------------------------------------------------------------
+
+
+def tail_ratio(history):
+    """The ratio of consecutive residuals at the end of a history, over two steps."""
+    return math.sqrt(history[-1] / history[-3])
+
+
+@pytest.mark.parametrize(
+    ("name", "theta", "rho", "within"),
+    [
+        ("two-bars", "0.45", "rho_max", 1e-5),
+        ("signorini", "0.95", "rho_normal", 1e-2),
+        ("section6", "0.95", "rho_max", 5e-2),
+    ],
+)
+def test_one_run_that_alternates_tells_rho(call, write, name, theta, rho, within):
+    file = write(text=examples()[name])
+    ratio = tail_ratio(call("run", file, "--theta", theta, "--json").document["history"])
+    found = call("advise", "--theta", theta, "--ratio", repr(ratio), "--json").document
+    (role,) = found["roles"]
+    assert role["rho"]["value"] == pytest.approx((1 + ratio) / float(theta) - 1, rel=1e-12)
+    assert role["rho"]["value"] == pytest.approx(getattr(vf.measure(vf.load(file)), rho).value, rel=within)
+    assert role["theta_predicted"] == pytest.approx(2 / (2 + role["rho"]["value"]))
+    assert role["rate_predicted"] == pytest.approx(role["rho"]["value"] / (2 + role["rho"]["value"]))
+
+
+def test_a_run_that_diverges_in_every_step_tells_rho_too(call, write):
+    """1 - theta - theta rho = -1.4 for the first steps, until the bars part."""
+    file = write(text=examples()["two-bars"])
+    history = call("run", file, "--theta", "0.6", "--json").document["history"]
+    ratios = [b / a for a, b in itertools.pairwise(history)]
+    found = call("advise", "--theta", "0.6", "--ratio", f"{ratios[3]:.9f}", "--json").document
+    assert ratios[3] == pytest.approx(1.4)
+    assert {reading["kind"]: reading["rho"]["value"] for reading in found["readings"]} == {
+        "mode-high": pytest.approx(3),
+        "level": None,  # the bars may part and meet
+    }
+    assert found["roles"] == []
+    assert call("run", file, "--theta", str(found["next"]["theta"]), "--json").document["converged"]
+
+
+def test_one_run_tells_nothing_of_the_other_role_and_proves_nothing(call):
+    found = call("advise", "--theta", "0.45", "--ratio", "0.8", "--json").document
+    (role,) = found["roles"]
+    assert set(role) >= ROLE
+    assert found["neumann_body"] is role["neumann_body"] is None
+    assert "neumann_body" in found["reason"]
+    assert {role[name] for name in PROVED} == {None}
+    assert set(role["reason"]) >= PROVED | {"neumann_body"}
+    answer = call("advise", "--theta", "0.45", "--ratio", "0.8")
+    assert pasted(answer.out) == "0.4"
+    assert "neumann_body" not in answer.out
+    assert max(map(len, answer.out.splitlines())) <= 80
+
+
+@pytest.mark.parametrize(
+    ("theta", "ratio", "rho"), [("1/3", "4/3", 6), ("1", "1/2", 0.5), ("1", "1e-60", 1e-60), ("1e-8", "1e-8", 1e8)]
+)
+def test_theta_and_ratio_are_read_exactly(call, theta, ratio, rho):
+    found = call("advise", "--theta", theta, "--ratio", ratio, "--json").document
+    assert found["readings"][0]["rho"]["value"] == pytest.approx(rho, rel=1e-7, abs=0)
+
+
+@pytest.mark.parametrize("size", ["1e-300", "1e-8", "1e8", "1e300"])
+@pytest.mark.parametrize("theta", ["1e-300", "1e-8", "1"])
+def test_no_size_of_a_ratio_crashes_the_advice(call, theta, size):
+    answer = call("advise", "--theta", theta, "--ratio", size, "--json")
+    assert "Traceback" not in answer.err
+    if answer.status == 2:
+        assert "--" in answer.complaint
+    else:
+        assert 0 < answer.document["next"]["theta"] < 1
+        assert call("advise", "--theta", theta, "--ratio", size).status == 0
+
+
+@pytest.mark.parametrize("value", ["0", "-1", "nan", "inf", "-inf", "abc", "", "1e400", "1e-400", "1/0", "auto"])
+@pytest.mark.parametrize("name", ["ratio", "theta"])
+def test_a_ratio_or_theta_outside_its_meaning_is_refused(call, name, value):
+    given = {"theta": "0.1", "ratio": "1.4"} | {name: value}
+    complaint = call("advise", "--theta", given["theta"], "--ratio", given["ratio"]).complaint
+    assert f"--{name} = {value}" in complaint
+    assert {"ratio": "a number > 0", "theta": "0 < theta <= 1"}[name] in complaint
+
+
+@pytest.mark.parametrize("theta", ["1.5", "1.0000000000000000000001"])
+def test_a_theta_above_1_is_refused(call, theta):
+    assert f"--theta = {theta}: needed" in call("advise", "--theta", theta, "--ratio", "1.4").complaint
+
+
+FORMS = [{"FILE"}, {"--S1", "--S2"}, {"--theta", "--ratio"}]
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        set(some)
+        for n in range(6)
+        for some in itertools.combinations(("FILE", "--S1", "--S2", "--theta", "--ratio"), n)
+        if set(some) not in FORMS
+    ],
+    ids=lambda given: " ".join(sorted(given)) or "nothing",
+)
+def test_advise_needs_exactly_one_of_its_forms_and_that_whole(call, write, tmp_path, given):
+    values = {"--theta": "0.1", "--ratio": "1.4"} | dict.fromkeys(("--S1", "--S2"), saved(tmp_path, "a", GOOD))
+    options = [word for name in sorted(given - {"FILE"}) for word in (name, values[name])]
+    complaint = call("advise", *(["FILE"] if "FILE" in given else []), *options).complaint
+    assert "needed" in complaint
+    assert all(name in complaint for name in given)
+
+
+@pytest.mark.parametrize(
+    ("name", "fragment"), [("missing.toml", "no such file"), ("", "folder"), ("a.npz", "interface file")]
+)
+def test_advise_names_a_file_that_is_no_problem(call, tmp_path, name, fragment):
+    saved(tmp_path, "a", GOOD)
+    complaint = call("advise", tmp_path / name).complaint
+    assert str(tmp_path / name) in complaint
+    assert fragment in complaint

@@ -1,0 +1,259 @@
+"""`region`: its picture, its screen and its document, and which region lies inside which."""
+
+import itertools
+import math
+import signal
+from xml.etree import ElementTree
+
+import pytest
+from problem_list import SMALL, edited
+
+import verification as vf
+from ndtheory import PRINTED, REPAIRED, evaluate, evaluate_sharp
+from verification.algorithm import runs
+from verification.bounds import bound
+from verification.bounds import region as plane
+from verification.bounds.bound import NotComputed
+from verification.bounds.semidefinite import SemidefiniteBound
+from verification.cli.problems import examples
+
+#: A mesh of 20 nodes, the roles such that runs converge, stall and run away.
+COARSE = {"body1.cells": "[5, 1]", "body2.cells": "[3, 1]", "contact.radius": "0.5", "iteration.neumann_body": "2"}
+
+
+@pytest.fixture(scope="module")
+def charted(tmp_path_factory):
+    """The plane of a coarse mesh, drawn once."""
+    file = tmp_path_factory.mktemp("plane") / "problem.toml"
+    file.write_text(edited(SMALL, COARSE), encoding="utf-8")
+    problem = vf.load(file)
+    shares = []
+    told = lambda what, share: shares.append(share) if what.startswith("runs") else None
+    return file, vf.measure(problem), plane.chart(problem, progress=told), shares
+
+
+@pytest.fixture
+def region(call, charted, monkeypatch):
+    """`region` on that plane, as often as one likes."""
+    monkeypatch.setattr(plane, "chart", lambda problem, progress: charted[2])
+    return lambda *arguments: call("region", charted[0], *arguments)
+
+
+def test_region_writes_a_picture_with_both_axes_every_edition_and_every_outcome(region, charted, tmp_path):
+    answer = region("-o", tmp_path / "plane.svg")
+    assert (answer.status, answer.err) == (0, "")
+    assert [path.name for path in tmp_path.iterdir()] == ["plane.svg"]
+    assert b"<dc:title>ndtheory</dc:title>" in (tmp_path / "plane.svg").read_bytes()
+    drawn = ElementTree.parse(tmp_path / "plane.svg").getroot()
+    text = "\n".join("".join(element.itertext()).strip() for element in drawn.iter() if element.tag.endswith("}text"))
+    assert "relaxation factor theta" in text
+    assert "coefficient of friction k" in text
+    assert all(f"{name}: k < " in text for name in ("printed (MPa)", "repaired", "sharp", "lmi"))
+    words = lambda outcome: "run still falling when stopped" if outcome == "limit" else f"run {outcome}"
+    assert all(words(outcome) in text for outcome in {point.outcome for point in charted[2].points})
+    assert region("-o", tmp_path / "plane.png").status == 0
+    assert (tmp_path / "plane.png").read_bytes().startswith(b"\x89PNG")
+    assert b"Software\x00ndtheory" in (tmp_path / "plane.png").read_bytes()
+
+
+@pytest.mark.parametrize("ending", ["svg", "png"])
+def test_region_writes_the_same_over_its_own_picture(region, tmp_path, ending):
+    first = []
+    for _ in range(2):
+        assert region("-o", tmp_path / f"plane.{ending}").status == 0
+        first.append((tmp_path / f"plane.{ending}").read_bytes())
+    assert first[0] == first[1]
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_the_screen_of_region_counts_runs_and_gives_each_edition_its_line(region, charted, tmp_path):
+    lines = region("-o", tmp_path / "plane.svg").out.splitlines()
+    outcomes = [point.outcome for point in charted[2].points]
+    assert any(f"{outcomes.count('converged')} converged" in line for line in lines)
+    assert any("still falling when stopped after" in line for line in lines)
+    head = next(i for i, line in enumerate(lines) if "every small theta: k <" in line and "some theta: k <" in line)
+    assert [line.split()[0] for line in lines[head + 1 : head + 5]] == ["printed", "repaired", "sharp", "lmi"]
+    assert "stresses in MPa" in lines[head + 5]
+    assert lines[-1].endswith("plane.svg")
+    assert [line for line in lines[:-1] if len(line) > 80] == []
+
+
+def test_the_document_of_region_is_its_plane(region, charted, tmp_path):
+    answer = region("-o", tmp_path / "plane.svg", "--json")
+    found = answer.document
+    assert (answer.status, answer.err, found["schema"]) == (0, "", "ndtheory.region/1")
+    assert set(found["regions"]) | set(found["reason"]) == {"printed", "repaired", "sharp", "lmi"}
+    for drawn in found["regions"].values():
+        assert drawn["k"] == sorted(set(drawn["k"]))
+        assert all(0 <= low < high <= 1 for low, high in drawn["theta"])
+        assert len(drawn["k"]) == len(drawn["theta"]) > 0
+    places = {(point["theta"], point["k"]) for point in found["points"]}
+    assert len(places) == len(found["points"]) == len(plane.THETAS) * len(plane.FRICTIONS)
+    assert {point["outcome"] for point in found["points"]} == {"converged", "limit", "stalled", "diverged"}
+    shares = charted[3]
+    assert shares == sorted(shares)
+    assert 0 <= shares[0] < shares[-1] <= 1
+
+
+def ends(region, every=1):
+    """Points just inside the border of a region, and in its middle."""
+    for k, (low, high) in list(zip(region.k, region.theta, strict=True))[::every]:
+        for share in (1e-6, 0.5, 1 - 1e-6):
+            yield k, low + share * (high - low)
+
+
+def test_what_the_printed_theorem_contracts_the_repaired_one_does_where_m_is_at_least_1(charted):
+    """In MPa, that is; with m below 1 the printed threshold is the larger one."""
+    _, measured, drawn, _ = charted
+    assert measured.m.value >= 1
+    for k, theta in ends(drawn.regions["printed"], every=9):
+        assert evaluate(REPAIRED, measured.with_friction(k).constants(), theta).verdict == "contraction"
+
+
+def test_below_m_equal_to_1_the_printed_region_is_not_inside_the_repaired_one(write):
+    measured = vf.measure(vf.load(write(COARSE | {"body1.young": "7e-8", "body2.young": "2e-8"})))
+    constants = measured.constants()
+    assert measured.m.value < 1
+    assert evaluate(PRINTED, constants).C2.value > evaluate(REPAIRED, constants).C2.value
+
+
+def test_what_the_repaired_theorem_contracts_the_one_in_energy_norms_does(charted):
+    _, measured, drawn, _ = charted
+    for k, theta in ends(drawn.regions["repaired"], every=9):
+        assert evaluate_sharp(measured.with_friction(k).energy_constants(), theta).verdict == "contraction"
+
+
+def test_what_the_theorem_in_energy_norms_contracts_the_semidefinite_bound_does(charted):
+    _, measured, drawn, _ = charted
+    sharp, lmi = drawn.regions["sharp"], drawn.regions["lmi"]
+    assert max(sharp.k) < max(lmi.k)
+    for k, (low, high) in zip(lmi.k, lmi.theta, strict=True):
+        inner = evaluate_sharp(measured.with_friction(k).energy_constants()).interval
+        assert inner is None or low <= inner[0] < inner[1] <= high * (1 + 1e-9)
+    for k, (_, high) in zip(sharp.k, sharp.theta, strict=True):  # the border falls as friction grows
+        assert high <= max((h for q, (_, h) in zip(lmi.k, lmi.theta, strict=True) if q <= k), default=1.0) * (1 + 1e-9)
+
+
+def test_the_border_of_a_region_is_where_contraction_ends(charted):
+    _, measured, drawn, _ = charted
+    for k, (_, high) in list(zip(drawn.regions["sharp"].k, drawn.regions["sharp"].theta, strict=True))[::5]:
+        energy = measured.with_friction(k).energy_constants()
+        assert high == 1 or evaluate_sharp(energy, min(high * (1 + 1e-6), 1 - 1e-12)).verdict == "no conclusion"
+    for name, edition in (("printed", PRINTED), ("repaired", REPAIRED)):
+        for k, (_, high) in list(zip(drawn.regions[name].k, drawn.regions[name].theta, strict=True))[::20]:
+            constants = measured.with_friction(k).constants()
+            assert evaluate(edition, constants, high * (1 + 1e-6)).verdict == "no conclusion"
+
+
+def test_no_run_inside_a_proved_region_stalls_or_runs_away(charted):
+    _, measured, drawn, _ = charted
+    proved = 0
+    for point in drawn.points:
+        sharp = evaluate_sharp(measured.with_friction(point.k).energy_constants(), point.theta)
+        if sharp.verdict == "contraction":
+            proved += 1
+            assert point.outcome in ("converged", "limit"), point
+            steps = math.log(1e-9 * (1 - sharp.factor.value)) / math.log(sharp.factor.value)
+            assert point.outcome == "converged" or point.iterations == plane.MOST_STEPS < 2 * steps, point
+    assert proved > 0
+    assert any(point.outcome in ("stalled", "diverged") for point in drawn.points)
+
+
+@pytest.mark.parametrize(
+    ("edits", "target", "fragments"),
+    [
+        (None, "plane.pdf", ["-o", "plane.pdf", ".svg or .png"]),
+        (None, "plane", ["-o", "plane", ".svg or .png"]),
+        (None, "plane.SVG", ["-o", "plane.SVG", ".svg or .png"]),
+        (None, ".svg", ["-o", ".svg or .png"]),
+        (None, "problem.toml", ["-o", "problem.toml", ".svg or .png"]),
+        (None, "missing/plane.svg", ["missing/plane.svg", "folder that exists", "-o"]),
+        (None, "problem.toml/plane.svg", ["problem.toml/plane.svg", "folder that exists", "-o"]),
+        (None, "foreign.svg", ["foreign.svg", "not written by this program", "-o"]),
+        (None, "foreign.png", ["foreign.png", "not written by this program", "-o"]),
+        (None, "folder.svg", ["folder.svg", "-o"]),
+        ("local law", "plane.svg", ["problem.toml", "local"]),
+        ({"contact.law": '"local"', "contact.radius": None, "contact.friction": "0"}, "plane.svg", ["local"]),
+        ("held tangentially", "plane.svg", ["problem.toml", "held tangentially"]),
+        ("without friction", "plane.svg", ["problem.toml", "contact.radius", "law of friction"]),
+        ({"body1.young": "-1"}, "plane.svg", ["problem.toml", "body1.young", "-1"]),
+    ],
+    ids=str,
+)
+def test_region_refuses_what_it_cannot_draw_before_anything_is_run(
+    call, write, tmp_path, monkeypatch, edits, target, fragments
+):
+    foreign = {"foreign.svg": "<svg>mine</svg>", "foreign.png": "mine, beside ndtheory"}
+    for name, text in foreign.items():
+        (tmp_path / name).write_text(text)
+    (tmp_path / "folder.svg").mkdir()
+    file = write(edits)
+    before = {path.name for path in tmp_path.iterdir()}
+    monkeypatch.setattr(plane, "run", None)
+    complaint = call("region", file, "-o", tmp_path / target).complaint
+    assert [fragment for fragment in fragments if fragment not in complaint] == []
+    assert {path.name for path in tmp_path.iterdir()} == before
+    assert {name: (tmp_path / name).read_text() for name in foreign} == foreign
+
+
+def test_region_refuses_two_bars(call, write, tmp_path):
+    complaint = call("region", write(text=examples()["two-bars"]), "-o", tmp_path / "plane.svg").complaint
+    assert "problem.toml" in complaint
+    assert "friction" in complaint
+
+
+def test_region_needs_the_name_of_a_picture(call, write):
+    assert "-o" in call("region", write()).complaint
+    assert "-o" in call("region", write(), "-o").complaint
+    assert "-o" in call("region", write(), "-o", "").complaint
+
+
+@pytest.fixture
+def short(monkeypatch):
+    """Few points on the borders, no semidefinite bound: what matters is the runs."""
+
+    def fail(self, subject, progress):
+        raise NotComputed("made up")
+
+    monkeypatch.setattr(bound, "TRACED", 4)
+    monkeypatch.setattr(SemidefiniteBound, "region", fail)
+
+
+def test_a_bound_without_a_region_says_why(call, short, write, tmp_path, monkeypatch):
+    monkeypatch.setattr(plane, "THETAS", (0.1,))
+    monkeypatch.setattr(plane, "FRICTIONS", (0.1,))
+    found = call("region", write(COARSE), "-o", tmp_path / "plane.svg", "--json").document
+    assert "lmi" not in found["regions"]
+    assert found["reason"] == {"lmi": "made up"}
+    assert "lmi: made up" in call("region", write(COARSE), "-o", tmp_path / "plane.svg").out
+
+
+@pytest.mark.parametrize("relaxation", ["newton", "momentum"])
+def test_region_runs_a_constant_theta_whatever_the_file_says(call, short, write, tmp_path, monkeypatch, relaxation):
+    monkeypatch.setattr(plane, "THETAS", (0.1, 0.9))
+    monkeypatch.setattr(plane, "FRICTIONS", (0.1,))
+    chosen = COARSE | {"iteration.relaxation": f'"{relaxation}"', "iteration.theta": '"auto"'}
+    points = [
+        call("region", write(edits), "-o", tmp_path / "plane.svg", "--json").document["points"]
+        for edits in (COARSE, chosen)
+    ]
+    assert points[0] == points[1]
+    assert [point["theta"] for point in points[0]] == [0.1, 0.9]
+
+
+@pytest.mark.parametrize("evaluations", [1, 40])
+def test_ctrl_c_ends_region(call, short, write, tmp_path, monkeypatch, evaluations):
+    iterates, seen = runs.iterates, itertools.count(1)
+
+    def interrupted(*args):
+        for state in iterates(*args):
+            if next(seen) == evaluations:
+                signal.raise_signal(signal.SIGINT)
+            yield state
+
+    monkeypatch.setattr(runs, "iterates", interrupted)
+    answer = call("region", write(COARSE), "-o", tmp_path / "plane.svg")
+    assert answer.status == 130
+    assert answer.err.strip().startswith("interrupted")
+    assert answer.err.strip().count("\n") == 0
+    assert next(seen) <= evaluations + 2  # no other run was begun

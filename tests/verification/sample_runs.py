@@ -1,0 +1,40 @@
+"""The sample problems run to their limits, each once in a process."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from problem_list import FOLLOWED, changed
+
+import verification as vf
+from verification.algorithm.runs import Run
+
+by_name = pytest.mark.parametrize("name", FOLLOWED)
+
+
+def problem(data: Mapping[str, Any], **iteration: Any) -> vf.Problem:
+    return vf.Problem.from_dict(changed(data, iteration=iteration))
+
+
+@cache
+def converged(name: str, swapped: bool = False) -> Run:
+    """Run a sample problem to 1e-12; with swapped roles at a theta that suits them."""
+    given = problem(FOLLOWED[name], tolerance="1e-12", max_iterations=3000)
+    if swapped:
+        given = given.swapped()
+        rho = vf.measure(given).rho_max
+        given = given.with_theta(1.8 / (2 + (40 if rho is None else rho.value)))
+    run = vf.run(given, solver="active-set")
+    assert run.outcome == "converged"
+    return run
+
+
+def relative(found: Any, expected: Any) -> float:
+    """Largest difference over largest value."""
+    found, expected = np.asarray(found), np.asarray(expected)
+    size = np.abs(expected).max(initial=0.0)
+    return float(np.abs(found - expected).max(initial=0.0) / (size or 1.0))
