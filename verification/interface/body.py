@@ -11,10 +11,11 @@ from typing import Literal
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, cholesky, qr
+from scipy.linalg import cholesky, qr
 
 from fem1d2d import Condensation, Material, Mesh, Supports, solver
 from fem1d2d.mesh import Floats, Ints
+from verification.dense import Cholesky
 from verification.interface.grid import Grid
 from verification.threads import one_thread
 from verification.value import Value, freeze
@@ -215,15 +216,12 @@ class Condensed(Value):
         return self.body
 
     @cached_property
-    def _factor(self) -> tuple[NDArray[np.float64], bool]:
-        factor: tuple[NDArray[np.float64], bool] = cho_factor(self.stiffness[np.ix_(self.free, self.free)])
-        return factor
+    def _factor(self) -> Cholesky:
+        return Cholesky(self.stiffness, np.flatnonzero(self.free))
 
     def flexibility(self, force: Floats) -> Floats:
-        """``S_a^-1 force`` on the free components, 0 on held ones, shape (2 n,)."""
-        result = np.zeros_like(force)
-        result[self.free] = cho_solve(self._factor, force[self.free], check_finite=False)
-        return result
+        """``S_a^-1 force`` on the free components, 0 on held ones, for one force or columns of them."""
+        return self._factor.solve(force)
 
     @cached_property
     def inverse(self) -> Floats:
@@ -262,6 +260,12 @@ class Condensed(Value):
         """
         gram: Floats = freeze(self.orient_form(self.mesh_body.lift_gram))
         return gram
+
+    @cached_property
+    def unloaded(self) -> Floats:
+        """Its displacement where nothing touches it, ``known + S_a^-1 l_a``."""
+        unloaded: Floats = freeze(self.known + self.flexibility(self.load))
+        return unloaded
 
     def dual_norm(self, force: Floats) -> float:
         """The norm (5.21), ``sqrt(force' S_a^-1 force)``, when this is the Neumann body."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -14,7 +15,7 @@ from verification.interface.body import Body, Condensed
 from verification.interface.interface import Interface
 from verification.problem import Problem, Settings
 from verification.problem.specification import MOST_FRICTION
-from verification.value import Value
+from verification.value import Value, freeze
 
 #: Poisson ratio from which on linear triangles err visibly.  Two models against a mesh that does not lock (rectangles
 #: split by both diagonals, 72 cells along Gamma_c): at 0.48 the nodal pressures of the built-in split are off by 5 and
@@ -210,10 +211,15 @@ class ContactPair(Value):
         force : array
             On the Neumann grid; sigma_N are its normal components.
         """
-        grid = self.interface.contact
         if not self.rubs:
-            return np.zeros(grid.t)
-        return np.asarray(float(self.friction) * grid.weights * np.abs(self.interface.stress(force)))
+            return np.zeros(self.interface.contact.t)
+        return np.asarray(self._limits * np.abs(self.interface.stress(force)))
+
+    @cached_property
+    def _limits(self) -> Floats:
+        """``w_j k``."""
+        limits: Floats = freeze(float(self.friction) * self.interface.contact.weights)
+        return limits
 
     @property
     def outside(self) -> list[str]:
