@@ -143,6 +143,27 @@ class ContactPair(Value):
             origin = origin.changed(friction=k) if k <= MOST_FRICTION else None
         return replace(self, friction=k, problem=origin)
 
+    def changed(self, **values: Any) -> ContactPair:
+        """The pair of its problem with other values, which are those of :meth:`verification.Problem.changed`.
+
+        What is condensed is shared: a body is condensed anew only where its mesh, its supports or its Poisson ratio
+        change.  Young's modulus multiplies its stiffness.  A law of friction of its own stays unless ``law`` or
+        ``radius`` is given; the settings are those of the changed problem.
+
+        Raises
+        ------
+        ProblemError
+            Naming the key as the problem file has it.
+        ValueError
+            The pair is made from matrices.
+        """
+        if self.problem is None:
+            raise ValueError("this pair is made from matrices: needed a problem, whose values can change")
+        from verification.interface.assembly import build  # it makes pairs
+
+        law = None if {"law", "radius"} & values.keys() else self.interface.law
+        return build(self.problem.changed(**values), law=law, like=self)
+
     def swapped(self) -> ContactPair:
         """The same bodies with the roles exchanged; what is condensed is shared.
 
