@@ -14,8 +14,8 @@ class Value:
     """
 
     def __post_init__(self) -> None:
-        for field in fields(self):  # type: ignore[arg-type]  # every subclass is a dataclass
-            freeze(getattr(self, field.name))
+        for value in vars(self).values():  # the fields: nothing else is set yet
+            freeze(value)
 
     @property
     def summary(self) -> str:
@@ -37,11 +37,11 @@ class Value:
 
 def freeze(value: Any) -> Any:
     """Make an array, the arrays of a sparse matrix, or those of a tuple read-only; the same object."""
-    if isinstance(value, tuple):
+    if hasattr(value, "setflags"):  # without numpy: the calculator starts without it
+        value.setflags(write=False)
+    elif isinstance(value, tuple):
         for member in value:
             freeze(member)
-    parts = [value, *(getattr(value, name, None) for name in ("data", "indices", "indptr"))]  # of a sparse matrix
-    for part in parts:
-        if hasattr(part, "setflags"):  # without numpy: the calculator starts without it
-            part.setflags(write=False)
+    elif hasattr(value, "indptr"):  # a sparse matrix
+        freeze((value.data, value.indices, value.indptr))
     return value

@@ -114,8 +114,8 @@ def test_a_rule_with_memory_is_no_slower_than_constant_theta(name):
 @pytest.mark.parametrize("relaxation", RULES)
 def test_every_evaluation_of_T_is_counted(relaxation, monkeypatch):
     """A state for each, those of Newton's line search among them; the last is not relaxed any more."""
-    calls, evaluate = [], FixedPointMap.__call__
-    monkeypatch.setattr(FixedPointMap, "__call__", lambda T, g: calls.append(g) or evaluate(T, g))
+    calls, evaluate = [], FixedPointMap.contact
+    monkeypatch.setattr(FixedPointMap, "contact", lambda T, g, u: calls.append(g) or evaluate(T, g, u))
     pair, measured, theta = section_6("upper, 7e4, 2e4")
     done = run(with_rule(pair, relaxation), theta=theta, measured=measured)
     assert done.evaluations == len(calls) == done.iterations + 1

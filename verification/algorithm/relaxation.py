@@ -13,7 +13,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import ClassVar
+from typing import ClassVar, final
 
 import numpy as np
 
@@ -74,6 +74,7 @@ class Rule(ABC):
         -------
         callable
             From an iterate to the g at which T is evaluated next; called with the iterates of one run, in order.
+            A :class:`Relaxation` where (III) has one factor: its steps take one solve with the Neumann body less.
         """
 
     def own_step(self, rho: float) -> float | None:
@@ -94,6 +95,17 @@ def inner(pair: ContactPair, a: Floats, b: Floats) -> float:
     return float(a @ pair.neumann.flexibility(b))
 
 
+@final
+@dataclass(frozen=True)
+class Relaxation:
+    """(III) with one factor; what is linear in g, as its displacement, goes on by the same factor."""
+
+    theta: float
+
+    def __call__(self, iterate: Iterate) -> Floats:
+        return self.theta * iterate.image + (1 - self.theta) * iterate.g
+
+
 @dataclass(frozen=True)
 class Constant(Rule):
     """(III): ``g <- theta T g + (1 - theta) g``."""
@@ -102,7 +114,7 @@ class Constant(Rule):
     words = "constant relaxation"
 
     def begin(self, pair: ContactPair, theta: float, rho: float | None) -> Step:
-        return lambda iterate: theta * iterate.image + (1 - theta) * iterate.g
+        return Relaxation(theta)
 
     def outside(self, friction: Fraction) -> str:
         return ""

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 from fem1d2d.mesh import Floats
+from verification.dense import Cholesky, worst
 from verification.value import Value
 
 #: Signs are read with this slack relative to the largest force, so that rounding does not flip a node for ever.
@@ -61,8 +61,40 @@ class Pattern(Value):
         return cls(touching=force[t:] > -v[t:] * stiffness, sliding=(slips * sign).astype(np.int8))
 
 
+class System:
+    """The linear system that a pattern makes of step II.
+
+    v = 0 where a node touches or sticks, the force is 0 where it is open and the friction bound where it slides.
+
+    Parameters
+    ----------
+    S : array, shape (t + n, t + n)
+    free : bool array, shape (t + n,)
+    pattern : Pattern
+    """
+
+    def __init__(self, S: Floats, free: NDArray[np.bool_], pattern: Pattern) -> None:
+        self.pattern = pattern
+        self._slides, self._open = pattern.sliding != 0, ~pattern.touching
+        self.sign = pattern.sliding.astype(float)
+        self._rows = np.flatnonzero(np.concatenate([self._slides, self._open]) & free)
+        self._columns, self._factor = S[self._rows], Cholesky(S, self._rows)
+
+    def solve(self, q: Floats, bound: Floats) -> tuple[Floats, Floats]:
+        """v and force, shape (t + n,) each."""
+        t, friction = len(bound), bound * self.sign
+        right = q.copy()
+        right[:t] -= friction
+        v = self._factor.solve(right)
+        force: Floats = q - v[self._rows] @ self._columns
+        # what the pattern says holds exactly; the certificate sees the rest
+        np.putmask(force[t:], self._open, 0.0)
+        np.putmask(force[:t], self._slides, friction)
+        return v, force
+
+
 class ActiveSet:
-    """The solver for one stiffness matrix; remembers the last factorisation.
+    """The solver for one stiffness matrix; keeps the linear system of the last pattern.
 
     Parameters
     ----------
@@ -75,33 +107,23 @@ class ActiveSet:
 
     def __init__(self, S: Floats, free: NDArray[np.bool_], tangential: int) -> None:
         self._S, self._free, self._t = S, free, tangential
-        self._last: tuple[bytes, NDArray[np.intp], tuple[NDArray[np.float64], bool]] | None = None
+        self._held = None if free[:tangential].all() else ~free[:tangential]
+        self._stiffness = float(np.diag(S).max())
+        self._last: System | None = None
 
-    def _moving(self, pattern: Pattern) -> tuple[NDArray[np.intp], tuple[NDArray[np.float64], bool] | None]:
-        moves = np.concatenate([pattern.sliding != 0, ~pattern.touching]) & self._free
-        key = moves.tobytes()
-        if self._last is not None and self._last[0] == key:
-            return self._last[1], self._last[2]
-        rows = np.flatnonzero(moves)
-        if len(rows) == 0:
-            return rows, None
-        factor = cho_factor(self._S[np.ix_(rows, rows)], check_finite=False)
-        self._last = key, rows, factor
-        return rows, factor
+    def _system(self, pattern: Pattern) -> System:
+        if self._last is None or self._last.pattern != pattern:
+            self._last = System(self._S, self._free, pattern)
+        return self._last
 
-    def equilibrium(self, q: Floats, bound: Floats, pattern: Pattern) -> tuple[Floats, Floats]:
-        """v and force for a given pattern: v = 0 where a node touches or sticks, the friction bound where it slides."""
-        rows, factor = self._moving(pattern)
-        v = np.zeros_like(q)
-        if factor is not None:
-            right = q.copy()
-            right[: self._t] -= bound * pattern.sliding
-            v[rows] = cho_solve(factor, right[rows], check_finite=False)
-        force = q - self._S @ v
-        force[self._t :][~pattern.touching] = 0.0  # what the pattern says holds exactly; the certificate sees the rest
-        slides = pattern.sliding != 0
-        force[: self._t][slides] = (bound * pattern.sliding)[slides]
-        return v, force
+    def _begin(self, start: Pattern, smooth: NDArray[np.bool_]) -> Pattern:
+        """The first guess: no held node slides, every node whose bound is zero does."""
+        sliding = start.sliding
+        if self._held is not None:
+            sliding = np.where(self._held, 0, sliding)
+        if np.count_nonzero(smooth):
+            sliding = np.where(smooth & (sliding == 0), 1, sliding)
+        return start if sliding is start.sliding else Pattern(touching=start.touching, sliding=sliding.astype(np.int8))
 
     def solve(self, q: Floats, bound: Floats, start: Pattern) -> tuple[Floats, Floats, Pattern] | None:
         """Mend the pattern until every sign agrees.
@@ -116,27 +138,27 @@ class ActiveSet:
         pattern : Pattern
             None instead of the three where the pattern does not settle.
         """
-        t, free = self._t, self._free[: self._t]
-        largest = max(float(np.abs(q).max(initial=0.0)), float(bound.max(initial=0.0)))
-        force_slack = SLACK * largest
-        length_slack = force_slack / float(np.diag(self._S).max())
-        smooth = (bound == 0) & free
-        pattern = start
+        t = self._t
+        force_slack = SLACK * max(worst(np.abs(q)), worst(bound))
+        length_slack = force_slack / self._stiffness
+        smooth = bound == 0 if self._held is None else (bound == 0) & ~self._held
+        pattern = self._begin(start, smooth)
         seen: set[bytes] = set()
         for _ in range(LIMIT):
-            sliding = np.where(free, pattern.sliding, 0)
-            sliding = np.where(smooth & (sliding == 0), 1, sliding).astype(np.int8)
-            pattern = Pattern(touching=pattern.touching, sliding=sliding)
+            system = self._system(pattern)
+            v, force = system.solve(q, bound)
+            # v_N = 0 where a node touches and force_N = 0 where it is open, so that each sign speaks of the others
+            pulls, enters = force[t:] < -force_slack, v[t:] > length_slack
+            pushed, back = np.abs(force[:t]) > bound + force_slack, system.sign * v[:t] < -length_slack
+            if np.count_nonzero(back):
+                back &= ~smooth
+            if self._held is not None:
+                pushed &= ~self._held
+            if not any(map(np.count_nonzero, (pulls, enters, pushed, back))):
+                return v, force, system.pattern
+            seen.add(pattern.key)
+            sliding = np.where(pushed, np.sign(force[:t]), np.where(back, 0, pattern.sliding)).astype(np.int8)
+            pattern = Pattern(touching=pattern.touching & ~pulls | enters, sliding=sliding)
             if pattern.key in seen:
                 return None
-            seen.add(pattern.key)
-            v, force = self.equilibrium(q, bound, pattern)
-            touching = np.where(pattern.touching, force[t:] >= -force_slack, v[t:] > length_slack)
-            pushed = np.where(np.abs(force[:t]) > bound + force_slack, np.sign(force[:t]), 0)
-            kept = np.where(sliding * v[:t] >= -length_slack, sliding, 0)
-            mended = np.where(free, np.where(smooth, sliding, np.where(sliding == 0, pushed, kept)), 0).astype(np.int8)
-            following = Pattern(touching=touching, sliding=mended)
-            if following == pattern:
-                return v, force, pattern
-            pattern = following
         return None

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fem1d2d.mesh import Floats
+from verification.dense import times, worst
 
 #: A solution of step II is accepted below this relative residual.
 TOLERANCE = 1e-11
@@ -39,43 +40,57 @@ class KKT:
     @property
     def residual(self) -> float:
         """The largest of them."""
-        return float(max(getattr(self, field.name) for field in fields(self)))
+        return max(
+            self.equilibrium, self.non_penetration, self.compression, self.complementarity, self.bound, self.slip
+        )
 
 
-def certify(
-    S: Floats, q: Floats, bound: Floats, v: Floats, force: Floats, free: NDArray[np.bool_] | None = None
-) -> KKT:
-    """Measure how far (v, force) is from solving step II.
+class Certificate:
+    """The KKT conditions of step II for one contact body.
 
     A complementarity pair is measured by the smaller of its two relative terms, the distance to the nearer branch.
 
     Parameters
     ----------
     S : array, shape (t + n, t + n)
-        Stiffness; t tangential components (0 in 1D) and then n normal ones.
-    q, v, force : array, shape (t + n,)
-    bound : array, shape (t,)
-        Friction bound on nodal forces, >= 0.
+        Stiffness, symmetric; t tangential components (0 in 1D) and then n normal ones.
     free : bool array, shape (t + n,), optional
         Components that are unknown; equilibrium is asked of them alone.
     """
-    t = len(bound)
-    elastic = S @ v
-    forces = max(
-        float(np.abs(q).max(initial=0.0)), float(np.abs(elastic).max(initial=0.0)), float(bound.max(initial=0.0))
-    )
-    if forces == 0.0:
-        forces = 1.0
-    lengths = forces / float(np.diag(S).max())
-    v_T, v_N, f_T, f_N = v[:t] / lengths, v[t:] / lengths, force[:t] / forces, force[t:] / forces
-    limit = bound / forces
-    off = np.abs(elastic + force - q) / forces
-    worst = lambda values: float(np.max(values, initial=0.0))
-    return KKT(
-        equilibrium=worst(off if free is None else off[free]),
-        non_penetration=worst(v_N),
-        compression=worst(-f_N),
-        complementarity=worst(np.minimum(np.abs(v_N), np.abs(f_N))),
-        bound=worst(np.abs(f_T) - limit),
-        slip=worst(np.minimum(np.abs(v_T), np.abs(f_T - limit * np.sign(v_T)))),
-    )
+
+    def __init__(self, S: Floats, free: NDArray[np.bool_] | None = None) -> None:
+        self._S, self._stiffness = S, float(np.diag(S).max())
+        self._held = None if free is None or free.all() else ~free
+
+    def measure(self, q: Floats, bound: Floats, v: Floats, force: Floats) -> KKT:
+        """Measure how far (v, force) is from solving step II.
+
+        Parameters
+        ----------
+        q, v, force : array, shape (t + n,)
+        bound : array, shape (t,)
+            Friction bound on nodal forces, >= 0.
+        """
+        t = len(bound)
+        elastic = times(self._S, v)
+        off = np.abs(elastic + force - q)
+        if self._held is not None:
+            off[self._held] = 0.0
+        stretch, size = self._stiffness * v, np.abs(force)  # both are forces
+        length = np.abs(stretch)
+        forces = max(worst(np.abs(q)), worst(np.abs(elastic)), worst(bound)) or 1.0
+        return KKT(
+            equilibrium=worst(off) / forces,
+            non_penetration=worst(stretch[t:]) / forces,
+            compression=worst(-force[t:]) / forces,
+            complementarity=worst(np.minimum(length[t:], size[t:])) / forces,
+            bound=worst(size[:t] - bound) / forces,
+            slip=worst(np.minimum(length[:t], np.abs(force[:t] - bound * np.sign(v[:t])))) / forces,
+        )
+
+
+def certify(
+    S: Floats, q: Floats, bound: Floats, v: Floats, force: Floats, free: NDArray[np.bool_] | None = None
+) -> KKT:
+    """Measure how far (v, force) is from solving step II; see :class:`Certificate`."""
+    return Certificate(S, free).measure(q, bound, v, force)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fem1d2d.mesh import Floats
 from verification.contact.active_set import ActiveSet, Pattern
-from verification.contact.kkt import KKT, TOLERANCE, certify
+from verification.contact.kkt import KKT, TOLERANCE, Certificate
 from verification.value import Value
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ class ContactStep:
         if solver not in ("auto", "cvxpy", "active-set"):
             raise ValueError(f"solver {solver!r}: needed 'auto', 'cvxpy' or 'active-set'")
         self._S, self._free, self._t, self._solver, self._near = S, free, tangential, solver, near
-        self._active = ActiveSet(S, free, tangential)
+        self._active, self._certificate = ActiveSet(S, free, tangential), Certificate(S, free)
         self._model: ContactModel | None = None
         self._pattern = Pattern.sticking(len(S) - tangential, tangential)
 
@@ -105,7 +105,7 @@ class ContactStep:
         if closed is None:
             return None
         v, force, pattern = closed
-        kkt = certify(self._S, q, bound, v, force, self._free)
+        kkt = self._certificate.measure(q, bound, v, force)
         if not kkt.residual <= TOLERANCE:
             return None
         return ContactSolution(v=v, force=force, pattern=pattern, kkt=kkt, solver=solver)
@@ -125,7 +125,7 @@ class ContactStep:
             return None
         force = q - self._S @ v
         pattern = Pattern.of(v, force, bound, float(np.diag(self._S).max()))
-        kkt = certify(self._S, q, bound, v, force, self._free)
+        kkt = self._certificate.measure(q, bound, v, force)
         return ContactSolution(v=v, force=force, pattern=pattern, kkt=kkt, solver="cvxpy")
 
 

@@ -36,7 +36,7 @@ from verification.problem.tables import ProblemError, short
 MOST_CONTACT_NODES = 2000
 
 
-def build(problem: Problem, *, law: Law | None = None) -> ContactPair:
+def build(problem: Problem, *, law: Law | None = None, like: ContactPair | None = None) -> ContactPair:
     """Two condensed bodies with roles, as the iteration and its constants need them.
 
     Parameters
@@ -45,6 +45,8 @@ def build(problem: Problem, *, law: Law | None = None) -> ContactPair:
         Its ``[iteration]`` gives the roles and the pair's settings.
     law : Law, optional
         A law of friction in place of the problem's.
+    like : ContactPair, optional
+        What it has condensed is shared by bodies that are the same, or differ in Young's modulus and loads alone.
 
     Raises
     ------
@@ -74,17 +76,29 @@ def build(problem: Problem, *, law: Law | None = None) -> ContactPair:
                 f"{body.name} can move rigidly ({k} free motion{'s' if k > 1 else ''}), so that its stiffness matrix in"
                 f" {step} is singular: fix or prescribe more of its sides, or use `ndtheory solve`",
             )
-    body1, body2 = (Condensed.of(body, bodies.interface.contact) for body in bodies.elastic)
-    below = iteration.neumann_body == 1
+    known = (None, None) if like is None else (like.body1, like.body2)
+    upward, grid = iteration.neumann_body == 2, bodies.interface.contact
+    lower, upper = (_condensed(body, grid, upward, side) for body, side in zip(bodies.elastic, known, strict=True))
     return ContactPair(
-        contact=body2.turned() if below else body1,
-        neumann=body1.turned() if below else body2,
+        contact=lower if upward else upper,
+        neumann=upper if upward else lower,
         interface=bodies.interface,
         friction=bodies.friction,
         neumann_body=iteration.neumann_body,
         settings=iteration.settings,
         problem=problem,
     )
+
+
+def _condensed(body: Body, grid: Grid, upward: bool, like: Condensed | None) -> Condensed:
+    """A body condensed, its normal components along y or against it; one like it may be condensed already."""
+    if like is None or like.body is None:
+        found = Condensed.of(body, grid)
+    elif body.equals(like.body):
+        found = like
+    else:
+        found = Condensed.of(body, grid, like.body)
+    return found if found.upward == upward else found.turned()
 
 
 def discretise(problem: Problem, *, law: Law | None = None) -> TwoBodies:

@@ -11,10 +11,11 @@ from typing import Literal
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, cholesky, qr
+from scipy.linalg import cholesky, qr
 
 from fem1d2d import Condensation, Material, Mesh, Supports, solver
 from fem1d2d.mesh import Floats, Ints
+from verification.dense import Cholesky
 from verification.interface.grid import Grid
 from verification.threads import one_thread
 from verification.value import Value, freeze
@@ -119,6 +120,19 @@ class Body(Value):
             gram: Floats = freeze(self.on_lifts(self.gram_matrix))
         return gram
 
+    def times_as_stiff(self, other: Body) -> float | None:
+        """How often the stiffness matrix of another body its own is, where Young's modulus and loads alone differ."""
+        plan = lambda body: (body.mesh.points, body.mesh.cells, body.known.known, body.nodes, body.poisson)
+        if not all(map(np.array_equal, plan(self), plan(other))):
+            return None
+        dimension = self.mesh.dimension
+        return float(self.material.continuity(dimension) / other.material.continuity(dimension))
+
+    def equals(self, other: Body) -> bool:
+        """Whether it is the same body, loads and norm included."""
+        rest = lambda body: (body.known.values, body.load, body.gram_matrix.data)
+        return self.times_as_stiff(other) == 1.0 and all(map(np.array_equal, rest(self), rest(other)))
+
     @property
     def known_trace(self) -> Floats:
         """Interface displacements that Gamma_u prescribes, 0 where it does not."""
@@ -168,13 +182,24 @@ class Condensed(Value):
         return f"{self.grid.n} contact nodes, {'from matrices' if self.body is None else self.body.name}"
 
     @classmethod
-    def of(cls, body: Body, grid: Grid) -> Condensed:
-        """Condense a body onto its contact nodes; normal components along y."""
+    def of(cls, body: Body, grid: Grid, like: Body | None = None) -> Condensed:
+        """Condense a body onto its contact nodes; normal components along y.
+
+        Parameters
+        ----------
+        body : Body
+        grid : Grid
+        like : Body, optional
+            Where it differs in Young's modulus and loads alone its condensation serves: the stiffness is a multiple,
+            and the lift the same.
+        """
+        times = None if like is None else body.times_as_stiff(like)
+        elastic = body.elastic if like is None or times is None else like.elastic
         rows = np.flatnonzero(body.unknown)
         size = len(body.unknown)
         matrix, load = np.zeros((size, size)), np.zeros(size)
-        matrix[np.ix_(rows, rows)] = body.elastic.schur
-        load[rows] = body.elastic.condense(body.load)
+        matrix[np.ix_(rows, rows)] = elastic.schur if times is None else times * elastic.schur
+        load[rows] = elastic.condense(body.load)
         return cls(grid=grid, stiffness=matrix, load=load, known=body.known_trace, free=body.unknown.copy(), body=body)
 
     def turned(self) -> Condensed:
@@ -215,15 +240,12 @@ class Condensed(Value):
         return self.body
 
     @cached_property
-    def _factor(self) -> tuple[NDArray[np.float64], bool]:
-        factor: tuple[NDArray[np.float64], bool] = cho_factor(self.stiffness[np.ix_(self.free, self.free)])
-        return factor
+    def _factor(self) -> Cholesky:
+        return Cholesky(self.stiffness, np.flatnonzero(self.free))
 
     def flexibility(self, force: Floats) -> Floats:
-        """``S_a^-1 force`` on the free components, 0 on held ones, shape (2 n,)."""
-        result = np.zeros_like(force)
-        result[self.free] = cho_solve(self._factor, force[self.free], check_finite=False)
-        return result
+        """``S_a^-1 force`` on the free components, 0 on held ones, for one force or columns of them."""
+        return self._factor.solve(force)
 
     @cached_property
     def inverse(self) -> Floats:
@@ -262,6 +284,12 @@ class Condensed(Value):
         """
         gram: Floats = freeze(self.orient_form(self.mesh_body.lift_gram))
         return gram
+
+    @cached_property
+    def unloaded(self) -> Floats:
+        """Its displacement where nothing touches it, ``known + S_a^-1 l_a``."""
+        unloaded: Floats = freeze(self.known + self.flexibility(self.load))
+        return unloaded
 
     def dual_norm(self, force: Floats) -> float:
         """The norm (5.21), ``sqrt(force' S_a^-1 force)``, when this is the Neumann body."""

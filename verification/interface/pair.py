@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -14,7 +15,7 @@ from verification.interface.body import Body, Condensed
 from verification.interface.interface import Interface
 from verification.problem import Problem, Settings
 from verification.problem.specification import MOST_FRICTION
-from verification.value import Value
+from verification.value import Value, freeze
 
 #: Poisson ratio from which on linear triangles err visibly.  Two models against a mesh that does not lock (rectangles
 #: split by both diagonals, 72 cells along Gamma_c): at 0.48 the nodal pressures of the built-in split are off by 5 and
@@ -142,6 +143,27 @@ class ContactPair(Value):
             origin = origin.changed(friction=k) if k <= MOST_FRICTION else None
         return replace(self, friction=k, problem=origin)
 
+    def changed(self, **values: Any) -> ContactPair:
+        """The pair of its problem with other values, which are those of :meth:`verification.Problem.changed`.
+
+        What is condensed is shared: a body is condensed anew only where its mesh, its supports or its Poisson ratio
+        change.  Young's modulus multiplies its stiffness.  A law of friction of its own stays unless ``law`` or
+        ``radius`` is given; the settings are those of the changed problem.
+
+        Raises
+        ------
+        ProblemError
+            Naming the key as the problem file has it.
+        ValueError
+            The pair is made from matrices.
+        """
+        if self.problem is None:
+            raise ValueError("this pair is made from matrices: needed a problem, whose values can change")
+        from verification.interface.assembly import build  # it makes pairs
+
+        law = None if {"law", "radius"} & values.keys() else self.interface.law
+        return build(self.problem.changed(**values), law=law, like=self)
+
     def swapped(self) -> ContactPair:
         """The same bodies with the roles exchanged; what is condensed is shared.
 
@@ -210,10 +232,15 @@ class ContactPair(Value):
         force : array
             On the Neumann grid; sigma_N are its normal components.
         """
-        grid = self.interface.contact
         if not self.rubs:
-            return np.zeros(grid.t)
-        return np.asarray(float(self.friction) * grid.weights * np.abs(self.interface.stress(force)))
+            return np.zeros(self.interface.contact.t)
+        return np.asarray(self._limits * np.abs(self.interface.stress(force)))
+
+    @cached_property
+    def _limits(self) -> Floats:
+        """``w_j k``."""
+        limits: Floats = freeze(float(self.friction) * self.interface.contact.weights)
+        return limits
 
     @property
     def outside(self) -> list[str]:

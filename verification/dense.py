@@ -1,0 +1,59 @@
+"""Products and solves with dense symmetric matrices by BLAS itself, for what is done at every step of the iteration.
+
+The checks at the doors of numpy and scipy cost more than a product of a hundred rows.  Matrices and vectors are checked
+where they come in; here nothing is.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg.blas import dsymv, dtrsv
+
+from fem1d2d.mesh import Floats, Ints
+
+
+def times(S: Floats, v: Floats) -> Floats:
+    """``S v`` for a symmetric S, of which one triangle is read: half the memory of a general product."""
+    product: Floats = dsymv(1.0, S if S.flags.f_contiguous else S.T, v)  # a transpose is no copy
+    return product
+
+
+def worst(values: Floats) -> float:
+    """The largest of some numbers and 0; not a number where one is none."""
+    return float(np.maximum.reduce(values, initial=0.0))
+
+
+class Cholesky:
+    """``S^-1`` on some rows of a symmetric S that is positive definite there, 0 on the others.
+
+    Parameters
+    ----------
+    S : array, shape (n, n)
+    rows : int array
+        May be all, or none.
+    """
+
+    def __init__(self, S: Floats, rows: Ints) -> None:
+        self._rows, self._all = rows, len(rows) == len(S)
+        self._factor = None
+        if len(rows):
+            block = S if self._all else S[np.ix_(rows, rows)]
+            self._factor = np.asfortranarray(cho_factor(block)[0])
+
+    def solve(self, right: Floats) -> Floats:
+        """``S^-1 right`` for a vector, shape (n,), or columns, shape (n, m)."""
+        if self._all:
+            return self._back(right)
+        result = np.zeros(right.shape)
+        if self._factor is not None:
+            result[self._rows] = self._back(right[self._rows])
+        return result
+
+    def _back(self, right: Floats) -> Floats:
+        found: Floats
+        if right.ndim == 1:  # LAPACK's own solve is written for many columns, and takes three times as long for one
+            found = dtrsv(self._factor, dtrsv(self._factor, right, trans=1), overwrite_x=1)
+        else:
+            found = np.ascontiguousarray(cho_solve((self._factor, False), right, check_finite=False))
+        return found
