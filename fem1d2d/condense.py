@@ -60,16 +60,26 @@ class Condensation:
     @cached_property
     def lift(self) -> Floats:
         """``-A_II^-1 A_IB``, shape (n - b, b): dense, and large where the body is; nothing else here needs it."""
-        lift: Floats = -self._solve_inside(self._coupling.toarray())
+        lift = -self._solve_inside(self._coupling.toarray())
         lift.setflags(write=False)
         return lift
 
     @cached_property
     def schur(self) -> Floats:
         """``A_BB + A_BI lift``, shape (b, b)."""
-        schur: Floats = self._eliminate(self.matrix)
-        schur.setflags(write=False)
-        return schur
+        if len(self.inside) == 0:
+            return _symmetric(self.matrix[:, self.interface][self.interface].toarray())
+        return self._rest(_factor(self.matrix, self.order))
+
+    def solver(self) -> Callable[[Floats], Floats]:
+        """``load -> A^-1 load`` on all unknowns, as :func:`solver`; its factorisation gives the Schur complement too.
+
+        The factorisation lives as long as what is returned: it is the largest part of the memory.
+        """
+        factor = _factor(self.matrix, self.order)
+        if len(self.inside):
+            self.schur = self._rest(factor)
+        return _solving(factor, self.order)
 
     def on_lifts(self, form: sp.csc_array) -> Floats:
         """``R' X R``, shape (b, b): a symmetric form X on all unknowns, evaluated at lifted interface values.
@@ -79,19 +89,14 @@ class Condensation:
         factorisation gives all entries to rounding.
         """
         step = STEP * _power_of_two(self.matrix) / _power_of_two(form)
-        return np.asarray(self._eliminate(self.matrix + 1j * step * form).imag / step)
+        return self._rest(_factor(self.matrix + 1j * step * form, self.order)).imag / step
 
-    def _eliminate(self, matrix: sp.csc_array) -> NDArray[Any]:
-        """``X_BB - X_BI X_II^-1 X_IB`` of a matrix X: what the elimination of I leaves on B."""
-        if len(self.inside) == 0:
-            rest = matrix[:, self.interface][self.interface].toarray()
-        else:
-            factor = _factor(matrix, self.order)
-            # the last rows and columns, unless SuperLU moved some that do not depend on each other
-            last = factor.perm_c[len(self.inside) :]
-            L, U = (part[:, last][last].toarray() for part in (factor.L, factor.U))
-            rest = L @ U
-        return (rest + rest.T) / 2
+    def _rest(self, factor: Any) -> NDArray[Any]:
+        """``X_BB - X_BI X_II^-1 X_IB`` of a factorised matrix X: what the elimination of I leaves on B."""
+        # the last rows and columns, unless SuperLU moved some that do not depend on each other
+        last = factor.perm_c[len(self.inside) :]
+        L, U = (part[:, last][last].toarray() for part in (factor.L, factor.U))
+        return _symmetric(L @ U)
 
     def condense(self, load: Floats) -> Floats:
         """The load as the interface feels it: ``load_B + lift' load_I``, shape (b,)."""
@@ -107,6 +112,13 @@ class Condensation:
         inner = -(self._coupling @ trace)
         full[self.inside] = self._solve_inside(inner if load is None else inner + load[self.inside])
         return full
+
+
+def _symmetric(matrix: NDArray[Any]) -> NDArray[Any]:
+    """The symmetric part, read-only."""
+    result: NDArray[Any] = (matrix + matrix.T) / 2
+    result.setflags(write=False)
+    return result
 
 
 def _power_of_two(matrix: sp.csc_array) -> float:
@@ -151,8 +163,11 @@ def solver(matrix: sp.csc_array, order: Ints | None = None) -> Callable[[Floats]
     """
     if matrix.shape[0] == 0:
         return lambda right: right
+    return _solving(_factor(matrix, order), order)
+
+
+def _solving(factor: Any, order: Ints | None) -> Callable[[Floats], Floats]:
     rows = slice(None) if order is None else order
-    factor = _factor(matrix, order)
 
     def solve(right: Floats) -> Floats:
         result = np.empty(right.shape)

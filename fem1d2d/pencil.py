@@ -82,7 +82,7 @@ def largest_sparse(
     if n <= DENSE:
         return largest(A.toarray(), B.toarray())
     inverse = LinearOperator((n, n), matvec=solve_B, dtype=float)
-    options = {"k": 1, "M": B, "tol": LANCZOS, "ncv": min(n - 1, 32)}
+    options = {"k": 1, "M": B, "tol": LANCZOS, "ncv": min(n - 1, 24)}
     if above is None:
         options |= {"Minv": inverse, "which": "LA"}
     else:

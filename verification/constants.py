@@ -315,7 +315,7 @@ def _body(body: Body) -> BodyConstants:
     A, H = body.stiffness, body.gram_matrix
     smallest = largest_sparse(H, A, solver(A, body.order))  # 1/m, so that products with A^-1 find it
     above = body.material.continuity(body.mesh.dimension)
-    biggest = largest_sparse(A, H, solver(H, body.order), above=above, order=body.order)
+    biggest = largest_sparse(A, H, body.gram.solver(), above=above, order=body.order)
     return BodyConstants(
         m=Number.of_float(1 / smallest.value),
         M=Number.of_float(biggest.value),

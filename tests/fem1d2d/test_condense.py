@@ -205,6 +205,17 @@ def test_matrices_of_one_mesh_share_an_order_of_elimination(body, seed):
     )
 
 
+@fewer(4, at_night=1)
+@given(condensed_bodies(), st.integers(0, 2**16))
+def test_the_solver_of_a_condensation_solves_the_whole_system_and_leaves_its_schur_complement(case, seed):
+    matrix, interface = case
+    load = np.random.default_rng(seed).standard_normal(matrix.shape[0])
+    one, other = Condensation(matrix, interface), Condensation(matrix, interface)
+    x = one.solver()(load)
+    assert norm(matrix @ x - load) <= len(load) * EPS * (norm(matrix.toarray()) * norm(x) + norm(load))
+    assert np.array_equal(one.schur, other.schur)
+
+
 def test_an_interface_longer_than_a_block_of_right_hand_sides_is_condensed_whole():
     mesh = rectangle((0.0, 4.0), (0.0, 1.0), (2 * BLOCK, 2))
     matrix = gram(mesh)[::2, ::2].tocsc()
