@@ -4,7 +4,7 @@ A small core in which every matrix is exact for its mesh.  It knows nothing of c
 """
 
 from fem1d2d.assembly import body_load, gram, side_load, stiffness
-from fem1d2d.condense import Condensation, solver
+from fem1d2d.condense import Condensation, elimination_order, solver
 from fem1d2d.material import Material, bar, plane_strain
 from fem1d2d.mesh import Mesh, MeshError, interval, rectangle
 from fem1d2d.mesh_files import from_file
@@ -21,6 +21,7 @@ __all__ = [
     "Supports",
     "bar",
     "body_load",
+    "elimination_order",
     "facing",
     "from_file",
     "gram",

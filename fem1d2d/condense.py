@@ -1,18 +1,26 @@
-"""Factor once, then everything on the interface: Schur complement, lift, condensed loads."""
+"""Factor once, then everything on the interface: Schur complement, forms on lifts, condensed loads."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.linalg import splu
+from numpy.typing import NDArray
+from scipy.sparse.linalg import spilu, splu
 
 from fem1d2d.mesh import Floats, Ints
 
 #: Right-hand sides solved at once; more of them leave the cache.
 BLOCK = 16
+
+#: SuperLU for a matrix whose diagonal can be trusted as pivots.
+SYMMETRIC: dict[str, Any] = {"diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
+
+#: The step of a derivative taken along the imaginary axis, relative to the matrix: its square is far below rounding.
+STEP = 2.0**-70
 
 
 class Condensation:
@@ -26,54 +34,127 @@ class Condensation:
     matrix : sparse array, shape (n, n)
     interface : int array, shape (b,)
         Positions of B, in the order wanted on the interface.
+    order : int array, shape (n,), optional
+        An order of elimination that ends with the interface, as :func:`elimination_order` finds it; matrices of one
+        mesh can share it.
     """
 
-    def __init__(self, matrix: sp.csc_array, interface: Ints) -> None:
+    def __init__(self, matrix: sp.csc_array, interface: Ints, order: Ints | None = None) -> None:
         self.matrix = matrix
         self.interface = interface
+        self.order = elimination_order(matrix, interface) if order is None else order
         inside = np.ones(matrix.shape[0], dtype=bool)
         inside[interface] = False
         self.inside: Ints = np.flatnonzero(inside)
-        self._columns = matrix[:, interface]
-        self._solve_inside = solver(matrix[self.inside][:, self.inside])
+
+    @cached_property
+    def _coupling(self) -> sp.csc_array:
+        """``A_IB``."""
+        return self.matrix[:, self.interface][self.inside]
+
+    @cached_property
+    def _solve_inside(self) -> Callable[[Floats], Floats]:
+        order = np.searchsorted(self.inside, self.order[: len(self.inside)])
+        return solver(self.matrix[:, self.inside][self.inside], order)
 
     @cached_property
     def lift(self) -> Floats:
-        """``-A_II^-1 A_IB``, shape (n - b, b): dense, and large where the body is."""
-        lift: Floats = -self._solve_inside(self._columns[self.inside].toarray())
+        """``-A_II^-1 A_IB``, shape (n - b, b): dense, and large where the body is; nothing else here needs it."""
+        lift = -self._solve_inside(self._coupling.toarray())
         lift.setflags(write=False)
         return lift
 
     @cached_property
     def schur(self) -> Floats:
-        """``A_BB + A_BI lift``, shape (b, b), a few columns at a time where the lift itself was not asked for."""
-        schur: Floats = self._columns[self.interface].toarray()
-        coupling = self._columns[self.inside]
-        if "lift" in self.__dict__:
-            schur += coupling.T @ self.lift
-        else:
-            for i in range(0, schur.shape[1], BLOCK):
-                schur[:, i : i + BLOCK] -= coupling.T @ self._solve_inside(coupling[:, i : i + BLOCK].toarray())
-        schur = (schur + schur.T) / 2
-        schur.setflags(write=False)
-        return schur
+        """``A_BB + A_BI lift``, shape (b, b)."""
+        if len(self.inside) == 0:
+            return _symmetric(self.matrix[:, self.interface][self.interface].toarray())
+        return self._rest(_factor(self.matrix, self.order))
+
+    def solver(self) -> Callable[[Floats], Floats]:
+        """``load -> A^-1 load`` on all unknowns, as :func:`solver`; its factorisation gives the Schur complement too.
+
+        The factorisation lives as long as what is returned: it is the largest part of the memory.
+        """
+        factor = _factor(self.matrix, self.order)
+        if len(self.inside):
+            self.schur = self._rest(factor)
+        return _solving(factor, self.order)
+
+    def on_lifts(self, form: sp.csc_array) -> Floats:
+        """``R' X R``, shape (b, b): a symmetric form X on all unknowns, evaluated at lifted interface values.
+
+        It is the derivative of the Schur complement of ``A + t X`` at t = 0: the lift minimises the energy, so that its
+        own change does not count.  The step is taken along the imaginary axis, where no difference cancels, and one
+        factorisation gives all entries to rounding.
+        """
+        step = STEP * _power_of_two(self.matrix) / _power_of_two(form)
+        return self._rest(_factor(self.matrix + 1j * step * form, self.order)).imag / step
+
+    def _rest(self, factor: Any) -> NDArray[Any]:
+        """``X_BB - X_BI X_II^-1 X_IB`` of a factorised matrix X: what the elimination of I leaves on B."""
+        # the last rows and columns, unless SuperLU moved some that do not depend on each other
+        last = factor.perm_c[len(self.inside) :]
+        L, U = (part[:, last][last].toarray() for part in (factor.L, factor.U))
+        return _symmetric(L @ U)
 
     def condense(self, load: Floats) -> Floats:
         """The load as the interface feels it: ``load_B + lift' load_I``, shape (b,)."""
-        return np.asarray(load[self.interface] + self.lift.T @ load[self.inside])
+        inner = load[self.inside]
+        if not inner.any():  # without a load there is nothing to factorise for
+            return np.asarray(load[self.interface])
+        return np.asarray(load[self.interface] - self._coupling.T @ self._solve_inside(inner))
 
     def extend(self, trace: Floats, load: Floats | None = None) -> Floats:
         """Values on all unknowns with the given interface values, in equilibrium with ``load`` inside, shape (n,)."""
         full = np.empty(self.matrix.shape[0])
         full[self.interface] = trace
-        full[self.inside] = self.lift @ trace
-        if load is not None:
-            full[self.inside] += self._solve_inside(load[self.inside])
+        inner = -(self._coupling @ trace)
+        full[self.inside] = self._solve_inside(inner if load is None else inner + load[self.inside])
         return full
 
 
-def solver(matrix: sp.csc_array) -> Callable[[Floats], Floats]:
+def _symmetric(matrix: NDArray[Any]) -> NDArray[Any]:
+    """The symmetric part, read-only."""
+    result: NDArray[Any] = (matrix + matrix.T) / 2
+    result.setflags(write=False)
+    return result
+
+
+def _power_of_two(matrix: sp.csc_array) -> float:
+    """The power of two next above the largest entry, so that scaling by it rounds nothing."""
+    return float(np.ldexp(1.0, int(np.frexp(np.abs(matrix.data).max(initial=0.0))[1])))
+
+
+def elimination_order(matrix: sp.csc_array, interface: Ints) -> Ints:
+    """An order of elimination with little fill: the unknowns inside, then those of the interface, shape (n,).
+
+    Only the pattern of the matrix counts.
+    """
+    inside = np.delete(np.arange(matrix.shape[0]), interface)
+    if len(inside) == 0:
+        return interface
+    inner = matrix[:, inside][inside]
+    # an incomplete factorisation that drops everything costs little more than the order it finds
+    found = spilu(inner, drop_tol=1.0, fill_factor=1.0, permc_spec="MMD_AT_PLUS_A", **SYMMETRIC)
+    return np.concatenate([inside[np.argsort(found.perm_c)], interface])
+
+
+def _factor(matrix: sp.csc_array, order: Ints | None) -> Any:
+    """``L U`` of the matrix with its unknowns in the given order; without one, in an order that SuperLU finds."""
+    if order is None:
+        return splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", **SYMMETRIC)
+    return splu(matrix[:, order][order].tocsc(), permc_spec="NATURAL", **SYMMETRIC)
+
+
+def solver(matrix: sp.csc_array, order: Ints | None = None) -> Callable[[Floats], Floats]:
     """Factorise a symmetric positive definite matrix once.
+
+    Parameters
+    ----------
+    matrix : sparse array, shape (n, n)
+    order : int array, shape (n,), optional
+        An order of elimination that is known already.
 
     Returns
     -------
@@ -82,15 +163,19 @@ def solver(matrix: sp.csc_array) -> Callable[[Floats], Floats]:
     """
     if matrix.shape[0] == 0:
         return lambda right: right
-    options = {"SymmetricMode": True}
-    factor = splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+    return _solving(_factor(matrix, order), order)
+
+
+def _solving(factor: Any, order: Ints | None) -> Callable[[Floats], Floats]:
+    rows = slice(None) if order is None else order
 
     def solve(right: Floats) -> Floats:
+        result = np.empty(right.shape)
         if right.ndim == 1:
-            return np.asarray(factor.solve(right))
-        if right.shape[1] == 0:
-            return right
-        blocks = range(0, right.shape[1], BLOCK)
-        return np.concatenate([factor.solve(right[:, i : i + BLOCK]) for i in blocks], axis=1)
+            result[rows] = factor.solve(right[rows])
+        else:
+            for i in range(0, right.shape[1], BLOCK):
+                result[rows, i : i + BLOCK] = factor.solve(right[rows, i : i + BLOCK])
+        return result
 
     return solve

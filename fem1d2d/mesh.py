@@ -92,9 +92,9 @@ class Mesh:
         why = overlap.fault(points, boundary) if points.shape[1] == 2 else _line_fault(points, cells)
         if why:
             raise MeshError(why)
-        on_boundary = _undirected(boundary, len(points))
+        on_boundary = undirected(boundary, len(points))
         for name, facets in sides.items():
-            named = _undirected(facets, len(points))
+            named = undirected(facets, len(points))
             wrong = ~np.isin(named, on_boundary)
             if wrong.any():
                 inside = _where(points, facets[int(np.argmax(wrong))])
@@ -146,7 +146,7 @@ def _where(points: NDArray[Any], facet: Ints) -> str:
     return f"at {ends[0]}" if len(ends) == 1 else f"from {ends[0]} to {ends[1]}"
 
 
-def _undirected(facets: Ints, nodes: int) -> Ints:
+def undirected(facets: Ints, nodes: int) -> Ints:
     """One number for each facet, whatever its direction."""
     return np.asarray(facets.min(axis=1) * nodes + facets.max(axis=1) if facets.shape[1] == 2 else facets[:, 0])
 
@@ -166,9 +166,9 @@ def _boundary(points: NDArray[Any], cells: Ints) -> Ints:
     else:
         facets = edges(cells)
         forwards = (facets[:, 0] < facets[:, 1]).astype(np.int64)
-    directed = np.sort(2 * _undirected(facets, n) + forwards)
+    directed = np.sort(2 * undirected(facets, n) + forwards)
     if (directed[1:] == directed[:-1]).any():
-        _, inverse, count = np.unique(2 * _undirected(facets, n) + forwards, return_inverse=True, return_counts=True)
+        _, inverse, count = np.unique(2 * undirected(facets, n) + forwards, return_inverse=True, return_counts=True)
         facet = int(np.argmax((count > 1)[inverse]))
         one, other = np.flatnonzero(inverse == inverse[facet])[:2] % len(cells)
         if set(cells[one].tolist()) == set(cells[other].tolist()):

@@ -11,7 +11,7 @@ from scipy.linalg import cho_factor, cho_solve, eigh
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from fem1d2d.condense import solver
-from fem1d2d.mesh import Floats
+from fem1d2d.mesh import Floats, Ints
 
 #: Up to this size a pencil is solved densely.
 DENSE = 40
@@ -61,7 +61,12 @@ def largest(A: Floats, B: Floats) -> Eigenvalue:
 
 
 def largest_sparse(
-    A: sp.csc_array, B: sp.csc_array, solve_B: Callable[[Floats], Floats], *, above: float | None = None
+    A: sp.csc_array,
+    B: sp.csc_array,
+    solve_B: Callable[[Floats], Floats],
+    *,
+    above: float | None = None,
+    order: Ints | None = None,
 ) -> Eigenvalue:
     """Largest eigenvalue of a large pencil by Lanczos, from a fixed start, so that it repeats to the digit.
 
@@ -73,16 +78,18 @@ def largest_sparse(
         ``r -> B^-1 r``.
     above : float, optional
         An upper bound of the spectrum: eigenvalues that crowd below it are told apart by their distance to it.
+    order : int array, shape (n,), optional
+        An order of elimination for ``above * B - A``, see :func:`fem1d2d.condense.elimination_order`.
     """
     n = A.shape[0]
     if n <= DENSE:
         return largest(A.toarray(), B.toarray())
     inverse = LinearOperator((n, n), matvec=solve_B, dtype=float)
-    options = {"k": 1, "M": B, "tol": LANCZOS, "ncv": min(n - 1, 32)}
+    options = {"k": 1, "M": B, "tol": LANCZOS, "ncv": min(n - 1, 24)}
     if above is None:
         options |= {"Minv": inverse, "which": "LA"}
     else:
-        nearest = solver(above * B - A)
+        nearest = solver(above * B - A, order)
         distance = LinearOperator((n, n), matvec=lambda r: -nearest(r), dtype=float)
         options |= {"sigma": above, "OPinv": distance, "which": "LM"}
     start = np.random.default_rng(0).standard_normal(n)

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from fem1d2d.mesh import Floats, Mesh, MeshError, edges, remade
+from fem1d2d.mesh import Floats, Mesh, MeshError, edges, remade, undirected
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,7 +100,7 @@ def rigid_motions(mesh: Mesh, known: NDArray[np.bool_]) -> Floats:
         size = np.abs(centred).max()
         modes[:, 0, 2], modes[:, 1, 2] = -centred[:, 1] / size, centred[:, 0] / size
     per_piece = modes.shape[2]
-    pairs = np.unique(np.column_stack([mesh.cells.ravel(), np.repeat(piece, mesh.cells.shape[1])]), axis=0)
+    pairs = np.column_stack(np.divmod(np.unique(mesh.cells * pieces + piece[:, None]), pieces))
     home = np.full(n, -1)  # one piece of each node; the others must agree with it there
     home[pairs[::-1, 0]] = pairs[::-1, 1]
     conditions = []
@@ -128,9 +128,12 @@ def rigid_motions(mesh: Mesh, known: NDArray[np.bool_]) -> Floats:
 
 def _pieces(mesh: Mesh) -> NDArray[np.int64]:
     """The piece of each cell, shape (c,): cells that share a facet lie in the same one."""
-    c, corners = mesh.cells.shape
+    c = len(mesh.cells)
     facets = mesh.cells.T.reshape(-1, 1) if mesh.dimension == 1 else edges(mesh.cells)
-    _, facet = np.unique(np.sort(facets, axis=1), axis=0, return_inverse=True)
-    touches = sp.coo_array((np.ones(c * corners), (np.tile(np.arange(c), corners), facet.ravel())))
-    _, piece = connected_components(touches @ touches.T, directed=False)
+    facet = undirected(facets, len(mesh.points))
+    order = np.argsort(facet, kind="stable")  # cells that share a facet come to stand side by side
+    shared = facet[order[1:]] == facet[order[:-1]]
+    one, other = order[:-1][shared] % c, order[1:][shared] % c
+    touches = sp.coo_array((np.ones(len(one)), (one, other)), shape=(c, c))
+    _, piece = connected_components(touches, directed=False)
     return np.asarray(piece, dtype=np.int64)

@@ -313,8 +313,9 @@ def _measure(pair: ContactPair) -> Measured:
 
 def _body(body: Body) -> BodyConstants:
     A, H = body.stiffness, body.gram_matrix
-    smallest = largest_sparse(H, A, body.solve)  # 1/m, so that products with A^-1 find it
-    biggest = largest_sparse(A, H, solver(H), above=body.material.continuity(body.mesh.dimension))
+    smallest = largest_sparse(H, A, solver(A, body.order))  # 1/m, so that products with A^-1 find it
+    above = body.material.continuity(body.mesh.dimension)
+    biggest = largest_sparse(A, H, body.gram.solver(), above=above, order=body.order)
     return BodyConstants(
         m=Number.of_float(1 / smallest.value),
         M=Number.of_float(biggest.value),

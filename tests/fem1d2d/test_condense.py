@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import fewer, held_bodies, numbers, powers_of_two
 
-from fem1d2d import Condensation, bar, gram, interval, rectangle, solver, stiffness
+from fem1d2d import Condensation, bar, elimination_order, gram, interval, rectangle, solver, stiffness
 from fem1d2d.condense import BLOCK
 
 EPS = np.finfo(float).eps
@@ -123,6 +123,22 @@ def test_condensed_loads_extensions_and_solves_are_those_of_the_whole_system(cas
     assert norm(A @ solution - load) <= 4 * n * EPS * norm(A) * (1 + norm(solution))
 
 
+@given(definite(), st.integers(0, 2**16))
+def test_a_form_on_lifts_is_its_product_with_the_lift_of_elimination_in_rationals(case, seed):
+    A, floats, interface = case
+    n = len(A)
+    G = np.random.default_rng(seed).integers(-4, 5, (n, n))
+    X = G + G.T
+    R = fem_oracle.zeros(n, len(interface))
+    R[interface, np.arange(len(interface))] = 1
+    R[fem_oracle.inner(n, interface)] = fem_oracle.lift(A, interface)
+    exact = R.T @ fem_oracle.exactly(X) @ R
+    found = Condensation(floats, interface).on_lifts(sp.csc_array(X.astype(float)))
+    cond = np.linalg.cond(A.astype(float))
+    assert norm(fem_oracle.exactly(found) - exact) <= n * EPS * cond * norm(X) * norm(R) ** 2
+    assert np.array_equal(found, found.T)
+
+
 # --- on elastic bodies, against dense linear algebra ------------------------------------------------------------------
 
 
@@ -150,12 +166,54 @@ def test_a_condensed_body_is_its_dense_schur_complement(case):
 
 @fewer(4, at_night=1)
 @given(condensed_bodies())
-def test_the_schur_complement_is_the_same_whether_or_not_the_lift_was_asked_for_first(case):
+def test_the_matrix_itself_on_lifts_is_its_schur_complement(case):
     matrix, interface = case
+    found = Condensation(matrix, interface)
+    assert norm(found.on_lifts(matrix) - found.schur) <= rounding(matrix.toarray(), found.lift)
+
+
+@fewer(4, at_night=1)
+@given(held_bodies(3), st.integers(0, 2**16), powers_of_two(-40, 40))
+def test_the_norm_of_the_elastic_lift_is_read_off_one_factorisation(body, seed, unit):
+    """In any unit of stress."""
+    mesh, material, free = body
+    A, H = (matrix[free][:, free].tocsc() for matrix in (stiffness(mesh, material) * float(unit), gram(mesh)))
+    interface = np.random.default_rng(seed).permutation(len(free))[: (len(free) + 1) // 2]
+    found = Condensation(A, interface)
+    fields = np.zeros((len(free), len(interface)))
+    fields[interface, np.arange(len(interface))] = 1
+    fields[found.inside] = dense_lift(A.toarray(), interface)
+    slack = len(free) * EPS * np.linalg.cond(A.toarray()) * norm(H.toarray()) * norm(fields) ** 2
+    assert norm(found.on_lifts(H) - fields.T @ H @ fields) <= slack
+
+
+@fewer(4, at_night=1)
+@given(held_bodies(3), st.integers(0, 2**16))
+def test_matrices_of_one_mesh_share_an_order_of_elimination(body, seed):
+    mesh, material, free = body
+    A, H = (matrix[free][:, free].tocsc() for matrix in (stiffness(mesh, material), gram(mesh)))
+    interface = np.random.default_rng(seed).permutation(len(free))[: (len(free) + 1) // 2]
+    order = elimination_order(A, interface)
+    assert sorted(order) == list(range(len(free)))
+    assert order[len(free) - len(interface) :].tolist() == interface.tolist()
+    shared, own = Condensation(H, interface, order), Condensation(H, interface)
+    assert norm(shared.schur - own.schur) <= rounding(H.toarray(), own.lift)
+    assert norm(shared.lift - own.lift) <= rounding(H.toarray(), own.lift)
+    load = np.arange(1.0, len(free) + 1)
+    assert norm(H @ solver(H, order)(load) - load) <= len(free) * EPS * (
+        norm(H.toarray()) * norm(solver(H, order)(load)) + norm(load)
+    )
+
+
+@fewer(4, at_night=1)
+@given(condensed_bodies(), st.integers(0, 2**16))
+def test_the_solver_of_a_condensation_solves_the_whole_system_and_leaves_its_schur_complement(case, seed):
+    matrix, interface = case
+    load = np.random.default_rng(seed).standard_normal(matrix.shape[0])
     one, other = Condensation(matrix, interface), Condensation(matrix, interface)
-    lift = other.lift
-    assert norm(one.schur - other.schur) <= rounding(matrix.toarray(), lift)
-    assert norm(one.lift - lift) <= rounding(matrix.toarray(), lift)
+    x = one.solver()(load)
+    assert norm(matrix @ x - load) <= len(load) * EPS * (norm(matrix.toarray()) * norm(x) + norm(load))
+    assert np.array_equal(one.schur, other.schur)
 
 
 def test_an_interface_longer_than_a_block_of_right_hand_sides_is_condensed_whole():

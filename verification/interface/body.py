@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.linalg import cholesky, qr
 
-from fem1d2d import Condensation, Material, Mesh, Supports, solver
+from fem1d2d import Condensation, Material, Mesh, Supports, elimination_order, solver
 from fem1d2d.mesh import Floats, Ints
 from verification.dense import Cholesky
 from verification.interface.grid import Grid
@@ -92,32 +92,25 @@ class Body(Value):
         return solve
 
     @cached_property
+    def order(self) -> Ints:
+        """An order of elimination that ends with the interface, one for all matrices of the mesh."""
+        return elimination_order(self.stiffness, self.interface)
+
+    @cached_property
     def elastic(self) -> Condensation:
         """The stiffness matrix condensed onto the interface."""
-        with one_thread():
-            condensed = Condensation(self.stiffness, self.interface)
-            condensed.lift  # noqa: B018  loads need it too: once for both
-            return condensed
+        return Condensation(self.stiffness, self.interface, self.order)
 
     @cached_property
     def gram(self) -> Condensation:
         """The Gram matrix condensed onto the interface."""
-        with one_thread():
-            return Condensation(self.gram_matrix, self.interface)
-
-    def on_lifts(self, matrix: sp.csc_array) -> Floats:
-        """``R_a' X R_a``: a symmetric form on the unknowns, evaluated at the lifts of interface vectors."""
-        inside, interface, lift = self.elastic.inside, self.elastic.interface, self.elastic.lift
-        cross = matrix[interface][:, inside] @ lift
-        inner = lift.T @ (matrix[inside][:, inside] @ lift)
-        product = matrix[interface][:, interface].toarray() + cross + cross.T + inner
-        return np.asarray((product + product.T) / 2)
+        return Condensation(self.gram_matrix, self.interface, self.order)
 
     @cached_property
     def lift_gram(self) -> Floats:
         """``N_a = R_a' H_a R_a``: the H1 norm squared of the elastic lift (4.5), on the free components."""
         with one_thread():
-            gram: Floats = freeze(self.on_lifts(self.gram_matrix))
+            gram: Floats = freeze(self.elastic.on_lifts(self.gram_matrix))
         return gram
 
     def times_as_stiff(self, other: Body) -> float | None:
@@ -198,8 +191,9 @@ class Condensed(Value):
         rows = np.flatnonzero(body.unknown)
         size = len(body.unknown)
         matrix, load = np.zeros((size, size)), np.zeros(size)
-        matrix[np.ix_(rows, rows)] = elastic.schur if times is None else times * elastic.schur
-        load[rows] = elastic.condense(body.load)
+        with one_thread():
+            matrix[np.ix_(rows, rows)] = elastic.schur if times is None else times * elastic.schur
+            load[rows] = elastic.condense(body.load)
         return cls(grid=grid, stiffness=matrix, load=load, known=body.known_trace, free=body.unknown.copy(), body=body)
 
     def turned(self) -> Condensed:
@@ -270,7 +264,8 @@ class Condensed(Value):
         ValueError
             Only matrices are known.
         """
-        gram: Floats = freeze(self.orient_form(self.mesh_body.gram.schur))
+        with one_thread():
+            gram: Floats = freeze(self.orient_form(self.mesh_body.gram.schur))
         return gram
 
     @cached_property
