@@ -65,9 +65,7 @@ def test_the_quadratic_solved_for_the_interval_is_the_highest_line_times_2_minus
     assert zero(highest - line(VERTEX, theta))
 
 
-def test_the_quadratic_solved_for_the_interval_tells_the_friction_number_at_0_and_has_a_short_discriminant(
-    coefficients,
-):
+def test_the_quadratic_solved_for_the_interval_tells_the_friction_number_at_0_and_has_a_short_discriminant():
     a, b, c = sharp.end_quadratic(*DATA)
     assert zero(c - 4 * (sharp.friction_number(*FRICTION) - 1))
     assert not zero(c - 2 * (sharp.friction_number(*FRICTION) - 1))

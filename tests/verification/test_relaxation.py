@@ -309,7 +309,7 @@ def test_no_rule_knows_the_units(relaxation, stress, length):
         other = build(in_units(pair.problem, stress, length))
         steps = [RULES[relaxation].begin(p, theta, measured.rho_max.value) for p in (pair, other)]
         norm = pair.neumann.dual_norm
-        both = [islice(iterates(FixedPointMap(p, "cvxpy"), s), 8) for p, s in zip((pair, other), steps, strict=True)]
+        both = [islice(iterates(FixedPointMap(p, "auto"), s), 8) for p, s in zip((pair, other), steps, strict=True)]
         size = 0.0
         for one, two in zip(*both, strict=True):
             size = max(size, norm(one.g), one.size)

@@ -131,7 +131,7 @@ def verify(
 
     Examples
     --------
-    >>> [row.verdict for row in verify(["5.12", "5.42"]).rows]
+    >>> [row.verdict for row in verify(["C1", "5.42"]).rows]
     ['PROVED', 'REPAIRED']
     """
     known = statements()
