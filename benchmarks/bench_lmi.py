@@ -1,51 +1,111 @@
-"""The semidefinite bound by SCS and by Clarabel, in turn, and what it adds to `compare` on the model of Section 6.
+"""The semidefinite bound: one program beside cvxpy's and SCS's, the whole of it, and the losses, on Section 6.
 
-Wanted: the certified factors agree to 1e-3, and SCS at 13 contact nodes is no slower than Clarabel.
+Wanted: one program under 0.1 s at 25 contact nodes and under 3 s at 97, factor, largest theta and threshold under 0.7 s
+at 25, the losses under 0.5 s, and the values of both solvers within 1e-3.  CPU time, one BLAS thread, medians, in turn.
+
+With --random N: how close branch and bound brings both bounds of the Lipschitz constant on N random problems.
 """
 
+import argparse
 import statistics
 import time
-import tomllib
 from collections.abc import Callable
-from dataclasses import replace
-from decimal import Decimal
 from typing import Any
 
-import verification as vf
-from verification.bounds import semidefinite as lmi
-from verification.cli.problems import examples
-from verification.interface.assembly import build
+import numpy as np
 
-problem = vf.Problem.from_dict(tomllib.loads(examples()["section6"], parse_float=Decimal))
-coarse = replace(problem, body1=replace(problem.body1, cells=(20, 3)), body2=replace(problem.body2, cells=(12, 3)))
+import verification as vf
+from verification.bounds import interior_point, model
+from verification.bounds.exact import GAP, budget, enclose
+from verification.bounds.losses import locate
+from verification.bounds.multipliers import QuadraticForms, friction_threshold
+from verification.bounds.program import LMIError, Optimum, Program
+from verification.ledger.cases import problem as random_problem
+from verification.threads import one_thread
+
+THETA = 0.7
 
 
 def timed(call: Callable[[], Any]) -> tuple[float, Any]:
-    begin = time.perf_counter()
+    begin = time.process_time()
     result = call()
-    return time.perf_counter() - begin, result
+    return time.process_time() - begin, result
 
 
-def factor(problem: vf.Problem, small: int) -> tuple[float, float]:
-    """Seconds and the certified factor; forms of up to `small` rows go to Clarabel."""
-    pair = build(problem)
-    measured = vf.measure(pair)
-    lmi.SMALL = small
-    seconds, found = timed(lambda: lmi.QuadraticForms(pair, measured).factor(0.7))
-    return seconds, found.value
+def of_section_6(cells: int) -> tuple[vf.ContactPair, vf.Measured]:
+    """The model with so many cells on the upper body's side of Gamma_c, in the proportions of the built-in one."""
+    rows = max(cells // 4, 1)
+    pair = vf.build(vf.example("section6").changed(cells=((5 * cells // 3, rows), (cells, rows))))
+    return pair, vf.measure(pair)
+
+
+def one_program(cells: int, times: int) -> tuple[Program, float, Optimum]:
+    """The program of the factor, the seconds it takes, and what it finds."""
+    pair, measured = of_section_6(cells)
+    asked: list[Program] = []
+
+    def solve(program: Program) -> Optimum:
+        asked.append(program)
+        return interior_point.solve(program)
+
+    QuadraticForms(pair, measured, solver=solve).factor(THETA)
+    runs = [timed(lambda: interior_point.solve(asked[0])) for _ in range(times)]
+    return asked[0], statistics.median(seconds for seconds, _ in runs), runs[0][1]
+
+
+def whole(pair: vf.ContactPair, measured: vf.Measured) -> None:
+    forms = QuadraticForms(pair, measured)
+    forms.factor(THETA)
+    forms.largest_theta()
+    friction_threshold(pair, measured, measured.friction_threshold.value)
+
+
+def on_random_problems(count: int) -> None:
+    gaps, seconds = [], []
+    for seed in range(count):
+        random = np.random.default_rng(seed)
+        pair = vf.build(random_problem(random, None))
+        measured = vf.measure(pair)
+        theta = min(2 / (2 + measured.rho_max.value) * random.uniform(0.3, 1.1), 0.97)
+        allowed = budget(pair.contact.grid.n)
+        try:
+            spent, found = timed(
+                lambda pair=pair, measured=measured, theta=theta, allowed=allowed: enclose(
+                    pair, QuadraticForms(pair, measured), theta, gap=GAP, programs=allowed
+                )
+            )
+        except (LMIError, ValueError) as error:
+            print(f"problem {seed}: {error}")
+            continue
+        gaps.append(found.gap)
+        seconds.append(spent)
+        if found.gap > GAP:
+            print(f"problem {seed}: {pair.contact.grid.n} nodes, k = {float(pair.friction):g}, gap {found.gap:.1%}")
+    within = np.mean(np.array(gaps) <= GAP)
+    print(f"{len(gaps)} random problems  {within:.0%} within {GAP:.0%}, {max(seconds):.1f} s at most")
 
 
 if __name__ == "__main__":
-    factor(coarse, 0)  # imports
-    runs = [(factor(coarse, 0), factor(coarse, 1000)) for _ in range(5)]
-    scs, clarabel = (statistics.median(run[i][0] for run in runs) for i in (0, 1))
-    print(f"13 contact nodes     SCS {scs:.2f} s, Clarabel {clarabel:.2f} s, ratio {scs / clarabel:.2f}, wanted <= 1")
-    print(f"factors              {runs[0][0][1]:.5f}, {runs[0][1][1]:.5f}")
-    fine = [factor(problem, 0) for _ in range(3)]
-    print(f"25 contact nodes     SCS {statistics.median(seconds for seconds, _ in fine):.2f} s")
-    whole = [timed(lambda: vf.compare(problem))[0] for _ in range(3)]
-    alone = [timed(lambda: vf.run(problem))[0] for _ in range(3)]
-    print(f"compare, run alone   {statistics.median(whole):.1f} s, {statistics.median(alone):.2f} s (462 nodes)")
-    assert abs(runs[0][0][1] - runs[0][1][1]) < 1e-3
-    if scs > clarabel:
-        raise SystemExit(1)
+    arguments = argparse.ArgumentParser()
+    arguments.add_argument("--random", type=int, default=0)
+    chosen = arguments.parse_args()
+    with one_thread():
+        for cells, times in ((12, 9), (24, 9), (48, 5), (96, 3)):
+            program, seconds, found = one_program(cells, times)
+            print(f"{cells + 1:3d} contact nodes    {seconds:6.3f} s, {found.steps} steps, q = {found.s**0.5:.6f}")
+            if cells == 24:
+                other, answer = timed(
+                    lambda program=program: model.solve(program, solver="SCS", eps=1e-4, max_iters=20_000)
+                )
+                print(f"     cvxpy with SCS  {other:6.3f} s, {other / seconds:.0f} times, q = {answer.s**0.5:.6f}")
+                assert abs(answer.s - found.s) < 1e-3
+        pair, measured = of_section_6(24)
+        seconds = statistics.median(timed(lambda: whole(pair, measured))[0] for _ in range(5))
+        print(f"whole, 25 nodes      {seconds:.2f} s")
+        forms = QuadraticForms(pair, measured)
+        seconds, found = timed(lambda: enclose(pair, forms, THETA, gap=GAP, programs=budget(25)))
+        print(f"both bounds          {seconds:.2f} s, {found.programs} programs, gap {found.gap:.2%}")
+        seconds = statistics.median(timed(lambda: locate(pair, measured))[0] for _ in range(5))
+        print(f"losses               {seconds:.2f} s")
+        if chosen.random:
+            on_random_problems(chosen.random)

@@ -13,7 +13,7 @@ ROOMS = ("fem1d2d", "ndtheory", "verification")
 
 #: module: the modules and packages that alone may import it
 DOORS = {
-    "cvxpy": ("verification.contact.model", "verification.bounds.program"),
+    "cvxpy": ("verification.contact.model", "verification.bounds.model"),
     "matplotlib": ("verification.figures",),
     "click": ("verification.cli",),
     "rich": ("verification.cli",),
@@ -142,7 +142,7 @@ def test_a_forbidden_edge_is_found(module, source):
         ("verification", "importlib.import_module(f'verification.{home}')"),
         ("verification.compare", "import ndtheory, fem1d2d, numpy"),
         ("verification.contact.model", "import cvxpy"),
-        ("verification.bounds.program", "def f():\n    import cvxpy"),
+        ("verification.bounds.model", "def f():\n    import cvxpy"),
         ("verification.figures.region", "import matplotlib"),
         ("verification.figures", "import matplotlib"),
         ("verification.testing.rules", "from hypothesis import strategies"),

@@ -213,6 +213,7 @@ def compare(
     *,
     theta: Any = None,
     solver: Solver = "auto",
+    exact: bool = False,
     watch: Callable[[Iterate], None] = lambda state: None,
     progress: Progress = silent,
 ) -> Comparison:
@@ -228,6 +229,8 @@ def compare(
         Relaxation factor, 0 < theta < 1; the problem's by default.
     solver : {'auto', 'cvxpy', 'active-set'}
         Who takes step II.
+    exact : bool
+        Bring the semidefinite bound to within 0.1 % of a factor that occurs, however many programs that takes.
     watch : callable
         Called with every iterate.
     progress : callable
@@ -260,7 +263,7 @@ def compare(
     finished = run(pair, theta=theta, solver=solver, watch=watch, measured=measured)
     reason: dict[str, str] = {}
     losses, results = None, {name: bound.absent(INTERRUPTED) for name, bound in BOUNDS.items()}
-    subject, interrupted = Subject.of(pair, measured), finished.interrupted
+    subject, interrupted = Subject.of(pair, measured, exact=exact), finished.interrupted
     try:
         if pair.contact.grid.n > LARGEST:
             reason["losses"] = f"{pair.contact.grid.n} contact nodes: worked out up to {LARGEST}"

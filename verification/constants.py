@@ -325,28 +325,24 @@ def _body(body: Body) -> BodyConstants:
     )
 
 
-def _top(A: Floats, B: Floats) -> float:
-    return largest(A, B).value
-
-
 def _of_section_5(pair: ContactPair, tangential: NDArray[np.bool_]) -> dict[str, float | None]:
     """C_R, C_tr and C_s: matrices on the components that both bodies leave free."""
     # along y, so that the constants do not depend on the roles, to the last digit
     bodies, grid, kernel = (pair.body1.mesh_body, pair.body2.mesh_body), pair.contact.grid, pair.interface.kernel
     E = [body.gram.schur for body in bodies]
     values: dict[str, float | None] = {
-        "C_R": float(np.sqrt(max(_top(body.lift_gram, e) for body in bodies for e in E)))
+        "C_R": float(np.sqrt(max(largest(body.lift_gram, e).value for body in bodies for e in E)))
     }
     if not tangential.any():
         return values | dict.fromkeys(("C_tr", "C_tr_half", "C_s"), 0.0)
     B_T = _tangential_mass(pair, tangential)
     kept = [np.where(np.outer(tangential, tangential), e, 0.0) for e in E]
-    values["C_tr"] = float(np.sqrt(max(_top(B_T, e) for e in E)))
-    values["C_tr_half"] = float(np.sqrt(max(min(_top(k, e) for k in kept) for e in E)))
+    values["C_tr"] = float(np.sqrt(max(largest(B_T, e).value for e in E)))
+    values["C_tr_half"] = float(np.sqrt(max(min(largest(k, e).value for k in kept) for e in E)))
     if kernel is not None:
         Z = [kernel @ body.elastic.schur[~tangential] for body in bodies]
         squares = [z.T @ (grid.weights[:, None] * z) for z in Z]
-        values["C_s"] = float(np.sqrt(max(_top((z + z.T) / 2, e) for z, e in zip(squares, E, strict=True))))
+        values["C_s"] = float(np.sqrt(max(largest((z + z.T) / 2, e).value for z, e in zip(squares, E, strict=True))))
     return values
 
 
@@ -357,14 +353,14 @@ def _energy(pair: ContactPair, tangential: NDArray[np.bool_]) -> dict[str, float
     normal = ~tangential
     carried = contact if interface.transfer is None else interface.carry_form(contact)
     values: dict[str, float | None] = {
-        "rho_max": _top(carried, neumann),
-        "rho_min": None if interface.transfer is not None else 1 / _top(neumann, contact),
+        "rho_max": largest(carried, neumann).value,
+        "rho_min": None if interface.transfer is not None else 1 / largest(neumann, contact).value,
     }
     normal_contact = _condense_tangential(contact, normal)
     if interface.transfer is not None:
         normal_contact = interface.transfer.T @ normal_contact @ interface.transfer
         normal = np.arange(pair.neumann.grid.size) >= pair.neumann.grid.t
-    values["rho_normal"] = _top(normal_contact, _condense_tangential(neumann, normal))
+    values["rho_normal"] = largest(normal_contact, _condense_tangential(neumann, normal)).value
     if not tangential.any():
         return values | dict.fromkeys(("C_s_energy", "C_t1", "C_t2"), 0.0)
     B_T = _tangential_mass(pair, tangential)
@@ -373,8 +369,10 @@ def _energy(pair: ContactPair, tangential: NDArray[np.bool_]) -> dict[str, float
         root = np.sqrt(grid.weights)[:, None] * kernel
         stress = root @ neumann[np.ix_(normal, normal)] @ root.T
         values["C_s_energy"] = float(np.sqrt(np.linalg.eigvalsh((stress + stress.T) / 2)[-1]))
-    values["C_t1"] = float(np.sqrt(_top(B_T, contact)))
-    values["C_t2"] = float(np.sqrt(_top(B_T if interface.transfer is None else interface.carry_form(B_T), neumann)))
+    values["C_t1"] = float(np.sqrt(largest(B_T, contact).value))
+    values["C_t2"] = float(
+        np.sqrt(largest(B_T if interface.transfer is None else interface.carry_form(B_T), neumann).value)
+    )
     return values
 
 

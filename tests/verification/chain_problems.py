@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from fractions import Fraction
+from itertools import product
 from typing import Any
 
 import numpy as np
 
+from verification.algorithm.affine_piece import Piece
 from verification.algorithm.fixed_point import FixedPointMap
 from verification.algorithm.runs import Run, run
 from verification.constants import Measured, measure
@@ -73,3 +76,15 @@ def state_of(
     pressure = large(n) * np.abs(g).max()
     v = np.concatenate([slide, np.where(pattern.touching, 0.0, gap)])
     return v, np.concatenate([shear, np.where(pattern.touching, pressure, 0.0)])
+
+
+def every_piece(pair: ContactPair) -> Iterator[Piece]:
+    """Every contact pattern; the sign of S sigma_N only turns the direction of slip."""
+    n, t = pair.contact.grid.n, pair.contact.grid.t
+    rubs = bool(pair.friction)
+    for choice in product(product((True, False), (0, 1, -1) if rubs else (1,)), repeat=n):
+        touching, sliding = (np.array(values) for values in zip(*choice, strict=True))
+        pattern = Pattern(touching=touching, sliding=sliding.astype(np.int8))
+        yield Piece(
+            pair=pair, pattern=pattern, sign=np.full(t, int(rubs), dtype=np.int8), still=np.zeros(n, dtype=bool)
+        )

@@ -6,15 +6,14 @@ semidefinite bound, theorem in energy norms, repaired theorem.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from itertools import product
 
 import numpy as np
 import pytest
 import strategies
-from chain_problems import case, energy, run_of, state_of, step_II, with_loads
+from chain_problems import case, energy, every_piece, run_of, state_of, step_II, with_loads
 from hypothesis import settings
 
 from ndtheory import REPAIRED, bounds, evaluate, sharp
@@ -23,7 +22,6 @@ from verification.algorithm.rates import largest_step_ratio
 from verification.bounds.multipliers import QuadraticForms
 from verification.bounds.pattern_search import largest_factor
 from verification.constants import Measured
-from verification.contact.active_set import Pattern
 from verification.interface.assembly import ContactPair
 from verification.threads import one_thread
 
@@ -222,18 +220,6 @@ def test_a_smaller_bound_is_found_out():
         for mutant, bound in MUTANTS.items():
             above[mutant] += found > 1.001 * bound(measured, theta)
     assert min(above.values()) > 0, above
-
-
-def every_piece(pair: ContactPair) -> Iterator[Piece]:
-    """Every contact pattern; the sign of S sigma_N only turns the direction of slip."""
-    n, t = pair.contact.grid.n, pair.contact.grid.t
-    rubs = bool(pair.friction)
-    for choice in product(product((True, False), (0, 1, -1) if rubs else (1,)), repeat=n):
-        touching, sliding = (np.array(values) for values in zip(*choice, strict=True))
-        pattern = Pattern(touching=touching, sliding=sliding.astype(np.int8))
-        yield Piece(
-            pair=pair, pattern=pattern, sign=np.full(t, int(rubs), dtype=np.int8), still=np.zeros(n, dtype=bool)
-        )
 
 
 def test_the_search_finds_nearly_the_largest_norm_of_all_contact_patterns():

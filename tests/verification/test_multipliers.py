@@ -103,11 +103,10 @@ class Forms:
 CERTIFIED = range(0, 36, 3)
 
 
-@pytest.mark.parametrize("nodewise", [True, False])
 @pytest.mark.parametrize("seed", CERTIFIED)
-def test_the_multipliers_prove_the_factor_and_no_smaller_one(seed, nodewise):
+def test_the_multipliers_prove_the_factor_and_no_smaller_one(seed):
     pair, measured, theta, random = case(seed)
-    found = QuadraticForms(pair, measured, nodewise=nodewise).factor(theta)
+    found = QuadraticForms(pair, measured).factor(theta)
     forms, q = Forms.of(pair), found.value
     assert forms.prove(found.multipliers, q * (1 + 1e-6), theta)
     assert not forms.prove(found.multipliers, q * (1 - 1e-6), theta)
@@ -213,9 +212,9 @@ def test_the_friction_number_bounds_the_work_of_every_piece_and_is_at_most_that_
     """``<g, p> <= c |||g|||^2``."""
     pair, measured, _, random = case(seed)
     c = QuadraticForms(pair, measured).friction_number().value
-    work = lambda piece: np.linalg.eigvalsh((piece.relaxed(1.0) + piece.relaxed(1.0).T) / 2)[-1]
+    work = lambda piece: (piece.relaxed(1.0) + piece.relaxed(1.0).T) / 2
     _, kappa_1, kappa_2 = (float(v) for v in energy(measured))
-    assert worst_piece(pair, lambda piece: float(work(piece)), random=random).value <= c + 1e-9
+    assert worst_piece(pair, work, random=random).value <= c + 1e-9
     assert c <= sharp.friction_number(kappa_1, kappa_2) + 1e-9
 
 

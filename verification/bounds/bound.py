@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from verification.interface.pair import ContactPair
 
 #: The semidefinite bound and the losses are worked out up to this many contact nodes: some seconds.
-LARGEST = 30
+LARGEST = 100
 
 #: How many friction values trace the border of a region.
 TRACED = 60
@@ -61,6 +61,8 @@ class Subject:
         The constants of the pair.
     why : str
         Why constants do not exist.
+    exact : bool
+        Whether a bound that can be brought closer to the Lipschitz constant is, however long that takes.
     """
 
     constants: Constants | None = None
@@ -68,9 +70,10 @@ class Subject:
     pair: ContactPair | None = None
     measured: Measured | None = None
     why: str = ""
+    exact: bool = False
 
     @classmethod
-    def of(cls, pair: ContactPair, measured: Measured) -> Subject:
+    def of(cls, pair: ContactPair, measured: Measured, *, exact: bool = False) -> Subject:
         """A pair and its measured constants."""
         return cls(
             constants=measured.constants(),
@@ -78,6 +81,7 @@ class Subject:
             pair=pair,
             measured=measured,
             why=next(iter(measured.reason.values()), ""),
+            exact=exact,
         )
 
     def at(self, k: float) -> Subject:

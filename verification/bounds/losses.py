@@ -9,7 +9,6 @@ psi - psi~.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import count, pairwise
 from typing import Any
@@ -21,7 +20,7 @@ from fem1d2d.mesh import Floats
 from ndtheory import PRINTED, REPAIRED
 from ndtheory import bounds as formulas
 from verification.algorithm.affine_piece import Piece
-from verification.bounds.pattern_search import worst_piece
+from verification.bounds.pattern_search import Form, Quick, size, worst_piece
 from verification.constants import Measured
 from verification.interface.pair import ContactPair
 from verification.progress import Progress, silent
@@ -29,6 +28,9 @@ from verification.threads import one_thread
 
 #: How often the patterns are searched for the losses of one problem.
 SEARCHES = 6
+
+#: Where each of them starts.
+STARTS = 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -156,21 +158,26 @@ def locate(pair: ContactPair, measured: Measured, *, seed: int = 0, progress: Pr
         S_1, size2 = pair.contact.stiffness, square(d_2, N_2)
         norm = square(forms.root, dual)
 
-        def found(form: Callable[[Piece], Floats], against: Floats | None = None) -> float:
+        def found(form: Form, quick: Quick, against: Floats | None = None) -> float:
             """The largest value of a quadratic form against another one, the norm (5.21) by default."""
             progress("searching what the inequalities lose", next(done) / SEARCHES)
             random = np.random.default_rng(seed)
-            return worst_piece(pair, lambda piece: top(form(piece), against), random=random, starts=2).value
+            return worst_piece(pair, form, quick=quick, against=against, random=random, starts=STARTS).value
+
+        def force(gram: Floats, against: Floats | None = None) -> float:
+            """``|T psi - T psi~|`` in a norm, squared."""
+            return found(lambda piece: square(forms.force(piece), gram), lambda some: size(some.force, gram), against)
+
+        def trace(against: Floats | None = None) -> float:
+            """``|w^1 - w~^1|_1``, squared."""
+            return found(lambda piece: square(forms.d_1(piece), N_1), lambda some: size(some.d_1, N_1), against)
 
         # suprema against e = |||psi - psi~|||, squared
-        F = found(forms.friction)
-        t = found(lambda piece: square(forms.force(piece), forms.inverse))
-        t_dual = found(lambda piece: square(forms.force(piece), dual))
-        d1 = found(lambda piece: square(forms.d_1(piece), N_1))
+        F = found(forms.friction, lambda some: some.friction)
+        t, t_dual, d1 = force(forms.inverse), force(dual), trace()
         d2, psi_dual = top(size2), top(norm)
         # and against other norms
-        ratio = found(lambda piece: square(forms.d_1(piece), N_1), size2)
-        T_dual = found(lambda piece: square(forms.force(piece), dual), norm)
+        ratio, T_dual = trace(size2), force(dual, norm)
         reaction = top(square(S_1, dual), N_1)
         energy = top(square(S_1, forms.inverse), S_1)
         d2_dual, e_dual = top(size2, norm), top(np.eye(len(norm)), norm)

@@ -20,18 +20,18 @@ that rounding this bound is never weaker.  Proofs in ``docs/sharp.md``.
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
-from scipy.linalg import block_diag, cho_factor, cho_solve, eigvalsh, solve_triangular
+from scipy.linalg import cho_factor, cho_solve, eigvalsh
 
 from fem1d2d.mesh import Floats
-from ndtheory.sharp import contraction_interval, turning_theta, worst_ratio
-from verification.bounds.bound import LARGEST
-from verification.bounds.program import LMIError, Program, Weights
-from verification.bounds.trace_forms import TraceForms
+from ndtheory.sharp import contraction_interval
+from verification.bounds import interior_point
+from verification.bounds.conditions import Conditions, Pieces, inside, mixed, times
+from verification.bounds.program import LMIError, Optimum, Program, Weights
 from verification.constants import Measured
 from verification.interface.pair import ContactPair
 from verification.progress import Progress, silent
@@ -42,8 +42,23 @@ NARROW = 1e-2
 #: It is given up below this share of the threshold of the theorem in energy norms, which it should exceed.
 LEAST = 1e-2
 
-#: A value that rounding leaves undecided is moved to the safe side by these shares, from none to 1.7 %.
-SHARES = (0.0, *(1e-15 * 4.0**k for k in range(23)))
+#: So many of them are tried in turn, before the rest is bisected.
+ENOUGH = 3
+
+#: Shares of what a solver proposes, the rest known multipliers, that are tried in turn.
+DRAWN = (1.0, 0.9999, 0.999, 0.99, 0.9)
+
+#: By how much a is larger and b smaller than known, from one start to the next, until one is inside.
+STRETCHES = (1.0, 2.0, 4.0, 16.0, 256.0)
+
+#: How much larger known multipliers are tried.
+MORE = (0.0, 1e-12, 1e-9, 1e-6)
+
+#: What rounding may cost, relatively, before other multipliers are tried.
+TIGHT = 1e-10
+
+#: A value that rounding leaves undecided is moved to the safe side by these shares, to at most 0.9 %.
+SHARES = tuple(1e-11 * 2.0**k for k in range(31))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -71,83 +86,32 @@ class Certified:
     gave_up: str = ""
 
 
-class QuadraticForms:
-    """The quadratic forms of a pair of bodies, in coordinates in which ``|g|`` and ``|d_1|`` are Euclidean norms.
-
-    What the solver proposes in them is checked in traces (:class:`verification.bounds.trace_forms.TraceForms`).
+class QuadraticForms(Conditions):
+    """What multipliers prove of a pair of bodies: see the head of this module.
 
     Parameters
     ----------
-    pair : ContactPair
-        The bodies whose conditions of step II are multiplied.
-    measured : Measured
-        Their constants.
-    friction : float, optional
-        k; the problem's by default.
-    nodewise : bool
-        Multipliers of their own for every node, or one set for all.
+    pair, measured, friction
+        As for :class:`verification.bounds.conditions.Conditions`.
+    solver : callable, optional
+        Program -> Optimum, whose proposals are checked; :func:`verification.bounds.interior_point.solve` by default.
 
     Raises
     ------
     ValueError
-        A contact node is held, or there are more than :data:`verification.bounds.bound.LARGEST`.
+        A contact node is held, or there are too many.
     """
 
     def __init__(
-        self, pair: ContactPair, measured: Measured, *, friction: float | None = None, nodewise: bool = True
+        self,
+        pair: ContactPair,
+        measured: Measured,
+        *,
+        friction: float | None = None,
+        solver: Callable[[Program], Optimum] | None = None,
     ) -> None:
-        if pair.contact.grid.n > LARGEST:
-            raise ValueError(f"{pair.contact.grid.n} contact nodes: worked out up to {LARGEST}")
-        if pair.held:
-            raise ValueError("a contact node is held: the semidefinite bound needs every one free")
-        self.nodewise = nodewise
-        k = float(pair.friction) if friction is None else friction
-        measured = measured.with_friction(k)
-        constants = measured.energy_constants()
-        if constants is None:
-            raise ValueError("rho does not exist: " + next(iter(measured.reason.values()), ""))
-        self._measured = measured
-        self._sharp = float(constants.at_work), float(constants.kappa_1), float(constants.kappa_2)
-        contact, neumann, interface = pair.contact.grid, pair.neumann.grid, pair.interface
-        carries = slice(0, contact.size) if k else contact.normal  # without friction p_T = 0
-        # g = L_2 y and p = B z with L_2 L_2' = S_2 and B' S_1^-1 B = 1: |y| = |||g|||, |z| = |d_1|
-        L_2, flexible = pair.neumann.root, pair.contact.inverse
-        inner = flexible[carries, carries]
-        turn = solve_triangular(np.linalg.cholesky(inner).T, np.eye(len(inner)), lower=False)
-        B = np.zeros((contact.size, len(inner)))
-        B[carries] = turn
-        S_1 = pair.contact.stiffness if k else cho_solve(cho_factor(inner), np.eye(len(inner)))
-        near = block_diag(pair.neumann.flexibility(L_2), inner @ turn)
-        self._traces = TraceForms(pair, k, S_1=S_1, carries=carries, near=near)
-        self.size = neumann.size
-        self.g = np.hstack([np.eye(neumann.size), np.zeros((neumann.size, len(inner)))])
-        back = L_2.T @ pair.neumann.flexibility(interface.carry_back(B))
-        self.p = np.hstack([np.zeros((neumann.size, neumann.size)), back])
-        force = np.hstack([np.zeros((contact.size, neumann.size)), B])
-        jump = np.hstack([-interface.carry(pair.neumann.flexibility(L_2)), -flexible @ B])
-        normal = contact.normal
-        families = [(force[normal], jump[normal])]
-        if k:
-            assert interface.kernel is not None
-            zeta = interface.kernel @ np.hstack([L_2[neumann.normal], np.zeros((neumann.n, B.shape[1]))])
-            weight = np.sqrt(k * contact.weights)[:, None]
-            slide = contact.tangential
-            families.append((force[slide], jump[slide]))
-            families += [(rows, rows) for rows in (weight * zeta, weight * jump[slide])]
-        self.families = families
-
-    def conditions(self, multipliers: Weights) -> Floats:
-        """The sum over the nodes of the multiplied conditions, a symmetric matrix."""
-        total = np.zeros((self.g.shape[1],) * 2)
-        for values, (a, b) in zip(multipliers, self.families, strict=True):
-            total += a.T @ (values[:, None] * b)
-        return (total + total.T) / 2
-
-    @property
-    def _cross(self) -> Floats:
-        """The form ``<g, p>``."""
-        cross = self.g.T @ self.p
-        return np.asarray(cross + cross.T) / 2
+        super().__init__(pair, measured, friction=friction)
+        self._solver = interior_point.solve if solver is None else solver
 
     def factor(self, theta: float) -> Certified:
         """The least Lipschitz constant of T_theta in the norm (5.21) that multipliers prove, for 0 < theta <= 1.
@@ -156,15 +120,38 @@ class QuadraticForms:
         ------
         LMIError
         """
+        return self.on(self.everywhere, theta)[0]
+
+    @property
+    def everywhere(self) -> Pieces:
+        """All pieces of T."""
+        return Pieces.all(len(self.families[0][0]), len(self.families[1][0]) if len(self.families) > 1 else 0)
+
+    def on(self, pieces: Pieces, theta: float, *, accuracy: float = 1e-7) -> tuple[Certified, Optimum | None]:
+        """The same for some of the affine pieces of T.
+
+        Parameters
+        ----------
+        pieces : Pieces
+        theta : float
+        accuracy : float
+            Of the solver.
+
+        Returns
+        -------
+        (Certified, Optimum or None)
+            The second is what the solver proposed; None where it gave up.
+
+        Raises
+        ------
+        LMIError
+        """
         step = theta * self.p + (1 - theta) * self.g
-        found = self._least(
-            -step.T @ step,
-            self._known(theta),
-            lambda value, weights: self._traces.definite(weights, square=value, step=(theta, 1 - theta)),
-        )
+        holds = lambda value, weights: self.traces.definite(weights, square=value, step=(theta, 1 - theta))
+        found, proposal = self._least(-step.T @ step, self.known(theta), theta, holds, pieces, accuracy)
         root = lambda square: float(np.sqrt(max(square, 0.0)))
         above = math.nextafter(root(found.value), math.inf)  # a root rounds either way; the bound must not
-        return replace(found, value=above, evaluated=root(found.evaluated), proposed=root(found.proposed))
+        return replace(found, value=above, evaluated=root(found.evaluated), proposed=root(found.proposed)), proposal
 
     def friction_number(self) -> Certified:
         """The least c with ``<g, p> <= c |g|^2`` that multipliers prove: every small theta contracts where c < 1.
@@ -173,119 +160,146 @@ class QuadraticForms:
         ------
         LMIError
         """
-        return self._least(
-            -self._cross,
-            self._uniform(1.0, self._sharp[1] / 2),
-            lambda value, weights: self._traces.definite(weights, square=value, cross=1.0),
-        )
+        holds = lambda value, weights: self.traces.definite(weights, square=value, cross=1.0)
+        return self._least(-self.cross, self.towards_zero, 1.0, holds, self.everywhere)[0]
 
     def largest_theta(self) -> Certified | None:
         """The largest theta <= 1 below which multipliers prove that every T_theta contracts; None where there is none.
 
         With q = 1 the form, over theta, is linear in theta and the multipliers: one program answers for all theta.
+        The program of the friction number says whether there is any, and starts it.
 
         Raises
         ------
         LMIError
         """
         move = self.p - self.g
-        still, moving = 2 * (self.g.T @ self.g - self._cross), move.T @ move
-        sharp = contraction_interval(*self._sharp, 1e-12)
-        highest = 0.5 if sharp is None else sharp[1] * (1 - 1e-9)
-        known = tuple(m / highest for m in self._known(highest))
-        candidates, gave_up = self._candidates(still, -moving, known, maximise=True)
-        found = []
-        for proposed, multipliers in candidates:
-            rest = still - self.conditions(multipliers)
-            if not eigvalsh(rest)[0] > 0:
-                continue
-            theta = min(1 / float(eigvalsh(moving, rest)[-1]), 1.0)
-            holds = lambda t, weights=multipliers: self._traces.definite(
-                weights, square=2.0, cross=2.0, step=(1.0, -1.0), weight=t
-            )
-            safe = next((t for share in SHARES if holds(t := theta * (1 - share))), None)
-            if safe is not None:
-                found.append(
-                    Certified(value=safe, evaluated=theta, proposed=proposed, multipliers=multipliers, gave_up=gave_up)
-                )
-        return max(found, key=lambda certified: certified.value, default=None)
-
-    def _least(self, fixed: Floats, known: Weights, holds: Callable[[float, Weights], bool]) -> Certified:
-        """The least s for which multipliers prove that ``s |g|^2 + fixed - conditions`` is positive definite."""
-        candidates, gave_up = self._candidates(fixed, self.g.T @ self.g, known)
-        found = []
-        for proposed, multipliers in candidates:
-            form, n = fixed - self.conditions(multipliers), self.size
-            try:
-                inner = cho_solve(cho_factor(form[n:, n:]), form[n:, :n])
-            except np.linalg.LinAlgError:  # multipliers that prove nothing
-                continue
-            least = -float(eigvalsh(form[:n, :n] - form[:n, n:] @ inner)[0])
-            size = max(abs(least), 1e-3)
-            safe = next((s for share in SHARES if holds(s := least + share * size, multipliers)), None)
-            if safe is not None:
-                found.append(
-                    Certified(value=safe, evaluated=least, proposed=proposed, multipliers=multipliers, gave_up=gave_up)
-                )
-        if not found:
-            raise LMIError(gave_up or "no multipliers prove anything: what they leave is lost in rounding")
-        return min(found, key=lambda certified: certified.value)
-
-    def _candidates(
-        self, fixed: Floats, free: Floats, known: Weights, *, maximise: bool = False
-    ) -> tuple[list[tuple[float, Weights]], str]:
-        """What the solver proposes, drawn towards known multipliers by several steps, and those alone.
-
-        Where both branches of q meet, the block of d_1 is singular: multipliers a little larger are inside.  The text
-        says why the solver gave up; it is empty where it did not.
-        """
-        alone = [(math.nan, tuple((1 + more) * m for m in known)) for more in (0.0, 1e-12, 1e-9, 1e-6)]
+        still, moving = 2 * (self.free - self.cross), move.T @ move
+        proposals: list[tuple[float, Weights]] = []
         try:
-            proposed, multipliers = self._program.solve(fixed, free, maximise=maximise)
-        except LMIError as error:
-            return [(value, _inside(weights)) for value, weights in alone], str(error)
-        shares = (1.0, 0.9999, 0.999, 0.99, 0.9)
-        mixed = (tuple(s * a + (1 - s) * b for a, b in zip(multipliers, known, strict=True)) for s in shares)
-        tried = [*((proposed, weights) for weights in mixed), *alone]
-        return [(value, _inside(weights)) for value, weights in tried], ""
+            start = self._program(-self.cross, self.towards_zero, 1.0, self.everywhere)
+            below = self._solver(replace(start, enough=1.0))
+            if below.s < 1:
+                found = self._solver(replace(start, fixed=still, free=-moving, s=0.0, y=2 * below.y, highest=1.01))
+                proposals.append((found.s, self.by_node(found.y, self.everywhere)))
+        except LMIError:  # the known multipliers may still prove something
+            pass
+        sharp = contraction_interval(*self.sharp, 1e-12)
+        if sharp is not None:
+            highest = sharp[1] * (1 - 1e-9)
+            proposals += [(math.nan, inside(times((1 + more) / highest, self.known(highest)))) for more in MORE]
+        candidates = []
+        for proposed, multipliers in proposals:
+            if (checked := self._check_theta(still - self.conditions(multipliers), moving, multipliers)) is not None:
+                safe, theta = (min(value, 1.0) for value in checked)
+                candidates.append(Certified(value=safe, evaluated=theta, proposed=proposed, multipliers=multipliers))
+        return max(candidates, key=lambda certified: certified.value, default=None)
 
-    def _known(self, theta: float) -> Weights:
-        """The multipliers that prove the factor q(theta) of the theorem in energy norms.
+    def _check_theta(self, rest: Floats, moving: Floats, multipliers: Weights) -> tuple[float, float] | None:
+        """The largest theta with ``rest - theta moving`` definite, on the safe side of rounding, and as evaluated."""
+        if not eigvalsh(rest)[0] > 0:
+            return None
+        theta = 1 / float(eigvalsh(moving, rest)[-1])
 
-        ``2 theta (1 - theta)`` where the worst ratio lies inside, and more where it is r, so that r is stationary.
+        def holds(share: float) -> bool:
+            weight = theta * (1 - share)
+            return self.traces.definite(multipliers, square=2.0, cross=2.0, step=(1.0, -1.0), weight=weight)
+
+        share = _least_share(holds)
+        return None if share is None else (theta * (1 - share), theta)
+
+    def _least(
+        self,
+        fixed: Floats,
+        known: Weights,
+        theta: float,
+        holds: Callable[[float, Weights], bool],
+        pieces: Pieces,
+        accuracy: float = 1e-7,
+    ) -> tuple[Certified, Optimum | None]:
+        """The least s for which multipliers prove that ``s |g|^2 + fixed - conditions`` is positive definite.
+
+        What the solver proposes is drawn towards the known multipliers where rounding would cost something; where both
+        branches of q meet, known ones a little larger are inside.
         """
-        rho, kappa_1, _ = self._sharp
-        X, weight = worst_ratio(theta, *self._sharp), 2 * theta * (1 - theta)
-        if theta >= turning_theta(*self._sharp):
-            slope = 2 * X - kappa_1
-            weight += max(2 * theta**2 * rho * X - weight * slope, 0.0) / (slope - math.sqrt(rho))
-        return self._uniform(weight, X)
+        proposal, gave_up = None, ""
+        drawn: list[Weights] = []
+        try:
+            program = self._program(fixed, known, theta, pieces)
+            proposal = self._solver(replace(program, accuracy=accuracy))
+            found, towards = self.by_node(proposal.y, pieces), self.by_node(self.rows(known, pieces)[3], pieces)
+            drawn = [mixed(share, found, towards) for share in DRAWN]
+        except LMIError as error:
+            gave_up = str(error)
+        believed = math.nan if proposal is None else proposal.s
+        tried = ((believed, drawn), (math.nan, [inside(times(1 + more, known)) for more in MORE]))
+        best = None
+        for proposed, candidates in tried:
+            for multipliers in candidates:
+                value = self._check(fixed, multipliers, holds)
+                if value is None:
+                    continue
+                safe, evaluated = value
+                if best is None or safe < best.value:
+                    best = Certified(
+                        value=safe, evaluated=evaluated, proposed=proposed, multipliers=multipliers, gave_up=gave_up
+                    )
+                if safe <= evaluated + TIGHT * abs(evaluated):  # rounding costs nothing that others could save
+                    break
+        if best is None:
+            raise LMIError(gave_up or "no multipliers prove anything: what they leave is lost in rounding")
+        return best, proposal
 
-    def _uniform(self, weight: float, X: float) -> Weights:
-        """``lambda = tau = weight``, and a, b with ``4 a b = tau^2`` that are best at the ratio X = |d_1|/|d_2|."""
-        values = [weight]
-        if len(self.families) > 1:
-            C_s, C_t1, C_t2 = (n.value for n in self._measured.of_friction)
-            alpha = (C_t1 * X + C_t2) / C_s
-            values = [weight, weight, weight * alpha / 2, weight / (2 * alpha)]
-        return tuple(np.full(len(a), value) for value, (a, _) in zip(values, self.families, strict=True))
+    def _check(
+        self, fixed: Floats, multipliers: Weights, holds: Callable[[float, Weights], bool]
+    ) -> tuple[float, float] | None:
+        """The least s that multipliers prove, on the safe side of rounding, and as evaluated; None if there is none."""
+        least = self._least_value(fixed - self.conditions(multipliers))
+        if least is None:
+            return None
+        size = max(abs(least), 1e-3)
+        share = _least_share(lambda share: holds(least + share * size, multipliers))
+        return None if share is None else (least + share * size, least)
 
-    @cached_property
-    def _program(self) -> Program:
-        return Program(self.families, nodewise=self.nodewise)
+    def _least_value(self, form: Floats) -> float | None:
+        """The least s for which ``s |g|^2 + form`` is positive semidefinite; None where the part of d_1 is not."""
+        n = self.size
+        try:
+            inner = cho_solve(cho_factor(form[n:, n:]), form[n:, :n])
+        except np.linalg.LinAlgError:
+            return None
+        return -float(eigvalsh(form[:n, :n] - form[:n, n:] @ inner)[0])
+
+    def _program(self, fixed: Floats, known: Weights, theta: float, pieces: Pieces) -> Program:
+        """The program of the least s; it starts from known multipliers that are moved inside the cone.
+
+        Raises
+        ------
+        LMIError
+        """
+        start = [2 * m + theta / 10 * more for m, more in zip(known, self.towards_zero, strict=True)]
+        for stretch in STRETCHES if len(start) > 1 else STRETCHES[:1]:
+            if len(start) > 1:  # the less b, the more is left to d_1
+                lam, tau, a, b = start
+                start = [lam, 0.95 * tau, stretch * a, b / stretch]
+            left, right, cones, y, most = self.rows(tuple(start), pieces)
+            least = self._least_value(fixed - self.conditions(self.by_node(y, pieces)))
+            if least is not None:
+                s = least + max(1.0, abs(least))
+                return Program(fixed=fixed, free=self.free, left=left, right=right, cones=cones, most=most, s=s, y=y)
+        raise LMIError("the multipliers to start from are lost in rounding")
 
 
-def _inside(multipliers: Weights) -> Weights:
-    """Multipliers of the cone ``4 a b >= tau^2``, rounding included."""
-    if len(multipliers) == 1:
-        return multipliers
-    lam, tau, a, b = multipliers
-    return lam, np.minimum(tau, 2 * np.sqrt(a * b) * (1 - 1e-15)), a, b
+def _least_share(holds: Callable[[float], bool]) -> float | None:
+    """The first of :data:`SHARES` for which something holds that then holds for all larger ones; None without one."""
+    for share in SHARES[:ENOUGH]:
+        if holds(share):
+            return share
+    first = bisect_left(SHARES, True, lo=ENOUGH, key=holds)
+    return SHARES[first] if first < len(SHARES) else None
 
 
-def friction_threshold(
-    pair: ContactPair, measured: Measured, start: float, *, nodewise: bool = True, progress: Progress = silent
-) -> float:
+def friction_threshold(pair: ContactPair, measured: Measured, start: float, *, progress: Progress = silent) -> float:
     """The friction below which every small theta is certified to contract: a bound from below, close to ``NARROW``.
 
     Parameters
@@ -307,7 +321,7 @@ def friction_threshold(
     def spare(k: float) -> float:
         progress(f"semidefinite bound: friction threshold, k = {k:.3g} is tried", None)
         try:
-            return 1 - QuadraticForms(pair, measured, friction=k, nodewise=nodewise).friction_number().value
+            return 1 - QuadraticForms(pair, measured, friction=k).friction_number().value
         except LMIError:  # nothing is proved at this friction
             return -1.0
 

@@ -1,125 +1,82 @@
-"""The program behind the semidefinite bound: cvxpy's model, the multipliers that a solver proposes."""
+"""The semidefinite program of the bound: the data that the interior-point method and cvxpy both read."""
 
 from __future__ import annotations
 
-import contextlib
-import io
-import warnings
-from collections.abc import Mapping, Sequence
-from typing import Any
+import math
+from dataclasses import dataclass
 
-import cvxpy as cp
 import numpy as np
-import scs
-from cvxpy.reductions.solvers.conic_solvers.scs_conif import dims_to_solver_dict
+from numpy.typing import NDArray
 
 from fem1d2d.mesh import Floats
-from verification.interrupts import undisturbed
-from verification.threads import one_thread
 
-#: Rows of the form up to which Clarabel is as fast as SCS, which takes over where Clarabel fails; its work grows with
-#: the sixth power of them.
-SMALL = 40
-
-#: Accuracy asked of SCS; the certificate decides what is reported.
-TOLERANCE = 1e-4
-
+#: lambda, tau, a, b by node; lambda alone without friction.  Where something is fixed at nodes, also what multiplies
+#: w k zeta v_T, v_N^2, p_N^2, p_T^2 and p_T sqrt(w k) zeta.
 Weights = tuple[Floats, ...]
 
 
 class LMIError(RuntimeError):
-    """The solver proposed no multipliers that certify anything."""
+    """No multipliers that certify anything were found."""
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Program:
-    """``fixed + s free - conditions`` positive semidefinite, in s and the multipliers, as cvxpy sees it.
+    """The least s for which ``fixed + s free - sum_i y_i (a_i b_i' + b_i a_i')/2`` is positive semidefinite.
 
-    Parameters
+    The multipliers are ``y >= 0``, with ``4 y_a y_b >= y_tau^2`` in each row of ``cones``.
+
+    Attributes
     ----------
-    families : sequence of pairs of arrays
-        The rows a_j, b_j of the products ``(a_j x) (b_j x)`` that each family of multipliers weighs, node by node.
-    nodewise : bool
-        A multiplier of its own for every node, or one for all.
+    fixed, free : array, shape (d, d)
+        Symmetric.
+    left, right : array, shape (K, d)
+        Their rows are a_i and b_i.
+    cones : int array, shape (n, 3)
+        Positions of (tau, a, b) among the multipliers.
+    most : array, shape (K,)
+        Multipliers may not exceed it; inf where they may.
+    s : float
+    y : array, shape (K,)
+        Where a search may start: the matrix is positive definite there, and every inequality strict.
+    highest : float or None
+        Where given, the largest s up to it is wanted instead of the least.
+    enough : float
+        A solver may end at any s below.
+    accuracy : float
+        It may end where it knows s so well, relatively.
     """
 
-    def __init__(self, families: Sequence[tuple[Floats, Floats]], *, nodewise: bool) -> None:
-        self._families = families
-        lengths = [np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1) for a, b in families]
-        if not nodewise:
-            lengths = [np.full_like(scale, scale.mean()) for scale in lengths]
-        # The solver sees numbers near one in any unit.  A node that no force reaches has the product 0 and no scale.
-        self._scales = [np.where(scale > 0, scale, scale.mean() or 1.0) for scale in lengths]
-        self._nodewise = nodewise
-        self._variables = [cp.Variable(len(s) if nodewise else 1, nonneg=True) for s in lengths]
-
-    def solve(self, fixed: Floats, free: Floats, *, maximise: bool = False) -> tuple[float, tuple[Floats, ...]]:
-        """The least s (or the largest, at most 1), and multipliers with ``4 a b >= tau^2``.
-
-        Raises
-        ------
-        LMIError
-        """
-        s = cp.Variable()
-        total: Any = fixed.ravel() + s * free.ravel()
-        for variable, scale, (a, b) in zip(self._variables, self._scales, self._families, strict=True):
-            forms = a[:, :, None] * b[:, None, :]
-            forms = (forms + forms.transpose(0, 2, 1)).reshape(len(scale), -1).T / (2 * scale)
-            total = total - (forms if self._nodewise else forms.sum(axis=1, keepdims=True)) @ variable
-        size = len(fixed)
-        constraints = [cp.reshape(total, (size, size), order="C") >> 0]
-        if len(self._variables) > 1:
-            tau, a, b = self._variables[1:]
-            ratio = np.sqrt(self._scales[2] * self._scales[3]) / self._scales[1]
-            for j in range(tau.size):
-                constraints.append(cp.SOC(a[j] + b[j], cp.hstack([ratio[j] * tau[j], a[j] - b[j]])))
-        problem = (
-            cp.Problem(cp.Maximize(s), [*constraints, s <= 1]) if maximise else cp.Problem(cp.Minimize(s), constraints)
-        )
-        first_order: dict[str, Any] = {"solver": cp.SCS, "eps": TOLERANCE, "max_iters": 20_000}
-        second = first_order | {"max_iters": 1000}  # it converges in some 150 where a solution exists
-        solvers = [{"solver": cp.CLARABEL}, second] if size <= SMALL else [first_order]
-        why = []
-        with warnings.catch_warnings(), one_thread():
-            warnings.simplefilter("ignore")  # "may be inaccurate": the check of the form decides
-            for options in solvers:
-                try:
-                    _solve(problem, **options)
-                except cp.SolverError:
-                    why.append(f"{options['solver']} failed")
-                    continue
-                if s.value is not None:
-                    break
-                why.append(f"{options['solver']} ended {problem.status}")
-            else:
-                raise LMIError(f"the solver gave up: {', '.join(why)}")
-        values = [np.maximum(np.asarray(v.value), 0.0) / z for v, z in zip(self._variables, self._scales, strict=True)]
-        return float(s.value), tuple(values)
+    fixed: Floats
+    free: Floats
+    left: Floats
+    right: Floats
+    cones: NDArray[np.intp]
+    most: Floats
+    s: float
+    y: Floats
+    highest: float | None = None
+    enough: float = -math.inf
+    accuracy: float = 1e-7
 
 
-def _solve(problem: cp.Problem, *, solver: str, **options: Any) -> None:
-    """``problem.solve``, from which Ctrl-C returns: cvxpy takes an SCS that was interrupted for one that failed."""
-    data, chain, inverse = problem.get_problem_data(solver, solver_opts=options)
-    found = _by_scs(data, **options) if solver == cp.SCS else chain.solve_via_data(problem, data, solver_opts=options)
-    problem.unpack_results(found, chain, inverse)
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Optimum:
+    """What a solver found.
 
-
-def _by_scs(data: Mapping[str, Any], *, eps: float, max_iters: int) -> Mapping[str, Any]:
-    """Solve cvxpy's data for SCS.
-
-    SCS puts a handler of its own in the place of Python's.  While it factorises that one drops Ctrl-C, which has to
-    wait then; while it iterates it ends with a status, and with a word on stdout.
-
-    Raises
-    ------
-    KeyboardInterrupt
+    Attributes
+    ----------
+    s : float
+    y : array, shape (K,)
+        The multipliers.
+    moments : array, shape (d, d)
+        The dual variable of the matrix: the second moments of the pairs of forces that are worst for it.
+    steps : int
+    converged : bool
+        Whether the gap to the dual value is below the accuracy asked for.
     """
-    matrices = {name: data[name] for name in ("P", "A", "b", "c") if name in data}
-    with undisturbed():
-        program = scs.SCS(
-            matrices, dims_to_solver_dict(data["dims"]), verbose=False, eps_abs=eps, eps_rel=eps, max_iters=max_iters
-        )
-    with contextlib.redirect_stdout(io.StringIO()):
-        found: Mapping[str, Any] = program.solve()
-    if found["info"]["status_val"] == scs.SIGINT:
-        raise KeyboardInterrupt
-    return found
+
+    s: float
+    y: Floats
+    moments: Floats
+    steps: int
+    converged: bool

@@ -1,4 +1,4 @@
-"""The semidefinite bound: nearly the exact Lipschitz constant of one step, for up to some thirty contact nodes."""
+"""The semidefinite bound: the Lipschitz constant of one step, between two bounds, for up to a hundred contact nodes."""
 
 from __future__ import annotations
 
@@ -29,6 +29,12 @@ class Semidefinite:
     ----------
     lipschitz : Number
         A Lipschitz constant of T_theta in the norm (5.21), checked in doubles with a bound on their rounding.
+    lower : float
+        The largest factor found, of an affine piece of T_theta that some loads and gaps bring about.
+    programs : int
+        How many programs brought both so close.
+    why_apart : str
+        Why they are further apart than was asked for; empty where they are not.
     theta_max : Number or None
         Every smaller theta contracts; None where none is proved to.
     friction_threshold : Number or None
@@ -39,6 +45,9 @@ class Semidefinite:
     """
 
     lipschitz: Number
+    lower: float
+    programs: int
+    why_apart: str
     theta_max: Number | None
     friction_threshold: Number | None
     gave_up: str = ""
@@ -47,6 +56,11 @@ class Semidefinite:
     def factor(self) -> Number | None:
         """The Lipschitz constant where it is a contraction factor."""
         return self.lipschitz if self.lipschitz.value < 1 else None
+
+    @property
+    def gap(self) -> float:
+        """How far the bound is above the largest factor found, relatively."""
+        return self.lipschitz.value / self.lower - 1
 
     @property
     def certified(self) -> bool:
@@ -76,13 +90,28 @@ class Semidefinite:
         reason = {name: reasons[name] for name, number in numbers.items() if number is None}
         return {
             **{name: None if number is None else number.to_dict() for name, number in numbers.items()},
+            "lower": self.lower,
+            "gap": self.gap,
+            "programs": self.programs,
             "certified": self.certified,
             "reason": reason if self.certified else reason | {"certified": NOT_CERTIFIED},
         }
 
 
-def work_out(pair: ContactPair, measured: Measured, theta: float, *, progress: Progress = silent) -> Semidefinite:
+def work_out(
+    pair: ContactPair, measured: Measured, theta: float, *, exact: bool = False, progress: Progress = silent
+) -> Semidefinite:
     """Solve the programs of a pair of bodies at one theta.
+
+    Parameters
+    ----------
+    pair : ContactPair
+    measured : Measured
+        Its constants.
+    theta : float
+    exact : bool
+        Go on to a gap of :data:`verification.bounds.exact.CLOSE`, however many programs that takes.
+    progress : callable
 
     Raises
     ------
@@ -90,6 +119,7 @@ def work_out(pair: ContactPair, measured: Measured, theta: float, *, progress: P
     ValueError
         As :class:`verification.bounds.multipliers.QuadraticForms`.
     """
+    from verification.bounds.exact import CLOSE, GAP, budget, enclose
     from verification.bounds.multipliers import QuadraticForms, friction_threshold
 
     progress("semidefinite bound: largest theta", None)
@@ -98,17 +128,21 @@ def work_out(pair: ContactPair, measured: Measured, theta: float, *, progress: P
     sharp = measured.friction_threshold
     allowed = None if sharp is None else friction_threshold(pair, measured, sharp.value, progress=progress)
     progress("semidefinite bound: factor of one step", None)
-    factor = forms.factor(theta)
+    asked = {"gap": CLOSE, "programs": None} if exact else {"gap": GAP, "programs": budget(pair.contact.grid.n)}
+    found = enclose(pair, forms, theta, **asked, progress=progress)
     return Semidefinite(
-        lipschitz=Number.of_float(factor.value),
+        lipschitz=Number.of_float(found.upper.value),
+        lower=found.lower,
+        programs=found.programs,
+        why_apart=found.why_apart,
         theta_max=None if largest is None else Number.of_float(largest.value),
         friction_threshold=None if allowed is None else Number.of_float(allowed),
-        gave_up=factor.gave_up,
+        gave_up=found.upper.gave_up,
     )
 
 
 class SemidefiniteBound(Bound):
-    """The least constant that multipliers of the conditions of step II prove; see ``docs/sharp.md``."""
+    """What multipliers of the conditions of step II prove, sign by sign of slip where needed; see ``docs/sharp.md``."""
 
     name, words = "lmi", "the semidefinite bound"
     colour = "#F0E442"
@@ -124,7 +158,7 @@ class SemidefiniteBound(Bound):
 
         theta = float(relaxation_factor(theta))
         try:
-            found = work_out(subject.pair, subject.measured, theta, progress=progress)
+            found = work_out(subject.pair, subject.measured, theta, exact=subject.exact, progress=progress)
         except (LMIError, ValueError) as error:
             return self.absent(str(error))
         factor, allowed = found.factor, found.friction_threshold

@@ -62,8 +62,13 @@ class TraceForms:
             shear, slip = force[contact.tangential], jump[contact.tangential]
             zeta = weight * (interface.kernel @ self._g[neumann.normal])
             zeta_size = weight * (np.abs(interface.kernel) @ np.abs(self._g[neumann.normal]))
-            families += [(shear, slip), (zeta, zeta), (weight * slip, weight * slip)]
-            sizes += [(np.abs(shear), np.abs(slip)), (zeta_size, zeta_size), (weight * np.abs(slip),) * 2]
+            of = np.abs
+            slide = weight * slip
+            (press, open_), *_ = families
+            families += [(shear, slip), (zeta, zeta), (slide, slide), (zeta, slide)]
+            families += [(open_, open_), (press, press), (shear, shear), (shear, zeta)]
+            sizes += [(of(shear), of(slip)), (zeta_size, zeta_size), (of(slide), of(slide)), (zeta_size, of(slide))]
+            sizes += [(of(open_),) * 2, (of(press),) * 2, (of(shear),) * 2, (of(shear), zeta_size)]
         self._families, self._sizes = families, sizes
         # inner products over nodes (a transfer has them too), over traces twice, and the scalars
         self._error = gamma(4 * (2 * size + len(S_1)) + (2 if interface.transfer is None else 4) * contact.n + 20)
@@ -82,16 +87,14 @@ class TraceForms:
         Parameters
         ----------
         multipliers : sequence of arrays
-            lambda, tau, a, b by node; lambda alone without friction.
+            As :data:`verification.bounds.program.Weights`.
         square, cross, weight : float
         step : (a, b), optional
             None: without that term.
         """
-        sum_of = lambda g, p, d, families, sign: (
-            square * d.T @ g + sign * cross * d.T @ p + sign * _conditions(multipliers, families)
-        )
-        form = sum_of(self._g, self._p, self._d, self._families, -1)
-        size = sum_of(np.abs(self._g), self._p_size, self._d, self._sizes, 1)
+        form = square * self._d.T @ self._g - cross * self._d.T @ self._p - _conditions(multipliers, self._families)
+        size = square * self._d.T @ np.abs(self._g) + abs(cross) * self._d.T @ self._p_size
+        size += _conditions([np.abs(m) for m in multipliers], self._sizes)
         near = self._near
         if step is not None:
             a, b = step
@@ -105,5 +108,5 @@ class TraceForms:
 
 
 def _conditions(multipliers: Sequence[Floats], families: Sequence[tuple[Floats, Floats]]) -> Floats:
-    """The sum over the nodes of the multiplied conditions."""
-    return np.asarray(sum(a.T @ (values[:, None] * b) for values, (a, b) in zip(multipliers, families, strict=True)))
+    """The sum over the nodes of the multiplied conditions; the last family is left out where no sign is fixed."""
+    return np.asarray(sum(a.T @ (values[:, None] * b) for values, (a, b) in zip(multipliers, families, strict=False)))

@@ -267,9 +267,10 @@ def solve(file: Path, keys: dict[str, str], folder: Path | None, as_json: bool) 
 @RELAXATION
 @SWAP
 @SOLVER
+@click.option("--exact", is_flag=True, help="Bring the semidefinite bound within 0.1 % of a factor that occurs.")
 @FOLDER
 @JSON
-def compare(file: Path, solver: Any, folder: Path | None, as_json: bool, **changes: Any) -> int:
+def compare(file: Path, solver: Any, exact: bool, folder: Path | None, as_json: bool, **changes: Any) -> int:
     """Constants, bounds, a run, and one verdict for each bound.
 
     Exit 1 where a proved bound is violated or the run stalls or diverges, 3 where rounding hides the answer.  Reaching
@@ -281,7 +282,7 @@ def compare(file: Path, solver: Any, folder: Path | None, as_json: bool, **chang
       ndtheory compare my.toml --set contact.friction=0.4
     """
     problem = load_problem(file, **changes)
-    return _compare(problem, Typed(file=file, **changes), folder, solver, as_json)
+    return _compare(problem, Typed(file=file, **changes), folder, solver, as_json, exact=exact)
 
 
 @click.command()
@@ -314,7 +315,9 @@ def demo(folder: Path, as_json: bool) -> int:
     return status
 
 
-def _compare(problem: Problem, typed: Typed, folder: Path | None, solver: Any, as_json: bool) -> int:
+def _compare(
+    problem: Problem, typed: Typed, folder: Path | None, solver: Any, as_json: bool, *, exact: bool = False
+) -> int:
     from verification import comparison as verdicts
     from verification.cli import screens
     from verification.interface.assembly import build
@@ -324,7 +327,7 @@ def _compare(problem: Problem, typed: Typed, folder: Path | None, solver: Any, a
     pair = build(problem)
     _warn(pair.warnings)
     with stages() as tell, progress(tell, problem.iteration.tolerance) as watch:
-        comparison = verdicts.compare(pair, solver=solver, watch=watch, progress=tell)
+        comparison = verdicts.compare(pair, solver=solver, exact=exact, watch=watch, progress=tell)
     _warn(comparison.run.choice.warnings)
     write = None if target is None else lambda: target.write_comparison(comparison)
     deliver(comparison, lambda: screens.comparison(comparison, typed), as_json, write, folder)

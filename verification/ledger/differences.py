@@ -20,7 +20,7 @@ from fem1d2d.mesh import Floats
 from verification.algorithm.affine_piece import Piece
 from verification.algorithm.fixed_point import FixedPointMap
 from verification.bounds.losses import Forms, square, top
-from verification.bounds.pattern_search import signs, worst_piece
+from verification.bounds.pattern_search import Form, Quick, signs, size, worst_piece
 from verification.contact import ContactError, ContactSolution
 from verification.contact.active_set import Pattern
 from verification.interface.body import Body
@@ -312,14 +312,16 @@ def pieces(setting: Setting, random: np.random.Generator, *, starts: int) -> lis
     friction = bool(pair.friction)
     found = [uniform_piece(pair, touching=True, sliding=0 if friction else 1)]
     found.append(uniform_piece(pair, touching=False, sliding=1))
-    objectives = [
-        lambda piece: top(square(forms.force(piece), forms.inverse)),
-        lambda piece: top(work_form(forms, piece)),
+    objectives: list[tuple[Form, Quick]] = [
+        (lambda piece: square(forms.force(piece), forms.inverse), lambda found: size(found.force, forms.inverse)),
+        (lambda piece: work_form(forms, piece), lambda found: found.force @ forms.inverse @ found.g),
     ]
     if friction:
-        objectives.append(lambda piece: top(forms.friction(piece)))
+        objectives.append((forms.friction, lambda found: found.friction))
     if starts:
-        found += [worst_piece(pair, measure, random=random, starts=starts).piece for measure in objectives]
+        found += [
+            worst_piece(pair, form, quick=quick, random=random, starts=starts).piece for form, quick in objectives
+        ]
     return found
 
 

@@ -1,0 +1,236 @@
+"""The conditions of step II as quadratic forms, and the multipliers that are known in closed form."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag, cho_factor, cho_solve, solve_triangular
+
+from fem1d2d.mesh import Floats
+from ndtheory.sharp import turning_theta, worst_ratio
+from verification.bounds.bound import LARGEST
+from verification.bounds.program import Weights
+from verification.bounds.trace_forms import TraceForms
+from verification.constants import Measured
+from verification.interface.pair import ContactPair
+
+Signs = NDArray[np.int8]
+Cones = NDArray[np.intp]
+
+
+#: How much the square of a form of length 1 may weigh that is 0: the more, the nearer to leaving it out.
+LARGE = 1e2
+
+#: Squares smaller than this are 0.
+TINY = 1e-300
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Pieces:
+    """Affine pieces of T that have something in common at some nodes.
+
+    Attributes
+    ----------
+    signs : int array, shape (t,)
+        eps where ``p_T v_T = eps w k zeta v_T``: the sign of slip against S sigma_N; 0 where it may be either.
+    normal : int array, shape (n,)
+        1 where the node touches, -1 where it is open, 0 where it may be either.
+    slip : int array, shape (t,)
+        1 where it slides (its sign is fixed, too), -1 where it sticks, 0 where it may do either.
+    """
+
+    signs: Signs
+    normal: Signs
+    slip: Signs
+
+    @classmethod
+    def all(cls, n: int, t: int) -> Pieces:
+        """All of them."""
+        return cls(signs=np.zeros(t, np.int8), normal=np.zeros(n, np.int8), slip=np.zeros(t, np.int8))
+
+    @property
+    def any(self) -> bool:
+        """Whether anything is fixed."""
+        return bool(self.signs.any() or self.normal.any() or self.slip.any())
+
+    def where(self, name: str, node: int, value: int) -> Pieces:
+        """Those of them with something more in common."""
+        values = getattr(self, name).copy()
+        values[node] = value
+        return replace(self, **{name: values})
+
+
+class Conditions:
+    """The quadratic forms of a pair of bodies, in coordinates in which ``|g|`` and ``|d_1|`` are Euclidean norms.
+
+    What the solver proposes in them is checked in traces (:class:`verification.bounds.trace_forms.TraceForms`).
+
+    Parameters
+    ----------
+    pair : ContactPair
+        The bodies whose conditions of step II are multiplied.
+    measured : Measured
+        Their constants.
+    friction : float, optional
+        k; the problem's by default.
+
+    Raises
+    ------
+    ValueError
+        A contact node is held, or there are more than :data:`verification.bounds.bound.LARGEST`.
+    """
+
+    def __init__(self, pair: ContactPair, measured: Measured, *, friction: float | None = None) -> None:
+        if pair.contact.grid.n > LARGEST:
+            raise ValueError(f"{pair.contact.grid.n} contact nodes: worked out up to {LARGEST}")
+        if pair.held:
+            raise ValueError("a contact node is held: the semidefinite bound needs every one free")
+        k = float(pair.friction) if friction is None else friction
+        measured = measured.with_friction(k)
+        constants = measured.energy_constants()
+        if constants is None:
+            raise ValueError("rho does not exist: " + next(iter(measured.reason.values()), ""))
+        self._measured = measured
+        self.sharp = float(constants.at_work), float(constants.kappa_1), float(constants.kappa_2)
+        contact, neumann, interface = pair.contact.grid, pair.neumann.grid, pair.interface
+        carries = slice(0, contact.size) if k else contact.normal  # without friction p_T = 0
+        # g = L_2 y and p = B z with L_2 L_2' = S_2 and B' S_1^-1 B = 1: |y| = |||g|||, |z| = |d_1|
+        L_2, flexible = pair.neumann.root, pair.contact.inverse
+        inner = flexible[carries, carries]
+        turn = solve_triangular(np.linalg.cholesky(inner).T, np.eye(len(inner)), lower=False)
+        B = np.zeros((contact.size, len(inner)))
+        B[carries] = turn
+        S_1 = pair.contact.stiffness if k else cho_solve(cho_factor(inner), np.eye(len(inner)))
+        near = block_diag(pair.neumann.flexibility(L_2), inner @ turn)
+        self.traces = TraceForms(pair, k, S_1=S_1, carries=carries, near=near)
+        self.size = neumann.size
+        self.g = np.hstack([np.eye(neumann.size), np.zeros((neumann.size, len(inner)))])
+        back = L_2.T @ pair.neumann.flexibility(interface.carry_back(B))
+        self.p = np.hstack([np.zeros((neumann.size, neumann.size)), back])
+        force = np.hstack([np.zeros((contact.size, neumann.size)), B])
+        jump = np.hstack([-interface.carry(pair.neumann.flexibility(L_2)), -flexible @ B])
+        normal = contact.normal
+        families = [(force[normal], jump[normal])]
+        if k:
+            assert interface.kernel is not None
+            zeta = interface.kernel @ np.hstack([L_2[neumann.normal], np.zeros((neumann.n, B.shape[1]))])
+            weight = np.sqrt(k * contact.weights)[:, None]
+            slide = contact.tangential
+            slip = weight * jump[slide]
+            zeta = weight * zeta
+            shear = force[slide]
+            families += [(shear, jump[slide]), (zeta, zeta), (slip, slip), (zeta, slip)]  # the last four for Pieces
+            families += [(jump[normal], jump[normal]), (force[normal], force[normal]), (shear, shear), (shear, zeta)]
+            self.weight = weight[:, 0]
+            self.reach = weight * zeta  # w k zeta
+        self.families = families
+
+    def conditions(self, multipliers: Weights) -> Floats:
+        """The sum over the nodes of the multiplied conditions, a symmetric matrix."""
+        total = np.zeros((self.g.shape[1],) * 2)
+        for values, (a, b) in zip(multipliers, self.families, strict=False):  # the last is there for fixed signs alone
+            total += a.T @ (values[:, None] * b)
+        return (total + total.T) / 2
+
+    @property
+    def free(self) -> Floats:
+        """The form ``|g|^2``."""
+        return self.g.T @ self.g
+
+    @property
+    def cross(self) -> Floats:
+        """The form ``<g, p>``."""
+        cross = self.g.T @ self.p
+        return np.asarray(cross + cross.T) / 2
+
+    def rows(self, multipliers: Weights, pieces: Pieces) -> tuple[Floats, Floats, Cones, Floats, Floats]:
+        """The rows of the products, what of their multipliers lies in cones, these, and the most they may be.
+
+        Where a sign is fixed the two sums of friction are one product, ``tau (p_T - eps w k zeta) v_T``; what is 0 at a
+        node enters by its square, with a multiplier up to :data:`LARGE`.
+        """
+        (force, jump), *friction = self.families[:4]
+        if not friction:
+            return force, jump, np.empty((0, 3), dtype=np.intp), multipliers[0], np.full(len(force), np.inf)
+        (shear, slip), (zeta, _), (slide, _) = friction
+        n, t = len(force), len(shear)
+        either = np.flatnonzero(pieces.signs == 0)
+        lam, tau, a, b = multipliers
+        signed = shear - pieces.signs[:, None] * self.reach
+        zero = [jump[pieces.normal > 0], force[pieces.normal < 0], slip[pieces.slip < 0], signed[pieces.slip > 0]]
+        left = np.vstack([force, signed, zeta[either], slide[either], *(-rows for rows in zero)])
+        right = np.vstack([jump, slip, zeta[either], slide[either], *zero])
+        place = n + t + np.arange(len(either))
+        cones = np.stack([n + either, place, place + len(either)], axis=1)
+        squares = np.concatenate([1 / np.maximum(np.einsum("ij,ij->i", rows, rows), TINY) for rows in zero])
+        y = np.concatenate([lam, tau, a[either], b[either], squares])
+        return left, right, cones, y, np.concatenate([np.full(len(y) - len(squares), np.inf), LARGE * squares])
+
+    def by_node(self, y: Floats, pieces: Pieces) -> Weights:
+        """The multipliers of :meth:`rows` as those of the families, node by node."""
+        n = len(self.families[0][0])
+        if len(self.families) == 1:
+            return (y,)
+        t = len(self.families[1][0])
+        either = pieces.signs == 0
+        counts = [n, t, either.sum(), either.sum(), (pieces.normal > 0).sum(), (pieces.normal < 0).sum()]
+        counts.append((pieces.slip < 0).sum())
+        lam, tau, of_a, of_b, touching, open_, sticks, slides = np.split(y, np.cumsum(counts))
+        a, b = np.zeros((2, t))
+        a[either], b[either] = of_a, of_b
+        lam, tau, a, b = inside((lam, np.where(either, tau, 0.0), a, b))
+        tau = np.where(either, tau, y[n : n + t])
+        if not pieces.any:
+            return lam, tau, a, b
+        jump, force, shear, mixed = np.zeros(n), np.zeros(n), np.zeros(t), np.zeros(t)
+        jump[pieces.normal > 0], force[pieces.normal < 0] = -touching, -open_
+        b[pieces.slip < 0] -= sticks / self.weight[pieces.slip < 0] ** 2
+        shear[pieces.slip > 0] = -slides  # -(p_T - eps w k zeta)^2
+        mixed[pieces.slip > 0] = (2 * pieces.signs * self.weight)[pieces.slip > 0] * slides
+        a[pieces.slip > 0] -= self.weight[pieces.slip > 0] ** 2 * slides
+        return lam, tau, a, b, -1.0 * pieces.signs * tau, jump, force, shear, mixed
+
+    def known(self, theta: float) -> Weights:
+        """The multipliers that prove the factor q(theta) of the theorem in energy norms.
+
+        ``2 theta (1 - theta)`` where the worst ratio lies inside, and more where it is r, so that r is stationary.
+        """
+        rho, kappa_1, _ = self.sharp
+        X, weight = worst_ratio(theta, *self.sharp), 2 * theta * (1 - theta)
+        if theta >= turning_theta(*self.sharp):
+            slope = 2 * X - kappa_1
+            weight += max(2 * theta**2 * rho * X - weight * slope, 0.0) / (slope - math.sqrt(rho))
+        return self.uniform(weight, X)
+
+    @property
+    def towards_zero(self) -> Weights:
+        """Multipliers that prove the factor for theta towards 0, over theta."""
+        return self.uniform(1.0, self.sharp[1] / 2)
+
+    def uniform(self, weight: float, X: float) -> Weights:
+        """``lambda = tau = weight``, and a, b with ``4 a b = tau^2`` that are best at the ratio X = |d_1|/|d_2|."""
+        values = [weight]
+        if len(self.families) > 1:
+            C_s, C_t1, C_t2 = (n.value for n in self._measured.of_friction)
+            alpha = (C_t1 * X + C_t2) / C_s
+            values = [weight, weight, weight * alpha / 2, weight / (2 * alpha)]
+        return tuple(np.full(len(a), value) for value, (a, _) in zip(values, self.families, strict=False))
+
+
+def times(factor: float, multipliers: Weights) -> Weights:
+    return tuple(factor * m for m in multipliers)
+
+
+def mixed(share: float, one: Weights, other: Weights) -> Weights:
+    return tuple(share * a + (1 - share) * b for a, b in zip(one, other, strict=True))
+
+
+def inside(multipliers: Weights) -> Weights:
+    """Multipliers with ``4 a b >= tau^2``, rounding included."""
+    if len(multipliers) == 1:
+        return multipliers
+    lam, tau, a, b = multipliers
+    return lam, np.minimum(tau, 2 * np.sqrt(a * b) * (1 - 1e-12)), a, b

@@ -1,0 +1,225 @@
+"""The Lipschitz constant of T_theta between two bounds: branch and bound over the signs of slip against S sigma_N.
+
+T is piecewise affine, so that its Lipschitz constant is the largest ``|J|`` of its pieces.  On a piece each node keeps
+a sign eps_j, with which step II gives ``p_T v_T = eps_j w k zeta v_T`` in place of the inequality (2.6): both sides
+are 0 where the node sticks.  With all signs fixed the multipliers a and b are not needed, and what the others prove is,
+as far as it was seen, attained by a piece.  So the worst set of pieces is divided, one node's sign at a time, until
+what is proved for every set is close to the largest ``|J|`` found.  Proofs in ``docs/sharp.md``.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import count
+
+import numpy as np
+from numpy.typing import NDArray
+
+from verification.algorithm.affine_piece import Piece
+from verification.bounds.conditions import Pieces, Signs
+from verification.bounds.multipliers import Certified, QuadraticForms
+from verification.bounds.pattern_search import factor_search
+from verification.bounds.program import LMIError, Optimum
+from verification.interface.pair import ContactPair
+from verification.progress import Progress, silent
+from verification.threads import one_thread
+
+#: The search ends where the upper bound exceeds the lower by this share.
+GAP = 1e-2
+
+#: And here where it may take as long as it takes.
+CLOSE = 1e-3
+
+#: Programs solved at 25 contact nodes unless more are asked for: some 3 s.  Counted, not timed, so that every machine
+#: gives the same number.
+PROGRAMS = 40
+
+#: And never more than this.
+MOST = 80
+
+#: Signs are fixed where that may save this share of what the bound is too large by.
+WORTH = 0.3
+
+#: A pattern read off the moments is climbed from where its ``|J|`` reaches this share of the best.
+PROMISING = 0.995
+
+
+#: Rows shorter than this are 0.
+SMALLEST = 1e-300
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Enclosure:
+    """What is known of the Lipschitz constant of T_theta in the norm (5.21), over all loads and gaps.
+
+    Attributes
+    ----------
+    upper : Certified
+        What multipliers prove for every set of pieces.
+    lower : float
+        The largest ``|J|`` found.
+    piece : Piece
+        Where.
+    programs : int
+        How many semidefinite programs were solved.
+    why_apart : str
+        Why the gap is larger than was asked for; empty where it is not.
+    """
+
+    upper: Certified
+    lower: float
+    piece: Piece
+    programs: int
+    why_apart: str
+
+    @property
+    def gap(self) -> float:
+        """``upper / lower - 1``."""
+        return self.upper.value / self.lower - 1
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Leaf:
+    """Some pieces: what is proved for them, and the program's answer."""
+
+    pieces: Pieces
+    upper: Certified
+    proposal: Optimum | None
+
+
+def budget(n: int) -> int:
+    """How many programs are solved for n contact nodes: as many as take some seconds.
+
+    Examples
+    --------
+    >>> [budget(n) for n in (13, 25, 49, 97)]
+    [80, 40, 7, 1]
+    """
+    return max(1, min(MOST, int(PROGRAMS * (25 / n) ** 2.5)))
+
+
+def enclose(
+    pair: ContactPair,
+    forms: QuadraticForms,
+    theta: float,
+    *,
+    gap: float,
+    programs: int | None,
+    progress: Progress = silent,
+) -> Enclosure:
+    """Enclose the Lipschitz constant of T_theta.
+
+    Parameters
+    ----------
+    pair : ContactPair
+        The bodies.
+    forms : QuadraticForms
+        Their quadratic forms.
+    theta : float
+        In (0, 1].
+    gap : float
+        The search ends where ``upper <= (1 + gap) lower``.
+    programs : int or None
+        The most programs that are solved, as in :func:`budget`; None for no limit.
+    progress : callable
+        Told how close both bounds are.
+
+    Raises
+    ------
+    LMIError
+        No multipliers prove anything.
+    """
+    with one_thread():
+        upper, proposal = forms.on(forms.everywhere, theta)
+        root = Leaf(pieces=forms.everywhere, upper=upper, proposal=proposal)
+        search = factor_search(pair, theta)
+        patterns = [*search.extremes(), *_read_off(forms, root, search.sign)]
+        best = max((search.climb(search.found(*pattern)) for pattern in patterns), key=lambda found: found.value)
+        order, solved = count(), 1
+        leaves, why = [(-upper.value, next(order), root)], ""
+        while True:
+            worst, lower = leaves[0][2], best.piece.factor(theta)
+            if worst.upper.value <= (1 + gap) * lower:
+                break
+            parts = _divided(forms, worst, lower)
+            if not parts:
+                why = "the worst set of pieces cannot be divided"
+                break
+            if programs is not None and solved + len(parts) > programs:
+                why = f"{solved} programs were solved"
+                break
+            progress(f"semidefinite bound: {worst.upper.value / lower - 1:.2%} above a factor that occurs", None)
+            children = []
+            for part in parts:
+                try:
+                    upper, proposal = forms.on(part, theta, accuracy=gap / 100)
+                except LMIError:
+                    upper, proposal = worst.upper, None
+                upper = min(upper, worst.upper, key=lambda certified: certified.value)
+                children.append(Leaf(pieces=part, upper=upper, proposal=proposal))
+                for pattern in _read_off(forms, children[-1], search.sign):
+                    start = search.found(*pattern)
+                    if start.value >= PROMISING**2 * best.value:
+                        best = max(best, search.climb(start), key=lambda found: found.value)
+            solved += len(parts)
+            heapq.heappop(leaves)
+            for leaf in children:
+                heapq.heappush(leaves, (-leaf.upper.value, next(order), leaf))
+    return Enclosure(upper=worst.upper, lower=lower, piece=best.piece, programs=solved, why_apart=why)
+
+
+def _divided(forms: QuadraticForms, leaf: Leaf, lower: float) -> list[Pieces]:
+    """A set of pieces in two, at the node where that promises most in the moments of the worst pairs.
+
+    First by signs, whose relaxation costs what is lost between ``tau |zeta| |v_T|`` and ``tau |zeta v_T|``; where that
+    is little of what the bound is too large by, by what a node does.
+    """
+    if leaf.proposal is None or len(forms.families) == 1:
+        return []
+    pieces, moments, (lam, tau, *_) = leaf.pieces, leaf.proposal.moments, leaf.upper.multipliers
+    (force, jump), (shear, slip), (zeta, _), (slide, _), *_ = forms.families
+    of = lambda a, b: np.einsum("ij,ij->i", a @ moments, b)
+    sizes = lambda a, b: np.sqrt(np.maximum(of(a, a) * of(b, b), 0.0))
+    free = pieces.signs == 0
+    lost = np.where(free & (pieces.slip == 0), tau * (sizes(zeta, slide) - np.abs(of(zeta, slide))), 0.0)
+    if lost.sum() >= WORTH * (leaf.upper.value**2 - lower**2):
+        node = int(np.argmax(lost))
+        return [pieces.where("signs", node, sign) for sign in (1, -1)]
+    signed = shear - pieces.signs[:, None] * forms.reach
+    both = np.concatenate(
+        [
+            np.where(pieces.normal == 0, lam * sizes(force, jump), -1.0),
+            np.where(~free & (pieces.slip == 0), tau * sizes(signed, slip), -1.0),
+        ]
+    )
+    node = int(np.argmax(both))
+    if both[node] >= 0:
+        name, node = ("normal", node) if node < len(lam) else ("slip", node - len(lam))
+        return [pieces.where(name, node, value) for value in (1, -1)]
+    if free.any():
+        node = int(np.argmax(np.where(free, lost, -1.0)))
+        return [pieces.where("signs", node, sign) for sign in (1, -1)]
+    return []
+
+
+def _read_off(forms: QuadraticForms, leaf: Leaf, sign: Signs) -> Iterator[tuple[NDArray[np.bool_], Signs]]:
+    """What each node does in the pairs of forces that are worst in the moments of a leaf: touching, sliding."""
+    if leaf.proposal is None:
+        return
+    normal = leaf.pieces.normal
+    first, second = np.linalg.eigh(leaf.proposal.moments)[1][:, -2:].T
+    for worst in (first, second, first + second, first - second):
+        relative = lambda rows, at=worst: np.abs(rows @ at) / np.maximum(np.linalg.norm(rows, axis=1), SMALLEST)
+        (force, jump), *friction = forms.families
+        touching = np.where(normal != 0, normal > 0, relative(force) > relative(jump))
+        if not friction:
+            yield touching, np.ones(len(sign), dtype=np.int8)
+            continue
+        (shear, slip), (zeta, _), (slide, _), *_ = friction
+        seen = np.sign((shear @ worst) * (slip @ worst) * (zeta @ worst) * (slide @ worst))
+        eps = np.where(leaf.pieces.signs != 0, leaf.pieces.signs, np.where(seen != 0, seen, 1))
+        rests = relative(shear - eps[:, None] * forms.reach) < relative(slip)
+        slides = np.where(leaf.pieces.slip != 0, leaf.pieces.slip > 0, rests)
+        yield touching, np.where(slides, eps * np.where(sign != 0, sign, 1), 0).astype(np.int8)

@@ -1,0 +1,296 @@
+"""A primal-dual interior-point method for the semidefinite bound.
+
+Each multiplier weighs a product of two rows, so in the direction of Helmberg, Rendl, Vanderbei and Wolkowicz, Kojima,
+Shindoh and Hara, and Monteiro (HKM) the Schur complement is a sum of elementwise products of six Gram matrices::
+
+    tr(A_i X A_j Z^-1),   A_i = (a_i b_i' + b_i a_i')/2
+
+and a step costs O(d^3) for forms of d rows and as many multipliers.  Predictor and corrector follow Mehrotra.  All
+multipliers that are visited satisfy the program strictly, so whatever the method ends with proves something.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve, eigh_tridiagonal
+
+from fem1d2d.mesh import Floats
+from verification.bounds.program import LMIError, Optimum, Program
+
+#: Steps after which it ends anyway; 10 to 15 are usual.
+MOST_STEPS = 60
+
+#: Added to the diagonal of the scaled Schur complement, in turn, until it can be factorised.
+SHIFTS = (0.0, 1e-14, 1e-12, 1e-10, 1e-8)
+
+#: Steps of the method of Lanczos; a matrix of no more rows is decomposed.
+LANCZOS = 30
+
+#: How well a step length is known, relatively.
+NEAR = 0.02
+
+#: The Krylov space ends where a new direction is this short, relatively.
+EXHAUSTED = 1e-12
+
+#: A value of s below this is as good as 0.
+SMALL = 1e-3
+
+Indices = NDArray[np.intp]
+
+
+class Form:
+    """The matrix of the program as one block: ``fixed + s free - sum_i y_i (a_i b_i' + b_i a_i')/2``.
+
+    The rows are scaled to length one, and the multipliers with them.
+    """
+
+    def __init__(self, program: Program, left: Floats, right: Floats) -> None:
+        self.fixed, self.free, self.left, self.right = program.fixed[None], program.free, left, right
+        self.rows = len(program.fixed)
+
+    def linear(self, y: Floats) -> Floats:
+        """The part of the slack that is linear in (s, y), shape (1, d, d)."""
+        half = self.left.T @ (y[1:, None] * self.right)
+        return np.asarray((y[0] * self.free - (half + half.T) / 2)[None])
+
+    def adjoint(self, matrix: Floats, total: Floats) -> None:
+        """Add the inner products of the coefficients of (s, y) with a symmetric matrix."""
+        total[0] += np.vdot(self.free, matrix[0])
+        total[1:] -= np.einsum("ij,ij->i", self.left @ matrix[0], self.right)
+
+    def schur(self, X: Floats, inverse: Floats, M: Floats) -> None:
+        """Add ``tr(G_i X G_j Z^-1)`` for the coefficients G_i of (s, y)."""
+        a, b, X, inverse, free = self.left, self.right, X[0], inverse[0], self.free
+        X_b, Z_b = X @ b.T, inverse @ b.T
+        X_ab, Z_ab = a @ X_b, a @ Z_b
+        M[1:, 1:] += ((b @ X_b) * (a @ inverse @ a.T) + (a @ X @ a.T) * (b @ Z_b)) / 4
+        M[1:, 1:] += (X_ab.T * Z_ab + X_ab * Z_ab.T) / 4
+        product = X @ free @ inverse
+        M[0, 0] += np.vdot(product.T, free)
+        mixed = np.einsum("ij,ij->i", a @ (product + product.T), b) / 2
+        M[0, 1:] -= mixed
+        M[1:, 0] -= mixed
+
+
+class Cones:
+    """Small blocks of one size: ``fixed_j + sum_k y_{j,k} E_{j,k}``, symmetric of 1 or 2 rows.
+
+    Parameters
+    ----------
+    fixed : array, shape (n, r, r)
+    terms : sequence of (int array of shape (n,), array of shape (n, r, r))
+        Positions in (s, y), and the coefficients E of what stands there.
+    """
+
+    def __init__(self, fixed: Floats, terms: Sequence[tuple[Indices, Floats]]) -> None:
+        self.fixed, self.terms = fixed, terms
+        self.rows = fixed.shape[0] * fixed.shape[1]
+
+    def linear(self, y: Floats) -> Floats:
+        """The part of the slack that is linear in (s, y), shape (n, r, r)."""
+        return np.asarray(sum(y[at][:, None, None] * E for at, E in self.terms))
+
+    def adjoint(self, matrix: Floats, total: Floats) -> None:
+        """Add the inner products of the coefficients of (s, y) with symmetric matrices."""
+        for at, E in self.terms:
+            total[at] += np.einsum("nij,nij->n", E, matrix)
+
+    def schur(self, X: Floats, inverse: Floats, M: Floats) -> None:
+        """Add ``tr(E_i X E_j Z^-1)``."""
+        for i, E in self.terms:
+            left = E @ X
+            for j, F in self.terms:
+                M[i, j] += np.einsum("nij,nji->n", left, F @ inverse)
+
+
+def solve(program: Program) -> Optimum:
+    """The least s (or the largest), with the multipliers and moments that belong to it.
+
+    Raises
+    ------
+    LMIError
+        The program's own start is not strictly feasible in floating point.
+    """
+    maximise = program.highest is not None
+    lengths = [np.linalg.norm(rows, axis=1) for rows in (program.left, program.right)]
+    # A node that no force reaches has rows without a length: its multiplier weighs nothing.
+    lengths = [np.where(length > 0, length, 1.0) for length in lengths]
+    size = lengths[0] * lengths[1]
+    form = Form(program, *(r / n[:, None] for r, n in zip((program.left, program.right), lengths, strict=True)))
+    blocks: list[Form | Cones] = [form, *_cones(program, size)]
+    cost = np.zeros(1 + len(size))
+    cost[0] = -1.0 if maximise else 1.0
+    order = sum(block.rows for block in blocks)
+
+    y = np.concatenate([[program.s], program.y * size])
+    Z = [block.fixed + block.linear(y) for block in blocks]
+    try:
+        roots = [_inverse_root(z) for z in Z]
+    except np.linalg.LinAlgError:
+        raise LMIError("no multipliers to start from: what the known ones leave is lost in rounding") from None
+    inverse = [_turned(root) @ root for root in roots]
+    mu = abs(1 / np.vdot(program.free, inverse[0]))  # on the central path, but for the one equation that s stands in
+    X = [mu * z for z in inverse]
+
+    steps, converged = 0, False
+    while steps < MOST_STEPS:
+        gap = _inner(X, Z)
+        missing = float(np.abs(cost - _adjoint(blocks, X, len(cost))).max())
+        converged = gap <= program.accuracy * max(abs(y[0]), SMALL) and missing <= program.accuracy
+        if converged or y[0] < program.enough:
+            break
+        M = np.zeros((len(cost),) * 2)
+        for block, x, z in zip(blocks, X, inverse, strict=True):
+            block.schur(x, z, M)
+        try:
+            eliminate = _elimination(M)
+            roots_X = [_inverse_root(x) for x in X]
+            newton = _Newton(blocks=blocks, cost=cost, X=X, inverse=inverse, eliminate=eliminate)
+            _, dZ, dX = newton.step(0.0, [np.zeros_like(z) for z in Z])
+            along_Z, along_X = min(_longest(roots, dZ), 1.0), min(_longest(roots_X, dX), 1.0)
+            left = _inner(_moved(X, along_X, dX), _moved(Z, along_Z, dZ)) / gap
+            shorter = min(along_Z, along_X)
+            centring = min(max(left, 0.0) ** max(1.0, 3 * shorter**2), 1.0)
+            second_order = [_symmetric(x @ d @ z) for x, d, z in zip(dX, dZ, inverse, strict=True)]
+            dy, dZ, dX = newton.step(centring * gap / order, second_order)
+            share = 0.9 + 0.09 * shorter
+            along_Z, along_X = min(share * _longest(roots, dZ), 1.0), min(share * _longest(roots_X, dX), 1.0)
+            trial = y + along_Z * dy
+            Z_trial = [block.fixed + block.linear(trial) for block in blocks]
+            roots = [_inverse_root(z) for z in Z_trial]
+        except np.linalg.LinAlgError:  # rounding is larger than what is left
+            break
+        y, Z, X = trial, Z_trial, _moved(X, along_X, dX)
+        inverse = [_turned(root) @ root for root in roots]
+        steps += 1
+    return Optimum(s=float(y[0]), y=y[1:] / size, moments=X[0][0], steps=steps, converged=converged)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Newton:
+    """The equations of one step: the dual constraints, ``Z = fixed + linear(y)`` and ``X Z = centre``, linearised."""
+
+    blocks: list[Form | Cones]
+    cost: Floats
+    X: list[Floats]
+    inverse: list[Floats]
+    eliminate: Callable[[Floats], Floats]
+
+    def step(self, centre: float, correction: list[Floats]) -> tuple[Floats, list[Floats], list[Floats]]:
+        """The changes of (s, y), Z and X, with ``X Z`` corrected by terms of second order."""
+        wanted = [centre * z - c for z, c in zip(self.inverse, correction, strict=True)]
+        dy = self.eliminate(_adjoint(self.blocks, wanted, len(self.cost)) - self.cost)
+        dZ = [block.linear(dy) for block in self.blocks]
+        quartets = zip(wanted, self.X, dZ, self.inverse, strict=True)
+        return dy, dZ, [w - x - _symmetric(x @ d @ z) for w, x, d, z in quartets]
+
+
+def _adjoint(blocks: list[Form | Cones], matrices: list[Floats], size: int) -> Floats:
+    total = np.zeros(size)
+    for block, matrix in zip(blocks, matrices, strict=True):
+        block.adjoint(matrix, total)
+    return total
+
+
+def _cones(program: Program, size: Floats) -> list[Cones]:
+    """The inequalities of the multipliers, and ``s <= highest``, as small blocks."""
+    tau, a, b = program.cones.T
+    alone = np.setdiff1d(np.arange(len(size)), np.concatenate([a, b]))  # 4 a b >= tau^2 implies a, b >= 0
+    one = np.ones((len(alone), 1, 1))
+    blocks = [Cones(0 * one, [(1 + alone, one)])]
+    limited = np.flatnonzero(np.isfinite(program.most))
+    if len(limited):
+        most = (program.most[limited] * size[limited])[:, None, None]
+        blocks.append(Cones(most, [(1 + limited, -np.ones_like(most))]))
+    if program.highest is not None:
+        blocks.append(Cones(np.full((1, 1, 1), program.highest), [(np.array([0]), -np.ones((1, 1, 1)))]))
+    if len(tau):
+        E = np.zeros((3, len(tau), 2, 2))
+        E[0, :, 0, 1] = E[0, :, 1, 0] = np.sqrt(size[a] * size[b]) / size[tau] / 2
+        E[1, :, 0, 0] = E[2, :, 1, 1] = 1.0
+        blocks.append(Cones(np.zeros((len(tau), 2, 2)), [(1 + i, e) for i, e in zip((tau, a, b), E, strict=True)]))
+    return blocks
+
+
+def _elimination(M: Floats) -> Callable[[Floats], Floats]:
+    """``r -> M^-1 r`` for a positive definite M, scaled to a unit diagonal and refined once."""
+    diagonal = np.diag(M)
+    if not (diagonal > 0).all():
+        raise np.linalg.LinAlgError("not positive definite")
+    scale = 1 / np.sqrt(diagonal)
+    scaled = M * np.outer(scale, scale)
+    for shift in SHIFTS:
+        try:
+            factor = cho_factor(scaled + shift * np.eye(len(M)), check_finite=False)
+            break
+        except np.linalg.LinAlgError:
+            if shift == SHIFTS[-1]:
+                raise
+    once = lambda r: scale * cho_solve(factor, scale * r, check_finite=False)
+
+    def eliminate(r: Floats) -> Floats:
+        found = once(r)
+        return np.asarray(found + once(r - M @ found))
+
+    return eliminate
+
+
+def _turned(matrices: Floats) -> Floats:
+    return np.swapaxes(matrices, -1, -2)
+
+
+def _symmetric(matrices: Floats) -> Floats:
+    return np.asarray((matrices + _turned(matrices)) / 2)
+
+
+def _inverse_root(matrices: Floats) -> Floats:
+    """R with ``R' R`` the inverse of each."""
+    return np.linalg.inv(np.linalg.cholesky(matrices))
+
+
+def _inner(X: list[Floats], Z: list[Floats]) -> float:
+    return float(sum(np.vdot(x, z) for x, z in zip(X, Z, strict=True)))
+
+
+def _moved(matrices: list[Floats], along: float, steps: list[Floats]) -> list[Floats]:
+    return [m + along * d for m, d in zip(matrices, steps, strict=True)]
+
+
+def _longest(roots: list[Floats], steps: list[Floats]) -> float:
+    """How far matrices with these inverse roots stay positive semidefinite along steps, at most."""
+    low = min(
+        _least(root[0], d[0]) if d.shape[1] > LANCZOS else float(np.linalg.eigvalsh(root @ d @ _turned(root)).min())
+        for root, d in zip(roots, steps, strict=True)
+    )
+    return -1 / low if low < 0 else math.inf
+
+
+def _least(root: Floats, step: Floats) -> float:
+    """A lower bound, close to it, of the least eigenvalue of ``root step root'``, by the method of Lanczos.
+
+    An eigenvalue lies within the norm of its residual of each Ritz value; that the least one does is not sure, and
+    where a step leaves the cone the factorisation that follows refuses it.
+    """
+    n = len(root)
+    basis, diagonal, beside = np.empty((LANCZOS, n)), np.empty(LANCZOS), np.empty(LANCZOS)
+    v = np.cos(np.arange(n) ** 2)  # no direction of its own
+    length = float(np.linalg.norm(v))
+    for k in range(LANCZOS):
+        basis[k] = v / length
+        v = root @ (step @ (basis[k] @ root))
+        diagonal[k] = v @ basis[k]
+        for _ in range(2):
+            v = v - (basis[: k + 1] @ v) @ basis[: k + 1]
+        beside[k] = length = float(np.linalg.norm(v))
+        exhausted = length <= EXHAUSTED * abs(diagonal[: k + 1]).max()
+        if k % 5 == 4 or exhausted or k == LANCZOS - 1:
+            values, vectors = eigh_tridiagonal(diagonal[: k + 1], beside[:k])
+            residual = length * abs(vectors[-1, 0])
+            if residual <= NEAR * abs(values[0]) or exhausted:
+                break
+    return float(values[0] - residual)

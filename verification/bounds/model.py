@@ -1,0 +1,62 @@
+"""cvxpy's model of the semidefinite bound: the program as the theorem states it, for a conic solver to answer."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import cvxpy as cp
+import numpy as np
+
+from verification.bounds.program import LMIError, Optimum, Program
+from verification.threads import one_thread
+
+
+def solve(program: Program, *, solver: str = cp.CLARABEL, **options: Any) -> Optimum:
+    """What a conic solver of cvxpy answers; its work grows with the sixth power of the rows.
+
+    Parameters
+    ----------
+    program : Program
+    solver : str
+        Its name in cvxpy.
+    **options
+        Handed to it.
+
+    Raises
+    ------
+    LMIError
+        The solver gave up.
+    """
+    s, size = cp.Variable(), np.linalg.norm(program.left, axis=1) * np.linalg.norm(program.right, axis=1)
+    size = np.where(size > 0, size, 1.0)  # the solver sees numbers near one in any unit
+    y = cp.Variable(len(size), nonneg=True)
+    products = program.left[:, :, None] * program.right[:, None, :]
+    products = (products + products.transpose(0, 2, 1)).reshape(len(size), -1).T / (2 * size)
+    rows = len(program.fixed)
+    flat: Any = program.fixed.ravel() + s * program.free.ravel() - products @ y
+    definite = cp.reshape(flat, (rows, rows), order="C") >> 0
+    limited = np.flatnonzero(np.isfinite(program.most))
+    constraints = [definite, y[limited] <= (program.most * size)[limited]]
+    for tau, a, b in program.cones:
+        ratio = np.sqrt(size[a] * size[b]) / size[tau]
+        constraints.append(cp.SOC(y[a] + y[b], cp.hstack([ratio * y[tau], y[a] - y[b]])))
+    if program.highest is None:
+        problem = cp.Problem(cp.Minimize(s), constraints)
+    else:
+        problem = cp.Problem(cp.Maximize(s), [*constraints, s <= program.highest])
+    with warnings.catch_warnings(), one_thread():
+        warnings.simplefilter("ignore")  # "may be inaccurate": the check of the form decides
+        try:
+            problem.solve(solver=solver, **options)
+        except cp.SolverError:
+            raise LMIError(f"{solver} failed") from None
+    if s.value is None:
+        raise LMIError(f"{solver} ended {problem.status}")
+    return Optimum(
+        s=float(s.value),
+        y=np.maximum(np.asarray(y.value), 0.0) / size,
+        moments=np.asarray(definite.dual_value),
+        steps=int(problem.solver_stats.num_iters or 0),
+        converged=problem.status == cp.OPTIMAL,
+    )
