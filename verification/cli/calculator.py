@@ -133,7 +133,7 @@ def _energy(given: Mapping[str, str | None], rubs: bool) -> EnergyConstants | No
 
 
 def bounds_table(rows: Sequence[BoundResult], unit: str) -> None:
-    """Print the bounds, and in which unit of stress the printed one speaks.
+    """Print the bounds, in which unit of stress the printed one speaks, and which factor below the last occurs.
 
     Parameters
     ----------
@@ -154,8 +154,11 @@ def bounds_table(rows: Sequence[BoundResult], unit: str) -> None:
             line.append("contracts" if row.factor is not None else "no conclusion")
         lines.append(line)
     table(lines)
-    if any(row.name == "printed" for row in rows):
-        note(f"printed: with stresses in {unit}; in another unit its figures are others", "  ")
+    notes = [f"printed: with stresses in {unit}" for row in rows if row.name == "printed"]
+    attained = [row.detail for row in rows if row.name == "lmi"]
+    notes += [f"lmi: {found.lower:.3f} occurs for some loads, {found.gap:.2%} less" for found in attained]
+    if notes:
+        note("; ".join(notes) if attained else f"{notes[0]}; in another unit its figures are others", "  ")
 
 
 def _allowed(row: BoundResult) -> list[str]:

@@ -199,10 +199,6 @@ def comparison(result: Comparison, typed: Typed | None = None) -> None:
         bounds_table(result.computed, stress)
     else:
         note("no bound applies: " + next(iter(measured.reason.values()), ""), "  ")
-    found = result.bounds["lmi"].detail
-    if found is not None:
-        apart = f", {found.why_apart}" if found.why_apart else ""
-        note(f"lmi: over all loads and gaps; a factor of {found.lower:.3f} occurs, gap {found.gap:.2%}{apart}", "  ")
     for name in ("lmi", "losses", "cvxpy"):
         if name in result.reason:
             note(f"{name}: {result.reason[name]}", "  ")
