@@ -21,6 +21,7 @@ from scipy.linalg import cho_factor, cho_solve, eigh_tridiagonal
 
 from fem1d2d.mesh import Floats
 from verification.bounds.program import LMIError, Optimum, Program
+from verification.threads import one_thread
 
 #: Steps after which it ends anyway; 10 to 15 are usual.
 MOST_STEPS = 60
@@ -108,6 +109,7 @@ class Cones:
                 M[i, j] += np.einsum("nij,nji->n", left, F @ inverse)
 
 
+@one_thread()
 def solve(program: Program) -> Optimum:
     """The least s (or the largest), with the multipliers and moments that belong to it.
 

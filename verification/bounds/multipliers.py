@@ -35,6 +35,7 @@ from verification.bounds.program import LMIError, Optimum, Program, Weights
 from verification.constants import Measured
 from verification.interface.pair import ContactPair
 from verification.progress import Progress, silent
+from verification.threads import one_thread
 
 #: The friction threshold is searched until its bracket is this narrow, relatively.
 NARROW = 1e-2
@@ -127,6 +128,7 @@ class QuadraticForms(Conditions):
         """All pieces of T."""
         return Pieces.all(len(self.families[0][0]), len(self.families[1][0]) if len(self.families) > 1 else 0)
 
+    @one_thread()
     def on(self, pieces: Pieces, theta: float, *, accuracy: float = 1e-7) -> tuple[Certified, Optimum | None]:
         """The same for some of the affine pieces of T.
 
@@ -153,6 +155,7 @@ class QuadraticForms(Conditions):
         above = math.nextafter(root(found.value), math.inf)  # a root rounds either way; the bound must not
         return replace(found, value=above, evaluated=root(found.evaluated), proposed=root(found.proposed)), proposal
 
+    @one_thread()
     def friction_number(self) -> Certified:
         """The least c with ``<g, p> <= c |g|^2`` that multipliers prove: every small theta contracts where c < 1.
 
@@ -163,6 +166,7 @@ class QuadraticForms(Conditions):
         holds = lambda value, weights: self.traces.definite(weights, square=value, cross=1.0)
         return self._least(-self.cross, self.towards_zero, 1.0, holds, self.everywhere)[0]
 
+    @one_thread()
     def largest_theta(self) -> Certified | None:
         """The largest theta <= 1 below which multipliers prove that every T_theta contracts; None where there is none.
 
