@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fem1d2d.mesh import Floats
 from verification.contact.active_set import ActiveSet, Pattern
 from verification.contact.kkt import KKT, TOLERANCE, Certificate
+from verification.interrupts import undisturbed
 from verification.value import Value
 
 if TYPE_CHECKING:
@@ -117,9 +118,7 @@ class ContactStep:
     def _of_program(self, q: Floats, bound: Floats) -> ContactSolution | None:
         """What the convex program itself answers; None where it gives nothing."""
         if self._model is None:
-            from verification.contact.model import ContactModel
-
-            self._model = ContactModel(self._S, self._free, self._t)
+            self._model = contact_model()(self._S, self._free, self._t)
         v = self._model.solve(q, bound)
         if v is None:
             return None
@@ -144,3 +143,13 @@ class ProgramStep(ContactStep):
         if found is None:
             raise ContactError("cvxpy's solver gave no answer to the contact step")
         return found
+
+
+def contact_model() -> type[ContactModel]:
+    """The convex program of step II.
+
+    cvxpy comes with it: that takes a second, and cvxpy takes an import that Ctrl-C breaks for a solver that is missing.
+    """
+    with undisturbed():
+        from verification.contact.model import ContactModel
+    return ContactModel
