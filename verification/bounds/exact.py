@@ -1,10 +1,10 @@
-"""The Lipschitz constant of T_theta between two bounds: branch and bound over the signs of slip against S sigma_N.
+"""The Lipschitz constant of T_theta between two bounds: branch and bound over signs of slip and states of nodes.
 
 T is piecewise affine, so that its Lipschitz constant is the largest ``|J|`` of its pieces.  On a piece each node keeps
 a sign eps_j, with which step II gives ``p_T v_T = eps_j w k zeta v_T`` in place of the inequality (2.6): both sides
-are 0 where the node sticks.  With all signs fixed the multipliers a and b are not needed, and what the others prove is,
-as far as it was seen, attained by a piece.  So the worst set of pieces is divided, one node's sign at a time, until
-what is proved for every set is close to the largest ``|J|`` found.  Proofs in ``docs/sharp.md``.
+are 0 where the node sticks.  So the set of pieces that the bound is largest for is divided in two, by the sign of a
+node or by what it does, until what is proved for every set is close to the largest ``|J|`` found.  Proofs in
+``docs/sharp.md``.
 """
 
 from __future__ import annotations
@@ -44,7 +44,6 @@ WORTH = 0.3
 
 #: A pattern read off the moments is climbed from where its ``|J|`` reaches this share of the best.
 PROMISING = 0.995
-
 
 #: Rows shorter than this are 0.
 SMALLEST = 1e-300
