@@ -211,7 +211,7 @@ class Conditions:
         return self.uniform(1.0, self.sharp[1] / 2)
 
     def uniform(self, weight: float, X: float) -> Weights:
-        """``lambda = tau = weight``, and a, b with ``4 a b = tau^2`` that are best at the ratio X = |d_1|/|d_2|."""
+        """``lambda = tau = weight``, and a, b with ``4 a b = tau^2`` that are best at the ratio ``X = |d_1|/|d_2|``."""
         values = [weight]
         if len(self.families) > 1:
             C_s, C_t1, C_t2 = (n.value for n in self._measured.of_friction)
