@@ -1,7 +1,7 @@
 """The semidefinite bound: one program beside cvxpy's and SCS's, the whole of it, and the losses, on Section 6.
 
 Wanted: one program under 0.1 s at 25 contact nodes and under 3 s at 97, factor, largest theta and threshold under 0.7 s
-at 25, the losses under 0.5 s, and the values of both solvers within 1e-3.  CPU time, one BLAS thread, medians, in turn.
+at 25, and the values of both solvers within 1e-3.  CPU time, one BLAS thread, medians, in turn.
 
 With --random N: how close branch and bound brings both bounds of the Lipschitz constant on N random problems.
 """

@@ -32,7 +32,7 @@ CANCELLED = 1e-6
 DIGITS = 9
 
 #: Candidates that are evaluated in full where no estimate promises anything.
-TRIED = 12
+TRIED = 30
 
 #: Entries of the systems that are solved at once.
 AT_ONCE = 2_000_000
