@@ -24,7 +24,7 @@ Cones = NDArray[np.intp]
 #: How much the square of a form of length 1 may weigh that is 0: the more, the nearer to leaving it out.
 LARGE = 1e2
 
-#: Squares smaller than this are 0.
+#: Lengths and squares smaller than this are 0.
 TINY = 1e-300
 
 
@@ -122,7 +122,7 @@ class Conditions:
             slip = weight * jump[slide]
             zeta = weight * zeta
             shear = force[slide]
-            families += [(shear, jump[slide]), (zeta, zeta), (slip, slip), (zeta, slip)]  # the last four for Pieces
+            families += [(shear, jump[slide]), (zeta, zeta), (slip, slip), (zeta, slip)]  # from here on for Pieces
             families += [(jump[normal], jump[normal]), (force[normal], force[normal]), (shear, shear), (shear, zeta)]
             self.weight = weight[:, 0]
             self.reach = weight * zeta  # w k zeta
@@ -131,7 +131,9 @@ class Conditions:
     def conditions(self, multipliers: Weights) -> Floats:
         """The sum over the nodes of the multiplied conditions, a symmetric matrix."""
         total = np.zeros((self.g.shape[1],) * 2)
-        for values, (a, b) in zip(multipliers, self.families, strict=False):  # the last is there for fixed signs alone
+        for values, (a, b) in zip(
+            multipliers, self.families, strict=False
+        ):  # the last families are there for Pieces alone
             total += a.T @ (values[:, None] * b)
         return (total + total.T) / 2
 
@@ -181,8 +183,7 @@ class Conditions:
         lam, tau, of_a, of_b, touching, open_, sticks, slides = np.split(y, np.cumsum(counts))
         a, b = np.zeros((2, t))
         a[either], b[either] = of_a, of_b
-        lam, tau, a, b = inside((lam, np.where(either, tau, 0.0), a, b))
-        tau = np.where(either, tau, y[n : n + t])
+        tau = np.where(either, inside((lam, tau, a, b))[1], tau)
         if not pieces.any:
             return lam, tau, a, b
         jump, force, shear, mixed = np.zeros(n), np.zeros(n), np.zeros(t), np.zeros(t)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from verification.algorithm.affine_piece import Piece
-from verification.bounds.conditions import Pieces, Signs
+from verification.bounds.conditions import TINY, Pieces, Signs
 from verification.bounds.multipliers import Certified, QuadraticForms
 from verification.bounds.pattern_search import factor_search
 from verification.bounds.program import LMIError, Optimum
@@ -44,9 +44,6 @@ WORTH = 0.3
 
 #: A pattern read off the moments is climbed from where its ``|J|`` reaches this share of the best.
 PROMISING = 0.995
-
-#: Rows shorter than this are 0.
-SMALLEST = 1e-300
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -210,7 +207,7 @@ def _read_off(forms: QuadraticForms, leaf: Leaf, sign: Signs) -> Iterator[tuple[
     normal = leaf.pieces.normal
     first, second = np.linalg.eigh(leaf.proposal.moments)[1][:, -2:].T
     for worst in (first, second, first + second, first - second):
-        relative = lambda rows, at=worst: np.abs(rows @ at) / np.maximum(np.linalg.norm(rows, axis=1), SMALLEST)
+        relative = lambda rows, at=worst: np.abs(rows @ at) / np.maximum(np.linalg.norm(rows, axis=1), TINY)
         (force, jump), *friction = forms.families
         touching = np.where(normal != 0, normal > 0, relative(force) > relative(jump))
         if not friction:

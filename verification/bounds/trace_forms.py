@@ -108,5 +108,5 @@ class TraceForms:
 
 
 def _conditions(multipliers: Sequence[Floats], families: Sequence[tuple[Floats, Floats]]) -> Floats:
-    """The sum over the nodes of the multiplied conditions; the last family is left out where no sign is fixed."""
+    """The sum over the nodes of the multiplied conditions; the last families are left out where nothing is fixed."""
     return np.asarray(sum(a.T @ (values[:, None] * b) for values, (a, b) in zip(multipliers, families, strict=False)))
