@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from problem_list import FOLLOWED, changed
+from problem_list import APART, PROBLEMS, changed
 
 import verification as vf
 from verification.algorithm.runs import Run
 
-by_name = pytest.mark.parametrize("name", FOLLOWED)
+by_name = pytest.mark.parametrize("name", PROBLEMS)
 
 
 def problem(data: Mapping[str, Any], **iteration: Any) -> vf.Problem:
@@ -23,7 +23,7 @@ def problem(data: Mapping[str, Any], **iteration: Any) -> vf.Problem:
 @cache
 def converged(name: str, swapped: bool = False) -> Run:
     """Run a sample problem to 1e-12; with swapped roles at a theta that suits them."""
-    given = problem(FOLLOWED[name], tolerance="1e-12", max_iterations=3000)
+    given = problem((PROBLEMS | APART)[name], tolerance="1e-12", max_iterations=3000)
     if swapped:
         given = given.swapped()
         rho = vf.measure(given).rho_max

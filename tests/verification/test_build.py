@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from problem_list import PROBLEMS
+from problem_list import plates
 
 import verification as vf
 from ndtheory import HypothesisError
@@ -38,7 +38,7 @@ def as_matrices(pair: ContactPair) -> dict[str, object]:
 
 def small(**changes: object) -> vf.Problem:
     """Section 6 with 7 contact nodes."""
-    problem = vf.Problem.from_dict(PROBLEMS["Section 6, centred"])
+    problem = vf.Problem.from_dict(plates())
     cells = {"body1": (10, 2), "body2": (6, 2)}
     bodies = {name: replace(getattr(problem, name), cells=cells[name]) for name in cells}
     contact = replace(problem.contact, **{k: v for k, v in changes.items() if k in ("friction", "gap")})

@@ -9,7 +9,8 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
-from problem_list import PROBLEMS, bars, plates
+from problem_list import APART, PROBLEMS, bars, plates
+from sample_runs import converged
 
 import verification as vf
 from verification.interface.assembly import discretise
@@ -31,16 +32,12 @@ def agree(one: vf.Run | vf.Solution, other: vf.Run | vf.Solution, within: float)
 
 
 @pytest.mark.parametrize("role", [1, 2])
-@pytest.mark.parametrize("name", PROBLEMS)
+@pytest.mark.parametrize("name", PROBLEMS | APART)
 def test_the_limit_of_the_iteration_is_the_global_solution_in_either_role(name: str, role: int) -> None:
-    problem = vf.Problem.from_dict(PROBLEMS[name])
-    if problem.iteration.neumann_body != role:
-        problem = problem.swapped()
-    rho = vf.measure(problem).rho_max
-    assert rho is not None
-    run = vf.run(problem, theta=f"{min(1.8 / (2 + rho.value), 0.9):.3f}", solver="active-set")
-    assert run.converged, run.outcome
-    solution = vf.solve(problem)
+    given = (PROBLEMS | APART)[name]
+    run = converged(name, swapped=role != vf.Problem.from_dict(given).iteration.neumann_body)
+    assert run.pair.neumann_body == role
+    solution = vf.solve(run.problem)
     assert solution.kkt_residual <= 1e-11
     agree(run, solution, 1e-8)
     assert run.contact.status == solution.contact.status
@@ -50,7 +47,7 @@ def test_the_limit_of_the_iteration_is_the_global_solution_in_either_role(name: 
 
 
 def test_a_gap_that_never_closes_is_a_valid_problem_without_force() -> None:
-    solution = vf.solve(vf.Problem.from_dict(PROBLEMS["a gap that never closes"]))
+    solution = vf.solve(vf.Problem.from_dict(APART["a gap that never closes"]))
     assert solution.contact.force == {"normal": 0.0, "tangential": 0.0}
     assert solution.contact.pattern["open"] == len(solution.contact.x)
 
@@ -292,7 +289,7 @@ def test_sweeps_lead_newton_on_where_its_branches_repeat() -> None:
 
 
 def test_each_broken_condition_raises_the_residual() -> None:
-    system = contact_system(discretise(vf.Problem.from_dict(PROBLEMS["Section 6, centred"])))
+    system = contact_system(discretise(vf.Problem.from_dict(plates())))
     found = system.solve()
     assert system.residual(found.force, found.motion) <= 1e-11
     n = len(found.force) - system.t

@@ -7,7 +7,7 @@ import zipfile
 
 import numpy as np
 import pytest
-from problem_list import PROBLEMS
+from problem_list import PROBLEMS, plates
 
 import verification as vf
 from verification.interface.files import NEEDED, read_interface, write_interface
@@ -48,7 +48,7 @@ def test_a_pair_that_was_written_gives_the_same_advice_and_the_same_run(pair, tm
 @pytest.fixture
 def arrays(tmp_path):
     """What an interface file holds."""
-    problem = vf.Problem.from_dict(PROBLEMS["Section 6, centred"])
+    problem = vf.Problem.from_dict(plates())
     pair = vf.build(problem.with_keys({"body1.cells": "[10, 2]", "body2.cells": "[6, 2]"}))
     path = tmp_path / "whole.npz"
     write_interface(pair, path)
@@ -128,7 +128,7 @@ def rows(path):
 
 
 def test_a_folder_holds_the_problem_the_tables_and_the_interface(arrays, tmp_path):
-    problem = vf.Problem.from_dict(PROBLEMS["Section 6, centred"])
+    problem = vf.Problem.from_dict(plates())
     problem = problem.with_keys({"body1.cells": "[10, 2]", "body2.cells": "[6, 2]"})
     run = vf.run(problem)
     Folder(tmp_path / "run", "run").write_run(run)
@@ -143,7 +143,7 @@ def test_a_folder_holds_the_problem_the_tables_and_the_interface(arrays, tmp_pat
 
 
 def test_a_problem_file_of_a_user_stays_as_it_is_and_ours_is_replaced(tmp_path):
-    problem = vf.Problem.from_dict(PROBLEMS["Section 6, centred"])
+    problem = vf.Problem.from_dict(plates())
     problem = problem.with_keys({"body1.cells": "[10, 2]", "body2.cells": "[6, 2]"})
     there = tmp_path / "problem.toml"
     there.write_text("# mine\n" + problem.to_toml(), encoding="utf-8")

@@ -12,7 +12,7 @@ import strategies
 from dense_oracle import dense_body
 from hypothesis import given
 from hypothesis import strategies as st
-from problem_list import FOLLOWED, SHEARED
+from problem_list import PROBLEMS, SHEARED
 from sample_runs import converged
 
 import verification as vf
@@ -167,6 +167,6 @@ def test_a_symmetric_problem_has_a_symmetric_answer():
 
 
 def test_the_samples_show_every_state():
-    states = {name: set(converged(name).contact.status) for name in FOLLOWED}
+    states = {name: set(converged(name).contact.status) for name in PROBLEMS}
     assert set().union(*states.values()) == {"stick", "slip", "open"}
     assert SHEARED["top"][0] != 0

@@ -14,7 +14,7 @@ import pytest
 import strategies
 from hypothesis import given
 from hypothesis import strategies as st
-from problem_list import FOLLOWED, SECTION_6, changed, loaded_bars
+from problem_list import PROBLEMS, SECTION_6, changed, loaded_bars
 from sample_runs import by_name, problem, relative
 
 import verification as vf
@@ -142,13 +142,13 @@ def same_states(one: Run, other: Run) -> bool:
 @by_name
 @pytest.mark.parametrize("solver", ["active-set", "auto"])
 def test_a_run_repeats_to_the_digit(name, solver):
-    one, other = (vf.run(problem(FOLLOWED[name], max_iterations=8), solver=solver) for _ in range(2))
+    one, other = (vf.run(problem(PROBLEMS[name], max_iterations=8), solver=solver) for _ in range(2))
     assert same_states(one, other)
 
 
 @by_name
 def test_all_solvers_give_the_same_iterates_and_certify_each(name):
-    runs = {s: vf.run(problem(FOLLOWED[name], max_iterations=12), solver=s) for s in ("active-set", "auto", "cvxpy")}
+    runs = {s: vf.run(problem(PROBLEMS[name], max_iterations=12), solver=s) for s in ("active-set", "auto", "cvxpy")}
     reference = runs["active-set"]
     assert {s.contact.solver for s in runs["cvxpy"].iterates} == {"cvxpy"}
     assert runs["auto"].iterates[0].contact.solver == "active-set"

@@ -12,7 +12,7 @@ from chain_problems import step_II
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from pieces import Evaluated, along_a_run, assert_affine, at_solution, forces, held, seeds
-from problem_list import FOLLOWED, bars
+from problem_list import PROBLEMS, bars
 
 import verification as vf
 from verification.algorithm.affine_piece import Piece, piece_of
@@ -28,10 +28,10 @@ def test_the_derivatives_of_a_piece_are_differences_of_T_over_a_step_inside_it(d
 
 
 @pytest.mark.parametrize("count", [0, 1, 5])
-@pytest.mark.parametrize("name", FOLLOWED)
+@pytest.mark.parametrize("name", PROBLEMS)
 def test_T_is_affine_around_the_iterates_of_a_run(name, count):
     """With the local law, with contact nodes held, at a kernel that sees single nodes, for bars."""
-    pair = build(vf.Problem.from_dict(FOLLOWED[name]))
+    pair = build(vf.Problem.from_dict(PROBLEMS[name]))
     g, random = along_a_run(pair, count), np.random.default_rng(count)
     assert assert_affine(pair, g, random) or count == 0  # 0 itself lies on an edge: no friction bound is smooth there
 
@@ -53,7 +53,7 @@ MUTANTS: dict[str, Callable[[Piece], Piece]] = {
 
 @pytest.mark.parametrize("mutant", MUTANTS)
 def test_the_derivative_on_another_piece_is_found_out(mutant):
-    pair = build(vf.Problem.from_dict(FOLLOWED["sheared until it slips"]))
+    pair = build(vf.Problem.from_dict(PROBLEMS["sheared until it slips"]))
     g, random = along_a_run(pair, 5), np.random.default_rng(0)
     assert assert_affine(pair, g, random)
     with pytest.raises(AssertionError):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from problem_list import FOLLOWED, SHEARED, plates
+from problem_list import PROBLEMS, SHEARED, plates
 from threadpoolctl import threadpool_info, threadpool_limits
 
 import verification as vf
@@ -25,13 +25,13 @@ from verification.threads import one_thread
 
 EPS = np.finfo(float).eps
 
-by_name = pytest.mark.parametrize("name", FOLLOWED)
+by_name = pytest.mark.parametrize("name", PROBLEMS)
 seeds = st.integers(0, 2**32 - 1).map(np.random.default_rng)
 
 
 @cache
 def pair_named(name, swapped=False):
-    pair = vf.build(vf.Problem.from_dict(FOLLOWED[name]))
+    pair = vf.build(vf.Problem.from_dict(PROBLEMS[name]))
     return pair.swapped() if swapped else pair
 
 
@@ -69,7 +69,7 @@ def counted(monkeypatch, owner, name):
 
 
 def pairs():
-    for name in FOLLOWED:
+    for name in PROBLEMS:
         yield pytest.param(lambda name=name: pair_named(name), id=name)
         yield pytest.param(lambda name=name: pair_named(name, swapped=True), id=f"{name}, roles exchanged")
     yield pytest.param(unlike, id="grids that differ")

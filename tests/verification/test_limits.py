@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from dense_oracle import DenseBody, dense_body
-from problem_list import FOLLOWED
+from problem_list import PROBLEMS
 from sample_runs import by_name, converged, problem, relative
 
 import verification as vf
@@ -62,9 +62,9 @@ def test_both_roles_call_the_states_of_the_limit_alike(name):
     assert converged(name).contact.status == converged(name, swapped=True).contact.status
 
 
-@pytest.mark.parametrize("name", FOLLOWED)
+@pytest.mark.parametrize("name", PROBLEMS)
 def test_the_global_method_finds_the_fixed_point(name):
-    run, solution = converged(name), vf.solve(problem(FOLLOWED[name]))
+    run, solution = converged(name), vf.solve(problem(PROBLEMS[name]))
     for quantity in ("pressure", "shear"):
         found, expected = getattr(run.contact, quantity), getattr(solution.contact, quantity)
         assert np.abs(found - expected).max() < 1e-9 * np.abs(solution.contact.pressure).max()

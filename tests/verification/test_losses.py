@@ -15,7 +15,7 @@ from chain_problems import case, state_of, step_II, with_loads
 from dense_oracle import DensePair, symmetric, top
 from hypothesis import given
 from hypothesis import strategies as st
-from problem_list import FOLLOWED, loaded_bars
+from problem_list import PROBLEMS, loaded_bars
 from scipy.linalg import eigh
 
 import verification as vf
@@ -332,5 +332,5 @@ def test_between_two_bars_only_the_constants_lose():
 
 
 def test_where_a_contact_node_is_held_no_losses_are_located():
-    pair = build(vf.Problem.from_dict(FOLLOWED["contact nodes held tangentially"]))
+    pair = build(vf.Problem.from_dict(PROBLEMS["contact nodes held tangentially"]))
     assert locate(pair, measure(pair)) is None

@@ -11,7 +11,7 @@ from chain_problems import case, with_loads
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from pieces import Evaluated, assert_affine, at_solution, held
-from problem_list import FOLLOWED, blocks
+from problem_list import PROBLEMS, blocks
 
 import verification as vf
 from verification.algorithm.affine_piece import Piece, piece_of
@@ -84,10 +84,10 @@ def test_within_the_margin_no_node_changes_its_state_and_just_beyond_it_one_does
     assume(assert_margin(pair, random))
 
 
-@pytest.mark.parametrize("name", FOLLOWED)
+@pytest.mark.parametrize("name", PROBLEMS)
 def test_the_margin_is_that_of_the_sample_problems_too(name):
     """With the local law, with contact nodes held, for bars."""
-    assert assert_margin(build(vf.Problem.from_dict(FOLLOWED[name])), np.random.default_rng(0))
+    assert assert_margin(build(vf.Problem.from_dict(PROBLEMS[name])), np.random.default_rng(0))
 
 
 # --- solutions that were chosen ---------------------------------------------------------------------------------------

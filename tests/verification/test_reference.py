@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from problem_list import PROBLEMS
+from problem_list import plates
 
 import verification as vf
 from verification.algorithm import reference
@@ -18,7 +18,7 @@ from verification.contact.step import ProgramStep
 @pytest.fixture(scope="module")
 def run():
     """Section 6 with 7 contact nodes."""
-    problem = vf.Problem.from_dict(PROBLEMS["Section 6, centred"])
+    problem = vf.Problem.from_dict(plates())
     cells = {"body1.cells": "[10, 2]", "body2.cells": "[6, 2]"}
     return vf.run(problem.with_keys({**cells, "iteration.tolerance": "1e-9"}))
 

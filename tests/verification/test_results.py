@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from problem_list import PROBLEMS
+from problem_list import plates
 
 import verification as vf
 from verification.algorithm.affine_piece import piece_of
@@ -22,7 +22,7 @@ SMALL = {"body1.cells": "[10, 2]", "body2.cells": "[6, 2]"}
 @pytest.fixture(scope="module")
 def problem() -> vf.Problem:
     """Section 6 with 7 contact nodes."""
-    return vf.Problem.from_dict(PROBLEMS["Section 6, centred"]).with_keys(SMALL)
+    return vf.Problem.from_dict(plates()).with_keys(SMALL)
 
 
 @pytest.fixture(scope="module")
