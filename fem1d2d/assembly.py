@@ -34,7 +34,7 @@ def gram(mesh: Mesh, length: float = 1.0) -> sp.csc_array:
     Parameters
     ----------
     length : float
-        L > 0; the paper is L = 1 in the file's unit of length.
+        L > 0, unit length; the paper is L = 1 in the file's unit.
 
     Raises
     ------
@@ -49,20 +49,37 @@ def gram(mesh: Mesh, length: float = 1.0) -> sp.csc_array:
 
 
 def body_load(mesh: Mesh, force: Sequence[float]) -> Floats:
-    """``int f . v`` of a constant force per volume, shape (n, d)."""
+    """``int f . v`` of a constant force f, shape (n, d), unit stress x length^(d - 1).
+
+    Parameters
+    ----------
+    force : sequence of float, shape (d,)
+        Unit stress / length.
+    """
     volumes = element.element_of(mesh).volumes(mesh).astype(float)
     weights = np.bincount(mesh.cells.ravel(), volumes.ravel(), minlength=len(mesh.points))
     return np.asarray(weights[:, None] * np.asarray(force, dtype=float))
 
 
 def side_load(mesh: Mesh, facets: Ints, traction: Sequence[float]) -> Floats:
-    """``int t . v`` over facets of a constant force per area, shape (n, d)."""
+    """``int t . v`` over facets of a constant traction t, shape (n, d), unit stress x length^(d - 1).
+
+    Parameters
+    ----------
+    facets : int array, shape (f, d)
+        The nodes of each facet.
+    traction : sequence of float, shape (d,)
+        Unit stress.
+    """
     weights = facet_weights(mesh, facets)
     return np.asarray(weights[:, None] * np.asarray(traction, dtype=float))
 
 
 def facet_weights(mesh: Mesh, facets: Ints) -> Floats:
-    """``int v`` over facets for every hat function v, shape (n,); in 1D a facet is a point of measure 1."""
+    """``int v`` over facets for every hat function v, shape (n,), unit length^(d - 1).
+
+    In 1D a facet is a point of measure 1.
+    """
     p = mesh.points[facets].astype(float)
     sizes = np.ones(len(facets)) if mesh.dimension == 1 else np.linalg.norm(p[:, 1] - p[:, 0], axis=1)
     share = np.repeat(sizes / facets.shape[1], facets.shape[1])

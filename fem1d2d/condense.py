@@ -99,14 +99,28 @@ class Condensation:
         return _symmetric(L @ U)
 
     def condense(self, load: Floats) -> Floats:
-        """The load as the interface feels it: ``load_B + lift' load_I``, shape (b,)."""
+        """The load as the interface feels it: ``load_B + lift' load_I``, shape (b,), of its unit.
+
+        Parameters
+        ----------
+        load : float array, shape (n,)
+            A force for each unknown.
+        """
         inner = load[self.inside]
         if not inner.any():  # without a load there is nothing to factorise for
             return np.asarray(load[self.interface])
         return np.asarray(load[self.interface] - self._coupling.T @ self._solve_inside(inner))
 
     def extend(self, trace: Floats, load: Floats | None = None) -> Floats:
-        """Values on all unknowns with the given interface values, in equilibrium with ``load`` inside, shape (n,)."""
+        """Values on all unknowns with the given interface values, in equilibrium with ``load`` inside, shape (n,).
+
+        Parameters
+        ----------
+        trace : float array, shape (b,)
+            Displacements, in the order of the interface; of their unit is the result.
+        load : float array, shape (n,), optional
+            Forces, of which those inside count; none if left out.
+        """
         full = np.empty(self.matrix.shape[0])
         full[self.interface] = trace
         inner = -(self._coupling @ trace)

@@ -228,6 +228,7 @@ def interval(x: Sequence[Any], cells: int) -> Mesh:
     Parameters
     ----------
     x : pair of float or of Fraction
+        The ends, unit length; fractions stay exact.
     cells : int
 
     Raises
@@ -258,6 +259,7 @@ def rectangle(x: Sequence[Any], y: Sequence[Any], cells: tuple[int, int]) -> Mes
     Parameters
     ----------
     x, y : pairs of float or of Fraction
+        The ends along x and along y, unit length; fractions stay exact.
     cells : pair of int
         Cells along x and along y.
 
