@@ -37,7 +37,7 @@ def main() -> None:
         place=5,
         title="Both bodies at once",
         ours="the global method, from the problem to the solution, assembly included",
-        other="the sparse factorisations of the two stiffness matrices alone, which the method cannot do without",
+        other="the sparse factorisations of the two stiffness matrices alone, which the method needs too",
         peer="factorisations",
         size="unknowns",
         rows=tuple(rows),

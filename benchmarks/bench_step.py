@@ -1,7 +1,7 @@
-"""One step of the iteration against the dense solves that it cannot do without, and against a rebuilt program.
+"""One step of the iteration beside its bare dense solves, and beside a rebuilt program.
 
 The bare solves are one with the Cholesky factor of S2, one product with S1 and one solve with the factor of the block
-of S1 that moves at the solution.
+of S1 that moves at the solution, by the usual routines of scipy and numpy.
 
 The other comparison: the default contact step beside rebuilding the program of body 1 in cvxpy at every step.
 
@@ -78,7 +78,7 @@ def main() -> None:
         place=1,
         title="One step of the iteration",
         ours="one step at the solution",
-        other="the dense solves that a step cannot do without, with factors at hand",
+        other="its two dense solves and its product alone, by scipy's Cholesky factors and numpy",
         peer="bare solves",
         size="contact nodes",
         rows=tuple(rows),

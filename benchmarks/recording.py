@@ -76,7 +76,7 @@ class Record:
     place : int
         Among the others on the page.
     title, ours, other : str
-        What is compared; the other side is a peer, a limit that no code can pass, or a yardstick.
+        What is compared; the other side is a peer, the work at the core of ours, or a yardstick.
     peer : str
         The other side in one or two words.
     apart : str
