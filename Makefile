@@ -1,5 +1,6 @@
 # make demo   the Section 6 model, end to end          make test   the whole test suite
 # make check  what CI runs: lint, types, tests, docs   make docs   the site, into docs/_build/html
+# make bench  the times on the site's page on speed; FULL=1 adds the long sizes
 # Needs Python >= 3.11 with pip, make and git; everything else goes into .venv, pinned by requirements.lock.
 
 PYTHON ?= python3
@@ -33,7 +34,7 @@ nightly: $(VENV)/.test
 	HYPOTHESIS_PROFILE=nightly $(BIN)/python -m pytest -n auto --dist worksteal
 
 bench: $(VENV)/.test
-	for b in benchmarks/bench_*.py; do $(BIN)/python $$b || exit 1; done
+	for b in benchmarks/bench_*.py; do $(BIN)/python $$b --record benchmarks/records $(if $(FULL),--full) || exit 1; done
 
 lock: $(VENV)/.venv
 	$(PIP) uv

@@ -1,18 +1,17 @@
-"""The semidefinite bound: one program beside cvxpy's and SCS's, the whole of it, and the losses, on Section 6.
+"""The semidefinite bound on Section 6: one program beside cvxpy with SCS, and what is made of it beside one program.
 
-Wanted: one program under 0.1 s at 25 contact nodes and under 3 s at 97, factor, largest theta and threshold under 0.7 s
-at 25, and the values of both solvers within 1e-3.  CPU time, one BLAS thread, medians, in turn.
+python benchmarks/bench_lmi.py [--full] [--largest NODES] [--random N]
 
-With --random N: how close branch and bound brings both bounds of the Lipschitz constant on N random problems.
+With --random N (100 with --full): how close branch and bound brings both bounds of the Lipschitz constant on N random
+problems.
 """
 
-import argparse
-import statistics
-import time
-from collections.abc import Callable
-from typing import Any
+from __future__ import annotations
 
 import numpy as np
+from models import of_section_6
+from recording import Record, options, report, row
+from timing import in_turn, timed
 
 import verification as vf
 from verification.bounds import interior_point, model
@@ -21,27 +20,21 @@ from verification.bounds.losses import locate
 from verification.bounds.multipliers import QuadraticForms, friction_threshold
 from verification.bounds.program import LMIError, Optimum, Program
 from verification.ledger.cases import problem as random_problem
-from verification.threads import one_thread
 
 THETA = 0.7
 
+#: Contact nodes and rounds.
+SIZES = {7: 9, 13: 9, 25: 9, 49: 5, 97: 3}
 
-def timed(call: Callable[[], Any]) -> tuple[float, Any]:
-    begin = time.process_time()
-    result = call()
-    return time.process_time() - begin, result
+#: Contact nodes up to which SCS is asked too; more with --full, where it takes minutes.
+SCS, SCS_FULL = 25, 49
 
-
-def of_section_6(cells: int) -> tuple[vf.ContactPair, vf.Measured]:
-    """The model with so many cells on the upper body's side of Gamma_c, in the proportions of the built-in one."""
-    rows = max(cells // 4, 1)
-    pair = vf.build(vf.example("section6").changed(cells=((5 * cells // 3, rows), (cells, rows))))
-    return pair, vf.measure(pair)
+#: Contact nodes up to which all that is made of the program is measured.
+WHOLE, BOTH = 49, 25
 
 
-def one_program(cells: int, times: int) -> tuple[Program, float, Optimum]:
-    """The program of the factor, the seconds it takes, and what it finds."""
-    pair, measured = of_section_6(cells)
+def program_of(pair: vf.ContactPair, measured: vf.Measured) -> Program:
+    """The program of the factor."""
     asked: list[Program] = []
 
     def solve(program: Program) -> Optimum:
@@ -49,8 +42,11 @@ def one_program(cells: int, times: int) -> tuple[Program, float, Optimum]:
         return interior_point.solve(program)
 
     QuadraticForms(pair, measured, solver=solve).factor(THETA)
-    runs = [timed(lambda: interior_point.solve(asked[0])) for _ in range(times)]
-    return asked[0], statistics.median(seconds for seconds, _ in runs), runs[0][1]
+    return asked[0]
+
+
+def by_scs(program: Program) -> Optimum:
+    return model.solve(program, solver="SCS", eps=1e-4, max_iters=20_000)
 
 
 def whole(pair: vf.ContactPair, measured: vf.Measured) -> None:
@@ -58,6 +54,10 @@ def whole(pair: vf.ContactPair, measured: vf.Measured) -> None:
     forms.factor(THETA)
     forms.largest_theta()
     friction_threshold(pair, measured, measured.friction_threshold.value)
+
+
+def both(pair: vf.ContactPair, measured: vf.Measured) -> None:
+    enclose(pair, QuadraticForms(pair, measured), THETA, gap=GAP, programs=budget(pair.contact.grid.n))
 
 
 def on_random_problems(count: int) -> None:
@@ -85,27 +85,69 @@ def on_random_problems(count: int) -> None:
     print(f"{len(gaps)} random problems  {within:.0%} within {GAP:.0%}, {max(seconds):.1f} s at most")
 
 
+def main() -> None:
+    parser = options(__doc__)
+    parser.add_argument("--random", type=int, metavar="N", help="branch and bound on N random problems")
+    chosen = parser.parse_args()
+    scs = SCS_FULL if chosen.full else SCS
+    models = {nodes: of_section_6(nodes) for nodes in SIZES if nodes <= chosen.largest}
+    programs = {nodes: program_of(*found) for nodes, found in models.items()}
+
+    rows = []
+    for nodes, program in programs.items():
+        ours, other = (lambda program=program, solve=solve: solve(program) for solve in (interior_point.solve, by_scs))
+        asked = nodes <= scs
+        apart = abs(ours().s - other().s) if asked else None  # a first round too
+        assert apart is None or apart < 1e-3
+        rounds = SIZES[nodes] if not asked else 3 if nodes <= SCS else 1
+        rows.append(row(nodes, in_turn(ours, other if asked else None, rounds=rounds, warm=not asked), apart))
+    record = Record(
+        name="bound_program",
+        place=6,
+        title="One program of the semidefinite bound",
+        ours="our interior-point method",
+        other="the same program by cvxpy and SCS, tolerance 1e-4",
+        peer="cvxpy with SCS",
+        size="contact nodes",
+        rows=tuple(rows),
+        apart="difference of q^2, the square of the factor",
+        wanted="less than 0.1 s at 25 nodes and less than 3 s at 97",
+    )
+    report(record, chosen.record)
+
+    for place, name, title, what, call, most, wanted in (
+        (7, "bound_whole", "The semidefinite bound", "the factor, the largest theta and the threshold of friction",
+         whole, WHOLE, "less than 0.7 s at 25 nodes"),
+        (9, "bound_losses", "What each inequality gives away", "the losses of all inequalities", locate, WHOLE, ""),
+        (8, "bound_both", "Both bounds of the Lipschitz constant",
+         f"branch and bound, down to a gap of {GAP:.0%} or until its budget of programs is spent", both, BOTH, ""),
+    ):  # fmt: skip
+        rows = []
+        for nodes, (pair, measured) in models.items():
+            if nodes > most:
+                break
+            pairs = in_turn(
+                lambda call=call, pair=pair, measured=measured: call(pair, measured),
+                lambda nodes=nodes: interior_point.solve(programs[nodes]),
+                rounds=3,
+            )
+            rows.append(row(nodes, pairs))
+        record = Record(
+            name=name,
+            place=place,
+            title=title,
+            ours=what,
+            other="one program of the semidefinite bound at the same size, as a yardstick",
+            peer="one program",
+            size="contact nodes",
+            rows=tuple(rows),
+            wanted=wanted,
+        )
+        report(record, chosen.record)
+
+    if count := 100 if chosen.random is None and chosen.full else chosen.random:
+        on_random_problems(count)
+
+
 if __name__ == "__main__":
-    arguments = argparse.ArgumentParser()
-    arguments.add_argument("--random", type=int, default=0)
-    chosen = arguments.parse_args()
-    with one_thread():
-        for cells, times in ((12, 9), (24, 9), (48, 5), (96, 3)):
-            program, seconds, found = one_program(cells, times)
-            print(f"{cells + 1:3d} contact nodes    {seconds:6.3f} s, {found.steps} steps, q = {found.s**0.5:.6f}")
-            if cells == 24:
-                other, answer = timed(
-                    lambda program=program: model.solve(program, solver="SCS", eps=1e-4, max_iters=20_000)
-                )
-                print(f"     cvxpy with SCS  {other:6.3f} s, {other / seconds:.0f} times, q = {answer.s**0.5:.6f}")
-                assert abs(answer.s - found.s) < 1e-3
-        pair, measured = of_section_6(24)
-        seconds = statistics.median(timed(lambda: whole(pair, measured))[0] for _ in range(5))
-        print(f"whole, 25 nodes      {seconds:.2f} s")
-        forms = QuadraticForms(pair, measured)
-        seconds, found = timed(lambda: enclose(pair, forms, THETA, gap=GAP, programs=budget(25)))
-        print(f"both bounds          {seconds:.2f} s, {found.programs} programs, gap {found.gap:.2%}")
-        seconds = statistics.median(timed(lambda: locate(pair, measured))[0] for _ in range(5))
-        print(f"losses               {seconds:.2f} s")
-        if chosen.random:
-            on_random_problems(chosen.random)
+    main()

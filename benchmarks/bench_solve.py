@@ -1,38 +1,50 @@
-"""The global method at about 2500 nodes, assembly included, and the share of its factorisations.
+"""The global method, assembly included, beside the factorisations in it.
 
-python benchmarks/bench_solve.py
+python benchmarks/bench_solve.py [--full] [--largest UNKNOWNS]
 """
 
 from __future__ import annotations
 
-import time
-from statistics import median
-
-from bench_step import problem
+from models import scaled
+from recording import Record, options, report, row
+from timing import in_turn
 
 import verification as vf
 from fem1d2d import solver
 from verification.interface.assembly import discretise
 
-ROUNDS = 9
+#: The cells of the benchmark problem are scaled by these; more with --full.
+FACTORS, MORE = (0.5, 1.0, 2.0, 3.0, 4.56), (7.0, 10.0)
 
 
 def main() -> None:
-    vf.solve(problem())  # imports and warm-up
-    whole, factorisations = [], []
-    for _ in range(ROUNDS):
-        begin = time.perf_counter()
-        solution = vf.solve(problem())
-        middle = time.perf_counter()
-        for body in solution.bodies.elastic:
-            solver(body.stiffness)  # the same factorisations once more, timed alone
-        whole.append(middle - begin)
-        factorisations.append(time.perf_counter() - middle)
-    bodies = discretise(problem())
-    nodes = sum(len(body.mesh.points) for body in bodies.elastic)
-    print(f"{nodes} nodes, {bodies.interface.contact.n} on Gamma_c, {solution.linear_solves} linear systems on Gamma_c")
-    print(f"whole solve        {median(whole):7.3f} s median of {ROUNDS}, wanted <= 0.5")
-    print(f"in factorisations  {median(f / w for f, w in zip(factorisations, whole, strict=True)):7.3f} of it")
+    chosen = options(__doc__).parse_args()
+    rows = []
+    for factor in FACTORS + MORE * chosen.full:
+        problem = scaled(factor)
+        bodies = discretise(problem).elastic
+        unknowns = sum(len(body.free) for body in bodies)
+        if unknowns > chosen.largest:
+            break
+        pairs = in_turn(
+            lambda problem=problem: vf.solve(problem),
+            lambda bodies=bodies: [solver(body.stiffness) for body in bodies],
+            rounds=9 if factor <= 1 else 3,
+        )
+        rows.append(row(unknowns, pairs))
+    record = Record(
+        name="solve",
+        place=5,
+        title="Both bodies at once",
+        ours="the global method, from the problem to the solution, assembly included",
+        other="the sparse factorisations of the two stiffness matrices alone, which the method needs too",
+        peer="factorisations",
+        size="unknowns",
+        rows=tuple(rows),
+        since=4_000,
+        wanted="at most 0.5 s at 4,860 unknowns",
+    )
+    report(record, chosen.record)
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 """Sphinx configuration: ``make docs`` builds the site into docs/_build/html, with warnings as errors."""
 
+import sys
 from importlib.metadata import distribution
 from pathlib import Path
 
@@ -10,6 +11,11 @@ from sphinx.util.docutils import SphinxRole
 
 from ndtheory import __version__
 from verification.ledger import quote, sheets, verify
+
+BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
+sys.path.append(str(BENCHMARKS))  # a folder of scripts, not a package
+
+import speed_page  # noqa: E402
 
 project = "ndtheory"
 author = "The ndtheory maintainers"
@@ -26,7 +32,7 @@ extensions = [
     "sphinx_proof",
     "sphinxcontrib.bibtex",
 ]
-exclude_patterns = ["_build"]
+exclude_patterns = ["_build", "generated/speed"]  # the latter is included by a page
 
 # Pages with code cells run at every build; a cell that fails fails the build.
 nb_execution_mode = "force"
@@ -80,6 +86,20 @@ def write_ledger(app: Sphinx) -> None:
         (folder / f"{name}.md").write_text(text, encoding="utf-8")
 
 
+def write_speed(app: Sphinx) -> None:
+    """The tables and the figure of the page on speed, from the records that ``make bench`` has left.
+
+    Raises
+    ------
+    ExtensionError
+        A file among the records is none.
+    """
+    try:
+        speed_page.write(BENCHMARKS / "records", Path(app.srcdir) / "generated" / "speed", "generated/speed")
+    except ValueError as error:
+        raise ExtensionError(str(error)) from None
+
+
 class FromLedger(SphinxRole):
     """A role that shows what the ledger says of a statement.
 
@@ -97,5 +117,6 @@ class FromLedger(SphinxRole):
 
 def setup(app: Sphinx) -> None:
     app.connect("builder-inited", write_ledger)
+    app.connect("builder-inited", write_speed)
     for name in ("verdict", "ledger"):
         app.add_role(name, FromLedger())
