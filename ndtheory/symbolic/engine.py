@@ -9,8 +9,8 @@ that roots disappear and both sides become rational.  Then
   taken off first where that is needed,
 * it fails if it fails at one point with rational coordinates.
 
-Nothing here is rounded.  Both sides must be defined wherever the charts lead: a common factor of numerator and
-denominator is cancelled.
+Nothing here is rounded.  Both sides must be defined wherever the charts lead: common factors of numerator and
+denominator may be cancelled.
 """
 
 from __future__ import annotations
