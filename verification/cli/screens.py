@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from shlex import quote
 from typing import Any
 
 from verification.advice.readings import NextRun, RunReading, SeenRun
 from verification.advice.roles import Advice
+from verification.algorithm.reference import Reference
 from verification.algorithm.runs import Run
+from verification.algorithm.theta import Choice
+from verification.bounds.bound import BoundResult
+from verification.bounds.losses import Losses
 from verification.bounds.region import MOST_STEPS, Plane
 from verification.cli.calculator import bounds_table
-from verification.cli.console import figures, heading, near_one, note, printable, say, table
+from verification.cli.console import figures, heading, near_one, note, part, printable, say, table
 from verification.cli.typed import Typed
-from verification.comparison import Comparison
+from verification.comparison import Comparison, Listener
 from verification.constants import ENERGY_NAMES, NAMES, Measured
 from verification.interface.fields import ContactFields
 from verification.interface.friction import LAWS
+from verification.interface.pair import ContactPair
 from verification.monolithic import Solution
 from verification.problem.reading import takes_theta
 from verification.problem.specification import Problem
@@ -89,7 +94,8 @@ def constants(measured: Measured, typed: Typed | None = None) -> None:
         typed.suggest("compare")
 
 
-def _happened(run: Run, comparison: Comparison | None = None) -> None:
+def _happened(run: Run, *, alone: bool) -> None:
+    """What a run did; ``alone`` where no verdict says why there is no forecast."""
     problem = _problem(run)
     heading("WHAT HAPPENED")
     rate, linear = run.observed_rate, run.linearised
@@ -106,14 +112,8 @@ def _happened(run: Run, comparison: Comparison | None = None) -> None:
     if run.observed_growth is not None:
         shown = f"grows by {run.observed_growth:.4g}"
     rows.append(["observed", shown, str(run.iterations), f"seen: {run.outcome}"])
-    cvxpy = None if comparison is None else comparison.cvxpy
-    if cvxpy is not None:
-        shown = "-" if cvxpy.observed_rate is None else near_one(cvxpy.observed_rate)
-        apart = f"T differs by {cvxpy.largest_difference:.0e} at most"
-        name = "cvxpy alone" if cvxpy.whole else "cvxpy alone, first and last"
-        rows.append([name, shown, str(cvxpy.steps - 1) if cvxpy.whole else "-", apart])
     table(rows)
-    if run.forecast is None and run.relaxation == "constant" and comparison is None:  # there the verdict tells why
+    if run.forecast is None and run.relaxation == "constant" and alone:
         note(f"no forecast: {run.why_no_forecast}", "  ")
     if linear is None:
         note(f"not linearised: {run.why_not_linearised}", "  ")
@@ -158,7 +158,7 @@ def run(finished: Run, typed: Typed | None = None) -> None:
     """The screen of ``run``."""
     nodes = sum(len(body.mesh.points) for body in finished.bodies.elastic)
     _setting(_problem(finished), nodes, finished.pair.contact.grid.n)
-    _happened(finished)
+    _happened(finished, alone=True)
     _limits(finished.outside)
     if typed is not None:
         typed.suggest("compare", iteration=True)
@@ -183,37 +183,91 @@ def _problem(run: Run) -> Problem:
     return problem.with_theta(run.theta)
 
 
-def comparison(result: Comparison, typed: Typed | None = None) -> None:
+class Parts(Listener):
+    """The parts of the screen of ``compare`` and ``demo``, each shown when it is told.
+
+    Parameters
+    ----------
+    pair : ContactPair
+        What is compared, made from a problem.
+    needed : bool
+        Whether the comparison is wanted for more than its screen.
+    """
+
+    def __init__(self, pair: ContactPair, *, needed: bool = False) -> None:
+        self.pair, self.needed = pair, needed
+
+    def constants(self, measured: Measured, choice: Choice) -> None:
+        assert self.pair.problem is not None  # see `show`
+        stress = self.pair.units["stress"]
+        m, M, C_R, C_s, C_tr, C_K, rho = (
+            figures(getattr(measured, name), 4) for name in ("m", "M", "C_R", "C_s", "C_tr", "C_K", "rho_max")
+        )
+        with part(needed=self.needed):
+            _setting(self.pair.problem.with_theta(choice.theta), measured.nodes, measured.interface_nodes)
+            heading("HOW LARGE ARE THE CONSTANTS?")
+            say(f"  m = {m} {stress}, M = {M} {stress}, C_R = {C_R}")
+            say(f"  C_s = {C_s}, C_tr = {C_tr}, C_K = {C_K} {stress}, rho = {rho}")
+
+    def bounds(self, results: Sequence[BoundResult], measured: Measured) -> None:
+        computed = [result for result in results if result.detail is not None]
+        with part(needed=self.needed):
+            heading("DOES ONE STEP CONTRACT?")
+            if computed:
+                bounds_table(computed, self.pair.units["stress"])
+            else:
+                note("no bound applies: " + next(iter(measured.reason.values()), ""), "  ")
+
+    def run(self, finished: Run) -> None:
+        with part(needed=self.needed):
+            _happened(finished, alone=False)
+
+    def cvxpy(self, reference: Reference | None, why: str) -> None:
+        with part(needed=self.needed):
+            if reference is None:
+                note(f"cvxpy: {why}", "  ")
+                return
+            rate = "no rate" if reference.observed_rate is None else f"rate {near_one(reference.observed_rate)}"
+            what = f"{rate}, {reference.steps - 1} steps" if reference.whole else "first and last step"
+            note(f"cvxpy alone         {what}; T differs by {reference.largest_difference:.0e} at most", "  ")
+
+    def losses(self, losses: Losses | None, why: str) -> None:
+        friction = () if losses is None else losses.friction
+        with part(needed=self.needed):
+            if friction or why:
+                heading("WHAT DOES EACH ESTIMATE GIVE AWAY?")
+            if why:
+                note(f"losses: {why}", "  ")
+            if friction:
+                estimates = [loss for loss in friction if not loss.only_unit]
+                total = sum(loss.decades for loss in estimates)
+                unit = sum(loss.decades for loss in friction) - total
+                say(f"  {total:.1f} decades from the largest friction term found to (5.30), repaired:")
+                links = ", ".join(f"{loss.label} {loss.decades:.1f}" for loss in estimates)
+                note(f"{links}; the unit adds {unit:.1f}", "  ")
+
+    def programs(self, results: Sequence[BoundResult]) -> None:
+        computed = [result for result in results if result.detail is not None]
+        with part(needed=self.needed):
+            heading("WHAT DO SEMIDEFINITE PROGRAMS PROVE OF ONE STEP?")
+            if computed:
+                bounds_table(computed, self.pair.units["stress"])
+            for result in results:
+                if result.detail is None:
+                    note(f"{result.name}: {result.not_computed}", "  ")
+
+
+def comparison(result: Comparison) -> None:
     """The screen of ``compare`` and ``demo``."""
-    finished, measured = result.run, result.measured
-    _setting(_problem(finished), measured.nodes, measured.interface_nodes)
-    heading("HOW LARGE ARE THE CONSTANTS?")
-    stress = finished.units["stress"]
-    m, M, C_R, C_s, C_tr, C_K, rho = (
-        figures(getattr(measured, name), 4) for name in ("m", "M", "C_R", "C_s", "C_tr", "C_K", "rho_max")
-    )
-    say(f"  m = {m} {stress}, M = {M} {stress}, C_R = {C_R}")
-    say(f"  C_s = {C_s}, C_tr = {C_tr}, C_K = {C_K} {stress}, rho = {rho}")
-    heading("DOES ONE STEP CONTRACT?")
-    if result.computed:
-        bounds_table(result.computed, stress)
-    else:
-        note("no bound applies: " + next(iter(measured.reason.values()), ""), "  ")
-    for name in ("lmi", "losses", "cvxpy"):
-        if name in result.reason:
-            note(f"{name}: {result.reason[name]}", "  ")
-    if result.losses is not None and result.losses.friction:
-        heading("WHAT DOES EACH ESTIMATE GIVE AWAY?")
-        estimates = [loss for loss in result.losses.friction if not loss.only_unit]
-        total = sum(loss.decades for loss in estimates)
-        unit = sum(loss.decades for loss in result.losses.friction) - total
-        say(f"  {total:.1f} decades from the largest friction term found to (5.30), repaired:")
-        links = ", ".join(f"{loss.label} {loss.decades:.1f}" for loss in estimates)
-        note(f"{links}; the unit adds {unit:.1f}", "  ")
-    _happened(finished, result)
+    result.tell(Parts(result.run.pair))
+    verdicts(result)
+
+
+def verdicts(result: Comparison, typed: Typed | None = None) -> None:
+    """The end of that screen."""
     heading("DOES THE RUN AGREE WITH THE BOUND?")
     table([["bound", "verdict", "why"], *([n, j.verdict, j.reason] for n, j in result.verdicts.items())])
-    _limits(finished.outside)
+    _limits(result.run.outside)
     if typed is not None:
         typed.suggest("advise")
 

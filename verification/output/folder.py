@@ -291,6 +291,6 @@ def _pictures(room: Path, result: Run | Solution, comparison: Comparison | None 
     if comparison is not None and comparison.losses is not None:
         drawn["waterfall"] = figures.draw_waterfall(comparison.losses, comparison.units["stress"])
     for name, figure in drawn.items():
-        for ending in ("svg", "png"):
+        for ending in ("png", "svg"):
             figures.save(figure, room / f"{name}.{ending}")
     return list(drawn)
