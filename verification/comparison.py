@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from ndtheory import EDITIONS
 from verification.algorithm.iterate import Iterate
@@ -25,6 +25,7 @@ from verification.interface.pair import ContactPair
 from verification.interrupts import INTERRUPTED
 from verification.problem import Problem
 from verification.progress import Progress, silent
+from verification.verdicts import Judgement, judge_bound, judge_forecast
 
 if TYPE_CHECKING:
     from verification.figures import Figure
@@ -32,23 +33,7 @@ if TYPE_CHECKING:
 #: The bounds whose violation is a bug or an error in a proof.
 NO_FINDING = tuple(bound.name for bound in BOUNDS.values() if not bound.finding)
 
-#: A bound may be attained: a ratio above it by less than this share of 1 - bound is equal to it.
-TIGHT = 1e-6
-
-#: A forecast comes true where its rate is the observed one to this, and its steps to one.
-AGREES = 1e-3
-
 T = TypeVar("T")
-
-RunVerdict = Literal["CONSISTENT", "VIOLATED", "INCONCLUSIVE", "HYPOTHESES_NOT_MET", "NOT_COMPUTED"]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Judgement:
-    """A verdict on one bound, with its reason in words."""
-
-    verdict: RunVerdict
-    reason: str
 
 
 class Listener:
@@ -196,58 +181,6 @@ class Comparison(Document):
         }
 
 
-def judge(bound: float | None, seen: StepRatio | None, why_none: str) -> Judgement:
-    """Hold a bound on the factor of one step against the largest factor seen.
-
-    A bound may be attained: what lies above it by less than :data:`TIGHT` of ``1 - bound`` is not told from it.
-
-    Parameters
-    ----------
-    bound : float or None
-        None: the bound draws no conclusion; ``why_none`` says why.
-    seen : StepRatio or None
-        None: no step stands clear of rounding.
-
-    Examples
-    --------
-    >>> judge(0.5, StepRatio(value=0.4, lo=0.39, hi=0.41, steps=9), "").verdict
-    'CONSISTENT'
-    """
-    if bound is None:
-        return Judgement(verdict="HYPOTHESES_NOT_MET", reason=why_none)
-    if seen is None:
-        return Judgement(verdict="INCONCLUSIVE", reason="no step stands clear of rounding")
-    if seen.steps == 0:
-        return Judgement(verdict="NOT_COMPUTED", reason="no step was taken")
-    digits = 4 if seen.hi <= bound else 6  # six where the bound is attained or violated
-    says = f"ratios <= {seen.value:.{digits}g} in {seen.steps} steps, bound {bound:.{digits}g}"
-    if seen.hi <= bound:
-        return Judgement(verdict="CONSISTENT", reason=says)
-    slack = TIGHT * (1 - bound)
-    if seen.lo > bound + slack:
-        return Judgement(verdict="VIOLATED", reason=says)
-    if seen.hi <= bound + slack:
-        return Judgement(verdict="CONSISTENT", reason=f"{says}: attained")
-    return Judgement(verdict="INCONCLUSIVE", reason=f"{says}: closer than rounding")
-
-
-def judge_forecast(run: Run) -> Judgement:
-    """Hold what was said half way against what the run then did."""
-    made, seen = run.forecast, run.observed_rate
-    if made is None:
-        return Judgement(verdict="NOT_COMPUTED", reason=run.why_no_forecast)
-    says = f"forecast {made.rate:.4g}, {made.iterations} steps"
-    if run.outcome == "interrupted":
-        return Judgement(verdict="NOT_COMPUTED", reason=f"{says}; the run was interrupted")
-    if seen is None:
-        return Judgement(verdict="VIOLATED", reason=f"{says}; the run {run.outcome}, and shows no rate")
-    ended = "" if run.converged else f", {run.outcome}"
-    right = abs(seen.value - made.rate) <= AGREES and abs(run.iterations - made.iterations) <= 1 and run.converged
-    return Judgement(
-        verdict="CONSISTENT" if right else "VIOLATED", reason=f"{says}; seen {seen.value:.4g}, {run.iterations}{ended}"
-    )
-
-
 def compare(
     problem: Problem | ContactPair | Path | str,
     *,
@@ -342,7 +275,7 @@ def compare(
     outside = "outside the theorem: " + "; ".join(finished.outside) if finished.outside else ""
     if not isinstance(finished.rule, Constant) and not outside:
         outside = f"the bounds speak of a constant theta, not of {finished.relaxation}"
-    verdicts = {name: _verdict(result, seen, outside) for name, result in results.items()}
+    verdicts = {name: judge_bound(result, seen, outside) for name, result in results.items()}
     verdicts["linearised"] = judge_forecast(finished)
     return Comparison(
         measured=measured,
@@ -399,12 +332,3 @@ def _losses(pair: ContactPair, measured: Measured, progress: Progress) -> tuple[
         return None, f"{pair.contact.grid.n} contact nodes: worked out up to {LARGEST}"
     found = locate(pair, measured, progress=progress)
     return found, "" if found is not None else next(iter(measured.reason.values()), "a contact node is held")
-
-
-def _verdict(result: BoundResult, seen: StepRatio | None, outside: str) -> Judgement:
-    """What the run says of one bound."""
-    if outside:
-        return Judgement(verdict="HYPOTHESES_NOT_MET", reason=outside)
-    if result.not_computed:
-        return Judgement(verdict="NOT_COMPUTED", reason=result.not_computed)
-    return judge(None if result.factor is None else result.factor.value, seen, result.why)

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from shlex import quote
-from typing import Any
 
-from verification.advice.readings import NextRun, RunReading, SeenRun
-from verification.advice.roles import Advice
 from verification.algorithm.reference import Reference
 from verification.algorithm.runs import Run
 from verification.algorithm.theta import Choice
@@ -23,27 +20,10 @@ from verification.comparison import Comparison, Listener
 from verification.constants import ENERGY_NAMES, NAMES, Measured
 from verification.interface.fields import ContactFields
 from verification.interface.friction import LAWS
+from verification.interface.interface import Interface
 from verification.interface.pair import ContactPair
 from verification.monolithic import Solution
-from verification.problem.reading import takes_theta
 from verification.problem.specification import Problem
-
-
-def show(result: Any) -> bool:
-    """Show a result on the screen of its command; False where it has none, as one of matrices alone."""
-    screens: dict[type, Callable[[Any], None]] = {
-        Measured: constants,
-        Run: run,
-        Solution: solution,
-        Comparison: comparison,
-        Advice: advice,
-        Plane: plane,
-    }
-    screen = screens.get(type(result))
-    if screen is None or (result.problem is None and not isinstance(result, Advice)):
-        return False
-    screen(result)
-    return True
 
 
 def _setting(problem: Problem, nodes: int | None = None, interface: int | None = None) -> None:
@@ -105,9 +85,9 @@ def _happened(run: Run, *, alone: bool) -> None:
         name = f"forecast at step {made.made_at_iteration}"
         rows.append([name, near_one(made.rate), str(made.iterations), "prediction, not a bound"])
     if linear is not None:
-        steps = _steps(linear.rate, problem.iteration.tolerance)
+        count = steps(linear.rate, problem.iteration.tolerance)
         consistency = "" if linear.predicted is None else f"; consistency of J {near_one(linear.predicted)}"
-        rows.append(["linearised at the solution", near_one(linear.rate), steps, f"afterwards{consistency}"])
+        rows.append(["linearised at the solution", near_one(linear.rate), count, f"afterwards{consistency}"])
     shown = "-" if rate is None else near_one(rate.value)
     if run.observed_growth is not None:
         shown = f"grows by {run.observed_growth:.4g}"
@@ -122,14 +102,24 @@ def _happened(run: Run, *, alone: bool) -> None:
         say(f"  {run.evaluations} evaluations of T, with the {run.relaxation} relaxation{proved}")
     elif run.choice.source != "given":
         note(f"theta = {float(run.theta):.4g} is the {run.choice.source} one: {run.choice.why}", "  ")
+    _grids(run.pair.contact_body, run.pair.interface)
     _contact(problem, run.contact, f"; KKT residual of step II {run.last.contact.kkt.residual:.1e}")
 
 
-def _steps(rate: float, tolerance: float) -> str:
+def steps(rate: float, tolerance: float) -> str:
     """How many steps of a rate lead to a tolerance."""
     if not 0 < rate < 1:
         return "1" if rate == 0 else "-"
     return str(math.ceil(math.log(tolerance) / math.log(rate)))
+
+
+def _grids(contact_body: int, interface: Interface) -> None:
+    """Who carries the contact grid, where there are two."""
+    if interface.transfer is not None:
+        names = {1: "lower", 2: "upper"}
+        own, other = names[contact_body], names[3 - contact_body]
+        counts = f"{interface.contact.n} nodes of the {own} body, Neumann grid: {interface.neumann.n} of the {other}"
+        note(f"contact grid        {counts}", "  ")
 
 
 def _contact(problem: Problem, contact: ContactFields, solved: str = "") -> None:
@@ -169,6 +159,7 @@ def solution(found: Solution, typed: Typed | None = None) -> None:
     bodies = found.bodies
     _setting(bodies.problem, sum(len(body.mesh.points) for body in bodies.elastic), bodies.interface.contact.n)
     heading("WHAT IS THE SOLUTION?")
+    _grids(bodies.problem.contact_body, bodies.interface)
     _contact(bodies.problem, found.contact)
     say(f"  KKT residual {found.kkt_residual:.1e} after {found.linear_solves} linear systems on Gamma_c")
     _limits(bodies.outside)
@@ -270,95 +261,6 @@ def verdicts(result: Comparison, typed: Typed | None = None) -> None:
     _limits(result.run.outside)
     if typed is not None:
         typed.suggest("advise")
-
-
-def advice(found: Advice, typed: Typed | None = None) -> None:
-    """The screen of ``advise``."""
-    if found.run is not None and found.next is not None:
-        _seen(found.run, found.readings, found.next)
-    theta = _roles(found) if found.roles else None
-    say()
-    for reason in found.outside:
-        note(f"Outside the theorem: {reason}.")
-    if found.next is not None:
-        say("Not claimed: a bound of rho with friction, or that a reading is the right one.")
-        say(f"Next: ndtheory advise --theta {found.next.theta:g} --ratio R (R: the ratio of that run)")
-        return
-    say("Not claimed: that the predicted theta is the best one for your loads.")
-    if found.problem is not None:
-        if typed is not None:
-            options = [] if found.roles[0].neumann_body == found.neumann_body else ["--swap-roles"]
-            if theta is not None and takes_theta(found.problem.iteration.relaxation):
-                options += ["--theta", theta]
-            typed.suggest("run", *options)
-    else:
-        say("Next: ndtheory advise --help")
-
-
-def _seen(run: SeenRun, readings: tuple[RunReading, ...], following: NextRun) -> None:
-    """What a run says of rho, and which one is to be made next."""
-    heading("WHAT DOES THE RUN SAY OF RHO?")
-    given = f"theta = {float(run.theta):.4g}; the residual |Tg - g| changes by {float(run.ratio):.4g} a step"
-    note(f"{given}, absolute and unrelaxed, steadily over {run.steps} steps or more.", "  ")
-    note("A residual that rises and falls has no steady ratio: give 1.", "  ")
-    note("The relative residual |Tg - g|/|Tg| of coupling libraries tells other things.", "  ")
-    rows = [["reading", "rho", "if it is the right one"]]
-    for reading in readings:
-        rho = "-" if reading.lo is None else f">= {figures(reading.lo)}"
-        rows.append([reading.kind, rho, reading.says])
-    table(rows)
-    heading("WHICH RUN NEXT?")
-    note(f"theta = {following.theta:g}: {following.why}", "  ")
-
-
-def _roles(found: Advice) -> str:
-    """What is known of each role; returns the theta to paste."""
-    best = found.best
-    names = {1: "body 1", 2: "body 2", None: "as in that run"}
-    heading("WHICH BODY GETS THE NEUMANN PROBLEM?")
-    if found.neumann_body is None:
-        say("  One run tells nothing of the other assignment.")
-    else:
-        other = next(role for role in found.roles if role is not best)
-        say(f"  {names[found.neumann_body]}: predicted rate {near_one(best.rate_predicted)} a step,")
-        say(f"  against {near_one(other.rate_predicted)} with the roles exchanged")
-    heading("WHICH THETA?")
-    rows = [["Neumann", "rho", "", "theta", "rate", "steps", ""]]
-    why = {}
-    for role in found.roles:
-        name, rate = names[role.neumann_body], role.rate_predicted
-        theta = figures(role.theta_predicted)
-        rows.append([name, figures(role.rho), "predicted", theta, near_one(rate), _steps(rate, 1e-9), "not a bound"])
-        if role.factor_proved is not None and role.theta_proved is not None:
-            q = role.factor_proved.value
-            rows.append(["", "", "proved", figures(role.theta_proved), near_one(q), f"<= {_steps(q, 1e-9)}", ""])
-        else:
-            rows.append(["", "", "proved", "-", "-", "-", "no conclusion"])
-            why[name] = role.reason["theta_proved"]
-    table(rows)
-    for name, reason in why.items():
-        note(f"{name}: {reason}", "  ")
-    say("  predicted: theta = 2/(2 + rho); proved: the theta of least proved factor")
-    say("  steps: to 1e-9 of the first error")
-    for role in found.roles:
-        auto = role.theta_auto
-        if auto is not None:
-            takes = f'theta = "auto" takes {float(auto.theta):.4g}, the {auto.source} one: {auto.why}'
-            note(f"{names[role.neumann_body]}: {takes}", "  ")
-    if found.friction is not None:
-        heading("HOW MUCH FRICTION IS PROVED?")
-        for role in found.roles:
-            if role.friction_threshold is None:
-                note(f"{names[role.neumann_body]}: {role.reason['friction_threshold']}", "  ")
-            else:
-                allowed = f"every small theta contracts for k < {figures(role.friction_threshold)}"
-                say(f"  {names[role.neumann_body]}: {allowed} (here k = {figures(found.friction, 2)})")
-    heading("TO PASTE")
-    theta = f"{min(best.theta_predicted, 0.99):.3g}" if found.next is None else f"{found.next.theta:g}"
-    body = f"neumann_body = {found.neumann_body}\n  " if found.neumann_body else ""
-    say(f"  {body}theta = {theta}")
-    say(f'  <acceleration:constant><relaxation value="{theta}" /></acceleration:constant>')
-    return theta
 
 
 def plane(found: Plane, target: Path | None = None) -> None:

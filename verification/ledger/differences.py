@@ -225,11 +225,7 @@ def _solve(pair: ContactPair, force: Floats) -> tuple[Floats, ContactSolution]:
 
 def _stress(pair: ContactPair, force: Floats) -> Floats:
     """``S sigma_N`` at the nodes."""
-    return (
-        np.zeros(pair.contact.grid.n)
-        if pair.interface.kernel is None
-        else np.asarray(pair.interface.kernel @ force[pair.contact.grid.normal])
-    )
+    return pair.interface.stress(force)
 
 
 def random_pairs(setting: Setting, random: np.random.Generator, count: int) -> Iterator[Difference]:

@@ -322,6 +322,13 @@ class Problem:
         """
         return replace(self, iteration=replace(self.iteration, theta=read_theta(theta)))
 
+    @property
+    def contact_body(self) -> Literal[1, 2]:
+        """The body that carries the contact grid: the one without the Neumann problem, or the only elastic one."""
+        if self.body1.rigid or self.body2.rigid:
+            return 2 if self.body1.rigid else 1
+        return 1 if self.iteration.neumann_body == 2 else 2
+
     def swapped(self) -> Problem:
         """The same problem with the Neumann problem given to the other body."""
         other: Literal[1, 2] = 1 if self.iteration.neumann_body == 2 else 2
