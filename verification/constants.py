@@ -17,8 +17,8 @@ from ndtheory import Constants, EnergyConstants, Number, evaluate_sharp, exact
 from ndtheory.sharp import friction_multiple
 from verification.document import Document
 from verification.interface.body import Body, Condensed
-from verification.interface.build import pair_of
-from verification.interface.pair import ContactPair
+from verification.interface.pair import ContactPair, TwoBodies
+from verification.operators import Pencils, needs_matrices, pair_or_bodies
 from verification.problem import Problem
 from verification.progress import Progress, silent
 from verification.threads import one_thread
@@ -247,30 +247,32 @@ def measure(problem: Problem | ContactPair | Path | str, *, refine: int = 0, pro
     >>> round(measure(Problem.from_dict(bars)).rho_max.value, 12)
     1.5
     """
-    pair = pair_of(problem)
+    pair = pair_or_bodies(problem)
     progress("measuring the constants", None)
     with one_thread():
         finer = [] if not refine else _halved(pair, refine)  # refused before any is measured
-        result = _measure(pair)
+        result = _measure(pair, progress)
         if refine:
             levels, reason = [result], dict(result.reason)
             try:
                 for halvings, halved in enumerate(finer, 1):
                     progress(f"measuring the constants, {halvings} of {refine} halvings", (halvings - 1) / refine)
-                    levels.append(_measure(pair_of(halved)))
+                    levels.append(_measure(pair_or_bodies(halved), progress))
             except KeyboardInterrupt:
                 reason["levels"] = f"interrupted after {len(levels) - 1} of {refine} halvings"
             result = replace(result, levels=tuple(levels), reason=reason)
     return result
 
 
-def _halved(pair: ContactPair, refine: int) -> list[Problem]:
+def _halved(pair: ContactPair | TwoBodies, refine: int) -> list[Problem]:
     if pair.problem is None:
         raise ValueError("this pair is made from matrices: needed a problem whose meshes can be halved")
     return [pair.problem.refined(level) for level in range(1, refine + 1)]
 
 
-def _measure(pair: ContactPair) -> Measured:
+def _measure(pair: ContactPair | TwoBodies, progress: Progress = silent) -> Measured:
+    if isinstance(pair, TwoBodies):
+        return _without_matrices(pair, progress)
     friction = float(pair.friction)
     values: dict[str, float | None] = dict.fromkeys((*NAMES, *ENERGY_NAMES))
     reason: dict[str, str] = {}
@@ -311,11 +313,40 @@ def _measure(pair: ContactPair) -> Measured:
     )
 
 
-def _body(body: Body) -> BodyConstants:
-    A, H = body.stiffness, body.gram_matrix
-    smallest = largest_sparse(H, A, solver(A, body.order))  # 1/m, so that products with A^-1 find it
+def _without_matrices(bodies: TwoBodies, progress: Progress) -> Measured:
+    """What needs no interface matrices."""
+    pencils, problem = Pencils(bodies, progress), bodies.problem
+    values: dict[str, Any] = dict.fromkeys((*NAMES, *ENERGY_NAMES))
+    lower, upper = (_body(body, dense=False) for body in bodies.elastic)
+    values |= {"m": min(lower.m.value, upper.m.value), "M": lower.M.value + upper.M.value}
+    if not pencils.reason:
+        neumann = problem.iteration.neumann_body
+        values["rho_max"] = pencils.largest(neumann_body=neumann).value
+        values["rho_min"] = 1 / pencils.largest(neumann_body=3 - neumann).value
+        values["rho_normal"] = pencils.largest(neumann_body=neumann, normal=True).value
+    if not bodies.friction:
+        values |= dict.fromkeys(("C_K", "kappa_1", "kappa_2"), 0.0)
+    numbers: dict[str, Any] = {name: None if v is None else Number.of_float(v) for name, v in values.items()}
+    missing = [name for name, value in numbers.items() if value is None]
+    return Measured(
+        body1=lower,
+        body2=upper,
+        friction=float(bodies.friction),
+        interface_nodes=bodies.interface.contact.n,
+        reason=dict.fromkeys(missing, needs_matrices(bodies)) | pencils.reason,
+        units=problem.units,
+        problem=problem,
+        **numbers,
+    )
+
+
+def _body(body: Body, *, dense: bool = True) -> BodyConstants:
+    """m and M; ``dense`` where the Schur complement of the norm is wanted too, which one factorisation gives."""
+    A, H, order = body.stiffness, body.gram_matrix, body.order if dense else None
+    solve_A, solve_H = (solver(A, order), body.gram.solver()) if dense else (body.solve, solver(H))
+    smallest = largest_sparse(H, A, solve_A)  # 1/m, so that products with A^-1 find it
     above = body.material.continuity(body.mesh.dimension)
-    biggest = largest_sparse(A, H, body.gram.solver(), above=above, order=body.order)
+    biggest = largest_sparse(A, H, solve_H, above=above, order=order)
     return BodyConstants(
         m=Number.of_float(1 / smallest.value),
         M=Number.of_float(biggest.value),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
@@ -20,11 +20,12 @@ from verification.advice.readings import NextRun, RunReading, SeenRun, read_rati
 from verification.algorithm.theta import Choice, automatic, sharp_bounds
 from verification.constants import measure
 from verification.document import Document
-from verification.interface.build import pair_of
 from verification.interface.matrices import check_matrix, size
-from verification.interface.pair import ContactPair
+from verification.interface.pair import ContactPair, TwoBodies
+from verification.operators import Pencils, needs_matrices, pair_or_bodies
 from verification.problem import Problem
 from verification.problem.tables import ProblemError
+from verification.progress import Progress, silent
 from verification.threads import one_thread
 
 if TYPE_CHECKING:
@@ -79,7 +80,7 @@ class Role:
         values = {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "energy"}
         values["reason"] = dict(self.reason)
         if self.theta_auto is None:
-            values["reason"]["theta_auto"] = "no problem file"
+            values["reason"].setdefault("theta_auto", "no problem file")
         return {name: v.to_dict() if isinstance(v, (Number, Choice)) else v for name, v in values.items()}
 
 
@@ -162,7 +163,7 @@ class Advice(Document):
         }
 
 
-def advise(problem: Problem | ContactPair | Path | str) -> Advice:
+def advise(problem: Problem | ContactPair | Path | str, *, progress: Progress = silent) -> Advice:
     """Advise on the roles of the bodies and on theta.
 
     The body whose prediction ``rho/(2 + rho)`` is smaller gets the Neumann problem.
@@ -170,6 +171,8 @@ def advise(problem: Problem | ContactPair | Path | str) -> Advice:
     Parameters
     ----------
     problem : Problem, ContactPair or path
+    progress : callable
+        Told the steps that rho takes where there are too many contact nodes for matrices.
 
     Returns
     -------
@@ -189,13 +192,16 @@ def advise(problem: Problem | ContactPair | Path | str) -> Advice:
     >>> found.neumann_body, round(found.best.theta_predicted, 6)
     (1, 0.857143)
     """
-    pair = pair_of(problem)
-    roles = tuple(_role(roles) for roles in (pair, pair.swapped()))
+    pair = pair_or_bodies(problem)
+    if isinstance(pair, TwoBodies):
+        roles = _roles_without_matrices(pair, progress)
+    else:
+        roles = tuple(_role(roles) for roles in (pair, pair.swapped()))
     best = min(roles, key=lambda role: role.rate_predicted)
     return Advice(
         neumann_body=best.neumann_body,
         roles=roles,
-        units=pair.units,
+        units=UNITS if pair.problem is None else pair.problem.units,
         problem=pair.problem,
         friction=float(pair.friction),
         outside=tuple(pair.outside),
@@ -230,6 +236,25 @@ def _role(pair: ContactPair) -> Role:
         theta_auto=automatic(sharp, outside, pair.settings.tolerance),
         energy=None if outside else measured.energy_constants(),
     )
+
+
+def _roles_without_matrices(bodies: TwoBodies, progress: Progress) -> tuple[Role, ...]:
+    """Both roles, the file's first: rho alone, and what it proves without friction."""
+    pencils, problem = Pencils(bodies, progress), bodies.problem
+    for why in pencils.reason.values():
+        raise ProblemError(problem.source, "contact", None, f"no advice: {why}")
+    needed, rubs, outside = needs_matrices(bodies), bool(bodies.friction), bodies.outside
+    roles = []
+    for neumann in (problem.iteration.neumann_body, problem.swapped().iteration.neumann_body):
+        rho = pencils.largest(neumann_body=neumann, normal=not rubs).value
+        reason = {"theta_auto": needed, "friction_threshold": needed}
+        nothing = f"outside the theorem: {outside[0]}" if outside else needed if rubs else None
+        unproved: dict[str, Any] = {}
+        if nothing is not None:
+            unproved = dict.fromkeys(("theta_proved", "factor_proved", "theta_max_proved"))
+            reason |= dict.fromkeys((*unproved, "friction_threshold"), nothing)
+        roles.append(replace(_plain_role(neumann, Fraction(rho)), reason=reason, **unproved))
+    return tuple(roles)
 
 
 def advise_matrices(S1: Floats, S2: Floats) -> Advice:

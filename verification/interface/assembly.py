@@ -36,6 +36,10 @@ from verification.problem.tables import ProblemError, short
 MOST_CONTACT_NODES = 2000
 
 
+class TooManyContactNodes(ProblemError):
+    """A sound problem, too large for dense interface matrices."""
+
+
 def build(problem: Problem, *, law: Law | None = None, like: ContactPair | None = None) -> ContactPair:
     """Two condensed bodies with roles, as the iteration and its constants need them.
 
@@ -53,29 +57,7 @@ def build(problem: Problem, *, law: Law | None = None, like: ContactPair | None 
     ProblemError
         As :func:`discretise`, and where a body is rigid or can move rigidly.
     """
-    iteration = problem.iteration
-    for name in ("body1", "body2"):
-        if getattr(problem, name).rigid:
-            role = "Neumann" if iteration.neumann_body == int(name[-1]) else "contact"
-            raise ProblemError(
-                problem.source,
-                f"{name}.shape",
-                "rigid",
-                f"needed an elastic body: it has the {role} problem of the iteration; `ndtheory solve` takes obstacles",
-            )
-    bodies = discretise(problem, law=law)
-    for body in bodies.elastic:
-        k = body.motions.shape[1]
-        if k:
-            neumann = iteration.neumann_body == int(body.name[-1])
-            step = "the Neumann problem of step I" if neumann else "the contact problem of step II"
-            raise ProblemError(
-                problem.source,
-                body.name,
-                None,
-                f"{body.name} can move rigidly ({k} free motion{'s' if k > 1 else ''}), so that its stiffness matrix in"
-                f" {step} is singular: fix or prescribe more of its sides, or use `ndtheory solve`",
-            )
+    bodies, iteration = held_bodies(problem, law=law), problem.iteration
     known = (None, None) if like is None else (like.body1, like.body2)
     upward, grid = iteration.neumann_body == 2, bodies.interface.contact
     lower, upper = (_condensed(body, grid, upward, side) for body, side in zip(bodies.elastic, known, strict=True))
@@ -90,6 +72,48 @@ def build(problem: Problem, *, law: Law | None = None, like: ContactPair | None 
     )
 
 
+def held_bodies(problem: Problem, *, law: Law | None = None, dense: bool = True) -> TwoBodies:
+    """The bodies on their meshes as the iteration needs them: elastic, and held by their supports.
+
+    Parameters
+    ----------
+    problem : Problem
+    law : Law, optional
+        As for :func:`build`.
+    dense : bool
+        As for :func:`discretise`.
+
+    Raises
+    ------
+    ProblemError
+        As :func:`build`.
+    """
+    iteration = problem.iteration
+    for name in ("body1", "body2"):
+        if getattr(problem, name).rigid:
+            role = "Neumann" if iteration.neumann_body == int(name[-1]) else "contact"
+            raise ProblemError(
+                problem.source,
+                f"{name}.shape",
+                "rigid",
+                f"needed an elastic body: it has the {role} problem of the iteration; `ndtheory solve` takes obstacles",
+            )
+    bodies = discretise(problem, law=law, dense=dense)
+    for body in bodies.elastic:
+        k = body.motions.shape[1]
+        if k:
+            neumann = iteration.neumann_body == int(body.name[-1])
+            step = "the Neumann problem of step I" if neumann else "the contact problem of step II"
+            raise ProblemError(
+                problem.source,
+                body.name,
+                None,
+                f"{body.name} can move rigidly ({k} free motion{'s' if k > 1 else ''}), so that its stiffness matrix in"
+                f" {step} is singular: fix or prescribe more of its sides, or use `ndtheory solve`",
+            )
+    return bodies
+
+
 def _condensed(body: Body, grid: Grid, upward: bool, like: Condensed | None) -> Condensed:
     """A body condensed, its normal components along y or against it; one like it may be condensed already."""
     if like is None or like.body is None:
@@ -101,17 +125,31 @@ def _condensed(body: Body, grid: Grid, upward: bool, like: Condensed | None) -> 
     return found if found.upward == upward else found.turned()
 
 
-def discretise(problem: Problem, *, law: Law | None = None) -> TwoBodies:
+def discretise(problem: Problem, *, law: Law | None = None, dense: bool = True) -> TwoBodies:
     """Mesh and assemble the bodies and find Gamma_c.
+
+    Parameters
+    ----------
+    problem : Problem
+    law : Law, optional
+        A law of friction in place of the problem's.
+    dense : bool
+        False where no interface matrices will be made: then there may be any number of contact nodes.
 
     Raises
     ------
+    TooManyContactNodes
+        More than MOST_CONTACT_NODES of them, for dense interface matrices.
     ProblemError
         A body held by nothing but contact, bodies that do not meet, grids that do not match, an interval outside the
         overlap, Gamma_u holding the normal component of a contact node, an unreadable mesh.
     """
     meshes = [None if spec.rigid else _mesh(problem, name) for name, spec in _specs(problem)]
     nodes, x, gap = _interface(problem, meshes)
+    if dense and len(x) > MOST_CONTACT_NODES:
+        raise TooManyContactNodes(
+            problem.source, "contact", None, f"needed at most {MOST_CONTACT_NODES} contact nodes, these are {len(x)}"
+        )
     body1, body2 = (
         None if mesh is None else _body(problem, name, mesh, own)
         for (name, _), mesh, own in zip(_specs(problem), meshes, nodes, strict=True)
@@ -260,8 +298,6 @@ def _check_matching(
                 f" and body 2 has {len(x2)}, which must lie at the same x",
             )
     x = positions[0]
-    if len(x) > MOST_CONTACT_NODES:
-        raise refuse("contact", None, f"needed at most {MOST_CONTACT_NODES} contact nodes, these are {len(x)}")
     if len(x) < 2 or max(x[0] - ends[0], ends[1] - x[-1]) > SAME * size:
         near = f"from {x[0]:g} to {x[-1]:g}" if len(x) else "nowhere"
         raise refuse(
