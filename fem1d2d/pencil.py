@@ -79,9 +79,10 @@ def largest_of(
     """Largest eigenvalue of a pencil of which only products and solves are known.
 
     Lanczos from a fixed start, so that it repeats to the digit.  A step costs one product with each matrix and one
-    solve.  The residual that is returned proves that some eigenvalue lies within it of the value, up to the error of
-    the solves.  That no larger one exists it does not prove: the start would have to be orthogonal to its eigenvectors,
-    which no random start is, or the larger one so near that Lanczos has not told them apart.
+    solve.  The residual of the result says that some eigenvalue lies within it of the value, up to the error of the
+    products and solves.  It does not say that this eigenvalue is the largest: that is the word of Lanczos, which misses
+    a larger one where the start is all but orthogonal to its eigenvectors, or where the two are so near each other that
+    it has not told them apart when the residual is small enough.
 
     Parameters
     ----------

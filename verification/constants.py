@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from fem1d2d import largest, largest_sparse, solver
+from fem1d2d import largest
 from fem1d2d.mesh import Floats
 from ndtheory import Constants, EnergyConstants, Number, evaluate_sharp, exact
 from ndtheory.sharp import friction_multiple
+from verification.body_constants import BodyConstants, constants_of
 from verification.document import Document
-from verification.interface.body import Body, Condensed
+from verification.interface.body import Condensed
 from verification.interface.pair import ContactPair, TwoBodies
 from verification.operators import Pencils, needs_matrices, pair_or_bodies
 from verification.problem import Problem
@@ -33,24 +34,6 @@ ENERGY_NAMES = ("C_s_energy", "C_t1", "C_t2", "kappa_1", "kappa_2")
 #: Those that a pair made from matrices does not have, and why.
 OF_MESHES = ("body1", "body2", "m", "M", "C_R", "C_s", "C_tr", "C_tr_half", "C_K")
 FROM_MATRICES = "the pair is made from matrices: needed the meshes of both bodies"
-
-
-@dataclass(frozen=True, kw_only=True)
-class BodyConstants:
-    """Coercivity m^a and continuity M^a of one body (4.1), unit stress, with the residuals of the eigenvalues.
-
-    ``residual_m``, ``residual_M`` are relative; the error of the eigenvalue is of the order of their square.
-    """
-
-    m: Number
-    M: Number
-    nodes: int
-    residual_m: float
-    residual_M: float
-
-    def to_dict(self) -> dict[str, Any]:
-        """The objects ``body1``, ``body2`` of the document."""
-        return {"m": self.m.to_dict(), "M": self.M.to_dict(), "nodes": self.nodes}
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -281,7 +264,7 @@ def _measure(pair: ContactPair | TwoBodies, progress: Progress = silent) -> Meas
     if not meshes:
         reason = dict.fromkeys(OF_MESHES, FROM_MATRICES)
     else:
-        body1, body2 = _body(pair.body1.mesh_body), _body(pair.body2.mesh_body)
+        body1, body2 = constants_of(pair.body1.mesh_body), constants_of(pair.body2.mesh_body)
         values |= {"m": min(body1.m.value, body2.m.value), "M": body1.M.value + body2.M.value}
     if pair.interface.transfer is None and not np.array_equal(pair.contact.free, pair.neumann.free):
         why = "the bodies hold different tangential components of Gamma_c: their traces differ"
@@ -317,7 +300,7 @@ def _without_matrices(bodies: TwoBodies, progress: Progress) -> Measured:
     """What needs no interface matrices."""
     pencils, problem = Pencils(bodies, progress), bodies.problem
     values: dict[str, Any] = dict.fromkeys((*NAMES, *ENERGY_NAMES))
-    lower, upper = (_body(body, dense=False) for body in bodies.elastic)
+    lower, upper = (constants_of(body, dense=False) for body in bodies.elastic)
     values |= {"m": min(lower.m.value, upper.m.value), "M": lower.M.value + upper.M.value}
     if not pencils.reason:
         neumann = problem.iteration.neumann_body
@@ -337,22 +320,6 @@ def _without_matrices(bodies: TwoBodies, progress: Progress) -> Measured:
         units=problem.units,
         problem=problem,
         **numbers,
-    )
-
-
-def _body(body: Body, *, dense: bool = True) -> BodyConstants:
-    """m and M; ``dense`` where the Schur complement of the norm is wanted too, which one factorisation gives."""
-    A, H, order = body.stiffness, body.gram_matrix, body.order if dense else None
-    solve_A, solve_H = (solver(A, order), body.gram.solver()) if dense else (body.solve, solver(H))
-    smallest = largest_sparse(H, A, solve_A)  # 1/m, so that products with A^-1 find it
-    above = body.material.continuity(body.mesh.dimension)
-    biggest = largest_sparse(A, H, solve_H, above=above, order=order)
-    return BodyConstants(
-        m=Number.of_float(1 / smallest.value),
-        M=Number.of_float(biggest.value),
-        nodes=len(body.mesh.points),
-        residual_m=smallest.residual / smallest.value,
-        residual_M=biggest.residual / biggest.value,
     )
 
 

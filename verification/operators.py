@@ -19,7 +19,6 @@ the rounding of the pivots: none lies above s, and nearest to s is the one that 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -100,7 +99,7 @@ class Traces:
 class Pencils:
     """The pencils (S_c, S_n) of two bodies, in both roles, with all components of the trace and with the normal ones.
 
-    Factorisations live as long as this object, and as long as its bodies.
+    The factorisations for one choice of components are kept until the other one is asked for.
 
     Parameters
     ----------
@@ -112,6 +111,7 @@ class Pencils:
 
     def __init__(self, bodies: TwoBodies, progress: Progress = silent) -> None:
         self.bodies, self.progress = bodies, progress
+        self._held: tuple[bool, list[Traces]] | None = None
 
     @property
     def reason(self) -> dict[str, str]:
@@ -121,18 +121,12 @@ class Pencils:
             return {}
         return dict.fromkeys(("rho_max", "rho_min", "rho_normal"), TRACES_DIFFER)
 
-    @cached_property
-    def _traces(self) -> dict[bool, tuple[Traces, Traces]]:
-        n = self.bodies.interface.contact.n
-
-        def of(normal: bool) -> tuple[Traces, Traces]:
-            lower, upper = (Traces(b, b.interface[-n:] if normal else b.interface) for b in self.bodies.elastic)
-            return lower, upper
-
-        return {normal: of(normal) for normal in (False, True)}
-
     def _roles(self, neumann_body: int, normal: bool) -> tuple[Traces, Traces]:
-        lower, upper = self._traces[normal]
+        if self._held is None or self._held[0] != normal:
+            self._held = None  # its factorisations are the largest part of the memory
+            n = self.bodies.interface.contact.n
+            self._held = normal, [Traces(b, b.interface[-n:] if normal else b.interface) for b in self.bodies.elastic]
+        lower, upper = self._held[1]
         return (lower, upper) if neumann_body == 2 else (upper, lower)
 
     def shifted(
@@ -168,14 +162,13 @@ class Pencils:
         with one_thread():
             found = largest_of(*pencil, tolerance=ROUGH, progress=tell)
             for last in (False, True):
-                distance = SHIFT
-                while True:
+                distance, nearest = SHIFT, None
+                while nearest is None:
                     shift = (1 + distance) * found.value
                     self.progress(f"{name}: counting the eigenvalues above {shift:.6g}", None)
                     nearest, count = self.shifted(shift, neumann_body=neumann_body, normal=normal)
-                    if count == 0:
-                        break
-                    distance *= FARTHER
+                    if count != 0:
+                        nearest, distance = None, distance * FARTHER
                 near = last or distance == SHIFT
                 found = largest_of(*pencil, above=(shift, nearest), tolerance=LANCZOS if near else ROUGH, progress=tell)
                 if near:
