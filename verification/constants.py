@@ -116,7 +116,8 @@ class Measured(Document):
 
         energy = self.energy_constants()
         if energy is None:
-            raise ValueError("rho does not exist: " + next(iter(self.reason.values()), ""))
+            missing = next(name for name in ("rho_max", "kappa_1") if getattr(self, name) is None)
+            raise ValueError(f"{missing} does not exist: {self.reason[missing]}")
         return draw_factor({"": energy})
 
     @property

@@ -138,6 +138,8 @@ def test_beyond_the_limit_rho_m_and_M_are_measured_and_the_rest_tells_why_not(mo
     assert (large.nodes, large.interface_nodes) == (dense.nodes, dense.interface_nodes)
     assert pickle.loads(pickle.dumps(large)).rho_max == large.rho_max
     assert large.to_dict().keys() == dense.to_dict().keys()
+    with pytest.raises(ValueError, match="kappa_1 does not exist: 41 contact nodes"):
+        large.plot()
 
 
 def test_without_friction_what_is_proved_is_proved_at_every_size(monkeypatch):
@@ -206,6 +208,16 @@ def test_a_body_that_moves_rigidly_is_refused_at_any_size(few):
     loose = changed(unequal(cells=40).to_dict(), body2={"prescribed": {"top": ["free", "-1/50"]}})
     with pytest.raises(vf.ProblemError, match="can move rigidly"):
         vf.measure(vf.Problem.from_dict(loose))
+
+
+def test_each_step_of_a_large_problem_is_told(few):
+    told = []
+    for answer in (vf.measure, vf.advise):
+        told.clear()
+        answer(unequal(cells=40), progress=lambda what, share: told.append(what))
+        for name in ("rho, Neumann body 1", "rho, Neumann body 2"):
+            assert f"{name}: step 1 of Lanczos" in told
+            assert any(what.startswith(f"{name}: counting the eigenvalues above") for what in told)
 
 
 # --- on the screen ----------------------------------------------------------------------------------------------------
