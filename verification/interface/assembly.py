@@ -144,6 +144,7 @@ def _mesh(problem: Problem, name: Name) -> Mesh:
             raise refuse(str(error).removeprefix(f"{path}: ")) from None
         if len(mesh.cells) > 2 * MOST_CELLS:
             raise refuse(f"needed at most {2 * MOST_CELLS} triangles, these are {len(mesh.cells)}")
+        mesh = _with_parts(problem, name, mesh)
         for key, sides in (("fixed", spec.fixed), ("prescribed", spec.prescribed), ("traction", spec.traction)):
             for side in sides:
                 if side not in mesh.sides:
@@ -161,9 +162,27 @@ def _mesh(problem: Problem, name: Name) -> Mesh:
         if problem.dimension == 1:
             return interval(x, spec.cells[0])
         assert spec.y is not None
-        return rectangle(x, (float(spec.y[0]), float(spec.y[1])), (spec.cells[0], spec.cells[1]))
+        mesh = rectangle(x, (float(spec.y[0]), float(spec.y[1])), (spec.cells[0], spec.cells[1]))
+        return _with_parts(problem, name, mesh)
     except MeshError as error:  # coordinates that no longer differ in doubles
         raise ProblemError(problem.source, f"{name}.cells", list(spec.cells), str(error)) from None
+
+
+def _with_parts(problem: Problem, name: Name, mesh: Mesh) -> Mesh:
+    """The mesh with the parts of sides that the problem names: the edges of the side between the ends of the part."""
+    parts = {}
+    for key, part in getattr(problem, name).parts.items():
+        refuse = lambda needed, key=key: ProblemError(problem.source, f"{name}.parts.{key}", None, needed)
+        if key in mesh.sides or part.side not in mesh.sides:
+            raise refuse(f"needed a part of a side, under a name of its own; sides: {short(', '.join(mesh.sides))}")
+        edges, slack = mesh.sides[part.side], SAME * extent(mesh)
+        along = mesh.points[edges, "xy".index(part.axis)].astype(float)
+        low, high = map(float, part.ends)
+        inside = (along.min(axis=1) >= low - slack) & (along.max(axis=1) <= high + slack)
+        if not inside.any():
+            raise refuse(f"no edge of side {part.side!r} lies between {part.axis} = {low:g} and {high:g}")
+        parts[key] = edges[inside]
+    return replace(mesh, sides={**mesh.sides, **parts}) if parts else mesh
 
 
 def _body(problem: Problem, name: Name, mesh: Mesh, nodes: Ints, ends: Floats) -> Body:
