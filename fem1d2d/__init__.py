@@ -3,14 +3,15 @@
 A small core in which every matrix is exact for its mesh.  It knows nothing of contact or of any theorem.
 """
 
-from fem1d2d.assembly import body_load, gram, side_load, stiffness
+from fem1d2d.assembly import body_load, facet_weights, gram, side_load, stiffness
 from fem1d2d.condense import Condensation, elimination_order, solver, solver_with_inertia
 from fem1d2d.material import Material, bar, plane_strain
 from fem1d2d.mesh import Mesh, MeshError, interval, rectangle
 from fem1d2d.mesh_files import from_file
 from fem1d2d.pencil import Eigenvalue, largest, largest_of, largest_sparse
 from fem1d2d.supports import Supports, rigid_motions, supports
-from fem1d2d.trace import facing, nodes_between, surface, trapezoid
+from fem1d2d.trace import facing, surface, trapezoid
+from fem1d2d.transfer import mortar
 
 __all__ = [
     "Condensation",
@@ -22,6 +23,7 @@ __all__ = [
     "bar",
     "body_load",
     "elimination_order",
+    "facet_weights",
     "facing",
     "from_file",
     "gram",
@@ -29,7 +31,7 @@ __all__ = [
     "largest",
     "largest_of",
     "largest_sparse",
-    "nodes_between",
+    "mortar",
     "plane_strain",
     "rectangle",
     "rigid_motions",

@@ -75,12 +75,24 @@ def side_load(mesh: Mesh, facets: Ints, traction: Sequence[float]) -> Floats:
     return np.asarray(weights[:, None] * np.asarray(traction, dtype=float))
 
 
-def facet_weights(mesh: Mesh, facets: Ints) -> Floats:
+def facet_weights(mesh: Mesh, facets: Ints, between: tuple[float, float] | None = None) -> Floats:
     """``int v`` over facets for every hat function v, shape (n,), unit length^(d - 1).
 
     In 1D a facet is a point of measure 1.
+
+    Parameters
+    ----------
+    facets : int array, shape (f, d)
+        The nodes of each facet.
+    between : pair of float, optional
+        In 2D, the part of the x axis over which to integrate; no facet may stand upright then.
     """
     p = mesh.points[facets].astype(float)
     sizes = np.ones(len(facets)) if mesh.dimension == 1 else np.linalg.norm(p[:, 1] - p[:, 0], axis=1)
-    share = np.repeat(sizes / facets.shape[1], facets.shape[1])
-    return np.asarray(np.bincount(facets.ravel(), share, minlength=len(mesh.points)), dtype=float)
+    share = np.full(facets.shape, 1 / facets.shape[1])
+    if between is not None and mesh.dimension == 2:
+        x = p[..., 0]
+        s, t = np.sort([np.clip((end - x[:, 0]) / (x[:, 1] - x[:, 0]), 0, 1) for end in between], axis=0)
+        share[:, 1] = (t**2 - s**2) / 2
+        share[:, 0] = t - s - share[:, 1]
+    return np.asarray(np.bincount(facets.ravel(), (sizes[:, None] * share).ravel(), minlength=len(mesh.points)))

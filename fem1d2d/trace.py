@@ -15,7 +15,7 @@ def extent(mesh: Mesh) -> float:
     return float(np.ptp(mesh.points.astype(float), axis=0).max())
 
 
-def surface(mesh: Mesh, *, upper: bool) -> Ints:
+def surface(mesh: Mesh, *, upper: bool, ends: tuple[float, float] | None = None) -> Ints:
     """Nodes of the flat top (or bottom) of a mesh, from left to right.
 
     That is the boundary at the largest (smallest) last coordinate.
@@ -24,6 +24,9 @@ def surface(mesh: Mesh, *, upper: bool) -> Ints:
     ----------
     upper : bool
         True for the top of a lower body, False for the bottom of an upper one.  In 1D: the right or the left end.
+    ends : pair of float, optional
+        A part of the x axis, in the mesh's unit of length (2D): the nodes of the edges that reach into it, the
+        outermost of which may lie beyond.
 
     Raises
     ------
@@ -37,7 +40,8 @@ def surface(mesh: Mesh, *, upper: bool) -> Ints:
     if mesh.dimension == 1:
         return np.flatnonzero(flat)
     edges = mesh.boundary
-    nodes = np.unique(edges[flat[edges].all(axis=1)])
+    edges = edges[flat[edges].all(axis=1)]
+    nodes = np.unique(edges if ends is None else _between(mesh, edges, ends))
     if len(nodes) == 0:
         raise MeshError(f"no flat {'top' if upper else 'bottom'}: no boundary edge lies at y = {level:g}")
     return np.asarray(nodes[np.argsort(points[nodes, 0], kind="stable")])
@@ -53,7 +57,8 @@ def facing(mesh: Mesh, *, upper: bool, ends: tuple[float, float]) -> Ints:
     upper : bool
         True for what faces up.
     ends : pair of float
-        Part of the x axis, in the mesh's unit of length.
+        A part of the x axis, in the mesh's unit of length: the nodes of the edges that reach into it, the outermost of
+        which may lie beyond.
 
     Raises
     ------
@@ -64,8 +69,8 @@ def facing(mesh: Mesh, *, upper: bool, ends: tuple[float, float]) -> Ints:
     x = mesh.points[:, 0].astype(float)
     rightwards = x[edges[:, 1]] - x[edges[:, 0]]  # the body lies to the left of an edge: below one that runs leftwards
     slack = SAME * extent(mesh)
-    nodes = np.unique(edges[rightwards < -slack if upper else rightwards > slack])
-    nodes = nodes_between(mesh, nodes[np.argsort(x[nodes], kind="stable")], ends)
+    nodes = np.unique(_between(mesh, edges[rightwards < -slack if upper else rightwards > slack], ends))
+    nodes = nodes[np.argsort(x[nodes], kind="stable")]
     double = np.flatnonzero(np.diff(x[nodes]) <= slack)
     if len(double):
         raise MeshError(
@@ -74,11 +79,10 @@ def facing(mesh: Mesh, *, upper: bool, ends: tuple[float, float]) -> Ints:
     return nodes
 
 
-def nodes_between(mesh: Mesh, nodes: Ints, ends: tuple[float, float]) -> Ints:
-    """Those of ``nodes`` with ``ends[0] <= x <= ends[1]``, ends included up to rounding (2D)."""
-    x = mesh.points[nodes, 0].astype(float)
-    slack = SAME * extent(mesh)
-    return np.asarray(nodes[(x >= ends[0] - slack) & (x <= ends[1] + slack)])
+def _between(mesh: Mesh, edges: Ints, ends: tuple[float, float]) -> Ints:
+    """Those of some edges that reach further than rounding between two positions."""
+    x, slack = mesh.points[edges, 0].astype(float), SAME * extent(mesh)
+    return np.asarray(edges[(x.min(axis=1) < ends[1] - slack) & (x.max(axis=1) > ends[0] + slack)])
 
 
 def trapezoid(x: Floats) -> Floats:

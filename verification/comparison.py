@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from ndtheory import EDITIONS
 from verification.algorithm.iterate import Iterate
 from verification.algorithm.rates import StepRatio, largest_step_ratio
 from verification.algorithm.reference import Reference, by_cvxpy_alone
 from verification.algorithm.relaxation import Constant
-from verification.algorithm.runs import NOT_ASKED, Run, run
+from verification.algorithm.runs import Run, check_memory, run
+from verification.algorithm.theta import Choice, begin
 from verification.bounds.bound import LARGEST, BoundResult, Subject
 from verification.bounds.losses import Losses, locate
 from verification.bounds.table import BOUNDS
@@ -24,6 +25,7 @@ from verification.interface.pair import ContactPair
 from verification.interrupts import INTERRUPTED
 from verification.problem import Problem
 from verification.progress import Progress, silent
+from verification.verdicts import Judgement, judge_bound, judge_forecast
 
 if TYPE_CHECKING:
     from verification.figures import Figure
@@ -31,21 +33,32 @@ if TYPE_CHECKING:
 #: The bounds whose violation is a bug or an error in a proof.
 NO_FINDING = tuple(bound.name for bound in BOUNDS.values() if not bound.finding)
 
-#: A bound may be attained: a ratio above it by less than this share of 1 - bound is equal to it.
-TIGHT = 1e-6
-
-#: A forecast comes true where its rate is the observed one to this, and its steps to one.
-AGREES = 1e-3
-
-RunVerdict = Literal["CONSISTENT", "VIOLATED", "INCONCLUSIVE", "HYPOTHESES_NOT_MET", "NOT_COMPUTED"]
+T = TypeVar("T")
 
 
-@dataclass(frozen=True, kw_only=True)
-class Judgement:
-    """A verdict on one bound, with its reason in words."""
+class Listener:
+    """Hears each part of a comparison as soon as it is known, in the order of these methods.
 
-    verdict: RunVerdict
-    reason: str
+    Here nothing is done with them; a screen shows them.  Ctrl-C in a method leaves out what is still to come.
+    """
+
+    def constants(self, measured: Measured, choice: Choice) -> None:
+        """The constants, and the theta of the run."""
+
+    def bounds(self, results: Sequence[BoundResult], measured: Measured) -> None:
+        """The bounds that follow from the constants."""
+
+    def run(self, finished: Run) -> None:
+        """The run, linearised."""
+
+    def cvxpy(self, reference: Reference | None, why: str) -> None:
+        """The run by cvxpy alone, or why there is none."""
+
+    def losses(self, losses: Losses | None, why: str) -> None:
+        """What each inequality of the proof gives away, or why that is not known."""
+
+    def programs(self, results: Sequence[BoundResult]) -> None:
+        """The bounds that take the matrices of the pair."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -100,6 +113,18 @@ class Comparison(Document):
         from verification.figures import draw_residuals
 
         return draw_residuals(self.run, self.computed)
+
+    def tell(self, listener: Listener) -> None:
+        """Tell each part, as it was told when it was worked out."""
+        listener.constants(self.measured, self.run.choice)
+        listener.bounds(self._bounds(calculated=True), self.measured)
+        listener.run(self.run)
+        listener.cvxpy(self.cvxpy, self.reason.get("cvxpy", ""))
+        listener.losses(self.losses, self.reason.get("losses", ""))
+        listener.programs(self._bounds(calculated=False))
+
+    def _bounds(self, *, calculated: bool) -> list[BoundResult]:
+        return [result for name, result in self.bounds.items() if BOUNDS[name].calculated == calculated]
 
     @property
     def computed(self) -> list[BoundResult]:
@@ -156,58 +181,6 @@ class Comparison(Document):
         }
 
 
-def judge(bound: float | None, seen: StepRatio | None, why_none: str) -> Judgement:
-    """Hold a bound on the factor of one step against the largest factor seen.
-
-    A bound may be attained: what lies above it by less than :data:`TIGHT` of ``1 - bound`` is not told from it.
-
-    Parameters
-    ----------
-    bound : float or None
-        None: the bound draws no conclusion; ``why_none`` says why.
-    seen : StepRatio or None
-        None: no step stands clear of rounding.
-
-    Examples
-    --------
-    >>> judge(0.5, StepRatio(value=0.4, lo=0.39, hi=0.41, steps=9), "").verdict
-    'CONSISTENT'
-    """
-    if bound is None:
-        return Judgement(verdict="HYPOTHESES_NOT_MET", reason=why_none)
-    if seen is None:
-        return Judgement(verdict="INCONCLUSIVE", reason="no step stands clear of rounding")
-    if seen.steps == 0:
-        return Judgement(verdict="NOT_COMPUTED", reason="no step was taken")
-    digits = 4 if seen.hi <= bound else 6  # six where the bound is attained or violated
-    says = f"ratios <= {seen.value:.{digits}g} in {seen.steps} steps, bound {bound:.{digits}g}"
-    if seen.hi <= bound:
-        return Judgement(verdict="CONSISTENT", reason=says)
-    slack = TIGHT * (1 - bound)
-    if seen.lo > bound + slack:
-        return Judgement(verdict="VIOLATED", reason=says)
-    if seen.hi <= bound + slack:
-        return Judgement(verdict="CONSISTENT", reason=f"{says}: attained")
-    return Judgement(verdict="INCONCLUSIVE", reason=f"{says}: closer than rounding")
-
-
-def judge_forecast(run: Run) -> Judgement:
-    """Hold what was said half way against what the run then did."""
-    made, seen = run.forecast, run.observed_rate
-    if made is None:
-        return Judgement(verdict="NOT_COMPUTED", reason=run.why_no_forecast)
-    says = f"forecast {made.rate:.4g}, {made.iterations} steps"
-    if run.outcome == "interrupted":
-        return Judgement(verdict="NOT_COMPUTED", reason=f"{says}; the run was interrupted")
-    if seen is None:
-        return Judgement(verdict="VIOLATED", reason=f"{says}; the run {run.outcome}, and shows no rate")
-    ended = "" if run.converged else f", {run.outcome}"
-    right = abs(seen.value - made.rate) <= AGREES and abs(run.iterations - made.iterations) <= 1 and run.converged
-    return Judgement(
-        verdict="CONSISTENT" if right else "VIOLATED", reason=f"{says}; seen {seen.value:.4g}, {run.iterations}{ended}"
-    )
-
-
 def compare(
     problem: Problem | ContactPair | Path | str,
     *,
@@ -216,6 +189,7 @@ def compare(
     exact: bool = False,
     watch: Callable[[Iterate], None] = lambda state: None,
     progress: Progress = silent,
+    listener: Listener | None = None,
 ) -> Comparison:
     """Measure the constants, evaluate the bounds, run the algorithm, and judge.
 
@@ -235,6 +209,8 @@ def compare(
         Called with every iterate.
     progress : callable
         Told what is being done.
+    listener : Listener, optional
+        Told each part when it is known, what takes long last.
 
     Returns
     -------
@@ -257,52 +233,41 @@ def compare(
     >>> compare(Problem.from_dict(bars)).verdicts["sharp"].verdict
     'CONSISTENT'
     """
-    pair = pair_of(problem)
+    pair, listener = pair_of(problem), listener or Listener()
+    check_memory(pair)  # nothing is told of a run that would be refused
     measured = measure(pair, progress=progress)
+    choice, subject = begin(pair, theta, None, measured)[1], Subject.of(pair, measured, exact=exact)
+    results = {
+        name: bound.evaluate(subject, choice.theta) if bound.calculated else bound.absent(INTERRUPTED)
+        for name, bound in BOUNDS.items()
+    }
+    listener.constants(measured, choice)
+    listener.bounds([result for name, result in results.items() if BOUNDS[name].calculated], measured)
     progress("iterating", None)
     finished = run(pair, theta=theta, solver=solver, watch=watch, measured=measured)
-    reason: dict[str, str] = {}
-    losses, results = None, {name: bound.absent(INTERRUPTED) for name, bound in BOUNDS.items()}
-    subject, interrupted = Subject.of(pair, measured, exact=exact), finished.interrupted
-    try:
-        if pair.contact.grid.n > LARGEST:
-            reason["losses"] = f"{pair.contact.grid.n} contact nodes: worked out up to {LARGEST}"
-        elif interrupted:
-            reason["losses"] = INTERRUPTED
-        else:
-            reason["losses"] = INTERRUPTED
-            losses = locate(pair, measured, progress=progress)
-            reason["losses"] = next(iter(measured.reason.values()), "a contact node is held")
-    except KeyboardInterrupt:
-        interrupted = True
-    for name, bound in BOUNDS.items():
-        try:
-            if bound.calculated or not interrupted:
-                results[name] = bound.evaluate(subject, finished.theta, progress=progress)
-        except KeyboardInterrupt:
-            interrupted = True
-    cvxpy, reason["cvxpy"] = None, INTERRUPTED
-    try:
-        if not interrupted:
-            progress("linearising", None)
-            finished = finished.linearise()
-            progress("repeating the run by cvxpy alone", None)
-            cvxpy = by_cvxpy_alone(finished)
-    except ContactError as error:
-        reason["cvxpy"] = str(error)
-    except KeyboardInterrupt:
-        interrupted = True
-    if cvxpy is not None:
-        del reason["cvxpy"]
-    if interrupted:
-        finished = replace(finished, interrupted=True)
-        if finished.why_not_linearised == NOT_ASKED:
-            finished = finished.linearise()  # which says why there is nothing
-    if losses is not None:
-        del reason["losses"]
-    for name in ("sharp", "lmi"):
-        if results[name].detail is None:
-            reason[name] = results[name].not_computed
+    left = _UntilCtrlC(finished.interrupted)
+
+    progress("linearising", None)
+    linearised = left.work(finished.linearise, None)
+    finished = linearised or replace(finished, interrupted=True).linearise()  # which says why there is nothing
+    left.tell(listener.run, finished)
+    progress("repeating the run by cvxpy alone", None)
+    no_reference: tuple[Reference | None, str] = (None, INTERRUPTED)
+    cvxpy, no_cvxpy = left.work(lambda: _reference(finished), no_reference)
+    left.tell(listener.cvxpy, cvxpy, no_cvxpy)
+    none_lost: tuple[Losses | None, str] = (None, INTERRUPTED)
+    losses, no_losses = left.work(lambda: _losses(pair, measured, progress), none_lost)
+    left.tell(listener.losses, losses, no_losses)
+    programs = [name for name, bound in BOUNDS.items() if not bound.calculated]
+    for name in programs:
+        evaluate = BOUNDS[name].evaluate
+        results[name] = left.work(lambda: evaluate(subject, choice.theta, progress=progress), results[name])  # noqa: B023
+    left.tell(listener.programs, [results[name] for name in programs])
+
+    finished = replace(finished, interrupted=left.interrupted)
+    missing = {"losses": no_losses, "cvxpy": no_cvxpy}
+    missing |= {name: results[name].not_computed for name in ("sharp", "lmi") if results[name].detail is None}
+    reason = {name: why for name, why in missing.items() if why}
     seen = largest_step_ratio(pair, finished.iterates)
     if seen is None:
         reason["step_ratio"] = "no step stands clear of rounding"
@@ -310,7 +275,7 @@ def compare(
     outside = "outside the theorem: " + "; ".join(finished.outside) if finished.outside else ""
     if not isinstance(finished.rule, Constant) and not outside:
         outside = f"the bounds speak of a constant theta, not of {finished.relaxation}"
-    verdicts = {name: _verdict(result, seen, outside) for name, result in results.items()}
+    verdicts = {name: judge_bound(result, seen, outside) for name, result in results.items()}
     verdicts["linearised"] = judge_forecast(finished)
     return Comparison(
         measured=measured,
@@ -324,10 +289,46 @@ def compare(
     )
 
 
-def _verdict(result: BoundResult, seen: StepRatio | None, outside: str) -> Judgement:
-    """What the run says of one bound."""
-    if outside:
-        return Judgement(verdict="HYPOTHESES_NOT_MET", reason=outside)
-    if result.not_computed:
-        return Judgement(verdict="NOT_COMPUTED", reason=result.not_computed)
-    return judge(None if result.factor is None else result.factor.value, seen, result.why)
+class _UntilCtrlC:
+    """Work that is left: after Ctrl-C nothing more of it is begun, and all of it is told.
+
+    Parameters
+    ----------
+    interrupted : bool
+        Whether there was a Ctrl-C before.
+    """
+
+    def __init__(self, interrupted: bool) -> None:
+        self.interrupted = interrupted
+
+    def work(self, compute: Callable[[], T], missing: T) -> T:
+        """What is computed; what is given instead where Ctrl-C came first."""
+        if not self.interrupted:
+            try:
+                return compute()
+            except KeyboardInterrupt:
+                self.interrupted = True
+        return missing
+
+    def tell(self, method: Callable[..., None], *parts: Any) -> None:
+        """Tell one part."""
+        try:
+            method(*parts)
+        except KeyboardInterrupt:
+            self.interrupted = True
+
+
+def _reference(finished: Run) -> tuple[Reference | None, str]:
+    """The run by cvxpy alone, or why there is none."""
+    try:
+        return by_cvxpy_alone(finished), ""
+    except ContactError as error:
+        return None, str(error)
+
+
+def _losses(pair: ContactPair, measured: Measured, progress: Progress) -> tuple[Losses | None, str]:
+    """What each inequality gives away, or why that was not worked out."""
+    if pair.contact.grid.n > LARGEST:
+        return None, f"{pair.contact.grid.n} contact nodes: worked out up to {LARGEST}"
+    found = locate(pair, measured, progress=progress)
+    return found, "" if found is not None else next(iter(measured.reason.values()), "a contact node is held")

@@ -8,18 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
-from fem1d2d import largest
-from fem1d2d.mesh import Floats
 from ndtheory import Constants, EnergyConstants, Number, evaluate_sharp, exact
 from ndtheory.sharp import friction_multiple
 from verification.body_constants import BodyConstants, constants_of
 from verification.document import Document
-from verification.interface.body import Condensed
 from verification.interface.pair import ContactPair, TwoBodies
 from verification.operators import Pencils, needs_matrices, pair_or_bodies
+from verification.pencils import of_energy, of_section_5
 from verification.problem import Problem
 from verification.progress import Progress, silent
 from verification.threads import one_thread
@@ -267,15 +263,20 @@ def _measure(pair: ContactPair | TwoBodies, progress: Progress = silent) -> Meas
     else:
         body1, body2 = constants_of(pair.body1.mesh_body), constants_of(pair.body2.mesh_body)
         values |= {"m": min(body1.m.value, body2.m.value), "M": body1.M.value + body2.M.value}
-    if pair.interface.transfer is None and not np.array_equal(pair.contact.free, pair.neumann.free):
+    if pair.interface.transfer is not None and pair.held:
+        why = "a contact node is held tangentially and the grids differ: no trace space serves both bodies"
+    elif not np.array_equal(pair.contact.free, pair.neumann.free) and pair.interface.transfer is None:
         why = "the bodies hold different tangential components of Gamma_c: their traces differ"
+    else:
+        why = ""
+    if why:
         reason |= dict.fromkeys((*NAMES[2:], *ENERGY_NAMES), why)
     else:
         free, grid = pair.contact.free, pair.contact.grid
         tangential = (np.arange(grid.size) < grid.t)[free]
-        values |= _energy(pair, tangential)
+        values |= of_energy(pair, tangential)
         if meshes:
-            values |= _of_section_5(pair, tangential)
+            values |= of_section_5(pair, tangential)
         if pair.interface.kernel is None:
             reason = dict.fromkeys(("C_s", "C_s_energy"), "no friction and no radius: S is not defined") | reason
             values |= {"kappa_1": 0.0, "kappa_2": 0.0} | ({"C_K": 0.0} if meshes else {})
@@ -322,77 +323,3 @@ def _without_matrices(bodies: TwoBodies, progress: Progress) -> Measured:
         problem=problem,
         **numbers,
     )
-
-
-def _of_section_5(pair: ContactPair, tangential: NDArray[np.bool_]) -> dict[str, float | None]:
-    """C_R, C_tr and C_s: matrices on the components that both bodies leave free."""
-    # along y, so that the constants do not depend on the roles, to the last digit
-    bodies, grid, kernel = (pair.body1.mesh_body, pair.body2.mesh_body), pair.contact.grid, pair.interface.kernel
-    E = [body.gram.schur for body in bodies]
-    values: dict[str, float | None] = {
-        "C_R": float(np.sqrt(max(largest(body.lift_gram, e).value for body in bodies for e in E)))
-    }
-    if not tangential.any():
-        return values | dict.fromkeys(("C_tr", "C_tr_half", "C_s"), 0.0)
-    B_T = _tangential_mass(pair, tangential)
-    kept = [np.where(np.outer(tangential, tangential), e, 0.0) for e in E]
-    values["C_tr"] = float(np.sqrt(max(largest(B_T, e).value for e in E)))
-    values["C_tr_half"] = float(np.sqrt(max(min(largest(k, e).value for k in kept) for e in E)))
-    if kernel is not None:
-        Z = [kernel @ body.elastic.schur[~tangential] for body in bodies]
-        squares = [z.T @ (grid.weights[:, None] * z) for z in Z]
-        values["C_s"] = float(np.sqrt(max(largest((z + z.T) / 2, e).value for z, e in zip(squares, E, strict=True))))
-    return values
-
-
-def _energy(pair: ContactPair, tangential: NDArray[np.bool_]) -> dict[str, float | None]:
-    """rho and what the theorem in energy norms knows of friction, with P between the grids."""
-    interface, grid, kernel = pair.interface, pair.contact.grid, pair.interface.kernel
-    contact, neumann = _free(pair.contact), _free(pair.neumann)
-    normal = ~tangential
-    carried = contact if interface.transfer is None else interface.carry_form(contact)
-    values: dict[str, float | None] = {
-        "rho_max": largest(carried, neumann).value,
-        "rho_min": None if interface.transfer is not None else 1 / largest(neumann, contact).value,
-    }
-    normal_contact = _condense_tangential(contact, normal)
-    if interface.transfer is not None:
-        normal_contact = interface.transfer.T @ normal_contact @ interface.transfer
-        normal = np.arange(pair.neumann.grid.size) >= pair.neumann.grid.t
-    values["rho_normal"] = largest(normal_contact, _condense_tangential(neumann, normal)).value
-    if not tangential.any():
-        return values | dict.fromkeys(("C_s_energy", "C_t1", "C_t2"), 0.0)
-    B_T = _tangential_mass(pair, tangential)
-    if kernel is not None:
-        # sup |S g_N|^2 / g' S_2^-1 g over g = S_2 phi is the largest eigenvalue of S (S_2)_NN S' in the weights
-        root = np.sqrt(grid.weights)[:, None] * kernel
-        stress = root @ neumann[np.ix_(normal, normal)] @ root.T
-        values["C_s_energy"] = float(np.sqrt(np.linalg.eigvalsh((stress + stress.T) / 2)[-1]))
-    values["C_t1"] = float(np.sqrt(largest(B_T, contact).value))
-    values["C_t2"] = float(
-        np.sqrt(largest(B_T if interface.transfer is None else interface.carry_form(B_T), neumann).value)
-    )
-    return values
-
-
-def _free(side: Condensed) -> Floats:
-    return side.stiffness[np.ix_(side.free, side.free)]
-
-
-def _tangential_mass(pair: ContactPair, tangential: NDArray[np.bool_]) -> Floats:
-    """B_T: the quadrature of ``|v_T|^2`` on the free components of the contact grid."""
-    grid = pair.contact.grid
-    weights = np.zeros(len(tangential))
-    weights[tangential] = grid.weights[pair.contact.free[grid.tangential]]
-    return np.diag(weights)
-
-
-def _condense_tangential(S: Floats, normal: Any) -> Floats:
-    """Schur complement of S on the normal components."""
-    slide = ~normal
-    if not slide.any():
-        return S
-    cross = S[np.ix_(slide, normal)]
-    inner = cho_solve(cho_factor(S[np.ix_(slide, slide)]), cross)
-    result = S[np.ix_(normal, normal)] - cross.T @ inner
-    return np.asarray((result + result.T) / 2)

@@ -93,7 +93,7 @@ class Solution(Document):
         for i, (body, sign) in enumerate(((self.bodies.body1, -1.0), (self.bodies.body2, 1.0))):
             if body is not None:
                 load = body.load.copy()
-                load[body.interface] += sign * self.force[body.unknown]
+                load[body.interface] += sign * self.bodies.force_on(body, self.force)[body.unknown]
                 full = body.known.values.ravel().copy()
                 k = body.motions.shape[1]
                 full[body.free] = body.solve(load) + body.motions @ self.motion[used : used + k]
@@ -104,6 +104,7 @@ class Solution(Document):
     def content(self) -> dict[str, Any]:
         return {
             "title": self.bodies.problem.title,
+            "grids": {"contact_body": self.problem.contact_body, **self.bodies.interface.counts},
             **self.contact.to_dict(),
             "kkt_residual": self.kkt_residual,
             "linear_solves": self.linear_solves,
@@ -179,12 +180,12 @@ def solution_force(pair: ContactPair) -> Floats:
     """
     found = solve(pair).contact
     stress = np.concatenate([pair.upward * found.shear[: pair.contact.grid.t], found.pressure])
-    return np.asarray(np.tile(found.weights, pair.contact.grid.dimension) * stress)
+    return pair.interface.carry_back(np.tile(found.weights, pair.contact.grid.dimension) * stress)
 
 
 def contact_system(bodies: TwoBodies) -> ContactSystem:
     """Assemble W, d_0 and the friction law of a problem."""
-    grid, kernel = bodies.interface.contact, bodies.interface.kernel
+    interface, grid = bodies.interface, bodies.interface.contact
     t, size = grid.t, grid.size
     W, d0 = np.zeros((size, size)), np.zeros(size)
     d0[t:] = -bodies.interface.gap
@@ -192,16 +193,19 @@ def contact_system(bodies: TwoBodies) -> ContactSystem:
     for body, sign in ((bodies.body1, 1.0), (bodies.body2, -1.0)):
         if body is not None:
             flexibility, trace = _flexibility(body)
+            moves = np.zeros((len(body.unknown), body.motions.shape[1]))
+            moves[body.unknown] = body.motions[body.interface]
+            if body is bodies.neumann:  # as the contact grid sees it
+                flexibility = interface.carry(interface.carry(flexibility).T)
+                trace, moves = interface.carry(trace), interface.carry(moves)
             W += flexibility
             d0 += sign * trace
-            traces = np.zeros((size, body.motions.shape[1]))
-            traces[body.unknown] = sign * body.motions[body.interface]
-            motions.append(traces)
+            motions.append(sign * moves)
             resultant.append(body.motions.T @ body.load)
     friction = np.zeros((t, grid.n))
     k = float(bodies.friction)
-    if k and kernel is not None:
-        friction = k * grid.weights[:, None] * kernel
+    if k and interface.contact_kernel is not None:
+        friction = k * grid.weights[:, None] * interface.contact_kernel
     return ContactSystem(W, d0, friction, motions=np.concatenate(motions, axis=1), resultant=np.concatenate(resultant))
 
 

@@ -5,12 +5,12 @@ substitutions by expressions in parameters that run freely over p > 0 or p >= 0 
 that roots disappear and both sides become rational.  Then
 
 * an equation holds if the numerator of the difference of its sides expands to 0,
-* an inequality holds if its difference is a quotient of polynomials without a negative coefficient, squares taken
-  off first where that is needed,
+* an inequality holds if its difference is a product of powers of polynomials without a negative coefficient, squares
+  taken off first where that is needed,
 * it fails if it fails at one point with rational coordinates.
 
-Nothing here is rounded.  Both sides must be defined wherever the charts lead: a common factor of numerator and
-denominator is cancelled.
+Nothing here is rounded.  Both sides must be defined wherever the charts lead: common factors of numerator and
+denominator may be cancelled.
 """
 
 from __future__ import annotations
@@ -22,6 +22,8 @@ from random import Random
 from typing import Any, Literal
 
 import sympy as sp
+
+from ndtheory.symbolic.quotient import NotRational, Quotient
 
 #: Values that parameters take in the search for a counterexample.
 TRIED = [sp.Rational(p, q) for p, q in ((1, 1), (1, 10), (3, 1), (1, 1000), (100, 1), (1, 2), (10**6, 1), (2, 1))]
@@ -127,14 +129,14 @@ def rational(expression: Any) -> Any:
 
 def _in_chart(goal: Goal, chart: Mapping[Any, Any]) -> Decision:
     relation = goal.relation
-    for symbol, value in chart.items():
-        if symbol.is_nonnegative and not _certified(rational(sp.sympify(value)), strict=symbol.is_positive):
+    values = {symbol: sp.sympify(value) for symbol, value in chart.items()}
+    for symbol, value in values.items():
+        if symbol.is_nonnegative and not _certified(rational(value), strict=symbol.is_positive):
             raise ValueError(f"{symbol} = {value} leaves its range")
-    inserted = lambda expression: rational(sp.sympify(expression).subs(chart, simultaneous=True))
+    inserted = lambda expression: rational(sp.sympify(expression).xreplace(values))
     difference = inserted(relation.right) - inserted(relation.left)
-    numerator, denominator = sp.fraction(sp.together(difference))
     if relation.sign == "=":
-        if sp.expand(numerator) == 0:
+        if _vanishes(difference):
             return Decision(holds=True)
     else:
         squares = [inserted(square) for square in goal.squares]
@@ -150,7 +152,8 @@ def _in_chart(goal: Goal, chart: Mapping[Any, Any]) -> Decision:
     }[relation.sign]
     parameters = sorted(difference.free_symbols, key=str)
     for point in _points(parameters):
-        if denominator.subs(point) != 0 and fails(difference.subs(point)):
+        value_there = difference.xreplace(point)
+        if value_there.is_finite and fails(value_there):  # at a pole nothing is compared
             names = sorted(sp.sympify(relation.left).free_symbols | sp.sympify(relation.right).free_symbols, key=str)
             value = lambda symbol, at=point: rational(_rest_1(sp.sympify(chart.get(symbol, symbol)).subs(at)))
             return Decision(holds=False, counterexample={str(symbol): str(value(symbol)) for symbol in names})
@@ -168,29 +171,29 @@ def _square(term: Any) -> bool:
     return all((f.is_Pow and f.exp.is_even) or _certified(f, strict=False) for f in factors)
 
 
+def _quotient(difference: Any) -> Quotient:
+    """A difference as a quotient; roots may cancel, which sympy sees where they do."""
+    try:
+        return Quotient.of(difference)
+    except NotRational:
+        return Quotient.of(sp.cancel(sp.together(difference)))
+
+
+def _vanishes(difference: Any) -> bool:
+    """Whether the numerator expands to 0."""
+    try:
+        return not _quotient(difference).polynomial
+    except NotRational:
+        return False
+
+
 def _certified(difference: Any, *, strict: bool) -> bool:
-    """Whether numerator and denominator have coefficients of one sign, and a term of parameters > 0 alone if strict."""
-    numerator, denominator = sp.fraction(sp.cancel(sp.together(difference)))
-    signs = []
-    for part, nonzero in ((numerator, strict), (denominator, True)):
-        symbols = sorted(part.free_symbols, key=str)
-        if not all(symbol.is_nonnegative for symbol in symbols) or not part.is_polynomial(*symbols):
-            return False
-        terms = sp.Poly(part, *symbols).terms() if symbols else [((), part)]
-        coefficients = [coefficient for _, coefficient in terms]
-        if not all(coefficient.is_Rational for coefficient in coefficients):
-            return False
-        sign = 1 if max(coefficients) > 0 else -1
-        if min(sign * coefficient for coefficient in coefficients) < 0:
-            return False
-        sure = any(
-            coefficient != 0 and all(s.is_positive for s, power in zip(symbols, powers, strict=True) if power)
-            for powers, coefficient in terms
-        )
-        if nonzero and not sure:
-            return False
-        signs.append(sign)
-    return signs[0] == signs[1] or numerator == 0
+    """Whether its factors show the sign, or numerator and denominator do once a common factor is cancelled."""
+    try:
+        quotient = _quotient(difference)
+    except NotRational:
+        return False
+    return quotient.is_certified(strict=strict) or quotient.cancelled().is_certified(strict=strict)
 
 
 def _points(parameters: Sequence[Any]) -> Iterable[dict[Any, Any]]:

@@ -8,12 +8,11 @@ from dataclasses import replace
 import pytest
 
 import verification
-from verification import comparison as verdicts
-from verification import figures
+from verification import comparison, figures, verdicts
 from verification.cli.problems import examples
-from verification.comparison import Judgement
 from verification.contact import ContactError
 from verification.monolithic import SolveError
+from verification.verdicts import Judgement
 
 DONE, NOT_MET, BAD_INPUT, INCONCLUSIVE, INTERRUPTED, CRASH = 0, 1, 2, 3, 130, 70
 
@@ -66,8 +65,8 @@ def test_a_command_ends_with_its_status_in_words_and_as_a_document(call, write, 
 )
 def test_the_worst_verdict_decides(call, write, monkeypatch, judged, edits, status):
     made = {name: Judgement(verdict=verdict, reason="made up") for name, verdict in judged.items()}
-    compare = verdicts.compare
-    monkeypatch.setattr(verdicts, "compare", lambda *args, **kw: replace(compare(*args, **kw), verdicts=made))
+    compare = comparison.compare
+    monkeypatch.setattr(comparison, "compare", lambda *args, **kw: replace(compare(*args, **kw), verdicts=made))
     answer = call("compare", write(edits))
     assert answer.status == status
     for name, verdict in judged.items():
@@ -75,7 +74,7 @@ def test_the_worst_verdict_decides(call, write, monkeypatch, judged, edits, stat
 
 
 def test_bad_input_wins_over_everything(call, write, monkeypatch):
-    monkeypatch.setattr(verdicts, "compare", None)
+    monkeypatch.setattr(comparison, "compare", None)
     assert call("compare", write("wrong roles"), "--theta", "2").complaint
 
 
@@ -110,7 +109,9 @@ def test_a_solver_that_fails_is_told_in_one_line(call, write, monkeypatch, comma
 
     monkeypatch.setattr(f"verification.{solver}.solve", fail)
     answer = call(command, write())
-    assert (answer.status, answer.out) == (NOT_MET, "")
+    assert answer.status == NOT_MET
+    assert ("DOES ONE STEP CONTRACT?" in answer.out) == (command == "compare")  # which was known before
+    assert "WHAT HAPPENED" not in answer.out
     assert answer.err.endswith("no certificate\n")
     assert answer.err.count("\n") == 1
 

@@ -67,6 +67,15 @@ ASSUMED = {"x": {"positive": True}, "p": {"nonnegative": True}}
         (less(1 / (1 + x), 1), True),
         (less(1 / (1 + p), 1), False),
         (at_most(1 / p, -1), None),  # p = 0 is no value
+        (at_most(-x / (-1 - p), 0), True),
+        (at_most(x / (-1 - p), 0), False),
+        (at_most((x**3 + p**3) / (x**2 - x * p + p**2), 0), True),  # x + p, once a common factor is cancelled
+        (equal((1 + sp.sqrt(2)) ** 2, 3 + 2 * sp.sqrt(2)), True),
+        (equal((1 + sp.sqrt(p)) ** 2, 1 + p), False),
+        (equal((1 + sp.sqrt(p)) ** 2, 1 + 2 * sp.sqrt(p) + p), True),
+        (equal(sp.Min(x, y), x), False),
+        (at_most(x + (1 + sp.sqrt(2)) ** 2, 3 + 2 * sp.sqrt(2)), True),
+        (at_most((1 + sp.sqrt(2)) * x, 0), None),  # no coefficient that is a rational number
         (equal((x + p) ** 2, x**2 + 2 * x * p + p**2), True),
         (equal((x + p) ** 2, x**2 + p**2), False),
         (at_most(sp.Symbol("r", real=True) ** 2, 0), None),  # no certificate without the square named
@@ -74,6 +83,21 @@ ASSUMED = {"x": {"positive": True}, "p": {"nonnegative": True}}
 )
 def test_what_is_decided_and_what_is_not(goal, holds):
     assert decide(goal).holds is holds
+
+
+def test_a_square_that_is_named_must_be_one_by_sight():
+    with pytest.raises(ValueError, match="may be negative"):
+        decide(at_most(x, x, squares=[x - p]))
+
+
+def test_a_chart_that_leaves_the_range_of_a_symbol_is_refused():
+    for value in (p, x - p, -x, 1 / p):
+        with pytest.raises(ValueError, match="leaves its range"):
+            decide(less(0, y, {y: value}))
+
+
+def test_no_counterexample_is_a_pole():
+    assert decide(equal(1 / p, 1)).counterexample["p"] != "0"
 
 
 def test_goals_hold_together_or_not_at_all():

@@ -25,10 +25,12 @@ def relaxation_factor(random: np.random.Generator, rho: float) -> float:
     return float(three_digits(min(2 / (2 + rho) * random.uniform(0.3, 1.1), 0.97)))
 
 
-def case(seed: int, friction: Any = None, **iteration: Any) -> tuple[ContactPair, Measured, float, np.random.Generator]:
+def case(
+    seed: int, friction: Any = None, *, matching: bool = True, **iteration: Any
+) -> tuple[ContactPair, Measured, float, np.random.Generator]:
     """The problem of a seed with its constants, a theta, and the generator that drew them."""
     random = np.random.default_rng(seed)
-    pair = build(problem(random, friction, **iteration))
+    pair = build(problem(random, friction, matching=matching, **iteration))
     measured = measure(pair)
     return pair, measured, relaxation_factor(random, measured.rho_max.value), random
 

@@ -56,7 +56,7 @@ def repaired_factor(measured: Measured, theta: float) -> float:
 
 def quotient(pair: ContactPair, theta: float, g: np.ndarray, other: np.ndarray) -> float:
     """``|||T_theta g - T_theta g~||| / |||g - g~|||``."""
-    d, p = g - other, step_II(pair, g).force - step_II(pair, other).force
+    d, p = g - other, pair.interface.carry_back(step_II(pair, g).force - step_II(pair, other).force)
     norm = pair.neumann.dual_norm
     return norm(theta * p + (1 - theta) * d) / norm(d)
 
@@ -64,7 +64,8 @@ def quotient(pair: ContactPair, theta: float, g: np.ndarray, other: np.ndarray) 
 def largest_quotient(pair: ContactPair, theta: float, g: np.ndarray, random: np.random.Generator) -> float:
     """Of random pairs around a force: a tenth of its size away, as far as it is large, and ten times as far."""
     neumann = pair.neumann
-    size = neumann.dual_norm(g) or max(neumann.dual_norm(side.load) for side in (neumann, pair.contact)) or 1.0
+    loads = neumann.load, pair.interface.carry_back(pair.contact.load)
+    size = neumann.dual_norm(g) or max(map(neumann.dual_norm, loads)) or 1.0
     forces = neumann.root @ random.standard_normal((neumann.root.shape[1], 6))
     pairs = zip((0.1, 0.1, 1.0, 1.0, 10.0, 10.0), forces.T, strict=True)
     a, b, c, d, e, f = (g + length * size * force / neumann.dual_norm(force) for length, force in pairs)
@@ -73,11 +74,17 @@ def largest_quotient(pair: ContactPair, theta: float, g: np.ndarray, random: np.
 
 def attained(piece: Piece, theta: float, random: np.random.Generator) -> float:
     """The quotient of two forces inside a piece, in its worst direction, for loads that bring the piece about."""
-    pair, n, t = piece.pair, piece.pair.contact.grid.n, piece.pair.contact.grid.t
+    pair, n, t = piece.pair, piece.pair.neumann.grid.n, piece.pair.neumann.grid.t
     g = np.concatenate([random.uniform(-1, 1, t), random.uniform(0.5, 1, n)])  # S sigma_N > 0: S has no entry < 0
     pair = with_loads(pair, g, *state_of(pair, piece.pattern, g, random))
-    stress = lambda g: 1.0 if pair.interface.kernel is None else float((pair.interface.kernel @ g[t:]).min())
-    inside = lambda g: step_II(pair, g).pattern == piece.pattern and stress(g) > 0
+    kernel = pair.interface.kernel
+    felt = None if kernel is None else kernel[kernel.any(axis=1)]  # out of reach of all Neumann nodes nothing rubs
+    stress = lambda g: 1.0 if felt is None else float((felt @ g[t:]).min(initial=np.inf))
+    rubs = piece.sign != 0  # a node with the bound 0 may slide either way
+    same = lambda one, other: (
+        np.array_equal(one.touching, other.touching) and np.array_equal(one.sliding[rubs], other.sliding[rubs])
+    )
+    inside = lambda g: same(step_II(pair, g).pattern, piece.pattern) and stress(g) > 0
     if not inside(g):  # friction so slight that rounding decides between stick and slip
         assert 0 < pair.friction < 1e-6
         return float("nan")
@@ -187,6 +194,17 @@ def test_each_number_is_at_most_the_next_and_the_semidefinite_edition_mostly_the
     assert np.mean([np.isfinite(c.excited) for c in chains.values()]) > 0.4  # and reached
     assert np.mean([c.tight for c in chains.values()]) > 0.65
     assert np.mean([c.tight for c in chains.values() if c.lmi < 1]) > 0.7
+
+
+def test_the_chain_holds_on_grids_that_differ_too():
+    """Of the first 200 problems the semidefinite bound lies within 1 % of the least Lipschitz constant in 72 %."""
+    chains = {
+        seed: chain_of(*case(seed, matching=False, **SETTINGS)) for seed in range(COUNT // 2 if BATCHES == 1 else 200)
+    }
+    assert {seed: c.broken for seed, c in chains.items() if c.broken} == {}
+    assert {seed: c for seed, c in chains.items() if not abs(c.attained / c.search - 1) < 1e-6} == {}
+    assert np.mean([np.isfinite(c.radius) for c in chains.values()]) > 0.9
+    assert np.mean([c.tight for c in chains.values()]) > 0.6
 
 
 def test_where_the_repaired_edition_proves_a_factor_every_other_number_is_below_it():

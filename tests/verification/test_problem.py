@@ -307,7 +307,6 @@ def test_what_is_no_problem_file_is_refused_with_its_name(tmp_path, content, nee
         ("body2.prescribed", {"top": ["free", 0]}, "body2"),
         ("body1.fixed", ["bottom", "top"], "body1.fixed"),
         ("body2.x", [3, 4], "body2.x"),
-        ("body2.cells", [7, 2], "body2.cells"),
         ("contact.interval", [0, 1], "contact.interval"),
     ],
 )

@@ -16,7 +16,8 @@ from verification.bounds.bound import LARGEST
 from verification.bounds.multipliers import QuadraticForms
 from verification.bounds.program import LMIError
 from verification.bounds.table import BOUNDS
-from verification.comparison import TIGHT, compare, judge, judge_forecast
+from verification.comparison import compare
+from verification.verdicts import TIGHT, judge, judge_forecast
 
 BOUND = 0.5
 SLACK = TIGHT * (1 - BOUND)

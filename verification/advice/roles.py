@@ -43,12 +43,13 @@ class Role:
     ----------
     neumann_body : {1, 2} or None
         None where it is not known which body that is.
-    rho : Number
-        Stiffness of the contact body over that of the Neumann body, at worst; with rho_normal without friction.
+    rho : Number or None
+        Stiffness of the contact body over that of the Neumann body, at worst; with rho_normal without friction.  None,
+        as all that rests on it, where the role is refused.
     theta_proved : float or None
         The theta of least proved factor.
     factor_proved, theta_max_proved : Number or None
-    theta_predicted, rate_predicted : float
+    theta_predicted, rate_predicted : float or None
         ``2/(2 + rho)`` and ``rho/(2 + rho)``: a prediction, proved without friction.
     friction_threshold : Number or None
         Friction below which every small theta is proved.
@@ -63,17 +64,30 @@ class Role:
     """
 
     neumann_body: Literal[1, 2] | None
-    rho: Number
+    rho: Number | None
     theta_proved: float | None
     factor_proved: Number | None
     theta_max_proved: Number | None
-    theta_predicted: float
-    rate_predicted: float
+    theta_predicted: float | None
+    rate_predicted: float | None
     friction_threshold: Number | None
     reason: Mapping[str, str]
     singular: bool = False
     theta_auto: Choice | None = None
     energy: EnergyConstants | None = None
+
+    @property
+    def predicted(self) -> tuple[float, float]:
+        """``theta_predicted`` and ``rate_predicted``.
+
+        Raises
+        ------
+        ValueError
+            The role is refused.
+        """
+        if self.theta_predicted is None or self.rate_predicted is None:
+            raise ValueError(self.reason["rho"])
+        return self.theta_predicted, self.rate_predicted
 
     def to_dict(self) -> dict[str, Any]:
         """A member of ``roles``."""
@@ -124,7 +138,7 @@ class Advice(Document):
             return f"{len(self.readings)} readings of a run"
         best = self.best
         who = "" if self.neumann_body is None else f"Neumann problem to body {self.neumann_body}, "
-        return f"{who}theta = {best.theta_predicted:.4g} predicted, rate {best.rate_predicted:.4g}"
+        return f"{who}theta = {best.predicted[0]:.4g} predicted, rate {best.predicted[1]:.4g}"
 
     def plot(self) -> Figure:
         """The factor of one step over theta, for each assignment of the roles."""
@@ -133,7 +147,12 @@ class Advice(Document):
         if not self.roles:
             raise ValueError("the ratio of this run has several readings: make the run that `next` names")
         named = {f"Neumann body {role.neumann_body}" if role.neumann_body else "that run": role for role in self.roles}
-        return draw_factor({name: role.energy or EnergyConstants(rho=role.rho.value) for name, role in named.items()})
+        energy = {
+            name: role.energy or EnergyConstants(rho=role.rho.value)
+            for name, role in named.items()
+            if role.rho is not None
+        }
+        return draw_factor(energy)
 
     @property
     def best(self) -> Role:
@@ -196,8 +215,8 @@ def advise(problem: Problem | ContactPair | Path | str, *, progress: Progress = 
     if isinstance(pair, TwoBodies):
         roles = _roles_without_matrices(pair, progress)
     else:
-        roles = tuple(_role(roles) for roles in (pair, pair.swapped()))
-    best = min(roles, key=lambda role: role.rate_predicted)
+        roles = (_role(pair), _exchanged(pair))
+    best = min((role for role in roles if role.rho is not None), key=lambda role: role.predicted[1])
     return Advice(
         neumann_body=best.neumann_body,
         roles=roles,
@@ -205,6 +224,24 @@ def advise(problem: Problem | ContactPair | Path | str, *, progress: Progress = 
         problem=pair.problem,
         friction=float(pair.friction),
         outside=tuple(pair.outside),
+    )
+
+
+def _exchanged(pair: ContactPair) -> Role:
+    """The other assignment of the roles, which may be refused."""
+    try:
+        return _role(pair.swapped())
+    except ProblemError as error:
+        why = error.needed
+    except ValueError as error:
+        why = str(error)
+    values = [
+        name for name in Role.__dataclass_fields__ if name not in ("neumann_body", "reason", "singular", "energy")
+    ]
+    return Role(
+        neumann_body=1 if pair.neumann_body == 2 else 2,
+        **dict.fromkeys(values),  # type: ignore[arg-type]
+        reason=dict.fromkeys(values, f"these roles are refused: {why}"),
     )
 
 
@@ -291,7 +328,7 @@ def advise_matrices(S1: Floats, S2: Floats) -> Advice:
         ratios = {2: Fraction(largest(one, two).value), 1: Fraction(largest(two, one).value)}
     unit = {2: Fraction(unit_1) / Fraction(unit_2), 1: Fraction(unit_2) / Fraction(unit_1)}
     roles = tuple(_plain_role(neumann, rho * unit[neumann]) for neumann, rho in ratios.items())
-    best = min(roles, key=lambda role: role.rate_predicted)
+    best = min(roles, key=lambda role: role.predicted[1])
     return Advice(neumann_body=best.neumann_body, roles=roles, units=UNITS)
 
 

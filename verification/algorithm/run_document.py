@@ -42,6 +42,7 @@ def run_document(run: Run) -> dict[str, Any]:
         "theta_reason": run.choice.why,
         "relaxation": run.relaxation,
         "neumann_body": run.pair.neumann_body,
+        "grids": {"contact_body": run.pair.contact_body, **run.pair.interface.counts},
         "iterations": run.iterations,
         "evaluations": run.evaluations,
         "outcome": run.outcome,

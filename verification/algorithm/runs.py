@@ -281,8 +281,13 @@ class Run(Document):
         return run_document(self)
 
 
-def _check_memory(pair: ContactPair) -> None:
-    """Refuse a run whose iterates would not fit into memory: every one is kept."""
+def check_memory(pair: ContactPair) -> None:
+    """Refuse a run whose iterates would not fit into memory: every one is kept.
+
+    Raises
+    ------
+    ProblemError
+    """
     most, asked = MOST_BYTES // (ITERATE_BYTES + 4 * 8 * pair.neumann.grid.size), pair.settings.max_iterations
     if asked > most:
         n = pair.contact.grid.n
@@ -339,7 +344,7 @@ def run(
     """
     pair = pair_of(problem)
     settings = pair.settings
-    _check_memory(pair)
+    check_memory(pair)
     relaxation, choice, step = begin(pair, theta, rule, measured)
     seen: list[Iterate] = []
     least, since = float("inf"), 0

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, eigh_tridiagonal
+from scipy.linalg.lapack import dtrtri
 
 from fem1d2d.mesh import Floats
 from verification.bounds.program import LMIError, Optimum, Program
@@ -252,7 +253,11 @@ def _symmetric(matrices: Floats) -> Floats:
 
 def _inverse_root(matrices: Floats) -> Floats:
     """R with ``R' R`` the inverse of each."""
-    return np.linalg.inv(np.linalg.cholesky(matrices))
+    lower = np.linalg.cholesky(matrices)
+    if len(lower) > 1:
+        return np.linalg.inv(lower)
+    inverse, _ = dtrtri(lower[0].T)  # of a triangle: a third of the time of another matrix
+    return np.asarray(inverse.T[None])
 
 
 def _inner(X: list[Floats], Z: list[Floats]) -> float:

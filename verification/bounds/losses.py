@@ -95,6 +95,7 @@ class Forms:
     def __init__(self, pair: ContactPair) -> None:
         self.pair = pair
         self.root, self.inverse = pair.neumann.root, pair.neumann.inverse
+        self.carried = pair.interface.carry(self.inverse)
         self.N_1, self.E_1 = pair.contact.lift_gram, pair.contact.gram
         self.N_2, self.E_2 = pair.neumann.lift_gram, pair.neumann.gram
         self.dual: Floats = np.asarray(np.linalg.inv(self.E_2))  # of the norm of V^2'
@@ -106,7 +107,7 @@ class Forms:
 
     def d_1(self, piece: Piece) -> Floats:
         """The trace of ``w^1 - w~^1``."""
-        return (self.inverse + piece.jump) @ self.root
+        return (self.carried + piece.jump) @ self.root
 
     def friction(self, piece: Piece) -> Floats:
         """The friction term of (5.12): nodes that slide."""
@@ -156,6 +157,7 @@ def locate(pair: ContactPair, measured: Measured, *, seed: int = 0, progress: Pr
         forms = Forms(pair)
         N_1, N_2, dual, d_2 = forms.N_1, forms.N_2, forms.dual, forms.d_2
         S_1, size2 = pair.contact.stiffness, square(d_2, N_2)
+        felt = pair.interface.carry_back(S_1)  # the contact body's reaction, as the Neumann body receives it
         norm = square(forms.root, dual)
 
         def found(form: Form, quick: Quick, against: Floats | None = None) -> float:
@@ -178,8 +180,8 @@ def locate(pair: ContactPair, measured: Measured, *, seed: int = 0, progress: Pr
         d2, psi_dual = top(size2), top(norm)
         # and against other norms
         ratio, T_dual = trace(size2), force(dual, norm)
-        reaction = top(square(S_1, dual), N_1)
-        energy = top(square(S_1, forms.inverse), S_1)
+        reaction = top(square(felt, dual), N_1)
+        energy = top(square(felt, forms.inverse), S_1)
         d2_dual, e_dual = top(size2, norm), top(np.eye(len(norm)), norm)
 
     decades = lambda right, left: math.log10(right / left) if left > 0 else math.inf

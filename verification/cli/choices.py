@@ -61,7 +61,7 @@ def advise(
     if keys and file is None:
         raise click.UsageError("received --set without FILE: it sets a key of a problem file", context)
     from verification.advice import roles as advice
-    from verification.cli import screens
+    from verification.cli.advice_screen import advice as show
 
     if file is not None:
         if file.suffix == ".npz" and keys:
@@ -82,7 +82,7 @@ def advise(
             found = advice.advise_run(theta, ratio)
         except HypothesisError as error:
             raise click.UsageError(f"--{error}", context) from None
-    deliver(found, lambda: screens.advice(found, None if file is None else Typed(file=file, keys=keys)), as_json)
+    deliver(found, lambda: show(found, None if file is None else Typed(file=file, keys=keys)), as_json)
 
 
 def _picture(context: click.Context, parameter: click.Parameter, value: Path) -> Path:

@@ -20,6 +20,8 @@ from verification.progress import Progress, silent
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from rich.progress import Progress as Live
+
     from verification.algorithm.iterate import Iterate
     from verification.document import Document
 
@@ -34,15 +36,16 @@ class Interrupted(Exception):
     """Ctrl-C, of which a line has told already."""
 
 
-#: What a command says that Ctrl-C ended before and after its result was shown.
-NOTHING, SHOWN = "interrupted before anything was computed", "interrupted; the result is shown above"
+#: What a command says that Ctrl-C ended before and after something of its result was shown.
+NOTHING, SHOWN = "interrupted before anything was computed", "interrupted; what was computed is shown above"
 
 
 class _Voice:
-    """Where results go, and whether one was shown."""
+    """Where results go, the live line that makes room for them, and whether one was shown."""
 
     stream: TextIO | None = None
     lines: list[str] | None = None
+    live: Live | None = None
     said = False
 
 
@@ -79,6 +82,33 @@ def say(text: str = "") -> None:
 
 
 @contextlib.contextmanager
+def part(*, needed: bool = False) -> Iterator[None]:
+    """Show a part of a result whole, while the rest is still worked out.
+
+    Parameters
+    ----------
+    needed : bool
+        Whether the rest is wanted even where nobody reads it, as for files.
+
+    Raises
+    ------
+    ReaderGone
+        Nobody reads stdout, and the rest is not needed.
+    """
+    with undisturbed():
+        if _voice.live is not None:
+            _voice.live.stop()
+        try:
+            yield
+        except ReaderGone:
+            if not needed:
+                raise
+            _voice.lines = []
+        if _voice.live is not None:
+            _voice.live.start()
+
+
+@contextlib.contextmanager
 def alone() -> Iterator[None]:
     """Let results alone reach stdout: what else is written there, by a C library too, goes to stderr."""
     out, _voice.said = sys.stdout, False
@@ -95,6 +125,7 @@ def alone() -> Iterator[None]:
         else:
             _voice.stream = out
         stack.callback(setattr, _voice, "stream", None)
+        stack.callback(setattr, _voice, "lines", None)
         stack.enter_context(contextlib.redirect_stdout(sys.stderr))
         yield
 
@@ -130,10 +161,15 @@ def interruptible(command: Callable[..., Any]) -> Callable[..., Any]:
             try:
                 return command(*args, **options)
             except KeyboardInterrupt:
-                complain(SHOWN if _voice.said else NOTHING)
+                complain(interruption())
                 raise Interrupted from None
 
     return run
+
+
+def interruption() -> str:
+    """What to say of a Ctrl-C that ended the command."""
+    return SHOWN if _voice.said else NOTHING
 
 
 def printable(text: str) -> str:
@@ -160,7 +196,7 @@ def deliver(
 ) -> None:
     """Show first, then write: what goes wrong while writing costs no result."""
     text = document.to_json() if as_json else ""
-    with undisturbed():  # shown whole
+    with part(needed=write is not None):
         if as_json:
             say(text)
         else:
@@ -260,6 +296,8 @@ def stages() -> Iterator[Progress]:
     with contextlib.ExitStack() as stack:
         with undisturbed():  # its thread takes no signal from the main one
             live = stack.enter_context(Live(*columns, console=Console(stderr=True), transient=True))
+        _voice.live = live
+        stack.callback(setattr, _voice, "live", None)
         task = live.add_task("", total=None)
 
         def tell(what: str, share: float | None) -> None:

@@ -17,7 +17,16 @@ import ndtheory
 import verification
 from ndtheory import HypothesisError
 from verification.cli import calculator, choices, ledger, problems
-from verification.cli.console import NOTHING, SHOWN, Interrupted, ReaderGone, complain, interruptible, printable
+from verification.cli.console import (
+    NOTHING,
+    SHOWN,
+    Interrupted,
+    ReaderGone,
+    complain,
+    interruptible,
+    interruption,
+    printable,
+)
 
 #: Exit statuses of the interface.  A crash is none of them.
 DONE, NOT_MET, BAD_INPUT, INCONCLUSIVE, INTERRUPTED, CRASH = 0, 1, 2, 3, 130, 70
@@ -160,7 +169,7 @@ def _run(arguments: Sequence[str] | None, seen: Sequence[int]) -> int:
         return error.code if isinstance(error.code, int) and error.code != NOT_MET else DONE
     except Exception as error:
         if seen:
-            complain(NOTHING)
+            complain(interruption())
             return INTERRUPTED
         return _explain(error)
     status = status if isinstance(status, int) else DONE

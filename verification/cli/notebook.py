@@ -2,14 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
+from verification.advice.roles import Advice
+from verification.algorithm.runs import Run
+from verification.bounds.region import Plane
 from verification.cli import screens
+from verification.cli.advice_screen import advice
 from verification.cli.console import heard
+from verification.comparison import Comparison
+from verification.constants import Measured
+from verification.monolithic import Solution
+
+SCREENS: dict[type, Callable[[Any], None]] = {
+    Measured: screens.constants,
+    Run: screens.run,
+    Solution: screens.solution,
+    Comparison: screens.comparison,
+    Advice: advice,
+    Plane: screens.plane,
+}
 
 
 def screen(result: Any) -> str:
-    """The screen of the command that makes such a result; empty where there is none."""
+    """The screen of the command that makes such a result; empty where there is none, as one of matrices alone."""
+    show = SCREENS.get(type(result))
+    if show is None or (result.problem is None and not isinstance(result, Advice)):
+        return ""
     with heard() as lines:
-        shown = screens.show(result)
-    return "\n".join(lines) if shown else ""
+        show(result)
+    return "\n".join(lines)

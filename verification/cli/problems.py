@@ -326,11 +326,12 @@ def _compare(
     target = None if folder is None else Folder(folder, "compare")
     pair = build(problem)
     _warn(pair.warnings)
+    parts = None if as_json else screens.Parts(pair, needed=target is not None)
     with stages() as tell, progress(tell, problem.iteration.tolerance) as watch:
-        comparison = verdicts.compare(pair, solver=solver, exact=exact, watch=watch, progress=tell)
+        comparison = verdicts.compare(pair, solver=solver, exact=exact, watch=watch, progress=tell, listener=parts)
     _warn(comparison.run.choice.warnings)
     write = None if target is None else lambda: target.write_comparison(comparison)
-    deliver(comparison, lambda: screens.comparison(comparison, typed), as_json, write, folder)
+    deliver(comparison, lambda: screens.verdicts(comparison, typed), as_json, write, folder)
     return _status_of_comparison(comparison, typed.swap)
 
 

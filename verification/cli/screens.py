@@ -3,43 +3,28 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Sequence
 from pathlib import Path
 from shlex import quote
-from typing import Any
 
-from verification.advice.readings import NextRun, RunReading, SeenRun
-from verification.advice.roles import Advice
+from verification.algorithm.reference import Reference
 from verification.algorithm.runs import Run
+from verification.algorithm.theta import Choice
+from verification.bounds.bound import BoundResult
+from verification.bounds.losses import Losses
 from verification.bounds.region import MOST_STEPS, Plane
 from verification.cli.calculator import bounds_table
-from verification.cli.console import figures, heading, near_one, note, printable, say, table
+from verification.cli.console import figures, heading, near_one, note, part, printable, say, table
 from verification.cli.typed import Typed
-from verification.comparison import Comparison
+from verification.comparison import Comparison, Listener
 from verification.constants import ENERGY_NAMES, NAMES, Measured
 from verification.interface import assembly
 from verification.interface.fields import ContactFields
 from verification.interface.friction import LAWS
+from verification.interface.interface import Interface
+from verification.interface.pair import ContactPair
 from verification.monolithic import Solution
-from verification.problem.reading import takes_theta
 from verification.problem.specification import Problem
-
-
-def show(result: Any) -> bool:
-    """Show a result on the screen of its command; False where it has none, as one of matrices alone."""
-    screens: dict[type, Callable[[Any], None]] = {
-        Measured: constants,
-        Run: run,
-        Solution: solution,
-        Comparison: comparison,
-        Advice: advice,
-        Plane: plane,
-    }
-    screen = screens.get(type(result))
-    if screen is None or (result.problem is None and not isinstance(result, Advice)):
-        return False
-    screen(result)
-    return True
 
 
 def _setting(problem: Problem, nodes: int | None = None, interface: int | None = None) -> None:
@@ -91,7 +76,8 @@ def constants(measured: Measured, typed: Typed | None = None) -> None:
         typed.suggest("advise" if measured.interface_nodes > assembly.MOST_CONTACT_NODES else "compare")
 
 
-def _happened(run: Run, comparison: Comparison | None = None) -> None:
+def _happened(run: Run, *, alone: bool) -> None:
+    """What a run did; ``alone`` where no verdict says why there is no forecast."""
     problem = _problem(run)
     heading("WHAT HAPPENED")
     rate, linear = run.observed_rate, run.linearised
@@ -101,21 +87,15 @@ def _happened(run: Run, comparison: Comparison | None = None) -> None:
         name = f"forecast at step {made.made_at_iteration}"
         rows.append([name, near_one(made.rate), str(made.iterations), "prediction, not a bound"])
     if linear is not None:
-        steps = _steps(linear.rate, problem.iteration.tolerance)
+        count = steps(linear.rate, problem.iteration.tolerance)
         consistency = "" if linear.predicted is None else f"; consistency of J {near_one(linear.predicted)}"
-        rows.append(["linearised at the solution", near_one(linear.rate), steps, f"afterwards{consistency}"])
+        rows.append(["linearised at the solution", near_one(linear.rate), count, f"afterwards{consistency}"])
     shown = "-" if rate is None else near_one(rate.value)
     if run.observed_growth is not None:
         shown = f"grows by {run.observed_growth:.4g}"
     rows.append(["observed", shown, str(run.iterations), f"seen: {run.outcome}"])
-    cvxpy = None if comparison is None else comparison.cvxpy
-    if cvxpy is not None:
-        shown = "-" if cvxpy.observed_rate is None else near_one(cvxpy.observed_rate)
-        apart = f"T differs by {cvxpy.largest_difference:.0e} at most"
-        name = "cvxpy alone" if cvxpy.whole else "cvxpy alone, first and last"
-        rows.append([name, shown, str(cvxpy.steps - 1) if cvxpy.whole else "-", apart])
     table(rows)
-    if run.forecast is None and run.relaxation == "constant" and comparison is None:  # there the verdict tells why
+    if run.forecast is None and run.relaxation == "constant" and alone:
         note(f"no forecast: {run.why_no_forecast}", "  ")
     if linear is None:
         note(f"not linearised: {run.why_not_linearised}", "  ")
@@ -124,14 +104,24 @@ def _happened(run: Run, comparison: Comparison | None = None) -> None:
         say(f"  {run.evaluations} evaluations of T, with the {run.relaxation} relaxation{proved}")
     elif run.choice.source != "given":
         note(f"theta = {float(run.theta):.4g} is the {run.choice.source} one: {run.choice.why}", "  ")
+    _grids(run.pair.contact_body, run.pair.interface)
     _contact(problem, run.contact, f"; KKT residual of step II {run.last.contact.kkt.residual:.1e}")
 
 
-def _steps(rate: float, tolerance: float) -> str:
+def steps(rate: float, tolerance: float) -> str:
     """How many steps of a rate lead to a tolerance."""
     if not 0 < rate < 1:
         return "1" if rate == 0 else "-"
     return str(math.ceil(math.log(tolerance) / math.log(rate)))
+
+
+def _grids(contact_body: int, interface: Interface) -> None:
+    """Who carries the contact grid, where there are two."""
+    if interface.transfer is not None:
+        names = {1: "lower", 2: "upper"}
+        own, other = names[contact_body], names[3 - contact_body]
+        counts = f"{interface.contact.n} nodes of the {own} body, Neumann grid: {interface.neumann.n} of the {other}"
+        note(f"contact grid        {counts}", "  ")
 
 
 def _contact(problem: Problem, contact: ContactFields, solved: str = "") -> None:
@@ -160,7 +150,7 @@ def run(finished: Run, typed: Typed | None = None) -> None:
     """The screen of ``run``."""
     nodes = sum(len(body.mesh.points) for body in finished.bodies.elastic)
     _setting(_problem(finished), nodes, finished.pair.contact.grid.n)
-    _happened(finished)
+    _happened(finished, alone=True)
     _limits(finished.outside)
     if typed is not None:
         typed.suggest("compare", iteration=True)
@@ -171,6 +161,7 @@ def solution(found: Solution, typed: Typed | None = None) -> None:
     bodies = found.bodies
     _setting(bodies.problem, sum(len(body.mesh.points) for body in bodies.elastic), bodies.interface.contact.n)
     heading("WHAT IS THE SOLUTION?")
+    _grids(bodies.problem.contact_body, bodies.interface)
     _contact(bodies.problem, found.contact)
     say(f"  KKT residual {found.kkt_residual:.1e} after {found.linear_solves} linear systems on Gamma_c")
     _limits(bodies.outside)
@@ -185,130 +176,93 @@ def _problem(run: Run) -> Problem:
     return problem.with_theta(run.theta)
 
 
-def comparison(result: Comparison, typed: Typed | None = None) -> None:
+class Parts(Listener):
+    """The parts of the screen of ``compare`` and ``demo``, each shown when it is told.
+
+    Parameters
+    ----------
+    pair : ContactPair
+        What is compared, made from a problem.
+    needed : bool
+        Whether the comparison is wanted for more than its screen.
+    """
+
+    def __init__(self, pair: ContactPair, *, needed: bool = False) -> None:
+        self.pair, self.needed = pair, needed
+
+    def constants(self, measured: Measured, choice: Choice) -> None:
+        assert self.pair.problem is not None  # see `show`
+        stress = self.pair.units["stress"]
+        m, M, C_R, C_s, C_tr, C_K, rho = (
+            figures(getattr(measured, name), 4) for name in ("m", "M", "C_R", "C_s", "C_tr", "C_K", "rho_max")
+        )
+        with part(needed=self.needed):
+            _setting(self.pair.problem.with_theta(choice.theta), measured.nodes, measured.interface_nodes)
+            heading("HOW LARGE ARE THE CONSTANTS?")
+            say(f"  m = {m} {stress}, M = {M} {stress}, C_R = {C_R}")
+            say(f"  C_s = {C_s}, C_tr = {C_tr}, C_K = {C_K} {stress}, rho = {rho}")
+
+    def bounds(self, results: Sequence[BoundResult], measured: Measured) -> None:
+        computed = [result for result in results if result.detail is not None]
+        with part(needed=self.needed):
+            heading("DOES ONE STEP CONTRACT?")
+            if computed:
+                bounds_table(computed, self.pair.units["stress"])
+            else:
+                note("no bound applies: " + next(iter(measured.reason.values()), ""), "  ")
+
+    def run(self, finished: Run) -> None:
+        with part(needed=self.needed):
+            _happened(finished, alone=False)
+
+    def cvxpy(self, reference: Reference | None, why: str) -> None:
+        with part(needed=self.needed):
+            if reference is None:
+                note(f"cvxpy: {why}", "  ")
+                return
+            rate = "no rate" if reference.observed_rate is None else f"rate {near_one(reference.observed_rate)}"
+            what = f"{rate}, {reference.steps - 1} steps" if reference.whole else "first and last step"
+            note(f"cvxpy alone         {what}; T differs by {reference.largest_difference:.0e} at most", "  ")
+
+    def losses(self, losses: Losses | None, why: str) -> None:
+        friction = () if losses is None else losses.friction
+        with part(needed=self.needed):
+            if friction or why:
+                heading("WHAT DOES EACH ESTIMATE GIVE AWAY?")
+            if why:
+                note(f"losses: {why}", "  ")
+            if friction:
+                estimates = [loss for loss in friction if not loss.only_unit]
+                total = sum(loss.decades for loss in estimates)
+                unit = sum(loss.decades for loss in friction) - total
+                say(f"  {total:.1f} decades from the largest friction term found to (5.30), repaired:")
+                links = ", ".join(f"{loss.label} {loss.decades:.1f}" for loss in estimates)
+                note(f"{links}; the unit adds {unit:.1f}", "  ")
+
+    def programs(self, results: Sequence[BoundResult]) -> None:
+        computed = [result for result in results if result.detail is not None]
+        with part(needed=self.needed):
+            heading("WHAT DO SEMIDEFINITE PROGRAMS PROVE OF ONE STEP?")
+            if computed:
+                bounds_table(computed, self.pair.units["stress"])
+            for result in results:
+                if result.detail is None:
+                    note(f"{result.name}: {result.not_computed}", "  ")
+
+
+def comparison(result: Comparison) -> None:
     """The screen of ``compare`` and ``demo``."""
-    finished, measured = result.run, result.measured
-    _setting(_problem(finished), measured.nodes, measured.interface_nodes)
-    heading("HOW LARGE ARE THE CONSTANTS?")
-    stress = finished.units["stress"]
-    m, M, C_R, C_s, C_tr, C_K, rho = (
-        figures(getattr(measured, name), 4) for name in ("m", "M", "C_R", "C_s", "C_tr", "C_K", "rho_max")
-    )
-    say(f"  m = {m} {stress}, M = {M} {stress}, C_R = {C_R}")
-    say(f"  C_s = {C_s}, C_tr = {C_tr}, C_K = {C_K} {stress}, rho = {rho}")
-    heading("DOES ONE STEP CONTRACT?")
-    if result.computed:
-        bounds_table(result.computed, stress)
-    else:
-        note("no bound applies: " + next(iter(measured.reason.values()), ""), "  ")
-    for name in ("lmi", "losses", "cvxpy"):
-        if name in result.reason:
-            note(f"{name}: {result.reason[name]}", "  ")
-    if result.losses is not None and result.losses.friction:
-        heading("WHAT DOES EACH ESTIMATE GIVE AWAY?")
-        estimates = [loss for loss in result.losses.friction if not loss.only_unit]
-        total = sum(loss.decades for loss in estimates)
-        unit = sum(loss.decades for loss in result.losses.friction) - total
-        say(f"  {total:.1f} decades from the largest friction term found to (5.30), repaired:")
-        links = ", ".join(f"{loss.label} {loss.decades:.1f}" for loss in estimates)
-        note(f"{links}; the unit adds {unit:.1f}", "  ")
-    _happened(finished, result)
+    result.tell(Parts(result.run.pair))
+    verdicts(result)
+
+
+def verdicts(result: Comparison, typed: Typed | None = None) -> None:
+    """The end of that screen."""
     heading("DOES THE RUN AGREE WITH THE BOUND?")
     table([["bound", "verdict", "why"], *([n, j.verdict, j.reason] for n, j in result.verdicts.items())])
-    _limits(finished.outside)
+    _limits(result.run.outside)
     if typed is not None:
         typed.suggest("advise")
-
-
-def advice(found: Advice, typed: Typed | None = None) -> None:
-    """The screen of ``advise``."""
-    if found.run is not None and found.next is not None:
-        _seen(found.run, found.readings, found.next)
-    theta = _roles(found) if found.roles else None
-    say()
-    for reason in found.outside:
-        note(f"Outside the theorem: {reason}.")
-    if found.next is not None:
-        say("Not claimed: a bound of rho with friction, or that a reading is the right one.")
-        say(f"Next: ndtheory advise --theta {found.next.theta:g} --ratio R (R: the ratio of that run)")
-        return
-    say("Not claimed: that the predicted theta is the best one for your loads.")
-    if found.problem is not None:
-        if typed is not None and found.best.theta_auto is None:  # too large for a run
-            typed.suggest("constants")
-        elif typed is not None:
-            options = [] if found.roles[0].neumann_body == found.neumann_body else ["--swap-roles"]
-            if theta is not None and takes_theta(found.problem.iteration.relaxation):
-                options += ["--theta", theta]
-            typed.suggest("run", *options)
-    else:
-        say("Next: ndtheory advise --help")
-
-
-def _seen(run: SeenRun, readings: tuple[RunReading, ...], following: NextRun) -> None:
-    """What a run says of rho, and which one is to be made next."""
-    heading("WHAT DOES THE RUN SAY OF RHO?")
-    given = f"theta = {float(run.theta):.4g}; the residual |Tg - g| changes by {float(run.ratio):.4g} a step"
-    note(f"{given}, absolute and unrelaxed, steadily over {run.steps} steps or more.", "  ")
-    note("A residual that rises and falls has no steady ratio: give 1.", "  ")
-    note("The relative residual |Tg - g|/|Tg| of coupling libraries tells other things.", "  ")
-    rows = [["reading", "rho", "if it is the right one"]]
-    for reading in readings:
-        rho = "-" if reading.lo is None else f">= {figures(reading.lo)}"
-        rows.append([reading.kind, rho, reading.says])
-    table(rows)
-    heading("WHICH RUN NEXT?")
-    note(f"theta = {following.theta:g}: {following.why}", "  ")
-
-
-def _roles(found: Advice) -> str:
-    """What is known of each role; returns the theta to paste."""
-    best = found.best
-    names = {1: "body 1", 2: "body 2", None: "as in that run"}
-    heading("WHICH BODY GETS THE NEUMANN PROBLEM?")
-    if found.neumann_body is None:
-        say("  One run tells nothing of the other assignment.")
-    else:
-        other = next(role for role in found.roles if role is not best)
-        say(f"  {names[found.neumann_body]}: predicted rate {near_one(best.rate_predicted)} a step,")
-        say(f"  against {near_one(other.rate_predicted)} with the roles exchanged")
-    heading("WHICH THETA?")
-    rows = [["Neumann", "rho", "", "theta", "rate", "steps", ""]]
-    why = {}
-    for role in found.roles:
-        name, rate = names[role.neumann_body], role.rate_predicted
-        theta = figures(role.theta_predicted)
-        rows.append([name, figures(role.rho), "predicted", theta, near_one(rate), _steps(rate, 1e-9), "not a bound"])
-        if role.factor_proved is not None and role.theta_proved is not None:
-            q = role.factor_proved.value
-            rows.append(["", "", "proved", figures(role.theta_proved), near_one(q), f"<= {_steps(q, 1e-9)}", ""])
-        else:
-            rows.append(["", "", "proved", "-", "-", "-", "no conclusion"])
-            why[name] = role.reason["theta_proved"]
-    table(rows)
-    for name, reason in why.items():
-        note(f"{name}: {reason}", "  ")
-    say("  predicted: theta = 2/(2 + rho); proved: the theta of least proved factor")
-    say("  steps: to 1e-9 of the first error")
-    for role in found.roles:
-        auto = role.theta_auto
-        if auto is not None:
-            takes = f'theta = "auto" takes {float(auto.theta):.4g}, the {auto.source} one: {auto.why}'
-            note(f"{names[role.neumann_body]}: {takes}", "  ")
-    if found.friction is not None:
-        heading("HOW MUCH FRICTION IS PROVED?")
-        for role in found.roles:
-            if role.friction_threshold is None:
-                note(f"{names[role.neumann_body]}: {role.reason['friction_threshold']}", "  ")
-            else:
-                allowed = f"every small theta contracts for k < {figures(role.friction_threshold)}"
-                say(f"  {names[role.neumann_body]}: {allowed} (here k = {figures(found.friction, 2)})")
-    heading("TO PASTE")
-    theta = f"{min(best.theta_predicted, 0.99):.3g}" if found.next is None else f"{found.next.theta:g}"
-    body = f"neumann_body = {found.neumann_body}\n  " if found.neumann_body else ""
-    say(f"  {body}theta = {theta}")
-    say(f'  <acceleration:constant><relaxation value="{theta}" /></acceleration:constant>')
-    return theta
 
 
 def plane(found: Plane, target: Path | None = None) -> None:

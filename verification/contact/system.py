@@ -22,6 +22,10 @@ LIMIT = 40
 SWEEPS, RESTARTS = 10, 10
 
 
+#: How many problems with a given friction bound, and which part of the way to its next value the bound goes.
+GIVEN, SHARES = 30, (1.0, 0.3)
+
+
 class SolveError(RuntimeError):
     """The global method did not reach its KKT certificate."""
 
@@ -121,6 +125,8 @@ class ContactSystem:
             The certificate was not reached.
         """
         found = self.newton(self.start())
+        if found is None and self.given is None:
+            found = self._from_given_bounds()
         force, count = np.zeros(len(self.d0)), SWEEPS
         for _ in range(RESTARTS):
             if found is not None:
@@ -132,6 +138,30 @@ class ContactSystem:
             why = "" if self.M.shape[1] == 0 else "; contact alone holds a body, and the loads may pull or slide it off"
             raise SolveError(f"the global method did not reach a KKT residual of {TOLERANCE:g}{why}")
         return found
+
+    def _from_given_bounds(self) -> Equilibrium | None:
+        """Start Newton's method from problems with a given friction bound, each from the forces of the one before.
+
+        Each of these is convex, and solved whatever the friction; the bound moves part of the way where the whole way
+        repeats itself.
+        """
+        for share in SHARES:
+            bound = np.zeros(self.t)
+            for _ in range(GIVEN):
+                tresca = ContactSystem(
+                    self.W, self.d0, self.friction, bound=bound, motions=self.M, resultant=self.resultant
+                )
+                try:
+                    force = tresca.solve().force
+                except SolveError:
+                    return None
+                finally:
+                    self.linear_solves += tresca.linear_solves
+                found = self.newton(self._branches(force))
+                if found is not None:
+                    return found
+                bound = (1 - share) * bound + share * self.bound(force)
+        return None
 
     def start(self) -> Branches:
         """What the bodies would do without contact forces, and sticking; all touch where contact has to hold a body."""

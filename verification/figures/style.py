@@ -60,7 +60,11 @@ def plain(text: str) -> str:
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a figure; the ending of the path chooses SVG or PNG."""
+    """Write a figure; the ending of the path chooses SVG or PNG.
+
+    The axes are laid out for the first file alone: that takes longer than to draw them.
+    """
     metadata = {"Creator": "ndtheory", "Date": None} if path.suffix == ".svg" else {"Software": "ndtheory"}
     with styled():
         figure.savefig(path, dpi=160, metadata=metadata)
+        figure.set_layout_engine(None)

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+import scipy.sparse as sp
 
 from ndtheory import HypothesisError, __version__
 from verification.interface.array_headers import headers
@@ -58,6 +59,28 @@ def write_interface(pair: ContactPair, path: Path) -> None:
         arrays |= {"kernel": interface.kernel, "law": interface.law.words, "outside": interface.law.outside}
     if interface.transfer is not None:
         arrays["transfer"] = interface.transfer
+    with path.open("wb") as file:
+        np.savez(file, **arrays)
+
+
+def write_transfer(interface: Interface, path: Path) -> None:
+    """Write P as ``scipy.sparse.load_npz`` reads it, with the positions and weights of both grids beside it.
+
+    P leads from nodal values on the Neumann grid to those on the contact grid, its transpose from nodal forces back.
+    """
+    P = sp.csr_array(interface.transfer)
+    arrays = {
+        "format": b"csr",
+        "shape": P.shape,
+        "data": P.data,
+        "indices": P.indices,
+        "indptr": P.indptr,
+        "x_contact": interface.contact.x,
+        "weights_contact": interface.contact.weights,
+        "x_neumann": interface.neumann.x,
+        "weights_neumann": interface.neumann.weights,
+        "ndtheory": __version__,
+    }
     with path.open("wb") as file:
         np.savez(file, **arrays)
 

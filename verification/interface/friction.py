@@ -36,12 +36,16 @@ class Law(ABC):
         Why the theorem does not speak of this law; empty where it does.
     needs_radius : bool
         Whether a problem file with friction must give a radius.
+    of_contact : bool
+        Whether it takes the forces of the contact grid where the grids differ.  They are no function of the forces g on
+        the Neumann grid, so that the global method alone can use it there.
     """
 
     name: ClassVar[str]
     label: ClassVar[str]
     outside: str = ""
     needs_radius: ClassVar[bool] = False
+    of_contact: ClassVar[bool] = False
 
     @classmethod
     def of(cls, radius: Fraction | None) -> Law | None:
@@ -64,6 +68,7 @@ class Law(ABC):
     def operator(self, interface: Interface) -> Floats:
         """S: normal nodal forces on the Neumann grid to normal stress at the contact nodes, shape (n_c, n_n).
 
+        With ``of_contact`` those on the contact grid, shape (n_c, n_c).
         Forces are per unit thickness, compressive ones positive.
         """
 
@@ -124,7 +129,7 @@ class Nonlocal(Law):
     def warnings(self, interface: Interface) -> list[str]:
         x, weights, kernel = interface.neumann.x, interface.contact.weights, interface.kernel
         assert kernel is not None
-        r, width, length = self.radius, float(np.diff(x).max()), float(x[-1] - x[0])
+        r, width, length = self.radius, float(np.diff(x).max()), float(np.ptp(interface.contact.x))
         # What a sliding body carries under an even pressure, as a part of k times the normal force.
         share = float(weights @ kernel @ interface.neumann.weights / weights.sum())
         if r < width * (1 - 1e-9):
@@ -162,6 +167,24 @@ class Local(Law):
         return stress if interface.transfer is None else interface.transfer @ stress
 
 
+@dataclass(frozen=True, kw_only=True)
+class LocalOfContact(Law):
+    """Coulomb's law with the pressure of the contact grid itself, ``(S r)_j = r_j / w_j``, as other codes have it.
+
+    On one grid it is :class:`Local`.
+    """
+
+    name, label, of_contact = "local-contact", "local", True
+    outside = Local.outside
+
+    @property
+    def words(self) -> str:
+        return "local law, pressure of the contact grid"
+
+    def operator(self, interface: Interface) -> Floats:
+        return np.diag(1.0 / interface.contact.weights)
+
+
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Given(Value, Law):
     """An operator S that was given as a matrix.
@@ -192,4 +215,4 @@ class Given(Value, Law):
 
 
 #: The laws of problem files, by name.
-LAWS: dict[str, type[Law]] = {law.name: law for law in (Nonlocal, Local)}
+LAWS: dict[str, type[Law]] = {law.name: law for law in (Nonlocal, Local, LocalOfContact)}

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from fem1d2d import trapezoid
 from fem1d2d.mesh import Floats
 from verification.value import Value
@@ -37,6 +39,10 @@ class Grid(Value):
     def on(cls, x: Floats, dimension: Literal[1, 2] = 2) -> Grid:
         """The grid of these nodes with trapezoid weights."""
         return cls(x=x, weights=trapezoid(x), dimension=dimension)
+
+    def equals(self, other: Grid) -> bool:
+        """Whether it is the same grid."""
+        return all(map(np.array_equal, (self.x, self.weights), (other.x, other.weights)))
 
     @property
     def n(self) -> int:

@@ -38,16 +38,38 @@ class Interface(Value):
     transfer: Floats | None = None
 
     @property
+    def counts(self) -> dict[str, int]:
+        """How many nodes each grid has."""
+        return {"contact_nodes": self.contact.n, "neumann_nodes": self.neumann.n}
+
+    @property
     def summary(self) -> str:
         return f"{self.contact.n} contact nodes, {'no law of friction' if self.law is None else self.law.words}"
 
     @cached_property
     def kernel(self) -> Floats | None:
-        """S as a matrix: normal nodal forces on the Neumann grid to normal stress at the contact nodes."""
+        """S as a matrix: normal nodal forces on the Neumann grid to normal stress at the contact nodes.
+
+        Raises
+        ------
+        ValueError
+            The grids differ, and the law takes the forces of the contact grid.
+        """
         if self.law is None or self.contact.dimension == 1:
             return None
+        if self.law.of_contact and self.transfer is not None:
+            raise ValueError(f"{self.law.words}: no operator on the Neumann grid")
         kernel: Floats = freeze(self.law.operator(self))
         return kernel
+
+    @property
+    def contact_kernel(self) -> Floats | None:
+        """S as a matrix on normal nodal forces of the contact grid, shape (contact nodes, contact nodes)."""
+        if self.transfer is not None and self.law is not None and self.law.of_contact:
+            return self.law.operator(self)
+        if self.transfer is None or self.kernel is None:
+            return self.kernel
+        return self.kernel @ self.transfer.T
 
     def stress(self, force: Floats) -> Floats:
         """``S sigma_N`` at the contact nodes for a force on the Neumann grid; 0 without a law of friction."""
@@ -66,7 +88,11 @@ class Interface(Value):
         if self.transfer is None:
             return forces
         blocks = np.split(forces, self.contact.dimension)
-        return np.concatenate([self.transfer.T @ block for block in blocks])
+        return np.concatenate([self.onto_neumann(block) for block in blocks])
+
+    def onto_neumann(self, forces: Floats) -> Floats:
+        """``P' f`` of one component: nodal forces on the contact grid, one or columns of them."""
+        return forces if self.transfer is None else np.asarray(self.transfer.T @ forces)
 
     def pressed(self, touching: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """The Neumann nodes on which the forces of some contact nodes act."""

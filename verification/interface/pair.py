@@ -53,6 +53,15 @@ class TwoBodies(Value):
         return f"{self.problem.title}, {self.interface.contact.n} contact nodes"
 
     @property
+    def neumann(self) -> Body | None:
+        """The body whose traces reach the contact grid by the transfer; None where it is rigid."""
+        return self.body2 if self.problem.contact_body == 1 else self.body1
+
+    def force_on(self, body: Body, force: Floats) -> Floats:
+        """Nodal forces on the contact grid as the grid of a body receives them."""
+        return self.interface.carry_back(force) if body is self.neumann else force
+
+    @property
     def elastic(self) -> list[Body]:
         """The bodies that are not rigid."""
         return [body for body in (self.body1, self.body2) if body is not None]
@@ -101,6 +110,11 @@ class ContactPair(Value):
     def summary(self) -> str:
         k = f"k = {float(self.friction):g}"
         return f"{self.title}, {self.contact.grid.n} contact nodes, {k}, Neumann body {self.neumann_body}"
+
+    @property
+    def contact_body(self) -> Literal[1, 2]:
+        """The body of step II, which carries the contact grid."""
+        return 1 if self.neumann_body == 2 else 2
 
     @property
     def body1(self) -> Condensed:
@@ -167,11 +181,19 @@ class ContactPair(Value):
     def swapped(self) -> ContactPair:
         """The same bodies with the roles exchanged; what is condensed is shared.
 
+        Where the grids differ the transfer is another one: that of the problem with these roles.
+
         Raises
         ------
+        ProblemError
+            The grids differ, and Gamma_c does not end at nodes of the other body.
         ValueError
-            The grids differ.
+            The grids differ, and the pair is made from matrices.
         """
+        if self.interface.transfer is not None and self.problem is not None:
+            from verification.interface.assembly import build  # it makes pairs
+
+            return build(self.problem.swapped(), law=self.interface.law, like=self)
         return replace(
             self,
             contact=self.neumann.turned(),
@@ -282,6 +304,6 @@ def _warnings(interface: Interface, friction: Fraction, bodies: list[Body]) -> l
             f" pressures (Section 6 at {LOCKING:g}: 5 %, at 0.499: 40 %); needed a finer mesh, or a mesh file whose"
             " rectangles are split by both diagonals"
         )
-    if friction and interface.law is not None and interface.kernel is not None:
+    if friction and interface.law is not None and interface.contact.dimension == 2:
         found += interface.law.warnings(interface)
     return found

@@ -27,8 +27,8 @@ def three_digits(value: float) -> Fraction:
     return Fraction(f"{value:.3g}")
 
 
-def problem(random: np.random.Generator, friction: Any = None, **iteration: Any) -> Problem:
-    """Draw two rectangles whose grids match, 2 to 9 contact nodes; one may jut out over the other on either side.
+def problem(random: np.random.Generator, friction: Any = None, *, matching: bool = True, **iteration: Any) -> Problem:
+    """Draw two rectangles, 2 to 9 contact nodes; one may jut out over the other on either side.
 
     E1/E2 from 1/50 to 50, either role, friction 0, 0.1, .., 1.  The lower body is clamped at its bottom, the top of
     the upper one is pushed and sheared, its sides carry tractions, and in one case of three there is a gap.
@@ -38,6 +38,9 @@ def problem(random: np.random.Generator, friction: Any = None, **iteration: Any)
     random : Generator
     friction : number, optional
         k in place of the one drawn.
+    matching : bool
+        Whether the grids are one.  Where they are not, the wider body has the Neumann problem: the other one has nodes
+        at both ends of Gamma_c.
     **iteration
         Further keys of the table ``iteration``.
     """
@@ -47,11 +50,16 @@ def problem(random: np.random.Generator, friction: Any = None, **iteration: Any)
     left, right = whole(0, 2), whole(0, 2)
     ends = {wider: (-left, count + right), 1 - wider: (0, count)}
     young = {0: Fraction(1000), 1: 1000 * three_digits(50 ** random.uniform(-1, 1))}
-    bodies = []
+    bodies: list[dict[str, Any]] = []
     for i in (0, 1):
         x = [CELL * end for end in ends[i]]
         height = (x[1] - x[0]) * SHAPES[random.integers(len(SHAPES))]
-        body = {"shape": "rectangle", "x": x, "y": [-height, 0] if i == 0 else [0, height], "young": young[i]}
+        body: dict[str, Any] = {
+            "shape": "rectangle",
+            "x": x,
+            "y": [-height, 0] if i == 0 else [0, height],
+            "young": young[i],
+        }
         body |= {"cells": [ends[i][1] - ends[i][0], whole(1, 3)], "poisson": ["0", "0.3", "0.45"][random.integers(3)]}
         bodies.append(body)
     bodies[0]["fixed"] = ["bottom"]
@@ -62,6 +70,11 @@ def problem(random: np.random.Generator, friction: Any = None, **iteration: Any)
     radius = CELL * Fraction(3, 4) * whole(1, 3)
     gap = [0, 0, CELL / 100][random.integers(3)]
     neumann_body = whole(1, 2)
+    if not matching:
+        for body in bodies:
+            body["cells"] = [whole(1, 9), body["cells"][1]]
+        radius *= 3  # some Neumann node lies within it
+        neumann_body = neumann_body if left == right == 0 else wider + 1
     return Problem.from_dict(
         {
             "body1": bodies[0],

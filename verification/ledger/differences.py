@@ -8,9 +8,9 @@ forces pushed through steps I and II, and directions on the affine pieces of T
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -169,9 +169,11 @@ class Difference:
         """``|||psi - T psi - (psi~ - T psi~)|||``: the difference of the unrelaxed steps."""
         return _norm(self.force - self.reaction, self.setting.forms.inverse)
 
-    def relaxed(self, theta: float) -> float:
-        """``|||T_theta psi - T_theta psi~|||`` (5.7)."""
-        return _norm(theta * self.reaction + (1 - theta) * self.force, self.setting.forms.inverse)
+    @cached_property
+    def relaxed(self) -> Callable[[float], float]:
+        """theta -> ``|||T_theta psi - T_theta psi~|||`` (5.7), which many inequalities ask for."""
+        inverse = self.setting.forms.inverse
+        return cache(lambda theta: _norm(theta * self.reaction + (1 - theta) * self.force, inverse))
 
 
 def _norm(v: Floats, gram: Floats) -> float:
@@ -223,11 +225,7 @@ def _solve(pair: ContactPair, force: Floats) -> tuple[Floats, ContactSolution]:
 
 def _stress(pair: ContactPair, force: Floats) -> Floats:
     """``S sigma_N`` at the nodes."""
-    return (
-        np.zeros(pair.contact.grid.n)
-        if pair.interface.kernel is None
-        else np.asarray(pair.interface.kernel @ force[pair.contact.grid.normal])
-    )
+    return pair.interface.stress(force)
 
 
 def random_pairs(setting: Setting, random: np.random.Generator, count: int) -> Iterator[Difference]:

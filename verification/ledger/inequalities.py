@@ -106,10 +106,14 @@ class Inequality:
                 return float(1 + abs(left - float(np.asarray(right))) / subject.size)
             return float(1 + np.linalg.norm(np.asarray(left) - np.asarray(right)) / math.sqrt(subject.size))
         terms = [*_terms(left), *(-term for term in _terms(right))]
-        if not all(math.isfinite(term) for term in terms):
+        positive = negative = 0.0
+        for term in terms:
+            if term > 0:
+                positive += term
+            else:
+                negative -= term
+        if not math.isfinite(positive + negative):
             return math.inf
-        positive: float = sum(term for term in terms if term > 0)
-        negative: float = -sum(term for term in terms if term < 0)
         if len(terms) > 2:
             positive -= ROUNDING * subject.size
         if positive <= 0:
@@ -118,7 +122,7 @@ class Inequality:
 
 
 def _terms(side: Terms) -> tuple[float, ...]:
-    return side if isinstance(side, tuple) else (float(np.asarray(side)),)
+    return side if isinstance(side, tuple) else (float(side),)
 
 
 def _editions(id: str, left: Side, right: Side, *, early: bool = False, **options: Any) -> list[Inequality]:

@@ -96,13 +96,13 @@ def loaded(pair: ContactPair, g: Floats, v: Floats, force: Floats) -> ContactPai
     ----------
     pair : ContactPair
         The two bodies with any loads.
-    g : array, shape (2 n,)
-        Force on the Neumann body.
+    g : array
+        Force on the Neumann body, on its grid.
     v, force : array, shape (2 n,)
-        They must obey the conditions of step II.
+        On the contact grid.  They must obey the conditions of step II.
     """
     neumann, contact = pair.neumann, pair.contact
-    u = neumann.known + neumann.flexibility(g + neumann.load) + v
+    u = pair.interface.carry(neumann.known + neumann.flexibility(g + neumann.load)) + v
     u[pair.contact.grid.normal] += pair.interface.gap
     return replace(pair, contact=replace(contact, load=force + contact.stiffness @ u), problem=None)
 

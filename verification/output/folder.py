@@ -32,11 +32,13 @@ _PICTURES = ("bodies.svg", "bodies.png", "residuals.svg", "residuals.png")
 
 _TABLES = ("contact.csv", "history.csv")
 
+_MATRICES = ("interface.npz", "P.npz")
+
 #: What each command writes, beside the problem.
 FILES: dict[Kind, tuple[str, ...]] = {
-    "run": ("run.json", *_TABLES, "interface.npz", *_PICTURES),
-    "solve": ("solve.json", *_TABLES[:1], *_PICTURES[:2]),
-    "compare": ("compare.json", *_TABLES, "interface.npz", *_PICTURES, "waterfall.svg", "waterfall.png", "report.html"),
+    "run": ("run.json", *_TABLES, *_MATRICES, *_PICTURES),
+    "solve": ("solve.json", *_TABLES[:1], *_MATRICES[1:], *_PICTURES[:2]),
+    "compare": ("compare.json", *_TABLES, *_MATRICES, *_PICTURES, "waterfall.svg", "waterfall.png", "report.html"),
     "verify": ("ledger.json", "ledger.md", "errata.md", "verdicts.json"),
 }
 
@@ -237,7 +239,7 @@ class Folder:
     def _tables(self, room: Path, result: Run | Solution) -> None:
         """Gamma_c and the history as CSV, the interface as matrices, and the problem where a user has none there."""
         from verification.algorithm.runs import Run
-        from verification.interface.files import write_interface
+        from verification.interface.files import write_interface, write_transfer
 
         length, stress = result.units["length"], result.units["stress"]
         units = f"x, gap, slip in {length}; pressure, shear in {stress}"
@@ -245,6 +247,9 @@ class Folder:
         if isinstance(result, Run):
             _csv(room / "history.csv", "residuals in the norm (5.21), relative ones without unit", result.table())
             write_interface(result.pair, room / "interface.npz")
+        interface = result.pair.interface if isinstance(result, Run) else result.bodies.interface
+        if interface.transfer is not None:
+            write_transfer(interface, room / "P.npz")
         there = self.path / "problem.toml"
         ours = not there.exists() or (not unreadable(there, MOST_BYTES) and MARKS[".toml"] in there.read_bytes())
         if result.problem is not None and ours:
@@ -291,6 +296,6 @@ def _pictures(room: Path, result: Run | Solution, comparison: Comparison | None 
     if comparison is not None and comparison.losses is not None:
         drawn["waterfall"] = figures.draw_waterfall(comparison.losses, comparison.units["stress"])
     for name, figure in drawn.items():
-        for ending in ("svg", "png"):
+        for ending in ("png", "svg"):
             figures.save(figure, room / f"{name}.{ending}")
     return list(drawn)

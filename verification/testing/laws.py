@@ -95,12 +95,12 @@ def interpolation(x: Floats, y: Floats) -> Floats:
 
 @st.composite
 def _interfaces(draw: st.DrawFn, law: Law, length: float) -> Interface:
-    """Grids along Gamma_c, alike or not, of unequal cells."""
+    """Grids along Gamma_c of unequal cells, alike or, for a law of the Neumann grid's forces, not."""
     random = np.random.default_rng(draw(SEEDS))
     spread = lambda n: length * np.concatenate([[0.0], np.cumsum(random.uniform(0.3, 1, n - 1))]) / n
     x = spread(draw(st.integers(2, 8)))
     contact = Grid.on(x)
-    if draw(st.booleans()):
+    if law.of_contact or draw(st.booleans()):
         return Interface(contact=contact, neumann=contact, gap=np.zeros(contact.n), law=law)
     y = spread(draw(st.integers(2, 8)))
     neumann = Grid.on(y * x[-1] / y[-1])

@@ -1,0 +1,227 @@
+"""Each part of a comparison is shown as soon as it is known; what takes long comes last."""
+
+import html
+import os
+import pty
+import re
+import signal
+import subprocess
+import sys
+
+import pytest
+from processes import ended
+
+import verification as vf
+from verification import comparison
+from verification.bounds import semidefinite
+
+#: Says on the same stdout when something slow begins, unbuffered: the order of its lines is what a reader sees.
+MARKED = """
+    import os, sys
+
+    out = os.dup(1)
+
+    def mark(what):
+        os.write(out, f"--- {what}\\n".encode())
+
+    class Imports:
+        def find_spec(self, name, path, target=None):
+            if name in ("numpy", "cvxpy", "matplotlib"):
+                mark(name)
+
+    sys.meta_path.insert(0, Imports())
+    from verification import comparison
+    from verification.bounds import semidefinite
+    from verification.cli import main
+
+    def marked(module, name):
+        compute = getattr(module, name)
+
+        def begun(*args, **options):
+            mark(name)
+            return compute(*args, **options)
+
+        setattr(module, name, begun)
+
+    for module, name in ((comparison, "run"), (comparison, "locate"), (semidefinite, "work_out")):
+        marked(module, name)
+    sys.exit(main())
+"""
+
+#: The screen with what begins in between.
+ORDER = [
+    "--- numpy",
+    "HOW LARGE ARE THE CONSTANTS?",
+    "DOES ONE STEP CONTRACT?",
+    "--- run",
+    "WHAT HAPPENED",
+    "--- cvxpy",
+    "  cvxpy alone         ",
+    "--- locate",
+    "WHAT DOES EACH ESTIMATE GIVE AWAY?",
+    "--- work_out",
+    "WHAT DO SEMIDEFINITE PROGRAMS PROVE OF ONE STEP?",
+    "DOES THE RUN AGREE WITH THE BOUND?",
+    "Next: ndtheory advise ",
+    "--- matplotlib",
+]
+
+CALL = "import sys; from verification.cli import main; sys.exit(main())"
+
+
+def test_a_reader_has_each_table_before_what_is_slower_begins(write, tmp_path):
+    found = ended(MARKED, "compare", write(), "-o", tmp_path / "results")
+    assert (found.returncode, found.stderr) == (0, f"written: {tmp_path / 'results'}\n")
+    seen = [begin for line in found.stdout.splitlines() for begin in ORDER if line.startswith(begin)]
+    assert seen == ORDER
+
+
+def test_a_document_is_written_last_and_alone(write):
+    found = ended(MARKED, "compare", write(), "--json")
+    marks, begin, document = found.stdout.partition("{")
+    assert [line[4:] for line in marks.splitlines()] == ["numpy", "run", "cvxpy", "locate", "work_out"]
+    assert '"schema": "ndtheory.compare/1"' in begin + document
+    assert "---" not in document
+
+
+@pytest.mark.parametrize("edits", [None, "without friction", "held tangentially", "wrong roles", "apart"], ids=str)
+def test_the_parts_make_the_view_of_a_notebook(call, write, edits):
+    file = write(edits)
+    *shown, following = call("compare", file).out.splitlines()
+    assert following.startswith("Next: ")
+    view = vf.compare(vf.load(file))._repr_html_()
+    assert html.unescape(view.removeprefix("<pre>").removesuffix("</pre>")).splitlines() == shown
+
+
+def test_a_listener_hears_what_the_comparison_then_holds(write):
+    class Heard(comparison.Listener):
+        def __init__(self):
+            self.parts = []
+
+        def constants(self, measured, choice):
+            self.parts += [measured, choice]
+
+        def bounds(self, results, measured):
+            self.parts += [*results, measured]
+
+        def run(self, finished):
+            self.parts += [finished.to_dict()]
+
+        def cvxpy(self, reference, why):
+            self.parts += [reference, why]
+
+        def losses(self, losses, why):
+            self.parts += [losses, why]
+
+        def programs(self, results):
+            self.parts += results
+
+    first, again = Heard(), Heard()
+    vf.compare(vf.load(write()), listener=first).tell(again)
+    assert len(first.parts) == 12
+    assert first.parts == again.parts
+
+
+def interrupt(*args, **options):
+    signal.raise_signal(signal.SIGINT)
+
+
+def fail(*args, **options):
+    raise RuntimeError("made up")
+
+
+def test_ctrl_c_after_the_first_tables_leaves_them_and_says_what_is_missing(call, write, monkeypatch):
+    whole = call("compare", write()).out
+    monkeypatch.setattr(comparison, "locate", interrupt)
+    answer = call("compare", write())
+    assert answer.status == 130
+    assert answer.err.startswith("interrupted after the run had ended (converged), ")
+    assert answer.err.count("\n") == 1
+    before, slow, after = answer.out.partition("\nWHAT DOES EACH ESTIMATE GIVE AWAY?\n")
+    assert slow
+    assert whole.startswith(before)
+    assert after.startswith("  losses: interrupted before it was worked out\n")
+    assert "\n  lmi: interrupted before it was worked out\n" in after
+    assert "interrupted before it was worked out" not in before
+
+
+@pytest.mark.parametrize(
+    ("what", "status", "says"),
+    [(interrupt, 130, "interrupted; what was computed is shown above\n"), (fail, 70, "RuntimeError: made up\n")],
+    ids=["interrupt", "error"],
+)
+@pytest.mark.parametrize(
+    ("module", "name", "last"),
+    [(comparison, "run", "DOES ONE STEP CONTRACT?"), (semidefinite, "work_out", "WHAT DOES EACH ESTIMATE GIVE AWAY?")],
+    ids=["run", "programs"],
+)
+def test_what_ends_a_comparison_leaves_the_tables_before_it(
+    call, write, monkeypatch, module, name, last, what, status, says
+):
+    whole = call("compare", write()).out
+    monkeypatch.setattr(module, name, what)
+    answer = call("compare", write())
+    assert answer.status == status
+    assert last in answer.out
+    if (what, name) == (interrupt, "work_out"):  # the run is known: the rest is told without the bound
+        assert "DOES THE RUN AGREE WITH THE BOUND?" in answer.out
+        assert answer.err.count("\n") == 1
+    else:
+        assert whole.startswith(answer.out)
+        assert says in answer.err
+    assert (status == 70) == ("Traceback" in answer.err)
+
+
+def test_a_broken_import_by_ctrl_c_after_the_first_tables_does_not_deny_them(call, write, monkeypatch):
+    def broken(*args, **options):
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt:
+            raise ImportError("initialization failed") from None
+
+    monkeypatch.setattr(comparison, "run", broken)
+    answer = call("compare", write())
+    assert (answer.status, answer.err) == (130, "interrupted; what was computed is shown above\n")
+    assert "DOES ONE STEP CONTRACT?" in answer.out
+
+
+@pytest.mark.parametrize(
+    "options", [["--theta", "2"], ["--set", "iteration.max_iterations=2000000000"]], ids=["theta", "memory"]
+)
+def test_bad_input_is_told_before_anything_is_shown(call, write, options):
+    assert call("compare", write(), *options).complaint
+
+
+def test_a_reader_that_goes_away_costs_no_file(write, tmp_path):
+    reader, writer = os.pipe()
+    os.close(reader)
+    found = ended(CALL, "compare", write("without friction"), "-o", tmp_path / "results", stdout=writer)
+    os.close(writer)
+    assert (found.returncode, found.stderr) == (0, f"written: {tmp_path / 'results'}\n")
+    assert (tmp_path / "results" / "report.html").exists()
+
+
+def test_the_live_line_of_a_terminal_makes_room_for_each_part(call, write):
+    file = write("without friction")
+    expected = call("compare", file).out.splitlines()
+    leader, follower = pty.openpty()
+    environment = os.environ | {"TERM": "xterm", "COLUMNS": "200"}
+    with subprocess.Popen(
+        [sys.executable, "-c", CALL, "compare", file], stdout=follower, stderr=follower, env=environment
+    ) as process:
+        os.close(follower)
+        written = b""
+        while True:
+            try:
+                chunk = os.read(leader, 4096)
+            except OSError:  # the other end was closed
+                break
+            if not chunk:
+                break
+            written += chunk
+    os.close(leader)
+    assert process.returncode == 0
+    text = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", written.decode())
+    lines = [line.split("\r")[-1] for line in text.replace("\r\n", "\n").split("\n")]  # what a line ends as
+    assert "measuring" in text
+    assert [line for line in lines if line in expected and line] == [line for line in expected if line]

@@ -1,0 +1,105 @@
+"""What ``advise`` shows."""
+
+from __future__ import annotations
+
+from verification.advice.readings import NextRun, RunReading, SeenRun
+from verification.advice.roles import Advice
+from verification.cli.console import figures, heading, near_one, note, say, table
+from verification.cli.screens import steps
+from verification.cli.typed import Typed
+from verification.problem.reading import takes_theta
+
+
+def advice(found: Advice, typed: Typed | None = None) -> None:
+    """The screen of ``advise``."""
+    if found.run is not None and found.next is not None:
+        _seen(found.run, found.readings, found.next)
+    theta = _roles(found) if found.roles else None
+    say()
+    for reason in found.outside:
+        note(f"Outside the theorem: {reason}.")
+    if found.next is not None:
+        say("Not claimed: a bound of rho with friction, or that a reading is the right one.")
+        say(f"Next: ndtheory advise --theta {found.next.theta:g} --ratio R (R: the ratio of that run)")
+        return
+    say("Not claimed: that the predicted theta is the best one for your loads.")
+    if found.problem is not None:
+        if typed is not None and found.best.theta_auto is None:  # too large for a run
+            typed.suggest("constants")
+        elif typed is not None:
+            options = [] if found.roles[0].neumann_body == found.neumann_body else ["--swap-roles"]
+            if theta is not None and takes_theta(found.problem.iteration.relaxation):
+                options += ["--theta", theta]
+            typed.suggest("run", *options)
+    else:
+        say("Next: ndtheory advise --help")
+
+
+def _seen(run: SeenRun, readings: tuple[RunReading, ...], following: NextRun) -> None:
+    """What a run says of rho, and which one is to be made next."""
+    heading("WHAT DOES THE RUN SAY OF RHO?")
+    given = f"theta = {float(run.theta):.4g}; the residual |Tg - g| changes by {float(run.ratio):.4g} a step"
+    note(f"{given}, absolute and unrelaxed, steadily over {run.steps} steps or more.", "  ")
+    note("A residual that rises and falls has no steady ratio: give 1.", "  ")
+    note("The relative residual |Tg - g|/|Tg| of coupling libraries tells other things.", "  ")
+    rows = [["reading", "rho", "if it is the right one"]]
+    for reading in readings:
+        rho = "-" if reading.lo is None else f">= {figures(reading.lo)}"
+        rows.append([reading.kind, rho, reading.says])
+    table(rows)
+    heading("WHICH RUN NEXT?")
+    note(f"theta = {following.theta:g}: {following.why}", "  ")
+
+
+def _roles(found: Advice) -> str:
+    """What is known of each role; returns the theta to paste."""
+    best = found.best
+    names = {1: "body 1", 2: "body 2", None: "as in that run"}
+    heading("WHICH BODY GETS THE NEUMANN PROBLEM?")
+    if found.neumann_body is None:
+        say("  One run tells nothing of the other assignment.")
+    else:
+        other = next(role for role in found.roles if role is not best)
+        say(f"  {names[found.neumann_body]}: predicted rate {near_one(best.predicted[1])} a step,")
+        if other.rho is not None:
+            say(f"  against {near_one(other.predicted[1])} with the roles exchanged")
+        else:
+            note(f"{names[other.neumann_body]}: {other.reason['rho']}", "  ")
+    heading("WHICH THETA?")
+    rows = [["Neumann", "rho", "", "theta", "rate", "steps", ""]]
+    why = {}
+    possible = [role for role in found.roles if role.rho is not None]
+    for role in possible:
+        name, rate = names[role.neumann_body], role.predicted[1]
+        theta = figures(role.theta_predicted)
+        rows.append([name, figures(role.rho), "predicted", theta, near_one(rate), steps(rate, 1e-9), "not a bound"])
+        if role.factor_proved is not None and role.theta_proved is not None:
+            q = role.factor_proved.value
+            rows.append(["", "", "proved", figures(role.theta_proved), near_one(q), f"<= {steps(q, 1e-9)}", ""])
+        else:
+            rows.append(["", "", "proved", "-", "-", "-", "no conclusion"])
+            why[name] = role.reason["theta_proved"]
+    table(rows)
+    for name, reason in why.items():
+        note(f"{name}: {reason}", "  ")
+    say("  predicted: theta = 2/(2 + rho); proved: the theta of least proved factor")
+    say("  steps: to 1e-9 of the first error")
+    for role in possible:
+        auto = role.theta_auto
+        if auto is not None:
+            takes = f'theta = "auto" takes {float(auto.theta):.4g}, the {auto.source} one: {auto.why}'
+            note(f"{names[role.neumann_body]}: {takes}", "  ")
+    if found.friction is not None:
+        heading("HOW MUCH FRICTION IS PROVED?")
+        for role in possible:
+            if role.friction_threshold is None:
+                note(f"{names[role.neumann_body]}: {role.reason['friction_threshold']}", "  ")
+            else:
+                allowed = f"every small theta contracts for k < {figures(role.friction_threshold)}"
+                say(f"  {names[role.neumann_body]}: {allowed} (here k = {figures(found.friction, 2)})")
+    heading("TO PASTE")
+    theta = f"{min(best.predicted[0], 0.99):.3g}" if found.next is None else f"{found.next.theta:g}"
+    body = f"neumann_body = {found.neumann_body}\n  " if found.neumann_body else ""
+    say(f"  {body}theta = {theta}")
+    say(f'  <acceleration:constant><relaxation value="{theta}" /></acceleration:constant>')
+    return theta

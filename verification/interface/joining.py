@@ -1,0 +1,195 @@
+"""Gamma_c: where the surfaces of two bodies lie opposite each other, and what joins their grids there."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from fem1d2d import Mesh, MeshError, facing, mortar, surface
+from fem1d2d.mesh import Floats, Ints
+from fem1d2d.trace import SAME, extent
+from verification.interface.friction import LAWS, Law
+from verification.interface.grid import Grid
+from verification.interface.interface import Interface
+from verification.problem.specification import BodySpec, Problem
+from verification.problem.tables import ProblemError
+
+#: The matrix of a transfer is dense; more nodes would fill the memory.
+MOST_NODES_APART = 2000
+
+#: Body 1 lies below, body 2 above.
+UPPER = (True, False)
+
+Ends = tuple[float, float]
+
+
+def join(problem: Problem, meshes: list[Mesh | None], law: Law | None = None) -> tuple[list[Ints], Interface]:
+    """Find Gamma_c, the nodes of each body on it, and the transfer between their grids.
+
+    Gamma_c begins and ends at nodes of the body that carries the contact grid.  That of the other one covers it: its
+    outermost nodes may lie beyond.
+
+    Parameters
+    ----------
+    meshes : list of Mesh or None
+        Of body 1 and of body 2; None where rigid.
+    law : Law, optional
+        A law of friction in place of the problem's.
+
+    Returns
+    -------
+    list of int array
+        Nodes from left to right; none on a rigid body.
+    Interface
+
+    Raises
+    ------
+    ProblemError
+        Bodies that do not meet, an interval outside the overlap or without nodes of the contact body at its ends, a
+        surface with a hole, too many nodes.
+    """
+    size = max(extent(mesh) for mesh in meshes if mesh is not None)
+    contact = problem.contact_body - 1
+    nodes = _surfaces(problem, meshes, _interval(problem))
+    if problem.dimension == 2:
+        ends = _ends(problem, meshes, nodes, size)
+        nodes = _surfaces(problem, meshes, ends)
+        _check_nodes(problem, meshes, nodes, ends, contact)
+    points = [None if mesh is None else mesh.points[own].astype(float) for mesh, own in zip(meshes, nodes, strict=True)]
+    levels = [
+        p[:, -1] if p is not None else _obstacle_level(spec, points[1 - i], upper=UPPER[i])
+        for i, (spec, p) in enumerate(zip((problem.body1, problem.body2), points, strict=True))
+    ]
+    positions = [p[:, 0] for p in points if p is not None]
+    # one grid has the positions of body 1, so that constants do not depend on the roles, to the last digit
+    grid = neumann = Grid.on(positions[0], problem.dimension)
+    P = None
+    if problem.dimension == 2 and len(positions) == 2 and not _same(positions[0], positions[1], SAME * size):
+        most = max(map(len, positions))
+        if most > MOST_NODES_APART:
+            needed = f"needed at most {MOST_NODES_APART} contact nodes on grids that differ, these are {most}"
+            raise _refuse(problem, "contact", None, needed)
+        grid, x = Grid.on(positions[contact]), positions[1 - contact].copy()
+        x[0], x[-1] = min(x[0], grid.x[0]), max(x[-1], grid.x[-1])  # ends that differ by rounding
+        P = mortar(grid.x, x)
+        neumann = Grid(x=x, weights=P.T @ grid.weights)
+        levels[1 - contact] = P @ levels[1 - contact]
+    interface = Interface(
+        contact=grid,
+        neumann=neumann,
+        gap=_gap(problem, np.broadcast_to(levels[1] - levels[0], grid.x.shape), levels, size),
+        law=law or LAWS[problem.contact.law].of(problem.contact.radius),
+        transfer=P,
+    )
+    if P is not None and interface.contact_kernel is not None and not interface.contact_kernel.any():
+        needed = "needed a larger one: it reaches no node of the Neumann grid from any contact node, so that S is 0"
+        raise _refuse(problem, "contact.radius", problem.contact.radius, needed)
+    return nodes, interface
+
+
+def _refuse(problem: Problem, key: str, value: Any, needed: str) -> ProblemError:
+    return ProblemError(problem.source, key, value, needed)
+
+
+def _interval(problem: Problem) -> Ends | None:
+    chosen = problem.contact.interval
+    return None if chosen is None else (float(chosen[0]), float(chosen[1]))
+
+
+def _surfaces(problem: Problem, meshes: list[Mesh | None], ends: Ends | None) -> list[Ints]:
+    """The nodes of both surfaces, or those whose hat functions reach between two positions."""
+    nodes = []
+    for mesh, upper in zip(meshes, UPPER, strict=True):
+        try:
+            if mesh is None:
+                nodes.append(np.empty(0, dtype=np.int64))
+            elif mesh.dimension == 1:
+                nodes.append(surface(mesh, upper=upper))
+            elif ends is not None and problem.contact.interval is not None:  # only then may it be curved
+                nodes.append(facing(mesh, upper=upper, ends=ends))
+            else:
+                nodes.append(surface(mesh, upper=upper, ends=ends))
+        except MeshError as error:
+            needed = f"{error}; needed the part of the x axis where they meet"
+            raise _refuse(problem, "contact.interval", None, needed) from None
+    return nodes
+
+
+def _ends(problem: Problem, meshes: list[Mesh | None], nodes: list[Ints], size: float) -> Ends:
+    """Where Gamma_c begins and ends: as the problem says, or where both bodies have a surface."""
+    chosen = _interval(problem)
+    reach = []
+    for spec, mesh, own in zip((problem.body1, problem.body2), meshes, nodes, strict=True):
+        if mesh is not None:  # a chosen part may be curved: the whole body counts then
+            x = mesh.points[own if chosen is None else slice(None), 0].astype(float)
+            reach.append((float(x.min()), float(x.max())))
+        else:  # an obstacle without x is endless
+            reach.append((-np.inf, np.inf) if spec.x is None else (float(spec.x[0]), float(spec.x[1])))
+    overlap = (max(low for low, _ in reach), min(high for _, high in reach))
+    if not overlap[1] - overlap[0] > SAME * size:
+        covers = ", ".join(f"body {i} covers x = {low:g} to {high:g}" for i, (low, high) in enumerate(reach, 1))
+        raise _refuse(problem, "body2.x", None, f"the bodies do not meet: {covers}")
+    if chosen is None:
+        return overlap
+    if chosen[0] < overlap[0] - SAME * size or chosen[1] > overlap[1] + SAME * size:
+        needed = f"needed an interval inside the overlap [{overlap[0]:g}, {overlap[1]:g}]"
+        raise _refuse(problem, "contact.interval", list(problem.contact.interval or ()), needed)
+    return chosen
+
+
+def _check_nodes(problem: Problem, meshes: list[Mesh | None], nodes: list[Ints], ends: Ends, contact: int) -> None:
+    """Gamma_c must begin and end at nodes of the body that carries the contact grid, and no surface may have a hole."""
+    given = None if problem.contact.interval is None else list(problem.contact.interval)
+    fits = [False, False]
+    for i, (mesh, own) in enumerate(zip(meshes, nodes, strict=True)):
+        if mesh is None:
+            continue
+        x = mesh.points[own, 0].astype(float)
+        off = SAME * extent(mesh)
+        fits[i] = bool(len(x) > 1 and abs(x[0] - ends[0]) <= off and abs(x[-1] - ends[1]) <= off)
+        edges = set(map(frozenset, mesh.boundary.tolist()))
+        holes = [j for j in range(len(own) - 1) if frozenset(own[j : j + 2].tolist()) not in edges]
+        if holes:
+            where = f"between x = {x[holes[0]]:g} and {x[holes[0] + 1]:g}"
+            needed = f"body {i + 1} has no surface {where}: needed a Gamma_c of one piece"
+            raise _refuse(problem, "contact.interval", given, needed)
+    if not fits[contact]:
+        mesh = meshes[contact]
+        assert mesh is not None
+        x = np.unique(mesh.points[nodes[contact], 0].astype(float))
+        near = ", ".join(f"{value:g}" for value in (x if len(x) < 4 else x[[0, 1, -2, -1]]))
+        swap = f"; body {2 - contact} has them: let body {contact + 1} have the Neumann problem"
+        needed = (
+            f"Gamma_c = [{ends[0]:g}, {ends[1]:g}] must begin and end at nodes of the contact body, body {contact + 1},"
+            f" whose nodes near its ends lie at {near or 'no x'}{swap if fits[1 - contact] else ''}"
+        )
+        raise _refuse(problem, "contact.interval", given, needed)
+
+
+def _obstacle_level(spec: BodySpec, other: Floats | None, *, upper: bool) -> Floats:
+    """Where the face of an obstacle lies; without coordinates it touches the other body."""
+    assert other is not None
+    ends = spec.x if other.shape[1] == 1 else spec.y
+    if ends is not None:
+        return np.array(float(ends[1] if upper else ends[0]))
+    return np.array(other[:, -1].min() if upper else other[:, -1].max())
+
+
+def _gap(problem: Problem, distance: Floats, levels: list[Floats], size: float) -> Floats:
+    """The initial distance at the contact nodes: that of the surfaces as they are drawn, and ``contact.gap``."""
+    nearest, gap = float(distance.min()), float(problem.contact.gap)
+    if min(abs(nearest), abs(nearest - gap)) > SAME * size:
+        axis = "x" if problem.dimension == 1 else "y"
+        low, high = float(np.max(levels[0])), float(np.min(levels[1]))
+        needed = (
+            f"the bodies do not meet: body 1 ends at {axis} = {low:g}, body 2 begins at {axis} = {high:g}"
+            " (draw them touching; contact.gap sets the initial distance)"
+        )
+        raise _refuse(problem, f"body2.{axis}", None, needed)
+    # A distance within rounding of the nearest one is that one: flat bodies have one gap.
+    return np.where(distance - nearest <= SAME * size, 0.0, distance - nearest) + gap
+
+
+def _same(one: Floats, other: Floats, within: float) -> bool:
+    return len(one) == len(other) and np.allclose(one, other, rtol=0, atol=within)

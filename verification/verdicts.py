@@ -1,0 +1,87 @@
+"""A verdict on each bound and forecast, with its reason, from what a run shows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from verification.algorithm.rates import StepRatio
+from verification.algorithm.runs import Run
+from verification.bounds.bound import BoundResult
+
+#: A bound may be attained: a ratio above it by less than this share of 1 - bound is equal to it.
+TIGHT = 1e-6
+
+#: A forecast comes true where its rate is the observed one to this, and its steps to one.
+AGREES = 1e-3
+
+RunVerdict = Literal["CONSISTENT", "VIOLATED", "INCONCLUSIVE", "HYPOTHESES_NOT_MET", "NOT_COMPUTED"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Judgement:
+    """A verdict on one bound, with its reason in words."""
+
+    verdict: RunVerdict
+    reason: str
+
+
+def judge(bound: float | None, seen: StepRatio | None, why_none: str) -> Judgement:
+    """Hold a bound on the factor of one step against the largest factor seen.
+
+    A bound may be attained: what lies above it by less than :data:`TIGHT` of ``1 - bound`` is not told from it.
+
+    Parameters
+    ----------
+    bound : float or None
+        None: the bound draws no conclusion; ``why_none`` says why.
+    seen : StepRatio or None
+        None: no step stands clear of rounding.
+
+    Examples
+    --------
+    >>> judge(0.5, StepRatio(value=0.4, lo=0.39, hi=0.41, steps=9), "").verdict
+    'CONSISTENT'
+    """
+    if bound is None:
+        return Judgement(verdict="HYPOTHESES_NOT_MET", reason=why_none)
+    if seen is None:
+        return Judgement(verdict="INCONCLUSIVE", reason="no step stands clear of rounding")
+    if seen.steps == 0:
+        return Judgement(verdict="NOT_COMPUTED", reason="no step was taken")
+    digits = 4 if seen.hi <= bound else 6  # six where the bound is attained or violated
+    says = f"ratios <= {seen.value:.{digits}g} in {seen.steps} steps, bound {bound:.{digits}g}"
+    if seen.hi <= bound:
+        return Judgement(verdict="CONSISTENT", reason=says)
+    slack = TIGHT * (1 - bound)
+    if seen.lo > bound + slack:
+        return Judgement(verdict="VIOLATED", reason=says)
+    if seen.hi <= bound + slack:
+        return Judgement(verdict="CONSISTENT", reason=f"{says}: attained")
+    return Judgement(verdict="INCONCLUSIVE", reason=f"{says}: closer than rounding")
+
+
+def judge_forecast(run: Run) -> Judgement:
+    """Hold what was said half way against what the run then did."""
+    made, seen = run.forecast, run.observed_rate
+    if made is None:
+        return Judgement(verdict="NOT_COMPUTED", reason=run.why_no_forecast)
+    says = f"forecast {made.rate:.4g}, {made.iterations} steps"
+    if run.outcome == "interrupted":
+        return Judgement(verdict="NOT_COMPUTED", reason=f"{says}; the run was interrupted")
+    if seen is None:
+        return Judgement(verdict="VIOLATED", reason=f"{says}; the run {run.outcome}, and shows no rate")
+    ended = "" if run.converged else f", {run.outcome}"
+    right = abs(seen.value - made.rate) <= AGREES and abs(run.iterations - made.iterations) <= 1 and run.converged
+    return Judgement(
+        verdict="CONSISTENT" if right else "VIOLATED", reason=f"{says}; seen {seen.value:.4g}, {run.iterations}{ended}"
+    )
+
+
+def judge_bound(result: BoundResult, seen: StepRatio | None, outside: str) -> Judgement:
+    """What the run says of one bound."""
+    if outside:
+        return Judgement(verdict="HYPOTHESES_NOT_MET", reason=outside)
+    if result.not_computed:
+        return Judgement(verdict="NOT_COMPUTED", reason=result.not_computed)
+    return judge(None if result.factor is None else result.factor.value, seen, result.why)
