@@ -13,10 +13,7 @@ import numpy as np
 from fem1d2d import largest
 from fem1d2d.mesh import Floats
 from ndtheory import EnergyConstants, Number, evaluate_sharp
-from ndtheory.constants import take
-from ndtheory.energy import LARGEST, SMALLEST
-from ndtheory.sharp import predicted_rate, predicted_theta
-from verification.advice.readings import NextRun, RunReading, SeenRun, read_ratio
+from verification.advice.readings import NextRun, RunReading, SeenRun
 from verification.algorithm.theta import Choice, automatic, sharp_bounds
 from verification.constants import measure
 from verification.document import Document
@@ -290,7 +287,7 @@ def _roles_without_matrices(bodies: TwoBodies, progress: Progress) -> tuple[Role
         if nothing is not None:
             unproved = dict.fromkeys(("theta_proved", "factor_proved", "theta_max_proved"))
             reason |= dict.fromkeys((*unproved, "friction_threshold"), nothing)
-        roles.append(replace(_plain_role(neumann, Fraction(rho)), reason=reason, **unproved))
+        roles.append(replace(plain_role(neumann, Fraction(rho)), reason=reason, **unproved))
     return tuple(roles)
 
 
@@ -327,12 +324,13 @@ def advise_matrices(S1: Floats, S2: Floats) -> Advice:
     with one_thread():
         ratios = {2: Fraction(largest(one, two).value), 1: Fraction(largest(two, one).value)}
     unit = {2: Fraction(unit_1) / Fraction(unit_2), 1: Fraction(unit_2) / Fraction(unit_1)}
-    roles = tuple(_plain_role(neumann, rho * unit[neumann]) for neumann, rho in ratios.items())
+    roles = tuple(plain_role(neumann, rho * unit[neumann]) for neumann, rho in ratios.items())
     best = min(roles, key=lambda role: role.predicted[1])
     return Advice(neumann_body=best.neumann_body, roles=roles, units=UNITS)
 
 
-def _plain_role(neumann_body: Any, rho: Fraction) -> Role:
+def plain_role(neumann_body: Any, rho: Fraction) -> Role:
+    """What rho alone says, without friction."""
     bounds = evaluate_sharp(EnergyConstants(rho=rho))
     return Role(
         neumann_body=neumann_body,
@@ -344,78 +342,4 @@ def _plain_role(neumann_body: Any, rho: Fraction) -> Role:
         rate_predicted=bounds.rate_predicted,
         friction_threshold=None,
         reason={"friction_threshold": "matrices alone say nothing of friction: the proved values are for k = 0"},
-    )
-
-
-def advise_run(theta: Any, ratio: Any) -> Advice:
-    """What one run of any code with constant theta says of rho, and the run to make next.
-
-    While contact does not change, a mode is multiplied by ``1 - theta (1 + lambda)`` in a step, with lambda at most
-    rho, and an open node by ``1 - theta``.  A residual has no sign, so that a ratio r of residuals can mean
-
-    * ``mode-high``: ``lambda = (1 + r)/theta - 1``.  Without friction or tied, rho is at least that wherever
-      ``r > 1 - theta``, since no step is longer than ``max(1 - theta, |1 - theta - theta rho|)``;
-    * ``mode-low``: ``lambda = (1 - r)/theta - 1``, where ``r <= 1 - theta``;
-    * ``open``: nothing of rho, where r is about ``1 - theta``;
-    * ``level``: contact opens and closes in turn, where r is about 1 or the growth does not last.  Without friction
-      theta does not contract, so that rho is at least ``2/theta - 1``.
-
-    With friction none of these bounds is proved.
-
-    Parameters
-    ----------
-    theta : number
-        The run's relaxation factor, 0 < theta <= 1.
-    ratio : number
-        r > 0, that of the absolute unrelaxed residual ``|T g - g|`` from one step to the next, steady over the last ten
-        steps or more, and over ``5/theta`` where these are more; above 1 where the run diverged, and 1 where the
-        residual rises and falls and has no steady ratio.
-
-    Returns
-    -------
-    Advice
-        Without roles while several readings are left.
-
-    Raises
-    ------
-    HypothesisError
-        theta or the ratio is no number of its range.
-
-    Examples
-    --------
-    >>> found = advise_run("0.1", "1.4")
-    >>> [(reading.kind, reading.lo) for reading in found.readings], found.next.theta
-    ([('mode-high', 23.0), ('level', 19.0)], 0.0808)
-    >>> advise_run("0.45", "0.8").best.rho.value
-    3.0
-    """
-    t = take("theta", theta, "the theta of a run, 0 < theta <= 1 (1e-75 or more)", lambda v: SMALLEST <= v <= 1)
-    needed = "the ratio of consecutive residuals, a number > 0 (1e-75 to 1e75)"
-    r = take("ratio", ratio, needed, lambda v: SMALLEST <= v <= LARGEST)
-    run, readings, following, rho = read_ratio(t, r)
-    return Advice(
-        neumann_body=None,
-        roles=() if rho is None else (_role_of_run(rho),),
-        units=UNITS,
-        run=run,
-        readings=readings,
-        next=following,
-    )
-
-
-def _role_of_run(rho: Fraction) -> Role:
-    nothing = "an observed ratio proves nothing"
-    return Role(
-        neumann_body=None,
-        rho=Number.of_float(rho),
-        theta_proved=None,
-        factor_proved=None,
-        theta_max_proved=None,
-        theta_predicted=float(predicted_theta(rho)),
-        rate_predicted=float(predicted_rate(rho)),
-        friction_threshold=None,
-        reason={
-            "neumann_body": "whichever body had the Neumann problem in that run",
-            **dict.fromkeys(("theta_proved", "factor_proved", "theta_max_proved", "friction_threshold"), nothing),
-        },
     )

@@ -79,7 +79,9 @@ def advise(
             raise click.UsageError(f"{S1}, {S2}: {error}", context) from None
     else:
         try:
-            found = advice.advise_run(theta, ratio)
+            from verification.advice.from_runs import advise_run
+
+            found = advise_run(theta, ratio)
         except HypothesisError as error:
             raise click.UsageError(f"--{error}", context) from None
     deliver(found, lambda: show(found, None if file is None else Typed(file=file, keys=keys)), as_json)
