@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from problem_list import changed
 
 import verification as vf
-from verification.advice.roles import advise_run
+from verification.advice.from_runs import advise_run
 from verification.algorithm.fixed_point import FixedPointMap, iterates
 from verification.algorithm.relaxation import Constant
 from verification.interface.assembly import build

@@ -105,7 +105,7 @@ class SeenRun:
 def read_ratio(theta: Fraction, r: Fraction) -> tuple[SeenRun, tuple[RunReading, ...], NextRun, Fraction | None]:
     """Every reading of a ratio r of residuals at theta, and the run to make next.
 
-    :func:`verification.advice.roles.advise_run` says what the readings are.
+    :func:`verification.advice.from_runs.advise_run` says what the readings are.
 
     Returns
     -------

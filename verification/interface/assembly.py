@@ -31,6 +31,13 @@ from verification.interface.pair import ContactPair, TwoBodies
 from verification.problem.specification import MOST_CELLS, BodySpec, Problem
 from verification.problem.tables import ProblemError, short
 
+#: Interface matrices are dense; more contact nodes would fill the memory.
+MOST_CONTACT_NODES = 2000
+
+
+class TooManyContactNodes(ProblemError):
+    """A sound problem, too large for dense interface matrices."""
+
 
 def build(problem: Problem, *, law: Law | None = None, like: ContactPair | None = None) -> ContactPair:
     """Two condensed bodies with roles, as the iteration and its constants need them.
@@ -49,6 +56,40 @@ def build(problem: Problem, *, law: Law | None = None, like: ContactPair | None 
     ProblemError
         As :func:`discretise`, and where a body is rigid or can move rigidly.
     """
+    bodies, iteration = held_bodies(problem, law=law), problem.iteration
+    known = (None, None) if like is None else (like.body1, like.body2)
+    upward, grids = iteration.neumann_body == 2, (bodies.interface.contact, bodies.interface.neumann)
+    lower, upper = (
+        _condensed(body, grid, upward, side)
+        for body, grid, side in zip(bodies.elastic, grids if upward else grids[::-1], known, strict=True)
+    )
+    return ContactPair(
+        contact=lower if upward else upper,
+        neumann=upper if upward else lower,
+        interface=bodies.interface,
+        friction=bodies.friction,
+        neumann_body=iteration.neumann_body,
+        settings=iteration.settings,
+        problem=problem,
+    )
+
+
+def held_bodies(problem: Problem, *, law: Law | None = None, dense: bool = True) -> TwoBodies:
+    """The bodies on their meshes as the iteration needs them: elastic, and held by their supports.
+
+    Parameters
+    ----------
+    problem : Problem
+    law : Law, optional
+        As for :func:`build`.
+    dense : bool
+        As for :func:`discretise`.
+
+    Raises
+    ------
+    ProblemError
+        As :func:`build`.
+    """
     iteration = problem.iteration
     for name in ("body1", "body2"):
         if getattr(problem, name).rigid:
@@ -59,7 +100,7 @@ def build(problem: Problem, *, law: Law | None = None, like: ContactPair | None 
                 "rigid",
                 f"needed an elastic body: it has the {role} problem of the iteration; `ndtheory solve` takes obstacles",
             )
-    bodies = discretise(problem, law=law)
+    bodies = discretise(problem, law=law, dense=dense)
     if bodies.interface.transfer is not None and bodies.interface.law is not None and bodies.interface.law.of_contact:
         raise ProblemError(
             problem.source,
@@ -80,21 +121,7 @@ def build(problem: Problem, *, law: Law | None = None, like: ContactPair | None 
                 f"{body.name} can move rigidly ({k} free motion{'s' if k > 1 else ''}), so that its stiffness matrix in"
                 f" {step} is singular: fix or prescribe more of its sides, or use `ndtheory solve`",
             )
-    known = (None, None) if like is None else (like.body1, like.body2)
-    upward, grids = iteration.neumann_body == 2, (bodies.interface.contact, bodies.interface.neumann)
-    lower, upper = (
-        _condensed(body, grid, upward, side)
-        for body, grid, side in zip(bodies.elastic, grids if upward else grids[::-1], known, strict=True)
-    )
-    return ContactPair(
-        contact=lower if upward else upper,
-        neumann=upper if upward else lower,
-        interface=bodies.interface,
-        friction=bodies.friction,
-        neumann_body=iteration.neumann_body,
-        settings=iteration.settings,
-        problem=problem,
-    )
+    return bodies
 
 
 def _condensed(body: Body, grid: Grid, upward: bool, like: Condensed | None) -> Condensed:
@@ -108,17 +135,30 @@ def _condensed(body: Body, grid: Grid, upward: bool, like: Condensed | None) -> 
     return found if found.upward == upward else found.turned()
 
 
-def discretise(problem: Problem, *, law: Law | None = None) -> TwoBodies:
+def discretise(problem: Problem, *, law: Law | None = None, dense: bool = True) -> TwoBodies:
     """Mesh and assemble the bodies and find Gamma_c.
+
+    Parameters
+    ----------
+    problem : Problem
+    law : Law, optional
+        A law of friction in place of the problem's.
+    dense : bool
+        False where no interface matrices will be made: then there may be any number of contact nodes.
 
     Raises
     ------
+    TooManyContactNodes
+        More than MOST_CONTACT_NODES of them, for dense interface matrices.
     ProblemError
         A body held by nothing but contact, bodies that do not meet, an interval outside the overlap or without nodes of
         the contact body at its ends, Gamma_u holding the normal component of a contact node, an unreadable mesh.
     """
     meshes = [None if spec.rigid else _mesh(problem, name) for name, spec in _specs(problem)]
     nodes, interface = join(problem, meshes, law)
+    if dense and interface.contact.n > MOST_CONTACT_NODES:
+        needed = f"needed at most {MOST_CONTACT_NODES} contact nodes, these are {interface.contact.n}"
+        raise TooManyContactNodes(problem.source, "contact", None, needed)
     body1, body2 = (
         None if mesh is None else _body(problem, name, mesh, own, interface.contact.x[[0, -1]])
         for (name, _), mesh, own in zip(_specs(problem), meshes, nodes, strict=True)
