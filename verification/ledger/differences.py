@@ -30,7 +30,7 @@ from verification.interface.pair import ContactPair
 DISTANCES = (0.1, 0.3, 1.0, 3.0)
 
 #: Up to this share of the energies behind it a^1(w^1 - w~^1, w^1 - w~^1) is rounding: where the Neumann grid is the
-#: finer one there are forces whose displacements P does not carry.  On 120 problems nothing is seen from 1e-26 to 1e-11.
+#: finer one there are forces whose displacements P does not carry.  On 120 problems nothing lies from 1e-26 to 1e-11.
 NO_MOTION = 1e-20
 
 #: Random directions on each piece, beside the worst ones.
