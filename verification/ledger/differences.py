@@ -79,8 +79,8 @@ class Setting:
 
     @cached_property
     def felt_1(self) -> Floats:
-        """``a^1(R phi, R P chi)``: the contact body's forces, as the Neumann body receives them."""
-        return self.pair.interface.carry_back(self.bilinear_1)
+        """``a^1(R P chi, R phi)`` for chi on the Neumann grid and phi on the contact grid, by P itself."""
+        return self.pair.interface.carry(np.eye(self.pair.neumann.grid.size)).T @ self.bilinear_1
 
     @cached_property
     def coordinates(self) -> Floats:
