@@ -141,8 +141,8 @@ class Tally:
         How many were compared; in how many of the problems the grids differ.
     by_unit : dict
         Unit of stress -> the worst ratio, where, the theta, and the problem where it has a name.
-    worst_apart : dict
-        Unit of stress -> the worst ratio where the grids differ.
+    worst_apart : float
+        The worst ratio where the grids differ, in any unit of stress; -inf where nothing was compared there.
     """
 
     inequality: Inequality
@@ -150,7 +150,7 @@ class Tally:
     problems: int = 0
     apart: int = 0
     by_unit: dict[float, tuple[float, str, float | None, str]] = field(default_factory=dict)
-    worst_apart: dict[float, float] = field(default_factory=dict)
+    worst_apart: float = -math.inf
 
     def take(self, case: Trial, subjects: Sequence[Any]) -> None:
         """Compare both sides on the pairs of a problem, where the inequality speaks of its grids."""
@@ -169,7 +169,7 @@ class Tally:
                     if math.isnan(ratio):
                         ratio = math.inf
                     if case.grids_differ:
-                        self.worst_apart[unit] = max(ratio, self.worst_apart.get(unit, 0.0))
+                        self.worst_apart = max(ratio, self.worst_apart)
                     # equal but for rounding: the first one stays, on any machine
                     if unit not in self.by_unit or not ratio <= self.by_unit[unit][0] * (1 + ALLOWANCE):
                         where = case.name if inequality.about == "bodies" else f"{case.name}, pair {number}"
@@ -203,7 +203,7 @@ class Tally:
         if self.inequality.one_grid:
             count += f", in each of which both bodies have one grid ({ONE_TRACE_SPACE})"
         else:
-            data["grids_differ"] = {"problems": self.apart, "worst_ratio": _digits(self.worst_apart.get(unit, 0.0))}
+            data["grids_differ"] = {"problems": self.apart, "worst_ratio": _digits(self.worst_apart)}
             count += f", of which {self.apart} have grids that differ{self.inequality.remark}"
         sides = "left/right" if not self.inequality.equality else "1 + |left - right|/energy"
         units = self.inequality.units
