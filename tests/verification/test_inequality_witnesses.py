@@ -24,8 +24,8 @@ def sliding_apart(case: Case, quality: Callable[[dict[str, np.ndarray]], tuple[n
     """The worst pair while every node is open and slips the same way.
 
     Friction alone then answers: ``T psi - T psi~ = P' J (psi - psi~)`` with ``J = (w k S, 0)``, and ``w^1 - w~^1`` is
-    its deflection ``-S1^-1 J``. So every quantity of Section 5 is a quadratic form in psi - psi~, and the worst direction
-    an eigenvector of the two forms that `quality` names.
+    its deflection ``-S1^-1 J``. So every quantity of Section 5 is a quadratic form in psi - psi~, and the worst
+    direction an eigenvector of the two forms that `quality` names.
     """
     t, dense, grid = case.dense.t, case.dense, case.pair.neumann.grid
     J = np.zeros((len(case.S1), len(case.S2)))
