@@ -156,8 +156,8 @@ def enclose(
                 upper = min(upper, worst.upper, key=lambda certified: certified.value)
                 children.append(Leaf(pieces=part, upper=upper, proposal=proposal))
                 for pattern in _read_off(forms, children[-1], search.sign):
-                    start = search.found(*pattern)
-                    if start.value >= PROMISING**2 * best.value:
+                    start = search.above(PROMISING**2 * best.value, *pattern)
+                    if start is not None:
                         best = max(best, search.climb(start), key=lambda found: found.value)
             solved += len(parts)
             heapq.heappop(leaves)
