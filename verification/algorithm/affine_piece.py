@@ -11,7 +11,8 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, null_space
+from scipy.linalg import null_space
+from scipy.linalg.lapack import dposv
 
 from fem1d2d.mesh import Floats
 from verification.contact.active_set import Pattern
@@ -70,8 +71,10 @@ class Piece(Value):
         if len(rows):
             load = -contact.stiffness @ carried
             load[:t] -= self.pattern.sliding[:, None] * self.bound
-            factor = cho_factor(contact.stiffness[np.ix_(rows, rows)], check_finite=False)
-            result[rows] = cho_solve(factor, load[rows], check_finite=False)
+            _, solved, failed = dposv(contact.stiffness[rows][:, rows], load[rows])
+            if failed:
+                raise np.linalg.LinAlgError("the stiffness of the contact body is not positive definite where it moves")
+            result[rows] = solved
         held = np.flatnonzero(~contact.free)
         result[held] = -carried[held]
         freeze(result)
