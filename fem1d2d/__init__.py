@@ -4,11 +4,11 @@ A small core in which every matrix is exact for its mesh.  It knows nothing of c
 """
 
 from fem1d2d.assembly import body_load, facet_weights, gram, side_load, stiffness
-from fem1d2d.condense import Condensation, elimination_order, solver
+from fem1d2d.condense import Condensation, elimination_order, solver, solver_with_inertia
 from fem1d2d.material import Material, bar, plane_strain
 from fem1d2d.mesh import Mesh, MeshError, interval, rectangle
 from fem1d2d.mesh_files import from_file
-from fem1d2d.pencil import Eigenvalue, largest, largest_sparse
+from fem1d2d.pencil import Eigenvalue, largest, largest_of, largest_sparse
 from fem1d2d.supports import Supports, rigid_motions, supports
 from fem1d2d.trace import facing, surface, trapezoid
 from fem1d2d.transfer import mortar
@@ -29,6 +29,7 @@ __all__ = [
     "gram",
     "interval",
     "largest",
+    "largest_of",
     "largest_sparse",
     "mortar",
     "plane_strain",
@@ -36,6 +37,7 @@ __all__ = [
     "rigid_motions",
     "side_load",
     "solver",
+    "solver_with_inertia",
     "stiffness",
     "supports",
     "surface",

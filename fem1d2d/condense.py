@@ -61,6 +61,11 @@ class Condensation:
         return self.matrix[:, self.interface][self.inside]
 
     @cached_property
+    def _on_interface(self) -> sp.csc_array:
+        """``A_BB``."""
+        return self.matrix[:, self.interface][self.interface]
+
+    @cached_property
     def _solve_inside(self) -> Callable[[Floats], Floats]:
         order = np.searchsorted(self.inside, self.order[: len(self.inside)])
         return solver(self.matrix[:, self.inside][self.inside], order)
@@ -76,7 +81,7 @@ class Condensation:
     def schur(self) -> Floats:
         """``A_BB + A_BI lift``, shape (b, b)."""
         if len(self.inside) == 0:
-            return _symmetric(self.matrix[:, self.interface][self.interface].toarray())
+            return _symmetric(self._on_interface.toarray())
         schur = self._rest(_factor(self._shifted(self.matrix), self.order))
         return _symmetric(schur - self._shift * np.eye(len(schur))) if self._shift else schur
 
@@ -87,6 +92,16 @@ class Condensation:
         diagonal = np.zeros(matrix.shape[0])
         diagonal[self.interface] = self._shift
         return (matrix + sp.diags_array(diagonal, format="csc")).tocsc()
+
+    def times(self, trace: Floats) -> Floats:
+        """``schur @ trace`` without the matrix: one solve inside, shape (b,), a force of the matrix's unit.
+
+        Parameters
+        ----------
+        trace : float array, shape (b,)
+            Displacements, in the order of the interface.
+        """
+        return np.asarray(self._on_interface @ trace - self._coupling.T @ self._solve_inside(self._coupling @ trace))
 
     def solver(self) -> Callable[[Floats], Floats]:
         """``load -> A^-1 load`` on all unknowns, as :func:`solver`; its factorisation gives the Schur complement too.
@@ -202,6 +217,33 @@ def solver(matrix: sp.csc_array, order: Ints | None = None) -> Callable[[Floats]
     if matrix.shape[0] == 0:
         return lambda right: right
     return _solving(_factor(matrix, order), order)
+
+
+def solver_with_inertia(matrix: sp.csc_array) -> tuple[Callable[[Floats], Floats], int | None]:
+    """Factorise a symmetric matrix that may be indefinite, and count its negative eigenvalues.
+
+    By Sylvester's law of inertia they are as many as the negative pivots.  The pivots stay on the diagonal: rounding
+    makes them those of a matrix near the given one, as long as they are not small beside what they divide.
+
+    Parameters
+    ----------
+    matrix : sparse array, shape (n, n)
+
+    Returns
+    -------
+    callable, int or None
+        ``b -> matrix^-1 b`` for one column, shape (n,), or several, shape (n, k); the number of negative eigenvalues,
+        None where a pivot of 0 on the diagonal had to be avoided, so that the signs tell nothing.
+
+    Examples
+    --------
+    >>> solve, negative = solver_with_inertia(sp.csc_array(np.array([[2.0, 3.0], [3.0, 1.0]])))
+    >>> negative, np.round(solve(np.array([5.0, 4.0])), 12).tolist()
+    (1, [1.0, 1.0])
+    """
+    factor = _factor(matrix, None)
+    on_diagonal = np.array_equal(factor.perm_r, factor.perm_c)
+    return _solving(factor, None), int((factor.U.diagonal() < 0).sum()) if on_diagonal else None
 
 
 def _solving(factor: Any, order: Ints | None) -> Callable[[Floats], Floats]:

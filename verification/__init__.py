@@ -24,7 +24,8 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from typing import Any
 
-    from verification.advice.roles import Advice, advise, advise_matrices, advise_run
+    from verification.advice.from_runs import advise_run
+    from verification.advice.roles import Advice, advise, advise_matrices
     from verification.algorithm.fixed_point import iterate
     from verification.algorithm.iterate import Iterate
     from verification.algorithm.relaxation import Rule
@@ -60,7 +61,7 @@ _HOME = {
     "Iterate": "algorithm.iterate",
     "advise": "advice.roles",
     "advise_matrices": "advice.roles",
-    "advise_run": "advice.roles",
+    "advise_run": "advice.from_runs",
     "build": "interface.build",
     "compare": "comparison",
     "example": "problem.examples",

@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from fem1d2d import largest_sparse, solver
 from ndtheory import Constants, EnergyConstants, Number, evaluate_sharp, exact
 from ndtheory.sharp import friction_multiple
+from verification.body_constants import BodyConstants, constants_of
 from verification.document import Document
-from verification.interface.body import Body
-from verification.interface.build import pair_of
-from verification.interface.pair import ContactPair
+from verification.interface.pair import ContactPair, TwoBodies
+from verification.operators import Pencils, needs_matrices, pair_or_bodies
 from verification.pencils import of_energy, of_section_5
 from verification.problem import Problem
 from verification.progress import Progress, silent
@@ -35,26 +34,6 @@ ENERGY_NAMES = ("C_s_energy", "C_t1", "C_t2", "kappa_1", "kappa_2")
 #: Those that a pair made from matrices does not have, and why.
 OF_MESHES = ("body1", "body2", "m", "M", "C_R", "C_s", "C_tr", "C_tr_half", "C_K")
 FROM_MATRICES = "the pair is made from matrices: needed the meshes of both bodies"
-
-
-@dataclass(frozen=True, kw_only=True)
-class BodyConstants:
-    """Coercivity m^a and continuity M^a of one body (4.1), unit stress, with the residuals of the eigenvalues.
-
-    m^a is 0, exactly, where a body can move rigidly.
-
-    ``residual_m``, ``residual_M`` are relative; the error of the eigenvalue is of the order of their square.
-    """
-
-    m: Number
-    M: Number
-    nodes: int
-    residual_m: float
-    residual_M: float
-
-    def to_dict(self) -> dict[str, Any]:
-        """The objects ``body1``, ``body2`` of the document."""
-        return {"m": self.m.to_dict(), "M": self.M.to_dict(), "nodes": self.nodes}
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -269,30 +248,32 @@ def measure(problem: Problem | ContactPair | Path | str, *, refine: int = 0, pro
     >>> round(measure(Problem.from_dict(bars)).rho_max.value, 12)
     1.5
     """
-    pair = pair_of(problem)
+    pair = pair_or_bodies(problem)
     progress("measuring the constants", None)
     with one_thread():
         finer = [] if not refine else _halved(pair, refine)  # refused before any is measured
-        result = _measure(pair)
+        result = _measure(pair, progress)
         if refine:
             levels, reason = [result], dict(result.reason)
             try:
                 for halvings, halved in enumerate(finer, 1):
                     progress(f"measuring the constants, {halvings} of {refine} halvings", (halvings - 1) / refine)
-                    levels.append(_measure(pair_of(halved)))
+                    levels.append(_measure(pair_or_bodies(halved), progress))
             except KeyboardInterrupt:
                 reason["levels"] = f"interrupted after {len(levels) - 1} of {refine} halvings"
             result = replace(result, levels=tuple(levels), reason=reason)
     return result
 
 
-def _halved(pair: ContactPair, refine: int) -> list[Problem]:
+def _halved(pair: ContactPair | TwoBodies, refine: int) -> list[Problem]:
     if pair.problem is None:
         raise ValueError("this pair is made from matrices: needed a problem whose meshes can be halved")
     return [pair.problem.refined(level) for level in range(1, refine + 1)]
 
 
-def _measure(pair: ContactPair) -> Measured:
+def _measure(pair: ContactPair | TwoBodies, progress: Progress = silent) -> Measured:
+    if isinstance(pair, TwoBodies):
+        return _without_matrices(pair, progress)
     friction = float(pair.friction)
     values: dict[str, float | None] = dict.fromkeys((*NAMES, *ENERGY_NAMES))
     reason: dict[str, str] = {}
@@ -301,7 +282,7 @@ def _measure(pair: ContactPair) -> Measured:
     if not meshes:
         reason = dict.fromkeys(OF_MESHES, FROM_MATRICES)
     else:
-        body1, body2 = _body(pair.body1.mesh_body), _body(pair.body2.mesh_body)
+        body1, body2 = constants_of(pair.body1.mesh_body), constants_of(pair.body2.mesh_body)
         values |= {"m": min(body1.m.value, body2.m.value), "M": body1.M.value + body2.M.value}
     if pair.interface.transfer is not None and pair.held:
         why = "a contact node is held tangentially and the grids differ: no trace space serves both bodies"
@@ -346,17 +327,28 @@ def _measure(pair: ContactPair) -> Measured:
     )
 
 
-def _body(body: Body) -> BodyConstants:
-    A, H = body.stiffness, body.gram_matrix
-    loose = body.motions.shape[1] > 0
-    # 1/m, so that products with A^-1 find it
-    smallest = None if loose else largest_sparse(H, A, solver(A, body.order))
-    above = body.material.continuity(body.mesh.dimension)
-    biggest = largest_sparse(A, H, body.gram.solver(), above=above, order=body.order)
-    return BodyConstants(
-        m=Number(value=0.0, lo=0.0, hi=0.0, level="exact") if smallest is None else Number.of_float(1 / smallest.value),
-        M=Number.of_float(biggest.value),
-        nodes=len(body.mesh.points),
-        residual_m=0.0 if smallest is None else smallest.residual / smallest.value,
-        residual_M=biggest.residual / biggest.value,
+def _without_matrices(bodies: TwoBodies, progress: Progress) -> Measured:
+    """What needs no interface matrices."""
+    pencils, problem = Pencils(bodies, progress), bodies.problem
+    values: dict[str, Any] = dict.fromkeys((*NAMES, *ENERGY_NAMES))
+    lower, upper = (constants_of(body, dense=False) for body in bodies.elastic)
+    values |= {"m": min(lower.m.value, upper.m.value), "M": lower.M.value + upper.M.value}
+    if not pencils.reason:
+        neumann = problem.iteration.neumann_body
+        values["rho_max"] = pencils.largest(neumann_body=neumann).value
+        values["rho_min"] = 1 / pencils.largest(neumann_body=3 - neumann).value
+        values["rho_normal"] = pencils.largest(neumann_body=neumann, normal=True).value
+    if not bodies.friction:
+        values |= dict.fromkeys(("C_K", "kappa_1", "kappa_2"), 0.0)
+    numbers: dict[str, Any] = {name: None if v is None else Number.of_float(v) for name, v in values.items()}
+    missing = [name for name, value in numbers.items() if value is None]
+    return Measured(
+        body1=lower,
+        body2=upper,
+        friction=float(bodies.friction),
+        interface_nodes=bodies.interface.contact.n,
+        reason=dict.fromkeys(missing, needs_matrices(bodies)) | pencils.reason,
+        units=problem.units,
+        problem=problem,
+        **numbers,
     )

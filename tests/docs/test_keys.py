@@ -162,7 +162,8 @@ def documents(folder: Path, small: vf.Problem) -> list[dict[str, Any]]:
     of_mesh = vf.Problem.from_dict(
         {
             "body1": {"mesh": str(folder / "square.msh"), "young": 1, "poisson": "0.3", "fixed": ["bottom"]},
-            "body2": {**above, "prescribed": {"top": [0, "-0.1"]}, "traction": {"right": [0, 1]}},
+            "body2": {**above, "prescribed": {"all": [0, "-0.1"]}, "traction": {"right": [0, 1]}}
+            | {"parts": {"all": {"side": "top", "x": [0, 1]}, "edge": {"side": "left", "y": [0, 1]}}},
             "contact": {"interval": [0, 1]},
             "iteration": {"theta": "auto"},
         }

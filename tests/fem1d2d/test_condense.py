@@ -14,7 +14,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import fewer, held_bodies, numbers, powers_of_two
 
-from fem1d2d import Condensation, bar, elimination_order, gram, interval, rectangle, solver, stiffness
+from fem1d2d import (
+    Condensation,
+    bar,
+    elimination_order,
+    gram,
+    interval,
+    rectangle,
+    solver,
+    solver_with_inertia,
+    stiffness,
+)
 from fem1d2d.condense import BLOCK
 
 EPS = np.finfo(float).eps
@@ -378,3 +388,35 @@ def test_a_bar_pulled_at_its_end_stretches_linearly(n, young):
     load = np.zeros(n)
     load[-1] = 1.0
     np.testing.assert_allclose(solver(found.matrix)(load), np.arange(1, n + 1) / n / float(young), rtol=n**2 * EPS)
+
+
+# --- without the Schur complement -------------------------------------------------------------------------------------
+
+
+@given(definite(), st.integers(0, 2**16))
+def test_a_product_with_the_schur_complement_needs_no_schur_complement(case, seed):
+    _, A, interface = case
+    phi = np.random.default_rng(seed).standard_normal(len(interface))
+    body = Condensation(A, interface)
+    size = np.abs(A.toarray()).sum() * (1 + norm(body.lift)) ** 2 * np.abs(phi).max()
+    assert np.abs(Condensation(A, interface).times(phi) - body.schur @ phi).max() <= 64 * EPS * size
+
+
+@given(st.integers(1, 12), st.integers(0, 2**16))
+def test_the_negative_pivots_are_as_many_as_the_negative_eigenvalues(n, seed):
+    """``L D L'`` with integers D and |L_ij| <= 1/2 beside a unit diagonal, in any order: the inertia is that of D."""
+    random = np.random.default_rng(seed)
+    D = random.choice([-3.0, -1.0, 1.0, 2.0], n)
+    L = np.eye(n) + np.diag(random.integers(-2, 3, n - 1) / 4, -1)
+    order = random.permutation(n)
+    A = (L * D @ L.T)[np.ix_(order, order)]
+    solve, negative = solver_with_inertia(sp.csc_array(A))
+    assert negative in (None, (D < 0).sum())  # None where the diagonal offers a pivot of 0
+    x = random.integers(-5, 6, n).astype(float)
+    assert np.allclose(solve(A @ x), x, rtol=0, atol=1e-9)
+
+
+def test_where_no_pivot_stands_on_the_diagonal_nothing_is_counted():
+    solve, negative = solver_with_inertia(sp.csc_array(np.array([[0.0, 1.0], [1.0, 0.0]])))
+    assert negative is None
+    assert solve(np.array([2.0, 3.0])).tolist() == [3, 2]

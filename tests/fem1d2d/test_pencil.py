@@ -14,6 +14,7 @@ from fem1d2d import (
     gram,
     interval,
     largest,
+    largest_of,
     largest_sparse,
     plane_strain,
     rectangle,
@@ -187,6 +188,55 @@ def test_a_largest_eigenvalue_of_high_multiplicity_is_found_also_when_rounding_s
     D = np.where(np.arange(n) < share * (n - 1), random.choice([-1.0, 0.5, 1.25], n), 1.5)
     A = L @ (Q * D) @ Q.T @ L.T
     assert largest((A + A.T) / 2, B).value == pytest.approx(1.5, rel=n * 16 * EPS)
+
+
+# --- from products and solves alone -----------------------------------------------------------------------------------
+
+
+def by_operators(A, B, **options):
+    """The largest eigenvalue where nothing but products and solves is handed over."""
+    operator = lambda apply: sp.linalg.LinearOperator(A.shape, matvec=apply, dtype=float)
+    solve = operator(lambda r: np.linalg.solve(B, r))
+    return largest_of(operator(A.__matmul__).matvec, operator(B.__matmul__).matvec, solve.matvec, len(A), **options)
+
+
+@given(pencils())
+def test_products_and_solves_alone_give_the_eigenvalue_of_the_matrices(pencil):
+    A, B, D, _ = pencil
+    found = by_operators(A, B)
+    assert found.value == pytest.approx(D.max(), abs=1e-13 * np.abs(D).max())
+    assert found.residual <= 1e-9 * np.abs(D).max()
+    assert np.abs(D - found.value).min() <= found.residual + 1e-13 * np.abs(D).max()
+
+
+def test_each_step_of_lanczos_is_told():
+    told = []
+    by_operators(np.diag(np.arange(1.0, 101.0)), np.eye(100), progress=told.append)
+    assert told
+    assert told == list(range(1, len(told) + 1))
+
+
+def test_lanczos_stops_earlier_where_less_is_asked():
+    D, steps = np.linspace(1.0, 2.0, 300) ** 0.1, []
+    for tolerance in (1e-3, 1e-10):
+        told = []
+        found = by_operators(np.diag(D), np.eye(300), tolerance=tolerance, progress=told.append)
+        assert found.residual <= tolerance * found.value
+        assert found.value <= D.max() * (1 + 1e-14)
+        steps.append(len(told))
+    assert steps[0] < steps[1] / 2
+
+
+def test_a_shift_just_above_a_crowd_takes_a_tenth_of_the_steps():
+    """Eigenvalues as those of waves along Gamma_c about the stiffest one, ``1 - (j/n)^2``: the gap is 1/n^2."""
+    n = 1000
+    D, B, shift = 3 * (1 - (np.arange(n) / n) ** 2), np.full(n, 2.0), 3 * (1 + 1e-5)
+    pencil = (lambda x: B * D * x, lambda x: B * x, lambda r: r / B, n)
+    plain, shifted = [], []
+    one = largest_of(*pencil, progress=plain.append)
+    other = largest_of(*pencil, above=(shift, lambda r: r / (B * (shift - D))), progress=shifted.append)
+    assert [one.value, other.value] == pytest.approx([3, 3], rel=1e-13)
+    assert len(shifted) < len(plain) / 10
 
 
 # --- it repeats -------------------------------------------------------------------------------------------------------

@@ -182,11 +182,11 @@ def top(A: np.ndarray, B: np.ndarray) -> tuple[float, np.ndarray]:
     return float(values[-1]), vectors[:, -1]
 
 
-def hat_operator(x: np.ndarray, weights: np.ndarray, law: str, radius: float) -> np.ndarray:
-    """S on normal nodal forces: the hat of integral 1, or division by the weights."""
+def hat_operator(x: np.ndarray, forces_at: np.ndarray, weights: np.ndarray, law: str, radius: float) -> np.ndarray:
+    """S on normal nodal forces: the hat of integral 1, or division by the weights (on one grid)."""
     if law == "local":
         return np.diag(1 / weights)
-    return np.array([[max(0.0, 1 - abs(a - b) / radius) / radius for b in x] for a in x])
+    return np.array([[max(0.0, 1 - abs(a - b) / radius) / radius for b in forces_at] for a in x])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -234,7 +234,15 @@ class DensePair:
         spec = self.pair.problem.contact
         if spec.law == "nonlocal" and spec.radius is None:
             return np.zeros((len(self.weights), len(self.weights)))
-        return hat_operator(self.pair.contact.grid.x, self.weights, spec.law, float(spec.radius or 0))
+        x = self.pair.contact.grid.x, self.pair.neumann.grid.x
+        return hat_operator(*x, self.weights, spec.law, float(spec.radius or 0))
+
+    @cached_property
+    def P(self) -> np.ndarray:
+        """Traces on the Neumann grid to the contact grid; its nodal matrix is held against its definition elsewhere."""
+        transfer = self.pair.interface.transfer
+        nodal = np.eye(len(self.weights)) if transfer is None else transfer
+        return np.kron(np.eye(self.pair.contact.grid.dimension), nodal)
 
     @cached_property
     def friction(self) -> float:

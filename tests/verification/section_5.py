@@ -89,7 +89,7 @@ class Case:
         one, two = self.dense.contact, self.dense.neumann
         self.S1, self.N1, self.l1 = one.S, one.N, one.condensed_load
         self.S2, self.N2, self.l2 = two.S, two.N, two.condensed_load
-        self.flexibility, self.dual = np.linalg.inv(two.S), np.linalg.inv(two.E)
+        self.flexibility, self.dual, self.P = np.linalg.inv(two.S), np.linalg.inv(two.E), self.dense.P
         gap = float(problem.contact.gap)
         self.gap = np.concatenate([np.zeros(self.dense.t), np.full(len(self.S1) - self.dense.t, gap)])
         self.step_from = FixedPointMap(self.pair, "active-set")
@@ -108,7 +108,7 @@ class Case:
         )
 
     def T(self, psi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """T psi, and w^1 - w^2 - gap on Gamma_c."""
+        """The forces of body 1 at the contact nodes, of which T psi is P' times, and w^1 - P w^2 - gap there."""
         try:
             _, solution = self.step_from(psi)
         except ContactError:
@@ -118,8 +118,8 @@ class Case:
     @cached_property
     def scale(self) -> float:
         """|||.||| of the forces that the loads and the gap bring up; or of 1 % of strain if none do."""
-        u = np.abs(self.flexibility @ self.l2) + self.gap
-        forces = (np.abs(self.S1) @ u + np.abs(self.l1), np.abs(self.l2))
+        u = np.abs(self.P @ self.flexibility @ self.l2) + self.gap
+        forces = (np.abs(self.P.T) @ (np.abs(self.S1) @ u + np.abs(self.l1)), np.abs(self.l2))
         spec = self.pair.problem.body1
         natural = float(np.sqrt(np.diag(self.S2).max()) * (spec.x[1] - spec.x[0])) / 100
         return max(self.norm(f) for f in forces) or natural
@@ -138,26 +138,28 @@ class Case:
         return float(np.sqrt(psi @ self.dual @ psi))
 
     def rounding(self, psi: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """How much rounding may change each component of T psi: some units in the last place of all that it adds."""
-        u = np.abs(self.flexibility @ (psi + self.l2))
-        return 32 * EPS * (np.abs(self.S1) @ (u + self.gap + np.abs(v)) + np.abs(self.l1) + np.abs(psi))
+        """How much rounding may change each force of body 1: some units in the last place of all that it adds."""
+        u = np.abs(self.P) @ np.abs(self.flexibility @ (psi + self.l2))
+        felt = np.abs(self.P) @ np.abs(psi)
+        return 32 * EPS * (np.abs(self.S1) @ (u + self.gap + np.abs(v)) + np.abs(self.l1) + felt)
 
 
 class TwoForces:
     """psi and psi~, all that Section 5 compares of them, and what of it may be rounding."""
 
     def __init__(self, case: Case, psi: np.ndarray, other: np.ndarray) -> None:
-        t, w = case.dense.t, case.dense.weights
+        t, w, normal = case.dense.t, case.dense.weights, case.pair.neumann.grid.normal
         (image, v), (other_image, other_v) = case.T(psi), case.T(other)
-        self.case, self.d, self.dT = case, psi - other, image - other_image
+        self.case, self.d, self.forces = case, psi - other, image - other_image
+        self.dT = case.P.T @ self.forces
         self.d2 = case.flexibility @ self.d  # trace of w^2 - w~^2, by (5.6)
         self.dv = v - other_v
-        self.d1 = self.d2 + self.dv
+        self.d1 = case.P @ self.d2 + self.dv
         self.size1, self.size2 = np.sqrt(self.d1 @ case.N1 @ self.d1), np.sqrt(self.d2 @ case.N2 @ self.d2)
         self.norm, self.dual = case.norm(self.d), case.dual_norm(self.d)
         self.norm_T, self.dual_T = case.norm(self.dT), case.dual_norm(self.dT)
         self.energy1 = self.d1 @ case.S1 @ self.d1
-        stress, other_stress = np.abs(case.dense.hat @ psi[t:]), np.abs(case.dense.hat @ other[t:])
+        stress, other_stress = np.abs(case.dense.hat @ psi[normal]), np.abs(case.dense.hat @ other[normal])
         jumps = np.abs(v[:t]) - np.abs(other_v[:t])
         wk = case.dense.friction * w[:t]
         #: ``- int k (|S sigma_N| - |S sigma~_N|) (|[w_T]| - |[w~_T]|)``, the integral by the trapezoid rule.
@@ -165,13 +167,15 @@ class TwoForces:
 
         error = case.rounding(psi, v) + case.rounding(other, other_v)
         slip = 32 * EPS * max(np.abs(v).max(), np.abs(other_v).max(), np.abs(self.d2).max())
-        moved = np.full(len(v), slip) + 32 * EPS * (np.abs(case.flexibility @ psi) + np.abs(case.flexibility @ other))
+        u = np.abs(case.flexibility @ psi) + np.abs(case.flexibility @ other)
+        moved = np.full(len(v), slip) + 32 * EPS * np.abs(case.P) @ u
+        returned = np.abs(case.P.T) @ error
         self.rounding = {
-            "force": case.norm(error),
-            "dual": case.dual_norm(error),
+            "force": case.norm(returned),
+            "dual": case.dual_norm(returned),
             "trace": case.condition * np.sqrt(moved @ case.N1 @ moved),
             "friction": case.condition * float(np.sum(wk * (stress + other_stress)[:t])) * slip,
-            "work": float(error @ np.abs(self.dv)) + case.condition * slip * float(np.sum(np.abs(self.dT))),
+            "work": float(error @ np.abs(self.dv)) + case.condition * slip * float(np.sum(np.abs(self.forces))),
         }
 
     def relaxed(self, theta: float) -> float:
@@ -189,7 +193,7 @@ INEQUALITIES: dict[str, Inequality] = {
         ((c.M * c.C_R + c.C_K) / c.m + np.sqrt(c.C_K / c.m)) * p.size2,
         p.rounding["trace"],
     ),
-    "(5.12)": lambda c, p, theta: (-p.dT @ p.dv, p.friction, p.rounding["work"] + p.rounding["friction"]),
+    "(5.12)": lambda c, p, theta: (-p.forces @ p.dv, p.friction, p.rounding["work"] + p.rounding["friction"]),
     "(5.13)": lambda c, p, theta: (p.friction, c.C_K * (p.size1 * p.size2 + p.size2**2), p.rounding["friction"]),
     "(5.16)": lambda c, p, theta: (p.dual_T, c.C_T * p.dual, p.rounding["dual"]),
     "(5.18)": lambda c, p, theta: (p.dual_T, c.M * c.C_R * p.size1, p.rounding["dual"]),
@@ -261,12 +265,14 @@ def one_node(case: Case, psi: np.ndarray, step: np.ndarray) -> np.ndarray:
 
 def same_normal(case: Case, psi: np.ndarray, step: np.ndarray) -> np.ndarray:
     """Equal normal parts: the friction bounds agree (in 1D: one force)."""
-    return np.concatenate([(psi + step)[: case.dense.t], psi[case.dense.t :]])
+    grid = case.pair.neumann.grid
+    return np.concatenate([(psi + step)[grid.tangential], psi[grid.normal]])
 
 
 def pressing(case: Case, psi: np.ndarray) -> np.ndarray:
     """All normal parts compressive."""
-    return np.concatenate([psi[: case.dense.t], np.abs(psi[case.dense.t :])])
+    grid = case.pair.neumann.grid
+    return np.concatenate([psi[grid.tangential], np.abs(psi[grid.normal])])
 
 
 PAIRS: dict[str, Callable[[Case, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]] = {

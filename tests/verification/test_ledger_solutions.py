@@ -29,7 +29,7 @@ EXPECTED = {
     "4.9.1": HOLDS,
     "4.9.2": [(PRINTED, False), (REPAIRED, True)],
     "4.9.3": HOLDS,
-    "prop-5.1": [(STEP, True), (PRINTED, True)],
+    "prop-5.1": [(STEP, True), (REPAIRED, True), (PRINTED, True)],
     "5.1": HOLDS,
     "5.2": HOLDS,
     "lemma-5.2": HOLDS,

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 import verification as vf
+from verification.algorithm.affine_piece import Piece
 from verification.algorithm.fixed_point import FixedPointMap
-from verification.bounds.pattern_search import largest_factor
+from verification.bounds.pattern_search import beside, factor_search, largest_factor, signs
+from verification.contact.active_set import Pattern
 
 N, THETA = 4, 0.6
 
@@ -64,3 +66,54 @@ def test_without_any_node_in_reach_the_largest_factor_is_that_without_friction()
     pair = pair_with(KERNELS["none in reach"])
     found = largest_factor(pair, THETA, random=np.random.default_rng(0)).value
     assert found == pytest.approx(largest_factor(pair.at(friction=0), THETA, random=np.random.default_rng(0)).value)
+
+
+def random_pattern(random, pair):
+    n, t = pair.contact.grid.n, pair.contact.grid.t
+    return Pattern(touching=random.random(n) < 0.5, sliding=random.integers(-1, 2, size=t).astype(np.int8))
+
+
+def across_a_transfer():
+    x, P = np.arange(float(N)), np.full((N, 6), 0.1) + 0.4 * np.eye(N, 6)
+    S_2, kernel = np.eye(12) + np.ones((12, 12)), np.eye(N, 6) + 0.2
+    return vf.build(S1=S1, S2=S_2, x=x, weights=np.ones(N), kernel=kernel, transfer=P, friction="0.8")
+
+
+PAIRS = {
+    "a transfer between grids": across_a_transfer,
+    "matching grids": lambda: vf.build(vf.example("section6").changed(cells=((10, 2), (6, 2)))),
+    "without friction": lambda: vf.build(vf.example("section6").changed(cells=((10, 2), (6, 2)), friction=0)),
+    "a node out of reach": lambda: pair_with(KERNELS["one node out of reach"]),
+}
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_what_t_makes_of_a_force_beside_a_pattern_is_what_it_makes_of_it_on_each_piece(name):
+    pair, random = PAIRS[name](), np.random.default_rng(7)
+    for _ in range(5):
+        base, sign = random_pattern(random, pair), signs(pair)
+        n = pair.contact.grid.n
+        node = random.integers(n, size=12)
+        touching, sliding = np.repeat(base.touching[None], 12, axis=0), np.repeat(base.sliding[None], 12, axis=0)
+        touching[np.arange(12), node] = random.random(12) < 0.5
+        sliding[np.arange(12), node] = random.integers(-1, 2, size=12)
+        g = random.standard_normal(pair.neumann.grid.size)
+        found = beside(pair, g, base, touching, sliding, node, sign)
+        for i in range(12):
+            pattern = Pattern(touching=touching[i], sliding=sliding[i])
+            piece = Piece(pair=pair, pattern=pattern, sign=sign, still=np.zeros(pair.neumann.grid.n, dtype=bool))
+            assert found.jump[i] == pytest.approx(piece.jump @ g, rel=1e-9, abs=1e-9 * np.abs(found.jump).max())
+            expected = piece.reaction @ g
+            assert found.reaction[i] == pytest.approx(expected, rel=1e-9, abs=1e-9 * np.abs(found.reaction).max())
+
+
+def test_a_piece_is_above_a_level_exactly_where_its_value_is():
+    pair = pair_with(KERNELS["regular"])
+    value = factor_search(pair, THETA).found(*factor_search(pair, THETA).extremes()[0]).value
+    for level, is_above in ((0.5, True), (1 - 1e-9, True), (1 + 1e-9, False), (2.0, False)):
+        search = factor_search(pair, THETA)
+        pattern = search.extremes()[0]
+        found = search.above(level * value, *pattern)
+        assert (found is not None) == is_above
+        assert (search.above(level * value, *pattern) is not None) == is_above  # asked again
+        assert search.found(*pattern).value == pytest.approx(value)

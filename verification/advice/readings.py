@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from decimal import ROUND_DOWN, Context, Decimal
+from decimal import ROUND_DOWN, ROUND_UP, Context, Decimal
 from fractions import Fraction
 from typing import Any, Literal
 
@@ -20,6 +20,9 @@ FEWEST_STEPS = 10
 #: model of Section 6 whose contact opened and closed in turn, averages over ten steps lay between 0.92 and 1.11, over
 #: twenty between 0.96 and 1.06.
 WIDEST, NARROWEST = Fraction(1, 10), Fraction(3, 100)
+
+#: Beyond this theta four figures would lead back to a smaller one.
+NEXT_TO_1 = Fraction(999, 1000)
 
 #: A run to make next has a theta larger by this factor at least, unless that would come too close to 1.
 SHORTEST_STEP = Fraction(9, 8)
@@ -105,7 +108,7 @@ class SeenRun:
 def read_ratio(theta: Fraction, r: Fraction) -> tuple[SeenRun, tuple[RunReading, ...], NextRun, Fraction | None]:
     """Every reading of a ratio r of residuals at theta, and the run to make next.
 
-    :func:`verification.advice.roles.advise_run` says what the readings are.
+    :func:`verification.advice.from_runs.advise_run` says what the readings are.
 
     Returns
     -------
@@ -181,5 +184,9 @@ def _double_below(value: Fraction) -> float:
 
 
 def _rounded_down(theta: Fraction) -> float:
-    """A theta in four figures, not above the one meant."""
+    """A theta in four figures, not above the one meant; next to 1 in four figures of ``1 - theta``."""
+    if theta > NEXT_TO_1:
+        rest = 1 - theta
+        up = Context(prec=4, rounding=ROUND_UP).divide(Decimal(rest.numerator), Decimal(rest.denominator))
+        return float(1 - up)
     return float(Context(prec=4, rounding=ROUND_DOWN).divide(Decimal(theta.numerator), Decimal(theta.denominator)))

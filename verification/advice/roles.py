@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
@@ -13,19 +13,19 @@ import numpy as np
 from fem1d2d import largest
 from fem1d2d.mesh import Floats
 from ndtheory import EnergyConstants, Number, evaluate_sharp
-from ndtheory.constants import take
-from ndtheory.energy import LARGEST, SMALLEST
 from ndtheory.sharp import predicted_rate, predicted_theta
-from verification.advice.readings import NextRun, RunReading, SeenRun, read_ratio
+from verification.advice.readings import NextRun, RunReading, SeenRun
 from verification.advice.role import Role
 from verification.algorithm.theta import automatic, by_prediction, sharp_bounds
 from verification.constants import measure
 from verification.document import Document
-from verification.interface.build import build, pair_of
+from verification.interface.build import build
 from verification.interface.matrices import check_matrix, size
-from verification.interface.pair import ContactPair, SingularRole
+from verification.interface.pair import ContactPair, SingularRole, TwoBodies
+from verification.operators import Pencils, needs_matrices, pair_or_bodies
 from verification.problem import Problem, load
 from verification.problem.tables import ProblemError
+from verification.progress import Progress, silent
 from verification.threads import one_thread
 
 if TYPE_CHECKING:
@@ -119,7 +119,7 @@ class Advice(Document):
         }
 
 
-def advise(problem: Problem | ContactPair | Path | str) -> Advice:
+def advise(problem: Problem | ContactPair | Path | str, *, progress: Progress = silent) -> Advice:
     """Advise on the roles of the bodies and on theta.
 
     The body whose prediction ``rho/(2 + rho)`` is smaller gets the Neumann problem.
@@ -127,6 +127,8 @@ def advise(problem: Problem | ContactPair | Path | str) -> Advice:
     Parameters
     ----------
     problem : Problem, ContactPair or path
+    progress : callable
+        Told the steps that rho takes where there are too many contact nodes for matrices.
 
     Returns
     -------
@@ -146,9 +148,12 @@ def advise(problem: Problem | ContactPair | Path | str) -> Advice:
     >>> found.neumann_body, round(found.best.theta_predicted, 6)
     (1, 0.857143)
     """
+    pair: ContactPair | TwoBodies
     try:
-        pair = pair_of(problem)
-        roles = (_role(pair), _exchanged(pair))
+        pair = pair_or_bodies(problem)
+        roles = (
+            _roles_without_matrices(pair, progress) if isinstance(pair, TwoBodies) else (_role(pair), _exchanged(pair))
+        )
     except SingularRole as error:
         assert not isinstance(problem, ContactPair)  # made with roles that are not singular
         given = problem if isinstance(problem, Problem) else load(problem)
@@ -158,7 +163,7 @@ def advise(problem: Problem | ContactPair | Path | str) -> Advice:
     return Advice(
         neumann_body=best.neumann_body,
         roles=roles,
-        units=pair.units,
+        units=UNITS if pair.problem is None else pair.problem.units,
         problem=pair.problem,
         friction=float(pair.friction),
         outside=tuple(pair.outside),
@@ -220,6 +225,25 @@ def _predicted_role(pair: ContactPair, rho: Number, why: str) -> Role:
     )
 
 
+def _roles_without_matrices(bodies: TwoBodies, progress: Progress) -> tuple[Role, ...]:
+    """Both roles, the file's first: rho alone, and what it proves without friction."""
+    pencils, problem = Pencils(bodies, progress), bodies.problem
+    for why in pencils.reason.values():
+        raise ProblemError(problem.source, "contact", None, f"no advice: {why}")
+    needed, rubs, outside = needs_matrices(bodies), bool(bodies.friction), bodies.outside
+    roles = []
+    for neumann in (problem.iteration.neumann_body, problem.swapped().iteration.neumann_body):
+        rho = pencils.largest(neumann_body=neumann, normal=not rubs).value
+        reason = {"theta_auto": needed, "friction_threshold": needed}
+        nothing = f"outside the theorem: {outside[0]}" if outside else needed if rubs else None
+        unproved: dict[str, Any] = {}
+        if nothing is not None:
+            unproved = dict.fromkeys(("theta_proved", "factor_proved", "theta_max_proved"))
+            reason |= dict.fromkeys((*unproved, "friction_threshold"), nothing)
+        roles.append(replace(plain_role(neumann, Fraction(rho)), reason=reason, **unproved))
+    return tuple(roles)
+
+
 def advise_matrices(S1: Floats, S2: Floats) -> Advice:
     """Advice from the interface stiffness matrices alone, free of friction.
 
@@ -253,12 +277,13 @@ def advise_matrices(S1: Floats, S2: Floats) -> Advice:
     with one_thread():
         ratios = {2: Fraction(largest(one, two).value), 1: Fraction(largest(two, one).value)}
     unit = {2: Fraction(unit_1) / Fraction(unit_2), 1: Fraction(unit_2) / Fraction(unit_1)}
-    roles = tuple(_plain_role(neumann, rho * unit[neumann]) for neumann, rho in ratios.items())
+    roles = tuple(plain_role(neumann, rho * unit[neumann]) for neumann, rho in ratios.items())
     best = min(roles, key=lambda role: role.predicted[1])
     return Advice(neumann_body=best.neumann_body, roles=roles, units=UNITS)
 
 
-def _plain_role(neumann_body: Any, rho: Fraction) -> Role:
+def plain_role(neumann_body: Any, rho: Fraction) -> Role:
+    """What rho alone says, without friction."""
     bounds = evaluate_sharp(EnergyConstants(rho=rho))
     return Role(
         neumann_body=neumann_body,
@@ -270,78 +295,4 @@ def _plain_role(neumann_body: Any, rho: Fraction) -> Role:
         rate_predicted=bounds.rate_predicted,
         friction_threshold=None,
         reason={"friction_threshold": "matrices alone say nothing of friction: the proved values are for k = 0"},
-    )
-
-
-def advise_run(theta: Any, ratio: Any) -> Advice:
-    """What one run of any code with constant theta says of rho, and the run to make next.
-
-    While contact does not change, a mode is multiplied by ``1 - theta (1 + lambda)`` in a step, with lambda at most
-    rho, and an open node by ``1 - theta``.  A residual has no sign, so that a ratio r of residuals can mean
-
-    * ``mode-high``: ``lambda = (1 + r)/theta - 1``.  Without friction or tied, rho is at least that wherever
-      ``r > 1 - theta``, since no step is longer than ``max(1 - theta, |1 - theta - theta rho|)``;
-    * ``mode-low``: ``lambda = (1 - r)/theta - 1``, where ``r <= 1 - theta``;
-    * ``open``: nothing of rho, where r is about ``1 - theta``;
-    * ``level``: contact opens and closes in turn, where r is about 1 or the growth does not last.  Without friction
-      theta does not contract, so that rho is at least ``2/theta - 1``.
-
-    With friction none of these bounds is proved.
-
-    Parameters
-    ----------
-    theta : number
-        The run's relaxation factor, 0 < theta <= 1.
-    ratio : number
-        r > 0, that of the absolute unrelaxed residual ``|T g - g|`` from one step to the next, steady over the last ten
-        steps or more, and over ``5/theta`` where these are more; above 1 where the run diverged, and 1 where the
-        residual rises and falls and has no steady ratio.
-
-    Returns
-    -------
-    Advice
-        Without roles while several readings are left.
-
-    Raises
-    ------
-    HypothesisError
-        theta or the ratio is no number of its range.
-
-    Examples
-    --------
-    >>> found = advise_run("0.1", "1.4")
-    >>> [(reading.kind, reading.lo) for reading in found.readings], found.next.theta
-    ([('mode-high', 23.0), ('level', 19.0)], 0.0808)
-    >>> advise_run("0.45", "0.8").best.rho.value
-    3.0
-    """
-    t = take("theta", theta, "the theta of a run, 0 < theta <= 1 (1e-75 or more)", lambda v: SMALLEST <= v <= 1)
-    needed = "the ratio of consecutive residuals, a number > 0 (1e-75 to 1e75)"
-    r = take("ratio", ratio, needed, lambda v: SMALLEST <= v <= LARGEST)
-    run, readings, following, rho = read_ratio(t, r)
-    return Advice(
-        neumann_body=None,
-        roles=() if rho is None else (_role_of_run(rho),),
-        units=UNITS,
-        run=run,
-        readings=readings,
-        next=following,
-    )
-
-
-def _role_of_run(rho: Fraction) -> Role:
-    nothing = "an observed ratio proves nothing"
-    return Role(
-        neumann_body=None,
-        rho=Number.of_float(rho),
-        theta_proved=None,
-        factor_proved=None,
-        theta_max_proved=None,
-        theta_predicted=float(predicted_theta(rho)),
-        rate_predicted=float(predicted_rate(rho)),
-        friction_threshold=None,
-        reason={
-            "neumann_body": "whichever body had the Neumann problem in that run",
-            **dict.fromkeys(("theta_proved", "factor_proved", "theta_max_proved", "friction_threshold"), nothing),
-        },
     )

@@ -12,7 +12,7 @@ from scipy.linalg import block_diag, cho_factor, cho_solve, solve_triangular
 from fem1d2d.mesh import Floats
 from ndtheory.sharp import turning_theta, worst_ratio
 from verification.bounds.bound import LARGEST
-from verification.bounds.program import Weights
+from verification.bounds.program import Program, Weights
 from verification.bounds.trace_forms import TraceForms
 from verification.constants import Measured
 from verification.interface.pair import ContactPair
@@ -62,6 +62,16 @@ class Pieces:
         """Whether anything is fixed."""
         return bool(self.signs.any() or self.normal.any() or self.slip.any())
 
+    @property
+    def zeros(self) -> tuple[NDArray[np.bool_], ...]:
+        """Where the jump, the normal force, the slip and ``p_T - eps w k zeta`` are 0."""
+        return self.normal > 0, self.normal < 0, self.slip < 0, self.slip > 0
+
+    @property
+    def key(self) -> bytes:
+        """What tells them from others of the same bodies."""
+        return self.signs.tobytes() + self.normal.tobytes() + self.slip.tobytes()
+
     def where(self, name: str, node: int, value: int) -> Pieces:
         """Those of them with something more in common."""
         values = getattr(self, name).copy()
@@ -71,6 +81,8 @@ class Pieces:
 
 class Conditions:
     """The quadratic forms of a pair of bodies, in coordinates in which ``|g|`` and ``|d_1|`` are Euclidean norms.
+
+    ``carried`` takes those of d_1 to forces p on the contact grid.
 
     What the solver proposes in them is checked in traces (:class:`verification.bounds.trace_forms.TraceForms`).
 
@@ -136,6 +148,7 @@ class Conditions:
             self.weight = weight[:, 0]
             self.reach = weight * zeta  # w k zeta
         self.families = families
+        self.carried = B
 
     def conditions(self, multipliers: Weights) -> Floats:
         """The sum over the nodes of the multiplied conditions, a symmetric matrix."""
@@ -171,7 +184,7 @@ class Conditions:
         either = np.flatnonzero(pieces.signs == 0)
         lam, tau, a, b = multipliers
         signed = shear - pieces.signs[:, None] * self.reach
-        zero = [jump[pieces.normal > 0], force[pieces.normal < 0], slip[pieces.slip < 0], signed[pieces.slip > 0]]
+        zero = [rows[at] for rows, at in zip((jump, force, slip, signed), pieces.zeros, strict=True)]
         left = np.vstack([force, signed, zeta[either], slide[either], *(-rows for rows in zero)])
         right = np.vstack([jump, slip, zeta[either], slide[either], *zero])
         place = n + t + np.arange(len(either))
@@ -186,13 +199,8 @@ class Conditions:
         if len(self.families) == 1:
             return (y,)
         t = len(self.families[1][0])
-        either = pieces.signs == 0
-        counts = [n, t, either.sum(), either.sum(), (pieces.normal > 0).sum(), (pieces.normal < 0).sum()]
-        counts.append((pieces.slip < 0).sum())
-        lam, tau, of_a, of_b, touching, open_, sticks, slides = np.split(y, np.cumsum(counts))
-        a, b = np.zeros((2, t))
-        a[either], b[either] = of_a, of_b
-        tau = np.where(either, inside((lam, tau, a, b))[1], tau)
+        (lam, tau, a, b), (touching, open_, sticks, slides) = self._of_rows(y, pieces)
+        tau = np.where(pieces.signs == 0, inside((lam, tau, a, b))[1], tau)
         if not pieces.any:
             return lam, tau, a, b
         jump, force, shear, mixed = np.zeros(n), np.zeros(n), np.zeros(t), np.zeros(t)
@@ -202,6 +210,33 @@ class Conditions:
         mixed[pieces.slip > 0] = (2 * pieces.signs * self.weight)[pieces.slip > 0] * slides
         a[pieces.slip > 0] -= self.weight[pieces.slip > 0] ** 2 * slides
         return lam, tau, a, b, -1.0 * pieces.signs * tau, jump, force, shear, mixed
+
+    def parts(self, y: Floats, pieces: Pieces) -> list[Floats]:
+        """The multipliers of :meth:`rows` kind by kind, each from left to right."""
+        either = int((pieces.signs == 0).sum())
+        counts = [*(len(a) for a, _ in self.families[:2]), either, either, *(at.sum() for at in pieces.zeros[:-1])]
+        return np.split(y, np.cumsum(counts))
+
+    def _of_rows(self, y: Floats, pieces: Pieces) -> tuple[Weights, list[Floats]]:
+        """lambda, tau, a, b among the multipliers of :meth:`rows`, 0 for those that are not there, and the rest."""
+        lam, tau, of_a, of_b, *rest = self.parts(y, pieces)
+        either = pieces.signs == 0
+        a, b = np.zeros((2, len(tau)))
+        a[either], b[either] = of_a, of_b
+        return (lam, tau, a, b), rest
+
+    def started(self, fixed: Floats, early: tuple[float, Floats], parent: Pieces, pieces: Pieces) -> Program:
+        """The program of the least s for those of some pieces with more signs fixed, from where theirs has been.
+
+        The matrix stays positive definite there: the equation of a sign takes the place of an inequality, with the same
+        multiplier, and takes less.
+        """
+        s, y = early
+        weights, squares = self._of_rows(y, parent)
+        left, right, cones, y, most = self.rows(weights, pieces)
+        rest = np.concatenate(squares)
+        y[len(y) - len(rest) :] = rest
+        return Program(fixed=fixed, free=self.free, left=left, right=right, cones=cones, most=most, s=s, y=y)
 
     def known(self, theta: float) -> Weights:
         """The multipliers that prove the factor q(theta) of the theorem in energy norms.

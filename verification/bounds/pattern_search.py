@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
+from scipy.linalg.lapack import dpotrf
 
 from fem1d2d.mesh import Floats
 from verification.algorithm.affine_piece import Piece
@@ -34,9 +35,6 @@ DIGITS = 9
 
 #: Candidates that are evaluated in full where no estimate promises anything.
 TRIED = 30
-
-#: Entries of the systems that are solved at once.
-AT_ONCE = 2_000_000
 
 Form = Callable[[Piece], Floats]
 
@@ -136,6 +134,7 @@ class Search:
         self.states = [(touching, slide) for touching in (True, False) for slide in tangential]
         self.sign, self._still = signs(pair), np.zeros(pair.neumann.grid.n, dtype=bool)
         self._visited: dict[tuple[bytes, bytes], Found] = {}  # ways up meet
+        self._below: dict[tuple[bytes, bytes], float] = {}  # a level that the value of a piece does not exceed
         self._reached = np.ones(pair.contact.grid.n, dtype=bool)
         self._reached[: len(self.sign)] = (self.sign != 0) | (not pair.rubs)
 
@@ -148,41 +147,54 @@ class Search:
 
     def found(self, touching: NDArray[np.bool_], sliding: NDArray[np.int8]) -> Found:
         """The piece of a pattern, but that a node without a friction bound slides."""
+        found = self.above(-np.inf, touching, sliding)
+        assert found is not None
+        return found
+
+    def above(self, level: float, touching: NDArray[np.bool_], sliding: NDArray[np.int8]) -> Found | None:
+        """The same; None where its value is not above a level.
+
+        A Cholesky factorisation decides that in a fraction of the time that the eigenvalues take.
+        """
         sliding = np.where(self._reached[: len(sliding)] | (sliding != 0), sliding, 1).astype(np.int8)
         pattern = Pattern(touching=np.asarray(touching, dtype=bool), sliding=sliding)
         visited = pattern.touching.tobytes(), sliding.tobytes()
         if visited not in self._visited:
-            self._visited[visited] = self._evaluated(pattern)
-        return self._visited[visited]
-
-    def _evaluated(self, pattern: Pattern) -> Found:
-        piece = Piece(pair=self.pair, pattern=pattern, sign=self.sign, still=self._still)
-        form = self._form(piece)
-        values, vectors = eigh(form, self._against, check_finite=False)
-        return Found(value=float(values[-1]), piece=piece, worst=vectors[:, -1])
+            if level >= self._below.get(visited, np.inf):
+                return None
+            piece = Piece(pair=self.pair, pattern=pattern, sign=self.sign, still=self._still)
+            form = self._form(piece)
+            if level > -np.inf:
+                against = np.eye(len(form)) if self._against is None else self._against
+                if dpotrf(level * against - form)[1] == 0:
+                    self._below[visited] = level
+                    return None
+            values, vectors = eigh(form, self._against, check_finite=False)
+            self._visited[visited] = Found(value=float(values[-1]), piece=piece, worst=vectors[:, -1])
+        found = self._visited[visited]
+        return found if found.value > level else None
 
     def climb(self, best: Found) -> Found:
         """The best piece on the way up: what one node does is changed, or several do, as long as that helps."""
         better: Found | None = best
         while better is not None:
             best = better
-            better = next(
-                (found for found in self._tried(best) if found.value > best.value + 10.0**-DIGITS * abs(best.value)),
-                None,
-            )
+            level = best.value + 10.0**-DIGITS * abs(best.value)
+            tried = (self.above(level, *pattern) for pattern in self._tried(best))
+            better = next((found for found in tried if found is not None), None)
         return best
 
-    def _tried(self, best: Found) -> Iterator[Found]:
-        """Pieces that may be better, the most promising first."""
+    def _tried(self, best: Found) -> Iterator[tuple[NDArray[np.bool_], NDArray[np.int8]]]:
+        """Patterns that may be better, the most promising first."""
         touching, sliding, node = self._neighbours(best.piece.pattern)
         if self._quick is None:
-            yield from (self.found(*pattern) for pattern in zip(touching, sliding, strict=True))
+            yield from zip(touching, sliding, strict=True)
             return
         g = self.pair.neumann.root @ best.worst
-        rounded = lambda values: np.round(values / (abs(best.value) or 1.0), DIGITS)
-        values = rounded(self._estimates(g, touching, sliding))
+        rounded = lambda found: np.round(self._quick(found) / (abs(best.value) or 1.0), DIGITS)
+        values = rounded(beside(self.pair, g, best.piece.pattern, touching, sliding, node, self.sign))
         order = np.argsort(-values, kind="stable")
-        helps = order[values[order] > rounded(best.value)]
+        helps = order[values[order] > np.round(best.value / (abs(best.value) or 1.0), DIGITS)]
         each = helps[np.sort(np.unique(node[helps], return_index=True)[1])]  # what helps most at each node
         if len(each) > 1:
             several = [each[:count] for count in _halves(len(each))]
@@ -191,33 +203,24 @@ class Search:
             for row, chosen in enumerate(several):
                 touches[row, node[chosen]] = touching[chosen, node[chosen]]
                 slides[row, node[chosen]] = sliding[chosen, node[chosen]]
-            most = int(np.argmax(rounded(self._estimates(g, touches, slides))))
-            yield self.found(touches[most], slides[most])
-        yield from (self.found(touching[i], sliding[i]) for i in order[:TRIED])
+            most = int(np.argmax(rounded(responses(self.pair, g, touches, slides, self.sign))))
+            yield touches[most], slides[most]
+        yield from zip(touching[order[:TRIED]], sliding[order[:TRIED]], strict=True)
 
     def _neighbours(self, pattern: Pattern) -> tuple[NDArray[np.bool_], NDArray[np.int8], NDArray[np.intp]]:
         """The patterns that differ at one node, and which."""
-        t = len(pattern.sliding)
-        touching, sliding, node = [], [], []
-        for j in range(len(pattern.touching)):
-            for touches, slides in self.states:
-                touch, slide = pattern.touching.copy(), pattern.sliding.copy()
-                touch[j], slide[j : j + 1] = touches, slides if slides or self._reached[j] else 1
-                if touch[j] != pattern.touching[j] or (j < t and slide[j] != pattern.sliding[j]):
-                    touching.append(touch)
-                    sliding.append(slide)
-                    node.append(j)
-        return np.array(touching), np.array(sliding), np.array(node)
-
-    def _estimates(self, g: Floats, touching: NDArray[np.bool_], sliding: NDArray[np.int8]) -> Floats:
-        """The values of the form at one change of force on the pieces of patterns: lower bounds of the largest ones."""
-        assert self._quick is not None
-        step = max(AT_ONCE // len(g) ** 2, 1)
-        parts = [
-            self._quick(responses(self.pair, g, touching[i : i + step], sliding[i : i + step], self.sign))
-            for i in range(0, len(touching), step)
-        ]
-        return np.concatenate(parts)
+        touches, slides = (np.array(column) for column in zip(*self.states, strict=True))
+        slides = np.where((slides != 0) | self._reached[:, None], slides, 1)
+        differs = touches != pattern.touching[:, None]
+        if len(pattern.sliding):
+            differs |= slides != pattern.sliding[:, None]
+        node, state = np.nonzero(differs)
+        touching = np.repeat(pattern.touching[None], len(node), axis=0)
+        sliding = np.repeat(pattern.sliding[None], len(node), axis=0)
+        touching[np.arange(len(node)), node] = touches[state]
+        if len(pattern.sliding):
+            sliding[np.arange(len(node)), node] = slides[node, state]
+        return touching, sliding, node
 
 
 def responses(
@@ -234,14 +237,9 @@ def responses(
     sign : int array, shape (t,)
         Of S sigma_N.
     """
-    contact, t = pair.contact, pair.contact.grid.t
-    carried = pair.interface.carry(pair.neumann.flexibility(g))
-    bound = np.zeros(t)
-    if pair.rubs:
-        bound = float(pair.friction) * pair.contact.grid.weights * sign * pair.interface.stress(g)
-    rubbing = np.zeros((len(touching), len(carried)))
-    rubbing[:, :t] = sliding * bound
-    moves = np.concatenate([sliding != 0, ~touching], axis=1) & contact.free
+    contact = pair.contact
+    carried, rubbing = _given(pair, g, sliding, sign)
+    moves = _moves(pair, touching, sliding)
     systems = contact.stiffness * (moves[:, :, None] & moves[:, None, :])
     diagonal = np.einsum("cii->ci", systems)
     diagonal[~moves] = 1.0
@@ -252,10 +250,92 @@ def responses(
     load = np.where(moves, -contact.stiffness @ carried - rubbing, 0.0)
     jump = np.asarray(np.linalg.solve(systems, load[..., None])[..., 0], dtype=float)
     jump[:, ~contact.free] = -carried[~contact.free]
-    reaction = -(carried + jump) @ contact.stiffness
+    return _responses(pair, g, jump, -(carried + jump) @ contact.stiffness, rubbing, touching, sliding)
+
+
+def beside(
+    pair: ContactPair,
+    g: Floats,
+    pattern: Pattern,
+    touching: NDArray[np.bool_],
+    sliding: NDArray[np.int8],
+    node: NDArray[np.intp],
+    sign: NDArray[np.int8],
+) -> Responses:
+    """The same on the pieces of patterns that differ from one at one node each.
+
+    Of each component of the trace d and of ``f = S_1 d`` step II gives one and asks for the other: f where the jump is
+    free, d where it is not.  One matrix, the principal pivot transform of S_1, takes what is given to what is asked
+    for, and a node that changes its mind leaves a system of its own components alone.
+
+    Parameters
+    ----------
+    pair, g, touching, sliding, sign
+        As in :func:`responses`.
+    pattern : Pattern
+        The one that they differ from.
+    node : int array, shape (c,)
+        Where.
+    """
+    contact, size = pair.contact, pair.contact.grid.size
+    carried, rubbing = _given(pair, g, np.vstack([pattern.sliding, sliding]), sign)
+    moves = _moves(pair, np.vstack([pattern.touching, touching]), np.vstack([pattern.sliding, sliding]))
+    given = np.where(moves, -rubbing, np.where(contact.free, carried, 0.0))
+    transform = _exchanged(contact.stiffness, moves[0])
+    asked = transform @ given[0]
+    at = node[:, None] + np.arange(0, size, contact.grid.n)  # the components of the node
+    row = np.arange(len(node))[:, None]
+    swapped = moves[1:][row, at] != moves[0][at]
+    systems = np.where(swapped[..., None], transform[at[:, :, None], at[:, None, :]], np.eye(at.shape[1]))
+    change = np.linalg.solve(systems, (given[1:][row, at] - np.where(swapped, asked[at], given[0][at]))[..., None])
+    answers = asked + np.einsum("ck,cki->ci", change[..., 0], transform.T[at])
+    inputs = np.repeat(given[:1], len(node), axis=0)
+    inputs[row, at] += change[..., 0]
+    d, f = np.where(moves[0], answers, inputs), np.where(moves[0], inputs, answers)
+    return _responses(pair, g, d - carried, -f, rubbing[1:], touching, sliding)
+
+
+def _given(pair: ContactPair, g: Floats, sliding: NDArray[np.int8], sign: NDArray[np.int8]) -> tuple[Floats, Floats]:
+    """The trace of the Neumann body on the contact grid, shape (2 n,), and the friction forces, shape (c, 2 n)."""
+    carried = pair.interface.carry(pair.neumann.flexibility(g))
+    rubbing = np.zeros((len(sliding), len(carried)))
+    if pair.rubs:
+        bound = float(pair.friction) * pair.contact.grid.weights * sign * pair.interface.stress(g)
+        rubbing[:, : pair.contact.grid.t] = sliding * bound
+    return carried, rubbing
+
+
+def _moves(pair: ContactPair, touching: NDArray[np.bool_], sliding: NDArray[np.int8]) -> NDArray[np.bool_]:
+    """Where step II leaves the jump free, shape (c, 2 n)."""
+    return np.concatenate([sliding != 0, ~touching], axis=1) & pair.contact.free
+
+
+def _responses(
+    pair: ContactPair,
+    g: Floats,
+    jump: Floats,
+    reaction: Floats,
+    rubbing: Floats,
+    touching: NDArray[np.bool_],
+    sliding: NDArray[np.int8],
+) -> Responses:
+    """Responses whose friction forces and open nodes are exact."""
+    t = pair.contact.grid.t
     reaction[:, :t] = np.where(sliding != 0, rubbing[:, :t], reaction[:, :t])
     reaction[:, t:][~touching] = 0.0
     return Responses(pair=pair, g=g, jump=jump, reaction=reaction)
+
+
+def _exchanged(S: Floats, moves: NDArray[np.bool_]) -> Floats:
+    """The principal pivot transform of S: with ``f = S d`` it takes f where moves and d elsewhere to the others."""
+    free, fixed = np.flatnonzero(moves), np.flatnonzero(~moves)
+    inverse = np.linalg.inv(S[np.ix_(free, free)])
+    across = inverse @ S[np.ix_(free, fixed)]
+    result = np.empty_like(S)
+    result[np.ix_(free, free)], result[np.ix_(free, fixed)] = inverse, -across
+    result[np.ix_(fixed, free)] = across.T
+    result[np.ix_(fixed, fixed)] = S[np.ix_(fixed, fixed)] - S[np.ix_(fixed, free)] @ across
+    return result
 
 
 def size(vectors: Floats, gram: Floats) -> Floats:

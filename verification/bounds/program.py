@@ -73,6 +73,9 @@ class Optimum:
     steps : int
     converged : bool
         Whether the gap to the dual value is below the accuracy asked for.
+    early : (float, array of shape (K,)), optional
+        s and y on the way, close to the central path and far from its end: a program with more conditions may start
+        there.
     """
 
     s: float
@@ -80,3 +83,4 @@ class Optimum:
     moments: Floats
     steps: int
     converged: bool
+    early: tuple[float, Floats] | None = None

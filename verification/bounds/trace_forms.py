@@ -8,7 +8,7 @@ and has a bound.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -70,41 +70,59 @@ class TraceForms:
             sizes += [(of(shear), of(slip)), (zeta_size, zeta_size), (of(slide), of(slide)), (zeta_size, of(slide))]
             sizes += [(of(open_),) * 2, (of(press),) * 2, (of(shear),) * 2, (of(shear), zeta_size)]
         self._families, self._sizes = families, sizes
-        # inner products over nodes (a transfer has them too), over traces twice, and the scalars
+        # inner products over nodes (a transfer has them too), over traces twice, and the scalars and sums
         self._error = gamma(4 * (2 * size + len(S_1)) + (2 if interface.transfer is None else 4) * contact.n + 20)
+        self._free = _changed(S_2, self._near_2)
+        self._free_error = self._error * _changed(np.abs(S_2), np.abs(self._near_2))
 
-    def definite(
+    def with_multipliers(
         self,
         multipliers: Sequence[Floats],
         *,
-        square: float,
         cross: float = 0.0,
         step: tuple[float, float] | None = None,
         weight: float = 1.0,
-    ) -> bool:
-        """Whether ``square |g|^2 - cross <g, p> - weight |a p + b g|^2 - conditions`` is positive definite for sure.
+    ) -> Callable[[float], bool]:
+        """What of ``square |g|^2 - cross <g, p> - weight |a p + b g|^2 - conditions`` does not depend on the square.
 
         Parameters
         ----------
         multipliers : sequence of arrays
             As :data:`verification.bounds.program.Weights`.
-        square, cross, weight : float
+        cross, weight : float
         step : (a, b), optional
             None: without that term.
+
+        Returns
+        -------
+        callable
+            square -> whether the form is positive definite for sure.
         """
-        form = square * self._d.T @ self._g - cross * self._d.T @ self._p - _conditions(multipliers, self._families)
-        size = square * self._d.T @ np.abs(self._g) + abs(cross) * self._d.T @ self._p_size
-        size += _conditions([np.abs(m) for m in multipliers], self._sizes)
-        near = self._near
+        form = -cross * self._d.T @ self._p - _conditions(multipliers, self._families)
+        size = abs(cross) * self._d.T @ self._p_size + _conditions([np.abs(m) for m in multipliers], self._sizes)
+        near, first = self._near, 0
         if step is not None:
             a, b = step
             row, row_size = a * self._p + b * self._g, abs(a) * self._p_size + abs(b) * np.abs(self._g)
             form = np.block([[self._S_2 / weight, row], [row.T, form]])
             size = np.block([[np.abs(self._S_2) / weight, row_size], [row_size.T, size]])
-            near = block_diag(np.sqrt(weight) * self._near_2, near)
-        form = near.T @ ((form + form.T) / 2) @ near
-        size = np.abs(near).T @ ((size + size.T) / 2) @ np.abs(near)
-        return positive_definite((form + form.T) / 2, self._error * (size + size.T) / 2)
+            near, first = block_diag(np.sqrt(weight) * self._near_2, near), len(row)
+        form, size = _changed(form, near), self._error * _changed(size, np.abs(near))
+        d = slice(first, first + len(self._S_2))
+
+        def definite(square: float) -> bool:
+            matrix, error = form.copy(), size.copy()
+            matrix[d, d] += square * self._free
+            error[d, d] += abs(square) * self._free_error
+            return positive_definite(matrix, error)
+
+        return definite
+
+
+def _changed(form: Floats, near: Floats) -> Floats:
+    """A form in the coordinates of some columns, symmetric to the last digit."""
+    form = near.T @ ((form + form.T) / 2) @ near
+    return np.asarray((form + form.T) / 2)
 
 
 def _conditions(multipliers: Sequence[Floats], families: Sequence[tuple[Floats, Floats]]) -> Floats:

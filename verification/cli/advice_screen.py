@@ -24,7 +24,9 @@ def advice(found: Advice, typed: Typed | None = None) -> None:
         return
     say("Not claimed: that the predicted theta is the best one for your loads.")
     if found.problem is not None:
-        if typed is not None:
+        if typed is not None and found.best.theta_auto is None:  # too large for a run
+            typed.suggest("constants")
+        elif typed is not None:
             options = [] if found.roles[0].neumann_body == found.neumann_body else ["--swap-roles"]
             if theta is not None and takes_theta(found.problem.iteration.relaxation):
                 options += ["--theta", theta]

@@ -66,7 +66,9 @@ def advise(
     if file is not None:
         if file.suffix == ".npz" and keys:
             raise click.UsageError(f"received --set with {file}: it sets a key of a problem file", context)
-        found = advice.advise(file if file.suffix == ".npz" else load_problem(file, keys))
+        problem = file if file.suffix == ".npz" else load_problem(file, keys)
+        with stages() as tell:
+            found = advice.advise(problem, progress=tell)
     elif S1 is not None and S2 is not None:
         from verification.advice.matrix_files import read_matrix
 
@@ -77,7 +79,9 @@ def advise(
             raise click.UsageError(f"{S1}, {S2}: {error}", context) from None
     else:
         try:
-            found = advice.advise_run(theta, ratio)
+            from verification.advice.from_runs import advise_run
+
+            found = advise_run(theta, ratio)
         except HypothesisError as error:
             raise click.UsageError(f"--{error}", context) from None
     deliver(found, lambda: show(found, None if file is None else Typed(file=file, keys=keys)), as_json)

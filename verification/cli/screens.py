@@ -18,6 +18,7 @@ from verification.cli.console import figures, heading, near_one, note, part, pri
 from verification.cli.typed import Typed
 from verification.comparison import Comparison, Listener
 from verification.constants import ENERGY_NAMES, NAMES, Measured
+from verification.interface import assembly
 from verification.interface.fields import ContactFields
 from verification.interface.friction import LAWS
 from verification.interface.interface import Interface
@@ -65,13 +66,14 @@ def constants(measured: Measured, typed: Typed | None = None) -> None:
     for name in (*NAMES, *ENERGY_NAMES):
         rows.append([name, *(figures(getattr(level, name), 6) for level in levels), units.get(name, "")])
     table(rows, right=range(1, len(levels) + 1))
-    for name, reason in measured.reason.items():
-        note(f"{name}: {reason}", "  ")
+    for reason in dict.fromkeys(measured.reason.values()):
+        names = ", ".join(name for name, why in measured.reason.items() if why == reason)
+        note(f"{names}: {reason}", "  ")
     say()
     say("Exact for this mesh, up to rounding.  On a mesh m is above and M below its")
     say("continuous value: for the continuous theorem both err on the unsafe side.")
     if typed is not None:
-        typed.suggest("compare")
+        typed.suggest("advise" if measured.interface_nodes > assembly.MOST_CONTACT_NODES else "compare")
 
 
 def _happened(run: Run, *, alone: bool) -> None:

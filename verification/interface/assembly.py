@@ -32,6 +32,13 @@ from verification.interface.pair import ContactPair, SingularRole, TwoBodies
 from verification.problem.specification import MOST_CELLS, BodySpec, Problem
 from verification.problem.tables import ProblemError, short
 
+#: Interface matrices are dense; more contact nodes would fill the memory.
+MOST_CONTACT_NODES = 2000
+
+
+class TooManyContactNodes(ProblemError):
+    """A sound problem, too large for dense interface matrices."""
+
 
 def build(problem: Problem, *, law: Law | None = None, like: ContactPair | None = None) -> ContactPair:
     """Two condensed bodies with roles, as the iteration and its constants need them.
@@ -50,26 +57,7 @@ def build(problem: Problem, *, law: Law | None = None, like: ContactPair | None 
     ProblemError
         As :func:`discretise`, and where a body is rigid, or the one with the Neumann problem can move rigidly.
     """
-    iteration = problem.iteration
-    for name in ("body1", "body2"):
-        if getattr(problem, name).rigid:
-            role = "Neumann" if iteration.neumann_body == int(name[-1]) else "contact"
-            raise ProblemError(
-                problem.source,
-                f"{name}.shape",
-                "rigid",
-                f"needed an elastic body: it has the {role} problem of the iteration; `ndtheory solve` takes obstacles",
-            )
-    bodies = discretise(problem, law=law)
-    if bodies.interface.transfer is not None and bodies.interface.law is not None and bodies.interface.law.of_contact:
-        raise ProblemError(
-            problem.source,
-            "contact.law",
-            problem.contact.law,
-            "needed another law on grids that differ: the iteration knows the forces of the Neumann grid, not those of"
-            " the contact grid; `ndtheory solve` takes it",
-        )
-    _check_supports(bodies)
+    bodies, iteration = held_bodies(problem, law=law), problem.iteration
     known = (None, None) if like is None else (like.body1, like.body2)
     upward, grids = iteration.neumann_body == 2, (bodies.interface.contact, bodies.interface.neumann)
     lower, upper = (
@@ -87,7 +75,46 @@ def build(problem: Problem, *, law: Law | None = None, like: ContactPair | None 
     )
 
 
-def _check_supports(bodies: TwoBodies) -> None:
+def held_bodies(problem: Problem, *, law: Law | None = None, dense: bool = True) -> TwoBodies:
+    """The bodies on their meshes as the iteration needs them: elastic, and held by their supports.
+
+    Parameters
+    ----------
+    problem : Problem
+    law : Law, optional
+        As for :func:`build`.
+    dense : bool
+        As for :func:`discretise`.
+
+    Raises
+    ------
+    ProblemError
+        As :func:`build`.
+    """
+    iteration = problem.iteration
+    for name in ("body1", "body2"):
+        if getattr(problem, name).rigid:
+            role = "Neumann" if iteration.neumann_body == int(name[-1]) else "contact"
+            raise ProblemError(
+                problem.source,
+                f"{name}.shape",
+                "rigid",
+                f"needed an elastic body: it has the {role} problem of the iteration; `ndtheory solve` takes obstacles",
+            )
+    bodies = discretise(problem, law=law, dense=dense)
+    if bodies.interface.transfer is not None and bodies.interface.law is not None and bodies.interface.law.of_contact:
+        raise ProblemError(
+            problem.source,
+            "contact.law",
+            problem.contact.law,
+            "needed another law on grids that differ: the iteration knows the forces of the Neumann grid, not those of"
+            " the contact grid; `ndtheory solve` takes it",
+        )
+    _check_supports(bodies, dense=dense)
+    return bodies
+
+
+def _check_supports(bodies: TwoBodies, *, dense: bool) -> None:
     """Refuse bodies that the iteration cannot take: contact may hold the contact body, and no other."""
     problem = bodies.problem
     for body in bodies.elastic:
@@ -101,6 +128,9 @@ def _check_supports(bodies: TwoBodies) -> None:
             needed = (
                 f"{moves}: its loads are its contact force, and nothing is left to iterate; `ndtheory solve` takes it"
             )
+            raise ProblemError(problem.source, body.name, None, needed)
+        if not dense:
+            needed = f"{moves}: needed at most {MOST_CONTACT_NODES} contact nodes for a body that contact alone holds"
             raise ProblemError(problem.source, body.name, None, needed)
         if body.motion_traces.shape[1] < k:
             needed = f"{moves} where no contact node feels it: fix or prescribe more of its sides"
@@ -118,17 +148,30 @@ def _condensed(body: Body, grid: Grid, upward: bool, like: Condensed | None) -> 
     return found if found.upward == upward else found.turned()
 
 
-def discretise(problem: Problem, *, law: Law | None = None) -> TwoBodies:
+def discretise(problem: Problem, *, law: Law | None = None, dense: bool = True) -> TwoBodies:
     """Mesh and assemble the bodies and find Gamma_c.
+
+    Parameters
+    ----------
+    problem : Problem
+    law : Law, optional
+        A law of friction in place of the problem's.
+    dense : bool
+        False where no interface matrices will be made: then there may be any number of contact nodes.
 
     Raises
     ------
+    TooManyContactNodes
+        More than MOST_CONTACT_NODES of them, for dense interface matrices.
     ProblemError
         Bodies that can move rigidly together, or do not meet, an interval outside the overlap or without nodes of
         the contact body at its ends, Gamma_u holding the normal component of a contact node, an unreadable mesh.
     """
     meshes = [None if spec.rigid else _mesh(problem, name) for name, spec in _specs(problem)]
     nodes, interface = join(problem, meshes, law)
+    if dense and interface.contact.n > MOST_CONTACT_NODES:
+        needed = f"needed at most {MOST_CONTACT_NODES} contact nodes, these are {interface.contact.n}"
+        raise TooManyContactNodes(problem.source, "contact", None, needed)
     body1, body2 = (
         None if mesh is None else _body(problem, name, mesh, own, interface.contact.x[[0, -1]])
         for (name, _), mesh, own in zip(_specs(problem), meshes, nodes, strict=True)
@@ -171,6 +214,7 @@ def _mesh(problem: Problem, name: Name) -> Mesh:
             raise refuse(str(error).removeprefix(f"{path}: ")) from None
         if len(mesh.cells) > 2 * MOST_CELLS:
             raise refuse(f"needed at most {2 * MOST_CELLS} triangles, these are {len(mesh.cells)}")
+        mesh = _with_parts(problem, name, mesh)
         for key, sides in (("fixed", spec.fixed), ("prescribed", spec.prescribed), ("traction", spec.traction)):
             for side in sides:
                 if side not in mesh.sides:
@@ -188,9 +232,27 @@ def _mesh(problem: Problem, name: Name) -> Mesh:
         if problem.dimension == 1:
             return interval(x, spec.cells[0])
         assert spec.y is not None
-        return rectangle(x, (float(spec.y[0]), float(spec.y[1])), (spec.cells[0], spec.cells[1]))
+        mesh = rectangle(x, (float(spec.y[0]), float(spec.y[1])), (spec.cells[0], spec.cells[1]))
+        return _with_parts(problem, name, mesh)
     except MeshError as error:  # coordinates that no longer differ in doubles
         raise ProblemError(problem.source, f"{name}.cells", list(spec.cells), str(error)) from None
+
+
+def _with_parts(problem: Problem, name: Name, mesh: Mesh) -> Mesh:
+    """The mesh with the parts of sides that the problem names: the edges of the side between the ends of the part."""
+    parts = {}
+    for key, part in getattr(problem, name).parts.items():
+        refuse = lambda needed, key=key: ProblemError(problem.source, f"{name}.parts.{key}", None, needed)
+        if key in mesh.sides or part.side not in mesh.sides:
+            raise refuse(f"needed a part of a side, under a name of its own; sides: {short(', '.join(mesh.sides))}")
+        edges, slack = mesh.sides[part.side], SAME * extent(mesh)
+        along = mesh.points[edges, "xy".index(part.axis)].astype(float)
+        low, high = map(float, part.ends)
+        inside = (along.min(axis=1) >= low - slack) & (along.max(axis=1) <= high + slack)
+        if not inside.any():
+            raise refuse(f"no edge of side {part.side!r} lies between {part.axis} = {low:g} and {high:g}")
+        parts[key] = edges[inside]
+    return replace(mesh, sides={**mesh.sides, **parts}) if parts else mesh
 
 
 def _body(problem: Problem, name: Name, mesh: Mesh, nodes: Ints, ends: Floats) -> Body:

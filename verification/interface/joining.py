@@ -15,8 +15,8 @@ from verification.interface.interface import Interface
 from verification.problem.specification import BodySpec, Problem
 from verification.problem.tables import ProblemError
 
-#: Interface matrices are dense; more contact nodes would fill the memory.
-MOST_CONTACT_NODES = 2000
+#: The matrix of a transfer is dense; more nodes would fill the memory.
+MOST_NODES_APART = 2000
 
 #: Body 1 lies below, body 2 above.
 UPPER = (True, False)
@@ -66,6 +66,10 @@ def join(problem: Problem, meshes: list[Mesh | None], law: Law | None = None) ->
     grid = neumann = Grid.on(positions[0], problem.dimension)
     P = None
     if problem.dimension == 2 and len(positions) == 2 and not _same(positions[0], positions[1], SAME * size):
+        most = max(map(len, positions))
+        if most > MOST_NODES_APART:
+            needed = f"needed at most {MOST_NODES_APART} contact nodes on grids that differ, these are {most}"
+            raise _refuse(problem, "contact", None, needed)
         grid, x = Grid.on(positions[contact]), positions[1 - contact].copy()
         x[0], x[-1] = min(x[0], grid.x[0]), max(x[-1], grid.x[-1])  # ends that differ by rounding
         P = mortar(grid.x, x)
@@ -142,9 +146,6 @@ def _check_nodes(problem: Problem, meshes: list[Mesh | None], nodes: list[Ints],
         if mesh is None:
             continue
         x = mesh.points[own, 0].astype(float)
-        if len(x) > MOST_CONTACT_NODES:
-            needed = f"needed at most {MOST_CONTACT_NODES} contact nodes, these are {len(x)}"
-            raise _refuse(problem, "contact", None, needed)
         off = SAME * extent(mesh)
         fits[i] = bool(len(x) > 1 and abs(x[0] - ends[0]) <= off and abs(x[-1] - ends[1]) <= off)
         edges = set(map(frozenset, mesh.boundary.tolist()))

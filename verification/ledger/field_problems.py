@@ -24,7 +24,7 @@ def _plates(lower: Any = None, upper: Any = None, **tables: Any) -> dict[str, An
     }
 
 
-#: Both roles; nodes that stick, slip and are open; an initial gap; no friction; one dimension.
+#: Both roles; nodes that stick, slip and are open; an initial gap; no friction; grids that differ; one dimension.
 PROBLEMS: dict[str, dict[str, Any]] = {
     "pressed": _plates(),
     "sheared, body 2 Neumann": _plates(
@@ -43,6 +43,14 @@ PROBLEMS: dict[str, dict[str, Any]] = {
         iteration={"neumann_body": 2, "theta": "0.7"},
     ),
     "without friction": _plates(contact={"friction": 0}),
+    "sheared, a finer contact grid": _plates(
+        upper={"cells": [9, 2], "prescribed": {"top": ["0.004", "-0.015"]}}, contact={"friction": "0.1"}
+    ),
+    "open in part, a finer Neumann grid": _plates(
+        {"young": 2},
+        {"young": 7, "cells": [11, 2], "prescribed": {"top": [0, "-0.006"]}, "traction": {"right": [0, "0.9"]}},
+        iteration={"neumann_body": 2, "theta": "0.7"},
+    ),
     "bars with a gap": {
         "dimension": 1,
         "body1": {"shape": "interval", "x": [0, 2], "cells": 3, "young": 1, "fixed": ["left"], "body_force": "0.1"},
@@ -77,12 +85,14 @@ PLANE: dict[str, dict[str, Any]] = {
         "contact": {"friction": 0, "radius": "0.4"},
         "iteration": {**RUN},
     },
-    "plates": _plates({"young": 1}, {"young": 1, "prescribed": {"top": ["0.004", "-0.015"]}}, contact={"friction": 0}),
+    "plates whose grids differ": _plates(
+        {"young": 1}, {"young": 1, "cells": [7, 2], "prescribed": {"top": ["0.004", "-0.015"]}}, contact={"friction": 0}
+    ),
 }
 
 
 def drawn(rng: np.random.Generator) -> dict[str, Any]:
-    """Two plates with everything drawn at random."""
+    """Two plates with everything drawn at random; a third have grids that differ."""
     pick = lambda low, high: round(float(rng.uniform(low, high)), 3)
     lower: dict[str, Any] = {"young": round(10 ** rng.uniform(-1, 1), 3), "poisson": pick(-0.3, 0.45)}
     upper: dict[str, Any] = {"young": round(10 ** rng.uniform(-1, 1), 3), "poisson": pick(-0.3, 0.45)}
@@ -90,4 +100,7 @@ def drawn(rng: np.random.Generator) -> dict[str, Any]:
     if rng.random() < 0.5:
         upper["traction"] = {"right": [0, pick(0, 0.3) * upper["young"]]}
     contact = {"friction": pick(0, 0.5), "radius": pick(0.2, 0.8), "gap": pick(0, 0.004)}
-    return _plates(lower, upper, contact=contact, iteration={"neumann_body": int(rng.integers(1, 3)), "theta": "auto"})
+    iteration = {"neumann_body": int(rng.integers(1, 3)), "theta": "auto"}
+    if rng.random() < 1 / 3:
+        upper["cells"] = [int(rng.integers(3, 12)), 2]
+    return _plates(lower, upper, contact=contact, iteration=iteration)

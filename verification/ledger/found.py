@@ -17,9 +17,21 @@ from verification.ledger.weak_forms import SEED, Case
 class Found:
     """Values of a check on one problem, and the bound they are held against."""
 
-    name: str
+    case: Case
     values: Floats
     limit: float
+
+    @property
+    def name(self) -> str:
+        """Of the problem."""
+        return self.case.name
+
+
+def on_problems(found: Sequence[Case]) -> str:
+    """How many problems, and how many of them have grids that differ."""
+    problems = {case.name: case.grids_differ for case in found}
+    apart = sum(problems.values())
+    return f"{len(problems)} problems" + (f", of which {apart} have grids that differ" if apart else "")
 
 
 def equations(of: Any, text: str, found: Sequence[Found], **data: Any) -> Evidence:
@@ -30,7 +42,9 @@ def equations(of: Any, text: str, found: Sequence[Found], **data: Any) -> Eviden
     count = sum(f.values.size for f in found)
     data = _data(found, data) | {"limit": limit}
     if holds:
-        return evidence(of, True, f"{text}: relative residuals below {limit:g} in {count} cases", data)
+        return evidence(
+            of, True, f"{text}: relative residuals below {limit:g} in {count} cases on {_problems(found)}", data
+        )
     data |= {"worst": top, "where": worst.name}
     return evidence(of, False, f"{text}: a relative residual of {top:.3g} ({worst.name}); needed {limit:g}", data)
 
@@ -46,9 +60,13 @@ def inequalities(of: Any, text: str, found: Sequence[Found], **data: Any) -> Evi
     data = _data(found, data) | {"limit": limit, "largest": figure(largest)}
     if holds:
         seen = f"left minus right over its scale between -{limit:g} and {largest:.3g} for {len(values)} test functions"
-        return evidence(of, True, f"{text}: {seen}", data)
+        return evidence(of, True, f"{text}: {seen} on {_problems(found)}", data)
     data |= {"worst": low, "where": worst.name}
     return evidence(of, False, f"{text}: left minus right is {low:.3g} of its scale ({worst.name})", data)
+
+
+def _problems(found: Sequence[Found]) -> str:
+    return on_problems([f.case for f in found])
 
 
 def _data(found: Sequence[Found], data: Mapping[str, Any]) -> dict[str, Any]:

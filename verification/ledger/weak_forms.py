@@ -4,7 +4,8 @@ The algorithm works on the interface alone, with condensed matrices.  Here a dis
 ``a`` and ``L`` are its stiffness matrix and its load, and lifts are solved for anew: a second path to the same numbers.
 
 Indices are the paper's: body 1 is the contact body, body 2 the Neumann body.  Normal components are along n^1, and an
-initial gap d, which the paper does not have, turns ``[v_N] <= 0`` into ``[v_N] <= d``.
+initial gap d, which the paper does not have, turns ``[v_N] <= 0`` into ``[v_N] <= d``.  Traces and forces are on the
+grid of their body; where the grids differ v^2 enters a jump, K and R_D^1 as ``P v^2`` at the contact nodes.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from verification.algorithm.iterate import Iterate
 from verification.algorithm.runs import Run, run
 from verification.contact import ContactError
 from verification.interface.assembly import build
-from verification.interface.body import Body
+from verification.interface.body import Body, Condensed
 from verification.interface.pair import ContactPair
 from verification.ledger.evidence import Level
 from verification.ledger.field_problems import PROBLEMS, drawn
@@ -78,13 +79,20 @@ class Weak:
         """R_D phi of (4.5)."""
         rows, solved = self._lifts[body.name]
         field = np.zeros((len(body.free), *trace.shape[1:]))
-        field[body.interface] = self.pair.orient(trace)
+        field[body.interface] = self._side(body).orient(trace)
         field[rows] = -solved(np.asarray(body.stiffness[rows][:, body.interface] @ field[body.interface]))
         return field
 
+    def _side(self, body: Body) -> Condensed:
+        return self.pair.contact if body is self.one else self.pair.neumann
+
     def trace(self, body: Body, field: Floats) -> Floats:
         """gamma v on Gamma_c, tangential components first."""
-        return self.pair.orient(field[body.interface])
+        return self._side(body).orient(field[body.interface])
+
+    def carried(self, two: Floats) -> Floats:
+        """gamma v of body 2 as body 1 feels it: at the contact nodes."""
+        return self.pair.interface.carry(self.trace(self.two, two))
 
     def excess(self, body: Body, field: Floats) -> Floats:
         """``a(u, .) - L(.)`` on the unknowns; on Gamma_c the nodal forces ``sigma n`` of the body."""
@@ -96,12 +104,12 @@ class Weak:
 
     def jump(self, one: Floats, two: Floats) -> Floats:
         """``v^1 - v^2`` on Gamma_c, less the initial gap in the normal components."""
-        jump = self.trace(self.one, one) - self.trace(self.two, two)
+        jump = self.trace(self.one, one) - self.carried(two)
         jump[self.pair.contact.grid.normal] -= self.pair.interface.gap.reshape(-1, *[1] * (jump.ndim - 1))
         return jump
 
     def bound(self, two: Floats) -> Floats:
-        """``w_j k |S sigma_N|`` at the nodes, sigma_N that of body 2."""
+        """``w_j k |S sigma_N|`` at the contact nodes, sigma_N that of body 2."""
         return self.pair.bound(self.force(self.two, two))
 
     def energy(self, fields: Fields) -> Floats:
@@ -120,9 +128,9 @@ class Weak:
     def at(self, state: Iterate) -> Fields:
         """``w^1`` and ``w^2`` of (5.5) and (5.6), steps II and I of an evaluation of T."""
         pair = self.pair
-        moved = state.displacement + state.contact.v
+        moved = pair.interface.carry(state.displacement) + state.contact.v
         moved[pair.contact.grid.normal] += pair.interface.gap
-        traces = {self.one.name: pair.orient(moved), self.two.name: pair.orient(state.displacement)}
+        traces = {self.one.name: pair.contact.orient(moved), self.two.name: pair.neumann.orient(state.displacement)}
         body1, body2 = pair.on_meshes().elastic
         return self.of((body1.displacement(traces["body1"]), body2.displacement(traces["body2"])))
 
@@ -142,6 +150,11 @@ class Case:
     def weak(self) -> Weak:
         """The weak forms."""
         return Weak(pair=build(self.problem))
+
+    @property
+    def grids_differ(self) -> bool:
+        """Whether the bodies have different grids along Gamma_c."""
+        return self.weak.pair.interface.transfer is not None
 
     @cached_property
     def solution(self) -> Fields:
@@ -203,94 +216,17 @@ def cases(level: Level) -> list[Case]:
     return [Case(name=name, problem=problem) for name, problem in named.items()]
 
 
-# Test functions.
-
-
-def directions(rng: np.random.Generator, body: Body, count: int) -> Floats:
-    """Rough and smooth random fields of a body, largest value 1, as columns."""
-    rough = rng.standard_normal((len(body.free), count))
-    smooth = body.solve(rng.standard_normal((len(body.free), count)))
-    columns = np.concatenate([rough, smooth], axis=1)
-    return np.asarray(columns / np.abs(columns).max(axis=0))
-
-
-def hats(body: Body) -> Floats:
-    """Both signs of the hat function of every interface unknown, as columns."""
-    columns = np.zeros((len(body.free), len(body.interface)))
-    columns[body.interface, np.arange(len(body.interface))] = 1.0
-    return np.concatenate([columns, -columns], axis=1)
-
-
-def closing(weak: Weak, u: Fields) -> Floats:
-    """Moves of body 1 by hat functions that undo the jump of u at one node, in one direction."""
-    count = len(weak.one.interface)
-    return np.asarray(hats(weak.one)[:, :count] * -weak.pair.orient(weak.jump(u.one, u.two)))
-
-
-def _sizes(rng: np.random.Generator, size: float, count: int) -> Floats:
-    return np.asarray(size * 10.0 ** rng.uniform(-4, 1, count))
-
-
-def moves_in_K(weak: Weak, u: Fields, rng: np.random.Generator, count: int) -> Fields:
-    """Columns ``v - u`` with v in K: random fields, hat functions on one body, on the other and on both, closing moves.
-
-    Where a column would penetrate one of the bodies gives way.
-    """
-    size = largest(u)
-    one, two = (directions(rng, body, count) for body in (weak.one, weak.two))
-    hat_1, hat_2 = hats(weak.one), hats(weak.two)
-    columns_1 = np.concatenate([one, hat_1, 0 * hat_1, hat_1] * 2 + [100 * one], axis=1)
-    columns_2 = np.concatenate([two, 0 * hat_2, hat_2, hat_2] * 2 + [100 * two], axis=1)
-    sizes = _sizes(rng, size, columns_1.shape[1])
-    undone = closing(weak, u)
-    one = np.concatenate([sizes * columns_1, undone], axis=1)
-    two = np.concatenate([sizes * columns_2, np.zeros((len(u.two), undone.shape[1]))], axis=1)
-    normal, up = weak.pair.contact.grid.normal, weak.pair.upward
-    rows_1, rows_2 = weak.one.interface[normal], weak.two.interface[normal]
-    room = -weak.jump(u.one, u.two)[normal][:, None]
-    first = rng.random(one.shape[1]) < 0.5
-    above = up * one[rows_1], up * two[rows_2]
-    one[rows_1] = up * np.where(first, np.minimum(above[0], above[1] + room), above[0])
-    two[rows_2] = up * np.where(first, above[1], np.maximum(above[1], above[0] - room))
-    return Fields(one=one, two=two)
-
-
-def moves_of_one(weak: Weak, u: Fields, rng: np.random.Generator, count: int) -> Floats:
-    """Columns ``v - u^1`` with v in V^1_-(u^2_N): random fields, hat functions, closing moves."""
-    random, hat = directions(rng, weak.one, count), hats(weak.one)
-    columns = np.concatenate([random, hat, hat, 100 * random], axis=1)
-    d = np.concatenate([_sizes(rng, largest(u), columns.shape[1]) * columns, closing(weak, u)], axis=1)
-    normal, up = weak.pair.contact.grid.normal, weak.pair.upward
-    rows = weak.one.interface[normal]
-    d[rows] = up * np.minimum(up * d[rows], -weak.jump(u.one, u.two)[normal][:, None])
-    return np.asarray(d)
-
-
-def obstacle_tests(weak: Weak, u: Fields, rng: np.random.Generator, count: int) -> Floats:
-    """Columns w of V^1_-(0): random ones, and ``u^1 - R u^2`` moved as in ``moves_of_one``."""
-    body, normal, up = weak.one, weak.pair.contact.grid.normal, weak.pair.upward
-    random, hat = directions(rng, body, count), hats(body)
-    start = u.one - weak.lift(body, weak.trace(weak.two, u.two))
-    columns = np.concatenate([random, hat, hat], axis=1)
-    moves = np.concatenate([_sizes(rng, largest(u), columns.shape[1]) * columns, closing(weak, u)], axis=1)
-    w = np.concatenate([start[:, None] + moves, 10 * largest(u) * random], axis=1)
-    rows = body.interface[normal]
-    w[rows] = up * np.minimum(up * w[rows], weak.pair.interface.gap[:, None])
-    return w
-
-
-def largest(u: Fields) -> float:
-    return float(max(np.abs(u.one).max(), np.abs(u.two).max()))
-
-
 # The statements, as numbers that should vanish or be non-negative; each relative to what its terms are made of.
 
 
 def unilateral(weak: Weak, u: Fields) -> dict[str, float]:
-    """(2.4): the largest violation of each condition, lengths relative to the largest displacement."""
-    normal, two = weak.pair.contact.grid.normal, weak.force(weak.two, u.two)
+    """(2.4) with sigma_N of body 1: the largest violation of each condition, lengths over the largest displacement.
+
+    P' has negative entries, so that where the grids differ sigma_N of body 2 may have the other sign at some node.
+    """
+    normal, one = weak.pair.contact.grid.normal, -weak.force(weak.one, u.one)
     jump = weak.jump(u.one, u.two)[normal] / max(np.abs(u.one).max(), np.abs(u.two).max())
-    pressure = two[normal] / (np.abs(two).max() or 1.0)
+    pressure = one[normal] / (np.abs(one).max() or 1.0)
     worst = lambda values: float(np.max(values, initial=0.0))
     return {
         "[u_N] <= 0": worst(jump),
@@ -315,9 +251,12 @@ def coulomb(weak: Weak, u: Fields) -> dict[str, float]:
 
 
 def reaction(weak: Weak, u: Fields) -> dict[str, float]:
-    """(2.3): differences of the stress components of the two bodies, relative to the largest nodal force."""
-    t, normal = weak.pair.contact.grid.tangential, weak.pair.contact.grid.normal
-    one, two = weak.force(weak.one, u.one), weak.force(weak.two, u.two)
+    """(2.3): differences of the stress components of the two bodies, relative to the largest nodal force.
+
+    The forces of body 1 as body 2 receives them.
+    """
+    t, normal = weak.pair.neumann.grid.tangential, weak.pair.neumann.grid.normal
+    one, two = weak.pair.interface.carry_back(weak.force(weak.one, u.one)), weak.force(weak.two, u.two)
     forces = float(np.abs(two).max()) or 1.0
     worst = lambda values: float(np.max(np.abs(values), initial=0.0)) / forces
     # sigma_N^a is the component along n^a, and both lists of forces are along n^1 = -n^2
@@ -331,7 +270,7 @@ def reaction(weak: Weak, u: Fields) -> dict[str, float]:
 def inequality(weak: Weak, u: Fields, d: Fields) -> Floats:
     """(4.4): left minus right side for columns ``d = v - u``, relative to ``|u| |d|`` in the norm of a."""
     work = weak.excess(weak.one, u.one) @ d.one + weak.excess(weak.two, u.two) @ d.two
-    value = work + _friction_of_move(weak, u, weak.trace(weak.one, d.one) - weak.trace(weak.two, d.two))
+    value = work + _friction_of_move(weak, u, weak.trace(weak.one, d.one) - weak.carried(d.two))
     return _over(value, weak.energy(u) * _moved(weak.energy(d), weak.energy(u)))
 
 
@@ -345,7 +284,7 @@ def contact_inequality(weak: Weak, u: Fields, d: Floats) -> Floats:
 def shifted_inequality(weak: Weak, u: Fields, w: Floats) -> Floats:
     """(4.9) II with the jump, (5.2): left minus right side for columns w, relative to ``|u| |w + R u^2 - u^1|``."""
     t = weak.pair.contact.grid.tangential
-    d = w + (weak.lift(weak.one, weak.trace(weak.two, u.two)) - u.one)[:, None]
+    d = w + (weak.lift(weak.one, weak.carried(u.two)) - u.one)[:, None]
     slides = np.abs(weak.trace(weak.one, w)[t]) - np.abs(weak.jump(u.one, u.two)[t])[:, None]
     value = weak.excess(weak.one, u.one) @ d + weak.bound(u.two) @ slides
     return _over(value, weak.energy(u) * _moved(norm(weak.one, d), weak.energy(u)))
@@ -366,15 +305,14 @@ def neumann_equation(weak: Weak, two: Floats, psi: Floats, v: Floats) -> Floats:
 
 def transfer(weak: Weak, u: Fields, image: Floats, v: Floats) -> Floats:
     """(4.9) III, (5.4): ``<T psi, v> + a^1(u^1, R v) - L^1(R v)``, relative to ``|u| |R v|``."""
-    trace = weak.trace(weak.two, v)
-    lifted = weak.lift(weak.one, trace)
-    rest = image @ trace + weak.excess(weak.one, u.one) @ lifted
+    lifted = weak.lift(weak.one, weak.carried(v))
+    rest = image @ weak.trace(weak.two, v) + weak.excess(weak.one, u.one) @ lifted
     return _over(np.abs(rest), weak.energy(u) * norm(weak.one, lifted))
 
 
 def balance(weak: Weak, u: Fields, v: Floats) -> Floats:
     """(5.1): ``a^2(u^2, v) - L^2(v) + a^1(u^1, R v) - L^1(R v)``, relative to ``|u| |v|``."""
-    lifted = weak.lift(weak.one, weak.trace(weak.two, v))
+    lifted = weak.lift(weak.one, weak.carried(v))
     rest = weak.excess(weak.two, u.two) @ v + weak.excess(weak.one, u.one) @ lifted
     return _over(np.abs(rest), weak.energy(u) * (norm(weak.two, v) + norm(weak.one, lifted)))
 

@@ -21,7 +21,7 @@ from verification.interface.pair import ContactPair
 from verification.ledger.cases import NAMED, problem
 from verification.ledger.differences import Difference, Setting, draw_pairs
 from verification.ledger.evidence import Evidence, figure
-from verification.ledger.inequalities import ALLOWANCE, INEQUALITIES, LEVELS, SEED, SHARES, Inequality
+from verification.ledger.inequalities import ALLOWANCE, INEQUALITIES, LEVELS, ONE_TRACE_SPACE, SEED, SHARES, Inequality
 from verification.ledger.reading import Reading
 from verification.problem.specification import Problem
 from verification.threads import one_thread
@@ -97,10 +97,30 @@ class Trial:
         return np.array([M / m for M, m in zip(self.M, self.m, strict=True)])
 
     @property
+    def grids_differ(self) -> bool:
+        """Whether the bodies have different grids along Gamma_c."""
+        return self.pair.interface.transfer is not None
+
+    @property
     def between_traces(self) -> Floats:
-        """The constants from the norm of H^1/2(Gamma_c) squared of the other body into that of each body."""
-        one, other = self.E
-        return np.array([top(one, other), top(other, one)])
+        """The constants from the norm of H^1/2(Gamma_c) squared of the other body into that of each body.
+
+        Where the grids differ into that of the contact body alone: nothing leads from its grid to the other one.
+        """
+        return self._across(self.E)
+
+    @property
+    def lifted_across(self) -> Floats:
+        """``|R_D^1 gamma v|^2 / |v|^2`` for v of the other body, at most, and with the bodies exchanged.
+
+        Where the grids differ ``R_D^1 P gamma v`` alone: nothing leads from the contact grid to the other one.
+        """
+        return self._across(self.N)
+
+    def _across(self, forms: tuple[Floats, Floats]) -> Floats:
+        one, other = forms
+        values = [top(self.pair.interface.carry_form(one), self.E[1])]
+        return np.array(values if self.grids_differ else [*values, top(other, self.E[0])])
 
     def at_share(self, share: Fraction) -> Trial:
         """The same bodies at a share of the friction C_2 of the repaired bound."""
@@ -117,21 +137,28 @@ class Tally:
     Attributes
     ----------
     inequality : Inequality
-    pairs, problems : int
-        How many were compared.
+    pairs, problems, apart : int
+        How many were compared; in how many of the problems the grids differ.
     by_unit : dict
         Unit of stress -> the worst ratio, where, the theta, and the problem where it has a name.
+    worst_apart : float
+        The worst ratio where the grids differ, in any unit of stress; -inf where nothing was compared there.
     """
 
     inequality: Inequality
     pairs: int = 0
     problems: int = 0
+    apart: int = 0
     by_unit: dict[float, tuple[float, str, float | None, str]] = field(default_factory=dict)
+    worst_apart: float = -math.inf
 
     def take(self, case: Trial, subjects: Sequence[Any]) -> None:
-        """Compare both sides on the pairs of a problem."""
+        """Compare both sides on the pairs of a problem, where the inequality speaks of its grids."""
         inequality = self.inequality
+        if inequality.one_grid and case.grids_differ:
+            return
         self.problems += 1
+        self.apart += case.grids_differ
         self.pairs += len(subjects)
         for unit in inequality.units:
             reading = inequality.reading(case.reading.in_unit(unit))
@@ -141,6 +168,8 @@ class Tally:
                     ratio = inequality.ratio(subject, reading, theta or 0.0)
                     if math.isnan(ratio):
                         ratio = math.inf
+                    if case.grids_differ:
+                        self.worst_apart = max(ratio, self.worst_apart)
                     # equal but for rounding: the first one stays, on any machine
                     if unit not in self.by_unit or not ratio <= self.by_unit[unit][0] * (1 + ALLOWANCE):
                         where = case.name if inequality.about == "bodies" else f"{case.name}, pair {number}"
@@ -171,6 +200,11 @@ class Tally:
             data |= {"unit": unit, "worst_ratio_by_unit": {f"{u:g}": _digits(v[0]) for u, v in self.by_unit.items()}}
         if name in NAMED:
             data["problem"] = {key: dict(table) for key, table in NAMED[name].items()}
+        if self.inequality.one_grid:
+            count += f", in each of which both bodies have one grid ({ONE_TRACE_SPACE})"
+        else:
+            data["grids_differ"] = {"problems": self.apart, "worst_ratio": _digits(self.worst_apart)}
+            count += f", of which {self.apart} have grids that differ{self.inequality.remark}"
         sides = "left/right" if not self.inequality.equality else "1 + |left - right|/energy"
         units = self.inequality.units
         if len(units) > 1:
@@ -185,19 +219,24 @@ def _digits(value: float) -> float | None:
     return figure(value, 7) if math.isfinite(value) else None
 
 
-def draw_cases(count: int) -> Iterator[tuple[Trial, np.random.Generator]]:
+def draw_cases(
+    count: int, apart: Callable[[int], bool] = lambda number: number % 3 == 0
+) -> Iterator[tuple[Trial, np.random.Generator]]:
     """The problems of a pass, each with a generator of its own: named ones, then random ones.
 
     Parameters
     ----------
     count : int
-        Random problems; every sixth has friction 10.
+        Random problems; every fifth has friction 10.
+    apart : callable
+        Of which of them the grids are drawn apart, by number; now and then these come out as one grid.
     """
     for number, (name, data) in enumerate(NAMED.items()):
         yield Trial.of(name, Problem.from_dict(data)), np.random.default_rng([SEED, 0, number])
     for number in range(1, count + 1):
         random = np.random.default_rng([SEED, number])
-        yield Trial.of(f"problem {number}", problem(random, 10 if number % 6 == 0 else None)), random
+        drawn = problem(random, 10 if number % 5 == 0 else None, matching=not apart(number))
+        yield Trial.of(f"problem {number}", drawn), random
 
 
 def discrete(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
@@ -23,6 +23,7 @@ from verification.problem.specification import (
     ContactSpec,
     IterationSpec,
     Problem,
+    SidePart,
     Theta,
     read_theta,
 )
@@ -210,15 +211,36 @@ def _components(dimension: int, *, free: bool) -> Any:
 def _by_side(table: Table, sides: tuple[str, ...] | None, read: Any) -> Mapping[str, Any]:
     """Read a sub-table keyed by side names; the sides of a mesh file are known only later."""
     result = {}
-    for name in table.names():
-        try:
-            label(name)
-        except Unfit as error:
-            raise table.refuse(str(name), None, str(error)) from None
+    for name in _names(table):
         if sides is not None and name not in sides:
             raise table.refuse(name, None, "unknown side; known here: " + ", ".join(sides))
         result[name] = table.take(name, read)
     return result
+
+
+def _read_parts(table: Table, sides: tuple[str, ...] | None, dimension: int) -> Mapping[str, SidePart]:
+    """Parts of sides, each under a name of its own: the side, and the ends of the part along x or y."""
+    parts = {}
+    for name in _names(table):
+        if dimension == 1:
+            raise table.refuse(name, None, "the side of a bar is a point: it has no parts")
+        if sides is not None and name in sides:
+            raise table.refuse(name, None, "needed a name that no side has; known here: " + ", ".join(sides))
+        part = table.table(name, required=True)
+        axis: Literal["x", "y"] = "y" if "y" in part else "x"
+        side, reach = part.take("side", choice(*sides) if sides is not None else label), part.take(axis, ends)
+        part.close()
+        parts[name] = SidePart(side=side, axis=axis, ends=reach)
+    return parts
+
+
+def _names(table: Table) -> Iterator[str]:
+    """The keys of a table, each of which must be a name that a file can hold."""
+    for name in table.names():
+        try:
+            yield label(name)
+        except Unfit as error:
+            raise table.refuse(str(name), None, str(error)) from None
 
 
 def _read_body(table: Table, dimension: int, source: str) -> BodySpec:
@@ -226,7 +248,13 @@ def _read_body(table: Table, dimension: int, source: str) -> BodySpec:
     if shape["shape"] == "rigid":
         table.close()
         return BodySpec(**shape)
-    sides = {"rectangle": RECTANGLE_SIDES, "interval": INTERVAL_SIDES, "mesh": None}[shape["shape"]]
+    sides: tuple[str, ...] | None = {"rectangle": RECTANGLE_SIDES, "interval": INTERVAL_SIDES, "mesh": None}[
+        shape["shape"]
+    ]
+
+    parts = _read_parts(table.table("parts"), sides, dimension)
+    if sides is not None:
+        sides += tuple(parts)
 
     def side_list(value: Any) -> tuple[str, ...]:
         if not isinstance(value, (list, tuple)) or not all(isinstance(name, str) for name in value):
@@ -264,6 +292,7 @@ def _read_body(table: Table, dimension: int, source: str) -> BodySpec:
         **shape,
         young=young,
         poisson=poisson,
+        parts=parts,
         fixed=fixed,
         prescribed=prescribed,
         traction=traction,

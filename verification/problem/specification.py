@@ -37,6 +37,23 @@ MOST_FRICTION = Fraction(10**9)
 
 
 @dataclass(frozen=True, kw_only=True)
+class SidePart:
+    """A part of a side of a body, between two positions along an axis.
+
+    Attributes
+    ----------
+    side : str
+    axis : {'x', 'y'}
+    ends : pair of Fraction
+        Unit of length; the part has the edges of the side that lie between them.
+    """
+
+    side: str
+    axis: Literal["x", "y"]
+    ends: tuple[Fraction, Fraction]
+
+
+@dataclass(frozen=True, kw_only=True)
 class BodySpec:
     """A body as the problem file describes it; lengths and stresses in the file's units.
 
@@ -49,6 +66,8 @@ class BodySpec:
     mesh : MeshFile or None
     young, poisson : Fraction
         E in stress; Poisson's ratio is 0 for a bar.  Both 0 where rigid.
+    parts : read-only mapping from name to SidePart
+        Parts of sides that are named like sides.
     fixed : tuple of str
     prescribed, traction : read-only mapping from side to components
         Displacement (length; None: free) and force per area (stress).
@@ -63,13 +82,14 @@ class BodySpec:
     mesh: MeshFile | None = None
     young: Fraction = Fraction(0)
     poisson: Fraction = Fraction(0)
+    parts: Mapping[str, SidePart] = field(default_factory=ReadOnly)
     fixed: tuple[str, ...] = ()
     prescribed: Mapping[str, Components] = field(default_factory=ReadOnly)
     traction: Mapping[str, tuple[Fraction, ...]] = field(default_factory=ReadOnly)
     body_force: tuple[Fraction, ...] = ()
 
     def __post_init__(self) -> None:
-        for name in ("prescribed", "traction"):
+        for name in ("parts", "prescribed", "traction"):
             object.__setattr__(self, name, ReadOnly(getattr(self, name)))
 
     @property

@@ -65,6 +65,7 @@ def _body(body: BodySpec) -> dict[str, Any]:
         written |= {
             "young": body.young,
             "poisson": None if bar else body.poisson,
+            "parts": {name: {"side": part.side, part.axis: part.ends} for name, part in body.parts.items()},
             "fixed": body.fixed,
             "prescribed": {side: vector(values) for side, values in body.prescribed.items()},
             "traction": {side: vector(values) for side, values in body.traction.items()},

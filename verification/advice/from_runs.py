@@ -1,0 +1,87 @@
+"""Advice from one run of any code: what its ratio of residuals says of rho."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+from ndtheory import Number
+from ndtheory.constants import take
+from ndtheory.energy import LARGEST, SMALLEST
+from ndtheory.sharp import predicted_rate, predicted_theta
+from verification.advice.readings import read_ratio
+from verification.advice.roles import UNITS, Advice, Role
+
+
+def advise_run(theta: Any, ratio: Any) -> Advice:
+    """What one run of any code with constant theta says of rho, and the run to make next.
+
+    While contact does not change, a mode is multiplied by ``1 - theta (1 + lambda)`` in a step, with lambda at most
+    rho, and an open node by ``1 - theta``.  A residual has no sign, so that a ratio r of residuals can mean
+
+    * ``mode-high``: ``lambda = (1 + r)/theta - 1``.  Without friction or tied, rho is at least that wherever
+      ``r > 1 - theta``, since no step is longer than ``max(1 - theta, |1 - theta - theta rho|)``;
+    * ``mode-low``: ``lambda = (1 - r)/theta - 1``, where ``r <= 1 - theta``;
+    * ``open``: nothing of rho, where r is about ``1 - theta``;
+    * ``level``: contact opens and closes in turn, where r is about 1 or the growth does not last.  Without friction
+      theta does not contract, so that rho is at least ``2/theta - 1``.
+
+    With friction none of these bounds is proved.
+
+    Parameters
+    ----------
+    theta : number
+        The run's relaxation factor, 0 < theta <= 1.
+    ratio : number
+        r > 0, that of the absolute unrelaxed residual ``|T g - g|`` from one step to the next, steady over the last ten
+        steps or more, and over ``5/theta`` where these are more; above 1 where the run diverged, and 1 where the
+        residual rises and falls and has no steady ratio.
+
+    Returns
+    -------
+    Advice
+        Without roles while several readings are left.
+
+    Raises
+    ------
+    HypothesisError
+        theta or the ratio is no number of its range.
+
+    Examples
+    --------
+    >>> found = advise_run("0.1", "1.4")
+    >>> [(reading.kind, reading.lo) for reading in found.readings], found.next.theta
+    ([('mode-high', 23.0), ('level', 19.0)], 0.0808)
+    >>> advise_run("0.45", "0.8").best.rho.value
+    3.0
+    """
+    t = take("theta", theta, "the theta of a run, 0 < theta <= 1 (1e-75 or more)", lambda v: SMALLEST <= v <= 1)
+    needed = "the ratio of consecutive residuals, a number > 0 (1e-75 to 1e75)"
+    r = take("ratio", ratio, needed, lambda v: SMALLEST <= v <= LARGEST)
+    run, readings, following, rho = read_ratio(t, r)
+    return Advice(
+        neumann_body=None,
+        roles=() if rho is None else (_role_of_run(rho),),
+        units=UNITS,
+        run=run,
+        readings=readings,
+        next=following,
+    )
+
+
+def _role_of_run(rho: Fraction) -> Role:
+    nothing = "an observed ratio proves nothing"
+    return Role(
+        neumann_body=None,
+        rho=Number.of_float(rho),
+        theta_proved=None,
+        factor_proved=None,
+        theta_max_proved=None,
+        theta_predicted=float(predicted_theta(rho)),
+        rate_predicted=float(predicted_rate(rho)),
+        friction_threshold=None,
+        reason={
+            "neumann_body": "whichever body had the Neumann problem in that run",
+            **dict.fromkeys(("theta_proved", "factor_proved", "theta_max_proved", "friction_threshold"), nothing),
+        },
+    )
