@@ -29,7 +29,6 @@ from verification.threads import one_thread
 #: A sum of forces that cancels up to this share of their sizes may be 0.
 CANCELLED = 1e-6
 
-
 #: Digits by which values are told apart: the way uphill is the same however a processor rounds.
 DIGITS = 9
 
