@@ -26,6 +26,8 @@ STEP = 2.0**-70
 class Condensation:
     """A symmetric positive definite matrix seen from some of its unknowns, the interface B; I is the rest.
 
+    It may be semidefinite, as the stiffness matrix of a body without support is, where its part inside is definite.
+
     ``lift = -A_II^-1 A_IB`` extends interface values with least energy, ``schur = A_BB + A_BI lift`` is that energy:
     ``phi' schur phi = min { v' A v : v_B = phi }``.
 
@@ -37,11 +39,17 @@ class Condensation:
     order : int array, shape (n,), optional
         An order of elimination that ends with the interface, as :func:`elimination_order` finds it; matrices of one
         mesh can share it.
+    singular : bool
+        Whether the matrix is semidefinite alone.  What eliminates it then meets last pivots of 0: the block of the
+        interface is shifted meanwhile, which shifts the Schur complement by as much and changes nothing else.
     """
 
-    def __init__(self, matrix: sp.csc_array, interface: Ints, order: Ints | None = None) -> None:
+    def __init__(
+        self, matrix: sp.csc_array, interface: Ints, order: Ints | None = None, *, singular: bool = False
+    ) -> None:
         self.matrix = matrix
         self.interface = interface
+        self._shift = _power_of_two(matrix) if singular else 0.0
         self.order = elimination_order(matrix, interface) if order is None else order
         inside = np.ones(matrix.shape[0], dtype=bool)
         inside[interface] = False
@@ -74,7 +82,16 @@ class Condensation:
         """``A_BB + A_BI lift``, shape (b, b)."""
         if len(self.inside) == 0:
             return _symmetric(self._on_interface.toarray())
-        return self._rest(_factor(self.matrix, self.order))
+        schur = self._rest(_factor(self._shifted(self.matrix), self.order))
+        return _symmetric(schur - self._shift * np.eye(len(schur))) if self._shift else schur
+
+    def _shifted(self, matrix: Any) -> Any:
+        """The matrix with the shift on the diagonal of its interface."""
+        if not self._shift:
+            return matrix
+        diagonal = np.zeros(matrix.shape[0])
+        diagonal[self.interface] = self._shift
+        return (matrix + sp.diags_array(diagonal, format="csc")).tocsc()
 
     def times(self, trace: Floats) -> Floats:
         """``schur @ trace`` without the matrix: one solve inside, shape (b,), a force of the matrix's unit.
@@ -90,7 +107,14 @@ class Condensation:
         """``load -> A^-1 load`` on all unknowns, as :func:`solver`; its factorisation gives the Schur complement too.
 
         The factorisation lives as long as what is returned: it is the largest part of the memory.
+
+        Raises
+        ------
+        ValueError
+            The matrix is singular.
         """
+        if self._shift:
+            raise ValueError("the matrix is singular: needed a definite one")
         factor = _factor(self.matrix, self.order)
         if len(self.inside):
             self.schur = self._rest(factor)
@@ -104,7 +128,7 @@ class Condensation:
         factorisation gives all entries to rounding.
         """
         step = STEP * _power_of_two(self.matrix) / _power_of_two(form)
-        return self._rest(_factor(self.matrix + 1j * step * form, self.order)).imag / step
+        return self._rest(_factor(self._shifted(self.matrix + 1j * step * form), self.order)).imag / step
 
     def _rest(self, factor: Any) -> NDArray[Any]:
         """``X_BB - X_BI X_II^-1 X_IB`` of a factorised matrix X: what the elimination of I leaves on B."""

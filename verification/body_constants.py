@@ -14,6 +14,8 @@ from verification.interface.body import Body
 class BodyConstants:
     """Coercivity m^a and continuity M^a of one body (4.1), unit stress, with the residuals of the eigenvalues.
 
+    m^a is 0, exactly, where the body can move rigidly.
+
     ``residual_m``, ``residual_M`` are relative; the error of the eigenvalue is of the order of their square.
     """
 
@@ -34,20 +36,21 @@ def constants_of(body: Body, *, dense: bool = True) -> BodyConstants:
     Parameters
     ----------
     body : Body
-        Held, so that its stiffness matrix is definite.
     dense : bool
         Whether the Schur complement of the norm is wanted too, which one factorisation gives with the solves; False
         where there are too many contact nodes for it.
     """
     A, H, order = body.stiffness, body.gram_matrix, body.order if dense else None
-    solve_A, solve_H = (solver(A, order), body.gram.solver()) if dense else (body.solve, solver(H))
-    smallest = largest_sparse(H, A, solve_A)  # 1/m, so that products with A^-1 find it
+    solve_H = body.gram.solver() if dense else solver(H)
+    loose = body.motions.shape[1] > 0
+    # 1/m, so that products with A^-1 find it
+    smallest = None if loose else largest_sparse(H, A, solver(A, order) if dense else body.solve)
     above = body.material.continuity(body.mesh.dimension)
     biggest = largest_sparse(A, H, solve_H, above=above, order=order)
     return BodyConstants(
-        m=Number.of_float(1 / smallest.value),
+        m=Number(value=0.0, lo=0.0, hi=0.0, level="exact") if smallest is None else Number.of_float(1 / smallest.value),
         M=Number.of_float(biggest.value),
         nodes=len(body.mesh.points),
-        residual_m=smallest.residual / smallest.value,
+        residual_m=0.0 if smallest is None else smallest.residual / smallest.value,
         residual_M=biggest.residual / biggest.value,
     )

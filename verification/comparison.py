@@ -170,7 +170,7 @@ class Comparison(Document):
             return None
         threshold = measured.friction_threshold
         if threshold is None:
-            document["reason"] |= dict.fromkeys(("friction_threshold", "friction_limit"), "no law of friction")
+            document["reason"] |= dict.fromkeys(("friction_threshold", "friction_limit"), measured.why_no_threshold)
         number = lambda value: None if value is None else value.to_dict()
         return document | {
             "rho": number(measured.rho_max),
@@ -331,4 +331,4 @@ def _losses(pair: ContactPair, measured: Measured, progress: Progress) -> tuple[
     if pair.contact.grid.n > LARGEST:
         return None, f"{pair.contact.grid.n} contact nodes: worked out up to {LARGEST}"
     found = locate(pair, measured, progress=progress)
-    return found, "" if found is not None else next(iter(measured.reason.values()), "a contact node is held")
+    return found, "" if found is not None else measured.why_no_constants or "a contact node is held"

@@ -23,6 +23,10 @@ from verification.threads import one_thread
 if TYPE_CHECKING:
     from verification.figures import Figure
 
+#: Why C_t1 is infinite, and m is 0.
+SLIDES = "infinite: the contact body can move rigidly along Gamma_c, and its energy does not bound how far"
+NO_COERCIVITY = "m = 0: the contact body can move rigidly, held by contact alone"
+
 #: The constants of both bodies together, as documents and screens list them.
 NAMES = ("m", "M", "C_R", "C_s", "C_tr", "C_tr_half", "C_K", "rho_max", "rho_min", "rho_normal")
 ENERGY_NAMES = ("C_s_energy", "C_t1", "C_t2", "kappa_1", "kappa_2")
@@ -43,7 +47,7 @@ class Measured(Document):
     body1, body2 : BodyConstants or None
         None, as m and M, where only matrices are known.
     m, M : Number or None
-        Smallest m^a, sum of the M^a (4.2); stress.
+        Smallest m^a, 0 where contact alone holds the contact body; sum of the M^a (4.2); stress.
     C_R : Number or None
         Lift constant, the safe maximum over both bodies' H^1/2 norms; dimensionless.
     C_s, C_tr : Number or None
@@ -112,8 +116,7 @@ class Measured(Document):
 
         energy = self.energy_constants()
         if energy is None:
-            missing = next(name for name in ("rho_max", "kappa_1") if getattr(self, name) is None)
-            raise ValueError(f"{missing} does not exist: {self.reason[missing]}")
+            raise ValueError("the theorem in energy norms does not speak of it: " + self.why_no_energy)
         return draw_factor({"": energy})
 
     @property
@@ -122,8 +125,8 @@ class Measured(Document):
         return None if self.body1 is None or self.body2 is None else self.body1.nodes + self.body2.nodes
 
     def constants(self) -> Constants | None:
-        """What enters the theorem; None where C_R or C_K does not exist."""
-        if self.m is None or self.M is None or self.C_R is None or self.C_K is None:
+        """What enters the theorem; None where C_R or C_K does not exist, or m is 0."""
+        if self.m is None or self.M is None or self.C_R is None or self.C_K is None or not self.m.value:
             return None
         friction: dict[str, Any] = {"C_K": 0}  # without a law of friction
         if self.C_s is not None and self.C_tr is not None:
@@ -138,11 +141,28 @@ class Measured(Document):
             return None
         return EnergyConstants(
             rho=self.rho_max,
-            # equal up to rounding where nothing slides
-            rho_normal=self.rho_normal if self.rho_normal.value <= self.rho_max.value else self.rho_max,
+            # equal up to rounding where nothing slides; 0 where the normal forces follow from the loads
+            rho_normal=self.rho_normal if 0 < self.rho_normal.value <= self.rho_max.value else self.rho_max,
             kappa_1=self.kappa_1,
             kappa_2=self.kappa_2,
         )
+
+    @property
+    def why_no_constants(self) -> str:
+        """Why nothing enters the theorem of Section 5."""
+        if self.m is not None and not self.m.value:
+            return f"{NO_COERCIVITY}: needed m > 0"
+        return next(iter(self.reason.values()), "")
+
+    @property
+    def why_no_energy(self) -> str:
+        """Why nothing enters the theorem in energy norms."""
+        return self.reason.get("kappa_1") or next(iter(self.reason.values()), "")
+
+    @property
+    def why_no_threshold(self) -> str:
+        """Why no friction is the largest one allowed."""
+        return f"C_t1 is {SLIDES}" if self.reason.get("C_t1") == SLIDES else "no law of friction"
 
     @property
     def of_friction(self) -> tuple[Number, ...]:
@@ -173,7 +193,8 @@ class Measured(Document):
             Friction without a law.
         """
         if k and not self.of_friction:
-            raise ValueError(f"friction {k}: needed a law of friction")
+            why = self.why_no_threshold
+            raise ValueError(f"friction {k}: " + ("needed a law of friction" if why.startswith("no ") else why))
         values: dict[str, Any] = {}
         if self.C_K is not None:
             C_s, C_tr = self.C_s, self.C_tr  # None without a law of friction
@@ -280,12 +301,20 @@ def _measure(pair: ContactPair | TwoBodies, progress: Progress = silent) -> Meas
         if pair.interface.kernel is None:
             reason = dict.fromkeys(("C_s", "C_s_energy"), "no friction and no radius: S is not defined") | reason
             values |= {"kappa_1": 0.0, "kappa_2": 0.0} | ({"C_K": 0.0} if meshes else {})
+        if pair.contact.slides:
+            reason["C_t1"] = SLIDES
+            if friction:
+                reason["kappa_1"] = f"C_t1 is {SLIDES}"
+            else:
+                values["kappa_1"] = 0.0
     products = (("C_K", "C_s", "C_tr"), ("kappa_1", "C_s_energy", "C_t1"), ("kappa_2", "C_s_energy", "C_t2"))
     for name, first, second in products:
         a, b = values[first], values[second]
         if a is not None and b is not None:
             values[name] = friction * a * b
     numbers: dict[str, Any] = {name: None if v is None else Number.of_float(v) for name, v in values.items()}
+    if body1 is not None and body2 is not None:
+        numbers["m"] = min(body1.m, body2.m, key=lambda m: m.value)  # 0 is exact
     return Measured(
         body1=body1,
         body2=body2,

@@ -12,11 +12,47 @@ from scipy.linalg.blas import dsymv, dtrsv
 
 from fem1d2d.mesh import Floats, Ints
 
+#: A component of an orthonormal rigid motion below this is 0.
+STILL = 1e-9
+
 
 def times(S: Floats, v: Floats) -> Floats:
     """``S v`` for a symmetric S, of which one triangle is read: half the memory of a general product."""
     product: Floats = dsymv(1.0, S if S.flags.f_contiguous else S.T, v)  # a transpose is no copy
     return product
+
+
+def vanishing(motions: Floats, rows: Ints) -> Floats:
+    """Combinations of orthonormal columns that vanish on some rows, orthonormal too, shape (n, as many as there are).
+
+    Parameters
+    ----------
+    motions : array, shape (n, k)
+    rows : int array
+    """
+    k = motions.shape[1]
+    if not k or not len(rows):
+        return motions
+    _, values, right = np.linalg.svd(np.linalg.qr(motions[rows], mode="r"))
+    rank = int((values > STILL).sum())
+    return np.asarray(motions @ right[rank:].T)
+
+
+def pinned(S: Floats, rows: Ints, motions: Floats) -> Floats:
+    """The block of some rows and columns of S, made definite where motions of its kernel move these rows alone.
+
+    With N these motions it is ``S + c N N'``: a solution for a right-hand side orthogonal to N is one of S, exactly.
+
+    Parameters
+    ----------
+    S : array, shape (n, n)
+        Symmetric, positive semidefinite.
+    rows : int array
+    motions : array, shape (n, k)
+        An orthonormal basis of the kernel.
+    """
+    N = vanishing(motions, np.setdiff1d(np.arange(len(S)), rows))[rows]
+    return np.asarray(S[np.ix_(rows, rows)] + float(np.diag(S).max()) * N @ N.T)
 
 
 def worst(values: Floats) -> float:
@@ -32,13 +68,18 @@ class Cholesky:
     S : array, shape (n, n)
     rows : int array
         May be all, or none.
+    motions : array, shape (n, k), optional
+        The kernel of S, where S is semidefinite; see :func:`pinned`.
     """
 
-    def __init__(self, S: Floats, rows: Ints) -> None:
+    def __init__(self, S: Floats, rows: Ints, motions: Floats | None = None) -> None:
         self._rows, self._all = rows, len(rows) == len(S)
         self._factor = None
         if len(rows):
-            block = S if self._all else S[np.ix_(rows, rows)]
+            if motions is not None and motions.shape[1]:
+                block = pinned(S, rows, motions)
+            else:
+                block = S if self._all else S[np.ix_(rows, rows)]
             self._factor = np.asfortranarray(cho_factor(block)[0])
 
     def solve(self, right: Floats) -> Floats:

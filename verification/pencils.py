@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 from fem1d2d import largest
 from fem1d2d.mesh import Floats
+from verification.dense import Cholesky, pinned
 from verification.interface.body import Condensed
 from verification.interface.pair import ContactPair
 
@@ -59,11 +59,9 @@ def of_energy(pair: ContactPair, tangential: NDArray[np.bool_]) -> dict[str, flo
     carried = contact if interface.transfer is None else interface.carry_form(contact)
     values: dict[str, float | None] = {
         "rho_max": largest(carried, neumann).value,
-        "rho_min": 1 / largest(neumann, contact).value
-        if interface.transfer is None
-        else _smallest(pair, carried, neumann),
+        "rho_min": _smallest(pair, carried, neumann, contact),
     }
-    normal_contact = _condense_tangential(contact, normal)
+    normal_contact = _condense_tangential(contact, normal, _motions(pair.contact))
     if interface.transfer is not None:
         normal_contact = interface.transfer.T @ normal_contact @ interface.transfer
         normal = np.arange(pair.neumann.grid.size) >= pair.neumann.grid.t
@@ -76,22 +74,32 @@ def of_energy(pair: ContactPair, tangential: NDArray[np.bool_]) -> dict[str, flo
         root = np.sqrt(grid.weights)[:, None] * kernel
         stress = root @ neumann[np.ix_(normal, normal)] @ root.T
         values["C_s_energy"] = float(np.sqrt(np.linalg.eigvalsh((stress + stress.T) / 2)[-1]))
-    values["C_t1"] = float(np.sqrt(largest(B_T, contact).value))
+    if not pair.contact.slides:  # else it is infinite; motions that do not slide are no part of the maximum
+        motions = _motions(pair.contact)
+        definite = contact if motions is None else pinned(contact, np.arange(len(contact)), motions)
+        values["C_t1"] = float(np.sqrt(largest(B_T, definite).value))
     values["C_t2"] = float(
         np.sqrt(largest(B_T if interface.transfer is None else interface.carry_form(B_T), neumann).value)
     )
     return values
 
 
-def _smallest(pair: ContactPair, carried: Floats, neumann: Floats) -> float:
-    """The smallest eigenvalue of (P' S_c P, S_n), to rounding relative to the largest."""
-    if pair.contact.grid.n < pair.neumann.grid.n:  # P has a kernel
+def _smallest(pair: ContactPair, carried: Floats, neumann: Floats, contact: Floats) -> float:
+    """The smallest eigenvalue of (P' S_c P, S_n); where P is not the identity to rounding relative to the largest."""
+    if pair.contact.loose or pair.contact.grid.n < pair.neumann.grid.n:  # S_c or P has a kernel
         return 0.0
+    if pair.interface.transfer is None:
+        return 1 / largest(neumann, contact).value
     return max(-largest(-carried, neumann).value, 0.0)
 
 
 def _free(side: Condensed) -> Floats:
     return side.stiffness[np.ix_(side.free, side.free)]
+
+
+def _motions(side: Condensed) -> Floats | None:
+    """The kernel of :func:`_free`; None where it is definite."""
+    return side.motions[side.free] if side.loose else None
 
 
 def _tangential_mass(pair: ContactPair, tangential: NDArray[np.bool_]) -> Floats:
@@ -102,12 +110,12 @@ def _tangential_mass(pair: ContactPair, tangential: NDArray[np.bool_]) -> Floats
     return np.diag(weights)
 
 
-def _condense_tangential(S: Floats, normal: Any) -> Floats:
-    """Schur complement of S on the normal components."""
+def _condense_tangential(S: Floats, normal: Any, motions: Floats | None = None) -> Floats:
+    """Schur complement of S on the normal components; S may be semidefinite, with motions as its kernel."""
     slide = ~normal
     if not slide.any():
         return S
     cross = S[np.ix_(slide, normal)]
-    inner = cho_solve(cho_factor(S[np.ix_(slide, slide)]), cross)
+    inner = Cholesky(S, np.flatnonzero(slide), motions).solve(S[:, normal])[slide]
     result = S[np.ix_(normal, normal)] - cross.T @ inner
     return np.asarray((result + result.T) / 2)

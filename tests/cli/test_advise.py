@@ -133,10 +133,18 @@ def test_however_soft_a_body_what_is_pasted_is_a_theta(call, write, edits):
     assert 0 < float(pasted(call("advise", write(edits)).out)) < 1
 
 
-def test_a_body_without_support_is_named_singular(call, write):
-    complaint = call("advise", write({"body2.prescribed": '{ top = ["free", -0.01] }'})).complaint
-    assert "body2" in complaint
-    assert "singular" in complaint
+@pytest.mark.parametrize("neumann", [1, 2])
+def test_a_role_in_which_a_body_can_move_is_singular_and_the_other_is_advised(call, write, neumann):
+    path = write({"body2.prescribed": '{ top = ["free", -0.01] }', "iteration.neumann_body": str(neumann)})
+    document = call("advise", path, "--json").document
+    assert document["neumann_body"] == 1
+    assert {role["neumann_body"]: role["singular"] for role in document["roles"]} == {1: False, 2: True}
+    screen = call("advise", path).out
+    assert "these roles are refused: body2 can move rigidly" in screen
+    following = screen.splitlines()[-1].removeprefix("Next: ndtheory ")
+    run = call(*shlex.split(following), "--json").document
+    assert run["neumann_body"] == 1
+    assert run["converged"]
 
 
 # --- advise, from one run --------------------------------------------------------------------------------------------

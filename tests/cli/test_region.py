@@ -202,6 +202,13 @@ def test_region_refuses_two_bars(call, write, tmp_path):
     assert "friction" in complaint
 
 
+def test_region_refuses_a_contact_body_that_can_slide(call, write, tmp_path):
+    complaint = call(
+        "region", write({"body2.prescribed": '{ top = ["free", -0.015] }'}), "-o", tmp_path / "plane.svg"
+    ).complaint
+    assert "body2: no region is proved: C_t1 is infinite" in complaint
+
+
 def test_region_needs_the_name_of_a_picture(call, write):
     assert "-o" in call("region", write()).complaint
     assert "-o" in call("region", write(), "-o").complaint

@@ -149,6 +149,39 @@ def test_a_form_on_lifts_is_its_product_with_the_lift_of_elimination_in_rational
     assert np.array_equal(found, found.T)
 
 
+# --- semidefinite ----------------------------------------------------------------------------------------------------
+
+
+@st.composite
+def semidefinite(draw, most=7):
+    """Springs between points on a line that nothing holds: the kernel is what moves all of them by as much."""
+    n = draw(st.integers(2, most))
+    random = np.random.default_rng(draw(st.integers(0, 2**16)))
+    A = np.zeros((n, n), dtype=int)
+    for i in range(1, n):
+        for j in {i - 1, int(random.integers(i))}:
+            A[np.ix_([i, j], [i, j])] += random.integers(1, 5) * np.array([[1, -1], [-1, 1]])
+    interface = random.permutation(n)[: draw(st.integers(1, n))]
+    return fem_oracle.exactly(A), sp.csc_array(A.astype(float)), interface
+
+
+@given(semidefinite(), st.integers(0, 2**16))
+def test_what_nothing_holds_is_condensed_as_in_rationals_and_keeps_its_rigid_motion(case, seed):
+    A, floats, interface = case
+    found, lift = Condensation(floats, interface, singular=True), fem_oracle.lift(A, interface)
+    assert norm(fem_oracle.exactly(found.schur) - fem_oracle.schur(A, interface)) <= 4 * rounding(A, lift)
+    assert np.abs(found.schur.sum(axis=0)).max() <= 4 * rounding(A, lift)
+    G = np.random.default_rng(seed).integers(-4, 5, A.shape)
+    R = fem_oracle.zeros(len(A), len(interface))
+    R[interface, np.arange(len(interface))] = 1
+    R[fem_oracle.inner(len(A), interface)] = lift
+    exact = R.T @ fem_oracle.exactly(G + G.T) @ R
+    slack = 1e3 * len(A) * EPS * norm(G + G.T) * norm(R) ** 2
+    assert norm(fem_oracle.exactly(found.on_lifts(sp.csc_array((G + G.T).astype(float)))) - exact) <= slack
+    with pytest.raises(ValueError, match="singular: needed a definite one"):
+        found.solver()
+
+
 # --- on elastic bodies, against dense linear algebra ------------------------------------------------------------------
 
 

@@ -304,7 +304,7 @@ def test_what_is_no_problem_file_is_refused_with_its_name(tmp_path, content, nee
 @pytest.mark.parametrize(
     ("key", "value", "named"),
     [
-        ("body2.prescribed", {"top": ["free", 0]}, "body2"),
+        ("body1.fixed", [], "body1"),
         ("body1.fixed", ["bottom", "top"], "body1.fixed"),
         ("body2.x", [3, 4], "body2.x"),
         ("contact.interval", [0, 1], "contact.interval"),

@@ -10,7 +10,8 @@ from ndtheory.constants import take
 from ndtheory.energy import LARGEST, SMALLEST
 from ndtheory.sharp import predicted_rate, predicted_theta
 from verification.advice.readings import read_ratio
-from verification.advice.roles import UNITS, Advice, Role
+from verification.advice.role import Role
+from verification.advice.roles import UNITS, Advice
 
 
 def advise_run(theta: Any, ratio: Any) -> Advice:

@@ -13,14 +13,17 @@ import numpy as np
 from fem1d2d import largest
 from fem1d2d.mesh import Floats
 from ndtheory import EnergyConstants, Number, evaluate_sharp
+from ndtheory.sharp import predicted_rate, predicted_theta
 from verification.advice.readings import NextRun, RunReading, SeenRun
-from verification.algorithm.theta import Choice, automatic, sharp_bounds
+from verification.advice.role import Role
+from verification.algorithm.theta import automatic, by_prediction, sharp_bounds
 from verification.constants import measure
 from verification.document import Document
+from verification.interface.build import build
 from verification.interface.matrices import check_matrix, size
-from verification.interface.pair import ContactPair, TwoBodies
+from verification.interface.pair import ContactPair, SingularRole, TwoBodies
 from verification.operators import Pencils, needs_matrices, pair_or_bodies
-from verification.problem import Problem
+from verification.problem import Problem, load
 from verification.problem.tables import ProblemError
 from verification.progress import Progress, silent
 from verification.threads import one_thread
@@ -30,69 +33,6 @@ if TYPE_CHECKING:
 
 #: What is unknown of matrices and runs from elsewhere.
 UNITS = {"length": "any", "stress": "any"}
-
-
-@dataclass(frozen=True, kw_only=True)
-class Role:
-    """What is known of the iteration when one body gets the Neumann problem.
-
-    Attributes
-    ----------
-    neumann_body : {1, 2} or None
-        None where it is not known which body that is.
-    rho : Number or None
-        Stiffness of the contact body over that of the Neumann body, at worst; with rho_normal without friction.  None,
-        as all that rests on it, where the role is refused.
-    theta_proved : float or None
-        The theta of least proved factor.
-    factor_proved, theta_max_proved : Number or None
-    theta_predicted, rate_predicted : float or None
-        ``2/(2 + rho)`` and ``rho/(2 + rho)``: a prediction, proved without friction.
-    friction_threshold : Number or None
-        Friction below which every small theta is proved.
-    singular : bool
-        Whether the Neumann problem has no unique solution; such roles are refused, so always False here.
-    reason : mapping
-        Why a value is None.
-    theta_auto : Choice or None
-        What ``theta = "auto"`` takes in these roles; None where there is no problem file.
-    energy : EnergyConstants or None
-        What the proved values rest on; None where nothing is proved.
-    """
-
-    neumann_body: Literal[1, 2] | None
-    rho: Number | None
-    theta_proved: float | None
-    factor_proved: Number | None
-    theta_max_proved: Number | None
-    theta_predicted: float | None
-    rate_predicted: float | None
-    friction_threshold: Number | None
-    reason: Mapping[str, str]
-    singular: bool = False
-    theta_auto: Choice | None = None
-    energy: EnergyConstants | None = None
-
-    @property
-    def predicted(self) -> tuple[float, float]:
-        """``theta_predicted`` and ``rate_predicted``.
-
-        Raises
-        ------
-        ValueError
-            The role is refused.
-        """
-        if self.theta_predicted is None or self.rate_predicted is None:
-            raise ValueError(self.reason["rho"])
-        return self.theta_predicted, self.rate_predicted
-
-    def to_dict(self) -> dict[str, Any]:
-        """A member of ``roles``."""
-        values = {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "energy"}
-        values["reason"] = dict(self.reason)
-        if self.theta_auto is None:
-            values["reason"].setdefault("theta_auto", "no problem file")
-        return {name: v.to_dict() if isinstance(v, (Number, Choice)) else v for name, v in values.items()}
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -208,11 +148,17 @@ def advise(problem: Problem | ContactPair | Path | str, *, progress: Progress = 
     >>> found.neumann_body, round(found.best.theta_predicted, 6)
     (1, 0.857143)
     """
-    pair = pair_or_bodies(problem)
-    if isinstance(pair, TwoBodies):
-        roles = _roles_without_matrices(pair, progress)
-    else:
-        roles = (_role(pair), _exchanged(pair))
+    pair: ContactPair | TwoBodies
+    try:
+        pair = pair_or_bodies(problem)
+        roles = (
+            _roles_without_matrices(pair, progress) if isinstance(pair, TwoBodies) else (_role(pair), _exchanged(pair))
+        )
+    except SingularRole as error:
+        assert not isinstance(problem, ContactPair)  # made with roles that are not singular
+        given = problem if isinstance(problem, Problem) else load(problem)
+        pair = build(given.swapped())  # refused itself where contact holds that body, too
+        roles = (Role.refused(given.iteration.neumann_body, error), _role(pair))
     best = min((role for role in roles if role.rho is not None), key=lambda role: role.predicted[1])
     return Advice(
         neumann_body=best.neumann_body,
@@ -228,26 +174,17 @@ def _exchanged(pair: ContactPair) -> Role:
     """The other assignment of the roles, which may be refused."""
     try:
         return _role(pair.swapped())
-    except ProblemError as error:
-        why = error.needed
     except ValueError as error:
-        why = str(error)
-    values = [
-        name for name in Role.__dataclass_fields__ if name not in ("neumann_body", "reason", "singular", "energy")
-    ]
-    return Role(
-        neumann_body=1 if pair.neumann_body == 2 else 2,
-        **dict.fromkeys(values),  # type: ignore[arg-type]
-        reason=dict.fromkeys(values, f"these roles are refused: {why}"),
-    )
+        return Role.refused(pair.contact_body, error)
 
 
 def _role(pair: ContactPair) -> Role:
     measured = measure(pair)
     sharp = sharp_bounds(measured)
+    if measured.rho_max is None:
+        raise ProblemError(pair.source, "contact", None, f"no advice: {measured.why_no_energy}")
     if sharp is None:
-        why = next(iter(measured.reason.values()))
-        raise ProblemError(pair.source, "contact", None, f"no advice: {why}")
+        return _predicted_role(pair, measured.rho_max, measured.why_no_energy)
     outside = pair.outside
     threshold = None if outside else measured.friction_threshold
     if outside:
@@ -256,7 +193,7 @@ def _role(pair: ContactPair) -> Role:
     else:
         reason = {name: why for name, why in sharp.reason.items() if name in Role.__dataclass_fields__}
         if threshold is None:
-            reason["friction_threshold"] = "no law of friction"
+            reason["friction_threshold"] = measured.why_no_threshold
     return Role(
         neumann_body=pair.neumann_body,
         rho=sharp.rho,
@@ -269,6 +206,22 @@ def _role(pair: ContactPair) -> Role:
         reason=reason,
         theta_auto=automatic(sharp, outside, pair.settings.tolerance),
         energy=None if outside else measured.energy_constants(),
+    )
+
+
+def _predicted_role(pair: ContactPair, rho: Number, why: str) -> Role:
+    """A role of which rho is known, and of which no theorem speaks."""
+    return Role(
+        neumann_body=pair.neumann_body,
+        rho=rho,
+        theta_proved=None,
+        factor_proved=None,
+        theta_max_proved=None,
+        theta_predicted=float(predicted_theta(Fraction(rho.value))),
+        rate_predicted=float(predicted_rate(Fraction(rho.value))),
+        friction_threshold=None,
+        reason=dict.fromkeys(("theta_proved", "factor_proved", "theta_max_proved", "friction_threshold"), why),
+        theta_auto=by_prediction(rho.value, why),
     )
 
 

@@ -12,10 +12,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import null_space
-from scipy.linalg.lapack import dposv
 
 from fem1d2d.mesh import Floats
 from verification.contact.active_set import Pattern
+from verification.dense import STILL, Cholesky, vanishing
 from verification.interface.pair import ContactPair
 from verification.value import Value, freeze
 
@@ -71,14 +71,22 @@ class Piece(Value):
         if len(rows):
             load = -contact.stiffness @ carried
             load[:t] -= self.pattern.sliding[:, None] * self.bound
-            _, solved, failed = dposv(contact.stiffness[rows][:, rows], load[rows])
-            if failed:
-                raise np.linalg.LinAlgError("the stiffness of the contact body is not positive definite where it moves")
-            result[rows] = solved
+            result[rows] = Cholesky(contact.stiffness, rows, contact.motions).solve(load)[rows]
         held = np.flatnonzero(~contact.free)
         result[held] = -carried[held]
         freeze(result)
         return result
+
+    @property
+    def balanced(self) -> bool:
+        """Whether friction on this piece does no work in a rigid motion that it leaves free.
+
+        Where it does, the piece is none: a change of the bound sets the contact body in motion, or stops it.
+        """
+        moves = np.concatenate([self.pattern.sliding != 0, ~self.pattern.touching])
+        free = vanishing(self.pair.contact.motions, np.flatnonzero(~moves))
+        work = free[: len(self.sign)].T @ (self.pattern.sliding[:, None] * self.bound) if free.size else free
+        return float(np.abs(work).max(initial=0.0)) <= STILL * float(np.abs(self.bound).max(initial=0.0))
 
     @cached_property
     def reaction(self) -> Floats:

@@ -41,7 +41,9 @@ class FixedPointMap:
     def __init__(self, pair: ContactPair, solver: Solver = "auto", *, step: type[ContactStep] = ContactStep) -> None:
         self.pair = pair
         contact = pair.contact
-        self._step = step(contact.stiffness, contact.free, contact.grid.t, solver, pair.nearly_incompressible)
+        near, motions = pair.nearly_incompressible, contact.motions
+        body = f"body {pair.contact_body}"
+        self._step = step(contact.stiffness, contact.free, contact.grid.t, solver, near, motions, body)
         self._all_free = bool(contact.free.all())
 
     def __call__(self, g: Floats) -> tuple[Floats, ContactSolution]:

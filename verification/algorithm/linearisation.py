@@ -96,6 +96,8 @@ def _near(pair: ContactPair, iterate: Iterate, theta: float) -> _Near:
     if pair.contact.grid.n > MOST_NODES:
         raise NotLinear(f"{pair.contact.grid.n} contact nodes: T is linearised up to {MOST_NODES}")
     piece = piece_of(pair, iterate.g, iterate.contact.pattern)
+    if not piece.balanced:
+        raise NotLinear("contact and friction just hold the contact body: a change of g sets it in motion")
     basis, inverse = piece.basis, pair.neumann.flexibility
     J = piece.relaxed(theta)
     try:

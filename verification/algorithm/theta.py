@@ -9,7 +9,7 @@ from fractions import Fraction
 from typing import Any
 
 from ndtheory import SharpBounds, evaluate_sharp, exact
-from ndtheory.sharp import predicted_factor
+from ndtheory.sharp import predicted_factor, predicted_theta
 from verification.algorithm.relaxation import Rule, Step, rule_of
 from verification.constants import Measured, measure
 from verification.interface.pair import ContactPair
@@ -90,13 +90,14 @@ def choose(
     relaxation = rule_of(rule or pair.settings.relaxation)
     if wanted != "auto" and not relaxation.needs_rho:
         return Choice(theta=wanted, source="given")
-    sharp = sharp_bounds(measured or measure(pair))
-    if sharp is None:
+    measured = measured or measure(pair)
+    sharp = sharp_bounds(measured)
+    if measured.rho_max is None:
         of_rule = relaxation.needs_rho
         key, value = ("iteration.relaxation", relaxation.name) if of_rule else ("iteration.theta", "auto")
         needed = f"needed {'another rule' if of_rule else 'a number'}: rho does not exist here"
         raise ProblemError(pair.source, key, value, needed)
-    rho = sharp.rho.value
+    rho = (measured.rho_max if sharp is None else sharp.rho).value
     own = relaxation.own_step(rho) if relaxation.needs_rho else None
     if own is not None:
         why = f"the step of the {relaxation.words} for this rho"
@@ -107,7 +108,11 @@ def choose(
         return Choice(theta=below_one(own), source=relaxation.name, rho=rho, why=why, unused=unused)
     if wanted != "auto":
         return Choice(theta=wanted, source="given", rho=rho)
-    return automatic(sharp, pair.outside, pair.settings.tolerance)
+    return (
+        by_prediction(rho, measured.why_no_energy)
+        if sharp is None
+        else automatic(sharp, pair.outside, pair.settings.tolerance)
+    )
 
 
 def begin(
@@ -162,6 +167,12 @@ def automatic(sharp: SharpBounds, outside: Sequence[str] = (), tolerance: float 
     if sharp.friction_multiple is None:
         why = "without friction the predicted one is proved"
     return Choice(theta=proved, source="proved", rho=rho, why=why)
+
+
+def by_prediction(rho: float, why: str) -> Choice:
+    """The predicted theta, where no theorem speaks of the problem."""
+    theta = below_one(float(predicted_theta(Fraction(rho))))
+    return Choice(theta=theta, source="predicted", rho=rho, why=f"no theta is proved: {why}")
 
 
 def below_one(theta: float) -> Fraction:

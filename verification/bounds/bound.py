@@ -59,8 +59,8 @@ class Subject:
         The bodies; None where constants alone were given.
     measured : Measured or None
         The constants of the pair.
-    why : str
-        Why constants do not exist.
+    why, why_energy : str
+        Why the constants of Section 5, and those in energy norms, do not exist.
     exact : bool
         Whether a bound that can be brought closer to the Lipschitz constant is, however long that takes.
     """
@@ -70,6 +70,7 @@ class Subject:
     pair: ContactPair | None = None
     measured: Measured | None = None
     why: str = ""
+    why_energy: str = ""
     exact: bool = False
 
     @classmethod
@@ -80,7 +81,8 @@ class Subject:
             energy=measured.energy_constants(),
             pair=pair,
             measured=measured,
-            why=next(iter(measured.reason.values()), ""),
+            why=measured.why_no_constants,
+            why_energy=measured.why_no_energy,
             exact=exact,
         )
 
@@ -95,6 +97,7 @@ class Subject:
             pair=self.pair.at(friction=k),
             measured=measured,
             why=self.why,
+            why_energy=self.why_energy,
         )
 
 

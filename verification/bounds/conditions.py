@@ -24,6 +24,12 @@ Cones = NDArray[np.intp]
 #: How much the square of a form of length 1 may weigh that is 0: the more, the nearer to leaving it out.
 LARGE = 1e2
 
+#: Why no multipliers are sought where a rigid motion lifts the contact body off.
+LIFTS = (
+    "the contact body can be lifted rigidly, which only multipliers of (2.4) that are equal at all nodes allow, as"
+    " those of the sharp bound are; others are not sought"
+)
+
 #: Lengths and squares smaller than this are 0.
 TINY = 1e-300
 
@@ -92,7 +98,8 @@ class Conditions:
     Raises
     ------
     ValueError
-        A contact node is held, or there are more than :data:`verification.bounds.bound.LARGEST`.
+        A contact node is held, the contact body can be lifted rigidly, or there are more nodes than
+        :data:`verification.bounds.bound.LARGEST`.
     """
 
     def __init__(self, pair: ContactPair, measured: Measured, *, friction: float | None = None) -> None:
@@ -104,13 +111,15 @@ class Conditions:
         measured = measured.with_friction(k)
         constants = measured.energy_constants()
         if constants is None:
-            raise ValueError("rho does not exist: " + next(iter(measured.reason.values()), ""))
+            raise ValueError("the theorem in energy norms does not speak of it: " + measured.why_no_energy)
+        if pair.contact.lifts:
+            raise ValueError(LIFTS)
         self._measured = measured
         self.sharp = float(constants.at_work), float(constants.kappa_1), float(constants.kappa_2)
         contact, neumann, interface = pair.contact.grid, pair.neumann.grid, pair.interface
         carries = slice(0, contact.size) if k else contact.normal  # without friction p_T = 0
         # g = L_2 y and p = B z with L_2 L_2' = S_2 and B' S_1^-1 B = 1: |y| = |||g|||, |z| = |d_1|
-        L_2, flexible = pair.neumann.root, pair.contact.inverse
+        L_2, flexible = pair.neumann.root, pair.contact.inverse  # without friction pinned motions do not matter
         inner = flexible[carries, carries]
         turn = solve_triangular(np.linalg.cholesky(inner).T, np.eye(len(inner)), lower=False)
         B = np.zeros((contact.size, len(inner)))

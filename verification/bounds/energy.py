@@ -18,13 +18,14 @@ class Sharp(Bound):
 
     def evaluate(self, subject: Subject, theta: Any = None, *, progress: Progress = silent) -> BoundResult:
         if subject.energy is None:
-            return self.absent(subject.why)
+            return self.absent(subject.why_energy)
         found = evaluate_sharp(subject.energy, theta)
         friction = Thresholds(every=found.friction_multiple, some=found.friction_limit_multiple, on="multiple")
-        why = ""
+        why, without = "", False
         if subject.measured is not None:  # then they are known on k
             measured = subject.measured
             friction = Thresholds(every=measured.friction_threshold, some=measured.friction_limit, on="k")
+            without = measured.C_t1 is None  # at 0 alone: no friction is allowed
             if theta is not None and found.factor is None:
                 why = why_not(found.interval, friction.some, measured.friction, found.theta)
         return BoundResult(
@@ -34,7 +35,7 @@ class Sharp(Bound):
             factor=found.factor,
             one_minus_factor=found.one_minus_factor,
             interval=found.interval,
-            friction=Thresholds() if friction.every is None else friction,
+            friction=Thresholds() if friction.every is None and not without else friction,
             why=why,
             detail=found,
         )

@@ -22,12 +22,12 @@ from scipy.linalg.lapack import dpotrf
 from fem1d2d.mesh import Floats
 from verification.algorithm.affine_piece import Piece
 from verification.contact.active_set import Pattern
+from verification.dense import vanishing
 from verification.interface.pair import ContactPair
 from verification.threads import one_thread
 
 #: A sum of forces that cancels up to this share of their sizes may be 0.
 CANCELLED = 1e-6
-
 
 #: Digits by which values are told apart: the way uphill is the same however a processor rounds.
 DIGITS = 9
@@ -242,6 +242,10 @@ def responses(
     systems = contact.stiffness * (moves[:, :, None] & moves[:, None, :])
     diagonal = np.einsum("cii->ci", systems)
     diagonal[~moves] = 1.0
+    if contact.loose:  # motions that a pattern leaves free are pinned: its reaction does not know of them
+        for system, still in zip(systems, ~moves, strict=True):
+            free = vanishing(contact.motions, np.flatnonzero(still))
+            system += float(np.diag(contact.stiffness).max()) * free @ free.T
     load = np.where(moves, -contact.stiffness @ carried - rubbing, 0.0)
     jump = np.asarray(np.linalg.solve(systems, load[..., None])[..., 0], dtype=float)
     jump[:, ~contact.free] = -carried[~contact.free]

@@ -11,7 +11,7 @@ import numpy as np
 from verification.algorithm.runs import Outcome, run
 from verification.bounds.bound import NotComputed, Region, Subject
 from verification.bounds.table import BOUNDS
-from verification.constants import measure
+from verification.constants import SLIDES, measure
 from verification.document import Document
 from verification.interface.assembly import build
 from verification.interface.friction import LAWS
@@ -118,8 +118,10 @@ def chart(problem: Problem, *, progress: Progress = silent) -> Plane:
     if pair.outside:
         raise ProblemError(problem.source, "contact", None, f"no region is proved: {pair.outside[0]}")
     measured = measure(pair)
-    if measured.constants() is None:
-        raise ProblemError(problem.source, "contact", None, next(iter(measured.reason.values())))
+    if pair.contact.slides:
+        raise ProblemError(problem.source, f"body{pair.contact_body}", None, f"no region is proved: C_t1 is {SLIDES}")
+    if measured.constants() is None and measured.energy_constants() is None:
+        raise ProblemError(problem.source, "contact", None, measured.why_no_constants)
     if measured.friction_threshold is None or measured.friction_limit is None:
         raise ProblemError(problem.source, "contact.radius", None, "needed a law of friction to vary k")
     subject = Subject.of(pair, measured)

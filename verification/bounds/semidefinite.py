@@ -42,6 +42,8 @@ class Semidefinite:
     gave_up : str
         Why the solver proposed no multipliers at this theta, so that the known ones alone stand behind ``lipschitz``;
         empty where it did.
+    no_threshold : str
+        Why there is no friction threshold.
     """
 
     lipschitz: Number
@@ -51,6 +53,7 @@ class Semidefinite:
     theta_max: Number | None
     friction_threshold: Number | None
     gave_up: str = ""
+    no_threshold: str = "no law of friction"
 
     @property
     def factor(self) -> Number | None:
@@ -85,7 +88,7 @@ class Semidefinite:
         reasons = {
             "factor": self.why_no_factor,
             "theta_max": "no theta is proved to contract at this friction",
-            "friction_threshold": "no law of friction",
+            "friction_threshold": self.no_threshold,
         }
         reason = {name: reasons[name] for name, number in numbers.items() if number is None}
         return {
@@ -138,6 +141,7 @@ def work_out(
         theta_max=None if largest is None else Number.of_float(largest.value),
         friction_threshold=None if allowed is None else Number.of_float(allowed),
         gave_up=found.upper.gave_up,
+        no_threshold=measured.why_no_threshold,
     )
 
 
@@ -169,7 +173,9 @@ class SemidefiniteBound(Bound):
             factor=factor,
             one_minus_factor=None if factor is None else Number.of_float(1 - factor.value),
             interval=None if found.theta_max is None else (0.0, found.theta_max.value),
-            friction=Thresholds(every=allowed, on="any" if allowed is None else "k"),
+            friction=Thresholds(
+                every=allowed, on="k" if allowed is not None or subject.measured.C_t1 is None else "any"
+            ),
             why=found.why_no_factor,
             not_computed=found.gave_up if factor is None else "",
             detail=found,
@@ -194,6 +200,6 @@ class SemidefiniteBound(Bound):
                 found = QuadraticForms(pair, measured, friction=float(k)).largest_theta()
                 if found is not None:
                     kept.append((float(k), (0.0, found.value)))
-        except LMIError as error:
+        except (LMIError, ValueError) as error:
             raise NotComputed(str(error)) from None
         return Region(k=tuple(k for k, _ in kept), theta=tuple(ends for _, ends in kept), every=last, some=None)

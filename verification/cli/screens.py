@@ -209,7 +209,7 @@ class Parts(Listener):
             if computed:
                 bounds_table(computed, self.pair.units["stress"])
             else:
-                note("no bound applies: " + next(iter(measured.reason.values()), ""), "  ")
+                note("no bound applies: " + measured.why_no_energy, "  ")
 
     def run(self, finished: Run) -> None:
         with part(needed=self.needed):

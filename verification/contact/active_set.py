@@ -71,14 +71,17 @@ class System:
     S : array, shape (t + n, t + n)
     free : bool array, shape (t + n,)
     pattern : Pattern
+    motions : array, shape (t + n, k), optional
+        The kernel of S, where contact alone holds the body.  Motions that the pattern leaves free are pinned: the
+        force does not know of them, and where the loads work in one the equilibrium fails.
     """
 
-    def __init__(self, S: Floats, free: NDArray[np.bool_], pattern: Pattern) -> None:
+    def __init__(self, S: Floats, free: NDArray[np.bool_], pattern: Pattern, motions: Floats | None = None) -> None:
         self.pattern = pattern
         self._slides, self._open = pattern.sliding != 0, ~pattern.touching
         self.sign = pattern.sliding.astype(float)
         self._rows = np.flatnonzero(np.concatenate([self._slides, self._open]) & free)
-        self._columns, self._factor = S[self._rows], Cholesky(S, self._rows)
+        self._columns, self._factor = S[self._rows], Cholesky(S, self._rows, motions)
 
     def solve(self, q: Floats, bound: Floats) -> tuple[Floats, Floats]:
         """v and force, shape (t + n,) each."""
@@ -99,21 +102,23 @@ class ActiveSet:
     Parameters
     ----------
     S : array, shape (t + n, t + n)
-        Symmetric, positive definite on the free components.
+        Symmetric, positive definite on the free components but for the motions.
     free : bool array, shape (t + n,)
     tangential : int
         t.
+    motions : array, shape (t + n, k), optional
+        The kernel of S, where contact alone holds the body.
     """
 
-    def __init__(self, S: Floats, free: NDArray[np.bool_], tangential: int) -> None:
-        self._S, self._free, self._t = S, free, tangential
+    def __init__(self, S: Floats, free: NDArray[np.bool_], tangential: int, motions: Floats | None = None) -> None:
+        self._S, self._free, self._t, self._motions = S, free, tangential, motions
         self._held = None if free[:tangential].all() else ~free[:tangential]
         self._stiffness = float(np.diag(S).max())
         self._last: System | None = None
 
     def _system(self, pattern: Pattern) -> System:
         if self._last is None or self._last.pattern != pattern:
-            self._last = System(self._S, self._free, pattern)
+            self._last = System(self._S, self._free, pattern, self._motions)
         return self._last
 
     def _begin(self, start: Pattern, smooth: NDArray[np.bool_]) -> Pattern:

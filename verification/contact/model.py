@@ -27,13 +27,20 @@ class ContactModel:
         Held components are not variables: their v is a datum.
     tangential : int
         t.
+    motions : int
+        How many rigid motions contact alone holds: the dimension of the kernel of S.
     """
 
-    def __init__(self, S: Floats, free: NDArray[np.bool_], tangential: int) -> None:
+    def __init__(self, S: Floats, free: NDArray[np.bool_], tangential: int, motions: int = 0) -> None:
         rows = np.flatnonzero(free)
         self._rows = rows
         self._stiffness = float(np.diag(S).max())
-        factor = cholesky(S[np.ix_(rows, rows)] / self._stiffness)
+        block = S[np.ix_(rows, rows)] / self._stiffness
+        if motions:
+            values, vectors = np.linalg.eigh(block)
+            factor = np.sqrt(np.maximum(values[motions:], 0.0))[:, None] * vectors[:, motions:].T
+        else:
+            factor = cholesky(block)
         slides, presses = np.flatnonzero(rows < tangential), np.flatnonzero(rows >= tangential)
         self._v = cp.Variable(len(rows))
         self._q = cp.Parameter(len(rows))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fem1d2d.mesh import Floats
 from verification.contact.active_set import ActiveSet, Pattern
+from verification.contact.existence import way_out
 from verification.contact.kkt import KKT, TOLERANCE, Certificate
 from verification.interrupts import undisturbed
 from verification.value import Value
@@ -21,7 +22,7 @@ Solver = Literal["auto", "cvxpy", "active-set"]
 
 
 class ContactError(RuntimeError):
-    """No solver reached the KKT certificate."""
+    """Step II has no minimiser, or no solver reached the KKT certificate."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -66,15 +67,28 @@ class ContactStep:
         ``auto``: the program where the active set does not close with its certificate.
     near : str
         What an error should name besides, as a Poisson ratio near 1/2.
+    motions : array, shape (t + n, k), optional
+        Orthonormal traces of the rigid motions that contact alone holds: the kernel of S.
+    body : str
+        What an error calls the body.
     """
 
     def __init__(
-        self, S: Floats, free: NDArray[np.bool_], tangential: int, solver: Solver = "auto", near: str = ""
+        self,
+        S: Floats,
+        free: NDArray[np.bool_],
+        tangential: int,
+        solver: Solver = "auto",
+        near: str = "",
+        motions: Floats | None = None,
+        body: str = "the contact body",
     ) -> None:
         if solver not in ("auto", "cvxpy", "active-set"):
             raise ValueError(f"solver {solver!r}: needed 'auto', 'cvxpy' or 'active-set'")
         self._S, self._free, self._t, self._solver, self._near = S, free, tangential, solver, near
-        self._active, self._certificate = ActiveSet(S, free, tangential), Certificate(S, free)
+        self._body = body
+        self._motions = np.zeros((len(S), 0)) if motions is None or not motions.size else motions
+        self._active, self._certificate = ActiveSet(S, free, tangential, self._motions), Certificate(S, free)
         self._model: ContactModel | None = None
         self._pattern = Pattern.sticking(len(S) - tangential, tangential)
 
@@ -86,8 +100,11 @@ class ContactStep:
         Raises
         ------
         ContactError
+            Without a minimiser, or a certificate.
         """
         found = None if self._solver == "cvxpy" else self._by_active_set(q, bound, self._pattern, "active-set")
+        if found is None and (way := way_out(self._motions, q, bound)):
+            raise ContactError(f"step II has no minimiser: the loads move {self._body} {way}")
         if found is None and self._solver != "active-set":
             found = self._by_program(q, bound)
         if found is None:
@@ -118,7 +135,7 @@ class ContactStep:
     def _of_program(self, q: Floats, bound: Floats) -> ContactSolution | None:
         """What the convex program itself answers; None where it gives nothing."""
         if self._model is None:
-            self._model = contact_model()(self._S, self._free, self._t)
+            self._model = contact_model()(self._S, self._free, self._t, self._motions.shape[1])
         v = self._model.solve(q, bound)
         if v is None:
             return None

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fem1d2d.mesh import Floats
+from fem1d2d.mesh import Floats, Ints
+from verification.dense import STILL
 
 #: A solution is accepted below this relative KKT residual.
 TOLERANCE = 1e-11
@@ -188,7 +189,7 @@ class ContactSystem:
 
     def _equilibrium(self, branches: Branches) -> tuple[Floats, Floats] | None:
         """The linear system of given branches: no jump where a node touches or sticks, its bound where it slides."""
-        t, k = self.t, self.M.shape[1]
+        t = self.t
         rows = np.flatnonzero(np.concatenate([branches.sliding == 0, branches.touching]) & self.flexible)
         slides = np.flatnonzero((branches.sliding != 0) & self.flexible[:t])
         force = np.zeros(len(self.d0))
@@ -200,7 +201,8 @@ class ContactSystem:
             spread[slides] = law @ spread[t:]
         else:
             force[slides] = branches.sliding[slides] * self.given[slides]
-        matrix = np.block([[self.W[rows] @ spread, -self.M[rows]], [self.M.T @ spread, np.zeros((k, k))]])
+        works = self.M.T @ spread
+        matrix = np.block([[self.W[rows] @ spread, -self.M[rows]], [works, self._pins(rows, works)]])
         right = np.concatenate([(self.d0 - self.W @ force)[rows], self.resultant - self.M.T @ force])
         self.linear_solves += 1
         try:
@@ -208,6 +210,23 @@ class ContactSystem:
         except np.linalg.LinAlgError:
             return None
         return force + spread @ solved[: len(rows)], solved[len(rows) :]
+
+    def _pins(self, rows: Ints, works: Floats) -> Floats:
+        """What pins the rigid motions that no touching or sticking node feels, and no friction that follows forces.
+
+        It is exact: a solution exists only where the loads do no work in them.
+        """
+        k = self.M.shape[1]
+        if not k:
+            return np.zeros((0, 0))
+        size = float(np.abs(self.M).max())
+        _, values, right = (
+            np.linalg.svd(np.linalg.qr(self.M[rows], mode="r")) if len(rows) else (0, np.zeros(0), np.eye(k))
+        )
+        free = right[int((values > STILL * size).sum()) :].T
+        if not free.size or np.abs(free.T @ works).max(initial=0.0) > STILL * size:
+            return np.zeros((k, k))
+        return np.asarray(free @ free.T) * size**2 / float(np.diag(self.W).max())
 
     def _mend(self, branches: Branches, force: Floats, motion: Floats) -> Branches:
         """The branches that the signs ask for; a sliding node of the wrong sign goes to stick first."""

@@ -23,11 +23,12 @@ from fem1d2d import (
 )
 from fem1d2d.mesh import Floats, Ints
 from fem1d2d.trace import SAME, extent
+from verification.dense import STILL
 from verification.interface.body import Body, Condensed, Name
 from verification.interface.friction import Law
 from verification.interface.grid import Grid
 from verification.interface.joining import join
-from verification.interface.pair import ContactPair, TwoBodies
+from verification.interface.pair import ContactPair, SingularRole, TwoBodies
 from verification.problem.specification import MOST_CELLS, BodySpec, Problem
 from verification.problem.tables import ProblemError, short
 
@@ -54,7 +55,7 @@ def build(problem: Problem, *, law: Law | None = None, like: ContactPair | None 
     Raises
     ------
     ProblemError
-        As :func:`discretise`, and where a body is rigid or can move rigidly.
+        As :func:`discretise`, and where a body is rigid, or the one with the Neumann problem can move rigidly.
     """
     bodies, iteration = held_bodies(problem, law=law), problem.iteration
     known = (None, None) if like is None else (like.body1, like.body2)
@@ -109,19 +110,31 @@ def held_bodies(problem: Problem, *, law: Law | None = None, dense: bool = True)
             "needed another law on grids that differ: the iteration knows the forces of the Neumann grid, not those of"
             " the contact grid; `ndtheory solve` takes it",
         )
-    for body in bodies.elastic:
-        k = body.motions.shape[1]
-        if k:
-            neumann = iteration.neumann_body == int(body.name[-1])
-            step = "the Neumann problem of step I" if neumann else "the contact problem of step II"
-            raise ProblemError(
-                problem.source,
-                body.name,
-                None,
-                f"{body.name} can move rigidly ({k} free motion{'s' if k > 1 else ''}), so that its stiffness matrix in"
-                f" {step} is singular: fix or prescribe more of its sides, or use `ndtheory solve`",
-            )
+    _check_supports(bodies, dense=dense)
     return bodies
+
+
+def _check_supports(bodies: TwoBodies, *, dense: bool) -> None:
+    """Refuse bodies that the iteration cannot take: contact may hold the contact body, and no other."""
+    problem = bodies.problem
+    for body in bodies.elastic:
+        k, number = body.motions.shape[1], int(body.name[-1])
+        if not k:
+            continue
+        if number == problem.iteration.neumann_body:
+            raise SingularRole(problem.source, number, k)
+        moves = f"{body.name} can move rigidly"
+        if problem.dimension == 1:
+            needed = (
+                f"{moves}: its loads are its contact force, and nothing is left to iterate; `ndtheory solve` takes it"
+            )
+            raise ProblemError(problem.source, body.name, None, needed)
+        if not dense:
+            needed = f"{moves}: needed at most {MOST_CONTACT_NODES} contact nodes for a body that contact alone holds"
+            raise ProblemError(problem.source, body.name, None, needed)
+        if body.motion_traces.shape[1] < k:
+            needed = f"{moves} where no contact node feels it: fix or prescribe more of its sides"
+            raise ProblemError(problem.source, body.name, None, needed)
 
 
 def _condensed(body: Body, grid: Grid, upward: bool, like: Condensed | None) -> Condensed:
@@ -151,7 +164,7 @@ def discretise(problem: Problem, *, law: Law | None = None, dense: bool = True) 
     TooManyContactNodes
         More than MOST_CONTACT_NODES of them, for dense interface matrices.
     ProblemError
-        A body held by nothing but contact, bodies that do not meet, an interval outside the overlap or without nodes of
+        Bodies that can move rigidly together, or do not meet, an interval outside the overlap or without nodes of
         the contact body at its ends, Gamma_u holding the normal component of a contact node, an unreadable mesh.
     """
     meshes = [None if spec.rigid else _mesh(problem, name) for name, spec in _specs(problem)]
@@ -163,7 +176,24 @@ def discretise(problem: Problem, *, law: Law | None = None, dense: bool = True) 
         None if mesh is None else _body(problem, name, mesh, own, interface.contact.x[[0, -1]])
         for (name, _), mesh, own in zip(_specs(problem), meshes, nodes, strict=True)
     )
-    return TwoBodies(body1=body1, body2=body2, interface=interface, friction=problem.contact.friction, problem=problem)
+    bodies = TwoBodies(
+        body1=body1, body2=body2, interface=interface, friction=problem.contact.friction, problem=problem
+    )
+    if len(bodies.elastic) == 2 and _move_together(bodies):
+        needed = "body1 and body2 can move rigidly together, each held by the other alone: fix or prescribe some sides"
+        raise ProblemError(problem.source, "body2", None, needed)
+    return bodies
+
+
+def _move_together(bodies: TwoBodies) -> bool:
+    """Whether both bodies have a rigid motion in common that changes nothing between them."""
+    both = bodies.elastic
+    if not all(body.motions.shape[1] for body in both):
+        return False
+    carry = bodies.interface.carry
+    traces = {body.name: body.motion_traces for body in both}
+    jumps = np.hstack([carry(traces[body.name]) if body is bodies.neumann else traces[body.name] for body in both])
+    return bool(np.linalg.svd(jumps, compute_uv=False)[-1] <= STILL or jumps.shape[1] > jumps.shape[0])
 
 
 def _specs(problem: Problem) -> list[tuple[Name, BodySpec]]:
@@ -247,13 +277,6 @@ def _body(problem: Problem, name: Name, mesh: Mesh, nodes: Ints, ends: Floats) -
             f"({', '.join(f'{c:g}' for c in where)})",
         )
     motions = rigid_motions(mesh, known.known)
-    if motions.shape[2] and not known.known.any():
-        raise ProblemError(
-            problem.source,
-            name,
-            None,
-            f"{name} can move rigidly, held by nothing but contact: fix or prescribe some of its sides",
-        )
     material = plane_strain(float(spec.young), float(spec.poisson)) if d == 2 else bar(float(spec.young))
     matrix = stiffness(mesh, material)
     load = body_load(mesh, plain(spec.body_force))

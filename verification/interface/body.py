@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
 
@@ -15,12 +15,15 @@ from scipy.linalg import cholesky, qr
 
 from fem1d2d import Condensation, Material, Mesh, Supports, elimination_order, solver
 from fem1d2d.mesh import Floats, Ints
-from verification.dense import Cholesky
+from verification.dense import STILL, Cholesky
 from verification.interface.grid import Grid
 from verification.threads import one_thread
 from verification.value import Value, freeze
 
 Name = Literal["body1", "body2"]
+
+#: The traces of no rigid motion.
+NO_MOTIONS: Floats = freeze(np.zeros((0, 0)))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -49,7 +52,7 @@ class Body(Value):
     load : array
         Loads on the unknowns: body force, tractions, prescribed displacements.
     motions : array, shape (unknowns, k)
-        Rigid motions that only contact can hold; k = 0 in the iteration.
+        Rigid motions that only contact can hold; in the iteration only the contact body may have some.
     """
 
     name: Name
@@ -99,7 +102,7 @@ class Body(Value):
     @cached_property
     def elastic(self) -> Condensation:
         """The stiffness matrix condensed onto the interface."""
-        return Condensation(self.stiffness, self.interface, self.order)
+        return Condensation(self.stiffness, self.interface, self.order, singular=self.motions.shape[1] > 0)
 
     @cached_property
     def gram(self) -> Condensation:
@@ -131,6 +134,17 @@ class Body(Value):
         """Interface displacements that Gamma_u prescribes, 0 where it does not."""
         return np.concatenate([self.known.values[self.nodes, p] for p in range(self.mesh.dimension)])
 
+    @property
+    def motion_traces(self) -> Floats:
+        """Orthonormal traces on Gamma_c of the rigid motions that only contact holds, shape (2 n, rank)."""
+        if not self.motions.shape[1]:
+            return NO_MOTIONS
+        left, values, _ = np.linalg.svd(self.motions[self.interface], full_matrices=False)
+        rank = int((values > STILL).sum())
+        traces = np.zeros((len(self.unknown), rank))
+        traces[self.unknown] = left[:, :rank]
+        return traces
+
     def displacement(self, trace: Floats) -> Floats:
         """Displacement of all nodes for given interface values, shape (nodes, d), unit of length."""
         full = self.known.values.ravel().copy()
@@ -160,6 +174,8 @@ class Condensed(Value):
         The body on its mesh; None where only matrices are known.
     upward : bool
         Whether the normal components point along y, as those of ``body`` do.
+    motions : array, shape (2 n, k)
+        Orthonormal traces of the rigid motions that only contact holds: the kernel of S_a; of shape (0, 0) without.
     """
 
     grid: Grid
@@ -169,6 +185,22 @@ class Condensed(Value):
     free: NDArray[np.bool_]
     body: Body | None = None
     upward: bool = True
+    motions: Floats = field(default_factory=lambda: NO_MOTIONS)
+
+    @property
+    def loose(self) -> bool:
+        """Whether contact alone holds the body: S_a is then semidefinite."""
+        return bool(self.motions.size)
+
+    @property
+    def slides(self) -> bool:
+        """Whether a rigid motion that only contact holds is tangential somewhere on Gamma_c."""
+        return bool(np.abs(self.motions[self.grid.tangential]).max(initial=0.0) > STILL)
+
+    @property
+    def lifts(self) -> bool:
+        """Whether a rigid motion that only contact holds has a normal component on Gamma_c."""
+        return bool(np.abs(self.motions[self.grid.normal]).max(initial=0.0) > STILL)
 
     @property
     def summary(self) -> str:
@@ -194,7 +226,15 @@ class Condensed(Value):
         with one_thread():
             matrix[np.ix_(rows, rows)] = elastic.schur if times is None else times * elastic.schur
             load[rows] = elastic.condense(body.load)
-        return cls(grid=grid, stiffness=matrix, load=load, known=body.known_trace, free=body.unknown.copy(), body=body)
+        return cls(
+            grid=grid,
+            stiffness=matrix,
+            load=load,
+            known=body.known_trace,
+            free=body.unknown.copy(),
+            body=body,
+            motions=body.motion_traces,
+        )
 
     def turned(self) -> Condensed:
         """The same body with its normal components along the opposite direction."""
@@ -207,6 +247,7 @@ class Condensed(Value):
             free=self.free,
             body=self.body,
             upward=not self.upward,
+            motions=turn(self.motions) if self.loose else self.motions,
         )
 
     def orient(self, interface: Floats) -> Floats:
@@ -235,10 +276,13 @@ class Condensed(Value):
 
     @cached_property
     def _factor(self) -> Cholesky:
-        return Cholesky(self.stiffness, np.flatnonzero(self.free))
+        return Cholesky(self.stiffness, np.flatnonzero(self.free), self.motions)
 
     def flexibility(self, force: Floats) -> Floats:
-        """``S_a^-1 force`` on the free components, 0 on held ones, for one force or columns of them."""
+        """``S_a^-1 force`` on the free components, 0 on held ones, for one force or columns of them.
+
+        Where contact alone holds the body, its motions are pinned: right for forces that do no work in them.
+        """
         return self._factor.solve(force)
 
     @cached_property

@@ -2,7 +2,8 @@
 
 Arrays: S1, S2, load1, load2, x, weights, gap; x_neumann and weights_neumann, the nodes of the Neumann body; kernel and
 transfer where there are such; known1, known2, free1, free2 (which interface components Gamma_u leaves free, and the
-displacement of the others).  Texts: friction, neumann_body, dimension, theta, tolerance, max_iterations as numbers are
+displacement of the others); motions1 or motions2, where contact alone holds a body, an orthonormal basis of the kernel
+of its matrix.  Texts: friction, neumann_body, dimension, theta, tolerance, max_iterations as numbers are
 written; law and outside, the words of a law of friction; ndtheory, the version.  Interface vectors list all tangential
 components from left to right, then all normal ones along y.
 """
@@ -17,12 +18,13 @@ import numpy as np
 import scipy.sparse as sp
 
 from ndtheory import HypothesisError, __version__
+from verification.dense import pinned
 from verification.interface.array_headers import headers
-from verification.interface.body import Condensed
+from verification.interface.body import NO_MOTIONS, Condensed
 from verification.interface.friction import Given
 from verification.interface.grid import Grid
 from verification.interface.interface import Interface
-from verification.interface.matrices import UNREADABLE, check_matrix, check_nodes, real_array
+from verification.interface.matrices import ASYMMETRY, UNREADABLE, check_matrix, check_nodes, real_array
 from verification.interface.pair import ContactPair
 from verification.problem import ProblemError, Settings
 from verification.problem.specification import read_theta
@@ -41,6 +43,8 @@ def write_interface(pair: ContactPair, path: Path) -> None:
     arrays: dict[str, Any] = {}
     for i, side in enumerate(pair.along_y, 1):
         arrays |= {f"S{i}": side.stiffness, f"load{i}": side.load, f"known{i}": side.known, f"free{i}": side.free}
+        if side.loose:
+            arrays[f"motions{i}"] = side.motions
     arrays |= {
         "x": interface.contact.x,
         "weights": interface.contact.weights,
@@ -145,6 +149,8 @@ def _pair(arrays: dict[str, np.ndarray]) -> ContactPair:
         max_iterations=int(text("max_iterations", "500")),
     )
     check_nodes(grid.x, grid.weights, real_array("gap", arrays["gap"], (n,)))
+    if neumann.loose:
+        raise ValueError(f"motions{neumann_body}: needed none of the body with the Neumann problem")
     interface = Interface(
         contact=grid, neumann=other, gap=real_array("gap", arrays["gap"], (n,)), law=law, transfer=transfer
     )
@@ -160,11 +166,22 @@ def _side(arrays: dict[str, np.ndarray], i: int, grid: Grid) -> Condensed:
     if free.shape != size:
         raise ValueError(f"free{i}: needed {grid.size} truth values")
     stiffness = real_array(f"S{i}", arrays[f"S{i}"], (grid.size, grid.size))
-    check_matrix(f"S{i}", stiffness[np.ix_(free, free)])
+    motions = arrays.get(f"motions{i}", NO_MOTIONS)
+    if motions.size:
+        motions = real_array(f"motions{i}", motions, (grid.size, motions.shape[-1]))
+        scale = float(np.abs(stiffness).max())
+        if motions[~free].any() or np.abs(motions.T @ motions - np.eye(motions.shape[1])).max() > ASYMMETRY:
+            raise ValueError(f"motions{i}: needed orthonormal columns, 0 where free{i} is false")
+        if np.abs(stiffness @ motions).max() > ASYMMETRY * scale:
+            raise ValueError(f"motions{i}: needed a basis of the kernel of S{i}")
+        check_matrix(f"S{i}", pinned(stiffness, np.flatnonzero(free), motions))
+    else:
+        check_matrix(f"S{i}", stiffness[np.ix_(free, free)])
     return Condensed(
         grid=grid,
         stiffness=stiffness,
         load=real_array(f"load{i}", arrays[f"load{i}"], size),
         known=real_array(f"known{i}", arrays.get(f"known{i}", np.zeros(size)), size),
         free=free,
+        motions=motions,
     )

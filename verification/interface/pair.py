@@ -15,12 +15,38 @@ from verification.interface.body import Body, Condensed
 from verification.interface.interface import Interface
 from verification.problem import Problem, Settings
 from verification.problem.specification import MOST_FRICTION
+from verification.problem.tables import ProblemError
 from verification.value import Value, freeze
 
 #: Poisson ratio from which on linear triangles err visibly.  Two models against a mesh that does not lock (rectangles
 #: split by both diagonals, 72 cells along Gamma_c): at 0.48 the nodal pressures of the built-in split are off by 5 and
 #: 6 % (0.7 and 2.3 % at 0.3) and the force by 2 %, 7 to 11 % with 12 cells; at 0.499 the pressures by 40 and 11 %.
 LOCKING = 0.48
+
+
+class SingularRole(ProblemError):
+    """The body that would get the Neumann problem can move rigidly.
+
+    Parameters
+    ----------
+    source : str
+    body : {1, 2}
+    motions : int
+        How many rigid motions its supports leave.
+    """
+
+    def __init__(self, source: str, body: int, motions: int) -> None:
+        name, other = f"body{body}", 3 - body
+        free = f"{motions} free motion{'s' if motions > 1 else ''}"
+        super().__init__(
+            source,
+            name,
+            None,
+            f"{name} can move rigidly ({free}), so that its stiffness matrix in the Neumann problem of step I is"
+            f" singular: give body {other} the Neumann problem (iteration.neumann_body = {other}), fix or prescribe"
+            f" more sides of {name}, or use `ndtheory solve`",
+        )
+
 
 #: What is unknown of matrices from elsewhere.
 UNITS = {"length": "any", "stress": "any"}
@@ -185,11 +211,15 @@ class ContactPair(Value):
 
         Raises
         ------
+        SingularRole
+            Contact alone holds the contact body, which would get the Neumann problem.
         ProblemError
             The grids differ, and Gamma_c does not end at nodes of the other body.
         ValueError
             The grids differ, and the pair is made from matrices.
         """
+        if self.contact.loose:
+            raise SingularRole(self.source, self.contact_body, self.contact.motions.shape[1])
         if self.interface.transfer is not None and self.problem is not None:
             from verification.interface.assembly import build  # it makes pairs
 

@@ -118,7 +118,7 @@ class _Check:
         self.measured: Measured = measure(pair)
         constants = self.measured.energy_constants()
         if constants is None:
-            raise ValueError(next(iter(self.measured.reason.values())))
+            raise ValueError(self.measured.why_no_energy)
         self.constants = constants
         best = evaluate_sharp(constants)
         self.theta = below_one(best.theta_predicted if best.theta_proved is None else best.theta_proved)
