@@ -276,19 +276,20 @@ def test_constants_keep_the_meshes_that_were_measured(call, write, monkeypatch):
 
 def test_region_draws_the_runs_that_were_made(call, write, tmp_path, monkeypatch):
     from verification.bounds import region as plane
+    from verification.sweeps import sweep
 
     monkeypatch.setattr(plane, "THETAS", (0.2, 0.4))
     monkeypatch.setattr(plane, "FRICTIONS", (0.1, 0.3))
     monkeypatch.setattr("verification.bounds.semidefinite.LARGEST", 0)  # without the semidefinite bound
-    run, runs = plane.run, []
+    row, rows = sweep.row, []
 
-    def interrupt(*args, **options):
-        runs.append(options["theta"])
-        if len(runs) == 3:
+    def interrupt(*args):
+        rows.append(args)
+        if len(rows) == 3:
             signal.raise_signal(signal.SIGINT)
-        return run(*args, **options)
+        return row(*args)
 
-    monkeypatch.setattr(plane, "run", interrupt)
+    monkeypatch.setattr(sweep, "row", interrupt)
     answer = call("region", write(), "-o", tmp_path / "plane.svg", "--json")
     assert answer.status == 130
     assert len(answer.document["points"]) == 2

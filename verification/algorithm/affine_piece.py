@@ -11,13 +11,37 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import null_space
+from scipy.linalg import null_space, schur
 
-from fem1d2d.mesh import Floats
+from fem1d2d.mesh import Floats, Ints
 from verification.contact.active_set import Pattern
 from verification.dense import STILL, Cholesky, vanishing
 from verification.interface.pair import ContactPair
 from verification.value import Value, freeze
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Changes:
+    """The conditions that hold on an affine piece.
+
+    First every contact node keeps touching or stays open; then, in this order, what slips goes on, what sticks stays
+    below its bound on either side, and S sigma_N keeps its sign.
+
+    Attributes
+    ----------
+    speed : array
+        By how much a condition changes at most for a change of g of size 1 in the norm (5.21).
+    nodes : int array
+        The contact node of each condition.
+    slips, sticks, rubs : int array
+        Contact nodes that slip, that stick, and both, where friction can act.
+    """
+
+    speed: Floats
+    nodes: Ints
+    slips: Ints
+    sticks: Ints
+    rubs: Ints
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -118,10 +142,39 @@ class Piece(Value):
         basis: Floats = freeze(root @ kept)
         return basis
 
+    @cached_property
+    def jacobian(self) -> Floats:
+        """T' in the coordinates of ``basis``: there (5.21) is the Euclidean norm."""
+        jacobian: Floats = freeze(self.basis.T @ self.pair.neumann.flexibility(self.force @ self.basis))
+        return jacobian
+
     def relaxed(self, theta: float) -> Floats:
-        """The Jacobian J of T_theta in the coordinates of ``basis``: there (5.21) is the Euclidean norm."""
-        J = self.basis.T @ self.pair.neumann.flexibility(self.force @ self.basis)
-        return np.asarray(theta * J + (1 - theta) * np.eye(len(J)))
+        """The Jacobian J of T_theta in those coordinates."""
+        return np.asarray(theta * self.jacobian + (1 - theta) * np.eye(len(self.jacobian)))
+
+    @cached_property
+    def modes(self) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+        """A Schur form of the transpose of ``jacobian`` and its vectors, which serve the J of every theta."""
+        form, vectors = schur(self.jacobian.T, output="complex")
+        return freeze((np.asfortranarray(form), np.asfortranarray(vectors)))  # type: ignore[no-any-return]
+
+    @cached_property
+    def changes(self) -> Changes:
+        """How fast each condition of the piece comes nearer to its end."""
+        contact, neumann = self.pair.contact.grid, self.pair.neumann.grid
+        t, touching, basis, kernel = contact.t, self.pattern.touching, self.basis, self.pair.interface.kernel
+        jump, reaction = self.jump @ basis, self.reaction @ basis
+        rows, nodes = [np.where(touching[:, None], reaction[t:], -jump[t:])], [np.arange(contact.n)]
+        slips = sticks = rubs = np.zeros(0, dtype=np.intp)
+        if self.sign.any() and kernel is not None:
+            bound, sliding = self.bound @ basis, self.pattern.sliding
+            rubs = np.flatnonzero(self.sign)
+            slips, sticks = rubs[sliding[rubs] != 0], rubs[sliding[rubs] == 0]
+            rows += [sliding[slips, None] * jump[slips], bound[sticks] - reaction[sticks]]
+            rows += [bound[sticks] + reaction[sticks], self.sign[rubs, None] * (kernel[rubs] @ basis[neumann.normal])]
+            nodes += [slips, sticks, sticks, rubs]
+        speed: Floats = np.linalg.norm(np.vstack(rows), axis=1)
+        return Changes(speed=speed, nodes=np.concatenate(nodes), slips=slips, sticks=sticks, rubs=rubs)
 
     def factor(self, theta: float) -> float:
         """``|J|``: the Lipschitz constant of T_theta on this piece in the norm (5.21)."""

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import schur
+from scipy.linalg.lapack import ztrexc
 
 from fem1d2d.mesh import Floats
 from verification.algorithm.affine_piece import Piece, piece_of
@@ -86,7 +86,7 @@ class _Near:
         return float(np.linalg.norm(self.J @ error - error))
 
 
-def _near(pair: ContactPair, iterate: Iterate, theta: float) -> _Near:
+def _near(pair: ContactPair, iterate: Iterate, theta: float, piece: Piece | None = None) -> _Near:
     """Linearise T_theta at an iterate close to the solution: no node may change its state in between.
 
     Raises
@@ -95,7 +95,7 @@ def _near(pair: ContactPair, iterate: Iterate, theta: float) -> _Near:
     """
     if pair.contact.grid.n > MOST_NODES:
         raise NotLinear(f"{pair.contact.grid.n} contact nodes: T is linearised up to {MOST_NODES}")
-    piece = piece_of(pair, iterate.g, iterate.contact.pattern)
+    piece = piece or piece_of(pair, iterate.g, iterate.contact.pattern)
     if not piece.balanced:
         raise NotLinear("contact and friction just hold the contact body: a change of g sets it in motion")
     basis, inverse = piece.basis, pair.neumann.flexibility
@@ -139,7 +139,7 @@ def linearise(pair: ContactPair, iterate: Iterate, theta: float, history: Sequen
         while first > 0 and _same(piece, piece_of(pair, history[first - 1].g, history[first - 1].contact.pattern)):
             first -= 1
         start = near.error + piece.basis.T @ pair.neumann.flexibility(history[first].g - iterate.g)
-        excited = _excited(J, start)
+        excited = _excited(piece, theta, start)
         if observed is not None and first <= observed.begin:
             e = np.linalg.matrix_power(J, observed.begin - first) @ start
             steps = observed.end - observed.begin
@@ -153,6 +153,31 @@ def linearise(pair: ContactPair, iterate: Iterate, theta: float, history: Sequen
         margin=near.margin / size if size else float("inf"),
         predicted=predicted,
     )
+
+
+def linearised_rate(piece: Piece, iterate: Iterate, theta: float, first: Floats | None = None) -> float:
+    """The rate alone that :func:`linearise` gives, on a piece whose matrices other runs may have asked for.
+
+    Parameters
+    ----------
+    piece : Piece
+        That of the iterate.
+    iterate : Iterate
+        Close to the solution.
+    theta : float
+    first : array, optional
+        The g with which a run came onto this piece for good; its error decides what is excited.
+
+    Raises
+    ------
+    NotLinear
+        As for :func:`linearise`.
+    """
+    near = _near(piece.pair, iterate, theta, piece)
+    if first is None:
+        return float(np.abs(1 - theta + theta * np.diagonal(piece.modes[0])).max(initial=0.0))
+    start = near.error + piece.basis.T @ piece.pair.neumann.flexibility(first - iterate.g)
+    return _excited(piece, theta, start)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -234,47 +259,39 @@ def _same(a: Piece, b: Piece) -> bool:
 
 def _margin(piece: Piece, iterate: Iterate) -> tuple[float, int]:
     """Distance in the norm (5.21) from g to the next change of state, and the contact node it happens at."""
-    pair, contact, neumann = piece.pair, piece.pair.contact.grid, piece.pair.neumann.grid
-    t, touching = contact.t, piece.pattern.touching
-    v, force, basis = iterate.contact.v, iterate.contact.force, piece.basis
-    jump, reaction = piece.jump @ basis, piece.reaction @ basis
-    rows = [np.where(touching[:, None], reaction[t:], -jump[t:])]
-    slack = [np.where(touching, force[t:], -v[t:])]
-    nodes = [np.arange(contact.n)]
-    kernel = pair.interface.kernel
-    if piece.sign.any() and kernel is not None:
-        stress, limit, bound = pair.interface.stress(iterate.g), pair.bound(iterate.g), piece.bound @ basis
-        sliding, rubs = piece.pattern.sliding, piece.sign != 0
-        slips, sticks = np.flatnonzero(rubs & (sliding != 0)), np.flatnonzero(rubs & (sliding == 0))
-        rows += [sliding[slips, None] * jump[slips], bound[sticks] - reaction[sticks], bound[sticks] + reaction[sticks]]
+    pair, t, changes = piece.pair, piece.pair.contact.grid.t, piece.changes
+    v, force = iterate.contact.v, iterate.contact.force
+    slack = [np.where(piece.pattern.touching, force[t:], -v[t:])]
+    if len(changes.rubs):
+        stress, limit, sliding = pair.interface.stress(iterate.g), pair.bound(iterate.g), piece.pattern.sliding
+        slips, sticks = changes.slips, changes.sticks
         slack += [sliding[slips] * v[slips], limit[sticks] - force[sticks], limit[sticks] + force[sticks]]
-        rows.append(piece.sign[rubs, None] * (kernel[rubs] @ basis[neumann.normal]))
-        slack.append(np.abs(stress[rubs]))
-        nodes += [slips, sticks, sticks, np.flatnonzero(rubs)]
-    gradient = np.linalg.norm(np.vstack(rows), axis=1)
+        slack.append(np.abs(stress[changes.rubs]))
     with np.errstate(divide="ignore", invalid="ignore"):
-        distance = np.where(gradient > 0, np.concatenate(slack) / gradient, np.inf)
+        distance = np.where(changes.speed > 0, np.concatenate(slack) / changes.speed, np.inf)
     least = int(np.argmin(distance))
-    return float(distance[least]), int(np.concatenate(nodes)[least])
+    return float(distance[least]), int(changes.nodes[least])
 
 
-def _excited(J: Floats, error: Floats) -> float:
+def _excited(piece: Piece, theta: float, error: Floats) -> float:
     """The largest modulus of an eigenvalue of J whose modes have a share of the error.
 
     The modes of modulus >= r have no share if and only if the error is orthogonal to the left invariant subspace of
-    those eigenvalues, which an ordered Schur form of J' spans with orthonormal columns.
+    those eigenvalues.  The first columns of a Schur form of J' whose eigenvalues fall in modulus span one after the
+    other; they are brought forward one by one until one shows.
     """
     size = float(np.linalg.norm(error))
     if size == 0.0:
         return 0.0
-    moduli = np.unique(np.abs(np.linalg.eigvals(J)))[::-1]
-    low, high = 0, len(moduli) - 1  # the first modulus that shows: by halving, as shares only grow
-    while low < high:
-        middle = (low + high) // 2
-        r = moduli[middle] * (1 - 1e-9)
-        _, vectors, count = schur(J.T, output="complex", sort=lambda z, r=r: abs(z) >= r)
-        if np.linalg.norm(vectors[:, :count].conj().T @ error) > SHARE * size:
-            high = middle
-        else:
-            low = middle + 1
-    return float(moduli[low])
+    form, vectors = piece.modes
+    seen, modulus = 0.0, 0.0
+    for first in range(len(form)):
+        moduli = np.abs(1 - theta + theta * np.diagonal(form)[first:])
+        largest = int(np.argmax(moduli))
+        modulus = float(moduli[largest])
+        if largest:
+            form, vectors, _ = ztrexc(form, vectors, first + largest + 1, first + 1)
+        seen += float(abs(np.vdot(vectors[:, first], error))) ** 2
+        if seen > (SHARE * size) ** 2:
+            break
+    return modulus

@@ -59,19 +59,26 @@ def observed_rate(pair: ContactPair, iterates: Sequence[Iterate]) -> ObservedRat
     nothing counts.
     """
     floors = [noise(pair, iterate) for iterate in iterates]
-    clear = [iterate.residual > CLEAR_OF_NOISE * floor for iterate, floor in zip(iterates, floors, strict=True)]
+    return rate_of([iterate.residual for iterate in iterates], floors, [each.contact.pattern for each in iterates])
+
+
+def rate_of(residuals: Sequence[float], floors: Sequence[float], patterns: Sequence[object]) -> ObservedRate | None:
+    """As :func:`observed_rate`, from the residuals, the noise of each and what can be compared of the patterns."""
+    clear = [residual > CLEAR_OF_NOISE * floor for residual, floor in zip(residuals, floors, strict=True)]
     count = clear.index(False) if False in clear else len(clear)
     if count < 3:
         return None
-    return rate_at_the_end(
-        [iterate.residual for iterate in iterates[:count]], floors[:count], settled(iterates[:count])
-    )
+    return rate_at_the_end(residuals[:count], floors[:count], _settled(patterns[:count]))
 
 
 def settled(iterates: Sequence[Iterate]) -> int:
     """From which iterate on the contact pattern is the last one."""
-    first = len(iterates) - 1
-    while first > 0 and iterates[first - 1].contact.pattern == iterates[-1].contact.pattern:
+    return _settled([iterate.contact.pattern for iterate in iterates])
+
+
+def _settled(patterns: Sequence[object]) -> int:
+    first = len(patterns) - 1
+    while first > 0 and patterns[first - 1] == patterns[-1]:
         first -= 1
     return first
 

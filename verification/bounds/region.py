@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from verification.algorithm.runs import Outcome, run
+from verification.algorithm.runs import Outcome
 from verification.bounds.bound import NotComputed, Region, Subject
 from verification.bounds.table import BOUNDS
 from verification.constants import SLIDES, measure
+from verification.contact import ContactError
 from verification.document import Document
 from verification.interface.assembly import build
 from verification.interface.friction import LAWS
-from verification.interface.pair import ContactPair
 from verification.interrupts import INTERRUPTED
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
 from verification.progress import Progress, silent
+from verification.sweeps.grid import Grid
+from verification.sweeps.row import Row
+from verification.sweeps.sweep import sweep_grid
 
 if TYPE_CHECKING:
     from verification.figures import Figure
@@ -128,7 +131,8 @@ def chart(problem: Problem, *, progress: Progress = silent) -> Plane:
     regions: dict[str, Region] = {}
     reason: dict[str, str] = {}
     points: list[Point] = []
-    cells = [(theta, k) for k in FRICTIONS for theta in THETAS]
+    limited = replace(pair.settings, relaxation="constant", max_iterations=MOST_STEPS)
+    grid = Grid.of({"theta": THETAS, "friction": FRICTIONS})
     reason |= dict.fromkeys((*BOUNDS, "points"), INTERRUPTED)
     try:
         for bound in BOUNDS.values():
@@ -137,29 +141,29 @@ def chart(problem: Problem, *, progress: Progress = silent) -> Plane:
                 del reason[bound.name]
             except NotComputed as error:
                 reason[bound.name] = str(error)
-        for point in _points(pair, cells, progress):
-            points.append(point)
-        del reason["points"]
+        found = sweep_grid(replace(pair, settings=limited), grid, progress=progress)
+        points = [_point(row) for row in found.rows]
+        if found.interrupted:
+            reason["points"] = f"interrupted after {len(points)} of {len(grid)} runs"
+        else:
+            del reason["points"]
     except KeyboardInterrupt:
         if not regions:
             raise
-        reason["points"] = f"interrupted after {len(points)} of {len(cells)} runs"
+        reason["points"] = f"interrupted after 0 of {len(grid)} runs"
     return Plane(
         title=problem.title, regions=regions, points=tuple(points), reason=reason, units=problem.units, problem=problem
     )
 
 
-def _points(pair: ContactPair, cells: Sequence[tuple[float, float]], progress: Progress) -> Iterator[Point]:
-    """What runs do at each theta and k."""
-    for i, (theta, k) in enumerate(cells):
-        progress(f"runs: theta = {theta:g}, k = {k:g}", i / len(cells))
-        finished = run(_rubbing(pair, k), theta=theta)
-        if finished.interrupted:
-            raise KeyboardInterrupt
-        yield Point(theta=theta, k=k, outcome=finished.outcome, iterations=finished.iterations)
+def _point(row: Row) -> Point:
+    """What a run did, of its row in a sweep.
 
-
-def _rubbing(pair: ContactPair, k: float) -> ContactPair:
-    """The same bodies at another friction, for runs of a limited length with a constant theta."""
-    settings = replace(pair.settings, relaxation="constant", max_iterations=MOST_STEPS)
-    return replace(pair.at(friction=k), settings=settings)
+    Raises
+    ------
+    ContactError
+        Step II did not reach its certificate.
+    """
+    if row["steps"] is None:
+        raise ContactError(row["reason"])
+    return Point(theta=row["theta"], k=row["friction"], outcome=row["outcome"], iterations=row["steps"])

@@ -70,6 +70,17 @@ def load(path: Path | str) -> Problem:
         ...
     verification.problem.tables.ProblemError: nowhere.toml: no such file
     """
+    return read_problem(read_file(path), str(path))
+
+
+def read_file(path: Path | str) -> dict[str, Any]:
+    """The tables of a TOML file; decimals are read exactly.
+
+    Raises
+    ------
+    ProblemError
+        No such file, not readable, not TOML.
+    """
     path = Path(path)
     name = str(path)
     why = unreadable(path, MOST_BYTES)
@@ -89,7 +100,7 @@ def load(path: Path | str) -> Problem:
         raise ProblemError(
             name, "", None, f"not TOML: {' '.join(str(error).split()) or type(error).__name__}"
         ) from None
-    return read_problem(data, name)
+    return data
 
 
 def read_problem(data: Mapping[str, Any], source: str) -> Problem:

@@ -1,0 +1,264 @@
+"""Constant relaxation on the affine pieces of T: many steps by a few products of matrices.
+
+While each contact node keeps what it does, T is affine.  Such steps are taken together, and every sign that step II
+asks for is then held against each of them.  Where one fails T is evaluated as elsewhere, with its certificate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from fem1d2d.mesh import Floats
+from verification.algorithm.affine_piece import Piece, piece_of
+from verification.algorithm.fixed_point import FixedPointMap, iterate_at
+from verification.algorithm.iterate import Iterate
+from verification.algorithm.linearisation import NotLinear
+from verification.contact.active_set import SLACK, Pattern, System
+from verification.interface.pair import ContactPair
+from verification.monolithic import SolveError, solution_force
+
+#: Steps that are taken together: few at first, as the pattern changes most then.
+FEWEST, MOST = 4, 64
+
+#: Pieces of one pair that are kept.
+KEPT = 64
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Steps:
+    """Consecutive evaluations of T on one piece, each an array over the steps.
+
+    Attributes
+    ----------
+    g, image : array, shape (2 n, steps)
+    residual, size, floor : array, shape (steps,)
+        ``|||T g - g|||``, ``|||T g|||`` and the rounding error of either, in the norm (5.21).
+    pattern, piece : object
+        Equal for steps of one contact pattern, and of one affine piece.
+    """
+
+    g: Floats
+    image: Floats
+    residual: Floats
+    size: Floats
+    floor: Floats
+    pattern: bytes
+    piece: tuple[bytes, ...]
+
+
+class Affine:
+    """T on one affine piece, with the signs that hold there.
+
+    Parameters
+    ----------
+    piece : Piece
+        Of a pair none of whose contact nodes is held.
+    """
+
+    def __init__(self, piece: Piece) -> None:
+        pair = piece.pair
+        contact, interface = pair.contact, pair.interface
+        self.piece, self.key = piece, key_of(piece)
+        unloaded = interface.carry(pair.neumann.unloaded)
+        obstacle = unloaded.copy()
+        obstacle[contact.grid.normal] += interface.gap
+        trace = interface.carry(pair.neumann.inverse)
+        start = contact.load - contact.stiffness @ obstacle  # q of step II at g = 0, where the bound is 0 as well
+        v, force = System(contact.stiffness, contact.free, piece.pattern).solve(start, np.zeros(contact.grid.t))
+        parts = [
+            (piece.reaction, force),
+            (piece.jump, v),
+            (-contact.stiffness @ trace, start),
+            (trace, unloaded),
+            (piece.force, interface.carry_back(force)),
+        ]
+        self._matrix = np.vstack([matrix for matrix, _ in parts])
+        self._offset = np.concatenate([offset for _, offset in parts])[:, None]
+        self._image = parts[-1]
+        self._stiffness = float(np.diag(contact.stiffness).max())
+        self._sliding = piece.pattern.sliding.astype(float)[:, None]
+
+    def relaxed(self, theta: float) -> tuple[Floats, Floats]:
+        """T_theta as a matrix and what it makes of 0."""
+        matrix, offset = self._image
+        relaxed = theta * matrix
+        relaxed[np.diag_indices_from(relaxed)] += 1 - theta
+        return relaxed, theta * offset
+
+    def on(self, g: Floats, norm: Norm) -> tuple[Steps, int]:
+        """T at the columns of g, and how many of them, from the first on, the signs of the piece admit."""
+        pair = self.piece.pair
+        interface, t = pair.interface, pair.contact.grid.t
+        found, size = self._matrix @ g + self._offset, pair.contact.grid.size
+        force, v, q, trace = (found[i * size : (i + 1) * size] for i in range(4))
+        image = found[4 * size :]
+        if pair.rubs and interface.kernel is not None:
+            stress = interface.kernel @ g[pair.neumann.grid.normal]
+            bound = norm.limits * np.abs(stress)
+            kept = (np.sign(stress) == self.piece.sign[:, None]).all(axis=0)
+        else:
+            bound, kept = np.zeros((t, g.shape[1])), np.ones(g.shape[1], dtype=bool)
+        slack = SLACK * np.maximum(np.abs(q).max(axis=0), bound.max(axis=0, initial=0.0))
+        # the conditions of the active set, at every step
+        kept &= (force[t:] >= -slack).all(axis=0) & (v[t:] <= slack / self._stiffness).all(axis=0)
+        kept &= (np.abs(force[:t]) <= bound + slack).all(axis=0)
+        kept &= ((self._sliding * v[:t] >= -slack / self._stiffness) | (bound == 0)).all(axis=0)
+        steps = Steps(
+            g=g,
+            image=image,
+            residual=norm.of(image - g),
+            size=norm.of(image),
+            floor=norm.rounding(g, trace),
+            pattern=self.key[0],
+            piece=self.key,
+        )
+        return steps, len(kept) if kept.all() else int(np.argmin(kept))
+
+
+class Norm:
+    """The norm (5.21) of columns, and the noise of :func:`verification.algorithm.rates.noise`."""
+
+    def __init__(self, pair: ContactPair) -> None:
+        self._factor = np.linalg.inv(pair.neumann.root)
+        self._back = pair.interface.carry_back(np.eye(pair.contact.grid.size))
+        self._stiffness, self._load = np.abs(pair.contact.stiffness), np.abs(pair.contact.load)[:, None]
+        self.limits = (float(pair.friction) * pair.contact.grid.weights)[:, None]
+
+    def of(self, force: Floats) -> Floats:
+        """``sqrt(force' S2^-1 force)`` of every column."""
+        return lengths(self._factor @ force)
+
+    def rounding(self, g: Floats, trace: Floats) -> Floats:
+        """The rounding error of T at every column."""
+        reaction = self._stiffness @ np.abs(trace) + self._load
+        magnitude = np.abs(self._back @ reaction) + np.abs(g)
+        return 4 * np.finfo(float).eps * self.of(magnitude)
+
+
+def lengths(columns: Floats) -> Floats:
+    """The Euclidean norm of every column."""
+    found: Floats = np.sqrt(np.einsum("ij,ij->j", columns, columns))
+    return found
+
+
+def key_of(piece: Piece) -> tuple[bytes, ...]:
+    """Equal for equal pieces of one pair; its first member is the pattern."""
+    return piece.pattern.key, piece.sign.tobytes(), piece.still.tobytes()
+
+
+class Pieces:
+    """What the runs of one pair share: its affine pieces, and the solution of the global method.
+
+    Parameters
+    ----------
+    pair : ContactPair
+    """
+
+    def __init__(self, pair: ContactPair) -> None:
+        self.pair = pair
+        self._found: dict[tuple[bytes, ...], Piece] = {}
+        self._affine: dict[tuple[bytes, ...], Affine] = {}
+
+    def piece(self, g: Floats, pattern: Pattern) -> Piece:
+        """The piece around g."""
+        new = piece_of(self.pair, g, pattern)
+        if len(self._found) >= KEPT:
+            self._found.clear()
+            self._affine.clear()
+        return self._found.setdefault(key_of(new), new)
+
+    def affine(self, piece: Piece) -> Affine:
+        """T on a piece."""
+        key = key_of(piece)
+        if key not in self._affine:
+            self._affine[key] = Affine(piece)
+        return self._affine[key]
+
+    @cached_property
+    def norm(self) -> Norm:
+        """The norm (5.21) of columns."""
+        return Norm(self.pair)
+
+    @cached_property
+    def _solution(self) -> Iterate | Exception:
+        if self.pair.problem is None:
+            return NotLinear("the run did not arrive, and without meshes the global method has nothing to solve")
+        try:
+            return iterate_at(FixedPointMap(self.pair), solution_force(self.pair))
+        except (SolveError, RuntimeError) as error:
+            return error
+
+    def solution(self) -> Iterate:
+        """T at the solution of the global method.
+
+        Raises
+        ------
+        NotLinear, SolveError, ContactError
+        """
+        if isinstance(self._solution, Exception):
+            raise self._solution
+        return self._solution
+
+    def steps(self, T: FixedPointMap, theta: float) -> Iterator[Steps]:
+        """The run with constant relaxation from g = 0, without end.
+
+        Parameters
+        ----------
+        T : FixedPointMap
+            Of the pair, new: which pattern it tries first depends on what it did before.
+        theta : float
+
+        Raises
+        ------
+        ContactError
+        """
+        g = np.zeros(self.pair.neumann.grid.size)
+        while True:
+            found = iterate_at(T, g)
+            piece = self.piece(g, found.contact.pattern)
+            yield self._single(found, piece)
+            g = theta * found.image + (1 - theta) * g
+            affine, count = self.affine(piece), FEWEST
+            kept = count
+            while kept == count:
+                with np.errstate(over="ignore", invalid="ignore"):  # of a run that diverges; no sign admits it
+                    taken, kept = affine.on(self._walk(affine, g, theta, count), self.norm)
+                if kept:
+                    yield _first(taken, kept)
+                    g = theta * taken.image[:, kept - 1] + (1 - theta) * taken.g[:, kept - 1]
+                if kept == count:
+                    kept = count = min(2 * count, MOST)
+
+    def _single(self, found: Iterate, piece: Piece) -> Steps:
+        g, trace = found.g[:, None], self.pair.interface.carry(found.displacement)[:, None]
+        residual, size = np.array([found.residual]), np.array([found.size])
+        key = key_of(piece)
+        floor = self.norm.rounding(g, trace)
+        return Steps(
+            g=g, image=found.image[:, None], residual=residual, size=size, floor=floor, pattern=key[0], piece=key
+        )
+
+    def _walk(self, affine: Affine, g: Floats, theta: float, count: int) -> Floats:
+        """The iterates of so many steps as columns."""
+        matrix, offset = affine.relaxed(theta)
+        walked = np.empty((len(g), count))
+        for i in range(count):
+            walked[:, i] = g
+            g = matrix @ g + offset
+        return walked
+
+
+def _first(steps: Steps, count: int) -> Steps:
+    return Steps(
+        g=steps.g[:, :count],
+        image=steps.image[:, :count],
+        residual=steps.residual[:count],
+        size=steps.size[:count],
+        floor=steps.floor[:count],
+        pattern=steps.pattern,
+        piece=steps.piece,
+    )

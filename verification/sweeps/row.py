@@ -1,0 +1,127 @@
+"""One row of a sweep: a function of a problem and the values of a grid, which never raises."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from ndtheory import HypothesisError
+from ndtheory.sharp import one_minus_square
+from verification.algorithm.relaxation import Rule, rule_of
+from verification.algorithm.theta import begin
+from verification.contact import ContactError
+from verification.interface.pair import ContactPair
+from verification.monolithic import SolveError
+from verification.problem.specification import Problem
+from verification.problem.tables import ProblemError
+from verification.sweeps.bodies import Bodies, Setting
+from verification.sweeps.course import Course, course
+from verification.threads import one_thread
+
+Row = dict[str, Any]
+
+#: The columns of a row after the values of the grid.
+RESULTS = (
+    *("iterations", "iterations_paper", "steps", "outcome", "observed_rate", "linearised_rate", "sharp_factor", "rho"),
+    "reason",
+)
+
+
+def row(problem: Problem | ContactPair, values: Mapping[str, Any], bodies: Bodies | None = None) -> Row:
+    """Run a problem with other values, and say what happened.
+
+    Parameters
+    ----------
+    problem : Problem or ContactPair
+    values : mapping
+        As :meth:`verification.sweeps.grid.Grid.rows` yields them: the name of an axis to its value.
+    bodies : Bodies, optional
+        What is condensed already, of the same problem; no digit of the row depends on it.
+
+    Returns
+    -------
+    dict
+        The values, the columns :data:`RESULTS`, and None where there is nothing, with ``reason`` in words.
+    """
+    shared = Bodies(problem) if bodies is None else bodies
+    found = _given(shared, values) | dict.fromkeys(RESULTS)
+    why: dict[str, str] = {}
+    try:
+        with one_thread():
+            setting = shared.setting(values)
+            found |= _of_pair(setting.pair)
+            why |= _run(found, setting, values)
+    except (ProblemError, HypothesisError) as error:
+        found["outcome"] = "refused"
+        why["outcome"] = str(error)
+    except (ContactError, SolveError) as error:
+        found["outcome"] = "failed"
+        why["outcome"] = str(error)
+    except Exception as error:  # the fault of one row costs no other row
+        found["outcome"] = "failed"
+        why["outcome"] = f"{type(error).__name__}: {error}"
+    found["reason"] = "; ".join(f"{name}: {' '.join(words.split())}" for name, words in why.items()) or None
+    return found
+
+
+def _given(bodies: Bodies, values: Mapping[str, Any]) -> Row:
+    """The columns of the grid; what does not vary is what the problem has."""
+    problem = bodies.problem
+    rule = values.get("rule", "constant" if problem is None else problem.iteration.relaxation)
+    start: Row = dict.fromkeys(("theta", "friction", "young1", "young2", "neumann_body"))
+    start |= {"refine": values.get("refine", 0), "law": None, "radius": None}
+    start["rule"] = rule.name if isinstance(rule, Rule) else rule
+    if problem is not None:
+        contact, theta = problem.contact, problem.iteration.theta
+        start |= {
+            "theta": None if theta == "auto" else float(theta),
+            "friction": float(contact.friction),
+            "neumann_body": problem.iteration.neumann_body,
+            "law": contact.law,
+            "radius": None if contact.radius is None else float(contact.radius),
+        }
+        bodies_of = (problem.body1, problem.body2)
+        start |= {f"young{i}": None if body.rigid else float(body.young) for i, body in enumerate(bodies_of, 1)}
+    if "young" in values:
+        start["young1"], start["young2"] = map(float, values["young"])
+    for name in ("theta", "friction", "radius"):
+        if name in values:
+            start[name] = None if values[name] == "auto" else float(values[name])
+    return start | {name: values[name] for name in ("neumann_body", "law") if name in values}
+
+
+def _of_pair(pair: ContactPair) -> Row:
+    """What the pair itself knows better than the problem: a friction, roles and a law of its own."""
+    law = pair.interface.law
+    found: Row = {"friction": float(pair.friction), "neumann_body": pair.neumann_body}
+    return found if law is None else found | {"law": law.name}
+
+
+def _run(found: Row, setting: Setting, values: Mapping[str, Any]) -> dict[str, str]:
+    """Fill the columns of a run; returns why some of them are None."""
+    pair, measured = setting.pair, setting.measured
+    found["rho"] = None if measured.rho_max is None else measured.rho_max.value
+    why = {} if measured.rho_max else {"rho": measured.reason["rho_max"]}
+    rule = rule_of(values.get("rule", pair.settings.relaxation))
+    chosen_rule, choice, step = begin(pair, values.get("theta"), rule, measured)
+    found |= {"theta": float(choice.theta), "rule": rule.name}
+    outside = pair.outside + ([words] if (words := rule.outside(pair.friction)) else [])
+    found["sharp_factor"] = None if outside else sharp_factor(setting.energy, float(choice.theta))
+    if found["sharp_factor"] is None:
+        why["sharp_factor"] = outside[0] if outside else "rho or the constants of friction do not exist"
+    went: Course = course(pair, chosen_rule, choice, step, setting.pieces)
+    found |= {
+        "iterations": went.steps if went.outcome == "converged" else None,
+        "iterations_paper": went.paper,
+        "steps": went.steps,
+        "outcome": went.outcome,
+        "observed_rate": went.observed_rate,
+        "linearised_rate": went.linearised_rate,
+    }
+    return why | dict(went.reason)
+
+
+def sharp_factor(energy: tuple[float, float, float] | None, theta: float) -> float | None:
+    """q(theta) of the theorem in energy norms, also where it is 1 or more; None where its constants do not exist."""
+    return None if energy is None else math.sqrt(max(1 - one_minus_square(theta, *energy), 0.0))
