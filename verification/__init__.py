@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from verification.problem.reading import load
     from verification.problem.specification import Problem
     from verification.problem.tables import ProblemError
+    from verification.sweeps.sweep import Sweep, sweep
 
 #: Where each public name lives.  No module at this level bears the name of a public function: it would hide it.
 _HOME = {
@@ -58,6 +59,7 @@ _HOME = {
     "Run": "algorithm.runs",
     "Solution": "monolithic",
     "SolveError": "monolithic",
+    "Sweep": "sweeps.sweep",
     "Iterate": "algorithm.iterate",
     "advise": "advice.roles",
     "advise_matrices": "advice.roles",
@@ -70,6 +72,7 @@ _HOME = {
     "measure": "constants",
     "run": "algorithm.runs",
     "solve": "monolithic",
+    "sweep": "sweeps.sweep",
     "verify": "ledger",
 }
 
@@ -88,6 +91,7 @@ __all__ = [
     "Run",
     "Solution",
     "SolveError",
+    "Sweep",
     "advise",
     "advise_matrices",
     "advise_run",
@@ -99,6 +103,7 @@ __all__ = [
     "measure",
     "run",
     "solve",
+    "sweep",
     "verify",
 ]
 

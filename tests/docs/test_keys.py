@@ -17,6 +17,7 @@ import pytest
 
 import verification as vf
 from verification.cli import main
+from verification.reproduce import READINGS, reproduce
 
 PAGE = (Path(__file__).parents[2] / "docs" / "json.md").read_text("utf-8")
 
@@ -181,7 +182,11 @@ def documents(folder: Path, small: vf.Problem) -> list[dict[str, Any]]:
         *(vf.advise(problem) for problem in (small, bars)),
         vf.advise_matrices(np.diag([2.0, 3.0]), np.eye(2)),
         *(vf.advise_run(theta, ratio) for theta, ratio in (("0.1", "1.4"), ("0.6", "0.7"), ("0.2", "0.5"))),
+        vf.sweep(small, theta=["0.5"], refine=[0, 8]),
+        vf.sweep(matrices, theta=["0.5"], young=[(1, 2)]),
+        vf.sweep(matrices, theta=["auto"], rule=["anderson"]),
         vf.verify(["5.30", "2.1", "thm-5.9"]),
+        reproduce(["fig5", "fig11"], readings=READINGS[:2]),
     ]
     return [result.to_dict() for result in results]
 

@@ -16,7 +16,7 @@ import click
 import ndtheory
 import verification
 from ndtheory import HypothesisError
-from verification.cli import calculator, choices, ledger, problems
+from verification.cli import calculator, choices, ledger, problems, reproducing, sweeping
 from verification.cli.console import (
     NOTHING,
     SHOWN,
@@ -58,6 +58,8 @@ for command in (
     problems.compare,
     choices.advise,
     choices.region,
+    sweeping.sweep,
+    reproducing.reproduce,
     ledger.verify,
 ):
     assert command.callback is not None

@@ -11,9 +11,11 @@ from verification.bounds.region import Plane
 from verification.cli import screens
 from verification.cli.advice_screen import advice
 from verification.cli.console import heard
+from verification.cli.sweep_screen import sweep
 from verification.comparison import Comparison
 from verification.constants import Measured
 from verification.monolithic import Solution
+from verification.sweeps.sweep import Sweep
 
 SCREENS: dict[type, Callable[[Any], None]] = {
     Measured: screens.constants,
@@ -22,6 +24,7 @@ SCREENS: dict[type, Callable[[Any], None]] = {
     Comparison: screens.comparison,
     Advice: advice,
     Plane: screens.plane,
+    Sweep: sweep,
 }
 
 

@@ -123,7 +123,7 @@ def example(name: str | None, as_json: bool) -> None:
         say(Examples().to_json())
     elif name is None:
         for key, title in titles.items():
-            say(f"  {key:12}  {title}")
+            say(f"  {key:14}  {title}")
         say()
         say("Next: ndtheory example section6 > my.toml; ndtheory compare my.toml")
     else:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import csv
 import os
 import tempfile
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -25,12 +26,16 @@ if TYPE_CHECKING:
     from verification.comparison import Comparison
     from verification.ledger import Ledger
     from verification.monolithic import Solution
+    from verification.reproduce import Reproduction
 
-Kind = Literal["run", "solve", "compare", "verify"]
+Kind = Literal["run", "solve", "compare", "verify", "reproduce"]
 
 _PICTURES = ("bodies.svg", "bodies.png", "residuals.svg", "residuals.png")
 
 _TABLES = ("contact.csv", "history.csv")
+
+#: The rows behind each figure of Section 6.
+_ROWS = ("fig5.csv", "fig10.csv", "fig11.csv", "fig12.csv")
 
 _MATRICES = ("interface.npz", "P.npz")
 
@@ -39,6 +44,7 @@ FILES: dict[Kind, tuple[str, ...]] = {
     "run": ("run.json", *_TABLES, *_MATRICES, *_PICTURES),
     "solve": ("solve.json", *_TABLES[:1], *_MATRICES[1:], *_PICTURES[:2]),
     "compare": ("compare.json", *_TABLES, *_MATRICES, *_PICTURES, "waterfall.svg", "waterfall.png", "report.html"),
+    "reproduce": ("reproduce.json", "reproduce.svg", "reproduce.png", *_ROWS),
     "verify": ("ledger.json", "ledger.md", "errata.md", "verdicts.json"),
 }
 
@@ -173,7 +179,7 @@ class Folder:
     Parameters
     ----------
     path : Path
-    kind : {'run', 'solve', 'compare', 'verify'}
+    kind : {'run', 'solve', 'compare', 'verify', 'reproduce'}
         What will be written: none of those files may be somebody else's.
 
     Raises
@@ -192,7 +198,7 @@ class Folder:
             raise ProblemError(str(path), "", None, f"needed a folder to write to: {why}") from None
         for name in FILES[kind]:
             check_ours(path / name)
-        if kind != "verify":
+        if kind not in ("verify", "reproduce"):
             _check_place(path / "problem.toml")  # a file of a user's stays as it is
 
     def write_problem(self, text: str) -> Path:
@@ -255,6 +261,21 @@ class Folder:
         if result.problem is not None and ours:
             _text(room / "problem.toml", f"{MARKS['.toml'].decode()}\n{result.problem.to_toml()}")
 
+    def write_reproduction(self, found: Reproduction) -> None:
+        """Write ``reproduce.json``, the rows behind each figure and the figures."""
+        from verification.figures import save
+
+        with staged(self.path, FILES["reproduce"]) as room:
+            _text(room / "reproduce.json", found.to_json())
+            for result in found.results:
+                names = list(dict.fromkeys(name for row in result.rows for name in row))
+                columns = {name: [row.get(name) for row in result.rows] for name in names}
+                units = "x, gap, slip in mm; pressure, shear, young1, young2 in MPa"
+                _csv(room / f"{result.figure}.csv", f"{result.figure} of Section 6, by reading; {units}", columns)
+            figure = found.plot()
+            for ending in ("png", "svg"):
+                save(figure, room / f"reproduce.{ending}")
+
     def write_ledger(self, ledger: Ledger) -> None:
         """Write ``ledger.json``, ``ledger.md``, and of a whole ledger ``errata.md`` and ``verdicts.json``."""
         from verification.ledger import sheets
@@ -280,9 +301,11 @@ def _text(path: Path, text: str) -> None:
 def _csv(path: Path, says: str, table: Mapping[str, Sequence[Any]]) -> None:
     """A table with a line of words above it, which readers of CSV take for a comment."""
     says = "".join(c if c.isprintable() else " " for c in says)
-    lines = [f"# ndtheory {__version__}: {says}", ",".join(table)]
-    lines += [",".join(str(value) for value in row) for row in zip(*table.values(), strict=True)]
-    _text(path, "\n".join(lines))
+    with path.open("w", encoding="utf-8", newline="") as file:
+        file.write(f"# ndtheory {__version__}: {says}\n")
+        rows = csv.writer(file, lineterminator="\n")
+        rows.writerow(table)
+        rows.writerows(zip(*table.values(), strict=True))
 
 
 def _pictures(room: Path, result: Run | Solution, comparison: Comparison | None = None) -> list[str]:

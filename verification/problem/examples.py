@@ -8,15 +8,35 @@ from importlib import resources
 
 from verification.problem.specification import Problem
 
+#: The meshes of Section 6 by their number of nodes: how often that of 60 nodes is halved.
+FAMILY = {60: 0, 190: 1, 666: 2, 2482: 3}
+
 
 def examples() -> dict[str, str]:
     """The built-in problem files by name, as text."""
     files = resources.files("verification") / "data"
-    return {
+    found = {
         entry.name.removesuffix(".toml"): entry.read_text("utf-8")
         for entry in sorted(files.iterdir(), key=lambda entry: entry.name)
         if entry.name.endswith(".toml")
     }
+    family = {f"section6-{nodes}": _member(found["section6"], nodes) for nodes in FAMILY}
+    return dict(
+        sorted({**found, **family}.items(), key=lambda item: (item[0].rstrip("0123456789"), len(item[0]), item[0]))
+    )
+
+
+def _member(section6: str, nodes: int) -> str:
+    """The file of Section 6 on a mesh of the paper: 10 x 2 cells below and 8 x 2 above, halved; the grids differ."""
+    n = 2 ** FAMILY[nodes]
+    return (
+        section6.replace(
+            "# The two-body model of Section 6,", f"# The two-body model of Section 6 on its mesh of {nodes} nodes,"
+        )
+        .replace('title = "Section 6, centred"', f'title = "Section 6, {nodes} nodes"')
+        .replace("cells = [40, 6]", f"cells = [{10 * n}, {2 * n}]")
+        .replace("cells = [24, 6]", f"cells = [{8 * n}, {2 * n}]")
+    )
 
 
 def example(name: str) -> Problem:

@@ -1,0 +1,146 @@
+"""The experiments of Section 6: readings, verdicts, and what stands behind them."""
+
+import csv
+import math
+
+import numpy as np
+import pytest
+
+import verification as vf
+from verification.interface.assembly import discretise
+from verification.interface.fields import ContactFields
+from verification.output.folder import Folder
+from verification.reproduce import FIGURES, READINGS, reproduce
+from verification.reproduce.claims import CLAIMS, Curve, curves_hold, share_as_printed, zones, zones_hold
+from verification.reproduce.experiments import Outcome, Reproduction, Result
+
+LITERAL = [reading for reading in READINGS if not reading.departs]
+CLAMPED = next(reading for reading in LITERAL if reading.top == "clamped")
+
+
+@pytest.mark.parametrize("nodes", [60, 190, 666, 2482])
+def test_the_family_has_the_paper_s_numbers_of_nodes_and_grids_that_differ(nodes):
+    problem = vf.example(f"section6-{nodes}")
+    bodies = discretise(problem)
+    assert sum(len(body.mesh.points) for body in bodies.elastic) == nodes
+    assert bodies.interface.transfer is not None
+    assert problem.refined(1).body1.cells == tuple(2 * n for n in problem.body1.cells)
+
+
+def test_readings_are_every_combination_and_four_leave_the_text_nowhere():
+    assert len(set(READINGS)) == len(READINGS) == 24
+    assert len(LITERAL) == 4
+    assert len({reading.name for reading in READINGS}) == 24
+    for reading in READINGS:
+        problem = reading.problem(60)
+        assert problem.iteration.neumann_body == reading.neumann_body
+        top = problem.body2.prescribed["top" if reading.moved == "whole top" else "moved"]
+        assert (top[0] is None) == (reading.top == "free to slide")
+        assert float(top[1]) == -0.015
+        assert ("Section 3" in " ".join(reading.departs)) == (reading.neumann_body == 2)
+
+
+def test_a_part_of_the_top_ends_at_its_share_of_the_length():
+    half = next(r for r in READINGS if r.moved == "left half" and r.position == "centred")
+    body = discretise(half.problem(190)).body2
+    held = body.mesh.points[body.known.known.any(axis=1), 0]
+    assert (held.min(), held.max()) == pytest.approx((0.4, 1.0))
+
+
+def fields(*states: str) -> ContactFields:
+    """A contact of 13 nodes over 1.2 mm in given states."""
+    x = np.linspace(0.4, 1.6, 13)
+    zero = np.zeros(13)
+    return ContactFields(x=x, weights=zero + 0.1, pressure=zero, shear=zero, gap=zero, slip=zero, status=states)
+
+
+PRINTED = ("stick",) * 6 + ("slip",) * 4 + ("open",) * 3
+
+
+def test_zones_are_read_off_half_way_between_nodes_and_must_be_those_of_figure_5():
+    printed = fields(*PRINTED)
+    assert [(s, round(a, 3), round(b, 3)) for s, a, b in zones(printed)] == [
+        ("stick", 0.0, 0.55), ("slip", 0.55, 0.95), ("open", 0.95, 1.2)
+    ]  # fmt: skip
+    assert zones_hold(printed)
+    assert share_as_printed(printed) == pytest.approx(1.1 / 1.2)
+    assert not zones_hold(fields("slip", *PRINTED[1:]))
+    assert not zones_hold(fields(*("stick",) * 4, *("slip",) * 6, *("open",) * 3))
+    assert not zones_hold(fields(*("stick",) * 13))
+    assert share_as_printed(fields(*("stick",) * 13)) == pytest.approx(0.5)
+
+
+def curve(**steps: int | None) -> Curve:
+    of = {float(f"0.{name[1:]}"): n for name, n in steps.items()}
+    return Curve(label="", steps=of, unrelaxed=of, rho=1.0)
+
+
+def test_a_curve_is_served_by_the_printed_theta_within_a_quarter_more_steps():
+    assert curve(t6=25, t8=20).cost == 1.25
+    assert curves_hold("fig11", [curve(t6=25, t8=20)])
+    assert not curves_hold("fig11", [curve(t6=25, t8=20), curve(t6=26, t8=20)])
+    assert curve(t6=None, t8=20).cost == math.inf
+    assert curve(t6=None, t8=None).fewest is None
+    assert curves_hold("fig10", [curve(t6=20), curve(t6=30)])
+    assert not curves_hold("fig10", [curve(t6=20), curve(t6=31)])
+    assert curves_hold("fig12", [curve(t6=20), curve(t6=31)])
+    assert curve(t5=20, t6=20, t8=24).best == (0.5, 0.6)
+
+
+def outcomes(held):
+    return tuple(Outcome(reading=reading, holds=holds) for reading, holds in zip(READINGS, held, strict=True))
+
+
+def test_a_figure_is_reproduced_where_every_reading_of_the_text_shows_it():
+    of_text = [not reading.departs for reading in READINGS]
+    assert Result(figure="fig10", outcomes=outcomes(of_text)).verdict == "reproduced"
+    one = [reading == CLAMPED for reading in READINGS]
+    assert Result(figure="fig10", outcomes=outcomes(one)).verdict == "reproduced under an assumption"
+    assert Result(figure="fig10", outcomes=outcomes([not held for held in of_text])).verdict != "reproduced"
+    assert Result(figure="fig10", outcomes=outcomes([False] * 24)).verdict == "not reproduced"
+    assert Result(figure="fig10", outcomes=outcomes([None] * 24)).verdict == "not reproduced"
+    together = Reproduction(results=(Result(figure="fig10", outcomes=outcomes(one)),))
+    assert together.closest == CLAMPED
+
+
+@pytest.fixture(scope="module")
+def found():
+    return reproduce(["fig5", "fig11"], readings=[CLAMPED])
+
+
+def test_steps_are_those_of_single_runs_by_both_rules(found):
+    (outcome,) = found.results[1].outcomes
+    problem = CLAMPED.problem(190).changed(friction="0.4")
+    run = vf.run(problem, theta="0.85")
+    strongest = outcome.curves[-1]
+    assert strongest.unrelaxed[0.85] == run.iterations
+    assert strongest.rho == pytest.approx(vf.measure(problem).rho_max.value, rel=1e-9)
+    assert strongest.steps[0.1] < strongest.unrelaxed[0.1]  # the increment test shrinks with theta
+    assert strongest.steps[0.85] == strongest.fewest
+
+
+def test_the_literal_reading_is_closed_everywhere_and_its_best_theta_is_not_the_printed_one(found):
+    zones_found, curves_found = (result.outcomes[0] for result in found.results)
+    assert "open" not in zones_found.contact.status
+    assert zones_found.holds is False
+    assert curves_found.holds is False
+    assert all(0.8 <= theta <= 0.9 for one in curves_found.curves for theta in one.best)
+
+
+def test_rows_figures_and_the_document_are_written_and_known_as_ours(found, tmp_path):
+    Folder(tmp_path, "reproduce").write_reproduction(found)
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {"reproduce.json", "reproduce.svg", "reproduce.png", "fig5.csv", "fig11.csv"}
+    lines = (tmp_path / "fig11.csv").read_text("utf-8").splitlines()
+    rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    assert len(rows) == 3 * 19
+    assert {row["reading"] for row in rows} == {CLAMPED.name}
+    assert "MPa" in lines[0]
+    Folder(tmp_path, "reproduce").write_reproduction(found)  # over its own files
+
+
+def test_unknown_figures_are_refused_and_every_claim_says_when_it_holds():
+    with pytest.raises(ValueError, match=r"fig7.*fig5, fig10, fig11, fig12"):
+        reproduce(["fig7"])
+    assert tuple(CLAIMS) == FIGURES
+    assert all(claim.says and claim.criterion for claim in CLAIMS.values())

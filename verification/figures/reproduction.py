@@ -1,0 +1,55 @@
+"""Figures of Section 6, run again, in the readings that come nearest."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from verification.figures.style import STATES, new_figure, styled
+from verification.reproduce.claims import PRINTED_THETA, ZONES
+from verification.reproduce.experiments import Reproduction, Result
+
+MARKERS = "osD^"
+SHADES = ("#0072B2", "#D55E00", "#009E73", "#000000")
+
+
+def draw_reproduction(found: Reproduction) -> Figure:
+    """One panel for each figure: that of the paper's text in grey, ours in the reading that comes nearest."""
+    results = found.results
+    with styled():
+        figure = new_figure(7.2, 2.9 * len(results))
+        for result, ax in zip(results, np.atleast_1d(figure.subplots(len(results), 1)), strict=True):
+            (_zones if result.figure == "fig5" else _curves)(result, ax)
+            ax.set_title(f"{result.figure}, {result.verdict}; nearest: {result.closest.reading.name}")
+    return figure
+
+
+def _zones(result: Result, ax: Any) -> None:
+    contact = result.closest.contact
+    if contact is None:
+        return
+    x = contact.x - contact.x[0]
+    ax.plot(x, contact.pressure, color="0.3", linewidth=0.8)
+    for state, colour in STATES.items():
+        here = np.array([status == state for status in contact.status])
+        ax.plot(x[here], contact.pressure[here], "o", color=colour, markersize=4, label=state)
+    for _, end in ZONES[:-1]:
+        ax.axvline(end, color="0.6", linestyle=":", label="printed ends of zones" if end == ZONES[0][1] else None)
+    ax.set_xlabel("x from the left end of Gamma_c (mm)")
+    ax.set_ylabel("pressure (MPa)")
+    ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+
+def _curves(result: Result, ax: Any) -> None:
+    ax.axvline(PRINTED_THETA, color="0.6", linestyle=":", label="printed best theta")
+    for curve, marker, shade in zip(result.closest.curves, MARKERS, SHADES, strict=False):
+        points = [(theta, n) for theta, n in curve.steps.items() if n is not None]
+        if points:
+            ax.plot(*zip(*points, strict=True), f"{marker}-", color=shade, markersize=3.5, label=curve.label)
+    ax.set_xlim(0, 1)
+    ax.set_yscale("log")
+    ax.set_xlabel("relaxation factor theta")
+    ax.set_ylabel("steps, increment test")
+    ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))

@@ -1,0 +1,237 @@
+"""The experiments of Section 6 in every reading: runs, and what they say of each figure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from verification.document import Document
+from verification.interface.fields import ContactFields
+from verification.monolithic import SolveError, solve
+from verification.problem.tables import ProblemError
+from verification.progress import Progress, silent
+from verification.reproduce.claims import CLAIMS, Curve, Verdict, curves_hold, share_as_printed, zones, zones_hold
+from verification.reproduce.readings import READINGS, Reading
+
+if TYPE_CHECKING:
+    from verification.figures import Figure
+
+FIGURES = tuple(CLAIMS)
+
+#: 0.05 to 0.95.
+THETAS = tuple(f"{n / 20:.2f}" for n in range(1, 20))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """What one reading makes of one figure.
+
+    Attributes
+    ----------
+    reading : Reading
+    holds : bool or None
+        None where the reading is refused.
+    closeness : float
+        How near it comes, between readings: the share of Gamma_c in the printed state, or the fewest steps over those
+        at 0.6 on the worst curve; 1 at best.
+    contact : ContactFields or None
+        Of Figure 5.
+    curves : tuple of Curve
+        Of the other figures.
+    reason : str
+        Why it is refused.
+    """
+
+    reading: Reading
+    holds: bool | None
+    closeness: float = 0.0
+    contact: ContactFields | None = None
+    curves: tuple[Curve, ...] = ()
+    reason: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """A member of ``readings``."""
+        shown: dict[str, Any] = {
+            "reading": self.reading.to_dict(),
+            "holds": self.holds,
+            "closeness": self.closeness,
+            "curves": [curve.to_dict() for curve in self.curves],
+            "zones": None,
+            "reason": self.reason,
+        }
+        if self.contact is not None:
+            shown["zones"] = [{"state": s, "from": low, "to": high} for s, low, high in zones(self.contact)]
+        return shown
+
+
+@dataclass(frozen=True, kw_only=True)
+class Result:
+    """A figure of the paper in all readings.
+
+    Attributes
+    ----------
+    figure : str
+    outcomes : tuple of Outcome
+    rows : tuple of dict
+        The runs behind it, with the name of the reading.
+    """
+
+    figure: str
+    outcomes: tuple[Outcome, ...]
+    rows: tuple[dict[str, Any], ...] = field(default=(), repr=False)
+
+    @property
+    def verdict(self) -> Verdict:
+        """Reproduced in every reading that does not leave the text, in some reading, or in none."""
+        of_text = [o.holds for o in self.outcomes if not o.reading.departs and o.holds is not None]
+        if of_text and all(of_text):
+            return "reproduced"
+        return "reproduced under an assumption" if any(o.holds for o in self.outcomes) else "not reproduced"
+
+    @property
+    def closest(self) -> Outcome:
+        """The reading that comes nearest; of equals the one that leaves the text least, and the first."""
+        return max(self.outcomes, key=lambda o: (bool(o.holds), o.closeness, -len(o.reading.departs)))
+
+    def to_dict(self) -> dict[str, Any]:
+        """A member of ``figures``."""
+        claim = CLAIMS[self.figure]
+        return {
+            "figure": self.figure,
+            "says": claim.says,
+            "criterion": claim.criterion,
+            "verdict": self.verdict,
+            "closest": self.closest.reading.name,
+            "readings": [outcome.to_dict() for outcome in self.outcomes],
+        }
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Reproduction(Document):
+    """Figures of Section 6, run again.
+
+    Attributes
+    ----------
+    results : tuple of Result
+    """
+
+    schema: ClassVar[str] = "ndtheory.reproduce/1"
+    units: ClassVar[Mapping[str, str]] = {"length": "mm", "stress": "MPa"}  # type: ignore[misc]
+
+    results: tuple[Result, ...]
+
+    @property
+    def summary(self) -> str:
+        return "; ".join(f"{result.figure}: {result.verdict}" for result in self.results)
+
+    @property
+    def closest(self) -> Reading:
+        """The reading that comes nearest to all figures together: most reproduced, then nearest in the mean."""
+        score = lambda reading: (
+            self.reproduced(reading),
+            sum(o.closeness for o in self._of(reading)),
+            -len(reading.departs),
+        )
+        return max((outcome.reading for outcome in self.results[0].outcomes), key=score)
+
+    def reproduced(self, reading: Reading) -> int:
+        """How many of the figures a reading reproduces."""
+        return sum(bool(outcome.holds) for outcome in self._of(reading))
+
+    def _of(self, reading: Reading) -> list[Outcome]:
+        return [o for result in self.results for o in result.outcomes if o.reading == reading]
+
+    def plot(self) -> Figure:
+        """The figures, in the readings that come nearest."""
+        from verification.figures import draw_reproduction
+
+        return draw_reproduction(self)
+
+    def content(self) -> dict[str, Any]:
+        return {
+            "figures": [result.to_dict() for result in self.results],
+            "closest": {"reading": self.closest.to_dict(), "reproduced": self.reproduced(self.closest)},
+        }
+
+
+def reproduce(
+    figures: Sequence[str] = FIGURES,
+    *,
+    readings: Sequence[Reading] = READINGS,
+    jobs: int = 1,
+    progress: Progress = silent,
+) -> Reproduction:
+    """Run the experiments behind figures of Section 6 in every reading.
+
+    Parameters
+    ----------
+    figures : sequence of {'fig5', 'fig10', 'fig11', 'fig12'}
+    readings : sequence of Reading
+    jobs : int
+        Processes for the runs.
+    progress : callable
+        Told what is run.
+
+    Returns
+    -------
+    Reproduction
+
+    Raises
+    ------
+    ValueError
+        An unknown figure.
+    """
+    for name in figures:
+        if name not in CLAIMS:
+            raise ValueError(f"no figure {name!r}; there are {', '.join(CLAIMS)}")
+    results, done, total = [], 0, len(figures) * len(readings)
+    for name in figures:
+        outcomes, rows = [], []
+        for reading in readings:
+            progress(f"{name}: {reading.name}", done / total)
+            outcome, behind = _zones(reading) if name == "fig5" else _curves(name, reading, jobs)
+            outcomes.append(outcome)
+            rows += [{"reading": reading.name, **row} for row in behind]
+            done += 1
+        results.append(Result(figure=name, outcomes=tuple(outcomes), rows=tuple(rows)))
+    return Reproduction(results=tuple(results))
+
+
+def _zones(reading: Reading) -> tuple[Outcome, list[dict[str, Any]]]:
+    """Figure 5: the states along Gamma_c, by the global method; a run finds the same, where there is one."""
+    try:
+        contact = solve(reading.problem(190)).contact
+    except (ProblemError, SolveError) as error:
+        return Outcome(reading=reading, holds=None, reason=str(error)), []
+    columns = contact.table()
+    rows = [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
+    return Outcome(
+        reading=reading, holds=zones_hold(contact), closeness=share_as_printed(contact), contact=contact
+    ), rows
+
+
+def _curves(name: str, reading: Reading, jobs: int) -> tuple[Outcome, list[dict[str, Any]]]:
+    """A figure of steps over theta."""
+    from verification.sweeps.sweep import sweep
+
+    claim = CLAIMS[name]
+    rows = [dict(row) for row in sweep(reading.problem(60), theta=THETAS, jobs=jobs, **claim.axes).rows]
+    of_curve = [rows[i : i + len(THETAS)] for i in range(0, len(rows), len(THETAS))]  # theta changes fastest
+    for label, some in zip(claim.labels, of_curve, strict=True):
+        for row in some:
+            row["curve"] = label
+    refused = next((row for row in rows if row["rho"] is None), None)
+    if refused is not None:
+        return Outcome(reading=reading, holds=None, reason=str(refused["reason"])), rows
+    curves = tuple(_curve(label, some) for label, some in zip(claim.labels, of_curve, strict=True))
+    worst = max(curve.cost for curve in curves)
+    near = 0.0 if math.isinf(worst) else 1 / worst
+    return Outcome(reading=reading, holds=curves_hold(name, curves), closeness=near, curves=curves), rows
+
+
+def _curve(label: str, rows: Sequence[Mapping[str, Any]]) -> Curve:
+    steps = {float(row["theta"]): row["iterations_paper"] for row in rows}
+    unrelaxed = {float(row["theta"]): row["iterations"] if row["outcome"] == "converged" else None for row in rows}
+    return Curve(label=label, steps=steps, unrelaxed=unrelaxed, rho=rows[0]["rho"])

@@ -1,0 +1,99 @@
+"""What the text of Section 6 leaves open, and each way to read it, named before any run.
+
+The text gives both rectangles, their moduli, nu = 0.3, k = 0.2, the displacement -0.015 mm of the upper body, and the
+numbers of nodes of four meshes.  Its pictures are not in the text: it does not say where the upper body sits, nor
+whether its top may slide.  Section 6 gives the Neumann problem to the first body, Section 3 to the second.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import product
+from typing import Any, Literal
+
+from verification.problem import Problem
+from verification.problem.examples import example
+
+#: Where the upper body, 1.2 mm long, sits on the lower one, 2 mm long.
+POSITIONS: dict[str, Fraction] = {"centred": Fraction(2, 5), "left edges aligned": Fraction(0)}
+
+#: Which part of the top is moved down: the share of its length from the left.
+MOVED: dict[str, Fraction] = {"whole top": Fraction(1), "left two thirds": Fraction(2, 3), "left half": Fraction(1, 2)}
+
+#: Whether what is moved may slide.
+TOPS = ("clamped", "free to slide")
+
+LENGTH, DOWN = Fraction(6, 5), Fraction(-15, 1000)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """One way to read Section 6.
+
+    Attributes
+    ----------
+    position : {'centred', 'left edges aligned'}
+    moved : {'whole top', 'left two thirds', 'left half'}
+    top : {'clamped', 'free to slide'}
+    neumann_body : {1, 2}
+        1, the lower body, as Section 6 has it, or 2 as Section 3.
+    """
+
+    position: str
+    moved: str
+    top: str
+    neumann_body: Literal[1, 2]
+
+    @property
+    def name(self) -> str:
+        """In a few words."""
+        moved = self.moved if self.moved == "whole top" else f"{self.moved} of the top"
+        return f"{self.position}, {moved} {self.top}, Neumann body {'lower' if self.neumann_body == 1 else 'upper'}"
+
+    @property
+    def departs(self) -> list[str]:
+        """Where it leaves the text of Section 6; empty where it only fills what the text leaves open."""
+        found = [] if self.moved == "whole top" else [f"only the {self.moved} of the top is moved"]
+        return found + ([] if self.neumann_body == 1 else ["the roles of the bodies are those of Section 3"])
+
+    @property
+    def assumes(self) -> list[str]:
+        """What it assumes where the text is silent."""
+        return [
+            f"the upper body is {self.position}" if self.position == "centred" else self.position,
+            f"top {self.top}",
+        ]
+
+    def problem(self, nodes: int = 60) -> Problem:
+        """The problem on a mesh of the family.
+
+        Parameters
+        ----------
+        nodes : {60, 190, 666, 2482}
+        """
+        start = POSITIONS[self.position]
+        ends = [start, start + LENGTH]
+        down: list[Any] = [0 if self.top == "clamped" else "free", DOWN]
+        keys: dict[str, Any] = {"x": ends}
+        if self.moved == "whole top":
+            keys["prescribed"] = {"top": down}
+        else:
+            keys["parts"] = {"moved": {"side": "top", "x": [start, start + MOVED[self.moved] * LENGTH]}}
+            keys["prescribed"] = {"moved": down}
+        base = example(f"section6-{nodes}").to_dict()
+        base["title"] = f"Section 6, {self.name}, {nodes} nodes"
+        base["body2"] = {key: value for key, value in base["body2"].items() if key != "prescribed"} | keys
+        base["iteration"]["neumann_body"] = self.neumann_body
+        return Problem.from_dict(base)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object ``reading`` of a document."""
+        return {**vars(self), "name": self.name, "departs": self.departs, "assumes": self.assumes}
+
+
+#: Every combination; nothing was left out after a run.
+READINGS: tuple[Reading, ...] = tuple(
+    Reading(position=position, moved=moved, top=top, neumann_body=role)  # type: ignore[arg-type]
+    for moved, role, position, top in product(MOVED, (1, 2), POSITIONS, TOPS)
+)
