@@ -66,7 +66,7 @@ class Moduli:
         return 3 - 4 * nu if self.plane == "strain" else (3 - nu) / (1 + nu)
 
     @property
-    def contact(self) -> Fraction:
+    def e_star(self) -> Fraction:
         """``E* = 8 G/(kappa + 1)``: ``E/(1 - nu^2)`` in plane strain, E in plane stress; unit stress."""
         return 8 * self.shear / (self.kappa + 1)
 
@@ -97,7 +97,7 @@ def half_planes(contact: Moduli, neumann: Moduli) -> HalfPlanes:
     HalfPlanes(high=Fraction(18, 35), low=Fraction(10, 63), free=Fraction(2, 7))
     """
     ratio = contact.shear / neumann.shear
-    return HalfPlanes(high=ratio * neumann.kappa, low=ratio / contact.kappa, free=contact.contact / neumann.contact)
+    return HalfPlanes(high=ratio * neumann.kappa, low=ratio / contact.kappa, free=contact.e_star / neumann.e_star)
 
 
 def wedge(opening: float) -> tuple[float, float]:
@@ -161,7 +161,7 @@ def end(contact: Moduli, neumann: Moduli, openings: tuple[float, float]) -> tupl
     trace = along_c * n_22 + across_c * n_11
     root = math.sqrt(max((along_c * n_22 - across_c * n_11) ** 2 + 4 * along_c * across_c * cross**2, 0.0))
     larger = (trace + root) / (2 * det_n)
-    ratio = float(contact.contact / neumann.contact)
+    ratio = float(contact.e_star / neumann.e_star)
     return ratio * det_c / (det_n * larger), ratio * larger
 
 

@@ -74,7 +74,7 @@ def test_a_wedge_resists_by_the_integral_of_its_radial_stresses(alpha):
 
 @given(bodies, bodies, angles, angles)
 def test_an_end_has_the_extremal_ratios_of_both_wedges_in_one_frame(contact, neumann, upper, lower):
-    ratio = float(contact.contact / neumann.contact)
+    ratio = float(contact.e_star / neumann.e_star)
     expected = ratio * eigh(spread(0, upper), spread(-lower, 0), eigvals_only=True)
     assert end(contact, neumann, (upper, lower)) == pytest.approx(expected, rel=1e-7)
 

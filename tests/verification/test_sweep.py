@@ -102,7 +102,7 @@ def test_what_is_null_has_a_reason_and_nothing_else_has(wide):
 
 
 def test_a_row_does_not_depend_on_the_rows_before_it(wide):
-    values = list(grid.Grid.of(WIDE).rows())
+    values = list(grid.SweepGrid.of(WIDE).rows())
     bodies = Bodies(SMALL)
     backwards = [row(SMALL, each, bodies) for each in reversed(values)]
     assert tuple(reversed(backwards)) == wide.rows

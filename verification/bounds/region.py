@@ -20,7 +20,7 @@ from verification.interrupts import INTERRUPTED
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
 from verification.progress import Progress, silent
-from verification.sweeps.grid import Grid
+from verification.sweeps.grid import SweepGrid
 from verification.sweeps.row import Row
 from verification.sweeps.sweep import sweep_grid
 
@@ -132,7 +132,7 @@ def chart(problem: Problem, *, progress: Progress = silent) -> Plane:
     reason: dict[str, str] = {}
     points: list[Point] = []
     limited = replace(pair.settings, relaxation="constant", max_iterations=MOST_STEPS)
-    grid = Grid.of({"theta": THETAS, "friction": FRICTIONS})
+    grid = SweepGrid.of({"theta": THETAS, "friction": FRICTIONS})
     reason |= dict.fromkeys((*BOUNDS, "points"), INTERRUPTED)
     try:
         for bound in BOUNDS.values():

@@ -98,8 +98,10 @@ class Difference:
     Attributes
     ----------
     setting : Setting
-    force, reaction : array
-        Nodal forces on the Neumann grid: ``psi - psi~`` and ``T psi - T psi~``.
+    force : array
+        ``psi - psi~``, nodal forces on the Neumann grid.
+    reaction : array
+        ``T psi - T psi~``, on the same grid.
     d_1, d_2 : array
         Traces of ``w^1 - w~^1`` on the contact grid and of ``w^2 - w~^2`` on the Neumann grid, unit of length.
     friction : float

@@ -13,7 +13,7 @@ from verification.monolithic import SolveError, solve
 from verification.problem.tables import ProblemError
 from verification.progress import Progress, silent
 from verification.reproduce.claims import CLAIMS, Curve, Verdict, curves_hold, share_as_printed, zones, zones_hold
-from verification.reproduce.readings import READINGS, Reading
+from verification.reproduce.readings import READINGS, ModelReading
 
 if TYPE_CHECKING:
     from verification.figures import Figure
@@ -30,7 +30,7 @@ class Outcome:
 
     Attributes
     ----------
-    reading : Reading
+    reading : ModelReading
     holds : bool or None
         None where the reading is refused.
     closeness : float
@@ -44,7 +44,7 @@ class Outcome:
         Why it is refused.
     """
 
-    reading: Reading
+    reading: ModelReading
     holds: bool | None
     closeness: float = 0.0
     contact: ContactFields | None = None
@@ -127,7 +127,7 @@ class Reproduction(Document):
         return "; ".join(f"{result.figure}: {result.verdict}" for result in self.results)
 
     @property
-    def closest(self) -> Reading:
+    def closest(self) -> ModelReading:
         """The reading that comes nearest to all figures together: most reproduced, then nearest in the mean."""
         score = lambda reading: (
             self.reproduced(reading),
@@ -136,11 +136,11 @@ class Reproduction(Document):
         )
         return max((outcome.reading for outcome in self.results[0].outcomes), key=score)
 
-    def reproduced(self, reading: Reading) -> int:
+    def reproduced(self, reading: ModelReading) -> int:
         """How many of the figures a reading reproduces."""
         return sum(bool(outcome.holds) for outcome in self._of(reading))
 
-    def _of(self, reading: Reading) -> list[Outcome]:
+    def _of(self, reading: ModelReading) -> list[Outcome]:
         return [o for result in self.results for o in result.outcomes if o.reading == reading]
 
     def plot(self) -> Figure:
@@ -159,7 +159,7 @@ class Reproduction(Document):
 def reproduce(
     figures: Sequence[str] = FIGURES,
     *,
-    readings: Sequence[Reading] = READINGS,
+    readings: Sequence[ModelReading] = READINGS,
     jobs: int = 1,
     progress: Progress = silent,
 ) -> Reproduction:
@@ -168,7 +168,7 @@ def reproduce(
     Parameters
     ----------
     figures : sequence of {'fig5', 'fig10', 'fig11', 'fig12'}
-    readings : sequence of Reading
+    readings : sequence of ModelReading
     jobs : int
         Processes for the runs.
     progress : callable
@@ -199,7 +199,7 @@ def reproduce(
     return Reproduction(results=tuple(results))
 
 
-def _zones(reading: Reading) -> tuple[Outcome, list[dict[str, Any]]]:
+def _zones(reading: ModelReading) -> tuple[Outcome, list[dict[str, Any]]]:
     """Figure 5: the states along Gamma_c, by the global method; a run finds the same, where there is one."""
     try:
         contact = solve(reading.problem(190)).contact
@@ -212,7 +212,7 @@ def _zones(reading: Reading) -> tuple[Outcome, list[dict[str, Any]]]:
     ), rows
 
 
-def _curves(name: str, reading: Reading, jobs: int) -> tuple[Outcome, list[dict[str, Any]]]:
+def _curves(name: str, reading: ModelReading, jobs: int) -> tuple[Outcome, list[dict[str, Any]]]:
     """A figure of steps over theta."""
     from verification.sweeps.sweep import sweep
 

@@ -28,7 +28,7 @@ LENGTH, DOWN = Fraction(6, 5), Fraction(-15, 1000)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reading:
+class ModelReading:
     """One way to read Section 6.
 
     Attributes
@@ -93,7 +93,7 @@ class Reading:
 
 
 #: Every combination; nothing was left out after a run.
-READINGS: tuple[Reading, ...] = tuple(
-    Reading(position=position, moved=moved, top=top, neumann_body=role)  # type: ignore[arg-type]
+READINGS: tuple[ModelReading, ...] = tuple(
+    ModelReading(position=position, moved=moved, top=top, neumann_body=role)  # type: ignore[arg-type]
     for moved, role, position, top in product(MOVED, (1, 2), POSITIONS, TOPS)
 )

@@ -14,7 +14,7 @@ from verification.interface.friction import Law
 from verification.interface.pair import ContactPair
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
-from verification.sweeps.lean import Pieces
+from verification.sweeps.lean import KnownPieces
 
 #: The axes of a grid that change bodies or what joins them; friction and theta do not.
 OF_BODIES = ("young", "neumann_body", "law", "radius")
@@ -34,13 +34,13 @@ class Setting:
     ----------
     pair : ContactPair
     measured : Measured
-    pieces : Pieces
+    pieces : KnownPieces
         The affine pieces of T that runs have passed through.
     """
 
     pair: ContactPair
     measured: Measured
-    pieces: Pieces
+    pieces: KnownPieces
 
     @cached_property
     def energy(self) -> tuple[float, float, float] | None:
@@ -92,7 +92,7 @@ class Bodies:
         measured = self._constants(refine, tuple(named.items()))
         if measured.of_friction:  # else there is no friction, or its constants do not exist
             measured = measured.with_friction(float(pair.friction))
-        return Setting(pair=pair, measured=measured, pieces=Pieces(pair))
+        return Setting(pair=pair, measured=measured, pieces=KnownPieces(pair))
 
     @staticmethod
     def _key(values: Mapping[str, Any]) -> tuple[int, Changes]:

@@ -19,7 +19,7 @@ from verification.algorithm.theta import Choice
 from verification.contact import ContactError
 from verification.interface.pair import ContactPair
 from verification.monolithic import SolveError
-from verification.sweeps.lean import Pieces, lengths
+from verification.sweeps.lean import KnownPieces, lengths
 
 #: The bound of the test of Section 6.3.
 PAPER = 1e-9
@@ -86,7 +86,7 @@ class Watch:
         return "limit" if iteration >= self._most else None
 
 
-def course(pair: ContactPair, rule: Rule, choice: Choice, step: Step, pieces: Pieces) -> Course:
+def course(pair: ContactPair, rule: Rule, choice: Choice, step: Step, pieces: KnownPieces) -> Course:
     """Run from g = 0 until both tests are met, or the run stalls, runs away or reaches its limit.
 
     Raises
@@ -102,7 +102,7 @@ def course(pair: ContactPair, rule: Rule, choice: Choice, step: Step, pieces: Pi
     return _stepwise(pair, rule, choice, step)
 
 
-def _lean(pieces: Pieces, theta: float) -> Course | None:
+def _lean(pieces: KnownPieces, theta: float) -> Course | None:
     """With constant relaxation: steps on one affine piece are taken together; None where rounding decides the count."""
     watch, T, bound = Watch(pieces.pair), FixedPointMap(pieces.pair), pieces.pair.settings.tolerance
     residuals: list[float] = []

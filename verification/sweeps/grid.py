@@ -60,7 +60,7 @@ AXES: dict[str, Callable[[Any], Any]] = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Grid:
+class SweepGrid:
     """The values of the axes that vary.
 
     Attributes
@@ -70,7 +70,7 @@ class Grid:
 
     Examples
     --------
-    >>> grid = Grid.of({"theta": [0.3, 0.5], "friction": [0, "1/5"]})
+    >>> grid = SweepGrid.of({"theta": [0.3, 0.5], "friction": [0, "1/5"]})
     >>> len(grid), [(str(v["friction"]), str(v["theta"])) for v in grid.rows()]
     (4, [('0', '3/10'), ('0', '1/2'), ('1/5', '3/10'), ('1/5', '1/2')])
     """
@@ -78,7 +78,7 @@ class Grid:
     axes: Mapping[str, tuple[Any, ...]] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, given: Mapping[str, Sequence[Any] | None], source: str = "<dict>", table: str = "") -> Grid:
+    def of(cls, given: Mapping[str, Sequence[Any] | None], source: str = "<dict>", table: str = "") -> SweepGrid:
         """Read the values of the axes, exactly; None leaves an axis out.
 
         Parameters

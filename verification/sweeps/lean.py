@@ -150,7 +150,7 @@ def key_of(piece: Piece) -> tuple[bytes, ...]:
     return piece.pattern.key, piece.sign.tobytes(), piece.still.tobytes()
 
 
-class Pieces:
+class KnownPieces:
     """What the runs of one pair share: its affine pieces, and the solution of the global method.
 
     Parameters
@@ -197,7 +197,7 @@ class Pieces:
 
         Raises
         ------
-        NotLinear, SolveError, ContactError
+        NotLinear, RuntimeError
         """
         if isinstance(self._solution, Exception):
             raise self._solution

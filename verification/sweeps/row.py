@@ -35,7 +35,7 @@ def row(problem: Problem | ContactPair, values: Mapping[str, Any], bodies: Bodie
     ----------
     problem : Problem or ContactPair
     values : mapping
-        As :meth:`verification.sweeps.grid.Grid.rows` yields them: the name of an axis to its value.
+        As :meth:`verification.sweeps.grid.SweepGrid.rows` yields them: the name of an axis to its value.
     bodies : Bodies, optional
         What is condensed already, of the same problem; no digit of the row depends on it.
 

@@ -21,7 +21,7 @@ from verification.problem.reading import load
 from verification.problem.specification import Problem
 from verification.progress import Progress, silent
 from verification.sweeps.bodies import Bodies
-from verification.sweeps.grid import Grid
+from verification.sweeps.grid import SweepGrid
 from verification.sweeps.row import Row, row
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ class Sweep(Document):
     Attributes
     ----------
     rows : tuple of dict
-        One for each run, in the order of :meth:`verification.sweeps.grid.Grid.rows`.
+        One for each run, in the order of :meth:`verification.sweeps.grid.SweepGrid.rows`.
     asked : int
         How many rows the grid has; Ctrl-C may have left some out.
     axes : tuple of str
@@ -186,11 +186,11 @@ def sweep(
         start = read_interface(Path(problem)) if Path(problem).suffix == ".npz" else load(problem)
     of = start.source if start.source else "<dict>"
     axes = {"theta": theta, "friction": friction, "young": young, "neumann_body": neumann_body, "refine": refine}
-    grid = Grid.of(axes | {"law": law, "radius": radius, "rule": rule}, of)
+    grid = SweepGrid.of(axes | {"law": law, "radius": radius, "rule": rule}, of)
     return sweep_grid(start, grid, jobs=jobs, progress=progress)
 
 
-def sweep_grid(start: Problem | ContactPair, grid: Grid, *, jobs: int = 1, progress: Progress = silent) -> Sweep:
+def sweep_grid(start: Problem | ContactPair, grid: SweepGrid, *, jobs: int = 1, progress: Progress = silent) -> Sweep:
     """As :func:`sweep`, over a grid that is read already."""
     wanted = list(grid.rows())
     done: dict[int, Row] = {}

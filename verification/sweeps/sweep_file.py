@@ -12,13 +12,13 @@ from verification.problem.examples import example, examples
 from verification.problem.reading import load, read_file
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError, Table, Unfit, number, positive, text
-from verification.sweeps.grid import MOST_ROWS, Grid
+from verification.sweeps.grid import MOST_ROWS, SweepGrid
 
 #: The keys of a range of values.
 RANGE = ("start", "stop", "step")
 
 
-def read_sweep(path: Path | str) -> tuple[Problem, Grid]:
+def read_sweep(path: Path | str) -> tuple[Problem, SweepGrid]:
     """Read a sweep file.
 
     Parameters
@@ -41,7 +41,7 @@ def read_sweep(path: Path | str) -> tuple[Problem, Grid]:
     given = {axis: grid.take(axis, partial(_values, str(path), grid.key(axis))) for axis in grid.names()}
     if not given:
         raise ProblemError(str(path), "grid", None, "needed at least one axis, as theta = [0.3, 0.5]")
-    return problem, Grid.of(given, str(path), "grid")
+    return problem, SweepGrid.of(given, str(path), "grid")
 
 
 def _problem(path: Path, name: str) -> Problem:
