@@ -56,10 +56,10 @@ def row(problem: Problem | ContactPair, values: Mapping[str, Any], bodies: Bodie
         found["outcome"] = "refused"
         why["outcome"] = str(error)
     except (ContactError, SolveError) as error:
-        found["outcome"] = "failed"
+        found["outcome"] = "error"
         why["outcome"] = str(error)
     except Exception as error:  # the fault of one row costs no other row
-        found["outcome"] = "failed"
+        found["outcome"] = "error"
         why["outcome"] = f"{type(error).__name__}: {error}"
     found["reason"] = "; ".join(f"{name}: {' '.join(words.split())}" for name, words in why.items()) or None
     return found
