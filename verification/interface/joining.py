@@ -54,7 +54,8 @@ def join(problem: Problem, meshes: list[Mesh | None], law: Law | None = None) ->
     nodes = _surfaces(problem, meshes, _interval(problem))
     if problem.dimension == 2:
         ends = _ends(problem, meshes, nodes, size)
-        nodes = _surfaces(problem, meshes, ends)
+        if problem.contact.interval is None:
+            nodes = _surfaces(problem, meshes, ends)
         _check_nodes(problem, meshes, nodes, ends, contact)
     points = [None if mesh is None else mesh.points[own].astype(float) for mesh, own in zip(meshes, nodes, strict=True)]
     levels = [

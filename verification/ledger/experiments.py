@@ -37,6 +37,7 @@ from verification.ledger.sweeps import (
     trace,
 )
 from verification.monolithic import solve
+from verification.reproduce.claims import ALIKE, SERVES
 
 
 def _evidence(of: Any, holds: bool | None, text: str, **data: Any) -> Evidence:
@@ -136,13 +137,6 @@ def _name(reading: Mapping[str, Any]) -> str:
 
 def _tell(found: Sequence[Mapping[str, Any]]) -> str:
     return ", ".join(f"{zone['state']} {zone['from']:.3g} to {zone['to']:.3g}" for zone in found)
-
-
-#: A theta serves several models if none takes more than this many times its own fewest steps.
-SERVES = 1.25
-
-#: The mesh does not matter much if the fewest steps differ by no more than this factor.
-ALIKE = 1.5
 
 
 def _one_theta(sweeps: Sweeps, families: Mapping[str, Sequence[Model]], what: str) -> Evidence:
