@@ -1,6 +1,8 @@
 """Processes that tests start: one limit for all of them, and none outlives the test that started it."""
 
 import os
+import pty
+import re
 import signal
 import subprocess
 import sys
@@ -11,6 +13,10 @@ from contextlib import contextmanager, suppress
 #: Seconds after which a process is taken to hang.  The slowest needs a few on an idle processor; a loaded one may take
 #: fifty times as long, and that is no failure.
 PATIENCE = 900
+
+
+#: The command line, for a fresh interpreter.
+COMMAND = "import sys; from verification.cli import main; sys.exit(main())"
 
 
 @contextmanager
@@ -31,3 +37,20 @@ def ended(code: str, *arguments: object, **options) -> subprocess.CompletedProce
     with running(code, *arguments, **options) as process:
         out, err = process.communicate(timeout=PATIENCE)
     return subprocess.CompletedProcess(process.args, process.returncode, out, err)
+
+
+def on_a_terminal(*arguments: object, columns: int = 120, streams: Sequence[str] = ("stderr",)) -> str:
+    """What the command writes to a terminal, without its movements; ``streams`` of stdout and stderr lead there."""
+    leader, follower = pty.openpty()
+    environment = os.environ | {"TERM": "xterm", "COLUMNS": str(columns)}
+    to = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL} | dict.fromkeys(streams, follower)
+    written = b""
+    with running(COMMAND, *arguments, env=environment, **to) as process:
+        os.close(follower)
+        with suppress(OSError):  # the other end was closed
+            while chunk := os.read(leader, 4096):
+                written += chunk
+        process.wait(PATIENCE)
+    os.close(leader)
+    assert process.returncode == 0
+    return re.sub(rb"\x1b\[[0-9;?]*[a-zA-Z]", b"", written).decode()

@@ -2,14 +2,10 @@
 
 import html
 import os
-import pty
-import re
 import signal
-import subprocess
-import sys
 
 import pytest
-from processes import ended
+from processes import COMMAND, ended, on_a_terminal
 
 import verification as vf
 from verification import comparison
@@ -65,8 +61,6 @@ ORDER = [
     "Next: ndtheory advise ",
     "--- matplotlib",
 ]
-
-CALL = "import sys; from verification.cli import main; sys.exit(main())"
 
 
 def test_a_reader_has_each_table_before_what_is_slower_begins(write, tmp_path):
@@ -195,7 +189,7 @@ def test_bad_input_is_told_before_anything_is_shown(call, write, options):
 def test_a_reader_that_goes_away_costs_no_file(write, tmp_path):
     reader, writer = os.pipe()
     os.close(reader)
-    found = ended(CALL, "compare", write("without friction"), "-o", tmp_path / "results", stdout=writer)
+    found = ended(COMMAND, "compare", write("without friction"), "-o", tmp_path / "results", stdout=writer)
     os.close(writer)
     assert (found.returncode, found.stderr) == (0, f"written: {tmp_path / 'results'}\n")
     assert (tmp_path / "results" / "report.html").exists()
@@ -204,24 +198,7 @@ def test_a_reader_that_goes_away_costs_no_file(write, tmp_path):
 def test_the_live_line_of_a_terminal_makes_room_for_each_part(call, write):
     file = write("without friction")
     expected = call("compare", file).out.splitlines()
-    leader, follower = pty.openpty()
-    environment = os.environ | {"TERM": "xterm", "COLUMNS": "200"}
-    with subprocess.Popen(
-        [sys.executable, "-c", CALL, "compare", file], stdout=follower, stderr=follower, env=environment
-    ) as process:
-        os.close(follower)
-        written = b""
-        while True:
-            try:
-                chunk = os.read(leader, 4096)
-            except OSError:  # the other end was closed
-                break
-            if not chunk:
-                break
-            written += chunk
-    os.close(leader)
-    assert process.returncode == 0
-    text = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", written.decode())
+    text = on_a_terminal("compare", file, columns=200, streams=["stdout", "stderr"])
     lines = [line.split("\r")[-1] for line in text.replace("\r\n", "\n").split("\n")]  # what a line ends as
     assert "measuring" in text
     assert [line for line in lines if line in expected and line] == [line for line in expected if line]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from processes import PATIENCE, ended, running
+from processes import COMMAND, PATIENCE, ended, running
 
 from verification.output.folder import FILES
 
@@ -17,11 +17,10 @@ PROJECT = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text
 #: Every dependency but the one of the command line; each is imported by the name of its distribution.
 HEAVY = [re.match(r"\w+", needed)[0] for needed in PROJECT["dependencies"] if not needed.startswith("click")]
 
-CALL = "import sys; from verification.cli import main; sys.exit(main())"
 BOUNDS = ["bounds", "--m", "3084", "--M", "153229", "--CR", "1.70", "--CK", "1e-8", "--theta", "1e-4"]
 
 
-def start(*arguments, code=CALL, **streams):
+def start(*arguments, code=COMMAND, **streams):
     """The command in a fresh interpreter."""
     return ended(code, *arguments, **streams)
 
@@ -36,13 +35,13 @@ def imported_by(code, *arguments):
     [
         ("import ndtheory", []),
         ("import verification", []),
-        (CALL, BOUNDS),
-        (CALL, [*BOUNDS, "--json"]),
-        (CALL, ["--help"]),
-        (CALL, ["run", "--help"]),
-        (CALL, ["example"]),
-        (CALL, ["bogus"]),
-        (CALL, ["run", "missing.toml"]),
+        (COMMAND, BOUNDS),
+        (COMMAND, [*BOUNDS, "--json"]),
+        (COMMAND, ["--help"]),
+        (COMMAND, ["run", "--help"]),
+        (COMMAND, ["example"]),
+        (COMMAND, ["bogus"]),
+        (COMMAND, ["run", "missing.toml"]),
     ],
     ids=["ndtheory", "verification", "bounds", "bounds --json", "--help", "run --help", "example", "bogus", "missing"],
 )
@@ -54,7 +53,7 @@ def test_what_needs_no_arrays_starts_without_them(code, arguments):
 
 
 def test_a_run_without_a_folder_draws_nothing(write):
-    assert "matplotlib" not in imported_by(CALL, "run", write())
+    assert "matplotlib" not in imported_by(COMMAND, "run", write())
 
 
 def test_a_command_is_reached_by_its_entry_point(write):
@@ -155,15 +154,15 @@ def test_a_folder_that_was_removed_underneath_is_no_crash(write, tmp_path):
     remove = f"import os; os.chdir({str(tmp_path)!r}); os.mkdir('gone'); os.chdir('gone'); os.rmdir('../gone'); "
     # a script has its own folder there; with the current one numpy cannot be imported by Python 3.13
     remove += "import sys; sys.path.remove(''); "
-    assert start("run", file, code=remove + CALL).returncode == 0
-    found = start("demo", code=remove + CALL)
+    assert start("run", file, code=remove + COMMAND).returncode == 0
+    found = start("demo", code=remove + COMMAND)
     assert found.returncode == 2
     assert found.stderr.count("\n") == 1
 
 
 def test_two_comparisons_at_once_in_one_folder_leave_whole_files(write, tmp_path):
     command = ["compare", write("without friction"), "-o", tmp_path / "results"]
-    with running(CALL, *command) as one, running(CALL, *command) as other:
+    with running(COMMAND, *command) as one, running(COMMAND, *command) as other:
         said = [process.communicate(timeout=PATIENCE)[1] for process in (one, other)]
     assert said == [f"written: {tmp_path / 'results'}\n"] * 2
     assert (one.returncode, other.returncode) == (0, 0)

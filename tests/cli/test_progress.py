@@ -1,16 +1,9 @@
 """A command that takes its time says what it is doing: on a terminal, and to whoever asks from Python."""
 
-import os
-import pty
-import re
-import subprocess
-import sys
-
 import pytest
+from processes import on_a_terminal
 
 import verification as vf
-
-CALL = "import sys; from verification.cli import main; sys.exit(main())"
 
 #: What a comparison does, in its order.
 STAGES = ["measuring", "iterating", "linearising", "repeating the run by cvxpy", "searching", "semidefinite bound"]
@@ -42,29 +35,10 @@ def test_constants_name_the_mesh_that_is_measured(write):
     assert told == ["measuring the constants", *(f"measuring the constants, {i} of 2 halvings" for i in (1, 2))]
 
 
-def on_a_terminal(*arguments):
-    """What a command writes to a terminal on stderr."""
-    leader, follower = pty.openpty()
-    environment = os.environ | {"TERM": "xterm", "COLUMNS": "120"}
-    command = [sys.executable, "-c", CALL, *map(str, arguments)]
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=follower, env=environment) as process:
-        os.close(follower)
-        written = b""
-        while True:
-            try:
-                chunk = os.read(leader, 4096)
-            except OSError:  # the other end was closed
-                break
-            if not chunk:
-                break
-            written += chunk
-    os.close(leader)
-    assert process.returncode == 0
-    return re.sub(rb"\x1b\[[0-9;?]*[a-zA-Z]", b"", written).decode()
-
-
 def test_a_terminal_shows_what_compare_is_doing(write, tmp_path):
-    shown = on_a_terminal("compare", write("without friction"), "-o", tmp_path / "results")
+    shown = on_a_terminal(
+        "compare", write("without friction"), "-o", tmp_path / "results", columns=120, streams=["stderr"]
+    )
     found = [shown.find(stage) for stage in [*STAGES, "drawing and writing"]]
     assert -1 not in found
     assert found == sorted(found)

@@ -3,12 +3,12 @@
 import csv
 from pathlib import Path
 
-import meshio
 import numpy as np
 import pytest
 import scipy.sparse as sp
 from hypothesis import given
 from hypothesis import strategies as st
+from mesh_writer import write_gmsh22
 from problem_list import SHEARED, changed
 
 import verification as vf
@@ -216,26 +216,10 @@ def test_a_surface_with_a_hole_under_gamma_c_is_refused(tmp_path):
     mesh = rectangle((0.0, 2.0), (-0.3, 0.0), (10, 3))
     centres = mesh.points[mesh.cells].mean(axis=1)
     kept = mesh.cells[~((np.abs(centres[:, 0] - 0.9) < 0.1) & (centres[:, 1] > -0.2))]
-    write_mesh(tmp_path / "notched.msh", mesh.points, kept, {"bottom": mesh.sides["bottom"]})
+    write_gmsh22(tmp_path / "notched.msh", mesh.points, kept, {"bottom": mesh.sides["bottom"]})
     notched = {"mesh": str(tmp_path / "notched.msh"), "young": 70000, "poisson": "0.3", "fixed": ["bottom"]}
     with pytest.raises(vf.ProblemError, match=r"body 1 has no surface between x = 0\.8 and 1"):
         vf.solve(vf.Problem.from_dict(APART | {"body1": notched}))
-
-
-def write_mesh(path, points, cells, sides):
-    tags = np.concatenate([np.full(len(facets), i) for i, facets in enumerate(sides.values(), 1)])
-    inside = np.full(len(cells), 9)
-    meshio.write(
-        path,
-        meshio.Mesh(
-            np.column_stack([points, np.zeros(len(points))]),
-            [("line", np.concatenate(list(sides.values()))), ("triangle", cells)],
-            cell_data={"gmsh:physical": [tags, inside], "gmsh:geometrical": [tags, inside]},
-            field_data={name: np.array([i, 1]) for i, name in enumerate(sides, 1)},
-        ),
-        file_format="gmsh22",
-        binary=False,
-    )
 
 
 def test_mesh_files_with_any_positions_of_nodes_are_taken(tmp_path):
@@ -247,7 +231,7 @@ def test_mesh_files_with_any_positions_of_nodes_are_taken(tmp_path):
         points = mesh.points.copy()
         moves = (points[:, 0] > 0) & (points[:, 0] < 1)
         points[moves, 0] += random.uniform(-0.3, 0.3, moves.sum()) / cells[0]
-        write_mesh(tmp_path / f"{name}.msh", points, mesh.cells, mesh.sides)
+        write_gmsh22(tmp_path / f"{name}.msh", points, mesh.cells, mesh.sides)
         body = {key: value for key, value in data[name].items() if key not in ("shape", "x", "y", "cells")}
         data[name] = body | {"mesh": str(tmp_path / f"{name}.msh")}
     found = vf.solve(vf.Problem.from_dict(data)).contact

@@ -8,12 +8,12 @@ import tomllib
 from decimal import Decimal
 from fractions import Fraction as F
 
-import meshio
 import numpy as np
 import pytest
 import strategies
 from hypothesis import given
 from hypothesis import strategies as st
+from mesh_writer import write_gmsh22
 from problem_list import bars, small
 
 import verification as vf
@@ -327,19 +327,7 @@ def gmsh(path, mesh, version="2.2", order=None):
     sides = {name: number[facets] for name, facets in mesh.sides.items()}
     cells = number[mesh.cells]
     if version == "2.2":
-        tags = np.concatenate([np.full(len(facets), i) for i, facets in enumerate(sides.values(), 1)])
-        inside = np.full(len(cells), 9)
-        meshio.write(
-            path,
-            meshio.Mesh(
-                np.column_stack([points, np.zeros(len(points))]),
-                [("line", np.concatenate(list(sides.values()))), ("triangle", cells)],
-                cell_data={"gmsh:physical": [tags, inside], "gmsh:geometrical": [tags, inside]},
-                field_data={name: np.array([i, 1]) for i, name in enumerate(sides, 1)},
-            ),
-            file_format="gmsh22",
-            binary=False,
-        )
+        write_gmsh22(path, points, cells, sides)
         return
     row = lambda values: " ".join(map(str, values))
     box = row([*points.min(axis=0), 0.0, *points.max(axis=0), 0.0])

@@ -3,9 +3,9 @@
 import re
 from pathlib import Path
 
-import meshio
 import numpy as np
 import pytest
+from mesh_writer import write_gmsh22
 from problem_list import SHEARED, changed, plates
 
 import verification as vf
@@ -50,19 +50,7 @@ def split(path, x, y, cells, both):
         points = np.concatenate([points, (points[sw] + points[ne]) / 2])
         corners = [(sw, se, middle), (se, ne, middle), (ne, nw, middle), (nw, sw, middle)]
     triangles = np.concatenate([np.column_stack(three) for three in corners])
-    tags = np.concatenate([np.full(len(facets), i) for i, facets in enumerate(mesh.sides.values(), 1)])
-    inside = np.full(len(triangles), 9)
-    meshio.write(
-        path,
-        meshio.Mesh(
-            np.pad(points, ((0, 0), (0, 1))),
-            [("line", np.concatenate(list(mesh.sides.values()))), ("triangle", triangles)],
-            cell_data={"gmsh:physical": [tags, inside], "gmsh:geometrical": [tags, inside]},
-            field_data={name: np.array([i, 1]) for i, name in enumerate(mesh.sides, 1)},
-        ),
-        file_format="gmsh22",
-        binary=False,
-    )
+    write_gmsh22(path, points, triangles, mesh.sides)
     return str(path)
 
 
