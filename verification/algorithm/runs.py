@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -28,7 +29,7 @@ from verification.interface.fields import ContactFields
 from verification.interface.pair import ContactPair, TwoBodies
 from verification.interrupts import INTERRUPTED
 from verification.monolithic import SolveError, solution_force
-from verification.problem import Problem
+from verification.problem import Problem, Settings
 from verification.problem.tables import ProblemError
 from verification.threads import one_thread
 
@@ -295,6 +296,33 @@ def check_memory(pair: ContactPair) -> None:
         raise ProblemError(pair.source, "iteration.max_iterations", asked, needed)
 
 
+class Ending:
+    """When a run ends, told its residuals one by one.
+
+    Parameters
+    ----------
+    settings : Settings
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        self._tolerance, self._most = settings.tolerance, settings.max_iterations
+        self._least, self._since, self._first = math.inf, 0, math.inf
+
+    def at(self, iteration: int, residual: float, scale: float) -> Outcome | None:
+        """The outcome where the run ends at this iterate."""
+        self._first = residual if iteration == 0 else self._first
+        self._least, self._since = (residual, 0) if residual < self._least else (self._least, self._since + 1)
+        return "converged" if residual <= self._tolerance * scale else self.given_up(iteration, residual)
+
+    def given_up(self, iteration: int, residual: float) -> Outcome | None:
+        """The outcome where it would end here, converged or not."""
+        if not residual <= RUNAWAY * self._first:
+            return "diverged"
+        if self._since >= PATIENCE:
+            return "stalled"
+        return "limit" if iteration >= self._most else None
+
+
 def run(
     problem: Problem | ContactPair | Path | str,
     *,
@@ -343,30 +371,23 @@ def run(
     ('converged', 1)
     """
     pair = pair_of(problem)
-    settings = pair.settings
     check_memory(pair)
     relaxation, choice, step = begin(pair, theta, rule, measured)
     seen: list[Iterate] = []
-    least, since = float("inf"), 0
-    outcome: Outcome = "limit"
+    ending = Ending(pair.settings)
+    outcome: Outcome | None = None
     try:
         for found in iterates(FixedPointMap(pair, solver), step):
             seen.append(found)
             watch(found)
-            least, since = (found.residual, 0) if found.residual < least else (least, since + 1)
-            if found.residual <= settings.tolerance * found.scale:
-                outcome = "converged"
-            elif not found.residual <= RUNAWAY * seen[0].residual:
-                outcome = "diverged"
-            elif since >= PATIENCE:
-                outcome = "stalled"
-            elif found.iteration < settings.max_iterations:
-                continue
-            break
+            outcome = ending.at(found.iteration, found.residual, found.scale)
+            if outcome is not None:
+                break
     except KeyboardInterrupt:
         if not seen:
             raise
         outcome = "interrupted"
+    assert outcome is not None  # the iterates have no end of their own
     return Run(
         pair=pair,
         rule=relaxation,

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fem1d2d.mesh import Floats
 from verification.algorithm.fixed_point import FixedPointMap, iterate_at, iterates
@@ -14,7 +14,7 @@ from verification.algorithm.iterate import Iterate
 from verification.algorithm.linearisation import NotLinear, linearised_rate
 from verification.algorithm.rates import rate_of
 from verification.algorithm.relaxation import Relaxation, Rule, Step
-from verification.algorithm.runs import PATIENCE, RUNAWAY, Outcome, Run
+from verification.algorithm.runs import PATIENCE, RUNAWAY, Ending, Outcome, Run
 from verification.algorithm.theta import Choice
 from verification.contact import ContactError
 from verification.interface.pair import ContactPair
@@ -53,37 +53,13 @@ class Course:
     reason: Mapping[str, str] = field(default_factory=dict)
 
 
-def meets_paper_test(g: Floats, before: Floats) -> bool:
-    """The test of Section 6.3: ``|g_n - g_{n-1}|/|g_n| < 1e-9`` or ``|g_n - g_{n-1}| < 1e-9``, Euclidean norms.
+def meets_paper_test(g: Floats, before: Floats) -> NDArray[np.bool_]:
+    """The test of Section 6.3: ``|g_n - g_{n-1}|/|g_n| < 1e-9`` or ``|g_n - g_{n-1}| < 1e-9``, for every column.
 
-    The second part is in the unit of force of the file.
+    Norms are Euclidean; the second part is in the unit of force of the file.
     """
-    increment, size = float(np.linalg.norm(g - before)), float(np.linalg.norm(g))
-    return increment < PAPER or increment < PAPER * size
-
-
-class Watch:
-    """When a run ends, step by step: by its own residual, as :func:`verification.run` does, and by the paper's test."""
-
-    def __init__(self, pair: ContactPair) -> None:
-        self._tolerance, self._most = pair.settings.tolerance, pair.settings.max_iterations
-        self._least, self._since, self._first = math.inf, 0, math.inf
-
-    def ends(self, iteration: int, residual: float, scale: float) -> Outcome | None:
-        """The outcome where a run ends at this iterate."""
-        self._first = residual if iteration == 0 else self._first
-        self._least, self._since = (residual, 0) if residual < self._least else (self._least, self._since + 1)
-        if residual <= self._tolerance * scale:
-            return "converged"
-        return self.gives_up(iteration, residual)
-
-    def gives_up(self, iteration: int, residual: float) -> Outcome | None:
-        """The outcome where it would end, converged or not."""
-        if not residual <= RUNAWAY * self._first:
-            return "diverged"
-        if self._since >= PATIENCE:
-            return "stalled"
-        return "limit" if iteration >= self._most else None
+    increment = lengths(g - before)
+    return (increment < PAPER) | (increment < PAPER * lengths(g))
 
 
 def course(pair: ContactPair, rule: Rule, choice: Choice, step: Step, pieces: KnownPieces) -> Course:
@@ -104,7 +80,8 @@ def course(pair: ContactPair, rule: Rule, choice: Choice, step: Step, pieces: Kn
 
 def _lean(pieces: KnownPieces, theta: float) -> Course | None:
     """With constant relaxation: steps on one affine piece are taken together; None where rounding decides the count."""
-    watch, T, bound = Watch(pieces.pair), FixedPointMap(pieces.pair), pieces.pair.settings.tolerance
+    settings, T = pieces.pair.settings, FixedPointMap(pieces.pair)
+    ending, bound = Ending(settings), settings.tolerance
     residuals: list[float] = []
     floors: list[float] = []
     kinds: list[bytes] = []
@@ -120,7 +97,7 @@ def _lean(pieces: KnownPieces, theta: float) -> Course | None:
                 piece, first = taken.piece, taken.g[:, 0]
             for i, (residual, size) in enumerate(zip(taken.residual.tolist(), taken.size.tolist(), strict=True)):
                 n, scale = n + 1, max(scale, size)
-                ended = watch.ends(n, residual, scale)
+                ended = ending.at(n, residual, scale)
                 if outcome is None:
                     if abs(residual - bound * scale) <= TIE * bound * scale:
                         return None
@@ -128,7 +105,7 @@ def _lean(pieces: KnownPieces, theta: float) -> Course | None:
                     floors.append(float(taken.floor[i]))
                     kinds.append(taken.pattern)
                     outcome, last = ended, taken.g[:, i]
-                if outcome and ((paper is not None and paper <= n) or watch.gives_up(n, residual)):
+                if outcome and ((paper is not None and paper <= n) or ending.given_up(n, residual)):
                     paper = None if paper is None or paper > n else paper
                     break
             else:
@@ -167,26 +144,25 @@ def _lean(pieces: KnownPieces, theta: float) -> Course | None:
 def _paper(g: Floats, before: Floats, last: int) -> int | None:
     """n of the first column of g at which :func:`meets_paper_test` is true, where ``last`` columns came before."""
     columns = np.column_stack([before, g]) if len(before) else g
-    increments, sizes = lengths(columns[:, 1:] - columns[:, :-1]), lengths(columns[:, 1:])
-    met = np.flatnonzero((increments < PAPER) | (increments < PAPER * sizes))
+    met = np.flatnonzero(meets_paper_test(columns[:, 1:], columns[:, :-1]))
     return None if not len(met) else last + int(met[0]) + (1 if len(before) else 2)
 
 
 def _stepwise(pair: ContactPair, rule: Rule, choice: Choice, step: Step) -> Course:
     """With any rule: as :func:`verification.run` goes."""
     seen: list[Iterate] = []
-    watch, paper, why = Watch(pair), None, ""
+    ending, paper, why = Ending(pair.settings), None, ""
     outcome: Outcome | None = None
     before: Floats | None = None
     try:
         for found in iterates(FixedPointMap(pair), step):
-            if paper is None and before is not None and meets_paper_test(found.g, before):
+            if paper is None and before is not None and meets_paper_test(found.g[:, None], before[:, None])[0]:
                 paper = found.iteration
             if outcome is None:
                 seen.append(found)
-            ended = watch.ends(found.iteration, found.residual, found.scale)
+            ended = ending.at(found.iteration, found.residual, found.scale)
             outcome = outcome or ended
-            if outcome is not None and (paper is not None or watch.gives_up(found.iteration, found.residual)):
+            if outcome is not None and (paper is not None or ending.given_up(found.iteration, found.residual)):
                 break
             before = found.g
     except ContactError as error:
