@@ -13,7 +13,7 @@ from ndtheory import __version__
 from verification.ledger import quote, sheets, verify
 
 BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
-sys.path.append(str(BENCHMARKS))  # a folder of scripts, not a package
+sys.path += [str(BENCHMARKS), str(Path(__file__).resolve().parent)]  # folders of scripts, not packages
 
 import speed_page  # noqa: E402
 
@@ -29,8 +29,10 @@ extensions = [
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
     "sphinx_copybutton",
+    "sphinx_design",
     "sphinx_proof",
     "sphinxcontrib.bibtex",
+    "builder.pages",
 ]
 exclude_patterns = ["_build", "generated/speed"]  # the latter is included by a page
 
@@ -55,6 +57,8 @@ html_theme = "furo"
 html_title = "ndtheory"
 html_static_path = [
     "site.css",
+    "widgets",
+    "generated/widgets",
     str(distribution("sphinx-mathjax-offline").locate_file(f"sphinx-mathjax-offline/static/mathjax/{MATHJAX}")),
 ]
 html_css_files = ["site.css"]

@@ -1,0 +1,94 @@
+"""Each page with code cells as a notebook to download: its text, its visible cells, and no solution."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+FIRST = "# Needs ndtheory (see its README) and Jupyter; figures are drawn below the cells.\n%matplotlib inline"
+
+GLUE = re.compile(r"\{glue:text\}`([^`:]+)(?::[^`]*)?`")
+ROLE = re.compile(r"\{[a-z:]+\}`(?:([^`<]*?) ?<[^`>]*>|([^`]*))`")
+TARGET = re.compile(r"^\([\w-]+\)=\n", re.MULTILINE)
+FENCE = re.compile(
+    r"^([:`]{3,}) ?\{([a-z:]+)\}(?: +([^\n]*))?\n(?P<options>(?::[\w-]+:[^\n]*\n)*)(.*?)^\1 *$",
+    re.DOTALL | re.MULTILINE,
+)
+
+
+def glued(path: Path) -> dict[str, str]:
+    """What hidden cells computed for the text, from the file that myst_nb leaves beside an executed notebook."""
+    if not path.exists():
+        return {}
+    found = json.loads(path.read_text(encoding="utf-8"))
+    return {name: output["data"]["text/plain"].strip("'") for name, output in found.items()}
+
+
+def plain(text: str, values: Mapping[str, str]) -> str:
+    """Text of a page as any notebook shows it: numbers in place, no roles, no directives, no solutions.
+
+    Examples
+    --------
+    >>> plain("rho is {glue:text}`rho`, see {doc}`theory`.", {"rho": "3"})
+    'rho is 3, see theory.'
+    """
+
+    def fence(match: re.Match[str]) -> str:
+        _, kind, title, _, body = match.groups()
+        if kind in ("dropdown", "widget"):
+            return ""
+        inner = plain(body, values)
+        return f"**{title}**\n\n{inner}" if title else inner
+
+    text = FENCE.sub(fence, text)
+    text = TARGET.sub("", text)
+    text = GLUE.sub(lambda match: values[match[1]], text)
+    return ROLE.sub(lambda match: match[1] or match[2].rsplit("/", 1)[-1], text)
+
+
+def portable(executed: Mapping[str, Any], values: Mapping[str, str]) -> dict[str, Any]:
+    """A notebook without outputs and hidden cells from one that was executed.
+
+    Parameters
+    ----------
+    executed : mapping
+        The notebook as its file holds it.
+    values : mapping
+        The numbers of the text, as :func:`glued` returns them.
+
+    Raises
+    ------
+    KeyError
+        A number in the text that no cell has computed.
+    """
+    cells = [_code(FIRST)]
+    for cell in executed["cells"]:
+        source = "".join(cell["source"])
+        if cell["cell_type"] == "markdown":
+            cells.append({"cell_type": "markdown", "metadata": {}, "source": plain(source, values)})
+        elif cell["cell_type"] == "code" and "remove-cell" not in cell["metadata"].get("tags", ()):
+            cells.append(_code(source))
+    for i, cell in enumerate(cells):
+        cell["id"] = f"cell-{i}"  # the same at every build
+    kernel = {"name": "python3", "display_name": "Python 3", "language": "python"}
+    return {"nbformat": 4, "nbformat_minor": 5, "metadata": {"kernelspec": kernel}, "cells": cells}
+
+
+def _code(source: str) -> dict[str, Any]:
+    return {"cell_type": "code", "metadata": {}, "source": source, "execution_count": None, "outputs": []}
+
+
+def write(source: Path, target: Path) -> None:
+    """Write the portable notebook of an executed one.
+
+    Raises
+    ------
+    KeyError
+        A number in the text that no cell has computed.
+    """
+    executed = json.loads(source.read_text(encoding="utf-8"))
+    notebook = portable(executed, glued(source.with_suffix(".glue.json")))
+    target.write_text(json.dumps(notebook, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")

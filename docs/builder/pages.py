@@ -1,0 +1,103 @@
+"""What the pages need of Sphinx: widgets, notebooks to download, theorems read in several processes."""
+
+from __future__ import annotations
+
+from collections.abc import Set
+from pathlib import Path
+from typing import Any
+
+from docutils import nodes
+from sphinx.application import Sphinx
+from sphinx.errors import ExtensionError
+from sphinx.util.docutils import SphinxDirective
+from sphinx_proof.domain import ProofDomain
+
+from builder import notebooks, widgets
+
+
+class Proofs(ProofDomain):
+    """The domain of theorems and proofs, when pages are read in several processes.
+
+    All that it knows is a list of the environment, which sphinx_proof itself merges.
+    """
+
+    def merge_domaindata(self, docnames: Set[str], otherdata: dict[str, Any]) -> None:
+        pass
+
+
+class WidgetDirective(SphinxDirective):
+    """``{widget} plane``: the widget of that name."""
+
+    required_arguments = 1
+
+    def run(self) -> list[nodes.Node]:
+        name = self.arguments[0]
+        if name not in widgets.WIDGETS:
+            raise self.error(f"widget {name!r}: needed one of {', '.join(widgets.WIDGETS)}")
+        page = self.env.metadata[self.env.docname]
+        page["widgets"] = sorted({name, *page.get("widgets", ())})
+        static = "../" * self.env.docname.count("/") + "_static"
+        return [nodes.raw("", widgets.element(name, static), format="html")]
+
+
+def write_widgets(app: Sphinx) -> None:
+    """What the widgets show, computed at every build."""
+    widgets.write(Path(app.srcdir) / "generated" / "widgets")
+
+
+def load_scripts(app: Sphinx, page: str, template: str, context: dict[str, Any], doctree: Any) -> None:
+    """Load the scripts of the widgets on the pages that show them, and on no other."""
+    shown = app.env.metadata.get(page, {}).get("widgets", ())
+    for file in widgets.scripts(shown):
+        app.add_js_file(file, loading_method="defer")
+    if shown:
+        app.add_css_file("widgets.css")
+
+
+def is_notebook(app: Sphinx, page: str) -> bool:
+    """Whether a page has code cells."""
+    return app.env.metadata.get(page, {}).get("file_format") == "mystnb"
+
+
+def name_of(page: str) -> str:
+    """The file of its notebook, from the root of the site."""
+    return f"notebooks/{page.rsplit('/', 1)[-1]}.ipynb"
+
+
+def link_notebook(app: Sphinx, page: str, template: str, context: dict[str, Any], doctree: Any) -> None:
+    """Put the link to its notebook under the title of a page."""
+    if doctree is not None and is_notebook(app, page):
+        link = f'<a href="{context["pathto"](name_of(page), 1)}" download>Download as a notebook</a>'
+        line = f'<p class="notebook">{link}</p>'
+        context["body"] = context["body"].replace("</h1>", f"</h1>\n{line}", 1)
+
+
+def write_notebooks(app: Sphinx, failed: Exception | None) -> None:
+    """Write the notebooks of all pages that were executed, once the site is built.
+
+    Raises
+    ------
+    ExtensionError
+        A number in the text that no cell has computed.
+    """
+    if failed is not None or app.builder.format != "html":
+        return
+    site = Path(app.outdir)
+    (site / "notebooks").mkdir(exist_ok=True)
+    for page in sorted(app.env.found_docs):
+        executed = site.parent / "jupyter_execute" / f"{page}.ipynb"
+        if is_notebook(app, page) and executed.exists():
+            try:
+                notebooks.write(executed, site / name_of(page))
+            except KeyError as error:
+                raise ExtensionError(f"{page}: no cell glues {error}") from None
+
+
+def setup(app: Sphinx) -> None:
+    """Connect all of it."""
+    app.add_domain(Proofs, override=True)
+    app.add_directive("widget", WidgetDirective)
+    app.connect("builder-inited", write_widgets)
+    app.connect("html-page-context", link_notebook)
+    app.connect("html-page-context", load_scripts)
+    app.connect("build-finished", write_notebooks)

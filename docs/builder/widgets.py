@@ -1,0 +1,188 @@
+"""What the widgets show: formulas and constants of the library, runs made here, and a still picture of each."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.linalg import eigh
+
+import verification as vf
+from builder import stills
+from builder.javascript import function
+from ndtheory import bounds, sharp
+
+#: The formulas that the widgets call, by their name in JavaScript.
+FORMULAS: dict[str, tuple[Callable[..., Any], tuple[str, ...]]] = {
+    "predictedFactor": (sharp.predicted_factor, ("theta", "rho")),
+    "predictedTheta": (sharp.predicted_theta, ("rho",)),
+    "sharpOneMinusSquare": (sharp.one_minus_square, ("theta", "rho", "kappa1", "kappa2")),
+    "sharpEnds": (sharp.contraction_ends, ("rho", "kappa1", "kappa2")),
+    "sharpMultiple": (sharp.friction_multiple, ("kappa1", "kappa2")),
+    "sharpLimit": (sharp.friction_limit, ("rho", "kappa1", "kappa2")),
+    "readPrinted": (bounds.PRINTED.coercivity, ("m",)),
+    "G": (bounds.G, ("x", "m", "M", "CR", "u")),
+    "P": (bounds.P, ("x", "m", "M", "CR", "u")),
+    "D": (bounds.D, ("x", "m", "M", "CR", "u")),
+    "Q": (bounds.Q, ("x", "m", "M", "CR")),
+    "C1": (bounds.C1, ("D", "Q")),
+    "lowerEnd": (bounds.lower_end, ("P",)),
+    "oneMinusH1": (bounds.one_minus_h1, ("theta", "D", "Q")),
+    "oneMinusH2": (bounds.one_minus_h2, ("theta", "P")),
+}
+
+#: The two bars: stiffness of the contact body, of the Neumann body, and how far the end is moved.
+BARS = {"S1": 3.0, "S2": 1.0, "moved": 0.1}
+
+#: The thetas of the runs that are shown step by step, and how many steps of each.
+THETAS = tuple(Fraction(n, 20) for n in range(1, 20))
+STEPS = 40
+
+#: One letter for the state of a contact node.
+STICK, SLIP, OPEN = "s", "l", "o"
+
+
+def javascript() -> str:
+    """All formulas as one script."""
+    written = [function(name, formula, *arguments) for name, (formula, arguments) in FORMULAS.items()]
+    names = ", ".join(FORMULAS)
+    return "\n".join(["window.ndFormulas = (() => {", *written, f"return {{ {names} }};", "})();", ""])
+
+
+def plane() -> dict[str, float]:
+    """The constants of Section 6, the lower body being the Neumann body, per unit of Young's modulus.
+
+    Each is a power of the moduli times a number of the geometry: m^a, M^a and the C_s of a body grow with its modulus,
+    rho with that of the contact body over that of the Neumann body, C_s in energy norms as the root of the latter, C_t1
+    and C_t2 as one over the root of their body's.
+    """
+    problem = vf.example("section6")
+    even = vf.measure(problem.changed(young=("1", "1")))
+    alone = {  # C_s is the larger of two: each counts alone where the other body is soft
+        "Cs1": vf.measure(problem.changed(young=("1", "1e-6"))).C_s.value,
+        "Cs2": vf.measure(problem.changed(young=("1e-6", "1"))).C_s.value,
+    }
+    return alone | {
+        "m1": even.body1.m.value,
+        "m2": even.body2.m.value,
+        "M1": even.body1.M.value,
+        "M2": even.body2.M.value,
+        "CR": even.C_R.value,
+        "Ctr": even.C_tr.value,
+        "rho": even.rho_max.value,
+        "CsEnergy": even.C_s_energy.value,
+        "Ct1": even.C_t1.value,
+        "Ct2": even.C_t2.value,
+        "E2": 20000.0,
+    }
+
+
+def spectrum() -> dict[str, Any]:
+    """Section 6 in both roles: eigenvalues of (S_c, S_n), and runs step by step."""
+    return {
+        "roles": [_role(problem) for problem in section6_in_both_roles()],
+        "thetas": [float(theta) for theta in THETAS],
+    }
+
+
+def section6_in_both_roles() -> tuple[vf.Problem, vf.Problem]:
+    """A coarse mesh, so that the states of its nodes can be read; the lower body Neumann first."""
+    problem = vf.example("section6").changed(cells=((10, 2), (6, 2)), radius="0.2")
+    return problem, problem.swapped()
+
+
+def _role(problem: vf.Problem) -> dict[str, Any]:
+    pair = vf.build(problem)
+    contact, neumann = (side.stiffness[np.ix_(side.free, side.free)] for side in (pair.contact, pair.neumann))
+    runs = []
+    for theta in THETAS:
+        states, residuals = [], []
+        for iterate, _ in zip(vf.iterate(pair, theta=theta), range(STEPS), strict=False):
+            states.append(_states(iterate.contact.pattern))
+            residuals.append(float(f"{iterate.relative_residual:.4g}"))
+            if residuals[-1] <= 1e-9:
+                break
+        runs.append({"states": states, "residuals": residuals})
+    name = "lower" if problem.iteration.neumann_body == 1 else "upper"
+    eigenvalues = eigh(contact, neumann, eigvals_only=True)
+    return {"neumann": name, "eigenvalues": [float(f"{value:.12g}") for value in eigenvalues], "runs": runs}
+
+
+def _states(pattern: Any) -> str:
+    return "".join(
+        OPEN if not touching else SLIP if sliding else STICK
+        for touching, sliding in zip(pattern.touching, pattern.sliding, strict=True)
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Widget:
+    """A widget.
+
+    Attributes
+    ----------
+    label : str
+        What a screen reader says, and the alternative text of its still picture.
+    data : callable
+        What it needs beside the formulas.
+    still : callable
+        Draws its first view.
+    """
+
+    label: str
+    data: Callable[[], dict[str, Any]]
+    still: Callable[[dict[str, Any]], Any]
+
+
+WIDGETS = {
+    "cobweb": Widget(
+        label="Cobweb of the iteration between two bars, and the V of its two slopes over theta",
+        data=lambda: dict(BARS),
+        still=stills.cobweb,
+    ),
+    "plane": Widget(
+        label="The plane of theta and friction, with the regions in which each form of the theorem proves contraction",
+        data=plane,
+        still=stills.plane,
+    ),
+    "spectrum": Widget(
+        label="Eigenvalues of the two bodies under a V, and a run step by step: states of the nodes, residuals",
+        data=spectrum,
+        still=stills.spectrum,
+    ),
+}
+
+
+def write(folder: Path) -> None:
+    """Formulas, data and still pictures, for the site to copy."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "formulas.js").write_text(javascript(), encoding="utf-8")
+    for name, widget in WIDGETS.items():
+        data = widget.data()
+        script = f"(window.ndData = window.ndData || {{}}).{name} = {json.dumps(data, separators=(',', ':'))};\n"
+        (folder / f"{name}-data.js").write_text(script, encoding="utf-8")
+        stills.save(widget.still(data), folder / f"{name}.svg")
+
+
+def scripts(shown: Iterable[str]) -> list[str]:
+    """The scripts of a page that shows these widgets, in the order in which they are loaded."""
+    own = [f"{name}{end}" for name in shown for end in ("-data.js", ".js")]
+    return ["formulas.js", "drawing.js", *own] if own else []
+
+
+def element(name: str, static: str) -> str:
+    """The HTML of a widget: a frame that its script fills, its still picture where scripts are off.
+
+    Parameters
+    ----------
+    name : str
+    static : str
+        The way to the folder of the pictures, from the page.
+    """
+    still = f'<noscript><img src="{static}/{name}.svg" alt="{WIDGETS[name].label}"></noscript>'
+    return f'<figure class="widget" data-widget="{name}" aria-label="{WIDGETS[name].label}">{still}</figure>'
