@@ -1,4 +1,4 @@
-"""What the pages need of Sphinx: widgets, notebooks to download, theorems read in several processes."""
+"""What the pages need of Sphinx: widgets, notebooks to download, the index of equations, several processes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from sphinx.errors import ExtensionError
 from sphinx.util.docutils import SphinxDirective
 from sphinx_proof.domain import ProofDomain
 
-from builder import notebooks, widgets
+from builder import equations, notebooks, widgets
 
 
 class Proofs(ProofDomain):
@@ -43,6 +43,11 @@ class WidgetDirective(SphinxDirective):
 def write_widgets(app: Sphinx) -> None:
     """What the widgets show, computed at every build."""
     widgets.write(Path(app.srcdir) / "generated" / "widgets")
+
+
+def write_equations(app: Sphinx) -> None:
+    """The index of equations, from the sources as they are."""
+    (Path(app.srcdir) / "generated" / "equations.md").write_text(equations.page(), encoding="utf-8")
 
 
 def load_scripts(app: Sphinx, page: str, template: str, context: dict[str, Any], doctree: Any) -> None:
@@ -98,6 +103,7 @@ def setup(app: Sphinx) -> None:
     app.add_domain(Proofs, override=True)
     app.add_directive("widget", WidgetDirective)
     app.connect("builder-inited", write_widgets)
+    app.connect("builder-inited", write_equations)
     app.connect("html-page-context", link_notebook)
     app.connect("html-page-context", load_scripts)
     app.connect("build-finished", write_notebooks)
