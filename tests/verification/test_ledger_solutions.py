@@ -1,23 +1,21 @@
 """What the ledger says of solutions, of iterates and of Section 6."""
 
-import itertools
 import json
-from dataclasses import replace
 from fractions import Fraction
 
-import numpy as np
 import pytest
 from ledger_evidence import HOLDS, PRINTED, REPAIRED, STEP, holds
 
 from verification.interface.assembly import build
 from verification.ledger import experiments as section_6
 from verification.ledger import solutions as ledger
-from verification.ledger import sweeps as sweeps_of
 from verification.ledger.evidence import settle
-from verification.ledger.experiments import Stopped, experiments
+from verification.ledger.experiments import Section6, Stopped
 from verification.ledger.solutions import solutions
-from verification.ledger.sweeps import Best, Count, Model, Sweeps
-from verification.monolithic import solve
+from verification.monolithic import solution_force, solve
+from verification.reproduce import READINGS
+from verification.reproduce.claims import zones
+from verification.sweeps.sweep import sweep
 
 EXPECTED = {
     "2.3": [(PRINTED, False), (REPAIRED, True)],
@@ -45,9 +43,10 @@ OF_SECTION_6 = {
     "fig-5": [(PRINTED, None)],
     "sec-6.3-stop": [(PRINTED, False), (REPAIRED, True)],
     "sec-6.3": [(PRINTED, None)],
-    "fig-10": HOLDS,
-    "fig-11": HOLDS,
-    "fig-12": [(PRINTED, False)],
+    "fig-10": [(PRINTED, None)],
+    "fig-11": [(PRINTED, None)],
+    "fig-12": [(PRINTED, None)],
+    "sec-7": [(PRINTED, False)],
 }
 
 
@@ -94,138 +93,159 @@ def test_only_what_is_asked_is_answered_and_the_share_done_is_told():
 
 # Section 6.
 
-
-def test_the_model_has_nearly_the_numbers_of_nodes_of_the_paper():
-    pairs = [build(Model(halvings=h).problem) for h in range(4)]
-    nodes = [len(pair.body1.body.mesh.points) + len(pair.body2.body.mesh.points) for pair in pairs]
-    assert nodes == [54, 170, 594, 2210]  # 60, 190, 666, 2482 in the paper
+of = lambda section, id: section_6.CHECKS[id](section)[0]
 
 
-def test_a_run_that_stops_early_does_not_give_the_same_results():
-    problem = Model().problem
-    loose = replace(problem, iteration=replace(problem.iteration, tolerance=1e-5))
-    assert section_6.difference(build(loose)) > sweeps_of.SAME
-    tight = replace(problem, iteration=replace(problem.iteration, tolerance=1e-12))
-    assert section_6.difference(build(tight)) < 1e-10
+def made(valley, outcome="converged"):
+    """Rows of sweeps that nobody ran: ``valley(reading, values)`` maps theta to steps."""
 
-
-def test_the_increment_is_theta_times_the_unrelaxed_residual():
-    run = sweeps_of.trace(build(Model().problem), 0.3, 20)
-    for n in range(1, 20):
-        step = np.linalg.norm(run.g[n] - run.g[n - 1])
-        assert step == pytest.approx(0.3 * run.residuals[n - 1] * np.linalg.norm(image(run, n, 0.3)), rel=1e-9)
-
-
-def image(run, n, theta):
-    """T g_{n-1} from two consecutive forces."""
-    return (run.g[n] - (1 - theta) * run.g[n - 1]) / theta
-
-
-def test_steps_are_counted_by_interpolation():
-    assert sweeps_of.steps_to([1.0, 1e-4, 1e-8], 1e-6) == pytest.approx(1.5)
-    assert sweeps_of.steps_to([1.0, 0.1], 1e-6) is None
-
-
-def test_equal_moduli_give_the_same_steps_whatever_their_size():
-    # 0.2e3 in Section 6.3 is most likely 0.2e5; only the quotient matters
-    counts = []
-    for young in (Fraction(200), Fraction(20000)):
-        pair = build(Model(young=(young, young), halvings=0).problem)
-        counts.append(sweeps_of.trace(pair, 0.5).stop(absolute=False))
-    assert counts[0] == counts[1]
-
-
-def test_zones_are_read_from_left_to_right():
-    x = np.array([0.4, 0.8, 1.0, 1.4, 1.6])
-    found = section_6.zones(x, ["stick", "stick", "slip", "slip", "open"])
-    assert section_6.as_printed(found, 0.2)
-    assert not section_6.as_printed(found, 0.1)
-    assert not section_6.as_printed(section_6.zones(x, ["stick"] * 5), 0.2)
-
-
-def test_the_zones_of_mirrored_readings_mirror_each_other(seen):
-    readings = {(r["geometry"], r["u_x on the top"]): r["zones"] for r in seen["fig-5"][0].data["readings"]}
-    # P1 triangles are not symmetric: up to one cell
-    right = readings["right edges aligned", "held"]
-    left = [
-        {"state": z["state"], "from": 1.2 - z["to"], "to": 1.2 - z["from"]}
-        for z in reversed(readings["left edges aligned", "held"])
-    ]
-    assert [z["state"] for z in left] == [z["state"] for z in right]
-    assert all(abs(a["to"] - b["to"]) <= 0.1 + 1e-9 for a, b in zip(left, right, strict=True))
-
-
-class Made(Sweeps):
-    """Sweeps of given numbers of steps."""
-
-    def __init__(self, steps):
-        super().__init__("quick")
-        self.counts = lambda model: {
-            theta: Count(increment=steps(model)(float(theta)), residual=None) for theta in self.thetas
+    def run(reading, values):
+        steps = valley(reading, values)(float(values["theta"])) if outcome == "converged" else None
+        why = None if outcome == "converged" else "made so"
+        return {"theta": float(values["theta"]), "iterations": steps, "iterations_paper": steps, "rho": 1.0} | {
+            "outcome": outcome,
+            "reason": why,
         }
-        self.row = lambda model: {
-            "best_theta": float(self.best(model).theta),
-            "iterations": self.best(model).steps,
-            "iterations_at_0.6": 1,
-        }
-        self.rho = lambda model: 1.0
+
+    return run
 
 
-def of_figure_11(shift):
-    """What is said of figure 11 where the best theta of the largest friction is `shift` of a geometry from the others'.
-
-    At its best theta every model takes 20 steps.
-    """
-    valley = lambda best: lambda theta: 20 + 400 * (theta - best) ** 2
-    steps = lambda model: valley(0.5 + (model.friction == Fraction(2, 5)) * shift(model.geometry))
-    sweeps = Made(steps)
-    assert sweeps.best(Model(friction=Fraction(1, 10))) == Best(theta=Fraction(1, 2), steps=20)
-    (evidence,) = section_6.CHECKS["fig-11"](sweeps)
-    return evidence.holds
+def at(best):
+    """20 steps at the best theta, and three times as many at a distance of 0.3."""
+    return lambda theta: round(20 + 450 * (theta - best) ** 2)
 
 
-@pytest.mark.parametrize(("shift", "verdict"), [(0.05, True), (0.4, False)])
-def test_whether_one_theta_serves_is_found_out(shift, verdict):
-    assert of_figure_11(lambda geometry: shift) is verdict
+IDS = ["sec-6.3", "fig-11", "fig-12"]
+OF_TEXT = [reading for reading in READINGS if not reading.departs]
 
 
-def test_readings_that_differ_decide_nothing():
-    assert of_figure_11(lambda geometry: 0.4 * (geometry == sweeps_of.TWO[0])) is None
+@pytest.mark.parametrize("id", [*IDS, "fig-10"])
+def test_what_every_reading_shows_is_numerical_and_said_to_be_reproduced(id):
+    evidence = of(Section6("full", run=made(lambda reading, values: at(0.6))), id)
+    assert evidence.holds is True
+    assert "reproduced in every reading that leaves the text nowhere, and in 24 of the 24" in evidence.text
+    assert settle([evidence])[0] == "NUMERICAL"
 
 
-@pytest.mark.parametrize(("shows", "verdict"), [((True,), True), ((True, False), None), ((False,), None)])
-def test_figure_5_holds_where_every_reading_shows_its_zones_and_no_reading_refutes_it(monkeypatch, shows, verdict):
-    """The paper's bodies are not known in full: a reading that shows other zones may not be theirs."""
-    answers = itertools.cycle(shows)
-    monkeypatch.setattr(section_6, "as_printed", lambda found, width: next(answers))
-    (evidence,) = experiments(["fig-5"])["fig-5"]
+@pytest.mark.parametrize("id", [*IDS, "fig-10"])
+def test_what_one_reading_shows_is_numerical_under_what_that_reading_assumes(id):
+    shows = READINGS[-1]
+    evidence = of(Section6("full", run=made(lambda reading, values: at(0.6 if reading == shows else 0.3))), id)
+    assert evidence.holds is True
+    assert "reproduced under an assumption, in 1 of the 24 readings tried" in evidence.text
+    for words in [*shows.assumes, *shows.departs]:
+        assert words in evidence.text
+    assert [found["holds"] for found in evidence.data["readings"]].count(True) == 1
+
+
+@pytest.mark.parametrize("id", [*IDS, "fig-10"])
+def test_what_no_reading_shows_is_undecided_and_the_nearest_reading_is_named(id):
+    near = READINGS[7]
+    evidence = of(Section6("full", run=made(lambda reading, values: at(0.45 if reading == near else 0.3))), id)
+    assert evidence.holds is None
+    assert settle([evidence])[0] == "INCONCLUSIVE"
+    assert "in none of the 24 readings tried; " in evidence.text
+    assert f"nearest comes {near.name}: theta = 0.6 takes 30 steps" in evidence.text
+    assert {found["holds"] for found in evidence.data["readings"]} == {False}
+
+
+def test_a_figure_of_all_meshes_that_one_mesh_does_not_refute_is_undecided_and_says_so():
+    run = made(lambda reading, values: at(0.6 if reading == READINGS[3] else 0.3))
+    quick, full = (of(Section6(level, run=run), "fig-10") for level in ("quick", "full"))
+    assert (quick.holds, full.holds) == (None, True)
+    assert "undecided in 1 of the 24 readings tried" in quick.text
+    assert "not refuted by 190 nodes; the other curves were not run" in quick.text
+    refuted = of(Section6("quick", run=made(lambda reading, values: at(0.3))), "fig-10")
+    assert "in none of the 24 readings tried" in refuted.text
+
+
+def test_one_curve_of_a_figure_that_0_6_does_not_serve_is_enough_against_a_reading():
+    strong = lambda reading, values: at(0.3 if values.get("friction") == Fraction(2, 5) else 0.6)
+    section = Section6("quick", run=made(strong))
+    assert of(section, "fig-11").holds is None
+    assert of(section, "fig-12").holds is True
+    assert of(section, "sec-6.3").holds is True
+
+
+@pytest.mark.parametrize(("outcome", "verdict"), [("refused", None), ("error", None)])
+def test_runs_that_fail_show_nothing_and_refute_nothing(outcome, verdict):
+    evidence = of(Section6("quick", run=made(None, outcome)), "fig-11")
     assert evidence.holds is verdict
+    assert "in none of the 24 readings tried, 24 of which are refused" in evidence.text
+    assert {found["reason"]["holds"] for found in evidence.data["readings"]} == {"made so"}
 
 
-def test_the_best_theta_holds_where_it_serves_every_reading(monkeypatch):
-    steps = {"iterations": 20, "iterations_at_0.6": 21}
-    told = {"geometry": "made", "neumann_body": 1, "E1": 7e4, "E2": 2e4, "best_theta": 0.65}
-    sweeps = Made(None)
-    sweeps.row = lambda model: told | steps
-    claim = section_6.CHECKS["sec-6.3"]
-    assert claim(sweeps)[0].holds is True
-    steps["iterations_at_0.6"] = 40
-    assert claim(sweeps)[0].holds is None
-    steps["iterations_at_0.6"] = None
-    assert claim(sweeps)[0].holds is None
+def test_one_theta_for_all_moduli_is_refuted_by_two_curves_that_share_none_and_never_shown():
+    turned = lambda best: lambda reading, values: at(best if "young" in values else 0.6)
+    assert of(Section6("quick", run=made(turned(0.3))), "sec-7").holds is False
+    assert of(Section6("quick", run=made(turned(0.65))), "sec-7").holds is None
+    assert of(Section6("quick", run=made(None, "error")), "sec-7").holds is None
 
 
-def test_figure_12_says_which_readings_were_tried_and_what_each_gave(seen):
-    (evidence,) = seen["fig-12"]
-    rows = evidence.data["rows"]
-    assert len(rows) == 4
-    for name, family in rows.items():
-        best = ", ".join(f"{row['best_theta']:g}" for row in family)
-        at = ", ".join(f"{row['iterations_at_0.6'] or 'none'}" for row in family)
-        assert f"{name}: best {best} (" in evidence.text
-        assert f"{name}: {at}" in evidence.text
-    assert "tried are 4 readings of the geometry and of the roles, with the top held and k = 0.2" in evidence.text
-    assert evidence.text.endswith(f"{family[0]['nodes']} nodes")
+def test_in_no_reading_of_section_6_is_0_6_the_best_theta_and_six_have_singular_roles(seen):
+    for id in ("sec-6.3", "fig-10", "fig-11", "fig-12"):
+        (evidence,) = seen[id]
+        assert "in none of the 24 readings tried, 6 of which are refused" in evidence.text
+        held = [found["holds"] for found in evidence.data["readings"]]
+        assert (held.count(False), held.count(None), len(held)) == (18, 6, len(READINGS))
+
+
+def test_a_refuting_pair_of_counts_is_that_of_single_runs(seen):
+    first = seen["fig-11"][0].data["readings"][0]
+    assert first["reading"] == READINGS[0].name
+    (curve,) = first["curves"]
+    steps = curve["steps"]
+    assert len(steps) == 2  # at 0.6, and next to 2/(2 + rho)
+    rows = sweep(READINGS[0].problem(190), theta=list(steps)).rows
+    assert [row["iterations_paper"] for row in rows] == list(steps.values())
+    assert steps["0.6"] > 1.25 * min(steps.values())
+
+
+def test_the_two_curves_against_one_theta_for_all_moduli_have_no_theta_in_common(seen):
+    hard, soft = seen["sec-7"][0].data["curves"]
+    assert len(hard["steps"]) + len(hard["not_met"]) == 19
+    serve = {float(theta) for theta, n in hard["steps"].items() if n <= 1.25 * min(hard["steps"].values())}
+    fail = {float(theta) for theta, n in soft["steps"].items() if n > 1.25 * min(soft["steps"].values())}
+    assert serve
+    assert serve <= fail | set(soft["not_met"])
+
+
+@pytest.mark.parametrize("reading", READINGS, ids=lambda reading: reading.name)
+def test_what_the_ledger_says_is_assumed_is_what_each_reading_has(seen, reading):
+    problem, (evidence,) = reading.problem(190), seen["fig-5"]
+    assert evidence.data["assumed"]["law"] == problem.contact.law
+    assert evidence.data["assumed"]["radius"] == float(problem.contact.radius)
+
+
+def test_figure_5_is_told_with_the_zones_of_the_nearest_reading(seen):
+    (evidence,) = seen["fig-5"]
+    readings = {found["reading"]: found["zones"] for found in evidence.data["readings"]}
+    assert len(readings) == len(READINGS)
+    (nearest,) = [name for name in readings if f"nearest comes {name}:" in evidence.text]
+    contact = solve(next(r for r in READINGS if r.name == nearest).problem(190)).contact
+    assert [zone["state"] for zone in readings[nearest]] == [state for state, _, _ in zones(contact)]
+    assert "open" in contact.status
+
+
+def test_runs_that_stop_early_do_not_give_the_same_results():
+    pair, contact = build(READINGS[0].problem(190)), solve(READINGS[0].problem(190)).contact
+    loose, tight = (section_6.finished(pair, section_6.PRINTED, bound).contact for bound in (1e-5, section_6.TIGHT))
+    assert section_6.difference(loose, contact) > section_6.SAME
+    assert section_6.difference(tight, contact) < 1e-10
+
+
+def test_results_that_differ_in_one_reading_are_not_the_same(monkeypatch):
+    run = made(lambda reading, values: at(0.6))
+    few = Section6("quick", OF_TEXT[:1], run=run)
+    assert of(few, "sec-6.2").holds is True
+    monkeypatch.setattr(section_6, "TIGHT", 1e-5)
+    assert of(few, "sec-6.2").holds is False
+
+
+def test_a_reading_whose_run_does_not_arrive_is_not_compared():
+    evidence = of(Section6("quick", run=made(None, "error")), "sec-6.2")
+    assert evidence.holds is None
+    assert "in none of the 4 readings that leave the text nowhere" in evidence.text
 
 
 def ends(residual_slow, residual_fast, steps_in_tpa):
@@ -246,22 +266,20 @@ def ends(residual_slow, residual_fast, steps_in_tpa):
         (ends(9e-10, 8e-10, 14), False),  # the unit of force changes the number of steps
     ],
 )
-def test_a_test_measures_the_error_if_neither_theta_nor_the_unit_matters(monkeypatch, runs, verdict):
-    names = {size: name for name, size in section_6.UNITS.items()}
-    fair = ends(9e-10, 8e-10, 20)
-    monkeypatch.setattr(section_6, "stopped", lambda model, *at: tuple(r[at[0], names[at[1]]] for r in (runs, fair)))
-    assert holds(section_6.CHECKS["sec-6.3-stop"](Made(None))) == [(PRINTED, verdict), (REPAIRED, True)]
+def test_a_test_measures_the_error_if_neither_theta_nor_the_unit_matters(runs, verdict):
+    assert section_6.on_test("printed", runs, 1.0).holds is verdict
+
+
+def test_both_tests_stop_where_the_residuals_of_a_run_say():
+    pair = build(READINGS[0].problem(190))
+    printed, residual = section_6.stopped(pair, Fraction(3, 5), solution_force(pair))
+    (row,) = sweep(READINGS[0].problem(190), theta=["3/5"]).rows
+    assert printed.steps == row["iterations_paper"]
+    assert residual.steps == row["iterations"]
 
 
 def test_the_increment_test_hides_the_factor_one_over_theta(seen):
     runs = seen["sec-6.3-stop"][0].data["runs"]
-    slow = runs["theta 0.05, MPa"]
     # the last increment is at most 1e-9, and theta times the residual before it
-    assert 0.9e-9 / 0.05 < slow["residual"] < 1e-9 / 0.05
-    assert slow["error"] > 10e-9
-
-
-def test_a_global_solution_gives_the_zones(seen):
-    contact = solve(Model(halvings=2).problem).contact
-    told = seen["fig-5"][0].data["readings"][0]["zones"]
-    assert section_6.zones(contact.x, contact.status) == told
+    assert runs["theta 0.05, MPa"]["error"] > 10e-9
+    assert runs["theta 0.05, MPa"]["residual"] > 10 * runs["theta 0.6, MPa"]["residual"]

@@ -11,11 +11,14 @@ from verification.interface.assembly import discretise
 from verification.interface.fields import ContactFields
 from verification.output.folder import Folder
 from verification.reproduce import FIGURES, READINGS, reproduce
-from verification.reproduce.claims import CLAIMS, Curve, curves_hold, share_as_printed, zones, zones_hold
-from verification.reproduce.experiments import Outcome, Reproduction, Result
+from verification.reproduce.claims import CLAIMS, OPTIMUM, Curve, curves_hold, share_as_printed, zones, zones_hold
+from verification.reproduce.experiments import THETAS, Outcome, Reproduction, Result, outcome_of
+from verification.reproduce.refutation import Runs, decide
 
 LITERAL = [reading for reading in READINGS if not reading.departs]
+SLIDING = [reading for reading in READINGS if reading.top == "free to slide" and reading.neumann_body == 1]
 CLAMPED = next(reading for reading in LITERAL if reading.top == "clamped")
+CURVES = [CLAIMS[name] for name in ("fig10", "fig11", "fig12")]
 
 
 @pytest.mark.parametrize("nodes", [60, 190, 666, 2482])
@@ -45,6 +48,14 @@ def test_a_part_of_the_top_ends_at_its_share_of_the_length():
     body = discretise(half.problem(190)).body2
     held = body.mesh.points[body.known.known.any(axis=1), 0]
     assert (held.min(), held.max()) == pytest.approx((0.4, 1.0))
+
+
+@pytest.mark.parametrize("reading", SLIDING, ids=lambda reading: reading.name)
+def test_an_upper_body_that_only_contact_holds_gets_the_steps_of_a_single_run(reading):
+    problem = reading.problem(190)
+    (row,) = vf.sweep(problem, theta=["17/20"]).rows
+    run = vf.run(problem, theta="17/20")
+    assert (row["outcome"], row["iterations"]) == ("converged", run.iterations)
 
 
 def fields(*states: str) -> ContactFields:
@@ -101,6 +112,105 @@ def test_a_figure_is_reproduced_where_every_reading_of_the_text_shows_it():
     assert Result(figure="fig10", outcomes=outcomes([None] * 24)).verdict == "not reproduced"
     together = Reproduction(results=(Result(figure="fig10", outcomes=outcomes(one)),))
     assert together.closest == CLAMPED
+
+
+def test_a_figure_is_undecided_where_a_reading_that_ran_may_yet_show_it():
+    seen = (curve(t6=20),)
+    perhaps = Outcome(reading=CLAMPED, holds=None, curves=seen)
+    refused = Outcome(reading=LITERAL[-1], holds=None)
+    against, shows = (Outcome(reading=READINGS[-1], holds=holds, curves=seen) for holds in (False, True))
+    verdict = lambda *made: Result(figure="fig10", outcomes=made).verdict
+    assert verdict(perhaps, refused, against) == "undecided"
+    assert verdict(refused, against) == "not reproduced"
+    assert verdict(perhaps, shows) == "reproduced under an assumption"  # that of the text did not show it
+
+
+def row(theta, steps, outcome="converged"):
+    return {"theta": float(theta), "iterations": steps, "iterations_paper": steps, "outcome": outcome, "rho": 1.0} | {
+        "reason": "made so"
+    }
+
+
+def test_runs_that_failed_leave_a_reading_undecided_unless_others_refute_it():
+    fail = lambda theta: row(theta, None, "error")
+    judged = lambda **rows: outcome_of("fig11", CLAMPED, rows)
+    assert judged(a=[row(0.6, 20), row(0.7, 20)]).holds is True
+    undecided = judged(a=[row(0.6, 20), fail(0.7)])
+    assert (undecided.holds, undecided.refused, undecided.reason) == (None, False, "made so")
+    assert judged(a=[fail(0.6), row(0.7, 20)]).refused
+    assert judged(a=[row(0.6, 26), row(0.7, 20), fail(0.8)]).holds is False
+    assert judged(a=[fail(0.6)], b=[row(0.6, 26), row(0.7, 20)]).holds is False
+    assert judged(a=[row(0.6, None), fail(0.7)]).holds is False  # 0.6 does not arrive
+
+
+class Counted:
+    """Steps over theta that nobody ran, and which theta were asked for."""
+
+    def __init__(self, steps, others):
+        self.steps, self.others, self.asked = steps, others, []
+
+    def __call__(self, values):
+        self.asked.append(values["theta"])
+        return row(values["theta"], self.steps.get(float(values["theta"]), self.others))
+
+
+@pytest.mark.parametrize(
+    ("steps", "others", "holds", "runs"),
+    [
+        ({}, 20, True, 19),  # as many everywhere
+        ({0.95: 16}, 20, True, 19),  # 20 is 1.25 times 16
+        ({0.95: 15}, 20, False, None),
+        ({0.05: 15}, 20, False, None),
+        ({0.65: 15}, 20, False, 2),  # the one next to 2/(2 + rho) is tried first
+        ({0.6: None}, 20, False, 1),
+        ({}, None, False, 1),
+        ({0.6: 20}, None, True, 19),  # no other arrives
+    ],
+)
+def test_a_reading_is_refuted_by_a_theta_that_takes_too_few_steps_and_by_no_other(steps, others, holds, runs):
+    made = Counted(steps, others)
+    found = decide(OPTIMUM, Runs(CLAMPED, made))
+    assert found.holds is holds
+    assert runs is None or len(made.asked) == runs
+    every = [row(theta, steps.get(float(theta), others)) for theta in THETAS]
+    assert outcome_of("sec-6.3", CLAMPED, {"all": every}).holds is holds
+    assert found.closeness >= outcome_of("sec-6.3", CLAMPED, {"all": every}).closeness
+
+
+def test_a_curve_whose_run_at_0_6_failed_leaves_it_to_the_others_to_refute():
+    fails = lambda values: "friction" not in values and float(values["theta"]) == 0.6
+    best = lambda values: 20 if float(values["theta"]) == 0.6 else 10
+    run = lambda values: row(values["theta"], best(values), "error" if fails(values) else "converged")
+    assert decide(CLAIMS["fig11"], Runs(CLAMPED, run)).holds is False
+    assert decide(OPTIMUM, Runs(CLAMPED, run)).holds is None
+
+
+def test_figures_share_the_runs_of_the_curve_that_they_have_in_common():
+    made = Counted({0.65: 10}, 20)
+    runs = Runs(CLAMPED, made)
+    assert [decide(claim, runs).holds for claim in (*CURVES, OPTIMUM)] == [False] * 4
+    assert len(made.asked) == 2
+
+
+def test_meshes_that_are_not_run_leave_a_figure_undecided_and_refute_it_as_well():
+    fine = lambda values: row(values["theta"], 20 if values["refine"] < 3 or float(values["theta"]) == 0.95 else 40)
+    figure_10 = lambda **meshes: decide(CLAIMS["fig10"], Runs(CLAMPED, fine), **meshes)
+    assert figure_10().holds is False
+    assert figure_10(meshes=[0, 1, 2]).holds is None
+    assert figure_10(meshes=[3]).holds is False
+    alike = lambda values: row(values["theta"], 20 + 4 * values["refine"])
+    assert decide(CLAIMS["fig10"], Runs(CLAMPED, alike)).holds is False  # 32 steps on the finest, 20 on the coarsest
+
+
+@pytest.mark.parametrize("reading", [CLAMPED, READINGS[5]], ids=lambda reading: reading.name)
+def test_early_refutation_says_of_a_reading_what_all_its_runs_say(reading):
+    (result,) = reproduce(["fig12"], readings=[reading]).results
+    early = decide(CLAIMS["fig12"], Runs(reading))
+    assert early.holds is result.outcomes[0].holds
+    assert early.closeness >= result.outcomes[0].closeness
+    whole = {curve.label: curve for curve in result.outcomes[0].curves}
+    for curve in early.curves:
+        assert all(whole[curve.label].steps[theta] == n for theta, n in curve.steps.items())
 
 
 @pytest.fixture(scope="module")

@@ -12,6 +12,7 @@ from problem_list import PROBLEMS
 
 import verification as vf
 from ndtheory import evaluate_sharp
+from verification.algorithm.relaxation import RULES
 from verification.interface import body
 from verification.sweeps import course, grid, sweep
 from verification.sweeps.bodies import Bodies
@@ -136,6 +137,24 @@ def test_rules_and_laws_vary_too():
         assert (each["steps"], each["theta"]) == (run.iterations, float(run.theta))
         assert (each["linearised_rate"] is None) == (each["rule"] != "constant")
         assert (each["sharp_factor"] is None) == (each["rule"] != "constant" or each["law"] == "local")
+
+
+def test_what_is_proved_of_a_row_is_proved_of_its_rule():
+    """q(theta) is about a constant theta, and momentum without friction has a rate of its own."""
+    found = vf.sweep(SMALL, friction=[0, "1/5", 5], rule=list(RULES), theta=[0.4]).rows
+    seen = {(each["rule"], each["friction"]): each for each in found}
+    for (rule, friction), each in seen.items():
+        run = vf.run(SMALL.changed(friction=friction, theta="2/5"), rule=rule)
+        if rule == "constant":
+            q = each["sharp_factor"]
+            assert each["proved_rate"] == (q if q < 1 else None)
+        else:
+            assert each["sharp_factor"] is None
+            assert each["proved_rate"] == (None if run.proved_rate is None else pytest.approx(run.proved_rate.value))
+    proved = {key for key, each in seen.items() if each["proved_rate"] is not None}
+    assert proved == {("constant", 0.0), ("constant", 0.2), ("momentum", 0.0)}
+    assert "no constant theta" in seen["momentum", 0.0]["reason"]
+    assert "not below 1" in seen["constant", 5.0]["reason"]
 
 
 # --- the paper's count ---

@@ -2,22 +2,26 @@
 
 from matplotlib.figure import Figure
 
+from verification.figures.best_theta import draw_best_theta
 from verification.figures.bodies import draw_bodies
 from verification.figures.factor import draw_factor
 from verification.figures.region import draw_region
 from verification.figures.reproduction import draw_reproduction
 from verification.figures.residuals import draw_residuals
+from verification.figures.rules import draw_rules
 from verification.figures.style import save
 from verification.figures.sweep import draw_sweep
 from verification.figures.waterfall import draw_waterfall
 
 __all__ = [
     "Figure",
+    "draw_best_theta",
     "draw_bodies",
     "draw_factor",
     "draw_region",
     "draw_reproduction",
     "draw_residuals",
+    "draw_rules",
     "draw_sweep",
     "draw_waterfall",
     "save",

@@ -16,7 +16,7 @@ SECTIONS = (
     ("Section 3: the algorithm", "3."),
     ("Section 4: the weak form", "4. norm-half prop-4 rem-4"),
     ("Section 5: convergence", ""),
-    ("Section 6: the experiments", "sec-6 fig-"),
+    ("Sections 6 and 7: the experiments", "sec- fig-"),
     ("What the paper does not state", "x-"),
 )
 
@@ -31,7 +31,7 @@ WORDS = {
     "PROVED": "derived in exact arithmetic for all admissible values, from the rows it leans on",
     "REPAIRED": "wrong or incomplete as printed; the repaired form is proved, exactly or in words",
     "REFUTED": "wrong as printed, and no repaired form is known",
-    "NUMERICAL": "holds in floating point on every problem that was tried",
+    "NUMERICAL": "holds in floating point on every problem tried, or in readings that the row names",
     "ASSUMED": "a definition, a law of the model or a cited result",
     "INCONCLUSIVE": "the evidence does not decide",
 }

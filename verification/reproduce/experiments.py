@@ -12,7 +12,17 @@ from verification.interface.fields import ContactFields
 from verification.monolithic import SolveError, solve
 from verification.problem.tables import ProblemError
 from verification.progress import Progress, silent
-from verification.reproduce.claims import CLAIMS, Curve, Verdict, curves_hold, share_as_printed, zones, zones_hold
+from verification.reproduce.claims import (
+    CLAIMS,
+    PRINTED_THETA,
+    SERVES,
+    Curve,
+    Verdict,
+    curves_hold,
+    share_as_printed,
+    zones,
+    zones_hold,
+)
 from verification.reproduce.readings import READINGS, ModelReading
 
 if TYPE_CHECKING:
@@ -23,6 +33,9 @@ FIGURES = tuple(CLAIMS)
 #: 0.05 to 0.95.
 THETAS = tuple(f"{n / 20:.2f}" for n in range(1, 20))
 
+#: Outcomes of a row that say nothing of steps.
+FAILED = ("refused", "error")
+
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
@@ -32,7 +45,7 @@ class Outcome:
     ----------
     reading : ModelReading
     holds : bool or None
-        None where the reading is refused.
+        None where the reading is refused, or its runs do not decide.
     closeness : float
         How near it comes, between readings: the share of Gamma_c in the printed state, or the fewest steps over those
         at 0.6 on the worst curve; 1 at best.
@@ -41,7 +54,7 @@ class Outcome:
     curves : tuple of Curve
         Of the other figures.
     reason : str
-        Why it is refused.
+        Why it is refused or undecided.
     """
 
     reading: ModelReading
@@ -50,6 +63,11 @@ class Outcome:
     contact: ContactFields | None = None
     curves: tuple[Curve, ...] = ()
     reason: str = ""
+
+    @property
+    def refused(self) -> bool:
+        """Whether nothing of it was computed."""
+        return self.holds is None and not self.curves
 
     def to_dict(self) -> dict[str, Any]:
         """A member of ``readings``."""
@@ -84,11 +102,14 @@ class Result:
 
     @property
     def verdict(self) -> Verdict:
-        """Reproduced in every reading that does not leave the text, in some reading, or in none."""
-        of_text = [o.holds for o in self.outcomes if not o.reading.departs and o.holds is not None]
+        """Reproduced in every reading that does not leave the text, in some reading, perhaps in one, or in none."""
+        seen = [o for o in self.outcomes if not o.refused]
+        of_text = [o.holds for o in seen if not o.reading.departs]
         if of_text and all(of_text):
             return "reproduced"
-        return "reproduced under an assumption" if any(o.holds for o in self.outcomes) else "not reproduced"
+        if any(o.holds for o in seen):
+            return "reproduced under an assumption"
+        return "undecided" if any(o.holds is None for o in seen) else "not reproduced"
 
     @property
     def closest(self) -> Outcome:
@@ -222,16 +243,39 @@ def _curves(name: str, reading: ModelReading, jobs: int) -> tuple[Outcome, list[
     for label, some in zip(claim.labels, of_curve, strict=True):
         for row in some:
             row["curve"] = label
-    refused = next((row for row in rows if row["rho"] is None), None)
-    if refused is not None:
-        return Outcome(reading=reading, holds=None, reason=str(refused["reason"])), rows
-    curves = tuple(_curve(label, some) for label, some in zip(claim.labels, of_curve, strict=True))
-    worst = max(curve.cost for curve in curves)
+    return outcome_of(name, reading, dict(zip(claim.labels, of_curve, strict=True))), rows
+
+
+def outcome_of(
+    figure: str, reading: ModelReading, rows: Mapping[str, Sequence[Mapping[str, Any]]], missing: str = ""
+) -> Outcome:
+    """What runs make of a figure.
+
+    Parameters
+    ----------
+    figure : str
+    reading : ModelReading
+    rows : mapping from the label of a curve to its runs
+        A curve on which only some theta were run may refute; a reading that it does not refute needs all of them.
+    missing : str
+        Which runs of the figure were not made: without them a reading is refuted or undecided.
+    """
+    failed = [row for some in rows.values() for row in some if row["outcome"] in FAILED]
+    curves = tuple(curve for label, some in rows.items() if PRINTED_THETA in (curve := curve_of(label, some)).steps)
+    reason = str(failed[0]["reason"]) if failed else missing
+    worst = max((curve.cost for curve in curves), default=math.inf)
     near = 0.0 if math.isinf(worst) else 1 / worst
-    return Outcome(reading=reading, holds=curves_hold(name, curves), closeness=near, curves=curves), rows
+    holds: bool | None = None
+    if curves and worst > SERVES:
+        holds, reason = False, ""
+    elif not reason:
+        holds = curves_hold(figure, curves)
+    return Outcome(reading=reading, holds=holds, closeness=near, curves=curves, reason=reason)
 
 
-def _curve(label: str, rows: Sequence[Mapping[str, Any]]) -> Curve:
-    steps = {float(row["theta"]): row["iterations_paper"] for row in rows}
-    unrelaxed = {float(row["theta"]): row["iterations"] if row["outcome"] == "converged" else None for row in rows}
-    return Curve(label=label, steps=steps, unrelaxed=unrelaxed, rho=rows[0]["rho"])
+def curve_of(label: str, rows: Sequence[Mapping[str, Any]]) -> Curve:
+    """The curve of some runs, without those that failed."""
+    ran = [row for row in rows if row["outcome"] not in FAILED]
+    steps = {float(row["theta"]): row["iterations_paper"] for row in ran}
+    unrelaxed = {float(row["theta"]): row["iterations"] if row["outcome"] == "converged" else None for row in ran}
+    return Curve(label=label, steps=steps, unrelaxed=unrelaxed, rho=ran[0]["rho"] if ran else None)

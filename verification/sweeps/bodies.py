@@ -121,6 +121,8 @@ class Bodies:
         try:
             base = self._base(refine)
         except ProblemError:  # with the roles or the law of the problem; those of the row may fit
+            if not changed:
+                raise
             law = None if {"law", "radius"} & changed.keys() else self._law
             return build(self._refined(refine).changed(**changed), law=law)
         return base.changed(**changed) if changed else base

@@ -72,7 +72,7 @@ def course(pair: ContactPair, rule: Rule, choice: Choice, step: Step, pieces: Kn
     """
     if isinstance(step, Relaxation) and not pair.held:
         found = _lean(pieces, step.theta)
-        if found is not None and found.outcome != "stalled":
+        if found is not None:
             return found
     # where rounding decides the steps of `run` do: a residual that wanders at a level, or meets the tolerance exactly
     return _stepwise(pair, rule, choice, step)
@@ -117,6 +117,8 @@ def _lean(pieces: KnownPieces, theta: float) -> Course | None:
             raise
         why = str(error)
     assert outcome is not None  # the iterates have no end of their own
+    if outcome == "stalled":
+        return None
     reason = _reason(outcome, len(residuals) - 1, paper, why)
     observed = None if outcome == "diverged" else rate_of(residuals, floors, kinds)
     if observed is None:

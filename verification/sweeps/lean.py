@@ -68,7 +68,8 @@ class Affine:
         obstacle[contact.grid.normal] += interface.gap
         trace = interface.carry(pair.neumann.inverse)
         start = contact.load - contact.stiffness @ obstacle  # q of step II at g = 0, where the bound is 0 as well
-        v, force = System(contact.stiffness, contact.free, piece.pattern).solve(start, np.zeros(contact.grid.t))
+        system = System(contact.stiffness, contact.free, piece.pattern, contact.motions)
+        v, force = system.solve(start, np.zeros(contact.grid.t))
         parts = [
             (piece.reaction, force),
             (piece.jump, v),

@@ -8,8 +8,8 @@ from typing import Any
 
 from ndtheory import HypothesisError
 from ndtheory.sharp import one_minus_square
-from verification.algorithm.relaxation import Rule, rule_of
-from verification.algorithm.theta import begin
+from verification.algorithm.relaxation import Constant, Rule, rule_of
+from verification.algorithm.theta import Choice, begin
 from verification.contact import ContactError
 from verification.interface.pair import ContactPair
 from verification.monolithic import SolveError
@@ -23,8 +23,8 @@ Row = dict[str, Any]
 
 #: The columns of a row after the values of the grid.
 RESULTS = (
-    *("iterations", "iterations_paper", "steps", "outcome", "observed_rate", "linearised_rate", "sharp_factor", "rho"),
-    "reason",
+    *("iterations", "iterations_paper", "steps", "outcome", "observed_rate", "linearised_rate", "sharp_factor"),
+    *("proved_rate", "rho", "reason"),
 )
 
 
@@ -106,10 +106,9 @@ def _run(found: Row, setting: Setting, values: Mapping[str, Any]) -> dict[str, s
     rule = rule_of(values.get("rule", pair.settings.relaxation))
     chosen_rule, choice, step = begin(pair, values.get("theta"), rule, measured)
     found |= {"theta": float(choice.theta), "rule": rule.name}
-    outside = pair.outside + ([words] if (words := rule.outside(pair.friction)) else [])
-    found["sharp_factor"] = None if outside else sharp_factor(setting.energy, float(choice.theta))
-    if found["sharp_factor"] is None:
-        why["sharp_factor"] = outside[0] if outside else "rho or the constants of friction do not exist"
+    proved, unproved = _proved(setting, chosen_rule, choice)
+    found |= proved
+    why |= unproved
     went: Course = course(pair, chosen_rule, choice, step, setting.pieces)
     found |= {
         "iterations": went.steps if went.outcome == "converged" else None,
@@ -120,6 +119,23 @@ def _run(found: Row, setting: Setting, values: Mapping[str, Any]) -> dict[str, s
         "linearised_rate": went.linearised_rate,
     }
     return why | dict(went.reason)
+
+
+def _proved(setting: Setting, rule: Rule, choice: Choice) -> tuple[Row, dict[str, str]]:
+    """The columns that a theorem gives, and why one is None."""
+    pair, factor, rate = setting.pair, None, None
+    outside = pair.outside + ([words] if (words := rule.outside(pair.friction)) else [])
+    of_factor = of_rate = outside[0] if outside else "rho or the constants of friction do not exist"
+    if isinstance(rule, Constant) and not outside:
+        factor = sharp_factor(setting.energy, float(choice.theta))
+        if factor is not None:
+            rate, of_rate = (factor, "") if factor < 1 else (None, "q(theta) is not below 1")
+    elif not outside:  # q is about steps with one factor, even where the rule has a proved rate of its own
+        of_factor = f"{rule.words}: no constant theta"
+        rate = None if choice.rho is None else rule.proved_rate(choice.rho)
+    found = {"sharp_factor": factor, "proved_rate": rate}
+    reasons = {"sharp_factor": of_factor, "proved_rate": of_rate}
+    return found, {name: words for name, words in reasons.items() if found[name] is None}
 
 
 def sharp_factor(energy: tuple[float, float, float] | None, theta: float) -> float | None:

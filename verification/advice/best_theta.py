@@ -1,0 +1,246 @@
+"""The best theta of a problem, found in four ways: by runs, by rho, by the Jacobian at the solution, and by each proof.
+
+The four answer different questions.  Runs from g = 0 show which theta took the fewest steps of those that were tried.
+``2/(2 + rho)`` needs no run; it is proved to be best without friction, and a prediction with it.  The Jacobian of T at
+the solution says which theta has the least spectral radius once no contact node changes its state any more.  A bound
+proves a factor of each step for each theta, and has a theta at which that factor is least.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from ndtheory import SharpBounds
+from verification.algorithm.linearisation import NotLinear
+from verification.algorithm.theta import sharp_bounds
+from verification.bounds.multipliers import QuadraticForms
+from verification.bounds.program import LMIError
+from verification.constants import Measured, measure
+from verification.contact import ContactError
+from verification.interface.build import pair_of
+from verification.interface.pair import ContactPair
+from verification.monolithic import SolveError
+from verification.problem.specification import Problem
+from verification.sweeps.lean import KnownPieces
+from verification.sweeps.row import Row
+from verification.sweeps.sweep import sweep
+
+#: The odds theta/(1 - theta) of the predicted theta are multiplied by these for the runs.  Contact that stays closed
+#: and sticks has its best theta at half of them at least, ``1/(1 + rho)``; above, runs soon stall, which takes longest.
+ODDS = tuple(2.0 ** (i / 4) for i in range(-5, 4))
+
+#: A proved factor is a convex function of theta; its least value is looked for up to this factor around the predicted
+#: theta, and to this accuracy of log theta.
+AROUND, ACCURACY = 4.0, 0.03
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fewest:
+    """The thetas of fewest steps among those that were run.
+
+    Attributes
+    ----------
+    steps : int
+    low, high : float
+        The smallest and the largest theta that took so many steps.
+    below, above : float or None
+        The next thetas that were run on either side, which took more steps or did not arrive; None where there are
+        none: fewer steps may lie beyond.
+    """
+
+    steps: int
+    low: float
+    high: float
+    below: float | None
+    above: float | None
+
+    @property
+    def theta(self) -> float:
+        """The middle of ``low`` and ``high``."""
+        return (self.low + self.high) / 2
+
+    @classmethod
+    def of(cls, rows: Sequence[Row], column: str = "iterations") -> Fewest | None:
+        """From rows of a sweep that differ in theta alone; None where no run arrived.
+
+        Parameters
+        ----------
+        rows : sequence of row
+        column : {'iterations', 'iterations_paper'}
+            The test that ends the count.
+
+        Examples
+        --------
+        >>> seen = [(0.2, 9), (0.3, 7), (0.4, 7), (0.5, None)]
+        >>> Fewest.of([{"theta": theta, "iterations": steps} for theta, steps in seen])
+        Fewest(steps=7, low=0.3, high=0.4, below=0.2, above=0.5)
+        """
+        counts = sorted((row["theta"], row[column]) for row in rows)
+        least = min((steps for _, steps in counts if steps is not None), default=None)
+        if least is None:
+            return None
+        thetas = [theta for theta, _ in counts]
+        best = [i for i, (_, steps) in enumerate(counts) if steps == least]
+        return cls(
+            steps=least,
+            low=thetas[best[0]],
+            high=thetas[best[-1]],
+            below=thetas[best[0] - 1] if best[0] else None,
+            above=thetas[best[-1] + 1] if best[-1] + 1 < len(thetas) else None,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Least:
+    """A theta and the factor of one step that is least there."""
+
+    theta: float
+    factor: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class BestTheta:
+    """The best theta of a problem in its roles and at its friction.
+
+    Attributes
+    ----------
+    rho : float
+        rho_normal without friction, rho with it.
+    predicted : float
+        ``2/(2 + rho)``.
+    seen : Fewest or None
+        None where no run arrived, or none was made.
+    linearised : Least or None
+        The theta of least spectral radius of the Jacobian of T_theta at the solution.
+    sharp, semidefinite : Least or None
+        The theta of least proved factor below 1: of the theorem in energy norms, and of the semidefinite bound.
+    reason : mapping from attribute to text
+        Why one of the four is None.
+    """
+
+    rho: float
+    predicted: float
+    seen: Fewest | None
+    linearised: Least | None
+    sharp: Least | None
+    semidefinite: Least | None
+    reason: Mapping[str, str] = field(default_factory=dict)
+
+
+def best_theta(
+    problem: Problem | ContactPair | Path | str, *, runs: bool = True, semidefinite: bool = True
+) -> BestTheta:
+    """The best theta of a problem, found in four ways.
+
+    Parameters
+    ----------
+    problem : Problem, ContactPair or path
+    runs : bool
+        Whether to look for the theta of fewest steps, by runs at the predicted theta and at eight around it.
+    semidefinite : bool
+        Whether to look for the least factor that the semidefinite bound proves: some ten programs.
+
+    Raises
+    ------
+    ValueError
+        rho does not exist.
+
+    Examples
+    --------
+    >>> bars = {"dimension": 1,
+    ...     "body1": {"shape": "interval", "x": [0, 1], "cells": 4, "young": 2, "fixed": ["left"]},
+    ...     "body2": {"shape": "interval", "x": [1, 2], "cells": 4, "young": 1, "prescribed": {"right": -0.1}}}
+    >>> found = best_theta(Problem.from_dict(bars))
+    >>> round(found.predicted, 12), round(found.sharp.theta, 12), round(found.sharp.factor, 12)
+    (0.5, 0.5, 0.5)
+
+    One bar in contact has one mode, which theta = 1/3 removes in one step; the proof speaks of open bars too.
+
+    >>> round(found.linearised.theta, 3), abs(found.seen.theta - 1/3) < 0.03
+    (0.333, True)
+    """
+    pair = pair_of(problem)
+    measured = measure(pair)
+    sharp = sharp_bounds(measured)
+    if sharp is None:
+        raise ValueError(f"needed bodies that have rho: {measured.why_no_energy}")
+    rho, predicted = float(sharp.rho.value), sharp.theta_predicted
+    outside = pair.outside[0] if pair.outside else ""
+    reason: dict[str, str] = {}
+
+    def found(name: str, why_not: str, work: Callable[[], Any], none: str = "") -> Any:
+        """What is asked for and can be worked out; else None, with the reason."""
+        value = None
+        try:
+            value = None if why_not else work()
+        except (NotLinear, ContactError, SolveError, LMIError, ValueError) as error:
+            why_not = str(error)
+        if value is None:
+            reason[name] = why_not or none
+        return value
+
+    of_program = lambda: _semidefinite(pair, measured, predicted)
+    return BestTheta(
+        rho=rho,
+        predicted=predicted,
+        seen=found("seen", "" if runs else "no runs were asked for", lambda: _seen(pair, rho), "no run arrived"),
+        linearised=found("linearised", "", lambda: _linearised(pair)),
+        sharp=found("sharp", outside, lambda: _sharp(sharp), "q(theta) is below 1 for no theta"),
+        semidefinite=found(
+            "semidefinite",
+            outside or ("" if semidefinite else "it was not asked for"),
+            of_program,
+            "no theta is proved to contract",
+        ),
+        reason=reason,
+    )
+
+
+def _seen(pair: ContactPair, rho: float) -> Fewest | None:
+    odds = [share * 2 / rho for share in ODDS]
+    return Fewest.of(sweep(pair, theta=[each / (1 + each) for each in odds], rule=["constant"]).rows)
+
+
+def _sharp(sharp: SharpBounds) -> Least | None:
+    theta, factor = sharp.theta_proved, sharp.factor_proved
+    return None if theta is None or factor is None else Least(theta=theta, factor=factor.value)
+
+
+def _linearised(pair: ContactPair) -> Least:
+    """The moduli of the eigenvalues ``1 - theta + theta mu`` are convex functions of theta, and so is their largest."""
+    known = KnownPieces(pair)
+    solution = known.solution()
+    piece = known.piece(solution.g, solution.contact.pattern)
+    if not piece.balanced:
+        raise NotLinear("contact and friction just hold the contact body: a change of g sets it in motion")
+    eigenvalues = np.diagonal(piece.modes[0])
+    radius = lambda theta: float(np.abs(1 - theta + theta * eigenvalues).max(initial=0.0))
+    found = _least(radius, 1e-6, 1.0, 1e-6)
+    if radius(1.0) <= found.factor:
+        raise NotLinear("the spectral radius falls up to theta = 1")
+    return found
+
+
+def _semidefinite(pair: ContactPair, measured: Measured, predicted: float) -> Least | None:
+    forms = QuadraticForms(pair, measured)
+    factor = lambda theta: forms.factor(theta).value
+    found = _least(factor, predicted / AROUND, min(1.0, predicted * AROUND), ACCURACY)
+    return found if found.factor < 1 else None
+
+
+def _least(factor: Callable[[float], float], low: float, high: float, accuracy: float) -> Least:
+    """The least value of a convex function of theta between two thetas."""
+    found = minimize_scalar(
+        lambda power: factor(math.exp(power)),
+        bounds=(math.log(low), math.log(high)),
+        method="bounded",
+        options={"xatol": accuracy},
+    )
+    return Least(theta=math.exp(found.x), factor=float(found.fun))

@@ -1,0 +1,111 @@
+"""Whether a reading shows what is said of steps over theta, with no more runs than that takes.
+
+On a curve on which only some theta were run, 0.6 costs at least what these say: one theta of the list that takes few
+enough steps refutes a reading, and only a curve that is not refuted needs all of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+from verification.interface.pair import ContactPair
+from verification.reproduce.claims import NODES, PRINTED_THETA, SERVES, Claim
+from verification.reproduce.experiments import FAILED, THETAS, Outcome, curve_of, outcome_of
+from verification.reproduce.readings import ModelReading
+from verification.sweeps.bodies import Bodies
+from verification.sweeps.grid import SweepGrid
+from verification.sweeps.row import Row, row
+
+#: The mesh of 190 nodes with the friction and the moduli of the text: a curve that Figures 10 to 12 have in common.
+COMMON: Mapping[str, Any] = {"refine": NODES.index(190)}
+
+#: Exactly, as a grid has them.
+PRINTED = Fraction(str(PRINTED_THETA))
+LISTED = tuple(map(Fraction, THETAS))
+
+
+class Runs:
+    """The runs of one reading, each made once it is asked for.
+
+    Parameters
+    ----------
+    reading : ModelReading
+    run : callable, optional
+        From values of a grid to the row of a sweep; by default it runs the problem of the reading.
+    """
+
+    def __init__(self, reading: ModelReading, run: Callable[[Mapping[str, Any]], Row] | None = None) -> None:
+        self.reading = reading
+        self._problem = reading.problem(NODES[0])
+        self._run = run or (lambda values: row(self._problem, values, self.bodies))
+        self._rows: dict[tuple[tuple[str, Any], ...], Row] = {}
+
+    @cached_property
+    def bodies(self) -> Bodies:
+        """What the runs share."""
+        return Bodies(self._problem)
+
+    def pair(self, **values: Any) -> ContactPair:
+        """The bodies on the mesh of 190 nodes, with other values of a grid.
+
+        Raises
+        ------
+        ProblemError
+            The reading is refused.
+        """
+        return self.bodies.setting({**COMMON, **values}).pair
+
+    def row(self, values: Mapping[str, Any], theta: Fraction) -> Row:
+        """The run at one theta; what the problem has anyway need not be among the values."""
+        key = (*self.changed(values).items(), ("theta", theta))
+        if key not in self._rows:
+            self._rows[key] = self._run(dict(key))
+        return self._rows[key]
+
+    def changed(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """The values that the problem does not have."""
+        of = self._problem
+        own = {"friction": of.contact.friction, "young": (of.body1.young, of.body2.young)}
+        return {name: value for name, value in values.items() if own.get(name) != value}
+
+    def until_refuted(self, values: Mapping[str, Any]) -> list[Row]:
+        """A curve from 0.6 on, then outwards from 2/(2 + rho), up to the theta that refutes it; all where none does."""
+        rows = [self.row(values, PRINTED)]
+        rho = rows[0]["rho"]
+        best = PRINTED if rho is None else 2 / (2 + rho)
+        for theta in sorted((theta for theta in LISTED if theta != PRINTED), key=lambda theta: abs(theta - best)):
+            if rows[0]["outcome"] in FAILED or refuted(rows):
+                break
+            rows.append(self.row(values, theta))
+        return rows
+
+
+def refuted(rows: Sequence[Row]) -> bool:
+    """Whether the runs of a curve, all or some, show that 0.6 does not serve it; the first is that at 0.6."""
+    return rows[0]["outcome"] not in FAILED and curve_of("", rows).cost > SERVES
+
+
+def decide(claim: Claim, runs: Runs, meshes: Collection[int] | None = None) -> Outcome:
+    """What a reading makes of a claim on steps over theta; its closeness is at most what is told.
+
+    Parameters
+    ----------
+    claim : Claim
+    runs : Runs
+    meshes : collection of int, optional
+        Halvings of the mesh of 60 nodes that are run, of those the claim has; all by default.  A reading that they do
+        not refute is undecided where the claim has more.
+    """
+    curves = list(zip(claim.labels, SweepGrid.of(claim.axes).rows(), strict=True))
+    chosen = [(label, values) for label, values in curves if meshes is None or values["refine"] in meshes]
+    chosen.sort(key=lambda curve: runs.changed(curve[1]) != COMMON)  # it may be known from another figure
+    rows: dict[str, Sequence[Row]] = {}
+    for label, values in chosen:
+        rows[label] = some = runs.until_refuted(values)
+        if some[0]["outcome"] == "refused" or refuted(some):
+            break
+    left = "" if len(chosen) == len(curves) else f"not refuted by {', '.join(rows)}; the other curves were not run"
+    return outcome_of(claim.name, runs.reading, rows, left)
