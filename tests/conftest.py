@@ -9,8 +9,8 @@ from hypothesis import settings
 # Read when sympy is imported: with its 1000 entries the algebra of the paper is expanded again and again.
 os.environ.setdefault("SYMPY_CACHE_SIZE", "100000")
 
-settings.register_profile("dev", deadline=None)
-settings.register_profile("ci", deadline=None, derandomize=True)
+settings.register_profile("dev", deadline=None, max_examples=50)
+settings.register_profile("ci", deadline=None, derandomize=True, max_examples=50)
 settings.register_profile("nightly", deadline=None, max_examples=2000)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE") or ("ci" if os.environ.get("CI") else "dev"))
 

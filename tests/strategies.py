@@ -206,7 +206,10 @@ def held_bodies(draw, most: int = 4):
 
 
 #: What the profiles for every day ask of a property, at most.
-EVERY_DAY = 100
+EVERY_DAY = 50
+
+#: Whether the profile asks for more than that.
+AT_NIGHT = settings.default.max_examples > EVERY_DAY
 
 
 def fewer(share: int, at_night: int | None = None) -> settings:
@@ -215,7 +218,7 @@ def fewer(share: int, at_night: int | None = None) -> settings:
     By `at_night`, where that is given, in profiles that ask for more than those for every day.
     """
     most = settings.default.max_examples
-    return settings(max_examples=max(1, most // (at_night if at_night and most > EVERY_DAY else share)))
+    return settings(max_examples=max(1, most // (at_night if at_night and AT_NIGHT else share)))
 
 
 # --- end of elastic bodies --------------------------------------------------------------------------------------------

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from copy import deepcopy
 from fractions import Fraction
+from functools import lru_cache
 from itertools import product
 from typing import Any
 
@@ -29,8 +31,16 @@ def case(
     seed: int, friction: Any = None, *, matching: bool = True, **iteration: Any
 ) -> tuple[ContactPair, Measured, float, np.random.Generator]:
     """The problem of a seed with its constants, a theta, and the generator that drew them."""
+    *known, random = _drawn(seed, friction, matching, tuple(iteration.items()))
+    return *known, deepcopy(random)
+
+
+@lru_cache(maxsize=256)  # the same few seeds are asked for again and again
+def _drawn(
+    seed: int, friction: Any, matching: bool, iteration: tuple[tuple[str, Any], ...]
+) -> tuple[ContactPair, Measured, float, np.random.Generator]:
     random = np.random.default_rng(seed)
-    pair = build(problem(random, friction, matching=matching, **iteration))
+    pair = build(problem(random, friction, matching=matching, **dict(iteration)))
     measured = measure(pair)
     return pair, measured, relaxation_factor(random, measured.rho_max.value), random
 

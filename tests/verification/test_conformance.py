@@ -30,14 +30,24 @@ from verification.testing import (
     problems,
     thetas,
 )
+from verification.testing import properties as kit
 from verification.testing.transforms import in_units, mirrored, reflect, upside_down
+
+# --- helpers ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def nearly_as_found(monkeypatch):
+    """A counterexample is made simpler by few draws: the property that fails is what counts."""
+    monkeypatch.setattr(kit, "SIMPLER", 4)
+
 
 # --- what is registered passes ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("rule", RULES.values(), ids=list(RULES))
 def test_a_registered_rule_passes(rule):
-    check_rule(rule, examples=6)
+    check_rule(rule, examples=4)
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=list(LAWS))
@@ -47,7 +57,7 @@ def test_a_registered_law_passes(law):
 
 @pytest.mark.parametrize("bound", BOUNDS.values(), ids=list(BOUNDS))
 def test_a_registered_bound_passes(bound):
-    check_bound(bound, examples=12 if bound.calculated else 2)
+    check_bound(bound, examples=8 if bound.calculated else 2)
 
 
 MATRICES = {
@@ -165,6 +175,7 @@ class Boasting(Momentum):
         return 0.9 * momentum_rate(rho)
 
 
+@pytest.mark.usefixtures("nearly_as_found")
 @pytest.mark.parametrize(
     ("rule", "property"),
     [
@@ -299,6 +310,7 @@ class OfALength(Sharp):
         return replace(found, factor=Number.of_float(1 - lost), one_minus_factor=Number.of_float(lost))
 
 
+@pytest.mark.usefixtures("nearly_as_found")
 @pytest.mark.parametrize(
     ("bound", "property"),
     [

@@ -141,6 +141,40 @@ def test_rigid_motions_pass_and_forces_keep_their_sum_and_moment(seed):
     )
 
 
+# --- orders -----------------------------------------------------------------------------------------------------------
+
+
+def orders(errors):
+    """log2 of the ratio of the errors of each mesh and of its halving."""
+    return np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
+
+
+@pytest.mark.parametrize("upper", [4, 3], ids=["matching", "non-matching"])
+def test_a_linear_pressure_is_met_of_order_three_halves_and_its_force_exactly(upper):
+    """Blocks on rollers, one side free, pulled along Gamma_c: p falls by nu/(1 - nu) f a unit of length."""
+    constant, slope = 0.01 / ((1 - 0.3**2) * (0.3 / 7 + 0.5 / 2)), 0.3 / 0.7 * 0.05
+    pull = {"body_force": ["0.05", 0]}
+    errors = []
+    for n in (1, 2, 4, 8):
+        problem = vf.Problem.from_dict(changed(pressed((4, upper)), body1=pull, body2=pull))
+        found = vf.solve(problem.changed(cells=((4 * n, 2 * n), (upper * n, 2 * n)))).contact
+        assert found.force["normal"] == pytest.approx(constant - slope / 2, rel=1e-12)
+        off = found.pressure - (constant - slope * (1 - found.x))
+        errors.append(np.sqrt(np.gradient(found.x) @ off**2))
+    assert np.abs(orders(errors) - 1.5).max() < 0.1
+
+
+def test_the_force_of_section_6_converges_with_the_same_order_on_both_kinds_of_grids():
+    """Corners limit it: 2 lambda = 1.42 where the clamped top meets a free side, near 3/2 on these meshes."""
+    force = lambda n, upper: vf.solve(
+        vf.example("section6").changed(cells=((10 * n, 2 * n), (upper * n, 2 * n)), radius="0.2")
+    ).contact.force["normal"]
+    fine = force(16, 6)
+    for upper in (6, 8):
+        assert np.abs(orders([abs(force(n, upper) / fine - 1) for n in (1, 2, 4)]) - 1.5).max() < 0.15
+    assert 1 < abs(force(1, 6) / fine - 1) / abs(force(1, 8) / fine - 1) < 1.3
+
+
 # --- against other codes ----------------------------------------------------------------------------------------------
 
 

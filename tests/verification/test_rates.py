@@ -5,13 +5,14 @@ from __future__ import annotations
 import sys
 from dataclasses import replace
 from fractions import Fraction
-from itertools import pairwise
+from itertools import islice, pairwise
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import verification as vf
+from verification.algorithm.fixed_point import FixedPointMap, iterate_at
 from verification.algorithm.rates import CLEAR_OF_NOISE, largest_step_ratio, noise, observed_rate, rate_at_the_end
 from verification.algorithm.runs import Run, run
 
@@ -20,8 +21,8 @@ EPSILON = sys.float_info.epsilon
 #: A pair whose noise at a state is 4 eps |g|.
 SAME = lambda values: values
 PAIR = SimpleNamespace(
-    interface=SimpleNamespace(carry=SAME, carry_back=SAME),
-    neumann=SimpleNamespace(dual_norm=lambda v: float(np.linalg.norm(v))),
+    interface=SimpleNamespace(transfer=None, carry=SAME, carry_back=SAME),
+    neumann=SimpleNamespace(stiffness=np.zeros((1, 1)), inverse=np.eye(1), load=np.zeros(1)),
     contact=SimpleNamespace(stiffness=np.zeros((1, 1)), load=np.zeros(1)),
 )
 
@@ -144,3 +145,68 @@ def test_the_interval_holds_the_noise_of_both_ends():
     assert found.value == pytest.approx(0.5)
     assert found.lo == pytest.approx(np.sqrt(0.23 / 1.01), rel=1e-12)
     assert found.hi == pytest.approx(np.sqrt(0.27 / 0.99), rel=1e-12)
+
+
+# --- the noise of one evaluation --------------------------------------------------------------------------------------
+
+
+def cantilever(length: int, height: str, cells: tuple[int, int]) -> vf.Problem:
+    """The Neumann body is clamped at its left end alone and pressed onto a clamped layer."""
+    x = {"shape": "rectangle", "poisson": "0.3", "x": [0, length]}
+    layer = {"y": ["-0.5", 0], "cells": [cells[0], 3], "young": 70000, "fixed": ["bottom"]}
+    beam = {"y": [0, height], "cells": list(cells), "young": 20000, "fixed": ["left"], "traction": {"top": [0, -1]}}
+    start = Fraction(2 * length, cells[0])
+    contact = {"friction": "0.2", "radius": "0.3", "interval": [str(start), length]}
+    return vf.Problem.from_dict({"body1": x | layer, "body2": x | beam, "contact": contact})
+
+
+exact = np.vectorize(Fraction, otypes=[object])
+
+
+def solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """By Gauss and Jordan, in rationals."""
+    rows = np.column_stack([exact(matrix), right])
+    for i in range(len(rows)):
+        rows[i] /= rows[i, i]
+        for j in set(range(len(rows))) - {i}:
+            rows[j] -= rows[j, i] * rows[i]
+    return rows[:, -1]
+
+
+def exact_image(pair: vf.ContactPair, state) -> np.ndarray:
+    """T at an iterate in rationals, by steps I and II written out for its contact pattern; one grid, friction acts."""
+    S, t, pattern = exact(pair.contact.stiffness), pair.contact.grid.t, state.contact.pattern
+    g = exact(state.g)
+    phi = exact(pair.neumann.known) + solved(pair.neumann.stiffness, g + exact(pair.neumann.load))
+    phi[pair.contact.grid.normal] += exact(pair.interface.gap)
+    pressure = exact(pair.interface.kernel) @ g[pair.neumann.grid.normal]
+    friction = exact(pair.contact.grid.weights) * Fraction(pair.friction) * abs(pressure) * exact(pattern.sliding)
+    q = exact(pair.contact.load) - S @ phi
+    right = q.copy()
+    right[:t] -= friction
+    moves = np.flatnonzero(np.concatenate([pattern.sliding != 0, ~pattern.touching]))
+    v = exact(np.zeros(len(q)))
+    if len(moves):
+        v[moves] = solved(pair.contact.stiffness[np.ix_(moves, moves)], right[moves])
+    return q - S @ v
+
+
+def test_the_noise_of_a_cantilever_covers_the_distance_to_T_in_rationals():
+    """Of what step I solves for little is left in u, so that errors come through ``S2^-1``: 22 times |S1| |u| there."""
+    pair = vf.build(cantilever(2, "0.2", (10, 2)))
+    theta = 1 / (1 + vf.measure(pair).rho_max.value)
+    for state in islice(vf.iterate(pair, theta=theta), 0, 41, 20):
+        off = (exact(state.image) - exact_image(pair, state)).astype(float)
+        assert 0 < pair.neumann.dual_norm(off) <= noise(pair, state)
+
+
+def test_the_noise_of_a_cantilever_covers_the_sums_of_a_run():
+    """T at the displacement that follows by sums against T at the one that is solved for, as for other bodies."""
+    pair = vf.build(cantilever(1, "0.5", (8, 4)))
+    T, compared = FixedPointMap(pair), 0
+    for state in islice(vf.iterate(pair, theta="0.02"), 80):
+        again = iterate_at(T, state.g)
+        if again.contact.pattern == state.contact.pattern:
+            assert pair.neumann.dual_norm(again.image - state.image) <= noise(pair, state)
+            compared += 1
+    assert compared > 40

@@ -13,6 +13,7 @@ from problem_list import PROBLEMS
 import verification as vf
 from ndtheory import evaluate_sharp
 from verification.algorithm.relaxation import RULES
+from verification.contact import ContactError, active_set
 from verification.interface import body
 from verification.sweeps import course, grid, sweep
 from verification.sweeps.bodies import Bodies
@@ -304,6 +305,33 @@ def test_the_table_reads_back_from_csv(wide):
     for one, found in zip(read, wide.rows, strict=True):
         assert list(one) == list(found)
         assert one == {name: "" if value is None else str(value) for name, value in found.items()}
+
+
+def test_what_reads_comments_anywhere_in_a_line_reads_whole_rows(monkeypatch):
+    """As pandas does with ``comment="#"``, whether a field stands in quotes or not."""
+
+    def fails(*args, **named):
+        raise ContactError("body #2, by a, b")
+
+    monkeypatch.setattr(course, "_lean", fails)
+    found = vf.sweep(BARS, theta=[0.3, 0.5])
+    kept = [line.split("#")[0] for line in found.to_csv().splitlines()]
+    read = list(csv.DictReader(line for line in kept if line))
+    assert [one["reason"] for one in read] == ["outcome: body %232, by a, b"] * 2
+    assert [each["reason"] for each in found.rows] == [one["reason"] for one in read]
+
+
+def test_rows_of_one_friction_factorise_each_pattern_once(monkeypatch):
+    made, original = [], active_set.System.__init__
+
+    def counted(self, S, free, pattern, motions=None):
+        made.append(pattern)
+        original(self, S, free, pattern, motions)
+
+    monkeypatch.setattr(active_set.System, "__init__", counted)
+    found = vf.sweep(SMALL, theta=[0.1, 0.3, 0.95], neumann_body=[2]).rows
+    assert [each["outcome"] for each in found] == ["converged", "stalled", "stalled"]
+    assert len(made) == len(set(made)) > 3
 
 
 def test_a_sweep_travels_and_is_shown(wide):

@@ -12,7 +12,7 @@ from scipy.linalg.lapack import ztrexc
 from fem1d2d.mesh import Floats
 from verification.algorithm.affine_piece import Piece, piece_of
 from verification.algorithm.iterate import Iterate
-from verification.algorithm.rates import CLEAR_OF_NOISE, noise, observed_rate, rate_at_the_end, settled
+from verification.algorithm.rates import CLEAR_OF_NOISE, noise, noises, observed_rate, rate_at_the_end, settled
 from verification.interface.pair import ContactPair
 
 #: Contact nodes up to which T is linearised: eigenvalues of larger Jacobians take minutes.
@@ -232,7 +232,7 @@ def forecast(pair: ContactPair, iterates: Sequence[Iterate], theta: float, toler
     if iterate.residual <= tolerance * iterate.scale:
         raise NotLinear("the run converged before a forecast could be made half way")
     seen = iterates[: half + 1]
-    residuals, floors = [s.residual for s in seen], [noise(pair, s) for s in seen]
+    residuals, floors = [s.residual for s in seen], noises(pair, seen)
     if tolerance * iterate.scale <= CLEAR_OF_NOISE * floors[-1]:
         raise NotLinear("the tolerance lies within rounding")
     near = _near(pair, iterate, theta)

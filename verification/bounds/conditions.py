@@ -24,7 +24,11 @@ Cones = NDArray[np.intp]
 #: How much the square of a form of length 1 may weigh that is 0: the more, the nearer to leaving it out.
 LARGE = 1e2
 
-#: Why no multipliers are sought where a rigid motion lifts the contact body off.
+#: Why no multipliers are sought where a rigid motion lifts the contact body off: without friction, and with it.
+LIFTS_SMOOTHLY = (
+    "the contact body can be lifted rigidly, which only multipliers of (2.4) that are equal at all nodes allow; without"
+    " friction these prove the sharp bound, and none prove less"
+)
 LIFTS = (
     "the contact body can be lifted rigidly, which only multipliers of (2.4) that are equal at all nodes allow, as"
     " those of the sharp bound are; others are not sought"
@@ -113,7 +117,7 @@ class Conditions:
         if constants is None:
             raise ValueError("the theorem in energy norms does not speak of it: " + measured.why_no_energy)
         if pair.contact.lifts:
-            raise ValueError(LIFTS)
+            raise ValueError(LIFTS if k else LIFTS_SMOOTHLY)
         self._measured = measured
         self.sharp = float(constants.at_work), float(constants.kappa_1), float(constants.kappa_2)
         contact, neumann, interface = pair.contact.grid, pair.neumann.grid, pair.interface

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +18,9 @@ SLACK = 1e-14
 
 #: A guess is mended at most so often; a few suffice unless it cycles.
 LIMIT = 60
+
+#: So many numbers of linear systems are kept, 32 MB: a run that comes back to a pattern finds its system there.
+KEPT = 4_000_000
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -96,8 +101,22 @@ class System:
         return v, force
 
 
+class Systems:
+    """The linear systems of the patterns of one stiffness matrix, each made once while it is in use.
+
+    Parameters
+    ----------
+    S, free, motions : array
+        As :class:`System` takes them.
+    """
+
+    def __init__(self, S: Floats, free: NDArray[np.bool_], motions: Floats | None = None) -> None:
+        made = lru_cache(maxsize=1 + KEPT // (2 * S.size + 1))
+        self.of: Callable[[Pattern], System] = made(lambda pattern: System(S, free, pattern, motions))
+
+
 class ActiveSet:
-    """The solver for one stiffness matrix; keeps the linear system of the last pattern.
+    """The solver for one stiffness matrix.
 
     Parameters
     ----------
@@ -108,18 +127,21 @@ class ActiveSet:
         t.
     motions : array, shape (t + n, k), optional
         The kernel of S, where contact alone holds the body.
+    systems : Systems, optional
+        Of the same matrix; what solvers share that run one after the other.
     """
 
-    def __init__(self, S: Floats, free: NDArray[np.bool_], tangential: int, motions: Floats | None = None) -> None:
-        self._S, self._free, self._t, self._motions = S, free, tangential, motions
+    def __init__(
+        self,
+        S: Floats,
+        free: NDArray[np.bool_],
+        tangential: int,
+        motions: Floats | None = None,
+        systems: Systems | None = None,
+    ) -> None:
+        self._t, self._systems = tangential, systems or Systems(S, free, motions)
         self._held = None if free[:tangential].all() else ~free[:tangential]
         self._stiffness = float(np.diag(S).max())
-        self._last: System | None = None
-
-    def _system(self, pattern: Pattern) -> System:
-        if self._last is None or self._last.pattern != pattern:
-            self._last = System(self._S, self._free, pattern, self._motions)
-        return self._last
 
     def _begin(self, start: Pattern, smooth: NDArray[np.bool_]) -> Pattern:
         """The first guess: no held node slides, every node whose bound is zero does."""
@@ -150,7 +172,7 @@ class ActiveSet:
         pattern = self._begin(start, smooth)
         seen: set[bytes] = set()
         for _ in range(LIMIT):
-            system = self._system(pattern)
+            system = self._systems.of(pattern)
             v, force = system.solve(q, bound)
             # v_N = 0 where a node touches and force_N = 0 where it is open, so that each sign speaks of the others
             pulls, enters = force[t:] < -force_slack, v[t:] > length_slack

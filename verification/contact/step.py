@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem1d2d.mesh import Floats
-from verification.contact.active_set import ActiveSet, Pattern
+from verification.contact.active_set import ActiveSet, Pattern, Systems
 from verification.contact.existence import way_out
 from verification.contact.kkt import KKT, TOLERANCE, Certificate
 from verification.interrupts import undisturbed
@@ -71,6 +71,8 @@ class ContactStep:
         Orthonormal traces of the rigid motions that contact alone holds: the kernel of S.
     body : str
         What an error calls the body.
+    systems : Systems, optional
+        Of the same matrix, shared with other steps.
     """
 
     def __init__(
@@ -82,13 +84,14 @@ class ContactStep:
         near: str = "",
         motions: Floats | None = None,
         body: str = "the contact body",
+        systems: Systems | None = None,
     ) -> None:
         if solver not in ("auto", "cvxpy", "active-set"):
             raise ValueError(f"solver {solver!r}: needed 'auto', 'cvxpy' or 'active-set'")
         self._S, self._free, self._t, self._solver, self._near = S, free, tangential, solver, near
         self._body = body
         self._motions = np.zeros((len(S), 0)) if motions is None or not motions.size else motions
-        self._active, self._certificate = ActiveSet(S, free, tangential, self._motions), Certificate(S, free)
+        self._active, self._certificate = ActiveSet(S, free, tangential, self._motions, systems), Certificate(S, free)
         self._model: ContactModel | None = None
         self._pattern = Pattern.sticking(len(S) - tangential, tangential)
 

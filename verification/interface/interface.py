@@ -80,14 +80,14 @@ class Interface(Value):
         """``P u``: traces on the Neumann grid, one or columns of them, as the contact grid sees them."""
         if self.transfer is None:
             return traces
-        blocks = np.split(traces, self.neumann.dimension)
+        blocks = traces.reshape(self.neumann.dimension, self.neumann.n, *traces.shape[1:])
         return np.concatenate([self.transfer @ block for block in blocks])
 
     def carry_back(self, forces: Floats) -> Floats:
         """``P' f``: nodal forces on the contact grid, one or columns of them, as the Neumann grid receives them."""
         if self.transfer is None:
             return forces
-        blocks = np.split(forces, self.contact.dimension)
+        blocks = forces.reshape(self.contact.dimension, self.contact.n, *forces.shape[1:])
         return np.concatenate([self.onto_neumann(block) for block in blocks])
 
     def onto_neumann(self, forces: Floats) -> Floats:

@@ -2,27 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import takewhile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fem1d2d.mesh import Floats
-from verification.algorithm.fixed_point import FixedPointMap, iterate_at, iterates
+from verification.algorithm.fixed_point import iterate_at, iterates
 from verification.algorithm.iterate import Iterate
 from verification.algorithm.linearisation import NotLinear, linearised_rate
-from verification.algorithm.rates import rate_of
-from verification.algorithm.relaxation import Relaxation, Rule, Step
-from verification.algorithm.runs import PATIENCE, RUNAWAY, Ending, Outcome, Run
+from verification.algorithm.rates import noises, rate_of
+from verification.algorithm.relaxation import Constant, Relaxation, Rule, Step
+from verification.algorithm.runs import PATIENCE, RUNAWAY, Ending, Outcome
 from verification.algorithm.theta import Choice
 from verification.contact import ContactError
 from verification.interface.pair import ContactPair
 from verification.monolithic import SolveError
-from verification.sweeps.lean import KnownPieces, lengths
+from verification.sweeps.lean import KnownPieces, key_of, lengths
 
 #: The bound of the test of Section 6.3.
 PAPER = 1e-9
+
+#: After so many steps without a new least residual a run most likely stalls; few that do not have as many.
+WANDERS = 12
 
 #: A residual within this share of the tolerance is on either side of it by rounding: it has about seven digits there.
 TIE = 1e-6
@@ -70,31 +76,78 @@ def course(pair: ContactPair, rule: Rule, choice: Choice, step: Step, pieces: Kn
     ContactError
         Step II did not reach its certificate before the run ended.
     """
-    if isinstance(step, Relaxation) and not pair.held:
-        found = _lean(pieces, step.theta)
-        if found is not None:
-            return found
+    went = _lean(pieces, step.theta) if isinstance(step, Relaxation) and not pair.held else None
     # where rounding decides the steps of `run` do: a residual that wanders at a level, or meets the tolerance exactly
-    return _stepwise(pair, rule, choice, step)
+    went = went or _stepwise(pieces, step)
+    reason = _reason(went.outcome, len(went.residuals) - 1, went.paper, went.why)
+    observed = None if went.outcome == "diverged" else rate_of(went.residuals, went.floors, went.kinds)
+    if observed is None:
+        reason["observed_rate"] = _no_rate(went.outcome)
+    linear = None
+    try:
+        if not isinstance(rule, Constant):
+            raise NotLinear(f"the {rule.name} relaxation is no constant theta")
+        here, first = went.arrived() if went.outcome == "converged" else (pieces.solution(), None)
+        linear = linearised_rate(pieces.piece(here.g, here.contact.pattern), here, float(choice.theta), first)
+    except (NotLinear, SolveError, ContactError) as error:
+        reason["linearised_rate"] = str(error)
+    return Course(
+        steps=len(went.residuals) - 1,
+        paper=went.paper,
+        outcome=went.outcome,
+        observed_rate=None if observed is None else observed.value,
+        linearised_rate=linear,
+        reason=reason,
+    )
 
 
-def _lean(pieces: KnownPieces, theta: float) -> Course | None:
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Went:
+    """How a run went.
+
+    Attributes
+    ----------
+    outcome : {'converged', 'stalled', 'limit', 'diverged'}
+    residuals, floors : list of float
+        Those of every evaluation until it ended, and the rounding of each.
+    kinds : list
+        What tells one contact pattern from another, for each.
+    paper : int or None
+        n at which the test of Section 6.3 is met.
+    why : str
+        What ended it before that test was met, other than its outcome.
+    arrived : callable
+        T at its last g, and the g with which it came onto that piece for good.
+    """
+
+    outcome: Outcome
+    residuals: Sequence[float]
+    floors: Sequence[float]
+    kinds: Sequence[object]
+    paper: int | None
+    why: str
+    arrived: Callable[[], tuple[Iterate, Floats]]
+
+
+def _lean(pieces: KnownPieces, theta: float) -> _Went | None:
     """With constant relaxation: steps on one affine piece are taken together; None where rounding decides the count."""
-    settings, T = pieces.pair.settings, FixedPointMap(pieces.pair)
+    settings, T = pieces.pair.settings, pieces.map()
     ending, bound = Ending(settings), settings.tolerance
     residuals: list[float] = []
-    floors: list[float] = []
-    kinds: list[bytes] = []
+    walked: list[tuple[Floats, Floats]] = []
+    kinds: list[object] = []
     outcome: Outcome | None = None
-    paper, why, scale, n = None, "", 0.0, -1
+    paper, why, scale, n, least, since = None, "", 0.0, -1, math.inf, 0
     before = last = first = np.zeros(0)
     piece: tuple[bytes, ...] = ()
     try:
         for taken in pieces.steps(T, theta):
             if paper is None:
                 paper = _paper(taken.g, before, n)
-            if taken.piece != piece and outcome is None:
-                piece, first = taken.piece, taken.g[:, 0]
+            if outcome is None:
+                walked.append((taken.g, taken.u))
+                if taken.piece != piece:
+                    piece, first = taken.piece, taken.g[:, 0]
             for i, (residual, size) in enumerate(zip(taken.residual.tolist(), taken.size.tolist(), strict=True)):
                 n, scale = n + 1, max(scale, size)
                 ended = ending.at(n, residual, scale)
@@ -102,9 +155,11 @@ def _lean(pieces: KnownPieces, theta: float) -> Course | None:
                     if abs(residual - bound * scale) <= TIE * bound * scale:
                         return None
                     residuals.append(residual)
-                    floors.append(float(taken.floor[i]))
                     kinds.append(taken.pattern)
                     outcome, last = ended, taken.g[:, i]
+                    least, since = (residual, 0) if residual < least else (least, since + 1)
+                    if since > WANDERS:
+                        return None
                 if outcome and ((paper is not None and paper <= n) or ending.given_up(n, residual)):
                     paper = None if paper is None or paper > n else paper
                     break
@@ -117,29 +172,15 @@ def _lean(pieces: KnownPieces, theta: float) -> Course | None:
             raise
         why = str(error)
     assert outcome is not None  # the iterates have no end of their own
-    if outcome == "stalled":
-        return None
-    reason = _reason(outcome, len(residuals) - 1, paper, why)
-    observed = None if outcome == "diverged" else rate_of(residuals, floors, kinds)
-    if observed is None:
-        reason["observed_rate"] = _no_rate(outcome)
-    linear = None
-    try:
-        if outcome == "converged":
-            here = iterate_at(T, last)
-            linear = linearised_rate(pieces.piece(last, here.contact.pattern), here, theta, first)
-        else:
-            here = pieces.solution()
-            linear = linearised_rate(pieces.piece(here.g, here.contact.pattern), here, theta)
-    except (NotLinear, SolveError, ContactError) as error:
-        reason["linearised_rate"] = str(error)
-    return Course(
-        steps=len(residuals) - 1,
-        paper=paper,
+    g, u = (np.hstack(parts)[:, : len(residuals)] for parts in zip(*walked, strict=True))
+    return _Went(
         outcome=outcome,
-        observed_rate=None if observed is None else observed.value,
-        linearised_rate=linear,
-        reason=reason,
+        residuals=residuals,
+        floors=pieces.norm.rounding(g, u).tolist(),
+        kinds=kinds,
+        paper=paper,
+        why=why,
+        arrived=lambda: (iterate_at(T, last), first),
     )
 
 
@@ -150,14 +191,15 @@ def _paper(g: Floats, before: Floats, last: int) -> int | None:
     return None if not len(met) else last + int(met[0]) + (1 if len(before) else 2)
 
 
-def _stepwise(pair: ContactPair, rule: Rule, choice: Choice, step: Step) -> Course:
+def _stepwise(pieces: KnownPieces, step: Step) -> _Went:
     """With any rule: as :func:`verification.run` goes."""
+    pair = pieces.pair
     seen: list[Iterate] = []
     ending, paper, why = Ending(pair.settings), None, ""
     outcome: Outcome | None = None
     before: Floats | None = None
     try:
-        for found in iterates(FixedPointMap(pair), step):
+        for found in iterates(pieces.map(), step):
             if paper is None and before is not None and meets_paper_test(found.g[:, None], before[:, None])[0]:
                 paper = found.iteration
             if outcome is None:
@@ -172,24 +214,20 @@ def _stepwise(pair: ContactPair, rule: Rule, choice: Choice, step: Step) -> Cour
             raise
         why = str(error)
     assert outcome is not None  # the iterates have no end of their own
-    run = Run(pair=pair, rule=rule, choice=choice, iterates=tuple(seen), outcome=outcome).linearise()
-    return _judged(run, paper, why)
 
+    def arrived() -> tuple[Iterate, Floats]:
+        last = key_of(pieces.piece(seen[-1].g, seen[-1].contact.pattern))
+        same = takewhile(lambda each: key_of(pieces.piece(each.g, each.contact.pattern)) == last, reversed(seen))
+        return seen[-1], deque(same, maxlen=1)[0].g
 
-def _judged(run: Run, paper: int | None, why: str) -> Course:
-    observed, linear = run.observed_rate, run.linearised
-    reason = _reason(run.outcome, run.iterations, paper, why)
-    if observed is None:
-        reason["observed_rate"] = _no_rate(run.outcome)
-    if linear is None:
-        reason["linearised_rate"] = run.why_not_linearised
-    return Course(
-        steps=run.iterations,
+    return _Went(
+        outcome=outcome,
+        residuals=[each.residual for each in seen],
+        floors=noises(pair, seen),
+        kinds=[each.contact.pattern for each in seen],
         paper=paper,
-        outcome=run.outcome,
-        observed_rate=None if observed is None else observed.value,
-        linearised_rate=None if linear is None else linear.rate,
-        reason=reason,
+        why=why,
+        arrived=arrived,
     )
 
 

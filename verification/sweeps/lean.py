@@ -17,7 +17,8 @@ from verification.algorithm.affine_piece import Piece, piece_of
 from verification.algorithm.fixed_point import FixedPointMap, iterate_at
 from verification.algorithm.iterate import Iterate
 from verification.algorithm.linearisation import NotLinear
-from verification.contact.active_set import SLACK, Pattern, System
+from verification.algorithm.rates import Noise
+from verification.contact.active_set import SLACK, Pattern, Systems
 from verification.interface.pair import ContactPair
 from verification.monolithic import SolveError, solution_force
 
@@ -34,18 +35,19 @@ class Steps:
 
     Attributes
     ----------
-    g, image : array, shape (2 n, steps)
-    residual, size, floor : array, shape (steps,)
-        ``|||T g - g|||``, ``|||T g|||`` and the rounding error of either, in the norm (5.21).
+    g, u, image : array, shape (2 n, steps)
+        g, its displacement and T g.
+    residual, size : array, shape (steps,)
+        ``|||T g - g|||`` and ``|||T g|||`` in the norm (5.21).
     pattern, piece : object
         Equal for steps of one contact pattern, and of one affine piece.
     """
 
     g: Floats
+    u: Floats
     image: Floats
     residual: Floats
     size: Floats
-    floor: Floats
     pattern: bytes
     piece: tuple[bytes, ...]
 
@@ -57,9 +59,11 @@ class Affine:
     ----------
     piece : Piece
         Of a pair none of whose contact nodes is held.
+    systems : Systems
+        Of its contact body.
     """
 
-    def __init__(self, piece: Piece) -> None:
+    def __init__(self, piece: Piece, systems: Systems) -> None:
         pair = piece.pair
         contact, interface = pair.contact, pair.interface
         self.piece, self.key = piece, key_of(piece)
@@ -68,13 +72,12 @@ class Affine:
         obstacle[contact.grid.normal] += interface.gap
         trace = interface.carry(pair.neumann.inverse)
         start = contact.load - contact.stiffness @ obstacle  # q of step II at g = 0, where the bound is 0 as well
-        system = System(contact.stiffness, contact.free, piece.pattern, contact.motions)
-        v, force = system.solve(start, np.zeros(contact.grid.t))
+        v, force = systems.of(piece.pattern).solve(start, np.zeros(contact.grid.t))
         parts = [
             (piece.reaction, force),
             (piece.jump, v),
             (-contact.stiffness @ trace, start),
-            (trace, unloaded),
+            (pair.neumann.inverse, pair.neumann.unloaded),
             (piece.force, interface.carry_back(force)),
         ]
         self._matrix = np.vstack([matrix for matrix, _ in parts])
@@ -95,8 +98,8 @@ class Affine:
         pair = self.piece.pair
         interface, t = pair.interface, pair.contact.grid.t
         found, size = self._matrix @ g + self._offset, pair.contact.grid.size
-        force, v, q, trace = (found[i * size : (i + 1) * size] for i in range(4))
-        image = found[4 * size :]
+        force, v, q = (found[i * size : (i + 1) * size] for i in range(3))
+        u, image = found[3 * size : -len(g)], found[-len(g) :]
         if pair.rubs and interface.kernel is not None:
             stress = interface.kernel @ g[pair.neumann.grid.normal]
             bound = norm.limits * np.abs(stress)
@@ -109,35 +112,22 @@ class Affine:
         kept &= (np.abs(force[:t]) <= bound + slack).all(axis=0)
         kept &= ((self._sliding * v[:t] >= -slack / self._stiffness) | (bound == 0)).all(axis=0)
         steps = Steps(
-            g=g,
-            image=image,
-            residual=norm.of(image - g),
-            size=norm.of(image),
-            floor=norm.rounding(g, trace),
-            pattern=self.key[0],
-            piece=self.key,
+            g=g, u=u, image=image, residual=norm.of(image - g), size=norm.of(image), pattern=self.key[0], piece=self.key
         )
         return steps, len(kept) if kept.all() else int(np.argmin(kept))
 
 
 class Norm:
-    """The norm (5.21) of columns, and the noise of :func:`verification.algorithm.rates.noise`."""
+    """The norm (5.21) of columns, what each may owe to rounding, and how far friction goes at each node."""
 
     def __init__(self, pair: ContactPair) -> None:
         self._factor = np.linalg.inv(pair.neumann.root)
-        self._back = pair.interface.carry_back(np.eye(pair.contact.grid.size))
-        self._stiffness, self._load = np.abs(pair.contact.stiffness), np.abs(pair.contact.load)[:, None]
+        self.rounding = Noise(pair).of
         self.limits = (float(pair.friction) * pair.contact.grid.weights)[:, None]
 
     def of(self, force: Floats) -> Floats:
         """``sqrt(force' S2^-1 force)`` of every column."""
         return lengths(self._factor @ force)
-
-    def rounding(self, g: Floats, trace: Floats) -> Floats:
-        """The rounding error of T at every column."""
-        reaction = self._stiffness @ np.abs(trace) + self._load
-        magnitude = np.abs(self._back @ reaction) + np.abs(g)
-        return 4 * np.finfo(float).eps * self.of(magnitude)
 
 
 def lengths(columns: Floats) -> Floats:
@@ -161,8 +151,14 @@ class KnownPieces:
 
     def __init__(self, pair: ContactPair) -> None:
         self.pair = pair
+        contact = pair.contact
+        self._systems = Systems(contact.stiffness, contact.free, contact.motions)
         self._found: dict[tuple[bytes, ...], Piece] = {}
         self._affine: dict[tuple[bytes, ...], Affine] = {}
+
+    def map(self) -> FixedPointMap:
+        """T for one run: which pattern it tries first depends on what it did before."""
+        return FixedPointMap(self.pair, systems=self._systems)
 
     def piece(self, g: Floats, pattern: Pattern) -> Piece:
         """The piece around g."""
@@ -176,7 +172,7 @@ class KnownPieces:
         """T on a piece."""
         key = key_of(piece)
         if key not in self._affine:
-            self._affine[key] = Affine(piece)
+            self._affine[key] = Affine(piece, self._systems)
         return self._affine[key]
 
     @cached_property
@@ -189,7 +185,7 @@ class KnownPieces:
         if self.pair.problem is None:
             return NotLinear("the run did not arrive, and without meshes the global method has nothing to solve")
         try:
-            return iterate_at(FixedPointMap(self.pair), solution_force(self.pair))
+            return iterate_at(self.map(), solution_force(self.pair))
         except (SolveError, RuntimeError) as error:
             return error
 
@@ -210,7 +206,7 @@ class KnownPieces:
         Parameters
         ----------
         T : FixedPointMap
-            Of the pair, new: which pattern it tries first depends on what it did before.
+            A new :meth:`map`.
         theta : float
 
         Raises
@@ -224,10 +220,10 @@ class KnownPieces:
             yield self._single(found, piece)
             g = theta * found.image + (1 - theta) * g
             affine, count = self.affine(piece), FEWEST
-            kept = count
+            relaxed, kept = affine.relaxed(theta), count
             while kept == count:
                 with np.errstate(over="ignore", invalid="ignore"):  # of a run that diverges; no sign admits it
-                    taken, kept = affine.on(self._walk(affine, g, theta, count), self.norm)
+                    taken, kept = affine.on(_walk(*relaxed, g, count), self.norm)
                 if kept:
                     yield _first(taken, kept)
                     g = theta * taken.image[:, kept - 1] + (1 - theta) * taken.g[:, kept - 1]
@@ -235,31 +231,29 @@ class KnownPieces:
                     kept = count = min(2 * count, MOST)
 
     def _single(self, found: Iterate, piece: Piece) -> Steps:
-        g, trace = found.g[:, None], self.pair.interface.carry(found.displacement)[:, None]
+        g = found.g[:, None]
         residual, size = np.array([found.residual]), np.array([found.size])
         key = key_of(piece)
-        floor = self.norm.rounding(g, trace)
-        return Steps(
-            g=g, image=found.image[:, None], residual=residual, size=size, floor=floor, pattern=key[0], piece=key
-        )
+        u = found.displacement[:, None]
+        return Steps(g=g, u=u, image=found.image[:, None], residual=residual, size=size, pattern=key[0], piece=key)
 
-    def _walk(self, affine: Affine, g: Floats, theta: float, count: int) -> Floats:
-        """The iterates of so many steps as columns."""
-        matrix, offset = affine.relaxed(theta)
-        walked = np.empty((len(g), count))
-        for i in range(count):
-            walked[:, i] = g
-            g = matrix @ g + offset
-        return walked
+
+def _walk(matrix: Floats, offset: Floats, g: Floats, count: int) -> Floats:
+    """So many iterates as columns, from g on."""
+    walked = np.empty((len(g), count))
+    for i in range(count):
+        walked[:, i] = g
+        g = matrix @ g + offset
+    return walked
 
 
 def _first(steps: Steps, count: int) -> Steps:
     return Steps(
         g=steps.g[:, :count],
+        u=steps.u[:, :count],
         image=steps.image[:, :count],
         residual=steps.residual[:count],
         size=steps.size[:count],
-        floor=steps.floor[:count],
         pattern=steps.pattern,
         piece=steps.piece,
     )

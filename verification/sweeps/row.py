@@ -42,7 +42,8 @@ def row(problem: Problem | ContactPair, values: Mapping[str, Any], bodies: Bodie
     Returns
     -------
     dict
-        The values, the columns :data:`RESULTS`, and None where there is nothing, with ``reason`` in words.
+        The values, the columns :data:`RESULTS`, and None where there is nothing, with ``reason`` in words; a "#" in
+        words is written ``%23``.
     """
     shared = Bodies(problem) if bodies is None else bodies
     found = _given(shared, values) | dict.fromkeys(RESULTS)
@@ -62,7 +63,8 @@ def row(problem: Problem | ContactPair, values: Mapping[str, Any], bodies: Bodie
         found["outcome"] = "error"
         why["outcome"] = f"{type(error).__name__}: {error}"
     found["reason"] = "; ".join(f"{name}: {' '.join(words.split())}" for name, words in why.items()) or None
-    return found
+    # in a CSV file a "#" begins a comment, in quotes too
+    return {name: value.replace("#", "%23") if isinstance(value, str) else value for name, value in found.items()}
 
 
 def _given(bodies: Bodies, values: Mapping[str, Any]) -> Row:
