@@ -1,0 +1,149 @@
+"""The pages of the course keep its rules: exercises with folded solutions, pictures in words, notebooks that run."""
+
+from __future__ import annotations
+
+import ast
+import builtins
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+DOCS = Path(__file__).parents[2] / "docs"
+CELL = re.compile(r"^```\{code-cell\} ipython3\n(.*?)^```$", re.DOTALL | re.MULTILINE)
+HEADER = re.compile(r"\A(?:---\n(?P<block>.*?)^---\n|(?P<tags>:tags: [^\n]*\n))", re.DOTALL | re.MULTILINE)
+EXERCISE = re.compile(r"^::::\{admonition\} Exercise \d: [^\n]+\n:class: exercise\n(.*?)^::::$", re.DOTALL | re.M)
+SOLUTION = re.compile(r"^:::\{dropdown\} Solution\n(.*?)^:::$", re.DOTALL | re.MULTILINE)
+TERM = re.compile(r"\{term\}`(?:[^`<]*<([^>`]*)>|([^`<]*))`")
+
+#: Pages of the course are those with exercises.
+PAGES = [
+    page
+    for page in sorted(DOCS.glob("**/*.md"))
+    if "_build" not in page.parts and "## Exercises" in page.read_text("utf-8")
+]
+each_page = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+
+WIDEST = 83
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cell:
+    """A code cell of a page: what stands above its code, and the code without magic commands."""
+
+    header: str
+    code: str
+
+    @property
+    def hidden(self) -> bool:
+        return "remove-cell" in self.header
+
+
+def cells(text: str) -> list[Cell]:
+    found = []
+    for source in CELL.findall(text):
+        header = HEADER.match(source)
+        code = source[header.end() :] if header else source
+        kept = "\n".join(line for line in code.splitlines() if not line.startswith("%"))
+        found.append(Cell(header=header[0] if header else "", code=kept))
+    return found
+
+
+def visible(text: str) -> list[Cell]:
+    return [cell for cell in cells(text) if not cell.hidden]
+
+
+def unbound(text: str) -> set[str]:
+    """Names that visible cells read and none of them binds: a notebook without the hidden cells would stop there."""
+    bound, read = set(dir(builtins)), set()
+    for cell in visible(text):
+        for node in ast.walk(ast.parse(cell.code)):
+            if isinstance(node, ast.Name):
+                (read if isinstance(node.ctx, ast.Load) else bound).add(node.id)
+            elif isinstance(node, ast.FunctionDef | ast.ClassDef):
+                bound.add(node.name)
+            elif isinstance(node, ast.arg):
+                bound.add(node.arg)
+            elif isinstance(node, ast.alias):
+                bound.add((node.asname or node.name).split(".")[0])
+    return read - bound
+
+
+def undrawn(text: str) -> list[str]:
+    """Visible cells that end in a figure and lack its caption, name or description."""
+    figures = [cell for cell in visible(text) if cell.code.rstrip().endswith("\nfigure")]
+    return [cell.code for cell in figures if not all(f"{key}: " in cell.header for key in ("caption", "name", "alt"))]
+
+
+@each_page
+def test_a_page_has_three_exercises_with_folded_solutions(page):
+    exercises = EXERCISE.findall(page.read_text("utf-8"))
+    assert len(exercises) == 3
+    for exercise in exercises:
+        assert re.search(r"\(\d+ min\)", exercise)
+        (solution,) = SOLUTION.findall(exercise)
+        assert "```" not in solution  # code in a solution would not be run
+
+
+@each_page
+def test_a_page_asks_a_question_and_takes_a_wrong_turn(page):
+    text = page.read_text("utf-8")
+    assert re.search(r"^# .*\?$", text, re.MULTILINE)
+    assert "\n## A wrong turn\n" in text
+
+
+@each_page
+def test_a_picture_of_the_course_has_a_caption_and_is_told_in_words(page):
+    assert undrawn(page.read_text("utf-8")) == []
+
+
+@each_page
+def test_the_notebook_of_a_page_runs_without_its_hidden_cells(page):
+    text = page.read_text("utf-8")
+    assert unbound(text) == set()
+    assert [cell.code for cell in visible(text) if "glue" in cell.code] == []
+
+
+@each_page
+def test_code_of_the_course_stays_in_its_column(page):
+    lines = [line for cell in visible(page.read_text("utf-8")) for line in cell.code.splitlines()]
+    assert [line for line in lines if len(line) > WIDEST] == []
+
+
+@each_page
+def test_every_number_of_the_text_is_computed_and_every_computed_one_is_shown(page):
+    text = page.read_text("utf-8")
+    computed = re.findall(r"""glue\(\s*["']([^"']+)["']""", text)
+    shown = set(re.findall(r"\{glue:text\}`([^`:]+)", text))
+    assert set(computed) <= shown
+    assert shown <= set(
+        re.findall(r"""["']([\w-]+)["']""", "\n".join(cell.code for cell in cells(text) if cell.hidden))
+    )
+
+
+def defined(glossary: str) -> set[str]:
+    """The terms of a glossary: lines of its blocks that are not indented."""
+    blocks = re.findall(r"^```\{glossary\}\n(.*?)^```$", glossary, re.DOTALL | re.MULTILINE)
+    return {line for block in blocks for line in block.splitlines() if line and not line.startswith(" ")}
+
+
+def test_every_term_that_a_page_uses_is_in_the_glossary():
+    terms = defined((DOCS / "glossary.md").read_text("utf-8"))
+    used = {(page.stem, given or plain) for page in PAGES for given, plain in TERM.findall(page.read_text("utf-8"))}
+    assert used
+    assert [(page, term) for page, term in sorted(used) if term not in terms] == []
+
+
+def test_what_breaks_a_rule_is_found():
+    page = (
+        "```{code-cell} ipython3\n:tags: [remove-cell]\nfrom myst_nb import glue\nx = 1\n```\n\n"
+        "```{code-cell} ipython3\ny = [x + z for z in (1, 2)]\nfigure = y\nfigure\n```\n"
+    )
+    assert unbound(page) == {"x"}
+    assert undrawn(page) == ["y = [x + z for z in (1, 2)]\nfigure = y\nfigure"]
+    told = "---\nmystnb:\n  figure:\n    caption: A\n    name: fig-a\n  image:\n    alt: b\n---\nfigure = 1\nfigure\n"
+    (cell,) = cells(f"```{{code-cell}} ipython3\n{told}```\n")
+    assert cell.code == "figure = 1\nfigure"
+    assert undrawn(f"```{{code-cell}} ipython3\n{told}```\n") == []
+    assert defined("```{glossary}\nrate\n  A number.\n\nstick, slip\n  States.\n```\n") == {"rate", "stick, slip"}
