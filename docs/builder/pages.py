@@ -40,6 +40,42 @@ class WidgetDirective(SphinxDirective):
         return [nodes.raw("", widgets.element(name, static), format="html")]
 
 
+class gallery(nodes.General, nodes.Element):  # noqa: N801 (docutils names its nodes so)
+    """The place of a gallery; its pages are read first."""
+
+
+class GalleryDirective(SphinxDirective):
+    """``{gallery}``: the main picture and the title of each page named in its lines, as links."""
+
+    has_content = True
+
+    def run(self) -> list[nodes.Node]:
+        return [gallery(pages=[line.strip() for line in self.content if line.strip()])]
+
+
+def fill_galleries(app: Sphinx, doctree: nodes.document, page: str) -> None:
+    """Put the first figure of each page and its title where the gallery stands.
+
+    Raises
+    ------
+    ExtensionError
+        A page that does not exist, or has no figure.
+    """
+    for place in list(doctree.findall(gallery)):
+        cards = nodes.container(classes=["gallery"])
+        for number, name in enumerate(place["pages"], 1):
+            if name not in app.env.found_docs:
+                raise ExtensionError(f"{page}: no page {name!r} for the gallery")
+            shown = next(app.env.get_doctree(name).findall(nodes.figure), None)
+            if shown is None:
+                raise ExtensionError(f"{page}: {name} has no figure for the gallery")
+            picture = next(shown.findall(nodes.image)).deepcopy()
+            link = nodes.reference("", "", internal=True, refuri=app.builder.get_relative_uri(page, name))
+            link += [picture, nodes.inline("", f"{number}. {app.env.titles[name].astext()}")]
+            cards += nodes.container("", link, classes=["card"])
+        place.replace_self(cards)
+
+
 def write_widgets(app: Sphinx) -> None:
     """What the widgets show, computed at every build."""
     widgets.write(Path(app.srcdir) / "generated" / "widgets")
@@ -102,6 +138,9 @@ def setup(app: Sphinx) -> None:
     """Connect all of it."""
     app.add_domain(Proofs, override=True)
     app.add_directive("widget", WidgetDirective)
+    app.add_node(gallery)
+    app.add_directive("gallery", GalleryDirective)
+    app.connect("doctree-resolved", fill_galleries)
     app.connect("builder-inited", write_widgets)
     app.connect("builder-inited", write_equations)
     app.connect("html-page-context", link_notebook)
