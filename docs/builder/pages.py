@@ -40,7 +40,7 @@ class WidgetDirective(SphinxDirective):
         return [nodes.raw("", widgets.element(name, static), format="html")]
 
 
-class gallery(nodes.General, nodes.Element):  # noqa: N801 (docutils names its nodes so)
+class gallery(nodes.General, nodes.Element):
     """The place of a gallery; its pages are read first."""
 
 
