@@ -7,6 +7,7 @@ import importlib
 import inspect
 import pkgutil
 import re
+from pathlib import Path
 from types import ModuleType
 
 import pytest
@@ -64,3 +65,28 @@ def test_a_public_function_tells_its_parameters_results_errors_and_an_example(na
     assert sections >= {"Parameters", "Raises", "Examples"}
     assert sections & {"Returns", "Yields"}
     assert ">>> " in told
+
+
+LINK = re.compile(r"\{py:(?:func|class)\}`(?:[^`<]*<)?([\w.]+)>?`")
+
+
+def unlinked(text: str) -> list[str]:
+    """Names of functions and classes in a page that the API pages do not list there: Sphinx links none of them."""
+    found = []
+    for name in LINK.findall(text):
+        module, _, last = name.rpartition(".")
+        if getattr(getattr(importlib.import_module(module), last, None), "__module__", None) != module:
+            found.append(name)
+    return found
+
+
+@pytest.mark.parametrize(
+    "page", sorted((Path(__file__).parents[2] / "docs" / "examples").glob("*.md")), ids=lambda page: page.name
+)
+def test_what_an_example_links_to_is_on_the_api_pages(page):
+    assert unlinked(page.read_text(encoding="utf-8")) == []
+
+
+def test_a_link_to_a_name_that_only_stands_for_another_is_found():
+    text = "{py:func}`verification.run`, {py:func}`run <verification.algorithm.runs.run>`, {py:func}`fem1d2d.none`"
+    assert unlinked(text) == ["verification.run", "fem1d2d.none"]

@@ -201,8 +201,9 @@ def test_a_line_that_leaves_the_column_is_found_in_screens_and_files_alone():
     assert too_wide(f"```text\n{'─' * WIDEST}\n```\n") == []  # counted in characters, not in bytes
 
 
-def test_the_choice_of_theta_needs_no_folding():
-    page = (DOCS / "examples" / "choosing_theta.md").read_text(encoding="utf-8")
+@pytest.mark.parametrize("name", ["spectrum", "which_side", "constants"])
+def test_the_code_of_an_example_needs_no_folding(name):
+    page = (DOCS / "examples" / f"{name}.md").read_text(encoding="utf-8")
     cells = [block for kind, block in BLOCK.findall(page) if kind == "{code-cell}"]
     assert cells
     assert max(len(line) for cell in cells for line in cell.splitlines()) <= WIDEST
