@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from verification.interface.pair import ContactPair
 
 #: How many friction values trace the border of its region.
-TRACED = 8
+TRACED = 12
 
 #: Why no value of this bound is called certified.
 NOT_CERTIFIED = "checked in doubles with a bound on their rounding, for the interface matrices as computed"
@@ -195,7 +195,7 @@ class SemidefiniteBound(Bound):
         try:
             last = friction_threshold(pair, measured, measured.friction_threshold.value, progress=progress)
             kept = []
-            for i, k in enumerate(np.append(np.geomspace(last * 1e-2, last * 0.9, TRACED - 1), last)):
+            for i, k in enumerate(last * np.arange(1, TRACED + 1) / TRACED):
                 progress(f"semidefinite bound: largest theta at k = {k:.3g}", i / TRACED)
                 found = QuadraticForms(pair, measured, friction=float(k)).largest_theta()
                 if found is not None:
