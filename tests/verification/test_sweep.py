@@ -17,6 +17,7 @@ from verification.contact import ContactError, active_set
 from verification.interface import body
 from verification.sweeps import course, grid, sweep
 from verification.sweeps.bodies import Bodies
+from verification.sweeps.lean import KnownPieces
 from verification.sweeps.row import RESULTS, row
 
 SMALL = vf.example("section6").changed(cells=((10, 2), (8, 2)), radius="0.2", max_iterations=200)
@@ -313,7 +314,7 @@ def test_what_reads_comments_anywhere_in_a_line_reads_whole_rows(monkeypatch):
     def fails(*args, **named):
         raise ContactError("body #2, by a, b")
 
-    monkeypatch.setattr(course, "_lean", fails)
+    monkeypatch.setattr(KnownPieces, "steps", fails)
     found = vf.sweep(BARS, theta=[0.3, 0.5])
     kept = [line.split("#")[0] for line in found.to_csv().splitlines()]
     read = list(csv.DictReader(line for line in kept if line))

@@ -41,7 +41,7 @@ class Course:
     Attributes
     ----------
     steps : int
-        Steps until it ended, as :attr:`Run.iterations` counts them.
+        Steps until it ended, as :attr:`verification.algorithm.runs.Run.iterations` counts them.
     paper : int or None
         n at which the test of Section 6.3 is met.
     outcome : {'converged', 'stalled', 'limit', 'diverged'}
