@@ -153,7 +153,7 @@ def bounds_table(rows: Sequence[BoundResult], unit: str) -> None:
         if theta is not None:
             line.append("contracts" if row.factor is not None else "no conclusion")
         lines.append(line)
-    table(lines)
+    table(lines, heads=2)
     notes = [f"printed: with stresses in {unit}" for row in rows if row.name == "printed"]
     attained = [row.detail for row in rows if row.name == "lmi"]
     notes += [f"lmi: {found.lower:.3f} occurs for some loads, {found.gap:.2%} less" for found in attained]
@@ -191,15 +191,16 @@ def _screen(constants: Constants | None, results: Mapping[str, BoundResult]) -> 
             rows.append([name, *(figures(getattr(b, name), 6) for b in section_5.values()), unit])
         table(rows, right=range(1, len(section_5) + 1))
     if isinstance(sharp, SharpBounds):
-        heading("WHICH THETA?")
-        _thetas(sharp)
+        thetas(sharp)
     say()
     if not all(b.proved for b in section_5.values()):
         note(on_the_printed_proof())
     say("Next: ndtheory example section6 > my.toml; ndtheory constants my.toml")
 
 
-def _thetas(sharp: SharpBounds) -> None:
+def thetas(sharp: SharpBounds) -> None:
+    """Show the theta with the least proved factor, and the predicted one."""
+    heading("WHICH THETA?")
     rows = [["", "theta", "factor", ""]]
     if sharp.theta_proved is None:
         rows.append(["proved", "-", "-", "q >= 1 for every theta: no conclusion"])

@@ -9,7 +9,8 @@ import os
 import sys
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any, TextIO
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, TextIO
 
 import click
 
@@ -40,11 +41,33 @@ class Interrupted(Exception):
 NOTHING, SHOWN = "interrupted before anything was computed", "interrupted; what was computed is shown above"
 
 
+@dataclass(frozen=True, kw_only=True)
+class Part:
+    """What one call says of a result, before it is laid out for a screen.
+
+    Attributes
+    ----------
+    kind : {'heading', 'line', 'note', 'table'}
+    text : str
+        Of all but a table, without the signs that make it bold.
+    head : tuple of str
+        The head of a table, one text for each column.
+    rows : tuple of tuple of str
+        The other rows of a table.
+    """
+
+    kind: Literal["heading", "line", "note", "table"]
+    text: str = ""
+    head: tuple[str, ...] = ()
+    rows: tuple[tuple[str, ...], ...] = ()
+
+
 class _Voice:
     """Where results go, the live line that makes room for them, and whether one was shown."""
 
     stream: TextIO | None = None
     lines: list[str] | None = None
+    parts: list[Part] | None = None
     live: Live | None = None
     said = False
 
@@ -63,6 +86,17 @@ def heard() -> Iterator[list[str]]:
         _voice.lines = before
 
 
+@contextlib.contextmanager
+def parted() -> Iterator[list[Part]]:
+    """Collect the parts of a result instead of writing them to stdout, for another layout than that of a screen."""
+    parts: list[Part] = []
+    before, _voice.parts = _voice.parts, parts
+    try:
+        yield parts
+    finally:
+        _voice.parts = before
+
+
 def say(text: str = "") -> None:
     """A line of the result.
 
@@ -71,6 +105,10 @@ def say(text: str = "") -> None:
     ReaderGone
         The other end of a pipe was closed.
     """
+    if _voice.parts is not None:
+        if text:
+            _voice.parts.append(Part(kind="line", text=click.unstyle(text)))
+        return
     if _voice.lines is not None:
         _voice.lines.append(click.unstyle(text))
         return
@@ -216,6 +254,9 @@ def deliver(
 
 def heading(question: str) -> None:
     """The question that the lines below answer."""
+    if _voice.parts is not None:
+        _voice.parts.append(Part(kind="heading", text=question))
+        return
     say()
     for line in textwrap.wrap(question, WIDTH, subsequent_indent="  "):
         say(click.style(line, bold=True))
@@ -223,16 +264,23 @@ def heading(question: str) -> None:
 
 def note(text: str, indent: str = "") -> None:
     """A sentence of the result, folded at the width of the screen."""
+    if _voice.parts is not None:
+        _voice.parts.append(Part(kind="note", text=click.unstyle(text)))
+        return
     folded = textwrap.TextWrapper(WIDTH, indent, indent + "  ", break_on_hyphens=False)
     for line in folded.wrap(text):
         say(line)
 
 
-def table(rows: Sequence[Sequence[str]], *, right: Sequence[int] = ()) -> None:
-    """Columns two spaces apart, the first row a head; ``right`` names columns aligned to the right.
+def table(rows: Sequence[Sequence[str]], *, right: Sequence[int] = (), heads: int = 1) -> None:
+    """Columns two spaces apart; ``right`` names columns aligned to the right, the first ``heads`` rows are the head.
 
     The last column is folded where it does not fit on the screen.
     """
+    if _voice.parts is not None:
+        head = tuple(" ".join(cell for cell in column if cell) for column in zip(*rows[:heads], strict=True))
+        _voice.parts.append(Part(kind="table", head=head, rows=tuple(tuple(row) for row in rows[heads:])))
+        return
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     for row in rows:
         cells = [

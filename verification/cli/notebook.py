@@ -1,16 +1,18 @@
-"""What a notebook shows of a result: the screen of its command, as text."""
+"""What a notebook and the written report show of a result: the screen of its command."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
 
+from ndtheory import SharpBounds
 from verification.advice.roles import Advice
 from verification.algorithm.runs import Run
 from verification.bounds.region import Plane
 from verification.cli import screens
 from verification.cli.advice_screen import advice
-from verification.cli.console import heard
+from verification.cli.calculator import thetas
+from verification.cli.console import Part, heard, parted
 from verification.cli.sweep_screen import sweep
 from verification.comparison import Comparison
 from verification.constants import Measured
@@ -36,3 +38,16 @@ def screen(result: Any) -> str:
     with heard() as lines:
         show(result)
     return "\n".join(lines)
+
+
+def report(result: Comparison) -> list[Part]:
+    """The parts of the screen of ``compare``, and at its end those of two other commands: theta, and all constants."""
+    with parted() as parts:
+        screens.comparison(result)
+        sharp = result.bounds["sharp"].detail
+        if isinstance(sharp, SharpBounds):
+            thetas(sharp)
+    with parted() as constants:
+        screens.constants(result.measured)
+    start = next(i for i, part in enumerate(constants) if part.kind == "heading")  # what is computed was said above
+    return [*parts, *constants[start:]]

@@ -70,8 +70,10 @@ def constants(measured: Measured, typed: Typed | None = None) -> None:
         names = ", ".join(name for name, why in measured.reason.items() if why == reason)
         note(f"{names}: {reason}", "  ")
     say()
-    say("Exact for this mesh, up to rounding.  On a mesh m is above and M below its")
-    say("continuous value: for the continuous theorem both err on the unsafe side.")
+    note("Exact for this mesh, up to rounding.")
+    note(
+        "On a mesh m is above and M below its continuous value: for the continuous theorem both err on the unsafe side."
+    )
     if typed is not None:
         typed.suggest("advise" if measured.interface_nodes > assembly.MOST_CONTACT_NODES else "compare")
 

@@ -1,0 +1,63 @@
+"""The pages for lecturers and for those who cite, and the head of the README, say what is so."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+import ndtheory
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text("utf-8")
+LECTURERS = (ROOT / "docs" / "lecturers.md").read_text("utf-8")
+CITE = (ROOT / "docs" / "cite.md").read_text("utf-8")
+
+
+def plan() -> dict[str, int]:
+    """The minutes of each row of the plan, by the first page it names."""
+    rows = re.findall(r"^\| (\d+) \| \{doc\}`(?:examples/)?(\w+)`", LECTURERS, re.MULTILINE)
+    return {page: int(minutes) for minutes, page in rows}
+
+
+def test_the_plan_for_a_lecture_adds_up_to_90_minutes() -> None:
+    assert sum(plan().values()) == 90
+    assert len(plan()) == 10
+
+
+def test_the_short_plan_adds_up_to_45_minutes() -> None:
+    short = re.search(r"With 45 minutes, take (.*)", LECTURERS)
+    assert short is not None
+    assert sum(plan()[page] for page in re.findall(r"\{doc\}`(?:examples/)?(\w+)`", short[1])) == 45
+
+
+def test_every_widget_has_its_moment_in_the_plan() -> None:
+    widgets = re.findall(r"\{widget\} (\w+)", (ROOT / "docs" / "widgets.md").read_text("utf-8"))
+    assert sorted(re.findall(r"\*\*widget\*\* \*(\w+)\*", LECTURERS)) == sorted(widgets)
+
+
+def test_the_entry_to_cite_names_this_version() -> None:
+    assert f"version = {{{ndtheory.__version__}}}" in CITE
+    assert f"version: {ndtheory.__version__}\n" in (ROOT / "CITATION.cff").read_text("utf-8")
+
+
+def test_the_facts_at_the_head_of_the_readme_are_those_of_the_package() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    facts = re.search(r"^\*(Python .*)\*$", README, re.MULTILINE)
+    assert facts is not None
+    pythons, licence, typed, status, _ = facts[1].split(" | ")
+    classifiers = project["classifiers"]
+    versions = [c.rsplit(" ", 1)[1] for c in classifiers if re.search(r":: 3\.\d+$", c)]
+    assert pythons == f"Python {', '.join(versions)}"
+    assert licence == project["license"]
+    assert (typed == "typed") == ("Typing :: Typed" in classifiers)
+    assert any(c.startswith("Development Status") and c.endswith(status.split(": ")[1]) for c in classifiers)
+
+
+def test_the_first_minute_of_the_readme_names_files_and_commands_that_exist() -> None:
+    first = README.partition("**The first minute.**")[2].partition("```text")[0]
+    commands = [line.strip() for line in first.splitlines() if line.startswith("    ")]
+    assert commands[0] == "make demo"
+    assert re.search(r"^demo:", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE)
+    assert (ROOT / "requirements.lock").exists()
+    assert all(line.startswith(("make", "python -m venv", ".venv/bin/")) for line in commands)

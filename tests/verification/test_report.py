@@ -1,0 +1,232 @@
+"""The written report: the words and digits of the screen, on any screen, asking nobody else."""
+
+import re
+import shutil
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import get_args
+from xml.etree import ElementTree
+
+import pytest
+from problem_list import small
+
+import verification as vf
+from verification import figures
+from verification.cli import screens
+from verification.cli.calculator import thetas
+from verification.cli.console import heard
+from verification.ledger.record import on_the_printed_proof
+from verification.output.folder import Folder
+from verification.output.report import report
+from verification.verdicts import RunVerdict
+
+ROOT = Path(__file__).parents[2]
+BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
+DRIVER = shutil.which("chromedriver")
+ONE_STEP = {"theta": "0.7", "max_iterations": 1}
+
+#: Titles that could leave their place in a file.
+TITLES = {
+    "markup": "</title><script>alert(1)</script><img src=http://example.org/x>",
+    "entities": "a < b & c > d \"quoted\" 'twice'",
+    "formula": r"modulus ratio $E_1/E_2 = \frac{7}{2}$",
+    "unknown formula": r"$\text{kN}$ and $\frac$",
+    "one dollar": "costs 5 $ and 3 $",
+    "template": "{{ 7 * 7 }} {% raw %}",
+    "control characters": "a\x1b[31mb\x07c\x00d",
+    "line break": "a\nb",
+    "another script": "\u63a5\u89e6 \u03bc",
+    "long": "long title " * 60,
+    "empty": "",
+}
+
+
+def problem(**changes):
+    return vf.Problem.from_dict(small() | {"title": "Small"} | changes)
+
+
+@pytest.fixture(scope="module")
+def comparison():
+    return vf.compare(problem())
+
+
+@pytest.fixture(scope="module")
+def written(comparison, tmp_path_factory):
+    """A folder with everything in it."""
+    folder = tmp_path_factory.mktemp("written")
+    Folder(folder, "compare").write_comparison(comparison)
+    return folder
+
+
+class Reader(HTMLParser):
+    """Text, and every attribute by which a page could ask for something."""
+
+    def __init__(self):
+        super().__init__()
+        self.text, self.heading, self.asked, self.tags, self.styles = "", "", [], [], ""
+        self.cells, self.terms = [], []
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append(tag)
+        self.asked += [value for key, value in attributes if key in ("src", "href", "xlink:href", "srcset", "data")]
+        self.styles += "".join(value or "" for key, value in attributes if key in ("style", "clip-path", "fill"))
+
+    def handle_data(self, data):
+        if self.tags and self.tags[-1] == "style":
+            self.styles += data
+        if self.tags and self.tags[-1] == "h1" and not self.heading:
+            self.heading = data
+        if self.tags and self.tags[-1] == "td" and data.strip():
+            self.cells.append(data)
+        if self.tags and self.tags[-1] == "dt" and data.strip():
+            self.terms.append(data)
+        self.text += data
+
+
+def read(folder: Path) -> Reader:
+    reader = Reader()
+    reader.feed((folder / "report.html").read_text("utf-8"))
+    return reader
+
+
+def test_the_report_asks_no_other_file_and_no_other_host(written):
+    page = read(written)
+    assert [asked for asked in page.asked if not asked.startswith("#")] == []
+    assert not {"script", "link", "iframe", "img", "object", "embed", "base"} & set(page.tags)
+    assert "@import" not in page.styles
+    assert [url for url in re.findall(r"url\(([^)]*)\)", page.styles) if not url.startswith("#")] == []
+
+
+def test_the_report_holds_its_figures_and_every_verdict_with_its_reason(comparison, written):
+    page = read(written)
+    assert page.tags.count("svg") == 3
+    for name, judgement in comparison.verdicts.items():
+        assert f"{name}\n" in page.text
+        assert judgement.verdict in page.text
+        assert judgement.reason in page.text
+    assert "Not claimed" in page.text
+    for unit in ("MPa", "mm"):
+        assert unit in page.text
+
+
+def test_the_report_says_of_the_printed_proof_what_is_recorded(written):
+    assert on_the_printed_proof() in read(written).text
+
+
+def screen(comparison) -> str:
+    """What three commands show of a comparison."""
+    with heard() as lines:
+        screens.comparison(comparison)
+        thetas(comparison.bounds["sharp"].detail)
+        screens.constants(comparison.measured)
+    return "\n".join(lines)
+
+
+def test_the_report_has_the_words_and_the_digits_of_the_screen(comparison, written):
+    page, shown = read(written), screen(comparison)
+    missing = set(shown.lower().split()) - set(page.text.lower().split())
+    assert missing <= {"|"}  # between the title and what follows
+    cells = "\n".join(page.cells)
+    assert "CONSISTENT" in cells
+    assert set(cells.split()) <= set(shown.split())
+
+
+def test_every_table_and_figure_of_the_report_has_a_caption(written):
+    page = read(written)
+    assert page.tags.count("table") == page.tags.count("caption") == 6
+    assert page.tags.count("figure") == page.tags.count("figcaption") == page.tags.count("svg") == 3
+
+
+def test_the_report_explains_every_verdict_and_words_that_the_glossary_has(written):
+    terms, verdicts = set(read(written).terms), set(get_args(RunVerdict))
+    glossary = re.findall(r"^(\S.*)\n  \S", (ROOT / "docs" / "glossary.md").read_text("utf-8"), re.MULTILINE)
+    assert verdicts | {"edition", "sharp", "lmi", "decade", "rho"} <= terms
+    assert terms - verdicts <= set(glossary)
+
+
+@pytest.fixture(scope="module")
+def phone():
+    """A browser as wide as a phone."""
+    webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
+    options = webdriver.ChromeOptions()
+    options.binary_location = BROWSER
+    for flag in ("--headless=new", "--no-sandbox", "--disable-gpu"):
+        options.add_argument(flag)
+    driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(DRIVER))
+    driver.execute_cdp_cmd(
+        "Emulation.setDeviceMetricsOverride", {"width": 375, "height": 700, "deviceScaleFactor": 2, "mobile": True}
+    )
+    yield driver
+    driver.quit()
+
+
+@pytest.mark.skipif(
+    BROWSER is None or DRIVER is None, reason="chromium and chromedriver are not installed: apt install chromium-driver"
+)
+def test_no_cell_of_the_report_leaves_the_screen_of_a_phone(phone, comparison, written):
+    phone.get((written / "report.html").as_uri())
+    assert phone.execute_script("return document.documentElement.scrollWidth") <= 375
+    cells = phone.execute_script(
+        "return [...document.querySelectorAll('tbody th, tbody td')].map(cell => {"
+        "const box = cell.getBoundingClientRect(); return [cell.innerText, box.left, box.right, cell.scrollWidth]})"
+    )
+    assert {judgement.verdict for judgement in comparison.verdicts.values()} <= {text for text, *_ in cells}
+    assert [cell for cell in cells if cell[1] < 0 or cell[2] > 375 or cell[1] + cell[3] > 375.5] == []
+
+
+def test_every_name_in_the_report_is_given_once(written):
+    names = re.findall(r'\bid="([^"]*)"', (written / "report.html").read_text("utf-8"))
+    assert sorted(name for name in set(names) if names.count(name) > 1) == []
+
+
+def page_and_figures(folder: Path, comparison) -> str:
+    """The report and both figures, whose files must be well-formed; returns the report."""
+    for name, figure in (
+        ("bodies", figures.draw_bodies(comparison.run)),
+        ("residuals", figures.draw_residuals(comparison.run, comparison.computed)),
+    ):
+        figures.save(figure, folder / f"{name}.svg")
+        ElementTree.parse(folder / f"{name}.svg")
+    texts = {name: (folder / f"{name}.svg").read_text("utf-8") for name in ("bodies", "residuals")}
+    return report(comparison, texts)
+
+
+def of_another_run(comparison, problem):
+    """Titles and units come with the run; bounds and losses, which cost twenty times as much, stay."""
+    return replace(comparison, run=vf.run(problem))
+
+
+BARS = {
+    "dimension": 1,
+    "body1": {"shape": "interval", "x": [0, 1], "cells": 4, "young": 1, "fixed": ["left"]},
+    "body2": {"shape": "interval", "x": [1, 2], "cells": 4, "young": 2, "prescribed": {"right": "-0.1"}},
+}
+
+
+@pytest.mark.parametrize(
+    "data", [BARS, small(body2={"prescribed": {"top": ["free", "-0.015"]}})], ids=["bars", "a sliding top"]
+)
+def test_a_problem_to_which_not_every_bound_applies_has_a_report_too(tmp_path, data):
+    comparison = vf.compare(vf.Problem.from_dict(data))
+    text = page_and_figures(tmp_path, comparison)
+    assert all(judgement.verdict in text for judgement in comparison.verdicts.values())
+
+
+@pytest.mark.parametrize("title", TITLES.values(), ids=TITLES)
+def test_a_title_stays_text_in_every_file(comparison, tmp_path, title):
+    text = page_and_figures(tmp_path, of_another_run(comparison, problem(title=title, iteration=ONE_STEP)))
+    page = Reader()
+    page.feed(text)
+    assert not {"script", "img"} & set(page.tags)
+    assert page.heading.strip() == (title.strip() if title.isprintable() else page.heading.strip())
+    assert all(character.isprintable() or character == "\n" for character in page.heading)
+
+
+@pytest.mark.parametrize("unit", ["$\\bad{$", "<b>m</b>", "\u00b5m", "in$^2$"])
+def test_a_unit_is_text_in_every_file(comparison, tmp_path, unit):
+    made = problem(units={"length": unit, "stress": unit}, iteration=ONE_STEP)
+    page = Reader()
+    page.feed(page_and_figures(tmp_path, of_another_run(comparison, made)))
+    assert "b" not in page.tags
+    assert page.text.count(unit) >= 4
