@@ -17,6 +17,9 @@ from fem1d2d.mesh import Floats, Ints, Mesh, MeshError, measures
 #: Nodes of a file are not numbered beyond this: a table of them would fill the memory.
 LARGEST_NUMBER = 10**8
 
+#: The endings of TetGen's files.
+TETRAHEDRA = (".node", ".ele")
+
 
 def from_file(path: Path | str) -> Mesh:
     """A triangle mesh in any format meshio reads; its sides are the physical names of its lines.
@@ -39,6 +42,8 @@ def from_file(path: Path | str) -> Mesh:
         if isinstance(error, MeshError):
             raise
         raise MeshError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    if path.suffix.lower() in TETRAHEDRA:  # meshio's reader would not come back from a short one
+        raise MeshError(f"{path}: a TetGen file holds tetrahedra: triangles are needed")
     largest = _largest_number(path)
     if largest > LARGEST_NUMBER:
         raise MeshError(f"{path}: a node has the number {largest:g}: at most {LARGEST_NUMBER} is needed")

@@ -205,7 +205,7 @@ RUBBISH = [b"", b"\x00\xff\x13\x80" * 64, b"hello\nworld\n", b"$MeshFormat\n4.1 
 
 
 @pytest.mark.parametrize("content", RUBBISH, ids=["empty", "binary", "words", "cut short"])
-@pytest.mark.parametrize("ending", [".msh", ".vtu", ".vtk", ".inp", ".mesh", ".xyz", ""])
+@pytest.mark.parametrize("ending", [".msh", ".vtu", ".vtk", ".inp", ".mesh", ".xyz", ".node", ".ele", ""])
 def test_rubbish_is_refused_whatever_it_is_called(tmp_path, content, ending):
     path = tmp_path / f"rubbish{ending}"
     path.write_bytes(content)
