@@ -8,7 +8,9 @@ alone have the same number of cells along their whole right side, and one point 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -59,6 +61,9 @@ def fault(points: NDArray[Any], edges: Ints) -> str | None:
         points = np.ldexp(points, -np.frexp(np.abs(points).max(axis=0))[1])
     start, end = points[edges[:, 0]], points[edges[:, 1]]
     floats = start.astype(float), end.astype(float)
+    if not rounding:  # in whole numbers: the same digits, and quicker than fractions
+        unit = math.lcm(*(Fraction(x).denominator for x in points.ravel()))
+        start, end = (np.frompyfunc(lambda x: int(x * unit), 1, 1)(ends) for ends in (start, end))
     for i, j in _near(*floats):
         crossing, touching = _meet(start[i], end[i], start[j], end[j], rounding)
         if crossing.any():

@@ -164,18 +164,25 @@ def in_floats(mesh: Mesh) -> Mesh:
 
 
 @st.composite
-def plane_meshes(draw, most: int = 2, least: int = 1, exact: bool = False):
+def plane_grids(draw, most: int = 2, least: int = 1, exact: bool = False):
+    """What `plane_meshes` are made of: rational points, cells, sides.  It is no mesh yet, which would be judged."""
+    nx, ny = draw(st.integers(least, most)), draw(st.integers(least, most))
+    grid = rectangle((0.0, float(nx)), (0.0, float(ny)), (nx, ny))
+    random = np.random.default_rng(draw(st.integers(0, 2**16)))
+    moves = 0 if exact else random.integers(-2, 3, grid.points.shape) * Fraction(1, 16)
+    corners = grid.points.astype(int) + Fraction(0)
+    points = draw(vectors()) + (corners + moves) @ draw(maps(unimodular=exact)).T
+    order = random.permutation(len(points))
+    name = np.argsort(order)
+    return points[order], name[grid.cells], {side: name[facets] for side, facets in grid.sides.items()}
+
+
+def plane_meshes(most: int = 2, least: int = 1, exact: bool = False) -> st.SearchStrategy[Mesh]:
     """Grids of `least` to `most` cells a side, each node moved by up to 1/8 cell, mapped linearly, nodes in any order.
 
     Twice the area of a triangle is at least 1/4 of a cell's.  `exact`: no node is moved, areas are powers of two.
     """
-    nx, ny = draw(st.integers(least, most)), draw(st.integers(least, most))
-    grid = rectangle((Fraction(0), Fraction(nx)), (Fraction(0), Fraction(ny)), (nx, ny))
-    random = np.random.default_rng(draw(st.integers(0, 2**16)))
-    moves = 0 if exact else random.integers(-2, 3, grid.points.shape) * Fraction(1, 16)
-    points = draw(vectors()) + (grid.points + moves) @ draw(maps(unimodular=exact)).T
-    moved = Mesh(points=points, cells=grid.cells, sides=grid.sides)
-    return renumbered(moved, random.permutation(len(points)))
+    return plane_grids(most, least, exact).map(lambda grid: Mesh(points=grid[0], cells=grid[1], sides=grid[2]))
 
 
 def meshes(most: int = 2) -> st.SearchStrategy[Mesh]:
@@ -198,9 +205,10 @@ def held_bodies(draw, most: int = 4):
 
     The top keeps a free node: two cells a side at least.
     """
-    mesh, material = in_floats(draw(plane_meshes(most, least=2))), draw(materials())
-    sides = draw(st.lists(st.sampled_from(["left", "right", "bottom"]), min_size=1, max_size=3, unique=True))
-    known = supports(mesh, {side: [0.0, 0.0] for side in sides}).known
+    points, cells, sides = draw(plane_grids(most, least=2))
+    mesh, material = Mesh(points=points.astype(float), cells=cells, sides=sides), draw(materials())
+    held = draw(st.lists(st.sampled_from(["left", "right", "bottom"]), min_size=1, max_size=3, unique=True))
+    known = supports(mesh, {side: [0.0, 0.0] for side in held}).known
     floats = Material(lame_lambda=float(material.lame_lambda), lame_mu=float(material.lame_mu))
     return mesh, floats, np.flatnonzero(~known.ravel())
 

@@ -72,7 +72,7 @@ def fill_galleries(app: Sphinx, doctree: nodes.document, page: str) -> None:
             picture = next(shown.findall(nodes.image)).deepcopy()
             link = nodes.reference("", "", internal=True, refuri=app.builder.get_relative_uri(page, name))
             link += [picture, nodes.inline("", f"{number}. {app.env.titles[name].astext()}")]
-            cards += nodes.container("", link, classes=["card"])
+            cards += nodes.paragraph("", "", link, classes=["card"])
         place.replace_self(cards)
 
 
@@ -134,7 +134,7 @@ def write_notebooks(app: Sphinx, failed: Exception | None) -> None:
                 raise ExtensionError(f"{page}: no cell glues {error}") from None
 
 
-def setup(app: Sphinx) -> None:
+def setup(app: Sphinx) -> dict[str, bool]:
     """Connect all of it."""
     app.add_domain(Proofs, override=True)
     app.add_directive("widget", WidgetDirective)
@@ -146,3 +146,4 @@ def setup(app: Sphinx) -> None:
     app.connect("html-page-context", link_notebook)
     app.connect("html-page-context", load_scripts)
     app.connect("build-finished", write_notebooks)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

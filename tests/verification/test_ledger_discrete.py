@@ -70,8 +70,8 @@ def on_pools(*entries: Any) -> list[Any]:
 
 
 @pytest.fixture(scope="module")
-def pools() -> Callable[[str], dict[str, Subjects]]:
-    return cache(pool_of)
+def pools(shared) -> Callable[[str], dict[str, Subjects]]:
+    return cache(lambda kind: shared(("pool", kind), lambda: pool_of(kind)))
 
 
 def pool_of(kind: str) -> dict[str, Subjects]:

@@ -86,7 +86,7 @@ class Section:
     parts: list[Part] = field(default_factory=list)
 
     @property
-    def title(self) -> str:
+    def heading(self) -> str:
         """The heading in small letters."""
         return self.heading.capitalize()
 
