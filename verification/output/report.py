@@ -86,7 +86,7 @@ class Section:
     parts: list[Part] = field(default_factory=list)
 
     @property
-    def heading(self) -> str:
+    def shown(self) -> str:
         """The heading in small letters."""
         return self.heading.capitalize()
 
