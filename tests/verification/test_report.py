@@ -105,6 +105,7 @@ def test_the_report_holds_its_figures_and_every_verdict_with_its_reason(comparis
         assert f"{name}\n" in page.text
         assert judgement.verdict in page.text
         assert judgement.reason in page.text
+    assert "Relative residual without relaxation at the end" in page.text
     assert "Not claimed" in page.text
     for unit in ("MPa", "mm"):
         assert unit in page.text
