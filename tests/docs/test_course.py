@@ -10,6 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from verification.ledger import quote
+from verification.ledger.sheets import WORDS
+
 DOCS = Path(__file__).parents[2] / "docs"
 CELL = re.compile(r"^```\{code-cell\} ipython3\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 HEADER = re.compile(r"\A(?:---\n(?P<block>.*?)^---\n|(?P<tags>:tags: [^\n]*\n))", re.DOTALL | re.MULTILINE)
@@ -150,3 +153,9 @@ def test_what_breaks_a_rule_is_found():
     assert cell.code == "figure = 1\nfigure"
     assert undrawn(f"```{{code-cell}} ipython3\n{told}```\n") == []
     assert defined("```{glossary}\nrate\n  A number.\n\nstick, slip\n  States.\n```\n") == {"rate", "stick, slip"}
+
+
+def test_each_word_of_the_ledger_has_an_example_in_chapter_0_that_bears_it():
+    """The table explains one word a row, in the order of the ledger's own table of words."""
+    rows = re.findall(r"^\| \{verdict\}`([^`]+)` \|", (DOCS / "chapter0.md").read_text("utf-8"), re.MULTILINE)
+    assert [quote(id) for id in rows] == list(WORDS)
