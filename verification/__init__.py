@@ -24,6 +24,7 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from typing import Any
 
+    from verification.advice.from_logs import advise_logs
     from verification.advice.from_runs import advise_run
     from verification.advice.roles import Advice, advise, advise_matrices
     from verification.algorithm.fixed_point import iterate
@@ -62,6 +63,7 @@ _HOME = {
     "Sweep": "sweeps.sweep",
     "Iterate": "algorithm.iterate",
     "advise": "advice.roles",
+    "advise_logs": "advice.from_logs",
     "advise_matrices": "advice.roles",
     "advise_run": "advice.from_runs",
     "build": "interface.build",
@@ -93,6 +95,7 @@ __all__ = [
     "SolveError",
     "Sweep",
     "advise",
+    "advise_logs",
     "advise_matrices",
     "advise_run",
     "build",

@@ -14,6 +14,7 @@ from typing import Any
 import meshio
 import numpy as np
 import pytest
+from coupling_logs import linear_run, precice
 
 import verification as vf
 from verification.cli import main
@@ -155,6 +156,20 @@ def triangles(path: Path) -> None:
     meshio.write(path, mesh, file_format="gmsh22", binary=False)
 
 
+def diverging(folder: Path) -> list[tuple[Path, str]]:
+    """A log of a tied run that diverges, absolute and relative, its last line cut off."""
+    absolute, relative = linear_run([1, 3], 0.8, 40)
+    log = precice(folder / "diverging.log", [{"ResAbs(M:F)": absolute, "ResRel(M:F)": relative}])
+    log.write_text(log.read_text("utf-8")[:-30], "utf-8")
+    return [(log, "0.8")]
+
+
+def falling(folder: Path) -> list[tuple[Path, str]]:
+    """A log of another run, in which rho is smaller."""
+    log = precice(folder / "falling.log", [{"ResAbs(M:F)": linear_run([0.5, 1], 0.9, 40)[0]}])
+    return [(log, "0.9")]
+
+
 @pytest.fixture(scope="module")
 def documents(folder: Path, small: vf.Problem) -> list[dict[str, Any]]:
     """Documents of every schema: with and without friction, in one dimension, from matrices, of mesh files, of runs."""
@@ -182,6 +197,7 @@ def documents(folder: Path, small: vf.Problem) -> list[dict[str, Any]]:
         *(vf.advise(problem) for problem in (small, bars)),
         vf.advise_matrices(np.diag([2.0, 3.0]), np.eye(2)),
         *(vf.advise_run(theta, ratio) for theta, ratio in (("0.1", "1.4"), ("0.6", "0.7"), ("0.2", "0.5"))),
+        *(vf.advise_logs(logs) for logs in (diverging(folder), falling(folder), diverging(folder) + falling(folder))),
         vf.sweep(small, theta=["0.5"], refine=[0, 8]),
         vf.sweep(matrices, theta=["0.5"], young=[(1, 2)]),
         vf.sweep(matrices, theta=["auto"], rule=["anderson"]),

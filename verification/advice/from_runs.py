@@ -62,7 +62,7 @@ def advise_run(theta: Any, ratio: Any) -> Advice:
     run, readings, following, rho = read_ratio(t, r)
     return Advice(
         neumann_body=None,
-        roles=() if rho is None else (_role_of_run(rho),),
+        roles=() if rho is None else (role_of_run(rho),),
         units=UNITS,
         run=run,
         readings=readings,
@@ -70,7 +70,8 @@ def advise_run(theta: Any, ratio: Any) -> Advice:
     )
 
 
-def _role_of_run(rho: Fraction) -> Role:
+def role_of_run(rho: Fraction) -> Role:
+    """What is predicted of the roles that a run had, of which rho was read from its residuals."""
     nothing = "an observed ratio proves nothing"
     return Role(
         neumann_body=None,

@@ -31,15 +31,21 @@ SHORTEST_STEP = Fraction(9, 8)
 SAME = Fraction(1, 20)
 
 
+def steps_needed(theta: Fraction) -> int:
+    """Over how many steps at least a ratio must be steady, for a level to be told from a decay."""
+    return max(FEWEST_STEPS, math.ceil(5 / theta))
+
+
 @dataclass(frozen=True, kw_only=True)
 class RunReading:
     """One thing that the ratio of a run can mean.
 
     Attributes
     ----------
-    kind : {'mode-high', 'mode-low', 'level', 'open'}
+    kind : {'mode-high', 'mode-low', 'level', 'plateau', 'open'}
         What sets the pace: the stiffest mode in contact, which changes sign in every step; the softest one, which keeps
-        its sign; contact that opens and closes in turn, so that the residual stays at a level; nodes that are open.
+        its sign; contact that opens and closes in turn, so that the residual stays at a level; a tied run that
+        diverges, so that its relative residual stays at a plateau; nodes that are open.
     value : float or None
         rho where all of Gamma_c is closed and nothing slides; None where the reading gives a bound at most.
     lo : float or None
@@ -48,7 +54,7 @@ class RunReading:
         The same in words.
     """
 
-    kind: Literal["mode-high", "mode-low", "level", "open"]
+    kind: Literal["mode-high", "mode-low", "level", "plateau", "open"]
     value: float | None = None
     lo: float | None = None
     says: str
@@ -92,8 +98,8 @@ class SeenRun:
 
     @property
     def steps(self) -> int:
-        """Over how many steps at least the ratio must be steady, for a level to be told from a decay."""
-        return max(FEWEST_STEPS, math.ceil(5 / self.theta))
+        """Over how many steps at least the ratio must be steady."""
+        return steps_needed(self.theta)
 
     def to_dict(self) -> dict[str, Any]:
         """The object ``run``."""
@@ -103,6 +109,25 @@ class SeenRun:
             "residual": "|Tg - g|, absolute and unrelaxed",
             "steady_over": self.steps,
         }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Observed:
+    """A number that was read from a run, and between which values it lies.
+
+    Attributes
+    ----------
+    value, least, most : Fraction
+    """
+
+    value: Fraction
+    least: Fraction
+    most: Fraction
+
+    @classmethod
+    def known(cls, value: Fraction) -> Observed:
+        """A number that was given."""
+        return cls(value=value, least=value, most=value)
 
 
 def read_ratio(theta: Fraction, r: Fraction) -> tuple[SeenRun, tuple[RunReading, ...], NextRun, Fraction | None]:
@@ -115,15 +140,21 @@ def read_ratio(theta: Fraction, r: Fraction) -> tuple[SeenRun, tuple[RunReading,
     run, readings, next, rho
         rho of the only reading that is left; None where there are several.
     """
-    high, low = (1 + r) / theta - 1, (1 - r) / theta - 1
-    readings = _readings(theta, r, high, low)
+    return SeenRun(theta=theta, ratio=r), *read_observed(theta, Observed.known(r))
+
+
+def read_observed(theta: Fraction, ratio: Observed) -> tuple[tuple[RunReading, ...], NextRun, Fraction | None]:
+    """The same of a ratio known within limits: bounds hold for all of it, and no reading of a part is left out."""
+    r = ratio.value
+    high = (1 + r) / theta - 1
+    readings = _readings(theta, ratio, high)
     kinds = [reading.kind for reading in readings]
     best = predicted_theta(high)
     between = 2 / (high + Fraction(7, 4))  # above the best theta of mode-high, below the one at which it diverges
     if kinds == ["mode-high"]:
         following = min(best, LARGEST_TO_PASTE)
         why = f"the best one if rho is {_few(high)}, and smaller than that of this run, which converges"
-    elif r > 1 + _spread(theta):
+    elif r > 1 + spread(theta):
         following = between
         confirmed = f"a ratio of {_few(following * (1 + high) - 1)} there confirms mode-high"
         why = f"smaller, as this run does not converge; {confirmed}, and else come back with what you see"
@@ -137,38 +168,73 @@ def read_ratio(theta: Fraction, r: Fraction) -> tuple[SeenRun, tuple[RunReading,
         if following * (1 + high) >= 2:
             why += f"; if the residual does not fall there, keep {_few(theta)}, which converges"
     rho = high if kinds == ["mode-high"] else None
-    return SeenRun(theta=theta, ratio=r), readings, NextRun(theta=_rounded_down(following), why=why), rho
+    return readings, NextRun(theta=rounded_down(following), why=why), rho
 
 
-def _readings(theta: Fraction, r: Fraction, high: Fraction, low: Fraction) -> tuple[RunReading, ...]:
-    """What a ratio r can mean; ``high`` and ``low`` are the lambda of a mode that changes or keeps its sign."""
-    fastest = f"the stiffest mode in this run has lambda = {_few(high)} at most"
+def read_plateau(theta: Fraction, plateau: Observed) -> tuple[tuple[RunReading, ...], NextRun]:
+    """The readings of a relative residual ``|T g - g|/|T g|`` that stays at P > 1, and the run to make next.
+
+    In a tied run that diverges the stiffest mode remains of g, of which ``T g`` is ``-rho`` times, so that
+    ``P = (1 + rho)/rho``.  It diverges where ``theta (1 + rho) > 2`` alone: a larger P is none of these plateaus.
+    """
+    least = 2 / theta - 1
+    rho = 1 / (plateau.value - 1)
+    found = []
+    following, why = theta / 2, f"half of {_few(theta)}, which does not converge; come back with its log"
+    if rho > least:
+        says = (
+            f"a tied run diverges, its relative residual at {_few(plateau.value)} = 1 + 1/rho: nothing opens or slides"
+        )
+        lo = max(1 / (plateau.most - 1), least)
+        found.append(RunReading(kind="plateau", value=float(rho), lo=double_below(lo), says=says))
+        following = 2 / (rho + Fraction(7, 4))
+        why = f"smaller; a ratio of {_few(following * (1 + rho) - 1)} there confirms plateau"
+    found.append(level(theta))
+    return tuple(found), NextRun(theta=rounded_down(following), why=why)
+
+
+def level(theta: Fraction, bounds: bool = True) -> RunReading:
+    """A residual that stays at a level, or grows for a while only; whether that tells of rho."""
+    least = 2 / theta - 1
+    says = "contact opens and closes in turn, and the residual stays at a level or grows for a while only"
+    if bounds:
+        says += (
+            f": without friction rho is at least {_few(least)}, nothing more; with friction this says nothing of rho"
+        )
+    else:
+        says += ", or the solvers of both sides are no more accurate: this says nothing of rho"
+    return RunReading(kind="level", lo=double_below(least) if bounds else None, says=says)
+
+
+def _readings(theta: Fraction, ratio: Observed, value: Fraction) -> tuple[RunReading, ...]:
+    """What a ratio can mean; ``value`` is the lambda of a mode that changes its sign."""
+    r, high, low = ratio.value, (1 + ratio.least) / theta - 1, (1 - ratio.most) / theta - 1
+    fastest = f"the stiffest mode in this run has lambda = {_few((1 + ratio.most) / theta - 1)} at most"
     proved = f"without friction, or tied, rho is at least {_few(high)}, and about that if all of Gamma_c stays closed"
     found = []
-    if r > 1:
+    if ratio.least > 1:
         says = f"the residual grows by this ratio in every step: {proved}"
-    elif r > 1 - theta:
+    elif ratio.least > 1 - theta:
         says = f"the stiffest mode changes its sign in every step: {proved}"
     else:
         says = f"the stiffest mode changes its sign in every step and is the slowest: {proved}"
-    found.append(RunReading(kind="mode-high", value=float(high), lo=_double_below(high), says=says))
-    if r <= 1 - theta:
+    found.append(RunReading(kind="mode-high", value=float(value), lo=double_below(high), says=says))
+    if ratio.least <= 1 - theta:
+        low = max(low, Fraction(0))
         bound = f"without friction, or tied, rho is at least {_few(low)}"
         says = f"the softest mode keeps its sign and is the slowest: {bound}; {fastest}"
-        found.append(RunReading(kind="mode-low", lo=_double_below(low), says=says))
-    open_too = abs(r - (1 - theta)) <= SAME * min(theta, 1 - theta)
+        found.append(RunReading(kind="mode-low", lo=double_below(low), says=says))
+    sure = max(ratio.most - r, r - ratio.least)
+    open_too = abs(r - (1 - theta)) <= SAME * min(theta, 1 - theta) + sure
     if open_too:
         says = f"nodes that are open set the pace, 1 - theta a step, whatever rho is; {fastest}"
         found.append(RunReading(kind="open", says=says))
-    if r >= 1 - _spread(theta) and r > 1 - theta and not open_too:
-        least = 2 / theta - 1
-        level = "contact opens and closes in turn, and the residual stays at a level or grows for a while only"
-        bound = f"without friction rho is at least {_few(least)}, nothing more; with friction this says nothing of rho"
-        found.append(RunReading(kind="level", lo=_double_below(least), says=f"{level}: {bound}"))
+    if ratio.most >= 1 - spread(theta) and ratio.most > 1 - theta and not open_too:
+        found.append(level(theta))
     return tuple(found)
 
 
-def _spread(theta: Fraction) -> Fraction:
+def spread(theta: Fraction) -> Fraction:
     """How far from 1 the ratio of a residual that stays at a level may come out, averaged over the steps asked for."""
     return min(WIDEST, max(NARROWEST, theta / 2))
 
@@ -177,13 +243,13 @@ def _few(value: Fraction) -> str:
     return f"{float(value):.4g}"
 
 
-def _double_below(value: Fraction) -> float:
+def double_below(value: Fraction) -> float:
     """The largest double that is not above a bound from below."""
     near = float(value)
     return near if Fraction(near) <= value else math.nextafter(near, -math.inf)
 
 
-def _rounded_down(theta: Fraction) -> float:
+def rounded_down(theta: Fraction) -> float:
     """A theta in four figures, not above the one meant; next to 1 in four figures of ``1 - theta``."""
     if theta > NEXT_TO_1:
         rest = 1 - theta

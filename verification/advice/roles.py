@@ -16,6 +16,7 @@ from ndtheory import EnergyConstants, Number, evaluate_sharp
 from ndtheory.sharp import predicted_rate, predicted_theta
 from verification.advice.readings import NextRun, RunReading, SeenRun
 from verification.advice.role import Role
+from verification.advice.seen import Interval, SeenLog
 from verification.algorithm.theta import automatic, by_prediction, sharp_bounds
 from verification.constants import measure
 from verification.document import Document
@@ -55,6 +56,10 @@ class Advice(Document):
         What that run can mean.
     next : NextRun or None
         The run to make next.
+    logs : tuple of SeenLog
+        What was seen in the logs of other runs.
+    interval : Interval or None
+        What these logs say of rho together.
     """
 
     schema: ClassVar[str] = "ndtheory.advice/1"
@@ -67,12 +72,14 @@ class Advice(Document):
     run: SeenRun | None = None
     readings: tuple[RunReading, ...] = ()
     next: NextRun | None = None
+    logs: tuple[SeenLog, ...] = ()
+    interval: Interval | None = None
     problem: Problem | None = None
 
     @property
     def summary(self) -> str:
         if not self.roles:
-            return f"{len(self.readings)} readings of a run"
+            return f"{len(self.readings)} readings of {'logs' if self.logs else 'a run'}"
         best = self.best
         who = "" if self.neumann_body is None else f"Neumann problem to body {self.neumann_body}, "
         return f"{who}theta = {best.predicted[0]:.4g} predicted, rate {best.predicted[1]:.4g}"
@@ -82,7 +89,7 @@ class Advice(Document):
         from verification.figures import draw_factor
 
         if not self.roles:
-            raise ValueError("the ratio of this run has several readings: make the run that `next` names")
+            raise ValueError("no reading is left alone: make the run that `next` names")
         named = {f"Neumann body {role.neumann_body}" if role.neumann_body else "that run": role for role in self.roles}
         energy = {
             name: role.energy or EnergyConstants(rho=role.rho.value)
@@ -101,19 +108,25 @@ class Advice(Document):
             The ratio of a run has several readings: ``next`` is the run to make.
         """
         if not self.roles:
-            raise ValueError("the ratio of this run has several readings: make the run that `next` names")
+            raise ValueError("no reading is left alone: make the run that `next` names")
         return next((r for r in self.roles if r.neumann_body == self.neumann_body), self.roles[0])
 
     def content(self) -> dict[str, Any]:
         reason = {} if self.neumann_body else {"neumann_body": "one run tells nothing of the other assignment"}
         if self.run is None:
-            reason |= dict.fromkeys(("run", "next"), "no run was given")
+            reason["run"] = "logs were given" if self.logs else "no run was given"
+        if self.next is None:
+            reason["next"] = "no run was given"
+        if self.interval is None:
+            reason["interval"] = "no logs were given"
         return {
             "neumann_body": self.neumann_body,
             "roles": [role.to_dict() for role in self.roles],
             "run": None if self.run is None else self.run.to_dict(),
             "readings": [reading.to_dict() for reading in self.readings],
             "next": None if self.next is None else self.next.to_dict(),
+            "logs": [log.to_dict() for log in self.logs],
+            "interval": None if self.interval is None else self.interval.to_dict(),
             "outside_theorem": list(self.outside),
             "reason": reason,
         }

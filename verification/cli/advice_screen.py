@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from verification.advice.readings import NextRun, RunReading, SeenRun
 from verification.advice.roles import Advice
-from verification.cli.console import figures, heading, near_one, note, say, table
+from verification.advice.seen import Interval, LogBound, SeenLog
+from verification.cli.console import figures, heading, near_one, note, printable, say, table
 from verification.cli.screens import steps
 from verification.cli.typed import Typed
 from verification.problem.reading import takes_theta
@@ -14,12 +15,20 @@ def advice(found: Advice, typed: Typed | None = None) -> None:
     """The screen of ``advise``."""
     if found.run is not None and found.next is not None:
         _seen(found.run, found.readings, found.next)
-    theta = _roles(found) if found.roles else None
+    if found.interval is not None and found.next is not None:
+        _logs(found.logs, found.interval, found.readings, found.next)
+        if found.roles:
+            _paste(None, f"{found.next.theta:g}")
+            note("Predicted for the roles that the bodies have; logs tell nothing of the other assignment.", "  ")
+    theta = _roles(found) if found.roles and not found.logs else None
     say()
     for reason in found.outside:
         note(f"Outside the theorem: {reason}.")
     if found.next is not None:
         say("Not claimed: a bound of rho with friction, or that a reading is the right one.")
+        if found.logs:
+            say(f"Next: the same with --log LOG --theta {found.next.theta:g} (LOG: the log of that run)")
+            return
         say(f"Next: ndtheory advise --theta {found.next.theta:g} --ratio R (R: the ratio of that run)")
         return
     say("Not claimed: that the predicted theta is the best one for your loads.")
@@ -42,13 +51,63 @@ def _seen(run: SeenRun, readings: tuple[RunReading, ...], following: NextRun) ->
     note(f"{given}, absolute and unrelaxed, steadily over {run.steps} steps or more.", "  ")
     note("A residual that rises and falls has no steady ratio: give 1.", "  ")
     note("The relative residual |Tg - g|/|Tg| of coupling libraries tells other things.", "  ")
+    _readings(readings)
+    heading("WHICH RUN NEXT?")
+    note(f"theta = {following.theta:g}: {following.why}", "  ")
+
+
+def _readings(readings: tuple[RunReading, ...]) -> None:
     rows = [["reading", "rho", "if it is the right one"]]
     for reading in readings:
         rho = "-" if reading.lo is None else f">= {figures(reading.lo)}"
         rows.append([reading.kind, rho, reading.says])
     table(rows)
+
+
+#: So many columns of all logs together are shown; the document holds every one.
+MOST_COLUMNS = 8
+
+
+def _logs(logs: tuple[SeenLog, ...], interval: Interval, readings: tuple[RunReading, ...], following: NextRun) -> None:
+    """What logs say of rho, alone and together, and which run is to be made next."""
+    heading("WHAT DO THE LOGS SHOW?")
+    room = MOST_COLUMNS
+    for log in logs:
+        note(f"theta = {float(log.theta):.4g}, {log.form}, {printable(log.file)}", "  ")
+        for column in log.columns[:room]:
+            residual = {"assumed": "taken as absolute", "drop": "over the first one"}.get(
+                column.residual, column.residual
+            )
+            note(f"{printable(column.name)}, {residual}: {column.says}", "    ")
+        room -= len(log.columns[:room])
+        for words in log.notes:
+            note(words, "    ")
+    left = sum(len(log.columns) for log in logs) - MOST_COLUMNS
+    if left > 0:
+        say(f"  and {left} columns more, see --json")
+    note(f"Assumed: theta constant in each run, no Aitken or quasi-Newton.  A ratio counts over {_steps(logs)}.", "  ")
+    heading("WHAT DO THEY SAY OF RHO?")
+    if readings:
+        _readings(readings)
+    else:
+        say("  Nothing: no residual falls, grows or stays steadily.")
+    if interval.contradiction is not None:
+        note(f"CONTRADICTION: {interval.contradiction}.", "  ")
+    else:
+        _bound("least", interval.lo, logs)
+        _bound("most", interval.hi, logs)
     heading("WHICH RUN NEXT?")
     note(f"theta = {following.theta:g}: {following.why}", "  ")
+
+
+def _steps(logs: tuple[SeenLog, ...]) -> str:
+    return " and ".join(f"{n}" for n in sorted({log.steps for log in logs})) + " steps"
+
+
+def _bound(which: str, bound: LogBound | None, logs: tuple[SeenLog, ...]) -> None:
+    if bound is not None:
+        source = f"theta = {float(bound.log.theta):.4g}: {bound.says}" if len(logs) > 1 else bound.says
+        note(f"rho is at {which} {figures(float(bound.value))} given {bound.assumes} ({source})", "  ")
 
 
 def _roles(found: Advice) -> str:
@@ -97,9 +156,14 @@ def _roles(found: Advice) -> str:
             else:
                 allowed = f"every small theta contracts for k < {figures(role.friction_threshold)}"
                 say(f"  {names[role.neumann_body]}: {allowed} (here k = {figures(found.friction, 2)})")
-    heading("TO PASTE")
     theta = f"{min(best.predicted[0], 0.99):.3g}" if found.next is None else f"{found.next.theta:g}"
-    body = f"neumann_body = {found.neumann_body}\n  " if found.neumann_body else ""
+    _paste(found.neumann_body, theta)
+    return theta
+
+
+def _paste(neumann_body: int | None, theta: str) -> None:
+    """The lines for a problem file and for a coupling configuration."""
+    heading("TO PASTE")
+    body = f"neumann_body = {neumann_body}\n  " if neumann_body else ""
     say(f"  {body}theta = {theta}")
     say(f'  <acceleration:constant><relaxation value="{theta}" /></acceleration:constant>')
-    return theta

@@ -18,7 +18,21 @@ from verification.cli.typed import Typed
 @SET
 @click.option("--S1", "S1", type=click.Path(path_type=Path), help="Interface stiffness of body 1, .npz or .npy.")
 @click.option("--S2", "S2", type=click.Path(path_type=Path), help="Interface stiffness of body 2, .npz or .npy.")
-@click.option("--theta", metavar="NUMBER", help="Relaxation factor of a run of any code, 0 < theta <= 1.")
+@click.option(
+    "--log",
+    "logs",
+    metavar="LOG",
+    type=click.Path(path_type=Path),
+    multiple=True,
+    help="Convergence log of a run of any code, as precice-Solid-convergence.log; may be repeated with its --theta.",
+)
+@click.option(
+    "--theta",
+    "thetas",
+    metavar="NUMBER",
+    multiple=True,
+    help="Relaxation factor of a run of any code, 0 < theta <= 1; of several logs one each, in their order.",
+)
 @click.option(
     "--ratio",
     metavar="NUMBER",
@@ -31,16 +45,17 @@ def advise(
     keys: dict[str, str],
     S1: Path | None,
     S2: Path | None,
-    theta: str | None,
+    logs: tuple[Path, ...],
+    thetas: tuple[str, ...],
     ratio: str | None,
     as_json: bool,
 ) -> None:
     """Which body gets the Neumann problem, and which theta?
 
     Give a problem FILE, or the interface.npz that a run has written; or the Schur complements of both bodies on the
-    same interface unknowns (dimension: force per displacement, any units); or one run of any other code with constant
-    theta: what the ratio of its residuals can mean, and which theta to run next.  Read its absolute residual |Tg - g|,
-    not the relative one of coupling libraries.
+    same interface unknowns (dimension: force per displacement, any units); or runs of any other code with constant
+    theta, as logs or as the ratio of their residuals: what these can mean, and which theta to run next.  Give the ratio
+    of the absolute residual |Tg - g|, not of the relative one of coupling libraries; a log may hold either.
 
     \b
     Examples:
@@ -49,15 +64,26 @@ def advise(
       ndtheory advise results/interface.npz
       ndtheory advise --S1 a.npz --S2 b.npz
       ndtheory advise --theta 0.1 --ratio 1.4
+      ndtheory advise --log precice-Solid-convergence.log --theta 0.5
+      ndtheory advise --log a.log --theta 0.3 --log b.log --theta 0.6
     """
     context = click.get_current_context()
+    theta = thetas[0] if thetas else None
     forms: dict[str, list[Any]] = {"FILE": [file], "--S1 and --S2": [S1, S2], "--theta and --ratio": [theta, ratio]}
+    if logs:
+        if ratio is not None:
+            raise click.UsageError("received --log with --ratio: a log shows its own ratio", context)
+        forms["--log and --theta"] = [logs, forms.pop("--theta and --ratio")[0]]
     given = [name for name, values in forms.items() if any(value is not None for value in values)]
     if len(given) != 1:
         received = " with ".join(given) or "nothing"
-        raise click.UsageError(f"received {received}: needed one of {', '.join(forms)}", context)
+        known = ["FILE", "--S1 and --S2", "--theta and --ratio", "--log and --theta"]
+        raise click.UsageError(f"received {received}: needed one of {', '.join(known)}", context)
     if any(value is None for value in forms[given[0]]):
         raise click.UsageError(f"needed both {given[0]}", context)
+    if len(thetas) != max(len(logs), 1) and thetas:
+        received = f"received {len(thetas)} --theta with {len(logs)} --log"
+        raise click.UsageError(f"{received}: needed one --theta for each log, or one with --ratio", context)
     if keys and file is None:
         raise click.UsageError("received --set without FILE: it sets a key of a problem file", context)
     from verification.advice import roles as advice
@@ -79,9 +105,10 @@ def advise(
             raise click.UsageError(f"{S1}, {S2}: {error}", context) from None
     else:
         try:
+            from verification.advice.from_logs import advise_logs
             from verification.advice.from_runs import advise_run
 
-            found = advise_run(theta, ratio)
+            found = advise_logs(zip(logs, thetas, strict=True)) if logs else advise_run(theta, ratio)
         except HypothesisError as error:
             raise click.UsageError(f"--{error}", context) from None
     deliver(found, lambda: show(found, None if file is None else Typed(file=file, keys=keys)), as_json)

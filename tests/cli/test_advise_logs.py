@@ -1,0 +1,103 @@
+"""`advise --log`: what the screen shows of the logs of other codes, and what it refuses."""
+
+import pytest
+from advice_calls import pasted
+from coupling_logs import linear_run, precice
+
+MODES = (0.2, 0.5, 1.1, 3.0)  # tied; rho = 3
+
+
+@pytest.fixture
+def log(tmp_path):
+    """``log(0.45)``: the file of a run with this theta, and the options that name it."""
+
+    def written(theta, modes=MODES, windows=1, steps=90, name=None):
+        absolute, relative = linear_run(modes, theta, steps)
+        columns = {"ResRel(Solid-Mesh:Displacement)": relative, "ResAbs(Solid-Mesh:Force)": absolute}
+        path = precice(tmp_path / (name or f"precice-Solid-{theta}-convergence.log"), [columns] * windows)
+        return ["--log", path, "--theta", theta]
+
+    return written
+
+
+CALLS = {
+    "one that decides": [0.45],
+    "one that leaves readings": [0.3],
+    "one that diverges": [0.7],
+    "two that decide": [0.3, 0.45],
+    "two that leave a run": [0.1, 0.7],
+    "three": [0.1, 0.7, 0.9],
+}
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_the_screen_of_logs_fits_80_columns_and_46_lines_and_says_what_it_assumes(call, log, name):
+    words = [word for theta in CALLS[name] for word in log(theta)]
+    answer, document = call("advise", *words), call("advise", *words, "--json").document
+    assert (answer.status, answer.err) == (0, "")
+    lines = answer.out.splitlines()
+    assert max(map(len, lines)) <= 80
+    assert len(lines) <= 46
+    flat = " ".join(answer.out.split())
+    assert "Assumed: theta constant in each run" in flat
+    assert "Not claimed: a bound of rho with friction" in flat
+    assert f"theta = {document['next']['theta']:g}: {document['next']['why']}" in flat
+    for side in ("lo", "hi"):
+        if document["interval"][side]:
+            assert f"given {document['interval'][side]['assumes']}" in flat
+    shown = [line.split()[0] for line in lines if line.startswith(("  mode-", "  level", "  open", "  plateau"))]
+    assert shown == [reading["kind"] for reading in document["readings"]]
+    if document["roles"]:
+        assert pasted(answer.out) == f"{document['next']['theta']:g}"
+        assert "WHICH BODY" not in answer.out
+    else:
+        assert "TO PASTE" not in answer.out
+
+
+def test_logs_that_contradict_each_other_are_told_on_the_screen(call, log):
+    answer = call("advise", *log(0.3, (1, 9), name="a.log"), *log(0.45, (0.5, 3), name="b.log"))
+    assert answer.status == 0
+    assert "CONTRADICTION: " in answer.out
+    assert "TO PASTE" not in answer.out
+    assert len(answer.out.splitlines()) <= 46
+
+
+def test_each_theta_belongs_to_the_log_of_its_place(call, log):
+    one, two = log(0.3), log(0.45)
+    mixed = ["--theta", 0.3, "--theta", 0.45, "--log", one[1], "--log", two[1]]
+    assert call("advise", *one, *two, "--json").out == call("advise", *mixed, "--json").out
+
+
+@pytest.mark.parametrize(
+    ("words", "fragment"),
+    [
+        (["--log", "LOG"], "needed both --log and --theta"),
+        (["--log", "LOG", "--log", "LOG", "--theta", "0.5"], "received 1 --theta with 2 --log"),
+        (["--log", "LOG", "--theta", "0.5", "--theta", "0.4"], "received 2 --theta with 1 --log"),
+        (["--theta", "0.5", "--theta", "0.4", "--ratio", "1.4"], "received 2 --theta with 0 --log"),
+        (["--log", "LOG", "--theta", "0.5", "--ratio", "0.9"], "--log with --ratio"),
+        (["--log", "LOG", "--theta", "0.5", "--S1", "a.npz"], "needed one of"),
+        (["--log", "LOG", "--theta", "0.5", "--set", "contact.friction=0"], "--set without FILE"),
+        (["--log", "LOG", "--theta", "2"], "--theta = 2: needed"),
+        (["--log", "missing.log", "--theta", "0.5"], "missing.log: no such file"),
+        (["--log", "FOLDER", "--theta", "0.5"], "folder"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_a_call_with_logs_that_lacks_or_mixes_something_is_refused(call, log, tmp_path, words, fragment):
+    places = {"LOG": str(log(0.45)[1]), "FOLDER": str(tmp_path)}
+    assert fragment in call("advise", *(places.get(word, word) for word in words)).complaint
+
+
+def test_a_broken_log_is_one_line_and_status_2(call, tmp_path):
+    path = tmp_path / "broken.log"
+    path.write_text("it res\n1 1.0\n2 \x1b[2Jx\n3 0.5\n", "utf-8")
+    complaint = call("advise", "--log", path, "--theta", "0.5").complaint
+    assert f"{path}, line 3: received" in complaint
+    assert "\x1b" not in complaint
+
+
+def test_a_column_name_cannot_steer_the_terminal(call, tmp_path):
+    path = tmp_path / "a.log"
+    path.write_text("it res\x1b[2J\n" + "".join(f"{n} {0.8**n:.8e}\n" for n in range(40)), "utf-8")
+    assert "\x1b[2J" not in call("advise", "--log", path, "--theta", "0.45").out

@@ -1,0 +1,274 @@
+"""Advice from the convergence logs of other runs: what they say of rho, alone and together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from ndtheory.constants import take
+from ndtheory.energy import SMALLEST
+from ndtheory.sharp import predicted_rate, predicted_theta
+from verification.advice.from_runs import role_of_run
+from verification.advice.log import Column, Log
+from verification.advice.logs import read_log
+from verification.advice.pace import CONVERGED, MOST_WINDOWS, Pace, pace, together
+from verification.advice.readings import (
+    FEWEST_STEPS,
+    LARGEST_TO_PASTE,
+    SHORTEST_STEP,
+    NextRun,
+    Observed,
+    RunReading,
+    double_below,
+    level,
+    read_observed,
+    read_plateau,
+    rounded_down,
+    spread,
+    steps_needed,
+)
+from verification.advice.roles import UNITS, Advice
+from verification.advice.seen import Interval, LogBound, SeenColumn, SeenLog, bounds
+from verification.problem.tables import ProblemError
+
+#: Bounds of 1 + rho that differ by less do not contradict each other: a ratio has not wholly settled.
+AGREE = Fraction(103, 100)
+
+#: Where the bounds of rho differ by less, a theta between costs a few steps at most.
+NARROW = Fraction(5, 4)
+
+#: The smallest theta that a log may have: for a smaller one a ratio has to be steady over millions of steps.
+SMALLEST_THETA = Fraction(1, 10**6)
+
+
+def advise_logs(logs: Iterable[tuple[Path | str, Any]]) -> Advice:
+    """What the convergence logs of runs of any code, each with a constant theta, say of rho together.
+
+    A log whose residual changes by a steady ratio r a step is read as
+    :func:`verification.advice.from_runs.advise_run` reads r.  A residual that stays at a level belongs to a run that
+    does not converge; a *relative* residual ``|T g - g|/|T g|`` that stays at P > 1 to a tied run that diverges with
+    ``rho = 1/(P - 1)``.  What is neither steady nor at a level tells nothing.
+
+    Without friction, or tied, ``rho >= (1 + r)/theta - 1`` wherever ``r > 1 - theta``, and ``rho >= 2/theta - 1`` of a
+    run that does not converge.  If near the solution all of Gamma_c is closed and nothing slides, a run that converges
+    has ``rho <= (1 + r)/theta - 1`` besides.  Logs whose bounds exclude each other are told as contradictory.
+
+    Parameters
+    ----------
+    logs : iterable of tuple
+        Logs of one coupling with the same roles: the path and the relaxation factor of each, 0 < theta <= 1.
+
+    Returns
+    -------
+    Advice
+        With a role, and a theta to paste, only where the logs decide; else ``next`` is the run to make.
+
+    Raises
+    ------
+    ProblemError
+        A log that cannot be read, or whose relaxation was not constant.
+    HypothesisError
+        A theta outside its range.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     log = Path(folder) / "residuals.txt"
+    ...     _ = log.write_text("".join(f"{0.8**n:.8e}\\n" for n in range(40)), encoding="utf-8")
+    ...     found = advise_logs([(log, "0.45")])
+    >>> [reading.kind for reading in found.readings], round(found.best.rho.value, 6)
+    (['mode-high'], 3.0)
+    """
+    needed = "the theta of a log, 0 < theta <= 1 (1e-6 or more)"
+    allowed = lambda value: max(SMALLEST, SMALLEST_THETA) <= value <= 1
+    given = [(Path(path), take("theta", theta, needed, allowed)) for path, theta in logs]
+    if not given:
+        raise ValueError("needed one log or more")
+    seen = tuple(_seen(read_log(path), theta) for path, theta in given)
+    lower, upper = bounds(seen)
+    interval = _interval(lower, upper)
+    readings, following, rho = _together(seen, interval)
+    return Advice(
+        neumann_body=None,
+        roles=() if rho is None else (role_of_run(rho),),
+        units=UNITS,
+        readings=readings,
+        next=following,
+        logs=seen,
+        interval=interval,
+    )
+
+
+def _seen(log: Log, theta: Fraction) -> SeenLog:
+    """What one log shows, and what that can mean."""
+    if log.theta is not None and abs(log.theta - float(theta)) > 1e-3 * float(theta):
+        named = f"the log names a relaxation factor of {log.theta:g}: needed the same theta, received {float(theta):g}"
+        raise ProblemError(str(log.path), "", None, named)
+    columns = tuple(_column(column, theta) for column in log.columns)
+    steps = steps_needed(theta)
+    bare = SeenLog(
+        file=str(log.path),
+        form=log.form,
+        theta=theta,
+        steps=steps,
+        columns=columns,
+        readings=(),
+        next=_longer(columns, theta, steps),
+        rho=None,
+        notes=log.notes,
+    )
+    ratio, plateau, rho = bare.slowest, bare.plateau, None
+    grows = ratio is not None and ratio.least > 1
+    if ratio is not None and grows:
+        readings, following, _ = read_observed(theta, ratio)
+        if plateau is not None and _one_mode(theta, ratio, plateau):
+            also = [reading for reading in read_plateau(theta, plateau)[0] if reading.kind == "plateau"]
+            readings = (*readings[:1], *also, *readings[1:])
+    elif plateau is not None:
+        readings, following = read_plateau(theta, plateau)
+    elif bare.stays:
+        readings, following, _ = read_observed(theta, Observed.known(Fraction(1)))
+        if all(column.residual == "relative" for column in columns if column.count("level")):
+            readings = (level(theta),)  # of a relative residual also a run that grows
+    elif ratio is not None:
+        readings, following, rho = read_observed(theta, ratio)
+        if not bare.converges and all(reading.kind != "level" for reading in readings):
+            readings, rho = (*readings, level(theta, bounds=False)), None
+    else:
+        return bare
+    return replace(bare, readings=readings, next=following, rho=rho)
+
+
+def _one_mode(theta: Fraction, ratio: Observed, plateau: Observed) -> bool:
+    """Whether the growth and the plateau of a run are those of one mode, as in a tied run."""
+    low, high = 1 / (plateau.most - 1), 1 / (plateau.least - 1)
+    return (1 + ratio.least) / theta <= AGREE * (1 + high) and 1 + low <= AGREE * (1 + ratio.most) / theta
+
+
+def _column(column: Column, theta: Fraction) -> SeenColumn:
+    """The windows of one field, read one by one and put together."""
+    steps = steps_needed(theta)
+    long = [window for window in column.windows if len(window) > FEWEST_STEPS] or list(column.windows)
+    paces = [
+        pace(
+            window,
+            relative=column.residual == "relative",
+            steps=steps,
+            theta=float(theta),
+            spread=float(spread(theta)),
+            digits=column.digits,
+            decimals=column.decimals,
+        )
+        for window in long[-MOST_WINDOWS:]
+    ]
+    return SeenColumn(
+        name=column.name,
+        residual=column.residual,
+        paces=tuple(paces),
+        windows=len(column.windows),
+        ratio=_put_together([one for one in paces if one.kind != "plateau" and one.value is not None]),
+        plateau=_put_together([one for one in paces if one.kind == "plateau"]),
+    )
+
+
+def _put_together(paces: list[Pace]) -> Observed | None:
+    """The ratio or plateau of several windows; a run that grows in some does so."""
+    grows = [one for one in paces if one.kind != "plateau" and one.least is not None and one.least > 1]
+    if not paces:
+        return None
+    value, least, most = (Fraction(number) for number in together(grows or paces))
+    return Observed(value=value, least=least, most=most)
+
+
+def _longer(columns: tuple[SeenColumn, ...], theta: Fraction, steps: int) -> NextRun:
+    """The run to make where a log shows nothing steady."""
+    paces = [one for column in columns for one in column.paces]
+    if all(one.height < CONVERGED for one in paces):
+        most = max(one.steps for one in paces)
+        return NextRun(theta=float(theta), why=f"keep it: the run converges within {most} steps, and shows no ratio")
+    if any(one.lost for one in paces):
+        why = "half of it, as the log ends in inf or nan before a ratio shows"
+        return NextRun(theta=rounded_down(theta / 2), why=why)
+    again = f"the same again, constant and without Aitken or quasi-Newton, {steps} steps or more in one time window"
+    if all(one.kind == "short" for one in paces):
+        why = f"{again}: smaller limits of convergence and a larger number of iterations"
+    else:
+        why = f"{again}, until the residual falls or grows steadily; a relative one must fall below 0.1 first"
+    return NextRun(theta=float(theta), why=why)
+
+
+def _interval(lower: list[LogBound], upper: list[LogBound]) -> Interval:
+    """The largest bound from below beside the smallest from above."""
+    lo = max(lower, key=lambda bound: bound.value, default=None)
+    hi = min(upper, key=lambda bound: bound.value, default=None)
+    contradiction = None
+    if lo is not None and hi is not None and 1 + lo.value > AGREE * (1 + hi.value):
+        one, other = (f"{bound.log.file} with theta = {float(bound.log.theta):.4g}" for bound in (hi, lo))
+        contradiction = (
+            f"by {one} rho is at most {float(hi.value):.4g}, by {other} at least {float(lo.value):.4g}: contact or "
+            "sliding changes between the runs, a theta was not constant, or they are not runs of one problem in the "
+            "same roles"
+        )
+    return Interval(lo=lo, hi=hi, contradiction=contradiction)
+
+
+def _together(logs: tuple[SeenLog, ...], interval: Interval) -> tuple[tuple[RunReading, ...], NextRun, Fraction | None]:
+    """The readings that are left, the run to make next, and rho where the logs decide."""
+    falling = [log for log in logs if log.converges]
+    rising = [log for log in logs if log.diverges]
+    if falling:
+        base = max(falling, key=lambda log: log.theta)
+    elif rising:
+        base = min(rising, key=lambda log: log.theta)
+    else:
+        base = next((log for log in logs if log.readings), logs[0])
+    if interval.contradiction is not None:
+        theta = float(min(log.theta for log in logs))
+        why = f"the logs contradict each other: {theta:.4g} once more, in one time window, with ResAbs in the log"
+        return base.readings, NextRun(theta=theta, why=why), None
+    lo, hi = interval.lo, interval.hi
+    if base.rho is not None:
+        return base.readings, _fastest(falling, base.rho) or base.next, base.rho
+    if lo is not None and hi is not None and hi.value <= NARROW * lo.value:
+        rho = max(lo.value, hi.value)  # they may overlap a little
+        best = min(predicted_theta(rho), LARGEST_TO_PASTE)
+        why = f"the best one if rho is {float(rho):.4g}, the upper end of what the logs leave"
+        if best > SHORTEST_STEP * base.theta:
+            return base.readings, NextRun(theta=rounded_down(best), why=why), None
+        if best > base.theta:
+            why = f"close to {float(best):.4g}, {why}, and known to converge"
+        left = f"between {float(min(lo.value, hi.value)):.4g} and {float(rho):.4g}"
+        says = f"the logs leave rho {left} if all of Gamma_c stays closed"
+        only = RunReading(kind="mode-high", value=float(rho), lo=double_below(lo.value), says=says)
+        following = NextRun(theta=rounded_down(min(best, base.theta)), why=why)
+        return (only,), _fastest(falling, rho) or following, rho
+    return base.readings, _between(base, rising), None
+
+
+def _fastest(falling: list[SeenLog], rho: Fraction) -> NextRun | None:
+    """The theta of a log that falls faster than is predicted of the best one for rho; None where there is none.
+
+    The prediction is for the slowest mode that there may be: a softest mode well above 0 leaves a smaller theta faster.
+    """
+    found = [(log.slowest.most, log.theta) for log in falling if log.slowest is not None]
+    ratio, theta = min(found)
+    if ratio >= predicted_rate(rho):
+        return None
+    predicted = f"{float(predicted_rate(rho)):.4g} is predicted of 2/(2 + rho) with rho = {float(rho):.4g}"
+    return NextRun(theta=float(theta), why=f"its log falls by {float(ratio):.4g} a step or faster, where {predicted}")
+
+
+def _between(base: SeenLog, rising: list[SeenLog]) -> NextRun:
+    """The next run of the log that decides most, below the thetas that do not converge."""
+    least = min((log.theta for log in rising), default=None)
+    if not base.converges or least is None or Fraction(base.next.theta) * SHORTEST_STEP <= least:
+        return base.next
+    low, high = float(base.theta), float(least)
+    if high <= low * float(SHORTEST_STEP):
+        return NextRun(theta=low, why=f"it converges and {high:.4g} does not: no larger one is worth a run")
+    theta = rounded_down(Fraction((low * high) ** 0.5))
+    return NextRun(theta=theta, why=f"between {low:.4g}, which converges, and {high:.4g}, which does not")

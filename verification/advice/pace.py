@@ -1,0 +1,211 @@
+"""The pace of one series of residuals: a steady ratio, a level, the plateau of a relative residual, or neither."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from fem1d2d.mesh import Floats
+from verification.advice.readings import FEWEST_STEPS
+
+#: Logarithms of ratios that scatter and drift by less, or by a fifth of theta, are steady.
+STEADY = 0.03
+
+#: Below this a relative residual ``|T x - x|/|T x|`` has the ratios of the absolute one, nearly: for the solution y and
+#: without friction, or tied, ``|T x - T y| <= |T x - x|`` in the norm (5.21): ``|T x|`` is ``|y|`` within this share.
+SMALL = 0.1
+
+#: A plateau P is flat where it varies by less than this share of P - 1, which tells rho.  A tied run comes as close to
+#: it as its numbers have digits; a run whose contact opens and closes has been seen at 1.0018, within 4 % of P - 1.
+FLAT = 0.01
+
+#: Below this share of the largest residual a level may be the accuracy of the participants' own solvers.
+FLOOR = 1e-3
+
+#: A run whose residual has fallen to this share has converged, and a level below is the accuracy of the solvers.
+CONVERGED = 1e-6
+
+#: Residuals below this share of the largest one are rounding.
+ROUNDING = 1e-12
+
+#: The rounding of one step of a run, as a share of the largest residual or of the size of the solution.
+ROUNDED = 1e-15
+
+#: How often the steady stretch is looked for further from the end.
+TRIES = 12
+
+#: Of more windows the last ones are read.
+MOST_WINDOWS = 300
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pace:
+    """How one series of residuals goes on.
+
+    Attributes
+    ----------
+    kind : {'steady', 'level', 'floor', 'plateau', 'unsteady', 'short'}
+        ``floor`` is a level so low that the accuracy of the participants' solvers may set it; its ratio is that of the
+        steady steps before.
+    value, least, most : float or None
+        The ratio of consecutive residuals, or P of a plateau, and between which values it lies.
+    steps : int
+        How many steps the series has that can be read.
+    height : float
+        The last residual as a share of the largest one.
+    lost : bool
+        Whether the series ends in inf or nan.
+    """
+
+    kind: Literal["steady", "level", "floor", "plateau", "unsteady", "short"]
+    value: float | None = None
+    least: float | None = None
+    most: float | None = None
+    steps: int
+    height: float = 1.0
+    lost: bool = False
+
+
+def pace(
+    residuals: Floats, *, relative: bool, steps: int, theta: float, spread: float, digits: float, decimals: float
+) -> Pace:
+    """How a series of residuals goes on.
+
+    The ratio is the median over the last ``steps`` steps of geometric means over an even number of consecutive ones, a
+    fifth of the steps: contact that lies open and closed in turn makes them alternate, and noise is smaller in a mean.
+    It is steady where these means scatter little between their deciles, and their medians in both halves agree.
+
+    Parameters
+    ----------
+    residuals : array
+    relative : bool
+        Whether they are ``|T x - x|/|T x|``.
+    steps : int
+        Over how many steps the ratio must be steady; fewer where the residual has fallen to CONVERGED.
+    theta, spread : float
+        The relaxation factor; how far from 1 the ratio of a level may come out.
+    digits, decimals : float
+        Rounding of the numbers, relative and absolute.
+    """
+    usable = np.flatnonzero(np.isfinite(residuals) & (residuals > 0))
+    end = int(usable[-1]) + 1 if usable.size else 0
+    lost = end < len(residuals) and not math.isfinite(float(residuals[end]))
+    gaps = np.flatnonzero(np.diff(usable) > 1)  # a relative residual is inf where T x vanishes: the bodies part
+    values = residuals[int(usable[gaps[-1] + 1]) if gaps.size else int(usable[0]) if usable.size else 0 : end]
+    if values.size:
+        peak = int(np.argmax(values))
+        below = ROUNDING if relative else max(ROUNDING * values[peak], 100 * decimals)
+        under = np.flatnonzero(values[peak:] < below)
+        values = values[: peak + int(under[0])] if under.size else values
+    taken = max(len(values) - 1, 0)
+    height = float(values[-1] / values.max()) if taken else 1.0
+    if height < CONVERGED:  # no level: fewer steps show the ratio
+        steps = min(steps, max(FEWEST_STEPS, taken // 2))
+    if taken < steps:
+        return Pace(kind="short", steps=taken, height=height, lost=lost)
+    logs = np.log(values)
+    limit = min(STEADY, theta / 5)
+
+    def ratio(end: int) -> Pace | None:
+        """The steady ratio of the steps before ``end``; None where there is none."""
+        stretch = logs[end - steps - 1 : end]
+        largest = float(np.exp(stretch.max()))
+        if relative and largest > SMALL:
+            return None
+        lag = 2 * max(1, steps // 10)
+        means = _slopes(stretch, lag)
+        median, half = float(np.median(means)), len(means) // 2
+        scatter, drift = _scatter(means), abs(float(np.median(means[:half]) - np.median(means[half:])))
+        before = 0.0 if relative else float(logs[: end - steps].max())  # the size of what was subtracted
+        unit = ROUNDED * math.exp(before - float(stretch.min()))
+        written = digits + decimals * math.exp(-float(stretch.min())) + unit
+        if (
+            2 * written / lag > limit
+            or max(scatter, drift) > limit + written
+            or _scatter(_slopes(stretch, 2)) > STEADY + written
+        ):
+            return None
+        sure = scatter + drift + 2 * written / steps + 1e-9
+        if relative:
+            sure += math.log((1 + largest) / (1 - largest)) / steps
+        return Pace(
+            kind="steady",
+            value=math.exp(median),
+            least=math.exp(median - sure),
+            most=math.exp(median + sure),
+            steps=taken,
+            height=height,
+        )
+
+    last = ratio(len(values))
+    tail = values[-steps - 1 :]
+    flat = last is not None and _least(last) <= 1 and not _falls(last)
+    if last is not None and not flat:
+        return last
+    if relative and (plateau := _plateau(tail, digits)) is not None:
+        return Pace(kind="plateau", value=plateau[1], least=plateau[0], most=plateau[2], steps=taken, height=height)
+    ends = range(len(values), steps, -max(1, steps // 2))[1 : TRIES + 1]
+    before = next((found for end in ends if (found := ratio(end)) is not None), None)
+    lengths = [n for n in (steps, 2 * steps, 4 * steps) if n <= taken]  # a rough level shows over a longer stretch
+    if flat or any(_level(logs[-n - 1 :], spread, limit) for n in lengths):
+        kind: Literal["level", "floor"] = "floor" if height < FLOOR else "level"
+        if height < CONVERGED and before is not None and _falls(before):
+            return before
+        if before is not None and (kind == "floor" or _grows(before)):
+            return replace(before, kind=kind)
+        return Pace(kind=kind, steps=taken, height=height)
+    if before is not None and _grows(before):
+        return before
+    return Pace(kind="unsteady", steps=taken, height=height, lost=lost)
+
+
+def _slopes(logs: Floats, lag: int) -> Floats:
+    """Logarithms of the mean ratio over so many steps."""
+    return (logs[lag:] - logs[:-lag]) / lag
+
+
+def _scatter(values: Floats) -> float:
+    """Half the distance between the deciles."""
+    return float(np.quantile(values, 0.9) - np.quantile(values, 0.1)) / 2
+
+
+def _grows(found: Pace) -> bool:
+    return _least(found) > 1
+
+
+def _least(found: Pace) -> float:
+    return -math.inf if found.least is None else found.least
+
+
+def _falls(found: Pace) -> bool:
+    return found.most is not None and found.most < 1
+
+
+def _plateau(tail: Floats, digits: float) -> tuple[float, float, float] | None:
+    """Least, median and largest value of a flat stretch above 1."""
+    least, most = float(tail.min()) * (1 - digits), float(tail.max()) * (1 + digits)
+    middle = float(np.median(tail))
+    flat = float(tail.max() - tail.min()) <= FLAT * (middle - 1) + 2 * digits * middle
+    return (least, middle, most) if least > 1 and flat else None
+
+
+def _level(logs: Floats, spread: float, limit: float) -> bool:
+    """Whether residuals stay as they are, or rise and fall, without a trend."""
+    ratios, half = np.diff(logs), len(logs) // 2
+    trend = abs(float(np.mean(logs[half:]) - np.mean(logs[:half]))) / half
+    turns = min(np.count_nonzero(ratios > 0), np.count_nonzero(ratios < 0)) >= len(ratios) // 5
+    still = float(np.abs(_slopes(logs, 2)).max()) <= limit
+    return trend <= (limit if still else spread) and bool(turns or still)
+
+
+def together(paces: Sequence[Pace]) -> tuple[float, float, float]:
+    """Median, least and largest ratio of several windows; of ten and more without the outer tenths."""
+    least, most = (np.array([getattr(one, name) for one in paces]) for name in ("least", "most"))
+    middle = float(np.median([one.value for one in paces if one.value is not None]))
+    if len(paces) < 10:
+        return middle, float(least.min()), float(most.max())
+    return middle, min(middle, float(np.quantile(least, 0.1))), max(middle, float(np.quantile(most, 0.9)))
