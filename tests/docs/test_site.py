@@ -1,6 +1,6 @@
-"""The site asks no other host, and its notation page names code that exists.
+"""The site asks no other host, its pictures have words, and its notation page names code that exists.
 
-Run on a built site: ``python tests/docs/test_site.py docs/_build/html`` prints what it would fetch elsewhere, exit 1.
+Run on a built site: ``python tests/docs/test_site.py docs/_build/html`` prints what is wrong, exit 1.
 """
 
 import ast
@@ -74,6 +74,23 @@ def external_requests(html_dir: Path) -> list[str]:
     ]
 
 
+def pictures_without_words(html_dir: Path) -> list[str]:
+    """Lines ``file: picture`` for all whose alternative text is none, or less than three words."""
+    found = []
+    for path in sorted(html_dir.rglob("*.html")):
+        for picture in re.findall(r"<img\b[^>]*>", path.read_text(encoding="utf-8")):
+            words = re.search(r'\balt="([^"]*)"', picture)
+            if "toggler" not in picture and (words is None or len(words[1].split()) < 3):
+                found.append(f"{path.relative_to(html_dir)}: {picture}")
+    return found
+
+
+@pytest.mark.parametrize(("alt", "count"), [('alt="Two lines that cross"', 0), ('alt="../_images/a.svg"', 1), ("", 1)])
+def test_a_picture_without_words_is_found(tmp_path, alt, count):
+    (tmp_path / "page.html").write_text(f'<p><img src="a.svg" {alt}></p>', encoding="utf-8")
+    assert len(pictures_without_words(tmp_path)) == count
+
+
 @pytest.mark.parametrize(
     ("name", "text"),
     [
@@ -119,6 +136,7 @@ def test_the_built_site_asks_no_other_host():
     if not (SITE / "index.html").exists():
         pytest.skip("the site is not built: run `make docs`")
     assert external_requests(SITE) == []
+    assert pictures_without_words(SITE) == []
 
 
 def test_a_slow_machine_and_a_stream_in_pieces_build_the_same_site():
@@ -169,9 +187,10 @@ def test_every_code_name_on_the_notation_page_exists():
 if __name__ == "__main__":
     if len(sys.argv) != 2 or not (Path(sys.argv[1]) / "index.html").exists():
         sys.exit("usage: python tests/docs/test_site.py DIRECTORY, the directory of a built site")
-    requests = external_requests(Path(sys.argv[1]))
-    print("\n".join(requests) or "the site asks no other host")
-    sys.exit(bool(requests))
+    site = Path(sys.argv[1])
+    faults = [*external_requests(site), *pictures_without_words(site)]
+    print("\n".join(faults) or "the site asks no other host, and every picture has words")
+    sys.exit(bool(faults))
 
 
 WIDEST = 83
