@@ -8,9 +8,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-FIRST = "# Needs ndtheory (see its README) and Jupyter; figures are drawn below the cells.\n%matplotlib inline"
+from verification.ledger import quote
+
+#: What the first cell of code begins with, so that the first cell is that of the page.
+FIRST = "# Needs ndtheory (see its README) and Jupyter; figures are drawn below the cells.\n%matplotlib inline\n\n"
 
 GLUE = re.compile(r"\{glue:text\}`([^`:]+)(?::[^`]*)?`")
+LEDGER = re.compile(r"\{(?:verdict|ledger)\}`([^`]+)`")
 ROLE = re.compile(r"\{[a-z:]+\}`(?:([^`<]*?) ?<[^`>]*>|([^`]*))`")
 TARGET = re.compile(r"^\([\w-]+\)=\n", re.MULTILINE)
 FENCE = re.compile(
@@ -28,24 +32,29 @@ def glued(path: Path) -> dict[str, str]:
 
 
 def plain(text: str, values: Mapping[str, str]) -> str:
-    """Text of a page as any notebook shows it: numbers in place, no roles, no directives, no solutions.
+    """Text of a page as any notebook shows it: numbers and verdicts in place, no roles, no directives, no solutions.
 
     Examples
     --------
     >>> plain("rho is {glue:text}`rho`, see {doc}`theory`.", {"rho": "3"})
     'rho is 3, see theory.'
+    >>> plain("(5.12) is {verdict}`5.12`.", {})
+    '(5.12) is PROVED.'
     """
 
     def fence(match: re.Match[str]) -> str:
         _, kind, title, _, body = match.groups()
-        if kind in ("dropdown", "widget"):
+        if kind == "dropdown":
             return ""
+        if kind == "widget":
+            return f"*The page has a picture to move here: {title}.*"
         inner = plain(body, values)
         return f"**{title}**\n\n{inner}" if title else inner
 
     text = FENCE.sub(fence, text)
     text = TARGET.sub("", text)
     text = GLUE.sub(lambda match: values[match[1]], text)
+    text = LEDGER.sub(lambda match: quote(*match[1].split()), text)
     return ROLE.sub(lambda match: match[1] or match[2].rsplit("/", 1)[-1], text)
 
 
@@ -64,13 +73,15 @@ def portable(executed: Mapping[str, Any], values: Mapping[str, str]) -> dict[str
     KeyError
         A number in the text that no cell has computed.
     """
-    cells = [_code(FIRST)]
+    cells: list[dict[str, Any]] = []
+    above = FIRST
     for cell in executed["cells"]:
         source = "".join(cell["source"])
         if cell["cell_type"] == "markdown":
             cells.append({"cell_type": "markdown", "metadata": {}, "source": plain(source, values)})
         elif cell["cell_type"] == "code" and "remove-cell" not in cell["metadata"].get("tags", ()):
-            cells.append(_code(source))
+            cells.append(_code(above + source))
+            above = ""
     for i, cell in enumerate(cells):
         cell["id"] = f"cell-{i}"  # the same at every build
     kernel = {"name": "python3", "display_name": "Python 3", "language": "python"}

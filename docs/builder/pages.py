@@ -96,8 +96,9 @@ def load_scripts(app: Sphinx, page: str, template: str, context: dict[str, Any],
 
 
 def is_notebook(app: Sphinx, page: str) -> bool:
-    """Whether a page has code cells."""
-    return app.env.metadata.get(page, {}).get("file_format") == "mystnb"
+    """Whether a page is offered as a notebook: it has code cells, and its head does not say ``notebook: none``."""
+    head = app.env.metadata.get(page, {})
+    return head.get("file_format") == "mystnb" and head.get("notebook") != "none"
 
 
 def name_of(page: str) -> str:

@@ -51,5 +51,5 @@ nd.onPage("cobweb", (figure) => {
       + `After ${steps} steps the force is ${nd.short(path[steps])}, off by ${nd.short(error)}.`;
     nd.fill(widget.table, ["step", "force g", "error"], path.slice(0, 13).map((g, i) => [i, nd.digits(g), nd.digits(Math.abs(g - fixed))]));
   }
-  nd.start(widget);
+  nd.start(widget, figure);
 });

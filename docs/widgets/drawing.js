@@ -177,7 +177,13 @@ window.nd = (() => {
     return widget;
   }
 
-  function start(widget) { widget.ready = true; widget.update(); }
+  // A link that holds a state of this widget leads to the widget.
+  function start(widget, figure) {
+    widget.ready = true;
+    widget.update();
+    const show = () => figure.scrollIntoView({ behavior: "instant" });
+    if (Object.keys(remembered(widget.name)).length) window.addEventListener("load", show);
+  }
 
   function fill(table, head, rows) {
     const cells = (tag, values) => html("tr", {}, ...values.map((value) => html(tag, {}, String(value))));

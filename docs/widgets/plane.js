@@ -9,7 +9,7 @@ nd.onPage("plane", (figure) => {
     name: "plane",
     question: "Which region moves when stresses are written in GPa instead of MPa?",
     answers: ["all of them", "the printed one", "none"],
-    reveal: () => "Only the printed one: it adds the number 1 to stresses. Move the unit and see. The bodies have not changed, so no true threshold can.",
+    reveal: () => "Only the printed one: it adds the number 1 to stresses. Move the unit to 1000 MPa, which is 1 GPa, and see. The bodies have not changed, so no true threshold can.",
     draw,
   });
   const theta = nd.slider(widget, { name: "theta", label: "theta", low: -18, high: -0.001, step: 0.001, value: Math.log10(0.6), show: (v) => nd.short(10 ** v) });
@@ -95,5 +95,5 @@ nd.onPage("plane", (figure) => {
     widget.says.textContent = `theta = ${nd.short(t)}, k = ${nd.short(k)}: ${words.join("; ")}. In this unit m = ${nd.short(c.m)}: ${proof}.`;
     nd.fill(widget.table, ["theorem", "friction below", "theta at this friction", "at the point"], rows);
   }
-  nd.start(widget);
+  nd.start(widget, figure);
 });

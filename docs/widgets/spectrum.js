@@ -51,5 +51,5 @@ nd.onPage("spectrum", (figure) => {
       + `${count("s")} nodes stick ●, ${count("l")} slip ▲, ${count("o")} are open ○.`;
     nd.fill(widget.table, ["step", "residual", "states"], run.residuals.map((r, i) => [i, r.toExponential(2), [...run.states[i]].map((s) => STATE[s][2]).join("")]));
   }
-  nd.start(widget);
+  nd.start(widget, figure);
 });

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import builtins
 import re
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -139,6 +140,52 @@ def test_every_term_that_a_page_uses_is_in_the_glossary():
     used = {(page.stem, given or plain) for page in PAGES for given, plain in TERM.findall(page.read_text("utf-8"))}
     assert used
     assert [(page, term) for page, term in sorted(used) if term not in terms] == []
+
+
+@pytest.fixture(scope="module")
+def notebooks():
+    sys.path.append(str(DOCS))
+    try:
+        from builder import notebooks
+    finally:
+        sys.path.remove(str(DOCS))
+    return notebooks
+
+
+@each_page
+def test_the_notebook_of_a_page_says_what_the_page_says_without_its_solutions(page, notebooks):
+    text = re.sub(r"\A---\n.*?^---$", "", page.read_text("utf-8"), flags=re.DOTALL | re.MULTILINE)
+    text = CELL.sub("", text)
+    values = dict.fromkeys(re.findall(r"\{glue:text\}`([^`:]+)", text), "7")
+    told = notebooks.plain(text, values)
+    assert re.findall(r"\{[a-z:]+\}`", told) == []
+    for quoted in re.findall(r"\{(?:verdict|ledger)\}`([^`]+)`", SOLUTION.sub("", text)):
+        assert quote(*quoted.split()) in told
+    for widget in re.findall(r"\{widget\} (\w+)", text):
+        assert f"a picture to move here: {widget}" in told
+    assert "Solution" not in told
+    for solution in SOLUTION.findall(text):
+        first = max(re.split(r"[`{}$\n]", solution), key=len)
+        assert first not in told
+
+
+def test_the_first_cell_of_a_notebook_is_that_of_its_page(notebooks):
+    """The text says 'in the first cell'; the cell that only the site needs is left out."""
+
+    def cell(kind, source, *tags):
+        return {"cell_type": kind, "source": source, "metadata": {"tags": list(tags)}}
+
+    of_page = [
+        cell("markdown", "# A page"),
+        cell("code", "glue('x', 1)", "remove-cell"),
+        cell("code", "x = 1"),
+        cell("code", "x"),
+    ]
+    title, first, second = notebooks.portable({"cells": of_page}, {})["cells"]
+    assert title["source"] == "# A page"
+    assert "%matplotlib inline" in first["source"].splitlines()
+    assert first["source"].endswith("\nx = 1")
+    assert second["source"] == "x"
 
 
 def test_what_breaks_a_rule_is_found():

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
 from pathlib import Path
 
 import ndtheory
+from verification.cli import main
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text("utf-8")
@@ -29,6 +31,47 @@ def test_the_short_plan_adds_up_to_45_minutes() -> None:
     short = re.search(r"With 45 minutes, take (.*)", LECTURERS)
     assert short is not None
     assert sum(plan()[page] for page in re.findall(r"\{doc\}`(?:examples/)?(\w+)`", short[1])) == 45
+
+
+def exercises() -> dict[str, list[int]]:
+    """The minutes of the exercises of each page that has some, by the page."""
+    found = {}
+    for page in (ROOT / "docs").glob("**/*.md"):
+        text = page.read_text("utf-8")
+        if "_build" not in page.parts and "## Exercises" in text:
+            minutes = re.findall(r"\{admonition\} Exercise \d: .*?\((\d+)\s+min\)", text, re.DOTALL)
+            found[page.relative_to(ROOT / "docs").with_suffix("").as_posix()] = [int(each) for each in minutes]
+    return found
+
+
+def test_the_exercise_class_adds_up_to_45_minutes() -> None:
+    told = re.search(r"For a class of 45 minutes(.*?)\n\n", LECTURERS, re.DOTALL)
+    assert told is not None
+    taken = re.findall(r"exercises? (\d)(?: and (\d))? of\s+\{doc\}`([\w/]+)`", told[1])
+    assert len(taken) == told[1].count("{doc}")
+    minutes = exercises()
+    assert sum(minutes[page][int(n) - 1] for *numbers, page in taken for n in numbers if n) == 45
+
+
+def test_the_table_of_exercises_has_all_pages_with_exercises_and_is_shown_as_a_table() -> None:
+    cell = re.search(r"```\{code-cell\} ipython3\n(.*?)^```", LECTURERS, re.DOTALL | re.MULTILINE)
+    assert cell is not None
+    order = re.search(r"ORDER = \((.*?)\)", cell[1], re.DOTALL)
+    assert order is not None
+    assert sorted(re.findall(r'"([\w/]+)"', order[1])) == sorted(exercises())
+    assert re.search(r"^mystnb:\n  markdown_format: myst$", cell[1], re.MULTILINE)  # CommonMark has no tables
+
+
+def test_the_run_of_the_lecture_converges_where_lmi_alone_speaks(tmp_path, monkeypatch, capsys) -> None:
+    first, second = re.findall(r"^ndtheory (.*)$", LECTURERS, re.MULTILINE)
+    monkeypatch.chdir(tmp_path)
+    command, _, file = first.partition(" > ")
+    assert main(command.split()) == 0
+    Path(file).write_text(capsys.readouterr().out, "utf-8")
+    assert main([*second.split(), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)["verdicts"]
+    assert said["sharp"] == said["repaired"] == said["printed"] == "HYPOTHESES_NOT_MET"
+    assert said["lmi"] == said["linearised"] == "CONSISTENT"
 
 
 def test_every_widget_has_its_moment_in_the_plan() -> None:

@@ -303,6 +303,22 @@ def test_a_link_brings_the_state_back(chromium, browser, page):
 
 
 @needs_browser
+def test_a_link_leads_to_its_widget(chromium, browser, page):
+    """In a low window, so that the last widget is below the first view."""
+    link = frame(browser, "spectrum").find_element("css selector", ".link a").get_attribute("href")
+    before = chromium.get_window_size()
+    chromium.set_window_size(1000, 600)
+    try:
+        for address, shown in ((page.as_uri(), "cobweb"), (link, "spectrum")):
+            chromium.get("about:blank")
+            chromium.get(address)
+            top = "return arguments[0].getBoundingClientRect().top"
+            assert abs(chromium.execute_script(top, frame(chromium, shown))) < 100, shown
+    finally:
+        chromium.set_window_size(before["width"], before["height"])
+
+
+@needs_browser
 def test_an_address_that_means_nothing_is_ignored(chromium, browser, page):
     chromium.get("about:blank")
     chromium.get(page.as_uri() + "#cobweb.theta=high&plane.k=99&spectrum.swap=2&x")
