@@ -13,8 +13,6 @@ from ndtheory import __version__
 from verification.ledger import quote, sheets, verify
 
 BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
-WIDGETS = Path(__file__).resolve().parent / "generated" / "widgets"
-WIDGETS.mkdir(parents=True, exist_ok=True)  # filled when the build begins, asked for before
 sys.path += [str(BENCHMARKS), str(Path(__file__).resolve().parent)]  # folders of scripts, not packages
 
 import speed_page  # noqa: E402

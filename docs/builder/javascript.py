@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from fractions import Fraction
+from functools import partialmethod
 from typing import Any
 
 
@@ -30,29 +31,14 @@ class Scalar:
         a, b = (text(other), self.text) if swap else (self.text, text(other))
         return self._new(f"{a} {sign} {b}")
 
-    def __add__(self, other: Any) -> Any:
-        return self._binary("+", other)
-
-    def __radd__(self, other: Any) -> Any:
-        return self._binary("+", other, swap=True)
-
-    def __sub__(self, other: Any) -> Any:
-        return self._binary("-", other)
-
-    def __rsub__(self, other: Any) -> Any:
-        return self._binary("-", other, swap=True)
-
-    def __mul__(self, other: Any) -> Any:
-        return self._binary("*", other)
-
-    def __rmul__(self, other: Any) -> Any:
-        return self._binary("*", other, swap=True)
-
-    def __truediv__(self, other: Any) -> Any:
-        return self._binary("/", other)
-
-    def __rtruediv__(self, other: Any) -> Any:
-        return self._binary("/", other, swap=True)
+    __add__ = partialmethod(_binary, "+")
+    __sub__ = partialmethod(_binary, "-")
+    __mul__ = partialmethod(_binary, "*")
+    __truediv__ = partialmethod(_binary, "/")
+    __radd__ = partialmethod(_binary, "+", swap=True)
+    __rsub__ = partialmethod(_binary, "-", swap=True)
+    __rmul__ = partialmethod(_binary, "*", swap=True)
+    __rtruediv__ = partialmethod(_binary, "/", swap=True)
 
     def __neg__(self) -> Any:
         return self._new(f"-{self.text}")
@@ -67,24 +53,12 @@ class Scalar:
     def _compared(self, sign: str, other: Any) -> Any:
         return self._new(f"{self.text} {sign} {text(other)}", Condition)
 
-    def __lt__(self, other: Any) -> Any:
-        return self._compared("<", other)
-
-    def __le__(self, other: Any) -> Any:
-        return self._compared("<=", other)
-
-    def __gt__(self, other: Any) -> Any:
-        return self._compared(">", other)
-
-    def __ge__(self, other: Any) -> Any:
-        return self._compared(">=", other)
-
-    def __eq__(self, other: object) -> Any:
-        return self._compared("===", other)
-
-    def __ne__(self, other: object) -> Any:
-        return self._compared("!==", other)
-
+    __lt__ = partialmethod(_compared, "<")
+    __le__ = partialmethod(_compared, "<=")
+    __gt__ = partialmethod(_compared, ">")
+    __ge__ = partialmethod(_compared, ">=")
+    __eq__ = partialmethod(_compared, "===")  # type: ignore[assignment]
+    __ne__ = partialmethod(_compared, "!==")  # type: ignore[assignment]
     __hash__ = None  # type: ignore[assignment]
 
     def __bool__(self) -> bool:

@@ -8,6 +8,7 @@ from typing import Any
 
 from docutils import nodes
 from sphinx.application import Sphinx
+from sphinx.config import Config
 from sphinx.errors import ExtensionError
 from sphinx.util.docutils import SphinxDirective
 from sphinx_proof.domain import ProofDomain
@@ -76,8 +77,8 @@ def fill_galleries(app: Sphinx, doctree: nodes.document, page: str) -> None:
         place.replace_self(cards)
 
 
-def write_widgets(app: Sphinx) -> None:
-    """What the widgets show, computed at every build."""
+def write_widgets(app: Sphinx, config: Config) -> None:
+    """What the widgets show, computed at every build, before Sphinx looks for the folder among the static ones."""
     widgets.write(Path(app.srcdir) / "generated" / "widgets")
 
 
@@ -142,7 +143,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
     app.add_node(gallery)
     app.add_directive("gallery", GalleryDirective)
     app.connect("doctree-resolved", fill_galleries)
-    app.connect("builder-inited", write_widgets)
+    app.connect("config-inited", write_widgets)
     app.connect("builder-inited", write_equations)
     app.connect("html-page-context", link_notebook)
     app.connect("html-page-context", load_scripts)

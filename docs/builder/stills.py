@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,11 +10,6 @@ from matplotlib.figure import Figure
 
 from ndtheory import sharp
 from verification.figures import style
-
-
-def save(figure: Figure, path: Path) -> None:
-    """Write a picture as SVG."""
-    style.save(figure, path)
 
 
 def cobweb(data: dict[str, float]) -> Figure:

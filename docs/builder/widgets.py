@@ -16,6 +16,7 @@ import verification as vf
 from builder import stills
 from builder.javascript import function
 from ndtheory import bounds, sharp
+from verification.figures import style
 
 #: The formulas that the widgets call, by their name in JavaScript.
 FORMULAS: dict[str, tuple[Callable[..., Any], tuple[str, ...]]] = {
@@ -166,7 +167,7 @@ def write(folder: Path) -> None:
         data = widget.data()
         script = f"(window.ndData = window.ndData || {{}}).{name} = {json.dumps(data, separators=(',', ':'))};\n"
         (folder / f"{name}-data.js").write_text(script, encoding="utf-8")
-        stills.save(widget.still(data), folder / f"{name}.svg")
+        style.save(widget.still(data), folder / f"{name}.svg")
 
 
 def scripts(shown: Iterable[str]) -> list[str]:

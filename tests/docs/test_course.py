@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import builtins
 import re
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -143,13 +142,8 @@ def test_every_term_that_a_page_uses_is_in_the_glossary():
 
 
 @pytest.fixture(scope="module")
-def notebooks():
-    sys.path.append(str(DOCS))
-    try:
-        from builder import notebooks
-    finally:
-        sys.path.remove(str(DOCS))
-    return notebooks
+def notebooks(builder):
+    return builder.notebooks
 
 
 @each_page

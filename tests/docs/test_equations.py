@@ -1,7 +1,6 @@
 """The index of equations finds what names a statement, and nothing that does not."""
 
 import re
-import sys
 from pathlib import Path
 
 import pytest
@@ -13,13 +12,8 @@ ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
-def equations():
-    sys.path.append(str(ROOT / "docs"))
-    try:
-        from builder import equations
-    finally:
-        sys.path.remove(str(ROOT / "docs"))
-    return equations
+def equations(builder):
+    return builder.equations
 
 
 @pytest.fixture(scope="module")

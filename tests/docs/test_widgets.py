@@ -5,36 +5,20 @@ from __future__ import annotations
 import random
 import re
 import shutil
-import sys
 from math import log10
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
+from browser import chromium, needs_browser
 
 import verification as vf
 from ndtheory import PRINTED, REPAIRED, evaluate, evaluate_sharp
 from verification.algorithm.fixed_point import FixedPointMap
 
 DOCS = Path(__file__).parents[2] / "docs"
-BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
-DRIVER = shutil.which("chromedriver")
-needs_browser = pytest.mark.skipif(
-    BROWSER is None or DRIVER is None, reason="chromium and chromedriver are not installed: apt install chromium-driver"
-)
 
 #: More than any widget may weigh, with what it shares.
 LARGEST = 300_000
-
-
-@pytest.fixture(scope="module")
-def builder():
-    sys.path.append(str(DOCS))
-    try:
-        from builder import javascript, widgets
-    finally:
-        sys.path.remove(str(DOCS))
-    return SimpleNamespace(javascript=javascript, widgets=widgets)
 
 
 @pytest.fixture(scope="module")
@@ -55,24 +39,17 @@ def page(builder, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def chromium():
-    webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
-    options = webdriver.ChromeOptions()
-    options.binary_location = BROWSER
-    for flag in ("--headless=new", "--no-sandbox", "--disable-gpu", "--window-size=1000,2400"):
-        options.add_argument(flag)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(DRIVER))
-    yield driver
-    driver.quit()
+def driver():
+    with chromium("--window-size=1000,2400") as found:
+        yield found
 
 
 @pytest.fixture
-def browser(chromium, page):
-    chromium.get("about:blank")
-    chromium.get(page.as_uri())
-    yield chromium
-    assert [entry["message"] for entry in chromium.get_log("browser")] == []
+def browser(driver, page):
+    driver.get("about:blank")
+    driver.get(page.as_uri())
+    yield driver
+    assert [entry["message"] for entry in driver.get_log("browser")] == []
 
 
 def frame(browser, name):
@@ -293,37 +270,37 @@ def test_swapping_the_roles_shows_the_other_run(browser, builder):
 
 
 @needs_browser
-def test_a_link_brings_the_state_back(chromium, browser, page):
+def test_a_link_brings_the_state_back(driver, browser, page):
     move(browser, "cobweb", "theta", 0.37)
     link = frame(browser, "cobweb").find_element("css selector", ".link a").get_attribute("href")
     assert "cobweb.theta=0.37" in link
-    chromium.get("about:blank")
-    chromium.get(link)
-    assert says(chromium, "cobweb").startswith("theta = 0.37")
+    driver.get("about:blank")
+    driver.get(link)
+    assert says(driver, "cobweb").startswith("theta = 0.37")
 
 
 @needs_browser
-def test_a_link_leads_to_its_widget(chromium, browser, page):
+def test_a_link_leads_to_its_widget(driver, browser, page):
     """In a low window, so that the last widget is below the first view."""
     link = frame(browser, "spectrum").find_element("css selector", ".link a").get_attribute("href")
-    before = chromium.get_window_size()
-    chromium.set_window_size(1000, 600)
+    before = driver.get_window_size()
+    driver.set_window_size(1000, 600)
     try:
         for address, shown in ((page.as_uri(), "cobweb"), (link, "spectrum")):
-            chromium.get("about:blank")
-            chromium.get(address)
+            driver.get("about:blank")
+            driver.get(address)
             top = "return arguments[0].getBoundingClientRect().top"
-            assert abs(chromium.execute_script(top, frame(chromium, shown))) < 100, shown
+            assert abs(driver.execute_script(top, frame(driver, shown))) < 100, shown
     finally:
-        chromium.set_window_size(before["width"], before["height"])
+        driver.set_window_size(before["width"], before["height"])
 
 
 @needs_browser
-def test_an_address_that_means_nothing_is_ignored(chromium, browser, page):
-    chromium.get("about:blank")
-    chromium.get(page.as_uri() + "#cobweb.theta=high&plane.k=99&spectrum.swap=2&x")
-    assert says(chromium, "cobweb").startswith("theta = 1.00")
-    assert "k = 7.94" in says(chromium, "plane")
+def test_an_address_that_means_nothing_is_ignored(driver, browser, page):
+    driver.get("about:blank")
+    driver.get(page.as_uri() + "#cobweb.theta=high&plane.k=99&spectrum.swap=2&x")
+    assert says(driver, "cobweb").startswith("theta = 1.00")
+    assert "k = 7.94" in says(driver, "plane")
 
 
 def test_the_scripts_call_formulas_of_the_library_alone(builder):

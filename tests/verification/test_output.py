@@ -10,35 +10,17 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from problem_list import small
+from small_result import ONE_STEP, problem
 
 import verification as vf
 from verification import figures
 from verification.output.folder import LOCKS, Folder, staged
 
-ONE_STEP = {"theta": "0.7", "max_iterations": 1}
 FIGURES = {f"{figure}.{ending}" for figure in ("bodies", "residuals") for ending in ("svg", "png")}
 DRAWN = {"compare.json", "report.html", "waterfall.svg", "waterfall.png"}
 TABLES = {"problem.toml", "contact.csv", "history.csv", "interface.npz"}
 WRITTEN = {"run": FIGURES | TABLES | {"run.json"}, "comparison": FIGURES | TABLES | DRAWN}
 OURS = WRITTEN["comparison"] - {"problem.toml"}  # that of a user stays as it is
-
-
-def problem(**changes):
-    return vf.Problem.from_dict(small() | {"title": "Small"} | changes)
-
-
-@pytest.fixture(scope="module")
-def comparison():
-    return vf.compare(problem())
-
-
-@pytest.fixture(scope="module")
-def written(comparison, tmp_path_factory):
-    """A folder with everything in it."""
-    folder = tmp_path_factory.mktemp("written")
-    Folder(folder, "compare").write_comparison(comparison)
-    return folder
 
 
 @pytest.fixture(scope="module")

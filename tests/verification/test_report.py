@@ -1,7 +1,6 @@
 """The written report: the words and digits of the screen, on any screen, asking nobody else."""
 
 import re
-import shutil
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -9,7 +8,9 @@ from typing import get_args
 from xml.etree import ElementTree
 
 import pytest
+from browser import chromium, needs_browser
 from problem_list import small
+from small_result import ONE_STEP, problem
 
 import verification as vf
 from verification import figures
@@ -17,14 +18,10 @@ from verification.cli import screens
 from verification.cli.calculator import thetas
 from verification.cli.console import heard
 from verification.ledger.record import on_the_printed_proof
-from verification.output.folder import Folder
 from verification.output.report import report
 from verification.verdicts import RunVerdict
 
 ROOT = Path(__file__).parents[2]
-BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
-DRIVER = shutil.which("chromedriver")
-ONE_STEP = {"theta": "0.7", "max_iterations": 1}
 
 #: Titles that could leave their place in a file.
 TITLES = {
@@ -40,23 +37,6 @@ TITLES = {
     "long": "long title " * 60,
     "empty": "",
 }
-
-
-def problem(**changes):
-    return vf.Problem.from_dict(small() | {"title": "Small"} | changes)
-
-
-@pytest.fixture(scope="module")
-def comparison():
-    return vf.compare(problem())
-
-
-@pytest.fixture(scope="module")
-def written(comparison, tmp_path_factory):
-    """A folder with everything in it."""
-    folder = tmp_path_factory.mktemp("written")
-    Folder(folder, "compare").write_comparison(comparison)
-    return folder
 
 
 class Reader(HTMLParser):
@@ -149,22 +129,14 @@ def test_the_report_explains_every_verdict_and_words_that_the_glossary_has(writt
 @pytest.fixture(scope="module")
 def phone():
     """A browser as wide as a phone."""
-    webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
-    options = webdriver.ChromeOptions()
-    options.binary_location = BROWSER
-    for flag in ("--headless=new", "--no-sandbox", "--disable-gpu"):
-        options.add_argument(flag)
-    driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(DRIVER))
-    driver.execute_cdp_cmd(
-        "Emulation.setDeviceMetricsOverride", {"width": 375, "height": 700, "deviceScaleFactor": 2, "mobile": True}
-    )
-    yield driver
-    driver.quit()
+    with chromium() as driver:
+        driver.execute_cdp_cmd(
+            "Emulation.setDeviceMetricsOverride", {"width": 375, "height": 700, "deviceScaleFactor": 2, "mobile": True}
+        )
+        yield driver
 
 
-@pytest.mark.skipif(
-    BROWSER is None or DRIVER is None, reason="chromium and chromedriver are not installed: apt install chromium-driver"
-)
+@needs_browser
 def test_no_cell_of_the_report_leaves_the_screen_of_a_phone(phone, comparison, written):
     phone.get((written / "report.html").as_uri())
     assert phone.execute_script("return document.documentElement.scrollWidth") <= 375
