@@ -11,6 +11,10 @@ near one point inside Gamma_c.  An end of Gamma_c adds values of its own.
 
 So each value is a *lower* bound of rho in the continuum, and of rho on fine meshes up to what they do not resolve yet.
 None is an upper bound: other thicknesses, supports or unequal Poisson ratios may make rho larger.
+
+In space a wave along a flat patch moves a half-space in the plane of the wave as in plane strain, and besides across
+it (antiplane) with the stiffness ``G |xi|``.  The ratio of these, ``G_c/G_n``, lies between the two of a patch that
+sticks, because kappa >= 1.
 """
 
 from __future__ import annotations
@@ -18,14 +22,18 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from ndtheory.constants import take
+from ndtheory.errors import HypothesisError
+
+#: In a plane, of strain or of stress, or in space.
+Plane = Literal["strain", "stress", "3d"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Moduli:
-    """A homogeneous isotropic body in the plane.
+    """A homogeneous isotropic body, in the plane or in space.
 
     Attributes
     ----------
@@ -33,7 +41,8 @@ class Moduli:
         E > 0; unit stress, one for both bodies.
     poisson : Fraction
         -1 < nu <= 1/2.
-    plane : {'strain', 'stress'}
+    plane : {'strain', 'stress', '3d'}
+        ``'3d'`` is a body in space, whose plane waves are those of plane strain.
 
     Raises
     ------
@@ -47,12 +56,14 @@ class Moduli:
 
     young: Any
     poisson: Any
-    plane: Literal["strain", "stress"] = "strain"
+    plane: Plane = "strain"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "young", take("E", self.young, "a number E > 0", lambda v: v > 0))
         needed = "a number with -1 < nu <= 1/2"
         object.__setattr__(self, "poisson", take("nu", self.poisson, needed, lambda v: -1 < v <= Fraction(1, 2)))
+        if self.plane not in get_args(Plane):
+            raise HypothesisError("plane", self.plane, f"one of {', '.join(get_args(Plane))}")
 
     @property
     def shear(self) -> Fraction:
@@ -61,13 +72,13 @@ class Moduli:
 
     @property
     def kappa(self) -> Fraction:
-        """Kolosov's constant: ``3 - 4 nu`` in plane strain, ``(3 - nu)/(1 + nu)`` in plane stress."""
+        """Kolosov's constant: ``3 - 4 nu`` in plane strain and in space, ``(3 - nu)/(1 + nu)`` in plane stress."""
         nu = Fraction(self.poisson)
-        return 3 - 4 * nu if self.plane == "strain" else (3 - nu) / (1 + nu)
+        return (3 - nu) / (1 + nu) if self.plane == "stress" else 3 - 4 * nu
 
     @property
     def e_star(self) -> Fraction:
-        """``E* = 8 G/(kappa + 1)``: ``E/(1 - nu^2)`` in plane strain, E in plane stress; unit stress."""
+        """``E* = 8 G/(kappa + 1)``: ``E/(1 - nu^2)`` in plane strain and in space, E in plane stress; unit stress."""
         return 8 * self.shear / (self.kappa + 1)
 
 
@@ -100,6 +111,17 @@ def half_planes(contact: Moduli, neumann: Moduli) -> HalfPlanes:
     return HalfPlanes(high=ratio * neumann.kappa, low=ratio / contact.kappa, free=contact.e_star / neumann.e_star)
 
 
+def antiplane(contact: Moduli, neumann: Moduli) -> Fraction:
+    """``G_c/G_n``: the ratio that waves across their own plane add in space, never the largest or the smallest one.
+
+    Examples
+    --------
+    >>> antiplane(Moduli(young=1, poisson="0.3", plane="3d"), Moduli(young=2, poisson="0.3", plane="3d"))
+    Fraction(1, 2)
+    """
+    return contact.shear / neumann.shear
+
+
 def wedge(opening: float) -> tuple[float, float]:
     """Stiffness of a wedge against a force at its apex, along and across its bisector, over E*.
 
@@ -128,7 +150,11 @@ def wedge(opening: float) -> tuple[float, float]:
 def end(contact: Moduli, neumann: Moduli, openings: tuple[float, float]) -> tuple[float, float]:
     """What an end of Gamma_c adds: the smaller and the larger ratio of the stiffnesses of both wedges there.
 
-    The mesh approaches them like ``1/log^2 h``, from inside.
+    A unit force in a direction d, spread over a short piece of Gamma_c of length e at its end, does the work
+    ``d' K^-1 d log(1/e) + O(1)`` on each body.  For every force rho is at least the work on the Neumann body over that
+    on the contact body: as e tends to 0, at least the largest eigenvalue of ``(K_c, K_n)``.  The mesh approaches the
+    values like ``1/log^2 h``, from inside.  In space an end is an edge, and forces along it add
+    ``(G_c alpha_c)/(G_n alpha_n)``.
 
     Parameters
     ----------
@@ -162,11 +188,92 @@ def end(contact: Moduli, neumann: Moduli, openings: tuple[float, float]) -> tupl
     root = math.sqrt(max((along_c * n_22 - across_c * n_11) ** 2 + 4 * along_c * across_c * cross**2, 0.0))
     larger = (trace + root) / (2 * det_n)
     ratio = float(contact.e_star / neumann.e_star)
-    return ratio * det_c / (det_n * larger), ratio * larger
+    low, high = ratio * det_c / (det_n * larger), ratio * larger
+    if "3d" in (contact.plane, neumann.plane):
+        along_edge = float(antiplane(contact, neumann)) * openings[0] / openings[1]
+        return min(low, along_edge), max(high, along_edge)
+    return low, high
+
+
+def free_end(contact: Moduli, neumann: Moduli, openings: tuple[float, float]) -> float:
+    """What an end of Gamma_c adds where both bodies slide freely: the ratio of the stiffnesses against a normal force.
+
+    It bounds rho_normal from below by the argument of :func:`end`, with normal forces alone.  A normal force at the
+    apex displaces the face of a wedge along its normal by ``sin^2(alpha/2)/K_along + cos^2(alpha/2)/K_across`` times
+    the logarithm, with the stiffnesses of :func:`wedge`.
+
+    Parameters
+    ----------
+    contact, neumann : Moduli
+    openings : pair of float
+        As of :func:`end`.
+
+    Raises
+    ------
+    HypothesisError
+
+    Examples
+    --------
+    A flat contact body on a Neumann body with corners of 90 degrees, of the same material:
+
+    >>> body = Moduli(young=1, poisson="0.3")
+    >>> round(free_end(body, body, (math.pi, math.pi / 2)), 3)
+    3.363
+    """
+
+    def flexibility(opening: float) -> float:
+        along, across = wedge(opening)
+        return math.sin(opening / 2) ** 2 / along + math.cos(opening / 2) ** 2 / across
+
+    return float(contact.e_star / neumann.e_star) * flexibility(openings[1]) / flexibility(openings[0])
+
+
+def layer(body: Moduli) -> float:
+    """The largest stiffness of the mirror image of a layer over that of the layer, whatever its thickness.
+
+    The layer is infinitely long and held along its other side.  At x = (wave number times thickness) its surface has
+    the stiffnesses ``S_TT, S_NN ~ (kappa + 1) (kappa sinh 2x -+ 2x)/2`` and
+    ``S_NT ~ kappa (kappa - 1) sinh^2 x - 2 x^2``, and the mirror image has another sign of S_NT: the ratio is
+    ``(1 + q)/(1 - q)`` with ``q = |S_NT|/sqrt(S_TT S_NN)``.  Short waves have kappa, as a half-plane; in a layer that
+    is nearly incompressible long ones have more.  The maximum is looked for among waves a hundredth apart in log10 x,
+    and is good to three figures.
+
+    Examples
+    --------
+    >>> [round(layer(Moduli(young=1, poisson=nu)), 2) for nu in ("0.3", "0.45", "0.5")]
+    [1.8, 2.47, 13.93]
+    """
+    kappa = float(body.kappa)
+
+    def ratio(x: float) -> float:
+        grows = kappa * math.sinh(2 * x)
+        diagonal = (kappa + 1) / 2 * math.sqrt((grows - 2 * x) * (grows + 2 * x))
+        q = abs(kappa * (kappa - 1) * math.sinh(x) ** 2 - 2 * x**2) / diagonal
+        return (1 + q) / (1 - q)
+
+    return max(kappa, *(ratio(10 ** (n / 100)) for n in range(-200, 101)))
+
+
+def column() -> float:
+    """The largest stiffness of the mirror image of a slender column over that of the column, for its end.
+
+    The end of a beam that is held at the other end has, for a unit force and a unit moment, flexibilities in the ratio
+    of ``((1/3, 1/2), (1/2, 1))``, and the mirror image turns to the other side: the ratio is ``(1 + q)/(1 - q)`` with
+    ``q = (1/2)/sqrt(1/3)``, which is ``(2 + sqrt 3)^2`` for every material and section.
+
+    Examples
+    --------
+    >>> round(column(), 3)
+    13.928
+    """
+    q = math.sqrt(3) / 2
+    return (1 + q) / (1 - q)
 
 
 def mirror(contact: Moduli, neumann: Moduli) -> Fraction | None:
-    """The least s with ``C_c <= s C_n`` between energies of strains: the larger ratio of ``G`` and of ``lambda + mu``.
+    """The least s with ``C_c <= s C_n`` between energies of strains.
+
+    It is the larger one of the ratio of G and of that of ``lambda + mu``, in space ``lambda + 2 mu/3``.
 
     Where Gamma_c is flat, the mirror image of the contact body lies in the Neumann body, and its supports on the image
     of Gamma_u too, that proves ``rho_normal <= s`` on nested meshes and in the continuum.  None where the contact body
@@ -180,4 +287,7 @@ def mirror(contact: Moduli, neumann: Moduli) -> Fraction | None:
     ratio = contact.shear / neumann.shear
     if contact.kappa == 1:
         return ratio if neumann.kappa == 1 else None
-    return ratio * max(Fraction(1), (neumann.kappa - 1) / (contact.kappa - 1))  # lambda + mu = 2 G/(kappa - 1)
+    bulk = (neumann.kappa - 1) / (contact.kappa - 1)  # lambda + mu = 2 G/(kappa - 1)
+    if "3d" in (contact.plane, neumann.plane):
+        bulk *= (1 + contact.poisson) / (1 + neumann.poisson)  # lambda + 2 mu/3 = (lambda + mu) 2 (1 + nu)/3
+    return ratio * max(Fraction(1), bulk)

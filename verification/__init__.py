@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from verification.advice.from_logs import advise_logs
+    from verification.advice.from_moduli import advise_moduli
     from verification.advice.from_runs import advise_run
     from verification.advice.roles import Advice, advise, advise_matrices
     from verification.algorithm.fixed_point import iterate
@@ -65,6 +66,7 @@ _HOME = {
     "advise": "advice.roles",
     "advise_logs": "advice.from_logs",
     "advise_matrices": "advice.roles",
+    "advise_moduli": "advice.from_moduli",
     "advise_run": "advice.from_runs",
     "build": "interface.build",
     "compare": "comparison",
@@ -97,6 +99,7 @@ __all__ = [
     "advise",
     "advise_logs",
     "advise_matrices",
+    "advise_moduli",
     "advise_run",
     "build",
     "compare",

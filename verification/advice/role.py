@@ -24,13 +24,13 @@ class Role:
     neumann_body : {1, 2} or None
         None where it is not known which body that is.
     rho : Number or None
-        Stiffness of the contact body over that of the Neumann body, at worst; with rho_normal without friction.  None,
-        as all that rests on it, where the role is refused.
+        Stiffness of the contact body over that of the Neumann body, at worst; with rho_normal without friction.  From
+        moduli alone a bound from below.  None, as all that rests on it, where the role is refused.
     theta_proved : float or None
         The theta of least proved factor.
     factor_proved, theta_max_proved : Number or None
     theta_predicted, rate_predicted : float or None
-        ``2/(2 + rho)`` and ``rho/(2 + rho)``: a prediction, proved without friction.
+        ``2/(2 + rho)`` and ``rho/(2 + rho)``: a prediction, proved without friction; None of a bound from below.
     friction_threshold : Number or None
         Friction below which every small theta is proved.
     singular : bool
@@ -63,10 +63,10 @@ class Role:
         Raises
         ------
         ValueError
-            The role is refused.
+            The role is refused, or rho is bounded from below only.
         """
         if self.theta_predicted is None or self.rate_predicted is None:
-            raise ValueError(self.reason["rho"])
+            raise ValueError(self.reason["theta_predicted"])
         return self.theta_predicted, self.rate_predicted
 
     def to_dict(self) -> dict[str, Any]:

@@ -30,6 +30,7 @@ from verification.progress import Progress, silent
 from verification.threads import one_thread
 
 if TYPE_CHECKING:
+    from verification.advice.from_moduli import SeenModuli
     from verification.figures import Figure
 
 #: What is unknown of matrices and runs from elsewhere.
@@ -60,6 +61,8 @@ class Advice(Document):
         What was seen in the logs of other runs.
     interval : Interval or None
         What these logs say of rho together.
+    moduli : SeenModuli or None
+        What was given of two bodies, and bounds of rho from below.
     """
 
     schema: ClassVar[str] = "ndtheory.advice/1"
@@ -75,9 +78,12 @@ class Advice(Document):
     logs: tuple[SeenLog, ...] = ()
     interval: Interval | None = None
     problem: Problem | None = None
+    moduli: SeenModuli | None = None
 
     @property
     def summary(self) -> str:
+        if self.moduli is not None:
+            return self.moduli.summary
         if not self.roles:
             return f"{len(self.readings)} readings of {'logs' if self.logs else 'a run'}"
         best = self.best
@@ -90,6 +96,8 @@ class Advice(Document):
 
         if not self.roles:
             raise ValueError("no reading is left alone: make the run that `next` names")
+        if self.moduli is not None:
+            raise ValueError("moduli bound rho from below only: no factor of a step follows")
         named = {f"Neumann body {role.neumann_body}" if role.neumann_body else "that run": role for role in self.roles}
         energy = {
             name: role.energy or EnergyConstants(rho=role.rho.value)
@@ -119,6 +127,10 @@ class Advice(Document):
             reason["next"] = "no run was given"
         if self.interval is None:
             reason["interval"] = "no logs were given"
+        if self.moduli is None:
+            reason["moduli"] = "no moduli were given"
+        elif not self.neumann_body:
+            reason["neumann_body"] = "both roles have the same bounds"
         return {
             "neumann_body": self.neumann_body,
             "roles": [role.to_dict() for role in self.roles],
@@ -127,6 +139,7 @@ class Advice(Document):
             "next": None if self.next is None else self.next.to_dict(),
             "logs": [log.to_dict() for log in self.logs],
             "interval": None if self.interval is None else self.interval.to_dict(),
+            "moduli": None if self.moduli is None else self.moduli.to_dict(),
             "outside_theorem": list(self.outside),
             "reason": reason,
         }

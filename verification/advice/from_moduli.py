@@ -1,0 +1,393 @@
+"""Advice from the moduli of two bodies alone: lower bounds of rho, and a theta where a mirror image fits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, Literal, get_args
+
+from ndtheory import HypothesisError, Number
+from ndtheory.constants import take
+from ndtheory.moduli import Moduli, Plane, column, end, free_end, half_planes, layer, mirror
+from ndtheory.sharp import predicted_rate, predicted_theta
+from verification.advice.readings import LARGEST_TO_PASTE, NextRun, double_below, rounded_down
+from verification.advice.role import Role
+from verification.advice.roles import UNITS, Advice
+from verification.problem.writing import written_number
+
+Body = Literal[1, 2]
+Corners = Literal["none", "1", "2", "both"]
+
+#: Sizes of E, and how close nu may come to -1 and to 1/2: bounds of rho then stay between 1e-75 and 1e75.
+LARGEST_YOUNG, CLOSEST = 10**24, Fraction(1, 10**12)
+
+#: Of the bounds that are proved for k = 0.
+NO_FRICTION = "a mirror image proves nothing of friction: the proved values are for k = 0"
+
+
+@dataclass(frozen=True, kw_only=True)
+class LowerBounds:
+    """What rho is at least in the continuum.
+
+    Attributes
+    ----------
+    stick : Number
+        Where a piece of Gamma_c may stick.
+    slide : Number
+        Of rho_normal, where both bodies slide freely.
+    """
+
+    stick: Number
+    slide: Number
+
+    def to_dict(self) -> dict[str, Any]:
+        """The bounds, and from which theta on no step contracts."""
+        kinds = ("stick", "slide")
+        excluded = {name: excluded_from(getattr(self, name)) for name in kinds}
+        why = "the bound is below 1, and excludes no theta up to 1"
+        return {
+            **{name: getattr(self, name).to_dict() for name in kinds},
+            **{f"theta_excluded_{name}": theta for name, theta in excluded.items()},
+            "reason": {f"theta_excluded_{name}": why for name, theta in excluded.items() if theta is None},
+        }
+
+
+def excluded_from(bound: Number) -> float | None:
+    """``2/(1 + bound)``: from this theta on no step contracts; None where that is above 1."""
+    theta = 2 / (1 + bound.value)
+    return theta if theta <= 1 else None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Start:
+    """A theta to start with, where the mirror image of the contact body fits into the Neumann body.
+
+    Attributes
+    ----------
+    s : Fraction
+        ``C_c <= s C_n``: rho_normal is at most s.
+    guess : float
+        What rho is at most with friction, by the likes of the Neumann body: a guess.
+    guessed_from : str
+        Which bodies these are.
+    """
+
+    s: Fraction
+    guess: float
+    guessed_from: str
+
+    @property
+    def theta_free(self) -> float:
+        """``2/(2 + s)``, at most 0.99: proved without friction."""
+        return rounded_down(min(predicted_theta(self.s), LARGEST_TO_PASTE))
+
+    @property
+    def theta_guess(self) -> float:
+        """``2/(2 + guess)``, not above `theta_free`: a guess with friction."""
+        return min(rounded_down(min(predicted_theta(Fraction(self.guess)), LARGEST_TO_PASTE)), self.theta_free)
+
+    def factor_free(self, theta: float) -> Number:
+        """``1 - theta``, the factor proved without friction for a theta up to ``2/(2 + s)``: that of an open node."""
+        return _exactly(1 - Fraction(theta))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object ``start``."""
+        s = -double_below(-self.s)  # not below the bound
+        return {
+            "s": Number(value=s, hi=s, level="exact").to_dict(),
+            "theta_frictionless": self.theta_free,
+            "factor_frictionless": self.factor_free(self.theta_free).to_dict(),
+            "rho_guess": self.guess,
+            "guessed_from": self.guessed_from,
+            "theta_guess": self.theta_guess,
+            "factor_frictionless_of_guess": self.factor_free(self.theta_guess).to_dict(),
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModuliRole:
+    """What moduli say when one body gets the Neumann problem.
+
+    Attributes
+    ----------
+    neumann_body : {1, 2}
+    corners : mapping
+        The bounds by the body that ends in corners of 90 degrees at the ends of Gamma_c: ``'none'`` holds for every
+        geometry, ``'1'``, ``'2'``, ``'both'`` add what such ends do.
+    start : Start or None
+    why_no_start : str
+    """
+
+    neumann_body: Body
+    corners: Mapping[Corners, LowerBounds]
+    start: Start | None
+    why_no_start: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """A member of ``moduli.roles``."""
+        return {
+            "neumann_body": self.neumann_body,
+            "bounds": [{"corners": name} | bounds.to_dict() for name, bounds in self.corners.items()],
+            "start": None if self.start is None else self.start.to_dict(),
+            "reason": {"start": self.why_no_start} if self.start is None else {},
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeenModuli:
+    """What was given of two bodies, and what it says of both roles.
+
+    Attributes
+    ----------
+    bodies : pair of Moduli
+        Bodies 1 and 2.
+    corners : {'none', '1', '2', 'both'} or None
+        Which body ends in corners of 90 degrees at the ends of Gamma_c; None where that was not told.
+    mirror : tuple of {1, 2}
+        The bodies whose mirror image fits into the other one, as the user confirms.
+    flat : bool
+        Whether the other one is a flat layer, as the user confirms.
+    roles : pair of ModuliRole
+        With the Neumann problem on body 1 and on body 2.
+    """
+
+    bodies: tuple[Moduli, Moduli]
+    corners: Corners | None
+    mirror: tuple[Body, ...]
+    flat: bool
+    roles: tuple[ModuliRole, ModuliRole]
+
+    def bounds(self, role: ModuliRole) -> LowerBounds:
+        """What is sure of a role for the ends that were told, or for every geometry."""
+        return role.corners[self.corners or "none"]
+
+    def largest(self, role: ModuliRole) -> float:
+        """The largest bound that the ends may bring, as far as they are known."""
+        known = role.corners.values() if self.corners is None else [self.bounds(role)]
+        return max(bounds.stick.value for bounds in known)
+
+    def smaller(self, kind: Literal["stick", "slide"]) -> Body | None:
+        """The Neumann body of the role with the smaller bound; None where both are equal."""
+        one, two = (getattr(self.bounds(role), kind).value for role in self.roles)
+        if math.isclose(one, two, rel_tol=1e-12):
+            return None
+        return 1 if one < two else 2
+
+    @property
+    def summary(self) -> str:
+        """The bounds of both roles in one line."""
+        each = (f"{self.bounds(role).stick.value:.4g} with Neumann body {role.neumann_body}" for role in self.roles)
+        return f"rho is at least {', '.join(each)}, where a piece of Gamma_c may stick"
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object ``moduli``."""
+        return {
+            "young": [written_number(body.young) for body in self.bodies],
+            "poisson": [written_number(body.poisson) for body in self.bodies],
+            "plane": self.bodies[0].plane,
+            "corners": self.corners,
+            "mirror": list(self.mirror),
+            "flat": self.flat,
+            "neumann_body_frictionless": self.smaller("slide"),
+            "roles": [role.to_dict() for role in self.roles],
+            "reason": ({} if self.corners else {"corners": "not told"})
+            | ({} if self.smaller("slide") else {"neumann_body_frictionless": "both roles have the same bound"}),
+        }
+
+
+def advise_moduli(
+    *,
+    young: Sequence[Any],
+    poisson: Sequence[Any],
+    plane: Plane = "strain",
+    corners: Corners | None = None,
+    mirror: Collection[int] = (),
+    flat: bool = False,
+) -> Advice:
+    """What the moduli of two bodies say of rho before there is a mesh.
+
+    For each role the advice has the bounds of rho from below that every geometry has in the continuum, and on meshes
+    that are fine enough: ``(G_c/G_n) kappa_n`` where a piece of Gamma_c may stick, ``E*_c/E*_n`` without friction, with
+    c for the contact body and n for the Neumann body; besides what corners of 90 degrees at the ends of Gamma_c add.
+    No theta from ``2/(1 + bound)`` on contracts.  The role with the smaller bound is worth trying first: two lower
+    bounds prove no order.
+
+    A bound from below gives no theta.  One to start with is there only where Gamma_c is flat, the mirror image of the
+    contact body lies in the Neumann body, and wherever the contact body is held its image is held too.  Then
+    ``rho_normal <= s`` with the s of :func:`ndtheory.moduli.mirror`, in the continuum and on meshes whose mirror image
+    refines that of the Neumann body, and ``theta = 2/(2 + s)`` contracts by ``s/(2 + s)`` in each step without
+    friction: the factor is ``max(1 - theta, |1 - theta (1 + rho_normal)|)``.  With friction
+    ``rho <= s lambda_max(J S_n J, S_n)``, with the reflection J.  The second factor is guessed: from a slender column,
+    which has more than any layer, or from a layer and its ends where the Neumann body is told to be flat
+    (:func:`ndtheory.moduli.column`, :func:`ndtheory.moduli.layer`, :func:`ndtheory.moduli.end`).
+
+    Parameters
+    ----------
+    young, poisson : pair of numbers
+        E and nu of bodies 1 and 2; E in one unit of stress.
+    plane : {'strain', 'stress', '3d'}
+    corners : {'none', '1', '2', 'both'}, optional
+        Which body ends in corners of 90 degrees at the ends of Gamma_c, where that is known.
+    mirror : collection of {1, 2}
+        The bodies whose mirror image fits into the other one, with the supports.
+    flat : bool
+        Whether a body into which such an image fits is at least twice as wide as high, and held along its other side.
+
+    Returns
+    -------
+    Advice
+
+    Raises
+    ------
+    HypothesisError
+        No pair of such numbers, or a mirror image that cannot fit with these corners.
+
+    Examples
+    --------
+    >>> found = advise_moduli(young=(70000, 20000), poisson=("0.3", "0.3"))
+    >>> found.neumann_body, [round(role.rho.value, 3) for role in found.roles], found.next.theta
+    (1, [0.514, 6.3], 0.2799)
+    >>> fits = advise_moduli(young=(70000, 20000), poisson=("0.3", "0.3"), corners="2", mirror=[2], flat=True)
+    >>> fits.best.theta_proved, fits.next.theta
+    (0.875, 0.7954)
+    """
+    bodies = _bodies(young, poisson, plane)
+    if corners is not None and corners not in get_args(Corners):
+        raise HypothesisError("corners", corners, f"one of {', '.join(get_args(Corners))}")
+    both: tuple[Body, ...] = (1, 2)
+    fits = tuple(body for body in both if body in mirror)
+    if len(set(mirror)) != len(fits):
+        raise HypothesisError("mirror", list(mirror), "bodies 1, 2 or both")
+    for body in fits:
+        if corners == str(3 - body):
+            needed = f"a mirror image that fits: that of body {body} goes on where body {3 - body} ends in a corner"
+            raise HypothesisError("mirror", body, needed)
+    if flat and not fits:
+        raise HypothesisError("flat", flat, "a mirror image that fits (mirror)")
+    roles = _role(1, bodies, corners, fits, flat), _role(2, bodies, corners, fits, flat)
+    seen = SeenModuli(bodies=bodies, corners=corners, mirror=fits, flat=flat, roles=roles)
+    tried = seen.smaller("stick") or seen.smaller("slide")
+    if tried is None:  # no difference but what is proved of one of them
+        started = [role.neumann_body for role in roles if role.start is not None]
+        tried = started[0] if len(started) == 1 else None
+    return Advice(
+        neumann_body=tried,
+        roles=tuple(_as_role(role, seen.bounds(role)) for role in roles),
+        units=UNITS,
+        next=_next(seen, tried),
+        moduli=seen,
+    )
+
+
+def _bodies(young: Sequence[Any], poisson: Sequence[Any], plane: Plane) -> tuple[Moduli, Moduli]:
+    given = {}
+    for key, pair, of in (("young", young, "E1,E2"), ("poisson", poisson, "nu1,nu2")):
+        if isinstance(pair, str) or not hasattr(pair, "__len__") or len(pair) != 2:
+            received = pair if isinstance(pair, str) or not hasattr(pair, "__len__") else ",".join(map(str, pair))
+            raise HypothesisError(key, received, f"two numbers {of}, of body 1 and of body 2")
+        given[key] = pair
+    needed = "numbers E > 0 (1e-24 to 1e24)"
+    E = [take("young", v, needed, lambda v: Fraction(1, LARGEST_YOUNG) <= v <= LARGEST_YOUNG) for v in given["young"]]
+    needed = "numbers with -1 < nu <= 1/2 (1e-12 from both ends, or 1/2 itself)"
+    half = Fraction(1, 2)
+    nu = [
+        take("poisson", v, needed, lambda v: v == half or -1 + CLOSEST <= v <= half - CLOSEST) for v in given["poisson"]
+    ]
+    one, two = (Moduli(young=e, poisson=n, plane=plane) for e, n in zip(E, nu, strict=True))
+    return one, two
+
+
+def _role(
+    neumann_body: Body, bodies: tuple[Moduli, Moduli], corners: Corners | None, fits: tuple[int, ...], flat: bool
+) -> ModuliRole:
+    contact_body = 3 - neumann_body
+    neumann, contact = bodies[neumann_body - 1], bodies[contact_body - 1]
+    patch = half_planes(contact, neumann)
+    bounds: dict[Corners, LowerBounds] = {}
+    for name in get_args(Corners):
+        openings = _opening(contact_body, name), _opening(neumann_body, name)
+        stick, slide = end(contact, neumann, openings)[1], free_end(contact, neumann, openings)
+        bounds[name] = LowerBounds(stick=_larger(patch.high, stick), slide=_larger(patch.free, slide))
+    if contact_body not in fits:
+        why = f"needed: the mirror image of body {contact_body} fits into body {neumann_body} (option --mirror)"
+        return ModuliRole(neumann_body=neumann_body, corners=bounds, start=None, why_no_start=why)
+    s = mirror(contact, neumann)
+    if s is None:
+        why = (
+            f"body {contact_body} is incompressible and body {neumann_body} is not: no multiple of its energy is enough"
+        )
+        return ModuliRole(neumann_body=neumann_body, corners=bounds, start=None, why_no_start=why)
+    # an image that fits has no wider angle than the Neumann body, which may end in a corner unless told otherwise
+    angle = math.pi / 2 if corners is None else _opening(neumann_body, corners)
+    reflected = max(layer(neumann), end(neumann, neumann, (angle, angle))[1])
+    words = "a layer and its ends"
+    if not flat:
+        reflected, words = max(reflected, column()), "a slender column, more than any layer"
+    start = Start(s=s, guess=float(s) * reflected, guessed_from=words)
+    return ModuliRole(neumann_body=neumann_body, corners=bounds, start=start)
+
+
+def _opening(body: int, corners: Corners) -> float:
+    return math.pi / 2 if corners in (str(body), "both") else math.pi
+
+
+def _larger(exact: Fraction, computed: float) -> Number:
+    """A rational bound from below as a double that is one too, or the computed one where that is larger."""
+    if computed > exact * (1 + Fraction(1, 10**12)):
+        return Number.of_float(computed)
+    below = double_below(exact)
+    return Number(value=below, lo=below, level="exact")
+
+
+def _exactly(value: Fraction) -> Number:
+    return Number.enclosed(value, value, value, "exact")
+
+
+def _as_role(role: ModuliRole, bounds: LowerBounds) -> Role:
+    """The role with its bound of rho, and what is proved of it without friction."""
+    reason = {
+        "theta_predicted": "moduli bound rho from below, which predicts no theta",
+        "rate_predicted": "moduli bound rho from below, which predicts no rate",
+        "friction_threshold": NO_FRICTION if role.start else "moduli alone say nothing of friction",
+    }
+    proved: dict[str, Any] = dict.fromkeys(("theta_proved", "factor_proved", "theta_max_proved"))
+    if role.start is None:
+        reason |= dict.fromkeys(proved, role.why_no_start)
+    else:
+        s = role.start.s
+        most = min(2 / (1 + s), Fraction(1))
+        proved = {
+            "theta_proved": float(predicted_theta(s)),
+            "factor_proved": _exactly(predicted_rate(s)),
+            "theta_max_proved": _exactly(most),
+        }
+    return Role(
+        neumann_body=role.neumann_body,
+        rho=bounds.stick,
+        theta_predicted=None,
+        rate_predicted=None,
+        friction_threshold=None,
+        reason=reason,
+        **proved,
+    )
+
+
+def _next(seen: SeenModuli, tried: Body | None) -> NextRun:
+    """The theta to start with in the role that is tried, or the run to make."""
+    role = seen.roles[0 if tried is None else tried - 1]
+    if role.start is not None:
+        why = (
+            "with friction a guess: a run at it, with its ratio of residuals, tells more; "
+            f"without friction {role.start.theta_free:.4g} is proved, as is this one"
+        )
+        return NextRun(theta=role.start.theta_guess, why=why)
+    largest = seen.largest(role)
+    who = "either body" if tried is None else f"body {tried}"
+    among = "the largest bound above" if seen.corners is None else "the bound above"
+    why = (
+        f"the Neumann problem on {who}, 1/(2 + {largest:.4g}) with {among}, which contracts without friction or tied "
+        f"if rho is below {3 + 2 * largest:.4g}; halve it if the residual does not fall"
+    )
+    return NextRun(theta=rounded_down(1 / (2 + Fraction(largest))), why=why)
