@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Any
 from ndtheory.constants import take
 from ndtheory.energy import SMALLEST
 from ndtheory.sharp import predicted_rate, predicted_theta
+from verification.advice.ends import DEAR, SETTLED, Box, cheapest, common, of_ratio, of_stiffest, telling
 from verification.advice.from_runs import role_of_run
 from verification.advice.log import Column, Log
 from verification.advice.logs import read_log
@@ -44,7 +46,7 @@ NARROW = Fraction(5, 4)
 SMALLEST_THETA = Fraction(1, 10**6)
 
 
-def advise_logs(logs: Iterable[tuple[Path | str, Any]]) -> Advice:
+def advise_logs(logs: Iterable[tuple[Path | str, Any]], *, tied: bool = False) -> Advice:
     """What the convergence logs of runs of any code, each with a constant theta, say of rho together.
 
     A log whose residual changes by a steady ratio r a step is read as
@@ -56,10 +58,18 @@ def advise_logs(logs: Iterable[tuple[Path | str, Any]]) -> Advice:
     run that does not converge.  If near the solution all of Gamma_c is closed and nothing slides, a run that converges
     has ``rho <= (1 + r)/theta - 1`` besides.  Logs whose bounds exclude each other are told as contradictory.
 
+    A theta is pasted that is predicted to take at most 1.4 times the fewest steps wherever the smallest and the largest
+    eigenvalue may lie by the logs (:mod:`verification.advice.ends`); in contact none above that of a run that
+    converged.  Where one log alone decides rho, the smallest eigenvalue is taken to be at most half of the largest.
+
     Parameters
     ----------
     logs : iterable of tuple
         Logs of one coupling with the same roles: the path and the relaxation factor of each, 0 < theta <= 1.
+    tied : bool
+        Whether the interface is tied, so that nothing opens or slips.  A run is linear then, and its steady ratio is
+        that of the softest or of the stiffest mode: two logs mostly tell both, and with them the best theta,
+        ``2/(2 + lambda_min + rho)``.
 
     Returns
     -------
@@ -91,7 +101,9 @@ def advise_logs(logs: Iterable[tuple[Path | str, Any]]) -> Advice:
     seen = tuple(_seen(read_log(path), theta) for path, theta in given)
     lower, upper = bounds(seen)
     interval = _interval(lower, upper)
-    readings, following, rho = _together(seen, interval)
+    readings, following, rho = _together(seen, interval, tied)
+    if tied:  # nothing opens or slips
+        readings = tuple(reading for reading in readings if reading.kind not in ("level", "open"))
     return Advice(
         neumann_body=None,
         roles=() if rho is None else (role_of_run(rho),),
@@ -216,7 +228,9 @@ def _interval(lower: list[LogBound], upper: list[LogBound]) -> Interval:
     return Interval(lo=lo, hi=hi, contradiction=contradiction)
 
 
-def _together(logs: tuple[SeenLog, ...], interval: Interval) -> tuple[tuple[RunReading, ...], NextRun, Fraction | None]:
+def _together(
+    logs: tuple[SeenLog, ...], interval: Interval, tied: bool
+) -> tuple[tuple[RunReading, ...], NextRun, Fraction | None]:
     """The readings that are left, the run to make next, and rho where the logs decide."""
     falling = [log for log in logs if log.converges]
     rising = [log for log in logs if log.diverges]
@@ -231,8 +245,14 @@ def _together(logs: tuple[SeenLog, ...], interval: Interval) -> tuple[tuple[RunR
         why = f"the logs contradict each other: {theta:.4g} once more, in one time window, with ResAbs in the log"
         return base.readings, NextRun(theta=theta, why=why), None
     lo, hi = interval.lo, interval.hi
+    if (swift := next((log for log in logs if log.swift), None)) is not None and base.rho is None:
+        most = max(pace.steps for column in swift.columns for pace in column.paces)
+        why = f"keep it: the run converges within {most} steps, and none much faster is to be found"
+        return swift.readings, NextRun(theta=rounded_down(swift.theta), why=why), None
+    if tied and (found := _by_ends(logs, base, None if lo is None else lo.value, tied)) is not None:
+        return found
     if base.rho is not None:
-        return base.readings, _fastest(falling, base.rho) or base.next, base.rho
+        return base.readings, _fastest(falling, base.rho) or _robust(logs, base.next), base.rho
     if lo is not None and hi is not None and hi.value <= NARROW * lo.value:
         rho = max(lo.value, hi.value)  # they may overlap a little
         best = min(predicted_theta(rho), LARGEST_TO_PASTE)
@@ -245,8 +265,79 @@ def _together(logs: tuple[SeenLog, ...], interval: Interval) -> tuple[tuple[RunR
         says = f"the logs leave rho {left} if all of Gamma_c stays closed"
         only = RunReading(kind="mode-high", value=float(rho), lo=double_below(lo.value), says=says)
         following = NextRun(theta=rounded_down(min(best, base.theta)), why=why)
-        return (only,), _fastest(falling, rho) or following, rho
+        return (only,), _fastest(falling, rho) or _robust(logs, following), rho
+    if falling and (found := _by_ends(logs, base, None if lo is None else lo.value, tied)) is not None:
+        return found
+    if not falling and len(rising) > 1:
+        why = "a quarter of the smallest theta so far, as none converges; come back with the log of that run, too"
+        return base.readings, NextRun(theta=rounded_down(base.theta / 4), why=why), None
     return base.readings, _between(base, rising), None
+
+
+def _boxes(log: SeenLog, tied: bool) -> list[Box]:
+    """Where the ends of the spectrum may lie by a log; in contact of the modes that are left near the solution."""
+    ratio, plateau, theta = log.slowest, log.plateau, float(log.theta)
+    left: list[Sequence[Box]] = []
+    if ratio is not None and (log.converges or (tied and ratio.least > 1)):
+        left.append(of_ratio(theta, float(ratio.least), float(ratio.most)))
+    if tied and log.diverges:
+        left.append(of_stiffest(2 * (1 - SETTLED) / theta))
+    if tied and plateau is not None:
+        low, high = float(1 / (plateau.most - 1)), float(1 / (plateau.least - 1))
+        left.append(of_stiffest(1 + low * (1 - SETTLED), 1 + high * (1 + SETTLED)))
+    return common(left)
+
+
+def _by_ends(
+    logs: tuple[SeenLog, ...], base: SeenLog, lo: Fraction | None, tied: bool
+) -> tuple[tuple[RunReading, ...], NextRun, Fraction | None] | None:
+    """The same by what all logs leave of the ends of the spectrum; None where that is no limit of rho."""
+    boxes = common([_boxes(log, tied) for log in logs])
+    known, most = [float(log.theta) for log in logs], float(LARGEST_TO_PASTE)
+    if not boxes:
+        if not tied:
+            return None
+        why = "no tied interface has all of these logs: this one once more, in one time window, or leave out tied"
+        return base.readings, NextRun(theta=float(base.theta), why=why), None
+    if math.isinf(stiffest := max(box.b[1] for box in boxes)):
+        return None
+    theta, dear = cheapest(boxes, most if tied else float(base.theta))
+    if dear <= DEAR:
+        says = f"the logs together leave one reading: {_ends(boxes)}; rho is taken at its upper end"
+        only = RunReading(kind="mode-high", value=stiffest - 1, lo=None if lo is None else double_below(lo), says=says)
+        following = NextRun(theta=rounded_down(Fraction(theta)), why=_left(boxes, dear))
+        return (only,), following, Fraction(stiffest) - 1
+    rising = [float(log.theta) for log in logs if log.diverges]
+    theta = rounded_down(Fraction(telling(boxes, known, most if tied else min([most, *rising]))))
+    why = f"it tells more: if {_ends(boxes)}, no theta is sure to be within {DEAR:g} times the fewest steps"
+    return base.readings, NextRun(theta=theta, why=why), None
+
+
+def _ends(boxes: Sequence[Box]) -> str:
+    """What is left of the smallest and the largest eigenvalue, in words."""
+    within = []
+    for which, limits in (("smallest", [box.a for box in boxes]), ("largest", [box.b for box in boxes])):
+        low, high = (f"{max(z - 1, 0):.3g}" for z in (min(z for z, _ in limits), max(z for _, z in limits)))
+        within.append(f"the {which} eigenvalue is {low if low == high else f'{low} to {high}'}")
+    return " and ".join(within)
+
+
+def _left(boxes: Sequence[Box], dear: float) -> str:
+    """Why a theta is advised, in words."""
+    times = (
+        "the fewest steps" if dear < 1.05 else f"at most {math.ceil(10 * dear - 1e-9) / 10:g} times the fewest steps"
+    )
+    return f"{times} if {_ends(boxes)}, as the logs leave them where contact does not change"
+
+
+def _robust(logs: tuple[SeenLog, ...], best: NextRun) -> NextRun:
+    """The theta where rho is known and the softest mode is not: at most ``2/(2 + rho)``, best where nodes are open."""
+    boxes = [box.softened() for box in common([_boxes(log, False) for log in logs])]
+    if not boxes:
+        return best
+    theta, dear = cheapest(boxes, best.theta)
+    smaller = rounded_down(Fraction(theta))
+    return best if smaller >= best.theta else NextRun(theta=smaller, why=_left(boxes, dear))
 
 
 def _fastest(falling: list[SeenLog], rho: Fraction) -> NextRun | None:

@@ -35,6 +35,9 @@ ROUNDING = 1e-12
 #: The rounding of one step of a run, as a share of the largest residual or of the size of the solution.
 ROUNDED = 1e-15
 
+#: Ratios that have not settled when a run arrives may have risen by this share over the stretch that is looked at.
+RISE = 0.3
+
 #: How often the steady stretch is looked for further from the end.
 TRIES = 12
 
@@ -160,7 +163,29 @@ def pace(
         return Pace(kind=kind, steps=taken, height=height)
     if before is not None and _grows(before):
         return before
+    if height < CONVERGED and (settles := _settling(tail, relative, limit, steps)) is not None:
+        least, value, most = settles
+        return Pace(kind="steady", value=value, least=least, most=most, steps=taken, height=height)
     return Pace(kind="unsteady", steps=taken, height=height, lost=lost)
+
+
+def _settling(tail: Floats, relative: bool, limit: float, steps: int) -> tuple[float, float, float] | None:
+    """Least, last and largest ratio of a run that has arrived while its ratios still rise to that of its slowest mode.
+
+    The ratios of a linear run rise, since faster modes die out first.  Their logarithms lie on a line up to what is
+    allowed of a steady ratio; by as much as they have risen over the stretch they may still rise.
+    """
+    if relative and float(tail.max()) > SMALL:
+        return None
+    lag = 2 * max(1, steps // 10)
+    means = _slopes(np.log(tail), lag)
+    x = np.arange(len(means)) - (len(means) - 1) / 2
+    tilt = float(x @ means / (x @ x))
+    rise, scatter = tilt * (len(means) - 1), _scatter(means - tilt * x)
+    middle, last = float(means.mean()), float(means.mean()) + rise / 2
+    if not (0 < rise <= RISE and scatter <= limit and last + rise + scatter < 0):
+        return None
+    return math.exp(middle - scatter), math.exp(last), math.exp(last + rise + scatter)
 
 
 def _slopes(logs: Floats, lag: int) -> Floats:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from verification.advice.pace import Pace
+from verification.advice.ends import DEAR, FEWEST, TO
+from verification.advice.pace import CONVERGED, Pace
 from verification.advice.readings import NextRun, Observed, RunReading
 
 #: What a ratio assumes to bound rho from below, and what from above.
@@ -139,6 +141,12 @@ class SeenLog:
         """Whether the run does not converge as far as the log goes."""
         ratio = self.slowest
         return self.stays or (ratio is not None and ratio.least > 1)
+
+    @property
+    def swift(self) -> bool:
+        """Whether the run has fallen to CONVERGED so fast, in the mean, that no faster one is looked for."""
+        paces = [pace for column in self.columns for pace in column.paces]
+        return all(p.height < CONVERGED and math.log(p.height) / p.steps <= TO / (DEAR * FEWEST) for p in paces)
 
     def to_dict(self) -> dict[str, Any]:
         """A member of ``logs``."""

@@ -1,0 +1,325 @@
+"""Thirty couplings whose spectrum is known, and what the advice from their logs costs.
+
+Bodies are those of scikit-fem, blocks with a curved outer side in the plane and bricks in space, and two plates of this
+project where there is friction.  They are tied, or in contact that is pressed and may open.  In each coupling a run
+writes the log that preCICE would write, `advise_logs` reads it, and the runs that the advice asks for are made, three
+at most.  The theta that it ends with is compared with the best one of a scan.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cached_property
+from itertools import islice, product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import skfem
+from scipy.linalg import cho_factor, cho_solve, cholesky, eigh, solve_triangular
+from scipy.optimize import nnls
+from scipy.sparse.linalg import splu
+from skfem.models.elasticity import lame_parameters, linear_elasticity
+
+import verification as vf
+from verification.advice.readings import steps_needed
+
+#: A run has arrived where its residual is this share of the force.
+ARRIVED = 1e-8
+
+#: Runs that the advice may ask for after the first one, and steps after which a run is given up.
+ASKED_FOR, LONGEST = 3, 2000
+
+#: A residual is multiplied by ``exp(NOISE z)`` with a normal z in every second coupling.
+NOISE = 0.01
+
+Floats = np.ndarray
+
+
+@dataclass(frozen=True, kw_only=True)
+class Body:
+    """A body condensed onto Gamma_c, unknowns by component, the normal one last.
+
+    Attributes
+    ----------
+    stiffness : array, shape (n, n)
+    load : array, shape (n,)
+    """
+
+    stiffness: Floats
+    load: Floats
+
+
+def body(mesh: skfem.Mesh, element: Any, moduli: tuple[float, float], push: Callable[[Floats], Floats]) -> Body:
+    """A body of scikit-fem condensed onto its boundary ``contact``, where the last axis is normal.
+
+    Parameters
+    ----------
+    mesh, element : mesh with boundaries ``contact`` and ``outer``, scalar element
+    moduli : tuple
+        Young's modulus and Poisson's ratio; plane strain in the plane.
+    push : callable
+        By how much places of ``outer`` are moved along the last axis; along the others they are held.
+    """
+    basis = skfem.Basis(mesh, skfem.ElementVector(element))
+    K = linear_elasticity(*lame_parameters(*moduli)).assemble(basis).tocsc()
+    on_facets = basis.facet_dofs if len(basis.facet_dofs) else np.empty((mesh.dim(), 0), int)
+    by_component = np.hstack([basis.nodal_dofs, on_facets])
+    outer, contact = (basis.get_dofs(name).all() for name in ("outer", "contact"))
+    places = basis.doflocs
+    ordered = [np.intersect1d(component, contact) for component in by_component]
+    contact = np.concatenate([dofs[np.lexsort(places[:-1, dofs])] for dofs in ordered])
+    x = np.zeros(K.shape[0])
+    pushed = np.intersect1d(outer, by_component[-1])
+    x[pushed] = push(places[:, pushed])
+    inner = np.setdiff1d(np.arange(len(x)), np.concatenate([outer, contact]))
+    solve, across = splu(K[inner][:, inner]).solve, K[contact][:, inner]
+    S = K[contact][:, contact].toarray() - across @ solve(K[inner][:, contact].toarray())
+    return Body(stiffness=(S + S.T) / 2, load=across @ solve((K @ x)[inner]) - (K @ x)[contact])
+
+
+def block(side: int, moduli: tuple[float, float], *, curve: float = 0.0, deep: float = 0.4, push: float = 0.0) -> Body:
+    """A block of second order in the plane, below (-1) or above (1) Gamma_c; its outer side is an arc."""
+    mesh = skfem.MeshQuad.init_tensor(np.linspace(0, 1, 9), np.linspace(0, deep, 4))
+    return body(_bent(mesh, side, deep, curve), skfem.ElementQuad2(), moduli, lambda at: push * (0.6 - at[0]))
+
+
+def brick(side: int, moduli: tuple[float, float], *, curve: float = 0.0, deep: float = 0.4, push: float = 0.0) -> Body:
+    """A brick of trilinear elements, below (-1) or above (1) Gamma_c; its outer side is bent."""
+    flat = np.linspace(0, 1, 6)
+    mesh = skfem.MeshHex.init_tensor(flat, flat, np.linspace(0, deep, 4))
+    return body(
+        _bent(mesh, side, deep, curve), skfem.ElementHex1(), moduli, lambda at: push * (0.8 - at[0] - at[1] / 2)
+    )
+
+
+def _bent(mesh: skfem.Mesh, side: int, deep: float, curve: float) -> skfem.Mesh:
+    """The mesh with its sides named and its outer side pulled into an arc."""
+    at_height = lambda height: lambda at: np.isclose(at[-1], height)
+    mesh = mesh.with_boundaries({"contact": at_height(0), "outer": at_height(deep)})
+    p = mesh.p.copy()
+    p[-1] *= side * (1 + curve * np.sin(np.pi * p[0]))
+    return replace(mesh, doflocs=p)
+
+
+def without_friction(given: Body, dim: int) -> Body:
+    """The same for the normal unknowns alone: without friction nothing holds the tangential ones."""
+    S, normal = given.stiffness, len(given.load) // dim
+    t, n = slice(None, -normal), slice(-normal, None)
+    left = np.linalg.solve(S[t, t], S[t, n]).T
+    stiffness = S[n, n] - left @ S[t, n]
+    return Body(stiffness=(stiffness + stiffness.T) / 2, load=given.load[n] - left @ given.load[t])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tied:
+    """Two bodies tied along Gamma_c: ``T g = l_c - S_c S_n^-1 (g + l_n)``."""
+
+    name: str
+    contact: Body
+    neumann: Body
+    tied = True
+
+    @cached_property
+    def spectrum(self) -> Floats:
+        """The eigenvalues of (S_c, S_n)."""
+        return eigh(self.contact.stiffness, self.neumann.stiffness, eigvals_only=True)
+
+    def forces(self, theta: float) -> Iterator[tuple[Floats, Floats]]:
+        """g and T g, step by step."""
+        factor, g = cho_factor(self.neumann.stiffness), np.zeros(len(self.neumann.load))
+        while True:
+            image = self.image(cho_solve(factor, g + self.neumann.load))
+            yield g, image
+            g = g + theta * (image - g)
+
+    def image(self, u: Floats) -> Floats:
+        """What the contact body answers to the displacement of the Neumann body."""
+        return self.contact.load - self.contact.stiffness @ u
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contact(Tied):
+    """The same in contact without friction, of normal unknowns: ``side (phi - u) >= 0`` for the contact body's phi."""
+
+    side: int
+    tied = False
+
+    @cached_property
+    def _root(self) -> Floats:
+        return cholesky(self.contact.stiffness)
+
+    def image(self, u: Floats) -> Floats:
+        # phi = u + side z, z >= 0, and R' R = S: the least of |R z - R^-T (l - S u) side|
+        free = self.side * (self.contact.load - self.contact.stiffness @ u)
+        z, _ = nnls(self._root, solve_triangular(self._root, free, trans="T"))
+        return self.contact.load - self.contact.stiffness @ (u + self.side * z)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plates:
+    """Two plates of this project in contact with friction."""
+
+    name: str
+    pair: vf.ContactPair
+    tied = False
+
+    @cached_property
+    def spectrum(self) -> Floats:
+        """The eigenvalues of the matrices of both bodies, all unknowns."""
+        return eigh(self.pair.contact.stiffness, self.pair.neumann.stiffness, eigvals_only=True)
+
+    def forces(self, theta: float) -> Iterator[tuple[Floats, Floats]]:
+        """g and T g, step by step."""
+        return ((state.g, state.image) for state in vf.iterate(self.pair, theta=repr(float(theta))))
+
+
+Coupling = Tied | Contact | Plates
+
+
+def residuals(coupling: Coupling, theta: float, most: int) -> list[tuple[float, float]]:
+    """``|T g - g|`` and ``|T g|`` of a run, until rounding or 1e60."""
+    found = []
+    for g, image in islice(coupling.forces(theta), most):
+        found.append((float(np.linalg.norm(image - g)), float(np.linalg.norm(image))))
+        if not 1e-13 * found[0][0] < found[-1][0] < 1e60 * found[0][0]:
+            break
+    return found
+
+
+def steps(coupling: Coupling, theta: float, most: int = LONGEST) -> float:
+    """Steps until the residual is ARRIVED of the force; inf where that takes more than ``most``."""
+    for n, (g, image) in enumerate(islice(coupling.forces(theta), most)):
+        size = float(np.linalg.norm(image - g))
+        if size <= ARRIVED * float(np.linalg.norm(image)):
+            return max(n, 1)
+        if not size < 1e60:
+            break
+    return math.inf
+
+
+def fewest(coupling: Coupling) -> tuple[int, float]:
+    """The fewest steps of a scan over theta, and the theta that takes them."""
+    middle = 2 / (1 + min(coupling.spectrum[0], 1) + coupling.spectrum[-1])
+    thetas = sorted({min(middle * 1.06**k, 0.999) for k in range(-16, 31)}, key=lambda theta: abs(theta - middle))
+    best, at = LONGEST, middle
+    for theta in thetas:
+        n = steps(coupling, theta, best)
+        if n < best:
+            best, at = int(n), theta
+    return best, at
+
+
+def log(coupling: Coupling, theta: float, path: Path, seed: int | None) -> Path:
+    """A run as preCICE logs it; with a seed, noise on its residuals."""
+    rows = np.array(residuals(coupling, theta, 60 + 3 * steps_needed(Fraction(repr(theta)))))
+    absolute, relative = rows[:, 0], rows[:, 0] / rows[:, 1]
+    if seed is not None:
+        factor = np.exp(NOISE * np.random.default_rng(seed).normal(size=len(rows)))
+        absolute, relative = absolute * factor, relative * factor
+    lines = ["  TimeWindow  Iteration  ResAbs(Solid-Mesh:Force)  ResRel(Solid-Mesh:Force)"]
+    lines += [f"{1:12d}  {n:9d}  {a:.8e}  {r:.8e}" for n, (a, r) in enumerate(zip(absolute, relative, strict=True), 1)]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+@dataclass(frozen=True, kw_only=True)
+class Followed:
+    """What following the advice has led to.
+
+    Attributes
+    ----------
+    name : str
+    least, largest : float
+        Ends of the spectrum of (S_c, S_n).
+    noise : bool
+    runs : tuple of float
+        The thetas that were run for a log.
+    theta : float
+        The one that is pasted, or of the run to make next.
+    decided : bool
+        Whether it is advised: to be pasted, or to be kept of a run that converged.
+    steps : int or None
+        What it takes; None where the run does not arrive.
+    fewest : int
+    best : float
+        The fewest steps of the scan, and their theta.
+    why : str
+    """
+
+    name: str
+    least: float
+    largest: float
+    noise: bool
+    runs: tuple[float, ...]
+    theta: float
+    decided: bool
+    steps: int | None
+    fewest: int
+    best: float
+    why: str
+
+    @property
+    def good(self) -> bool:
+        """Whether the advice takes at most 1.4 times the fewest steps; a run to make is no advice."""
+        return self.decided and self.steps is not None and 5 * self.steps <= 7 * self.fewest
+
+
+def followed(chosen: Iterable[Coupling], first: float, folder: Path) -> Iterator[Followed]:
+    """The advice followed in each coupling, with noise in every second one, of each kind and in both roles."""
+    for i, coupling in enumerate(chosen):
+        yield follow(coupling, first, folder, i if (i + i // 4) % 4 in (1, 2) else None)
+
+
+def follow(coupling: Coupling, first: float, folder: Path, seed: int | None) -> Followed:
+    """Make the first run and those that the advice asks for, and take the theta that it ends with."""
+    logs: list[tuple[Path, str]] = []
+    theta, runs = first, []
+    for n in range(1 + ASKED_FOR):
+        runs.append(theta)
+        logs.append((log(coupling, theta, folder / f"{n}.log", None if seed is None else 97 * seed + n), repr(theta)))
+        found = vf.advise_logs(logs, tied=coupling.tied)
+        assert found.next is not None
+        theta = found.next.theta
+        kept = theta in runs and found.interval is not None and found.interval.contradiction is None
+        if found.roles or kept:
+            break
+    best, at = fewest(coupling)
+    taken = steps(coupling, theta)
+    return Followed(
+        name=coupling.name,
+        least=float(coupling.spectrum[0]),
+        largest=float(coupling.spectrum[-1]),
+        noise=seed is not None,
+        runs=tuple(runs),
+        theta=theta,
+        decided=bool(found.roles) or kept,
+        steps=int(taken) if math.isfinite(taken) else None,
+        fewest=best,
+        best=at,
+        why=found.next.why,
+    )
+
+
+#: Young's modulus and Poisson's ratio of the body below and of the one above.
+MODULI = (((210.0, 0.3), (70.0, 0.33)), ((70.0, 0.33), (70.0, 0.33)), ((110.0, 0.34), (3.0, 0.38)))
+
+
+def couplings() -> Iterator[Coupling]:
+    """The thirty: tied and in contact, in the plane and in space, in both roles; six with friction."""
+    for (make, dim), (lower, upper) in product(((block, 2), (brick, 3)), MODULI):
+        below = make(-1, lower, curve=0.3, deep=0.4)
+        above = make(1, upper, curve=-0.3, deep=0.3, push=-0.01)
+        for neumann in (1, 2):
+            name = f"{lower[0]:g}/{upper[0]:g}, {dim}D, Neumann body {neumann}"
+            bodies = (below, above) if neumann == 2 else (above, below)
+            yield Tied(name=f"tied, {name}", contact=bodies[0], neumann=bodies[1])
+            free = [without_friction(given, dim) for given in bodies]
+            yield Contact(name=f"contact, {name}", contact=free[0], neumann=free[1], side=-1 if neumann == 2 else 1)
+    for (E1, E2), neumann in product(((70000, 20000), (20000, 20000), (20000, 70000)), (1, 2)):
+        plates = vf.example("section6").changed(young=(E1, E2), cells=((10, 2), (6, 2)), friction="0.2")
+        plates = plates.changed(neumann_body=neumann)
+        yield Plates(name=f"friction 0.2, {E1 // 1000}/{E2 // 1000}, 2D, Neumann body {neumann}", pair=vf.build(plates))
