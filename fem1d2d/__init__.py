@@ -8,7 +8,7 @@ from fem1d2d.condense import Condensation, elimination_order, solver, solver_wit
 from fem1d2d.material import Material, bar, plane_strain
 from fem1d2d.mesh import Mesh, MeshError, interval, rectangle
 from fem1d2d.mesh_files import from_file
-from fem1d2d.pencil import Eigenvalue, largest, largest_of, largest_sparse
+from fem1d2d.pencil import Eigenvalue, Extremes, extremes_by_solves, largest, largest_of, largest_sparse
 from fem1d2d.supports import Supports, rigid_motions, supports
 from fem1d2d.trace import facing, surface, trapezoid
 from fem1d2d.transfer import mortar
@@ -16,6 +16,7 @@ from fem1d2d.transfer import mortar
 __all__ = [
     "Condensation",
     "Eigenvalue",
+    "Extremes",
     "Material",
     "Mesh",
     "MeshError",
@@ -23,6 +24,7 @@ __all__ = [
     "bar",
     "body_load",
     "elimination_order",
+    "extremes_by_solves",
     "facet_weights",
     "facing",
     "from_file",

@@ -24,6 +24,13 @@ LANCZOS = 1e-10
 #: Vectors that Lanczos keeps; when they are full it restarts from what they have found.
 BASIS = 24
 
+#: Where one product and one solve are all that is known, they are dearer than memory: vectors kept then, and those of
+#: them that a restart keeps from the lower and from the upper end.
+LONG_BASIS, KEPT = 120, (15, 30)
+
+#: So often the ends of the spectrum are looked at: it costs as much as a step with 10^4 unknowns.
+LOOK = 5
+
 
 @dataclass(frozen=True, kw_only=True)
 class Eigenvalue:
@@ -133,6 +140,110 @@ def largest_of(
             break
         start = found.vector
     return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class Extremes:
+    """The ends of a spectrum, as Lanczos found them.
+
+    Attributes
+    ----------
+    least, largest : Eigenvalue
+        Some eigenvalue lies within the residual of each.  The least eigenvalue is at most ``least.value``, the largest
+        one at least ``largest.value``, up to rounding: they are Rayleigh quotients.
+    steps : int
+        Products with A.
+    """
+
+    least: Eigenvalue
+    largest: Eigenvalue
+    steps: int
+
+
+def extremes_by_solves(
+    apply_A: Callable[[Floats], Floats],
+    solve_B: Callable[[Floats], Floats],
+    n: int,
+    *,
+    tolerance: float = 1e-6,
+    least_tolerance: float = 1e-2,
+    most: int = 1000,
+    progress: Callable[[int, float, float], None] = lambda steps, value, residual: None,
+) -> Extremes:
+    """Least and largest eigenvalue of a pencil of which a product with A and a solve with B are all that is known.
+
+    Lanczos for ``A B^-1`` on vectors y = B x, symmetric in the scalar product ``y' B^-1 z``, orthogonalised in full and
+    restarted with the vectors of both ends.  A step costs one product and one solve.  It stops at the tolerances or
+    after ``most`` steps, and the residuals tell how far it came.  That no eigenvalue lies outside is its word alone, as
+    for :func:`largest_of`.
+
+    Parameters
+    ----------
+    apply_A : callable
+        ``x -> A x`` for vectors of shape (n,); A symmetric.
+    solve_B : callable
+        ``r -> B^-1 r``; B symmetric positive definite.
+    n : int
+    tolerance, least_tolerance : float
+        Residuals of the largest and of the least eigenvalue at which it stops, as parts of the largest one.
+    most : int
+        The largest number of steps.
+    progress : callable
+        Told steps, largest value and its residual after the first step and then every few.
+
+    Examples
+    --------
+    >>> A = np.linspace(1.0, 3.0, 1000)
+    >>> found = extremes_by_solves(lambda x: A * x, lambda r: 2 * r, 1000)
+    >>> round(found.largest.value, 9), found.largest.residual < 1e-5, round(found.least.value, 3)
+    (6.0, True, 2.0)
+    """
+    room = min(n, LONG_BASIS)
+    Y, X = np.empty((room, n)), np.empty((room, n))  # y and x = B^-1 y, orthonormal: Y X' = 1
+    H = np.zeros((room, room))
+    y = np.random.default_rng(0).standard_normal(n)
+    x = solve_B(y)
+    beta, j = math.sqrt(float(x @ y)), 0
+    for steps in range(1, most + 1):
+        Y[j], X[j] = y / beta, x / beta
+        y = np.array(apply_A(X[j]), dtype=float)
+        size = np.linalg.norm(y)
+        for _ in range(2):  # twice is enough
+            part = X[: j + 1] @ y
+            y -= part @ Y[: j + 1]
+            H[: j + 1, j] += part
+        H[j, : j + 1] = H[: j + 1, j]
+        x = solve_B(y)
+        exhausted = j + 1 == n or np.linalg.norm(y) <= n * np.finfo(float).eps * size
+        beta = 0.0 if exhausted else math.sqrt(max(float(x @ y), 0.0))
+        if steps % LOOK == 1 or not beta or j + 1 == room or steps == most:
+            values, vectors = eigh(H[: j + 1, : j + 1])
+            residuals, scale = beta * np.abs(vectors[-1]), float(np.abs(values).max())
+            progress(steps, float(values[-1]), float(residuals[-1]))
+            if not beta or (residuals[-1] <= tolerance * scale and residuals[0] <= least_tolerance * scale):
+                break
+        j += 1
+        if j == room and steps < most:
+            low, high = KEPT
+            kept = np.r_[:low, room - high : room]
+            j = len(kept)
+            Y[:j], X[:j] = vectors[:, kept].T @ Y, vectors[:, kept].T @ X
+            H[:] = 0.0
+            H[np.arange(j), np.arange(j)] = values[kept]
+    rows = len(values)
+
+    def pair(i: int) -> Eigenvalue:
+        force = vectors[:, i] @ Y[:rows]
+        trace = solve_B(force)
+        unit = math.sqrt(float(trace @ force))
+        force, trace = force / unit, trace / unit
+        product = apply_A(trace)
+        value = float(trace @ product)
+        r = product - value * force
+        trace.setflags(write=False)
+        return Eigenvalue(value=value, vector=trace, residual=math.sqrt(max(float(r @ solve_B(r)), 0.0)))
+
+    return Extremes(least=pair(0), largest=pair(-1), steps=steps)
 
 
 def largest_sparse(

@@ -25,9 +25,10 @@ if TYPE_CHECKING:
     from typing import Any
 
     from verification.advice.from_logs import advise_logs
+    from verification.advice.from_matrices import advise_matrices
     from verification.advice.from_moduli import advise_moduli
     from verification.advice.from_runs import advise_run
-    from verification.advice.roles import Advice, advise, advise_matrices
+    from verification.advice.roles import Advice, advise
     from verification.algorithm.fixed_point import iterate
     from verification.algorithm.iterate import Iterate
     from verification.algorithm.relaxation import Rule
@@ -65,7 +66,7 @@ _HOME = {
     "Iterate": "algorithm.iterate",
     "advise": "advice.roles",
     "advise_logs": "advice.from_logs",
-    "advise_matrices": "advice.roles",
+    "advise_matrices": "advice.from_matrices",
     "advise_moduli": "advice.from_moduli",
     "advise_run": "advice.from_runs",
     "build": "interface.build",

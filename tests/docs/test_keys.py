@@ -196,6 +196,8 @@ def documents(folder: Path, small: vf.Problem) -> list[dict[str, Any]]:
         vf.measure(small, refine=1),
         *(vf.advise(problem) for problem in (small, bars)),
         vf.advise_matrices(np.diag([2.0, 3.0]), np.eye(2)),
+        vf.advise_matrices(np.diag([2.0, 3.0]), np.eye(2), transfer=np.eye(1)),
+        vf.advise_matrices(lambda u: 2 * u, solve2=lambda f: f, unknowns=3),
         *(vf.advise_run(theta, ratio) for theta, ratio in (("0.1", "1.4"), ("0.6", "0.7"), ("0.2", "0.5"))),
         *(vf.advise_logs(logs) for logs in (diverging(folder), falling(folder), diverging(folder) + falling(folder))),
         vf.advise_moduli(young=(7, 2), poisson=("0.3", "0.3"), mirror=[2]),

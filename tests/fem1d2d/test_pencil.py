@@ -1,5 +1,7 @@
 """Extremal eigenvalues against spectra known by construction and against a dense solver; residuals as error bounds."""
 
+import itertools
+
 import numpy as np
 import pytest
 import scipy.linalg
@@ -11,6 +13,7 @@ from strategies import fewer, held_bodies, in_floats, plane_meshes, powers_of_tw
 from fem1d2d import (
     Condensation,
     bar,
+    extremes_by_solves,
     gram,
     interval,
     largest,
@@ -23,7 +26,7 @@ from fem1d2d import (
     supports,
     surface,
 )
-from fem1d2d.pencil import DENSE, rayleigh_quotient
+from fem1d2d.pencil import DENSE, LONG_BASIS, rayleigh_quotient
 
 EPS = np.finfo(float).eps
 
@@ -314,3 +317,54 @@ def test_no_body_exceeds_the_continuity_of_its_material(mesh, poisson):
     law = plane_strain(1.0, poisson)
     A, H = stiffness(in_floats(mesh), law).toarray(), gram(in_floats(mesh)).toarray()
     assert largest(A, H).value < law.continuity(2)
+
+
+# --- products and solves alone ----------------------------------------------------------------------------------------
+
+
+@given(pencils())
+def test_both_ends_of_a_spectrum_need_one_product_and_one_solve_a_step(pencil):
+    A, B, D, _ = pencil
+    calls = {"products": 0, "solves": 0}
+
+    def counted(name, matrix):
+        def apply(vector):
+            calls[name] += 1
+            return matrix @ vector
+
+        return apply
+
+    found = extremes_by_solves(counted("products", A), counted("solves", np.linalg.inv(B)), len(D), tolerance=1e-10)
+    unit = np.abs(D).max()
+    assert found.largest.value == pytest.approx(D.max(), abs=1e-9 * unit)
+    assert found.least.value == pytest.approx(D.min(), abs=1e-3 * unit)
+    assert calls["products"] == found.steps + 2  # and one to see each residual
+    assert calls["solves"] == found.steps + 1 + 4
+    for end in (found.least, found.largest):
+        assert end.vector @ B @ end.vector == pytest.approx(1, rel=1e-9)
+        assert np.abs(D - end.value).min() <= end.residual + 1e-10 * unit
+
+
+@pytest.mark.parametrize("n", [1000, 3000])
+def test_a_restart_keeps_what_was_found(n):
+    """A spectrum that crowds at its upper end takes more steps than there are vectors."""
+    D = 1 - (1 - np.linspace(0, 1, n)) ** 2
+    told = []
+    found = extremes_by_solves(
+        lambda x: D * x, lambda r: r, n, tolerance=1e-4, progress=lambda *step: told.append(step)
+    )
+    values = [value for _, value, _ in told]
+    assert all(later >= earlier - 1e-13 for earlier, later in itertools.pairwise(values))
+    assert 1 - found.largest.residual <= found.largest.value <= 1 + 1e-12
+    assert found.largest.residual <= 1.01e-4
+    assert found.steps > LONG_BASIS
+    assert told[-1][0] == found.steps
+
+
+def test_a_limit_of_steps_ends_with_what_is_known_and_its_residual():
+    D = np.linspace(1.0, 2.0, 2000)
+    found = extremes_by_solves(lambda x: D * x, lambda r: r, 2000, tolerance=1e-12, most=10)
+    assert found.steps == 10
+    assert found.largest.value < 2
+    assert np.abs(D - found.largest.value).min() <= found.largest.residual
+    assert found.largest.residual > 1e-3

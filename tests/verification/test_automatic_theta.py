@@ -11,7 +11,7 @@ from problem_list import changed
 
 import verification as vf
 from ndtheory import EnergyConstants, evaluate_sharp
-from verification.advice.roles import advise_matrices
+from verification.advice.from_matrices import advise_matrices
 from verification.algorithm.relaxation import RULES, Constant
 from verification.algorithm.theta import automatic, choose, sharp_bounds
 from verification.cli.problems import examples, load_problem

@@ -1,76 +1,289 @@
-"""Reading an interface stiffness matrix from a file of numpy or scipy, which may be damaged or too large."""
+"""Reading interface matrices and vectors from files of many kinds, which may be damaged or too large."""
 
 from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterator
+import zlib
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
+import scipy.io
 import scipy.sparse as sp
+from scipy.io.matlab import MatReadError
 
 from fem1d2d.mesh import Floats
 from verification.interface.array_headers import headers
+from verification.interface.files import NEEDED
 from verification.interface.matrices import MOST_ROWS, UNREADABLE
-from verification.problem.tables import ProblemError, unreadable
+from verification.problem.tables import ProblemError, short, unreadable
 
 #: Largest size of a matrix file: a full matrix of MOST_ROWS rows, with the two indices of each entry.
 MOST_BYTES = 24 * MOST_ROWS**2
 
+#: The same of a text: numbers of 17 digits take so many characters.
+MOST_CHARACTERS = 32 * MOST_ROWS**2
 
-def read_matrix(path: Path) -> Floats:
-    """A matrix from ``.npz`` (scipy.sparse.save_npz, or numpy.savez of one array) or ``.npy``.
+#: What the readers raise on a file that is no matrix.
+DAMAGED = (*UNREADABLE, MatReadError)
 
-    Shapes are read first: a small file may unpack to more than the memory holds.
+#: The first bytes of an HDF5 file, which MATLAB writes as version 7.3 behind a header of 512 bytes.
+HDF5 = b"\x89HDF\r\n\x1a\n"
+
+#: What a file is that none of the readers knows.
+KNOWN = ".npy, .npz, .mtx, .mat, .csv or .txt"
+
+
+class _Refusal(Exception):
+    """Why a file is refused, in words of our own."""
+
+
+def read_matrix(path: Path, name: str = "") -> Floats:
+    """A matrix or a vector from a file, by its ending.
+
+    ``.npy``; ``.npz`` (scipy.sparse.save_npz, or numpy.savez); ``.mtx`` (Matrix Market); ``.mat`` (MATLAB, not 7.3);
+    ``.csv`` and ``.txt`` (rows of numbers, separated by commas, semicolons or blanks).  Shapes are read first: a small
+    file may unpack to more than the memory holds.
+
+    Parameters
+    ----------
+    path : Path
+    name : str
+        Which of several arrays; where there is one only, its name does not matter.
 
     Raises
     ------
     ProblemError
     """
     refuse = lambda needed: ProblemError(str(path), "", None, needed)
-    why = unreadable(path, MOST_BYTES)
+    read = _READERS.get(path.suffix.lower())
+    text = read is _text
+    why = unreadable(path, MOST_CHARACTERS if text else MOST_BYTES)
     if why:
-        raise refuse(why if "folder" not in why else "a matrix file (.npz or .npy) is needed, this is a folder")
+        raise refuse(why if "folder" not in why else f"a matrix file ({KNOWN}) is needed, this is a folder")
+    if read is None:
+        raise refuse(f"a matrix file is needed: {KNOWN}")
     try:
-        with warnings.catch_warnings(), path.open("rb") as file:
+        with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of numbers that do not fit their type: what comes out is checked
-            most = max(_rows(file), default=0)
-            if most > MOST_ROWS:
-                raise refuse(f"needed at most {MOST_ROWS} rows, received {most}")
+            return _real(read(path, name))
+    except _Refusal as error:
+        raise refuse(str(error)) from None
+    except DAMAGED:
+        raise refuse(f"not a matrix that {_WRITERS[path.suffix.lower()]} saved") from None
+
+
+def read_array(path: Path, name: str) -> Floats:
+    """One array of a file ``.npz`` that holds a sparse matrix too, as P.npz of a run does.
+
+    Raises
+    ------
+    ProblemError
+    """
+    try:
+        with path.open("rb") as file:
+            _within(max(_rows(file), default=0))
             file.seek(0)
-            data = np.load(file, allow_pickle=False)
-            if isinstance(data, np.ndarray):
-                return _real(data)
-            if "format" in data.files and "shape" in data.files:
-                rows = int(np.max(data["shape"]))
-                if rows > MOST_ROWS:
-                    raise refuse(f"needed at most {MOST_ROWS} rows, received {rows}")
-                file.seek(0)
-                sparse = sp.load_npz(file)
-                if hasattr(sparse, "check_format"):
-                    sparse.check_format(full_check=True)  # else indices that point outside are followed
-                return _real(sparse.toarray())
-            if len(data.files) != 1:
-                raise refuse(f"needed one array, received {', '.join(data.files) or 'none'}")
-            return _real(data[data.files[0]])
-    except UNREADABLE as error:
-        if isinstance(error, ProblemError):
-            raise
-        why = f": {error}" if "needed real numbers" in str(error) else ""
-        raise refuse(f"not a matrix that numpy or scipy saved{why}") from None
+            return _real(np.load(file, allow_pickle=False)[name])
+    except _Refusal as error:
+        raise ProblemError(str(path), name, None, str(error)) from None
+    except DAMAGED:
+        raise ProblemError(str(path), name, None, "not an array that numpy saved") from None
+
+
+def names_in(path: Path) -> tuple[str, ...]:
+    """The names of the arrays in a file ``.npz`` or ``.mat``; none where it is neither, or damaged."""
+    try:
+        if unreadable(path, MOST_BYTES):
+            return ()
+        if path.suffix.lower() == ".npz":
+            with path.open("rb") as file:
+                return tuple(header.name for header in headers(file))
+        if path.suffix.lower() == ".mat":
+            return tuple(name for name, *_ in scipy.io.whosmat(path))
+    except DAMAGED:
+        pass
+    return ()
+
+
+def is_interface(path: Path) -> bool:
+    """Whether a file has all arrays of an ``interface.npz``."""
+    return set(NEEDED) <= set(names_in(path))
+
+
+def _within(rows: int) -> None:
+    if rows > MOST_ROWS:
+        raise _Refusal(f"needed at most {MOST_ROWS} rows, received {rows}")
+
+
+def _real(matrix: np.ndarray) -> Floats:
+    if matrix.dtype.kind not in "fiu":
+        received = ", received complex ones" if matrix.dtype.kind == "c" else ""
+        raise _Refusal(f"not a matrix that numpy or scipy saved: needed real numbers{received}")
+    return np.asarray(matrix, dtype=float)
+
+
+def _chosen(names: list[str], name: str) -> str:
+    """Which of several arrays."""
+    if name in names:
+        return name
+    if len(names) != 1:
+        wanted = f"one array, or one named {name}" if name else "one array"
+        raise _Refusal(f"needed {wanted}, received {short(', '.join(names), 200) or 'none'}")
+    return names[0]
+
+
+# --- numpy and scipy --------------------------------------------------------------------------------------------------
+
+
+def _numpy(path: Path, name: str) -> np.ndarray:
+    with path.open("rb") as file:
+        _within(max(_rows(file), default=0))
+        file.seek(0)
+        data = np.load(file, allow_pickle=False)
+        if isinstance(data, np.ndarray):
+            return data
+        if "format" in data.files and "shape" in data.files:
+            _within(int(np.max(data["shape"])))
+            file.seek(0)
+            return _dense(sp.load_npz(file))
+        return np.asarray(data[_chosen(data.files, name)])
+
+
+def _dense(sparse: sp.sparray) -> np.ndarray:
+    if hasattr(sparse, "check_format"):
+        sparse.check_format(full_check=True)  # else indices that point outside are followed
+    return np.asarray(sparse.toarray())
 
 
 def _rows(file: BinaryIO) -> Iterator[int]:
     """For each array of a file how many rows a square matrix of as many entries has, from its header alone."""
     for header in headers(file):
-        if header.entry_bytes > np.dtype(np.clongdouble).itemsize:
+        if header.entry_bytes > np.dtype(np.clongdouble).itemsize and header.entries > MOST_ROWS:
             raise ValueError("needed real numbers")
         yield math.isqrt(header.entries)
 
 
-def _real(matrix: np.ndarray) -> Floats:
-    if matrix.dtype.kind not in "fiu":
-        raise ValueError("needed real numbers" + (", received complex ones" if matrix.dtype.kind == "c" else ""))
-    return np.asarray(matrix, dtype=float)
+# --- Matrix Market ----------------------------------------------------------------------------------------------------
+
+
+def _market(path: Path, name: str) -> np.ndarray:
+    rows, columns, entries, _, field, _ = scipy.io.mminfo(path)
+    if field not in ("real", "double", "integer", "unsigned-integer"):
+        raise _Refusal(f"a Matrix Market file of {field} entries: needed real ones")
+    _within(max(rows, columns, math.isqrt(entries)))
+    found = scipy.io.mmread(path, spmatrix=False)
+    return _dense(found) if sp.issparse(found) else np.asarray(found)
+
+
+# --- MATLAB -----------------------------------------------------------------------------------------------------------
+
+
+def _matlab(path: Path, name: str) -> np.ndarray:
+    with path.open("rb") as file:
+        head = file.read(520)
+        if head.startswith(HDF5) or head[512:] == HDF5:
+            raise _Refusal(
+                "a MATLAB file of version 7.3 (HDF5), which is not read here: needed one of version 7,"
+                " save('S.mat', 'S1', 'S2', '-v7')"
+            )
+        if len(head) < 20:
+            raise ValueError("no MATLAB file")
+        file.seek(0)
+        if _unpacked(file) > MOST_BYTES:
+            raise _Refusal(f"needed a file that unpacks to at most {MOST_BYTES} bytes")
+    shapes = {entry[0]: entry[1] for entry in scipy.io.whosmat(path)}
+    chosen = _chosen(list(shapes), name)
+    _within(max(shapes[chosen], default=0))
+    found = scipy.io.loadmat(path, variable_names=[chosen], spmatrix=False)[chosen]
+    return _dense(sp.csc_array(found)) if sp.issparse(found) else np.asarray(found)
+
+
+def _unpacked(file: BinaryIO) -> int:
+    """The bytes to which the compressed elements of a MATLAB file unpack; no more than MOST_BYTES and a block."""
+    head = file.read(128)
+    order = {b"IM": "<", b"MI": ">"}.get(head[126:128])
+    if order is None:  # version 4, which is not compressed
+        return 0
+    total = 0
+    while total <= MOST_BYTES and len(tag := file.read(8)) == 8:
+        kind, length = (int(n) for n in np.frombuffer(tag, dtype=f"{order}u4"))
+        if kind != 15:  # not compressed
+            file.seek(length, 1)
+            total += length
+            continue
+        data, rest = zlib.decompressobj(), file.read(length)
+        while rest and total <= MOST_BYTES:
+            total += len(data.decompress(rest, 2**20))
+            rest = data.unconsumed_tail
+    return total
+
+
+# --- texts ------------------------------------------------------------------------------------------------------------
+
+
+def _text(path: Path, name: str) -> np.ndarray:
+    """Rows of numbers; what begins with # or % is a comment."""
+    rows: list[Floats] = []
+    separator: str | None = None
+    with path.open(encoding="utf-8-sig") as file:
+        for number, line in enumerate(file, 1):
+            line = line.strip()
+            if not line or line[0] in "#%":
+                continue
+            if not rows:
+                separator = next((sign for sign in ";," if sign in line), None)
+            cells = [cell.strip() for cell in line.split(separator)]
+            if separator is not None and not cells[-1]:
+                cells.pop()  # a separator at the end of each line
+            if max(len(cells), len(rows) + 1) > MOST_ROWS:
+                _within(max(len(cells), len(rows) + 1))
+            rows.append(_numbers(cells, number, first=not rows))
+            if len(rows[-1]) != len(rows[0]):
+                raise _Refusal(f"line {number} has {len(rows[-1])} numbers: needed {len(rows[0])}, as in the first row")
+    if not rows:
+        raise _Refusal("needed rows of numbers, received none")
+    return np.array(rows)
+
+
+def _numbers(cells: list[str], line: int, *, first: bool) -> Floats:
+    try:
+        return np.array([float(cell) for cell in cells])
+    except ValueError:
+        bad = next(cell for cell in cells if not _is_number(cell))
+    shown = f"line {line} has {short(bad, 30)!r}"
+    if "," in bad and _is_number(bad.replace(",", ".")):
+        raise _Refusal(f"{shown}, a decimal comma: needed a decimal point")
+    if first and not any(map(_is_number, cells)):
+        raise _Refusal(f"{shown}, so that it looks like a header: needed numbers alone, delete it")
+    raise _Refusal(f"{shown}: needed a number")
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
+
+
+_READERS: dict[str, Callable[[Path, str], np.ndarray]] = {
+    ".npy": _numpy,
+    ".npz": _numpy,
+    ".mtx": _market,
+    ".mat": _matlab,
+    ".csv": _text,
+    ".txt": _text,
+}
+
+#: Who writes files of these endings.
+_WRITERS = {
+    ".npy": "numpy or scipy",
+    ".npz": "numpy or scipy",
+    ".mtx": "a Matrix Market writer",
+    ".mat": "MATLAB or scipy",
+    ".csv": "any program as text",
+    ".txt": "any program as text",
+}

@@ -8,26 +8,21 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
-import numpy as np
-
-from fem1d2d import largest
-from fem1d2d.mesh import Floats
 from ndtheory import EnergyConstants, Number, evaluate_sharp
 from ndtheory.sharp import predicted_rate, predicted_theta
 from verification.advice.readings import NextRun, RunReading, SeenRun
 from verification.advice.role import Role
 from verification.advice.seen import Interval, SeenLog
+from verification.advice.seen_matrices import SeenMatrices
 from verification.algorithm.theta import automatic, by_prediction, sharp_bounds
 from verification.constants import measure
 from verification.document import Document
 from verification.interface.build import build
-from verification.interface.matrices import check_matrix, size
 from verification.interface.pair import ContactPair, SingularRole, TwoBodies
 from verification.operators import Pencils, needs_matrices, pair_or_bodies
 from verification.problem import Problem, load
 from verification.problem.tables import ProblemError
 from verification.progress import Progress, silent
-from verification.threads import one_thread
 
 if TYPE_CHECKING:
     from verification.advice.from_moduli import SeenModuli
@@ -63,6 +58,8 @@ class Advice(Document):
         What these logs say of rho together.
     moduli : SeenModuli or None
         What was given of two bodies, and bounds of rho from below.
+    matrices : SeenMatrices or None
+        What was seen of the matrices that were given; None where none were.
     """
 
     schema: ClassVar[str] = "ndtheory.advice/1"
@@ -77,6 +74,7 @@ class Advice(Document):
     next: NextRun | None = None
     logs: tuple[SeenLog, ...] = ()
     interval: Interval | None = None
+    matrices: SeenMatrices | None = None
     problem: Problem | None = None
     moduli: SeenModuli | None = None
 
@@ -131,6 +129,8 @@ class Advice(Document):
             reason["moduli"] = "no moduli were given"
         elif not self.neumann_body:
             reason["neumann_body"] = "both roles have the same bounds"
+        if self.matrices is None:
+            reason["matrices"] = "no matrices were given"
         return {
             "neumann_body": self.neumann_body,
             "roles": [role.to_dict() for role in self.roles],
@@ -140,6 +140,7 @@ class Advice(Document):
             "logs": [log.to_dict() for log in self.logs],
             "interval": None if self.interval is None else self.interval.to_dict(),
             "moduli": None if self.moduli is None else self.moduli.to_dict(),
+            "matrices": None if self.matrices is None else self.matrices.to_dict(),
             "outside_theorem": list(self.outside),
             "reason": reason,
         }
@@ -268,44 +269,6 @@ def _roles_without_matrices(bodies: TwoBodies, progress: Progress) -> tuple[Role
             reason |= dict.fromkeys((*unproved, "friction_threshold"), nothing)
         roles.append(replace(plain_role(neumann, Fraction(rho)), reason=reason, **unproved))
     return tuple(roles)
-
-
-def advise_matrices(S1: Floats, S2: Floats) -> Advice:
-    """Advice from the interface stiffness matrices alone, free of friction.
-
-    Parameters
-    ----------
-    S1, S2 : array, shape (n, n)
-        Schur complements of bodies 1 and 2 on the same interface unknowns; symmetric positive definite.
-
-    Returns
-    -------
-    Advice
-
-    Raises
-    ------
-    ValueError
-        Matrices that are not square, finite, symmetric or positive definite, or do not fit.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> found = advise_matrices(np.diag([3.0, 2.0]), np.eye(2))
-    >>> found.neumann_body, round(found.best.theta_predicted, 3)
-    (1, 0.8)
-    """
-    for name, matrix in (("S1", S1), ("S2", S2)):
-        check_matrix(name, matrix)
-    if S1.shape != S2.shape:
-        raise ValueError(f"S1 is {size(S1)}, S2 is {size(S2)}: needed matrices on the same interface unknowns")
-    unit_1, unit_2 = float(np.abs(S1).max()), float(np.abs(S2).max())
-    one, two = S1 / unit_1, S2 / unit_2  # entries of order 1, whatever the unit
-    with one_thread():
-        ratios = {2: Fraction(largest(one, two).value), 1: Fraction(largest(two, one).value)}
-    unit = {2: Fraction(unit_1) / Fraction(unit_2), 1: Fraction(unit_2) / Fraction(unit_1)}
-    roles = tuple(plain_role(neumann, rho * unit[neumann]) for neumann, rho in ratios.items())
-    best = min(roles, key=lambda role: role.predicted[1])
-    return Advice(neumann_body=best.neumann_body, roles=roles, units=UNITS)
 
 
 def plain_role(neumann_body: Any, rho: Fraction) -> Role:

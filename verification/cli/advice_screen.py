@@ -6,6 +6,7 @@ from verification.advice.readings import NextRun, RunReading, SeenRun
 from verification.advice.roles import Advice
 from verification.advice.seen import Interval, LogBound, SeenLog
 from verification.cli.console import figures, heading, near_one, note, printable, say, table
+from verification.cli.matrices import matrices
 from verification.cli.moduli_screen import moduli
 from verification.cli.screens import steps
 from verification.cli.typed import Typed
@@ -17,6 +18,8 @@ def advice(found: Advice, typed: Typed | None = None) -> None:
     if found.moduli is not None:
         moduli(found, found.moduli)
         return
+    if found.matrices is not None:
+        matrices(found.matrices)
     if found.run is not None and found.next is not None:
         _seen(found.run, found.readings, found.next)
     if found.interval is not None and found.next is not None:

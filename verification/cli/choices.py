@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from ndtheory import HypothesisError
 from verification.cli.console import Interrupted, complain, deliver, stages
+from verification.cli.matrices import NAMES as OF_MATRICES
+from verification.cli.matrices import advice_from_files, matrix_options
+from verification.cli.moduli import NAMES as OF_MODULI
+from verification.cli.moduli import advice_from_moduli, moduli_options, of_moduli
 from verification.cli.problems import FILE, JSON, SET, load_problem
 from verification.cli.typed import Typed
-
-if TYPE_CHECKING:
-    from verification.advice.roles import Advice
 
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path), required=False)
 @SET
-@click.option("--S1", "S1", type=click.Path(path_type=Path), help="Interface stiffness of body 1, .npz or .npy.")
-@click.option("--S2", "S2", type=click.Path(path_type=Path), help="Interface stiffness of body 2, .npz or .npy.")
+@matrix_options
 @click.option(
     "--log",
     "logs",
@@ -42,54 +42,34 @@ if TYPE_CHECKING:
     help="Ratio of its residual |Tg - g|, absolute and unrelaxed, from one step to the next, steady over 10 or more; "
     "1 where it rises and falls.",
 )
-@click.option("--young", metavar="E1,E2", help="Moduli of elasticity of body 1 and of body 2, in one unit of stress.")
-@click.option("--poisson", metavar="NU1,NU2", help="Poisson ratios of body 1 and of body 2.")
-@click.option("--plane-stress", is_flag=True, help="With --young: plane stress; plane strain by default.")
-@click.option("--three-dimensional", is_flag=True, help="With --young: bodies in space.")
-@click.option(
-    "--corners",
-    type=click.Choice(["none", "1", "2", "both"]),
-    help="With --young: which body ends in corners of 90 degrees at the ends of Gamma_c.",
-)
-@click.option(
-    "--mirror",
-    type=click.Choice(["1", "2", "both"]),
-    help="With --young: the body whose mirror image in a flat Gamma_c lies inside the other one, and wherever it is "
-    "held, its image is held too.",
-)
-@click.option(
-    "--flat",
-    is_flag=True,
-    help="With --mirror: the other body is at least twice as wide as high and held along its other side.",
-)
+@moduli_options
 @JSON
 def advise(
     file: Path | None,
     keys: dict[str, str],
-    S1: Path | None,
-    S2: Path | None,
     logs: tuple[Path, ...],
     thetas: tuple[str, ...],
     ratio: str | None,
-    young: str | None,
-    poisson: str | None,
     as_json: bool,
-    **shape: Any,
+    **options: Any,
 ) -> None:
     """Which body gets the Neumann problem, and which theta?
 
     Give a problem FILE, or the interface.npz that a run has written; or the Schur complements of both bodies on the
-    same interface unknowns (dimension: force per displacement, any units); or runs of any other code with constant
-    theta, as logs or as the ratio of their residuals: what these can mean, and which theta to run next.  Give the ratio
-    of the absolute residual |Tg - g|, not of the relative one of coupling libraries; a log may hold either.  Before
-    there is a mesh, the moduli of both bodies alone bound rho from below.
+    same interface unknowns (force per displacement, any units), with a map between grids and with friction if there
+    are such: then vectors list all tangential components from left to right, then all normal ones; or runs of any
+    other code with constant theta, as logs or as the ratio of their residuals: what these can mean, and which theta to
+    run next.  Give the ratio of the absolute residual |Tg - g|, not of the relative one of coupling libraries; a log
+    may hold either.  Before there is a mesh, the moduli of both bodies alone bound rho from below.
 
     \b
     Examples:
       ndtheory advise my.toml
       ndtheory advise my.toml --set contact.friction=0.4
       ndtheory advise results/interface.npz
-      ndtheory advise --S1 a.npz --S2 b.npz
+      ndtheory advise --S1 a.npz --S2 b.mtx
+      ndtheory advise --S1 both.mat --map P.npz
+      ndtheory advise --S1 a.npz --S2 b.npz --friction 0.2 --x x.npy --radius 0.1
       ndtheory advise --theta 0.1 --ratio 1.4
       ndtheory advise --log precice-Solid-convergence.log --theta 0.5
       ndtheory advise --log a.log --theta 0.3 --log b.log --theta 0.6
@@ -97,8 +77,16 @@ def advise(
     """
     context = click.get_current_context()
     theta = thetas[0] if thetas else None
-    forms: dict[str, list[Any]] = {"FILE": [file], "--S1 and --S2": [S1, S2], "--theta and --ratio": [theta, ratio]}
-    forms["--young and --poisson"] = [young, poisson]
+    matrices, moduli = (
+        {name: options[name] for name in names.values() if options[name] not in (None, False)}
+        for names in (OF_MATRICES, OF_MODULI)
+    )
+    forms: dict[str, list[Any]] = {
+        "FILE": [file],
+        "--S1 and --S2": [matrices or None],
+        "--theta and --ratio": [theta, ratio],
+        of_moduli(moduli): [moduli or None],
+    }
     if logs:
         if ratio is not None:
             raise click.UsageError("received --log with --ratio: a log shows its own ratio", context)
@@ -115,9 +103,6 @@ def advise(
         raise click.UsageError(f"{received}: needed one --theta for each log, or one with --ratio", context)
     if keys and file is None:
         raise click.UsageError("received --set without FILE: it sets a key of a problem file", context)
-    of_moduli = [f"--{name.replace('_', '-')}" for name, value in shape.items() if value]
-    if of_moduli and young is None:
-        raise click.UsageError(f"received {of_moduli[0]} with {given[0]}: it goes with --young and --poisson", context)
     from verification.advice import roles as advice
     from verification.cli.advice_screen import advice as show
 
@@ -127,16 +112,11 @@ def advise(
         problem = file if file.suffix == ".npz" else load_problem(file, keys)
         with stages() as tell:
             found = advice.advise(problem, progress=tell)
-    elif S1 is not None and S2 is not None:
-        from verification.advice.matrix_files import read_matrix
-
-        matrices = [read_matrix(path) for path in (S1, S2)]
-        try:
-            found = advice.advise_matrices(*matrices)
-        except ValueError as error:
-            raise click.UsageError(f"{S1}, {S2}: {error}", context) from None
-    elif young is not None and poisson is not None:
-        found = _from_moduli(context, young, poisson, **shape)
+    elif matrices:
+        with stages() as tell:
+            found = advice_from_files(matrices, tell)
+    elif moduli:
+        found = advice_from_moduli(moduli)
     else:
         try:
             from verification.advice.from_logs import advise_logs
@@ -146,39 +126,6 @@ def advise(
         except HypothesisError as error:
             raise click.UsageError(f"--{error}", context) from None
     deliver(found, lambda: show(found, None if file is None else Typed(file=file, keys=keys)), as_json)
-
-
-def _from_moduli(
-    context: click.Context,
-    young: str,
-    poisson: str,
-    *,
-    plane_stress: bool,
-    three_dimensional: bool,
-    corners: Any,
-    mirror: str | None,
-    flat: bool,
-) -> Advice:
-    from verification.advice.from_moduli import advise_moduli
-
-    if flat and mirror is None:
-        raise click.UsageError(
-            "received --flat without --mirror: it tells of the body that such an image fits into", context
-        )
-    if plane_stress and three_dimensional:
-        raise click.UsageError("received --plane-stress with --three-dimensional: needed one of both", context)
-    fits = [body for body in (1, 2) if mirror in (str(body), "both")]
-    try:
-        return advise_moduli(
-            young=young.split(","),
-            poisson=poisson.split(","),
-            plane="stress" if plane_stress else "3d" if three_dimensional else "strain",
-            corners=corners,
-            mirror=fits,
-            flat=flat,
-        )
-    except HypothesisError as error:
-        raise click.UsageError(f"--{error}", context) from None
 
 
 def _picture(context: click.Context, parameter: click.Parameter, value: Path) -> Path:

@@ -17,12 +17,15 @@ class Header:
 
     Attributes
     ----------
+    name : str
+        Of the array in its file; empty where the file is one array.
     entries : int
         How many numbers, truth values or texts the array has.
     entry_bytes : int
         What one of them takes in memory.
     """
 
+    name: str
     entries: int
     entry_bytes: int
 
@@ -42,16 +45,16 @@ def headers(file: BinaryIO) -> Iterator[Header]:
     """
     if not zipfile.is_zipfile(file):
         file.seek(0)
-        yield _header(file)
+        yield _header("", file)
         return
     with zipfile.ZipFile(file) as archive:
         for name in archive.namelist():
             with archive.open(name) as member:
-                yield _header(member)
+                yield _header(name.removesuffix(".npy"), member)
 
 
-def _header(stream: IO[bytes]) -> Header:
+def _header(name: str, stream: IO[bytes]) -> Header:
     version = np.lib.format.read_magic(stream)
     read = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}[version]
     shape, _, dtype = read(stream)
-    return Header(entries=math.prod(shape), entry_bytes=dtype.itemsize)
+    return Header(name=name, entries=math.prod(shape), entry_bytes=dtype.itemsize)

@@ -10,12 +10,12 @@ import numpy as np
 from fem1d2d import trapezoid
 from fem1d2d.mesh import Floats
 from verification.interface import assembly
-from verification.interface.body import Condensed
+from verification.interface.body import NO_MOTIONS, Condensed
 from verification.interface.files import read_interface
 from verification.interface.friction import Given, Law
 from verification.interface.grid import Grid
 from verification.interface.interface import Interface
-from verification.interface.matrices import check_matrix, check_nodes, real_array, size
+from verification.interface.matrices import check_matrix, check_nodes, real_array, size, stiffness
 from verification.interface.pair import ContactPair
 from verification.problem import Problem, load
 
@@ -49,7 +49,8 @@ def build(
     law : Law, optional
         A law of friction in place of the problem's, or of a kernel.
     S1, S2 : array, shapes (2 n1, 2 n1), (2 n2, 2 n2)
-        Schur complements of the stiffness matrices on the contact nodes: symmetric, positive definite.
+        Schur complements of the stiffness matrices on the contact nodes: symmetric, positive definite; that of the
+        contact body may be singular, where contact alone holds it.
     load1, load2 : array, shapes (2 n1,), (2 n2,), optional
         Loads condensed onto the contact nodes; 0 by default.
     x : array, shape (n,)
@@ -99,12 +100,15 @@ def build(
         raise ValueError(f"neumann_body {neumann_body!r}: needed 1 or 2")
     if kernel is not None and law is not None:
         raise ValueError("received a kernel and a law: needed one of them")
+    contact_name, neumann_name = ("S1", "S2") if neumann_body == 2 else ("S2", "S1")
     for name, matrix in (("S1", S1), ("S2", S2)):
-        check_matrix(name, np.asarray(matrix))
+        if name == neumann_name:
+            check_matrix(name, np.asarray(matrix))
         if len(matrix) % 2:
             raise ValueError(f"{name} is {size(matrix)}: needed two components at each contact node")
     lower, upper = (S1, load1), (S2, load2)
     (S_c, l_c), (S_n, l_n) = (lower, upper) if neumann_body == 2 else (upper, lower)
+    motions = stiffness(contact_name, np.asarray(S_c)).motions
     n, m = len(S_c) // 2, len(S_n) // 2
     if transfer is None and n != m:
         raise ValueError(f"S1 is {size(S1)}, S2 is {size(S2)}: needed the same contact nodes, or a transfer")
@@ -119,8 +123,8 @@ def build(
     other = grid if P is None else Grid(x=np.full(m, np.nan), weights=P.T @ w)
     given = law if kernel is None else Given(matrix=real_array("kernel", kernel, (n, m)))
     contact, neumann = (
-        _condensed(name, matrix, load, own, upward=neumann_body == 2)
-        for name, matrix, load, own in (("contact", S_c, l_c, grid), ("neumann", S_n, l_n, other))
+        _condensed(name, matrix, load, own, free, upward=neumann_body == 2)
+        for name, matrix, load, own, free in (("contact", S_c, l_c, grid, motions), ("neumann", S_n, l_n, other, None))
     )
     interface = Interface(contact=grid, neumann=other, gap=distance, law=given, transfer=P)
     pair = ContactPair(contact=contact, neumann=neumann, interface=interface, neumann_body=neumann_body)
@@ -132,7 +136,9 @@ def pair_of(problem: Problem | ContactPair | Path | str) -> ContactPair:
     return problem if isinstance(problem, ContactPair) else build(problem)
 
 
-def _condensed(name: str, matrix: Floats, load: Floats | None, grid: Grid, *, upward: bool) -> Condensed:
+def _condensed(
+    name: str, matrix: Floats, load: Floats | None, grid: Grid, motions: Floats | None, *, upward: bool
+) -> Condensed:
     S = np.array(matrix, dtype=float)
     condensed = Condensed(
         grid=grid,
@@ -140,5 +146,6 @@ def _condensed(name: str, matrix: Floats, load: Floats | None, grid: Grid, *, up
         load=np.zeros(grid.size) if load is None else real_array(f"the load of the {name} body", load, (grid.size,)),
         known=np.zeros(grid.size),
         free=np.ones(grid.size, dtype=bool),
+        motions=NO_MOTIONS if motions is None or not motions.size else motions,
     )
     return condensed if upward else condensed.turned()

@@ -1,0 +1,341 @@
+"""`advise` from files of every kind, with friction and between grids; matrices that are no Schur complement."""
+
+import zlib
+
+import numpy as np
+import pytest
+import scipy.io
+import scipy.sparse as sp
+from advice_calls import GOOD, by_body, saved
+
+import verification as vf
+from verification.advice.matrix_files import read_matrix
+from verification.interface.assembly import build
+
+
+@pytest.fixture
+def matrices(write):
+    pair = build(vf.load(write("wrong roles")))
+    return pair.contact.stiffness, pair.neumann.stiffness  # bodies 1 and 2
+
+
+# --- other kinds of files ---------------------------------------------------------------------------------------------
+
+FULL = np.array([[4.0, 1.0, 0.5], [1.0, 3.0, -0.25], [0.5, -0.25, 2.0]])
+
+
+def text(separator, end="", before=""):
+    rows = "\n".join(separator.join(map(repr, row)) + end for row in FULL.tolist())
+    return lambda path: path.write_text(f"{before}{rows}\n", "utf-8")
+
+
+WRITTEN = {
+    "a.npy": lambda path: np.save(path, FULL),
+    "b.npz": lambda path: np.savez(path, other=np.eye(7), S2=FULL),
+    "c.mtx": lambda path: scipy.io.mmwrite(path, FULL, symmetry="symmetric"),
+    "d.mtx": lambda path: scipy.io.mmwrite(path, FULL, symmetry="general"),
+    "e.mtx": lambda path: scipy.io.mmwrite(path, sp.coo_array(FULL), symmetry="symmetric"),
+    "f.mtx": lambda path: scipy.io.mmwrite(path, sp.coo_array(FULL), symmetry="general"),
+    "g.mat": lambda path: scipy.io.savemat(path, {"anything": FULL}),
+    "h.mat": lambda path: scipy.io.savemat(path, {"S2": FULL, "S1": np.eye(3)}, do_compression=True),
+    "i.mat": lambda path: scipy.io.savemat(path, {"S2": sp.csc_array(FULL), "x": 1.0}),
+    "j.mat": lambda path: scipy.io.savemat(path, {"S2": FULL}, format="4"),
+    "k.csv": text(","),
+    "l.csv": text("; ", end=";"),
+    "m.txt": text(" "),
+    "n.txt": text("\t", before="# K\u00f6rper\n\n% columns\n"),
+    "o.CSV": lambda path: path.write_bytes(
+        b"\xef\xbb\xbf" + b"\r\n".join(b",".join(b"%.17g" % v for v in r) for r in FULL)
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WRITTEN)
+def test_a_matrix_is_read_from_every_kind_of_file(tmp_path, name):
+    WRITTEN[name](tmp_path / name)
+    assert np.array_equal(read_matrix(tmp_path / name, "S2"), FULL)
+
+
+def compressed(path):
+    """A MATLAB file of a few kB that unpacks to 400 MB."""
+    scipy.io.savemat(path, {"S2": FULL})
+    data = zlib.compressobj(9)
+    block = b"".join(data.compress(bytes(10**7)) for _ in range(40)) + data.flush()
+    head = path.read_bytes()[:128]
+    path.write_bytes(head + np.array([15, len(block)], dtype="<u4").tobytes() + block)
+
+
+def hdf5(path):
+    path.write_bytes(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM" + bytes(384) + b"\x89HDF\r\n\x1a\n" + bytes(64))
+
+
+HOSTILE = {
+    "a.mat": (hdf5, ["7.3", "HDF5", "'-v7'"]),
+    "b.mat": (compressed, ["unpacks to at most"]),
+    "c.mat": (lambda path: path.write_bytes(b""), ["MATLAB or scipy"]),
+    "d.mat": (lambda path: path.write_bytes(b"x" * 400), ["MATLAB or scipy"]),
+    "e.mat": (lambda path: scipy.io.savemat(path, {}), ["one array", "none"]),
+    "f.mat": (lambda path: scipy.io.savemat(path, {"K": FULL, "M": FULL}), ["named S2", "K, M"]),
+    "g.mat": (lambda path: scipy.io.savemat(path, {"S2": "text"}), ["real numbers"]),
+    "h.mat": (lambda path: scipy.io.savemat(path, {"S2": {"a": FULL}}), ["real numbers"]),
+    "i.mat": (lambda path: scipy.io.savemat(path, {"S2": FULL * 1j}), ["complex"]),
+    "j.mat": (lambda path: scipy.io.savemat(path, {"S2": sp.csc_array((10**6, 10**6))}), ["1000000", "4000"]),
+    "k.mtx": (
+        lambda path: path.write_text("%%MatrixMarket matrix coordinate real general\n3 3 9\n1 1 1\n"),
+        ["Market"],
+    ),
+    "l.mtx": (
+        lambda path: path.write_text("%%MatrixMarket matrix coordinate real general\n9 9 99999999999\n1 1 1\n"),
+        ["4000"],
+    ),
+    "m.mtx": (
+        lambda path: path.write_text("%%MatrixMarket matrix array real general\n1000000 1000000\n1\n"),
+        ["1000000", "4000"],
+    ),
+    "n.mtx": (lambda path: path.write_text("1 2\n2 1\n"), ["Market"]),
+    "o.mtx": (
+        lambda path: path.write_text("%%MatrixMarket matrix coordinate pattern symmetric\n2 2 1\n1 1\n"),
+        ["pattern", "real"],
+    ),
+    "p.mtx": (lambda path: scipy.io.mmwrite(path, FULL * 1j), ["complex", "real"]),
+    "q.mtx": (
+        lambda path: path.write_text("%%MatrixMarket matrix coordinate real general\n2 2 1\n5 5 1\n"),
+        ["Market"],
+    ),
+    "r.csv": (lambda path: path.write_text("a,b\n1,2\n2,3\n"), ["line 1", "'a'", "header", "delete"]),
+    "s.csv": (lambda path: path.write_text("1,2\n2,x\n"), ["line 2", "'x'", "needed a number"]),
+    "t.csv": (lambda path: path.write_text("1,2\n2\n"), ["line 2", "1 numbers", "needed 2"]),
+    "u.csv": (lambda path: path.write_text("1,5;2,0\n2,0;3,0\n"), ["line 1", "decimal comma"]),
+    "v.csv": (lambda path: path.write_text("1,,2\n"), ["line 1", "''"]),
+    "w.csv": (lambda path: path.write_text("# nothing\n\n"), ["rows of numbers", "none"]),
+    "x.csv": (lambda path: path.write_text(",".join("1" * 4001) + "\n"), ["4001", "4000"]),
+    "y.txt": (lambda path: path.write_text("1\n" * 4001), ["4001", "4000"]),
+    "z.txt": (lambda path: path.write_bytes(bytes(range(256))), ["text"]),
+    "a.h5": (lambda path: path.write_bytes(b"x"), [".npy", ".mat", ".csv"]),
+    "none": (lambda path: path.write_bytes(b"x"), [".npy", ".mat", ".csv"]),
+    "b.csv": (lambda path: path.mkdir(), ["folder"]),
+    "c.mtx": (lambda path: None, ["no such file"]),
+}
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+@pytest.mark.parametrize("other", [False, True], ids=["S2", "S1 alone"])
+def test_a_file_of_another_kind_that_holds_no_matrix_is_refused_in_one_line(call, tmp_path, name, other):
+    write, fragments = HOSTILE[name]
+    bad = tmp_path / name
+    write(bad)
+    words = ("--S1", bad, "--S2", bad) if other else ("--S1", saved(tmp_path, "good", GOOD), "--S2", bad)
+    complaint = call("advise", *words).complaint
+    fragments = [] if other else fragments  # of one file for both its names may be asked for first
+    assert [fragment for fragment in [name, *fragments] if fragment not in complaint] == []
+    assert complaint.isprintable()
+    assert len(complaint) < 1000
+
+
+@pytest.mark.parametrize("ending", ["npz", "mat"])
+def test_one_file_may_hold_both_matrices(call, tmp_path, matrices, ending):
+    both = tmp_path / f"both.{ending}"
+    named = dict(zip(("S1", "S2"), matrices, strict=True))
+    np.savez(both, **named) if ending == "npz" else scipy.io.savemat(both, named)
+    a, b = (saved(tmp_path, name, matrix) for name, matrix in zip("ab", matrices, strict=True))
+    expected = call("advise", "--S1", a, "--S2", b, "--json").document
+    for words in (("--S1", both), ("--S1", both, "--S2", both), ("--S1", both, "--S2", b)):
+        assert call("advise", *words, "--json").document == expected
+
+
+# --- what is not a Schur complement -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("skew", [1e-9, 1e-6, 0.9e-3, 1.1e-3])
+def test_an_asymmetry_is_rounded_told_or_refused(call, tmp_path, skew):
+    given = FULL.copy()
+    given[0, 1] += skew * 4
+    a, b = saved(tmp_path, "a", given), saved(tmp_path, "b", GOOD)
+    words = ("advise", "--S1", a, "--S2", b)
+    if skew > 1e-3:
+        assert all(part in call(*words).complaint for part in ("a.npz", "S1 is not symmetric", "0.0011", "0.001"))
+        return
+    document = call(*words, "--json").document
+    assert document["matrices"]["S1"]["asymmetry"] == pytest.approx(skew)
+    told = [note for note in document["matrices"]["notes"] if "asymmetric" in note]
+    assert len(told) == (skew > 1e-8)
+    assert ("asymmetric by" in call(*words).out) == (skew > 1e-8)
+    c = saved(tmp_path, "c", (given + given.T) / 2)
+    symmetric = call("advise", "--S1", c, "--S2", b, "--json").document
+    assert document["roles"][0]["rho"]["value"] == pytest.approx(symmetric["roles"][0]["rho"]["value"], rel=1e-14)
+
+
+def test_an_assembled_matrix_is_told_from_a_condensed_one(call, tmp_path):
+    """Both are positive definite: nothing but the zeros speaks."""
+    body = build(vf.example("section6")).body1.mesh_body
+    S = build(vf.example("section6")).body1.stiffness
+    sp.save_npz(tmp_path / "K.npz", body.stiffness)
+    whole = call("advise", "--S1", tmp_path / "K.npz", "--S2", tmp_path / "K.npz")
+    assert whole.status == 0
+    assert "assembled" in whole.out
+    assert max(map(len, whole.out.splitlines())) <= 80
+    condensed = call("advise", "--S1", saved(tmp_path, "S", S), "--S2", saved(tmp_path, "T", 2 * S))
+    assert "assembled" not in condensed.out
+
+
+def test_decoupled_components_are_not_taken_for_an_assembled_matrix(call, tmp_path):
+    """Three components that do not act on each other leave two thirds of zeros."""
+    block = np.kron(np.eye(3), np.ones((9, 9)) + np.eye(9))
+    found = call("advise", "--S1", saved(tmp_path, "a", block), "--S2", saved(tmp_path, "b", block), "--json").document
+    assert found["matrices"]["notes"] == []
+    assert found["matrices"]["S1"]["zeros"] == pytest.approx(2 / 3, abs=0.03)
+
+
+# --- friction, maps, whole interfaces ---------------------------------------------------------------------------------
+
+
+def same_advice(found, expected):
+    assert found["neumann_body"] == expected["neumann_body"]
+    assert len(found["roles"]) == len(expected["roles"])
+    for role in expected["roles"]:
+        other = by_body(found)[role["neumann_body"]]
+        for name in ("rho", "factor_proved", "theta_max_proved", "friction_threshold"):
+            assert other[name]["value"] == pytest.approx(role[name]["value"], rel=1e-7), name
+        assert other["theta_proved"] == pytest.approx(role["theta_proved"], rel=1e-5)  # where the factor is flat
+
+
+@pytest.fixture
+def run_folder(call, write, quick, tmp_path):
+    """A run of the small problem, with its interface file."""
+    file = write({"contact.friction": "0.1"})
+    call("run", file, "-o", tmp_path / "results")
+    return file, tmp_path / "results"
+
+
+def test_an_interface_file_is_read_whole_wherever_it_is_given(call, run_folder):
+    file, results = run_folder
+    expected = call("advise", file, "--json").document
+    name = results / "interface.npz"
+    for words in ((name,), ("--S1", name), ("--S1", name, "--S2", name)):
+        same_advice(call("advise", *words, "--json").document, expected)
+    assert "an interface file has all of it" in call("advise", "--S1", name, "--friction", "0.2").complaint
+
+
+def test_matrices_with_friction_give_the_advice_of_the_problem(call, run_folder, tmp_path):
+    file, results = run_folder
+    expected = call("advise", file, "--json").document
+    pair = build(vf.load(file))
+    radius = str(vf.load(file).contact.radius)
+    with np.load(results / "interface.npz") as arrays:
+        parts = {name: arrays[name] for name in ("S1", "S2", "x", "weights", "kernel")}
+    for name, array in parts.items():
+        np.save(tmp_path / f"{name}.npy", array)
+    np.savetxt(tmp_path / "x.csv", parts["x"][None], delimiter=",", fmt="%.17g")
+    place = lambda name: tmp_path / f"{name}.npy"
+    both = ("--S1", place("S1"), "--S2", place("S2"), "--friction", "1/10", "--json")
+    for words in (
+        ("--x", place("x"), "--radius", radius),
+        ("--x", tmp_path / "x.csv", "--radius", radius),
+        ("--kernel", place("kernel"), "--weights", place("weights")),
+        ("--kernel", place("kernel"), "--x", place("x")),
+    ):
+        found = call("advise", *both, *words).document
+        same_advice(found, expected)
+        assert "tangential" in found["matrices"]["ordering"]
+    assert pair.neumann_body in (1, 2)
+
+
+LACKING = [
+    ("--friction 0.1", "needed a radius with x, or a kernel"),
+    ("--friction 0.1 --radius 0.1", "needed x"),
+    ("--friction 0.1 --x x.npy", "needed a radius with x, or a kernel"),
+    ("--friction 0.1 --x x.npy --radius 0.1 --kernel k.npy", "not both"),
+    ("--friction 0.1 --kernel k.npy", "needed weights of its nodes, or x"),
+    ("--friction 0.1 --weights x.npy", "needed a radius with x, or a kernel"),
+    ("--x x.npy", "x without friction"),
+    ("--radius 0.1", "radius without friction"),
+    ("--kernel k.npy", "kernel without friction"),
+    ("--weights x.npy", "weights without friction"),
+    ("--friction -1 --x x.npy --radius 0.1", "--friction = -1: needed a number >= 0"),
+    ("--friction much --x x.npy --radius 0.1", "--friction = much: needed a number >= 0"),
+    ("--friction 0.1 --x x.npy --radius 0", "--radius = 0: needed a number > 0"),
+    ("--friction 0.1 --x x.npy --radius wide", "--radius = wide: needed a number > 0"),
+    ("--friction 0.1 --x long.npy --radius 0.1", "x is 3: needed 2 real numbers"),
+    ("--friction 0.1 --x back.npy --radius 0.1", "needed positions that increase"),
+    ("--friction 0.1 --kernel k.npy --weights back.npy", "weights: needed positive ones"),
+    ("--friction 0.1 --kernel long.npy --weights x.npy", "kernel is 3: needed 2 x 2"),
+    ("--friction 0.1 --kernel k.npy --weights x.npy --map P.npy", "P.npy"),
+    ("--map P.npy", "the transfer is 3 x 4, S1 has 4 rows, S2 4"),
+    ("--map k.npy --neumann-body 3", "--neumann-body"),
+]
+
+
+@pytest.mark.parametrize(("words", "fragment"), LACKING)
+def test_a_combination_that_lacks_or_mixes_something_is_one_clear_line(call, tmp_path, monkeypatch, words, fragment):
+    monkeypatch.chdir(tmp_path)
+    for name, array in {
+        "S": np.diag([1.0, 2.0, 3.0, 4.0]),
+        "x": np.array([0.5, 1.0]),
+        "back": np.array([1.0, -1.0]),
+        "long": np.array([0.0, 1.0, 2.0]),
+        "k": np.eye(2),
+        "P": np.ones((3, 4)),
+    }.items():
+        np.save(f"{name}.npy", array)
+    assert fragment in call("advise", "--S1", "S.npy", "--S2", "S.npy", *words.split()).complaint
+
+
+@pytest.mark.parametrize("option", ["--S2", "--map", "--x", "--kernel", "--weights", "--friction", "--radius"])
+def test_what_belongs_to_matrices_needs_matrices(call, tmp_path, option):
+    complaint = call("advise", option, saved(tmp_path, "a", GOOD)).complaint
+    assert option in complaint
+    assert "needed both --S1 and --S2" in complaint
+
+
+def test_friction_of_an_odd_number_of_unknowns_is_refused(call, tmp_path):
+    a = saved(tmp_path, "a", GOOD)
+    np.save(tmp_path / "x.npy", np.arange(3.0))
+    words = ("--friction", "0.1", "--x", tmp_path / "x.npy", "--radius", "1")
+    assert "two components at each node" in call("advise", "--S1", a, "--S2", a, *words).complaint
+
+
+@pytest.fixture
+def of_two_grids(call, write, quick, tmp_path):
+    """A run between grids that differ, with P.npz."""
+    file = write({"body2.cells": "[5, 2]", "contact.friction": "0.1"})
+    answer = call("run", file, "-o", tmp_path / "results")
+    assert answer.status in (0, 1), answer
+    return file, tmp_path / "results"
+
+
+def test_the_map_of_a_run_gives_the_role_it_leads_to_and_refuses_the_other(call, of_two_grids, tmp_path):
+    file, results = of_two_grids
+    neumann = vf.load(file).iteration.neumann_body
+    expected = by_body(call("advise", file, "--json").document)[neumann]
+    with np.load(results / "interface.npz") as arrays:
+        both = tmp_path / "both.npz"
+        np.savez(both, S1=arrays["S1"], S2=arrays["S2"])
+        np.save(tmp_path / "kernel.npy", arrays["kernel"])
+    words = ("advise", "--S1", both, "--map", results / "P.npz")
+    found = by_body(call(*words, "--json").document)
+    assert found[neumann]["rho"]["value"] == pytest.approx(expected["rho"]["value"], rel=1e-9)
+    assert found[3 - neumann]["rho"] is None
+    assert "transfer of its own" in found[3 - neumann]["reason"]["rho"]
+    assert "transfer of its own" in " ".join(call(*words).out.split())
+    radius = str(vf.load(file).contact.radius)
+    for law in (
+        ("--radius", radius),  # positions and weights of both grids stand in P.npz
+        ("--kernel", tmp_path / "kernel.npy"),
+    ):
+        rubbing = by_body(call(*words, "--friction", "0.1", *law, "--json").document)
+        for name in ("rho", "friction_threshold", "factor_proved"):
+            assert rubbing[neumann][name]["value"] == pytest.approx(expected[name]["value"], rel=1e-7)
+        assert "transfer of its own" in rubbing[3 - neumann]["reason"]["rho"]
+
+
+@pytest.mark.parametrize("words", [(), ("--friction", "0.1")])
+def test_the_screen_says_which_ordering_is_assumed_and_fits(call, tmp_path, matrices, words):
+    S1, S2 = (saved(tmp_path, name, matrix) for name, matrix in zip("ab", matrices, strict=True))
+    np.save(tmp_path / "x.npy", np.linspace(0, 1, len(matrices[0]) // 2))
+    rest = ("--x", tmp_path / "x.npy", "--radius", "0.3") if words else ()
+    out = call("advise", "--S1", S1, "--S2", S2, *words, *rest).out
+    folded = " ".join(out.split())
+    assert ("Ordering: any" in folded) == (not words)
+    assert ("tangential, from left to right" in folded) == bool(words)
+    assert max(map(len, out.splitlines())) <= 80
+    assert len(out.splitlines()) <= 46
