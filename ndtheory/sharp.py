@@ -153,6 +153,37 @@ def predicted_rate(rho: Any) -> Any:
     return rho / (2 + rho)
 
 
+def tied_theta(rho_min: Any, rho: Any) -> Any:
+    """``2/(2 + rho_min + rho)``: the best theta where nothing opens or slips, so that every step is linear.
+
+    Below 2/(1 + rho), and so safe without friction where something opens after all.
+
+    Examples
+    --------
+    >>> tied_theta(Fraction(1, 2), Fraction(3, 2))
+    Fraction(1, 2)
+    """
+    return 2 / (2 + rho_min + rho)
+
+
+def tied_rate(rho_min: Any, rho: Any) -> Any:
+    """``(rho - rho_min)/(2 + rho_min + rho)``: the factor at :func:`tied_theta` where nothing opens or slips."""
+    return (rho - rho_min) / (2 + rho_min + rho)
+
+
+def tied_factor(theta: Any, rho_min: Any, rho: Any) -> Any:
+    """``max(|1 - theta (1 + rho_min)|, |1 - theta (1 + rho)|)``: the factor where nothing opens or slips.
+
+    A step then multiplies each mode by ``1 - theta (1 + lambda)``, rho_min <= lambda <= rho; it is attained at an end.
+
+    Examples
+    --------
+    >>> tied_factor(Fraction(1, 2), Fraction(1, 2), Fraction(3, 2)) == tied_rate(Fraction(1, 2), Fraction(3, 2))
+    True
+    """
+    return maximum(absolute(1 - theta * (1 + rho_min)), absolute(1 - theta * (1 + rho)))
+
+
 def predicted_factor(theta: Any, rho: Any) -> Any:
     """``max(|1 - theta|, |1 - theta (1 + rho)|)``: q(theta) without friction, and a prediction with it.
 

@@ -148,7 +148,7 @@ def test_advice_on_a_built_in_problem_fits_one_screen(call, built_in, monkeypatc
     assert (answer.status, answer.err) == (0, "")
     assert [line for line in lines if line in HEADINGS["advise"]] == HEADINGS["advise"]
     assert lines[-1].startswith("Next: ndtheory run ")
-    assert len(lines) <= 40
+    assert len(lines) <= 46
     assert [line for line in lines if len(line) > 80] == []
 
 

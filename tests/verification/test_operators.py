@@ -155,7 +155,7 @@ def test_without_friction_what_is_proved_is_proved_at_every_size(monkeypatch):
         assert one.theta_proved == pytest.approx(other.theta_proved, rel=1e-9)
         assert one.factor_proved.value == pytest.approx(other.factor_proved.value, rel=1e-9)
         assert one.theta_max_proved.value == pytest.approx(other.theta_max_proved.value, rel=1e-9)
-        assert set(one.reason) == {"theta_auto", "friction_threshold"}
+        assert set(one.reason) == {"theta_auto", "friction_threshold", "rho_min"}
 
 
 def test_with_friction_a_role_has_its_prediction_and_says_why_nothing_is_proved(monkeypatch):

@@ -20,6 +20,7 @@ from verification.advice.pace import CONVERGED, MOST_WINDOWS, Pace, pace, togeth
 from verification.advice.readings import (
     FEWEST_STEPS,
     LARGEST_TO_PASTE,
+    OF_OPEN_NODES,
     SHORTEST_STEP,
     NextRun,
     Observed,
@@ -103,7 +104,7 @@ def advise_logs(logs: Iterable[tuple[Path | str, Any]], *, tied: bool = False) -
     interval = _interval(lower, upper)
     readings, following, rho = _together(seen, interval, tied)
     if tied:  # nothing opens or slips
-        readings = tuple(reading for reading in readings if reading.kind not in ("level", "open"))
+        readings = tuple(reading for reading in readings if reading.kind not in OF_OPEN_NODES)
     return Advice(
         neumann_body=None,
         roles=() if rho is None else (role_of_run(rho),),
@@ -112,6 +113,7 @@ def advise_logs(logs: Iterable[tuple[Path | str, Any]], *, tied: bool = False) -
         next=following,
         logs=seen,
         interval=interval,
+        tied=tied,
     )
 
 

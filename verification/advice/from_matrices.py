@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.linalg import eigh
 from scipy.sparse.linalg import LinearOperator
 
 from fem1d2d import largest
 from fem1d2d.mesh import Floats
+from ndtheory import Number
 from verification.advice.from_operators import is_operator, of_operators
 from verification.advice.given_matrices import (
     BODIES,
@@ -26,7 +28,7 @@ from verification.advice.given_matrices import (
     some_role_left,
     with_seen,
 )
-from verification.advice.role import Role
+from verification.advice.role import Role, with_both_ends
 from verification.advice.roles import Advice, advise, plain_role
 from verification.advice.seen_matrices import SeenMatrix
 from verification.interface.build import build
@@ -51,6 +53,7 @@ def advise_matrices(
     weights: Any = None,
     radius: float | None = None,
     kernel: Any = None,
+    tied: bool = False,
     progress: Progress = silent,
 ) -> Advice:
     """Advice from the interface stiffness of both bodies: matrices, or operators for interfaces of any size.
@@ -89,6 +92,8 @@ def advise_matrices(
         Of the hat kernel.
     kernel : array, optional
         The operator S of the law of friction as :func:`verification.build` takes it, in place of ``radius``.
+    tied : bool
+        Whether to advise by what holds where nothing opens or slips.
     progress : callable
         Told steps, value and residual of Lanczos.
 
@@ -128,16 +133,21 @@ def advise_matrices(
     ):
         if friction is not None:
             raise ValueError("friction with an operator: needed S1, S2 and the transfer as matrices")
-        return of_operators((S1, S2), (solve1, solve2), unknowns, transfer, neumann_body, progress)
+        return of_operators((S1, S2), (solve1, solve2), unknowns, transfer, neumann_body, tied, progress)
     one, two = (stiffness(name, dense(name, S), asymmetry=TOLD) for name, S in (("S1", S1), ("S2", S2)))
-    return _of_matrices({1: one, 2: two}, transfer, neumann_body, friction, beside)
+    return _of_matrices({1: one, 2: two}, transfer, neumann_body, friction, beside, tied)
 
 
 # --- matrices ---------------------------------------------------------------------------------------------------------
 
 
 def _of_matrices(
-    given: dict[Body, Stiffness], transfer: Any, neumann_body: Body | None, friction: Any, beside: dict[str, Any]
+    given: dict[Body, Stiffness],
+    transfer: Any,
+    neumann_body: Body | None,
+    friction: Any,
+    beside: dict[str, Any],
+    tied: bool,
 ) -> Advice:
     P = read_transfer(transfer, {body: len(S.matrix) for body, S in given.items()}, neumann_body)
     refused = refused_by(P)
@@ -149,11 +159,10 @@ def _of_matrices(
             refused[body] = replace(refused[body], singular=True)
     some_role_left(refused)
     if friction is None:
-        found = advice_of(
-            tuple(refused.get(body) or plain_role(body, _rho(given[other(body)], given[body], P)) for body in BODIES)
-        )
+        roles = tuple(refused.get(body) or _role(body, given, P) for body in BODIES)
+        found = advice_of(roles if P is not None or refused else with_both_ends(roles), tied=tied)
     else:
-        found = _with_friction(given, P, 1 if 2 in refused else 2, friction, beside)
+        found = _with_friction(given, P, 1 if 2 in refused else 2, friction, beside, tied)
         found = replace(found, roles=tuple(refused.get(role.neumann_body or 2, role) for role in found.roles))
     seen = {
         body: SeenMatrix(
@@ -164,20 +173,29 @@ def _of_matrices(
     return with_seen(found, seen, P, ordered=friction is not None)
 
 
-def _rho(contact: Stiffness, neumann: Stiffness, P: Transfer | None) -> Fraction:
-    """``lambda_max(P' S_c P, S_n)``, with entries of order 1 whatever the unit."""
-    units = [float(np.abs(S.matrix).max()) for S in (contact, neumann)]
-    S_c, S_n = (S.matrix / unit for S, unit in zip((contact, neumann), units, strict=True))
+def _role(body: Body, given: dict[Body, Stiffness], P: Transfer | None) -> Role:
+    """The role in which a body has the Neumann problem, by the spectrum of (P' S_c P, S_n)."""
+    units = [float(np.abs(S.matrix).max()) for S in (given[other(body)], given[body])]
+    S_c, S_n = (S.matrix / unit for S, unit in zip((given[other(body)], given[body]), units, strict=True))
     if P is not None:
         S_c = P.carry_back(P.carry_back(S_c).T)
         S_c = (S_c + S_c.T) / 2
+    unit = Fraction(units[0]) / Fraction(units[1])
     with one_thread():
-        found = largest(S_c, S_n).value
-    return Fraction(found) * Fraction(units[0]) / Fraction(units[1])
+        role = plain_role(body, Fraction(largest(S_c, S_n).value) * unit)
+        if P is None and not given[other(body)].motions.size:
+            return role  # the eigenvalues of both roles are reciprocal
+        least = max(float(eigh(S_c, S_n, eigvals_only=True, subset_by_index=[0, 0])[0]), 0.0)
+    return replace(role, rho_min=Number.of_float(Fraction(least) * unit), rho_tied=role.rho)
 
 
 def _with_friction(
-    given: dict[Body, Stiffness], P: Transfer | None, neumann_body: Body, friction: Any, beside: dict[str, Any]
+    given: dict[Body, Stiffness],
+    P: Transfer | None,
+    neumann_body: Body,
+    friction: Any,
+    beside: dict[str, Any],
+    tied: bool,
 ) -> Advice:
     x, x_neumann, weights, radius, kernel = beside.values()
     for body, S in given.items():
@@ -212,7 +230,10 @@ def _with_friction(
         friction=friction,
         neumann_body=neumann_body,
     )
-    return advise(pair)
+    found = advise(pair, tied=tied)
+    return replace(
+        found, roles=tuple(replace(role, theta_auto=None) for role in found.roles)
+    )  # there is no problem file
 
 
 def _plain(matrix: Any) -> Any:

@@ -14,6 +14,7 @@ from scipy.sparse.linalg import LinearOperator
 
 from fem1d2d import extremes_by_solves, solver_with_inertia
 from fem1d2d.mesh import Floats
+from ndtheory import Number
 from verification.advice.given_matrices import (
     BODIES,
     TOLD,
@@ -70,6 +71,7 @@ def of_operators(
     unknowns: int | None,
     transfer: Any,
     neumann_body: Body | None,
+    tied: bool,
     progress: Progress,
 ) -> Advice:
     """What :func:`verification.advise_matrices` answers where a body is an operator: (S1, S2), (solve1, solve2)."""
@@ -103,11 +105,9 @@ def of_operators(
             raise ValueError(f"S{other(n)} is not positive (rho = {float(rho):.3g}): needed a stiffness")
         role = plain_role(n, rho)
         nothing = dict.fromkeys(PROVED, WORD_OF_LANCZOS)
-        roles.append(
-            replace(
-                role, theta_proved=None, factor_proved=None, theta_max_proved=None, reason={**role.reason, **nothing}
-            )
-        )
+        least = Number.of_float(max(Fraction(ends.least.value), Fraction(0)))
+        unproved: dict[str, Any] = dict.fromkeys(PROVED)
+        roles.append(replace(role, **unproved, reason={**role.reason, **nothing}, rho_min=least, rho_tied=role.rho))
         lanczos.append(
             SeenLanczos(
                 neumann_body=n,
@@ -119,7 +119,7 @@ def of_operators(
             )
         )
     seen = {body: side.seen for body, side in sides.items()}
-    return with_seen(advice_of(tuple(roles)), seen, P, lanczos=tuple(lanczos))
+    return with_seen(advice_of(tuple(roles), tied=tied), seen, P, lanczos=tuple(lanczos))
 
 
 def _rows(given: dict[Any, Any], unknowns: Any, transfer: Any) -> dict[int, int]:

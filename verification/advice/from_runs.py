@@ -9,12 +9,12 @@ from ndtheory import Number
 from ndtheory.constants import take
 from ndtheory.energy import LARGEST, SMALLEST
 from ndtheory.sharp import predicted_rate, predicted_theta
-from verification.advice.readings import read_ratio
+from verification.advice.readings import LARGEST_TO_PASTE, OF_OPEN_NODES, NextRun, read_ratio, rounded_down, spread
 from verification.advice.role import Role
 from verification.advice.roles import UNITS, Advice
 
 
-def advise_run(theta: Any, ratio: Any) -> Advice:
+def advise_run(theta: Any, ratio: Any, *, tied: bool = False) -> Advice:
     """What one run of any code with constant theta says of rho, and the run to make next.
 
     While contact does not change, a mode is multiplied by ``1 - theta (1 + lambda)`` in a step, with lambda at most
@@ -37,6 +37,9 @@ def advise_run(theta: Any, ratio: Any) -> Advice:
         r > 0, that of the absolute unrelaxed residual ``|T g - g|`` from one step to the next, steady over the last ten
         steps or more, and over ``5/theta`` where these are more; above 1 where the run diverged, and 1 where the
         residual rises and falls and has no steady ratio.
+    tied : bool
+        Whether nothing opens or slips.  A step is linear then: ``open`` and ``level`` are no readings, and a run that
+        grows goes on at the pace of the stiffest mode, which tells rho.
 
     Returns
     -------
@@ -55,11 +58,20 @@ def advise_run(theta: Any, ratio: Any) -> Advice:
     ([('mode-high', 23.0), ('level', 19.0)], 0.0808)
     >>> advise_run("0.45", "0.8").best.rho.value
     3.0
+    >>> advise_run("0.1", "1.4", tied=True).best.rho.value
+    23.0
     """
     t = take("theta", theta, "the theta of a run, 0 < theta <= 1 (1e-75 or more)", lambda v: SMALLEST <= v <= 1)
     needed = "the ratio of consecutive residuals, a number > 0 (1e-75 to 1e75)"
     r = take("ratio", ratio, needed, lambda v: SMALLEST <= v <= LARGEST)
     run, readings, following, rho = read_ratio(t, r)
+    if tied:
+        readings = tuple(reading for reading in readings if reading.kind not in OF_OPEN_NODES)
+        if rho is None and r > 1 + spread(t):
+            rho = (1 + r) / t - 1
+            best = rounded_down(min(predicted_theta(rho), LARGEST_TO_PASTE))
+            why = f"2/(2 + rho) with rho = {float(rho):.4g}, the pace at which a tied run grows"
+            following = NextRun(theta=best, why=why)
     return Advice(
         neumann_body=None,
         roles=() if rho is None else (role_of_run(rho),),
@@ -67,6 +79,7 @@ def advise_run(theta: Any, ratio: Any) -> Advice:
         run=run,
         readings=readings,
         next=following,
+        tied=tied,
     )
 
 

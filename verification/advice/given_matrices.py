@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator
 
 from fem1d2d.mesh import Floats
-from verification.advice.role import Role
+from verification.advice.role import Role, best_of
 from verification.advice.roles import UNITS, Advice
 from verification.advice.seen_matrices import ORDERING, SeenLanczos, SeenMatrices, SeenMatrix
 from verification.interface.matrices import ASYMMETRY, size
@@ -129,10 +129,9 @@ def some_role_left(refused: dict[Body, Role]) -> None:
         raise ValueError("; ".join(f"body {body}: {refused[body].reason['rho']}" for body in sorted(refused)))
 
 
-def advice_of(roles: tuple[Role, ...]) -> Advice:
-    """Advice for the role of the smaller predicted rate; one of them at least is not refused."""
-    best = min((role for role in roles if role.rho is not None), key=lambda role: role.predicted[1])
-    return Advice(neumann_body=best.neumann_body, roles=roles, units=UNITS)
+def advice_of(roles: tuple[Role, ...], *, tied: bool) -> Advice:
+    """Advice for the role that takes fewer steps; one of them at least is not refused."""
+    return Advice(neumann_body=best_of(roles, tied=tied).neumann_body, roles=roles, units=UNITS, tied=tied)
 
 
 def with_seen(

@@ -27,6 +27,9 @@ NEXT_TO_1 = Fraction(999, 1000)
 #: A run to make next has a theta larger by this factor at least, unless that would come too close to 1.
 SHORTEST_STEP = Fraction(9, 8)
 
+#: The readings that need nodes that open: none of a tied interface.
+OF_OPEN_NODES = ("open", "level")
+
 #: Ratios this close to 1 - theta, as a share of theta and of 1 - theta, are those of open nodes.
 SAME = Fraction(1, 20)
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from ndtheory import EnergyConstants, Number, evaluate_sharp
 from ndtheory.sharp import predicted_rate, predicted_theta
-from verification.advice.readings import NextRun, RunReading, SeenRun
-from verification.advice.role import Role
+from verification.advice.readings import LARGEST_TO_PASTE, NextRun, RunReading, SeenRun, rounded_down
+from verification.advice.role import Role, best_of, fewer, steps, with_both_ends
 from verification.advice.seen import Interval, SeenLog
 from verification.advice.seen_matrices import SeenMatrices
 from verification.algorithm.theta import automatic, by_prediction, sharp_bounds
@@ -60,6 +60,8 @@ class Advice(Document):
         What was given of two bodies, and bounds of rho from below.
     matrices : SeenMatrices or None
         What was seen of the matrices that were given; None where none were.
+    tied : bool
+        Whether the advice is for an interface of which nothing opens or slips.
     """
 
     schema: ClassVar[str] = "ndtheory.advice/1"
@@ -77,6 +79,7 @@ class Advice(Document):
     matrices: SeenMatrices | None = None
     problem: Problem | None = None
     moduli: SeenModuli | None = None
+    tied: bool = False
 
     @property
     def summary(self) -> str:
@@ -84,9 +87,64 @@ class Advice(Document):
             return self.moduli.summary
         if not self.roles:
             return f"{len(self.readings)} readings of {'logs' if self.logs else 'a run'}"
-        best = self.best
+        theta, rate = self.chosen(self.best)
         who = "" if self.neumann_body is None else f"Neumann problem to body {self.neumann_body}, "
-        return f"{who}theta = {best.predicted[0]:.4g} predicted, rate {best.predicted[1]:.4g}"
+        return f"{who}theta = {theta:.4g} {'if tied' if self.tied else 'predicted'}, rate {rate:.4g}"
+
+    def chosen(self, role: Role) -> tuple[float, float]:
+        """theta and rate by which a role is judged here."""
+        return role.advised(tied=self.tied and role.ends is not None)
+
+    @property
+    def theta(self) -> float | None:
+        """The theta to paste, not above the one that is meant; None while several readings are left, or of moduli."""
+        if not self.roles or self.moduli is not None:
+            return None
+        if self.next is not None:
+            return self.next.theta
+        return rounded_down(min(Fraction(self.chosen(self.best)[0]), LARGEST_TO_PASTE))
+
+    @property
+    def why_no_theta(self) -> str:
+        """Why there is no theta to paste; empty where there is one."""
+        if self.theta is not None:
+            return ""
+        if self.moduli is not None:
+            return "moduli bound rho from below: a theta to start with stands in moduli.roles.start, where there is one"
+        return "several readings are left: make the run that `next` names"
+
+    @property
+    def other(self) -> Role | None:
+        """The role that is not advised; None where it is unknown or refused."""
+        rest = [role for role in self.roles if role is not self.best and role.rho is not None]
+        return rest[0] if rest else None
+
+    @property
+    def no_difference(self) -> bool:
+        """Whether both roles take the same number of steps, but for SAME of it."""
+        return self.other is not None and not fewer(self.chosen(self.other)[1], self.chosen(self.best)[1], either=True)
+
+    @property
+    def quote(self) -> str | None:
+        """The reason for the advice, to be quoted; None where there is no theta to paste."""
+        from verification.advice.quote import reason
+
+        return None if self.theta is None else reason(self)
+
+    def snippet(self, library: str) -> str:
+        """What to paste into the configuration of a coupling library: preCICE, Kratos or Norma.
+
+        Raises
+        ------
+        ValueError
+            Several readings are left, or no such library.
+        """
+        from verification.advice.snippets import Coupling, snippet
+
+        if self.theta is None:
+            raise ValueError(self.why_no_theta)
+        count = steps(self.chosen(self.best)[1])
+        return snippet(library, Coupling(neumann_body=self.neumann_body, theta=self.theta, steps=count, tied=self.tied))
 
     def plot(self) -> Figure:
         """The factor of one step over theta, for each assignment of the roles."""
@@ -131,8 +189,13 @@ class Advice(Document):
             reason["neumann_body"] = "both roles have the same bounds"
         if self.matrices is None:
             reason["matrices"] = "no matrices were given"
+        if self.theta is None:
+            reason |= dict.fromkeys(("theta", "quote"), self.why_no_theta)
         return {
             "neumann_body": self.neumann_body,
+            "theta": self.theta,
+            "tied": self.tied,
+            "quote": self.quote,
             "roles": [role.to_dict() for role in self.roles],
             "run": None if self.run is None else self.run.to_dict(),
             "readings": [reading.to_dict() for reading in self.readings],
@@ -146,14 +209,17 @@ class Advice(Document):
         }
 
 
-def advise(problem: Problem | ContactPair | Path | str, *, progress: Progress = silent) -> Advice:
+def advise(problem: Problem | ContactPair | Path | str, *, tied: bool = False, progress: Progress = silent) -> Advice:
     """Advise on the roles of the bodies and on theta.
 
-    The body whose prediction ``rho/(2 + rho)`` is smaller gets the Neumann problem.
+    The body whose prediction ``rho/(2 + rho)`` is smaller gets the Neumann problem; for a tied interface the one whose
+    rate ``(rho - rho_min)/(2 + rho_min + rho)`` is.
 
     Parameters
     ----------
     problem : Problem, ContactPair or path
+    tied : bool
+        Whether to advise by what holds where nothing opens or slips.
     progress : callable
         Told the steps that rho takes where there are too many contact nodes for matrices.
 
@@ -179,17 +245,19 @@ def advise(problem: Problem | ContactPair | Path | str, *, progress: Progress = 
     try:
         pair = pair_or_bodies(problem)
         roles = (
-            _roles_without_matrices(pair, progress) if isinstance(pair, TwoBodies) else (_role(pair), _exchanged(pair))
+            _roles_without_matrices(pair, tied, progress)
+            if isinstance(pair, TwoBodies)
+            else (_role(pair), _exchanged(pair))
         )
     except SingularRole as error:
         assert not isinstance(problem, ContactPair)  # made with roles that are not singular
         given = problem if isinstance(problem, Problem) else load(problem)
         pair = build(given.swapped())  # refused itself where contact holds that body, too
         roles = (Role.refused(given.iteration.neumann_body, error), _role(pair))
-    best = min((role for role in roles if role.rho is not None), key=lambda role: role.predicted[1])
     return Advice(
-        neumann_body=best.neumann_body,
+        neumann_body=best_of(roles, tied=tied).neumann_body,
         roles=roles,
+        tied=tied,
         units=UNITS if pair.problem is None else pair.problem.units,
         problem=pair.problem,
         friction=float(pair.friction),
@@ -211,7 +279,7 @@ def _role(pair: ContactPair) -> Role:
     if measured.rho_max is None:
         raise ProblemError(pair.source, "contact", None, f"no advice: {measured.why_no_energy}")
     if sharp is None:
-        return _predicted_role(pair, measured.rho_max, measured.why_no_energy)
+        return _predicted_role(pair, measured.rho_max, measured.rho_min, measured.why_no_energy)
     outside = pair.outside
     threshold = None if outside else measured.friction_threshold
     if outside:
@@ -233,10 +301,12 @@ def _role(pair: ContactPair) -> Role:
         reason=reason,
         theta_auto=automatic(sharp, outside, pair.settings.tolerance),
         energy=None if outside else measured.energy_constants(),
+        rho_min=measured.rho_min,
+        rho_tied=measured.rho_max,
     )
 
 
-def _predicted_role(pair: ContactPair, rho: Number, why: str) -> Role:
+def _predicted_role(pair: ContactPair, rho: Number, rho_min: Number | None, why: str) -> Role:
     """A role of which rho is known, and of which no theorem speaks."""
     return Role(
         neumann_body=pair.neumann_body,
@@ -249,11 +319,16 @@ def _predicted_role(pair: ContactPair, rho: Number, why: str) -> Role:
         friction_threshold=None,
         reason=dict.fromkeys(("theta_proved", "factor_proved", "theta_max_proved", "friction_threshold"), why),
         theta_auto=by_prediction(rho.value, why),
+        rho_min=rho_min,
+        rho_tied=rho,
     )
 
 
-def _roles_without_matrices(bodies: TwoBodies, progress: Progress) -> tuple[Role, ...]:
-    """Both roles, the file's first: rho alone, and what it proves without friction."""
+def _roles_without_matrices(bodies: TwoBodies, tied: bool, progress: Progress) -> tuple[Role, ...]:
+    """Both roles, the file's first: rho alone, and what it proves without friction.
+
+    Of frictionless contact rho is rho_normal, and a tied interface needs two eigenvalues more.
+    """
     pencils, problem = Pencils(bodies, progress), bodies.problem
     for why in pencils.reason.values():
         raise ProblemError(problem.source, "contact", None, f"no advice: {why}")
@@ -268,7 +343,20 @@ def _roles_without_matrices(bodies: TwoBodies, progress: Progress) -> tuple[Role
             unproved = dict.fromkeys(("theta_proved", "factor_proved", "theta_max_proved"))
             reason |= dict.fromkeys((*unproved, "friction_threshold"), nothing)
         roles.append(replace(plain_role(neumann, Fraction(rho)), reason=reason, **unproved))
-    return tuple(roles)
+    if rubs:
+        return with_both_ends(roles)
+    if not tied:
+        more = "without friction rho is rho_normal, and a tied interface needs two more eigenvalues: ask for tied"
+        return tuple(replace(role, reason={**role.reason, "rho_min": more}) for role in roles)
+    bodies_of = (problem.iteration.neumann_body, problem.contact_body)
+    ends = with_both_ends(
+        [
+            replace(role, rho=Number.of_float(pencils.largest(neumann_body=neumann).value))
+            for role, neumann in zip(roles, bodies_of, strict=True)
+        ]
+    )
+    pairs = zip(roles, ends, strict=True)
+    return tuple(replace(role, rho_min=end.rho_min, rho_tied=end.rho_tied) for role, end in pairs)
 
 
 def plain_role(neumann_body: Any, rho: Fraction) -> Role:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from verification.advice.readings import NextRun, RunReading, SeenRun
+from verification.advice.readings import LARGEST_TO_PASTE, NextRun, RunReading, SeenRun
+from verification.advice.role import Role, in_steps
 from verification.advice.roles import Advice
 from verification.advice.seen import Interval, LogBound, SeenLog
+from verification.advice.snippets import SNIPPETS
 from verification.cli.console import figures, heading, near_one, note, printable, say, table
 from verification.cli.matrices import matrices
 from verification.cli.moduli_screen import moduli
@@ -25,9 +27,14 @@ def advice(found: Advice, typed: Typed | None = None) -> None:
     if found.interval is not None and found.next is not None:
         _logs(found.logs, found.interval, found.readings, found.next)
         if found.roles:
-            _paste(None, f"{found.next.theta:g}")
+            _paste(found)
             note("Predicted for the roles that the bodies have; logs tell nothing of the other assignment.", "  ")
-    theta = _roles(found) if found.roles and not found.logs else None
+    if found.roles and not found.logs:
+        _which_body(found)
+        _which_theta(found)
+        _friction(found)
+        _paste(found)
+        _quote(found)
     say()
     for reason in found.outside:
         note(f"Outside the theorem: {reason}.")
@@ -36,16 +43,18 @@ def advice(found: Advice, typed: Typed | None = None) -> None:
         if found.logs:
             say(f"Next: the same with --log LOG --theta {found.next.theta:g} (LOG: the log of that run)")
             return
-        say(f"Next: ndtheory advise --theta {found.next.theta:g} --ratio R (R: the ratio of that run)")
+        tied = "--tied " * found.tied
+        say(f"Next: ndtheory advise {tied}--theta {found.next.theta:g} --ratio R (R: the ratio of that run)")
         return
-    say("Not claimed: that the predicted theta is the best one for your loads.")
+    what = "that nothing opens or slips" if found.tied else "that the predicted theta is the best one for your loads"
+    say(f"Not claimed: {what}.")
     if found.problem is not None:
         if typed is not None and found.best.theta_auto is None:  # too large for a run
             typed.suggest("constants")
         elif typed is not None:
             options = [] if found.roles[0].neumann_body == found.neumann_body else ["--swap-roles"]
-            if theta is not None and takes_theta(found.problem.iteration.relaxation):
-                options += ["--theta", theta]
+            if found.theta is not None and takes_theta(found.problem.iteration.relaxation):
+                options += ["--theta", f"{found.theta:g}"]
             typed.suggest("run", *options)
     else:
         say("Next: ndtheory advise --help")
@@ -117,60 +126,139 @@ def _bound(which: str, bound: LogBound | None, logs: tuple[SeenLog, ...]) -> Non
         note(f"rho is at {which} {figures(float(bound.value))} given {bound.assumes} ({source})", "  ")
 
 
-def _roles(found: Advice) -> str:
-    """What is known of each role; returns the theta to paste."""
-    best = found.best
-    names = {1: "body 1", 2: "body 2", None: "as in that run"}
+NAMES = {1: "body 1", 2: "body 2", None: "as in that run"}
+
+
+def _which_body(found: Advice) -> None:
+    """Which body gets the Neumann problem, what exchanging the roles changes, and who reads what."""
+    best, other = found.best, found.other
     heading("WHICH BODY GETS THE NEUMANN PROBLEM?")
     if found.neumann_body is None:
         say("  One run tells nothing of the other assignment.")
+        neumann, contact = "the Neumann body", "the contact body"
     else:
-        other = next(role for role in found.roles if role is not best)
-        say(f"  {names[found.neumann_body]}: predicted rate {near_one(best.predicted[1])} a step,")
-        if other.rho is not None:
-            say(f"  against {near_one(other.predicted[1])} with the roles exchanged")
+        rate = found.chosen(best)[1]
+        kind = "rate if tied" if found.tied else "predicted rate"
+        say(f"  {NAMES[found.neumann_body]}: {kind} {near_one(rate)} a step, {in_steps(rate)} to 1e-9,")
+        if other is None:
+            refused = next(role for role in found.roles if role is not best)
+            note(f"{NAMES[refused.neumann_body]}: {refused.reason['rho']}", "  ")
+        elif found.no_difference:
+            say("  and no difference with the roles exchanged")
         else:
-            note(f"{names[other.neumann_body]}: {other.reason['rho']}", "  ")
+            away = found.chosen(other)[1]
+            say(f"  against {near_one(away)} with the roles exchanged, {in_steps(away)}")
+        neumann, contact = NAMES[found.neumann_body], f"{NAMES[3 - found.neumann_body]}, the contact body,"
+    writes = "reads forces and writes displacements", "reads displacements and writes forces"
+    note(f"The solver of {neumann} {writes[0]}, that of {contact} {writes[1]}.", "  ")
+
+
+def _which_theta(found: Advice) -> None:
+    """What is predicted and proved of each role, what holds if nothing opens or slips, and what "auto" takes."""
     heading("WHICH THETA?")
     rows = [["Neumann", "rho", "", "theta", "rate", "steps", ""]]
     why = {}
     possible = [role for role in found.roles if role.rho is not None]
     for role in possible:
-        name, rate = names[role.neumann_body], role.predicted[1]
-        theta = figures(role.theta_predicted)
-        rows.append([name, figures(role.rho), "predicted", theta, near_one(rate), steps(rate, 1e-9), "not a bound"])
+        name, rate = NAMES[role.neumann_body], role.predicted[1]
+        theta, bound = figures(role.theta_predicted), "proved" if role.proved else "not a bound"
+        rows.append([name, figures(role.rho), "predicted", theta, near_one(rate), steps(rate, 1e-9), bound])
         if role.factor_proved is not None and role.theta_proved is not None:
             q = role.factor_proved.value
             rows.append(["", "", "proved", figures(role.theta_proved), near_one(q), f"<= {steps(q, 1e-9)}", ""])
         else:
             rows.append(["", "", "proved", "-", "-", "-", "no conclusion"])
-            why[name] = role.reason["theta_proved"]
+            if role.theta_auto is None:  # which says it below
+                why[name] = role.reason["theta_proved"]
+        if role.theta_tied is not None and role.rate_tied is not None:
+            rate = role.rate_tied
+            numbers = [figures(role.theta_tied), near_one(rate), f"<= {steps(rate, 1e-9)}"]
+            rows.append(["", "", "if tied", *numbers, _at_predicted(role)])
+        elif found.tied:
+            why[name] = role.why_not_tied
     table(rows)
-    for name, reason in why.items():
-        note(f"{name}: {reason}", "  ")
+    _together(why)
     say("  predicted: theta = 2/(2 + rho); proved: the theta of least proved factor")
-    say("  steps: to 1e-9 of the first error")
+    ends = [
+        f"{figures(role.rho_min)}, {figures(role.rho_tied)} ({NAMES[role.neumann_body]})"
+        for role in possible
+        if role.ends is not None
+    ]
+    if ends:
+        note(f"if tied, nothing opens or slips: 2/(2+rho_min+rho) of {', '.join(ends)}", "  ")
+    say(f"  steps: to 1e-9 of the first error{'; at the end those of the predicted theta' * bool(ends)}")
     for role in possible:
         auto = role.theta_auto
         if auto is not None:
             takes = f'theta = "auto" takes {float(auto.theta):.4g}, the {auto.source} one: {auto.why}'
-            note(f"{names[role.neumann_body]}: {takes}", "  ")
-    if found.friction is not None:
-        heading("HOW MUCH FRICTION IS PROVED?")
-        for role in possible:
-            if role.friction_threshold is None:
-                note(f"{names[role.neumann_body]}: {role.reason['friction_threshold']}", "  ")
-            else:
-                allowed = f"every small theta contracts for k < {figures(role.friction_threshold)}"
-                say(f"  {names[role.neumann_body]}: {allowed} (here k = {figures(found.friction, 2)})")
-    theta = f"{min(best.predicted[0], 0.99):.3g}" if found.next is None else f"{found.next.theta:g}"
-    _paste(found.neumann_body, theta)
-    return theta
+            note(f"{NAMES[role.neumann_body]}: {takes}", "  ")
 
 
-def _paste(neumann_body: int | None, theta: str) -> None:
+def _at_predicted(role: Role) -> str:
+    """The steps of the predicted theta where nothing opens or slips."""
+    theta = role.predicted[0]
+    rate = role.factor_where_tied(theta)
+    if rate is None or rate >= 1:
+        return f"grows at {figures(theta)}"
+    return f"{steps(rate, 1e-9)} at {figures(theta)}"
+
+
+def _friction(found: Advice) -> None:
+    """How much friction is proved."""
+    if found.friction is None:
+        return
+    heading("HOW MUCH FRICTION IS PROVED?")
+    said = {}
+    for role in found.roles:
+        if role.rho is None:
+            continue
+        said[NAMES[role.neumann_body]] = role.reason.get("friction_threshold", "")
+        if role.friction_threshold is not None:
+            allowed = f"every small theta contracts for k < {figures(role.friction_threshold)}"
+            said[NAMES[role.neumann_body]] = f"{allowed} (here k = {figures(found.friction, 2)})"
+    _together(said)
+
+
+def _together(said: dict[str, str]) -> None:
+    """What is to be said of each role, once where it is the same of both."""
+    for text in dict.fromkeys(said.values()):
+        note(f"{', '.join(name for name, own in said.items() if own == text)}: {text}", "  ")
+
+
+def _paste(found: Advice) -> None:
     """The lines for a problem file and for a coupling configuration."""
     heading("TO PASTE")
-    body = f"neumann_body = {neumann_body}\n  " if neumann_body else ""
-    say(f"  {body}theta = {theta}")
-    say(f'  <acceleration:constant><relaxation value="{theta}" /></acceleration:constant>')
+    if found.neumann_body is not None:
+        say(f"  neumann_body = {found.neumann_body}")
+    say(f"  theta = {found.theta:g}")
+    say(f'  <acceleration:constant><relaxation value="{found.theta:g}" /></acceleration:constant>')
+    note(f"Whole blocks: --snippets {', '.join(SNIPPETS)} or all.", "  ")
+    auto = found.best.theta_auto
+    if auto is not None and found.theta is not None:
+        if found.theta == float(LARGEST_TO_PASTE) <= auto.theta:
+            note(f'theta = "auto" takes {float(auto.theta):.4g}; {found.theta:g} is the largest to paste.', "  ")
+        elif abs(found.theta - float(auto.theta)) <= 1e-3 * found.theta:
+            note('This is what theta = "auto" takes, rounded.', "  ")
+        elif found.tied:
+            note('theta = "auto" takes another one, since contact may open and slip.', "  ")
+        elif auto.source == "proved":
+            note('theta = "auto" keeps to the proved one up to twice the predicted steps.', "  ")
+    same = "The same theta for forces and displacements (heat: fluxes and temperatures) in serial coupling"
+    note(f"{same}, not in parallel coupling.", "  ")
+    note("Transient: rho is that of K + c M/dt^2; the better role may change with dt.", "  ")
+
+
+def _quote(found: Advice) -> None:
+    """One reason that can be quoted."""
+    if found.quote is not None:
+        heading("TO QUOTE")
+        note(found.quote, "  ")
+
+
+def snippets(found: Advice, library: str) -> None:
+    """The whole blocks for a library, or for all of them, each below its name."""
+    names = list(SNIPPETS) if library == "all" else [library]
+    for name in names:
+        if library == "all":
+            heading(name)
+        say(found.snippet(name))

@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from ndtheory import HypothesisError
+from verification.advice.snippets import SNIPPETS
 from verification.cli.console import Interrupted, complain, deliver, stages
 from verification.cli.matrices import NAMES as OF_MATRICES
 from verification.cli.matrices import advice_from_files, matrix_options
@@ -43,6 +44,12 @@ from verification.cli.typed import Typed
     "1 where it rises and falls.",
 )
 @moduli_options
+@click.option("--tied", is_flag=True, help="Advise by what holds where nothing opens or slips.")
+@click.option(
+    "--snippets",
+    type=click.Choice([*SNIPPETS, "all"], case_sensitive=False),
+    help="Print whole blocks for the configuration of a coupling library instead, serial coupling.",
+)
 @JSON
 def advise(
     file: Path | None,
@@ -50,6 +57,8 @@ def advise(
     logs: tuple[Path, ...],
     thetas: tuple[str, ...],
     ratio: str | None,
+    tied: bool,
+    snippets: str | None,
     as_json: bool,
     **options: Any,
 ) -> None:
@@ -62,6 +71,9 @@ def advise(
     run next.  Give the ratio of the absolute residual |Tg - g|, not of the relative one of coupling libraries; a log
     may hold either.  Before there is a mesh, the moduli of both bodies alone bound rho from below.
 
+    In a transient the matrices are those of K + c M/dt^2 (c = 1/beta of Newmark's method): give these as --S1 and --S2,
+    since the better role may change with dt.
+
     \b
     Examples:
       ndtheory advise my.toml
@@ -70,6 +82,8 @@ def advise(
       ndtheory advise --S1 a.npz --S2 b.mtx
       ndtheory advise --S1 both.mat --map P.npz
       ndtheory advise --S1 a.npz --S2 b.npz --friction 0.2 --x x.npy --radius 0.1
+      ndtheory advise my.toml --tied
+      ndtheory advise my.toml --snippets preCICE
       ndtheory advise --theta 0.1 --ratio 1.4
       ndtheory advise --log precice-Solid-convergence.log --theta 0.5
       ndtheory advise --log a.log --theta 0.3 --log b.log --theta 0.6
@@ -103,18 +117,24 @@ def advise(
         raise click.UsageError(f"{received}: needed one --theta for each log, or one with --ratio", context)
     if keys and file is None:
         raise click.UsageError("received --set without FILE: it sets a key of a problem file", context)
+    if snippets is not None and as_json:
+        raise click.UsageError("received --snippets with --json: a block to paste is no JSON document", context)
+    if tied and moduli:
+        raise click.UsageError(
+            "received --tied with --young: moduli bound both ends of the spectrum from inside", context
+        )
     from verification.advice import roles as advice
-    from verification.cli.advice_screen import advice as show
+    from verification.cli import advice_screen
 
     if file is not None:
         if file.suffix == ".npz" and keys:
             raise click.UsageError(f"received --set with {file}: it sets a key of a problem file", context)
         problem = file if file.suffix == ".npz" else load_problem(file, keys)
         with stages() as tell:
-            found = advice.advise(problem, progress=tell)
+            found = advice.advise(problem, tied=tied, progress=tell)
     elif matrices:
         with stages() as tell:
-            found = advice_from_files(matrices, tell)
+            found = advice_from_files(matrices, tell, tied=tied)
     elif moduli:
         found = advice_from_moduli(moduli)
     else:
@@ -122,10 +142,18 @@ def advise(
             from verification.advice.from_logs import advise_logs
             from verification.advice.from_runs import advise_run
 
-            found = advise_logs(zip(logs, thetas, strict=True)) if logs else advise_run(theta, ratio)
+            of_logs = zip(logs, thetas, strict=True)
+            found = advise_logs(of_logs, tied=tied) if logs else advise_run(theta, ratio, tied=tied)
         except HypothesisError as error:
             raise click.UsageError(f"--{error}", context) from None
-    deliver(found, lambda: show(found, None if file is None else Typed(file=file, keys=keys)), as_json)
+    typed = None if file is None else Typed(file=file, keys=keys)
+    if snippets is not None and found.theta is not None:
+        show = lambda: advice_screen.snippets(found, snippets)
+    else:
+        show = lambda: advice_screen.advice(found, typed)
+    deliver(found, show, as_json)
+    if snippets is not None and found.theta is None:
+        complain("no snippet: several readings are left, make the run that is named")
 
 
 def _picture(context: click.Context, parameter: click.Parameter, value: Path) -> Path:

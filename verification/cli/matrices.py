@@ -51,7 +51,7 @@ def matrix_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
-def advice_from_files(given: Mapping[str, Any], tell: Progress) -> Advice:
+def advice_from_files(given: Mapping[str, Any], tell: Progress, *, tied: bool) -> Advice:
     """The advice that the options ask for.
 
     Parameters
@@ -59,6 +59,8 @@ def advice_from_files(given: Mapping[str, Any], tell: Progress) -> Advice:
     given : mapping
         The options that were given, by the names of their parameters.
     tell : callable
+    tied : bool
+        ``--tied``.
 
     Raises
     ------
@@ -78,7 +80,7 @@ def advice_from_files(given: Mapping[str, Any], tell: Progress) -> Advice:
     if S2 in (None, S1) and is_interface(S1):
         if others:
             raise click.UsageError(f"received {others[0]} with {S1}: an interface file has all of it", context)
-        return advise(S1, progress=tell)
+        return advise(S1, tied=tied, progress=tell)
     if S2 is None:
         held = names_in(S1)
         if not {"S1", "S2"} <= set(held):
@@ -101,7 +103,7 @@ def advice_from_files(given: Mapping[str, Any], tell: Progress) -> Advice:
         values["neumann_body"] = int(given["neumann_body"])
     files = ", ".join(dict.fromkeys(str(value) for value in given.values() if isinstance(value, Path)))
     try:
-        return advise_matrices(**values, friction=given.get("friction"), progress=tell)
+        return advise_matrices(**values, friction=given.get("friction"), tied=tied, progress=tell)
     except (ValueError, MemoryError) as error:
         of_option = isinstance(error, HypothesisError) and error.key == "friction"
         raise click.UsageError(f"--{error}" if of_option else f"{files}: {error}", context) from None

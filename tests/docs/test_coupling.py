@@ -1,0 +1,56 @@
+"""The page of advice for couplings: its commands run, it names the sources of its keys, and the index leads to it."""
+
+import re
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+from coupling_logs import linear_run, precice
+
+from verification.advice.snippets import SNIPPETS
+from verification.cli import main
+
+DOCS = Path(__file__).parents[2] / "docs"
+PAGE = (DOCS / "coupling.md").read_text("utf-8")
+CONSOLE = re.findall(r"```console\n(.*?)```", PAGE, flags=re.S)
+COMMANDS = [line.removeprefix("$ ndtheory ") for block in CONSOLE for line in block.splitlines()]
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch, capsys):
+    """A folder with the files that the page speaks of."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["example", "section6"]) == 0
+    Path("my.toml").write_text(capsys.readouterr().out, encoding="utf-8")
+    for name, values in (("a", [3.0, 2.0]), ("b", [1.0, 4.0])):
+        np.savez(f"{name}.npz", np.diag(values))
+    for name, theta in (("precice-Solid-convergence", 0.5), ("a", 0.3), ("b", 0.6)):
+        precice(Path(f"{name}.log"), [{"ResAbs(Mesh:Force)": linear_run((0.2, 1.1), theta, 60)[0]}])
+    return tmp_path
+
+
+def test_every_line_of_a_console_is_a_command_of_this_project():
+    assert len(COMMANDS) > 8
+    assert all(line.startswith("$ ndtheory ") for block in CONSOLE for line in block.splitlines())
+    assert {"--tied", "--snippets", "--log", "--S1"} <= set(" ".join(COMMANDS).split())
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_on_the_page_runs(folder, capsys, command):
+    words = shlex.split(command.partition(" > ")[0])
+    assert main(words) == 0
+    assert capsys.readouterr().out
+
+
+def test_the_page_names_each_library_with_the_sources_of_its_keys():
+    table = {line.split("]")[0].removeprefix("| [").rstrip(): line for line in PAGE.splitlines() if "| [" in line}
+    assert {name.removesuffix(".jl") for name in table} == set(SNIPPETS)
+    assert all(re.search(r"`[\w/]+\.(cpp|py|jl)`", line) for line in table.values())
+    assert re.search(r"<!-- The keys were read in: .*commit \w{8}.* -->", PAGE, flags=re.S)
+
+
+def test_the_index_leads_to_the_page():
+    index = (DOCS / "index.md").read_text("utf-8")
+    assert "{doc}`coupling`" in index
+    assert "\ncoupling\n" in index

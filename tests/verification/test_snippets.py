@@ -1,0 +1,154 @@
+"""The blocks to paste into coupling configurations: they parse, and say who reads what and by which theta."""
+
+import json
+import re
+import xml.etree.ElementTree as ET
+from collections import Counter
+
+import pytest
+
+import verification as vf
+from verification.advice.snippets import SNIPPETS, Coupling, snippet
+
+#: Tags of the coupling scheme with their attributes, and how often each may be there, as preCICE 3.4.1 has them.
+PRECICE = {
+    "participants": ({"first", "second"}, 1),
+    "time-window-size": ({"value"}, 1),
+    "max-time-windows": ({"value"}, 1),
+    "max-iterations": ({"value"}, 1),
+    "exchange": ({"data", "mesh", "from", "to"}, 2),
+    "relative-convergence-measure": ({"data", "mesh", "limit"}, 1),
+    "acceleration:constant": (set(), 1),
+    "acceleration:aitken": (set(), 1),
+    "relaxation": ({"value"}, 1),
+    "initial-relaxation": ({"value"}, 1),
+    "data": ({"name", "mesh"}, 1),
+}
+
+#: Keys that Norma.jl 0.1.0 requires of a controller, and those of a contact condition.
+CONTROLLER = {"type", "domains", "initial time", "final time", "time step", "minimum iterations", "maximum iterations"}
+CONTROLLER |= {"relative tolerance", "absolute tolerance"}
+CONTACT = {"side set", "source", "source side set", "friction type"}
+
+COUPLINGS = [
+    Coupling(neumann_body=body, theta=theta, steps=count, tied=tied)
+    for body, theta, count, tied in ((1, 0.808, 13, False), (2, 0.1172, 167, True), (None, 1e-05, None, False))
+]
+
+
+def named(coupling):
+    return (
+        ("NeumannBody", "ContactBody")
+        if coupling.neumann_body is None
+        else (f"Body{coupling.neumann_body}", f"Body{3 - coupling.neumann_body}")
+    )
+
+
+def element(text):
+    """XML whose prefixes are part of the name, as preCICE reads it."""
+    return ET.fromstring(re.sub(r"(</?)(coupling-scheme|acceleration):", r"\1\2..", text))
+
+
+def plain(tag):
+    return tag.replace("..", ":")
+
+
+@pytest.mark.parametrize("coupling", COUPLINGS, ids=str)
+@pytest.mark.parametrize("relaxation", ["constant", "aitken"])
+def test_the_preCICE_scheme_relaxes_the_forces_that_the_neumann_body_reads(coupling, relaxation):
+    neumann, contact = named(coupling)
+    text = snippet("preCICE", coupling)
+    comments = re.findall(r"<!--(.*?)-->", text, flags=re.S)
+    scheme = element(re.sub(r"<!--.*?-->", "", text, flags=re.S))
+    if relaxation == "aitken":  # put in the place of the constant one
+        scheme.remove(scheme.find("acceleration..constant"))
+        scheme.append(element(comments[-1].partition(",\n")[2]))
+    assert plain(scheme.tag) == "coupling-scheme:serial-implicit"
+    found = [child for child in scheme.iter() if child is not scheme]
+    for child in found:
+        attributes, _ = PRECICE[plain(child.tag)]
+        assert set(child.attrib) == attributes
+    for tag, count in Counter(plain(child.tag) for child in found).items():
+        assert count == PRECICE[tag][1]
+    first, second = (scheme.find("participants").get(which) for which in ("first", "second"))
+    exchanged = {e.get("data"): (e.get("from"), e.get("to")) for e in scheme.findall("exchange")}
+    assert exchanged == {"Displacement": (neumann, contact), "Force": (contact, neumann)}
+    # of a serial scheme preCICE relaxes what the second participant sends to the first, and nothing else
+    assert (first, second) == (neumann, contact)
+    measure = scheme.find("relative-convergence-measure")
+    assert (measure.get("data"), measure.get("mesh")) == ("Force", f"{neumann}-Mesh")
+    if relaxation == "constant":
+        factor = scheme.find("acceleration..constant/relaxation")
+    else:
+        factor = scheme.find("acceleration..aitken/initial-relaxation")
+        data = scheme.find("acceleration..aitken/data")
+        assert (data.get("name"), data.get("mesh")) == ("Force", f"{neumann}-Mesh")
+    assert float(factor.get("value")) == coupling.theta
+    assert int(scheme.find("max-iterations").get("value")) >= (coupling.steps or 1)
+    assert f"{neumann}, the Neumann body, reads Force and writes Displacement" in " ".join(comments[0].split())
+
+
+@pytest.mark.parametrize("coupling", COUPLINGS, ids=str)
+def test_the_Kratos_settings_relax_the_forces_that_the_neumann_body_reads(coupling):
+    neumann, contact = named(coupling)
+    settings = json.loads(snippet("Kratos", coupling))["solver_settings"]
+    assert settings["type"] == "coupled_solvers.gauss_seidel_strong"  # serial; the parallel one is jacobi_strong
+    (accelerator,) = settings["convergence_accelerators"]
+    assert accelerator == {
+        "type": "constant_relaxation",
+        "alpha": coupling.theta,
+        "solver": neumann,
+        "data_name": "force",
+    }
+    (criterion,) = settings["convergence_criteria"]
+    assert (criterion["solver"], criterion["data_name"]) == (neumann, "force")
+    assert set(criterion) - {"solver", "data_name"} == {"type", "abs_tolerance", "rel_tolerance"}
+    first, second = settings["coupling_sequence"]
+    # the second solver fetches displacements and sends forces, which the first one then has
+    assert (first["name"], first["input_data_list"], first["output_data_list"]) == (neumann, [], [])
+    (reads,), (writes,) = second["input_data_list"], second["output_data_list"]
+    assert second["name"] == contact
+    assert (reads["data"], reads["from_solver"], reads["from_solver_data"]) == ("displacement", neumann, "displacement")
+    assert (writes["data"], writes["to_solver"], writes["to_solver_data"]) == ("force", neumann, "force")
+    assert writes["data_transfer_operator_options"] == ["use_transpose", "swap_sign"]
+    assert {reads["data_transfer_operator"], writes["data_transfer_operator"]} == set(
+        settings["data_transfer_operators"]
+    )
+    assert settings["num_coupling_iterations"] >= (coupling.steps or 1)
+
+
+@pytest.mark.parametrize("coupling", COUPLINGS, ids=str)
+def test_the_Norma_files_put_the_body_that_reads_displacements_first(coupling):
+    yaml = pytest.importorskip("yaml", reason="PyYAML comes with the tools of the docs")
+    neumann, contact = (name.lower() for name in named(coupling))
+    controller, of_contact, of_neumann = yaml.safe_load_all(snippet("Norma", coupling))
+    assert set(controller) == CONTROLLER | {"relaxation parameter"}
+    assert controller["type"] == "multi"
+    assert controller["domains"] == [f"{contact}.yaml", f"{neumann}.yaml"]
+    assert controller["relaxation parameter"] == coupling.theta
+    assert all(isinstance(controller[key], float) for key in ("relative tolerance", "absolute tolerance"))
+    for body, partner in ((of_contact, neumann), (of_neumann, contact)):
+        (condition,) = body["boundary conditions"]["Schwarz contact"]
+        assert set(condition) == CONTACT
+        assert condition["source"] == partner
+        assert condition["friction type"] == ("tied" if coupling.tied else "frictionless")
+
+
+@pytest.mark.parametrize("library", SNIPPETS)
+@pytest.mark.parametrize("coupling", COUPLINGS, ids=str)
+def test_every_snippet_fits_on_a_screen_of_80_columns(library, coupling):
+    assert max(map(len, snippet(library, coupling).splitlines())) <= 80
+
+
+@pytest.mark.parametrize("tied", [False, True])
+def test_advice_hands_on_its_own_role_and_theta(tied):
+    found = vf.advise(vf.example("two-bars"), tied=tied)
+    said = json.loads(found.snippet("Kratos"))["solver_settings"]["convergence_accelerators"][0]
+    assert (said["alpha"], said["solver"]) == (found.theta, f"Body{found.neumann_body}")
+
+
+def test_there_is_no_snippet_while_several_readings_are_left_or_for_another_library():
+    with pytest.raises(ValueError, match="make the run"):
+        vf.advise_run("0.1", "1.4").snippet("preCICE")
+    with pytest.raises(ValueError, match="needed one of preCICE, Kratos, Norma"):
+        vf.advise_run("0.45", "0.8").snippet("precise")

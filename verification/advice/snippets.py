@@ -1,0 +1,194 @@
+"""What to paste into the configuration of a coupling library: the roles, theta, and who reads what.
+
+The keys are those of preCICE 3.4.1, of the CoSimulationApplication of Kratos Multiphysics and of Norma.jl 0.1.0;
+``docs/coupling.md`` names the files of their sources in which they stand.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+#: The residual at which a snippet stops the iteration, over the size of the forces.
+TOLERANCE = 1e-6
+
+#: The most iterations that a snippet allows, as a multiple of the steps to 1e-9, and where these are not known.
+ROOM, UNKNOWN = 2, 200
+
+
+@dataclass(frozen=True, kw_only=True)
+class Coupling:
+    """What a snippet says.
+
+    Attributes
+    ----------
+    neumann_body : {1, 2} or None
+        Whose solver reads forces and writes displacements; None where advice is for the roles that a run had.
+    theta : float
+        The relaxation factor.
+    steps : int or None
+        To 1e-9 of the first error, by the rate of the advice.
+    tied : bool
+        Whether nothing opens or slips.
+    """
+
+    neumann_body: Literal[1, 2] | None
+    theta: float
+    steps: int | None
+    tied: bool = False
+
+    @property
+    def neumann(self) -> str:
+        """The name of the participant that reads forces."""
+        return "NeumannBody" if self.neumann_body is None else f"Body{self.neumann_body}"
+
+    @property
+    def contact(self) -> str:
+        """The name of the participant that reads displacements."""
+        return "ContactBody" if self.neumann_body is None else f"Body{3 - self.neumann_body}"
+
+    @property
+    def iterations(self) -> int:
+        """The most iterations to allow."""
+        return UNKNOWN if self.steps is None else max(10, ROOM * self.steps)
+
+
+def snippet(library: str, coupling: Coupling) -> str:
+    """The snippet for a library.
+
+    Raises
+    ------
+    ValueError
+        No snippet has that name.
+
+    Examples
+    --------
+    >>> print(snippet("Norma", Coupling(neumann_body=1, theta=0.8, steps=14)).splitlines()[3])
+    domains: ["body2.yaml", "body1.yaml"]
+    """
+    if library not in SNIPPETS:
+        raise ValueError(f"{library}: needed one of {', '.join(SNIPPETS)}")
+    return SNIPPETS[library](coupling)
+
+
+def precice(c: Coupling) -> str:
+    """The coupling scheme; the relaxed data are those that the second participant sends to the first.
+
+    Both fields live on the mesh of the Neumann body, to which the other participant maps: displacements consistently,
+    forces conservatively, which is the transposed map.
+    """
+    mesh = f"{c.neumann}-Mesh"
+    return f"""\
+<!-- {c.neumann}, the Neumann body, reads Force and writes Displacement;
+     {c.contact}, the contact body, reads Displacement and writes Force. -->
+<coupling-scheme:serial-implicit>
+  <participants first="{c.neumann}" second="{c.contact}" />
+  <time-window-size value="1" />
+  <max-time-windows value="1" />
+  <max-iterations value="{c.iterations}" />
+  <exchange data="Displacement" mesh="{mesh}"
+            from="{c.neumann}" to="{c.contact}" />
+  <exchange data="Force" mesh="{mesh}"
+            from="{c.contact}" to="{c.neumann}" />
+  <relative-convergence-measure data="Force" mesh="{mesh}"
+                                limit="{TOLERANCE:g}" />
+  <acceleration:constant>
+    <relaxation value="{c.theta:g}" />
+  </acceleration:constant>
+</coupling-scheme:serial-implicit>
+<!-- or, with a factor that adapts and no proof of convergence,
+  <acceleration:aitken>
+    <initial-relaxation value="{c.theta:g}" />
+    <data name="Force" mesh="{mesh}" />
+  </acceleration:aitken>
+-->"""
+
+
+def kratos(c: Coupling) -> str:
+    """The members of ``solver_settings`` beside ``solvers``, in which each body has the data displacement and force."""
+    one, other = c.neumann, c.contact
+    force: dict[str, Any] = {"solver": one, "data_name": "force"}
+    settings = {
+        "type": "coupled_solvers.gauss_seidel_strong",
+        "num_coupling_iterations": c.iterations,
+        "convergence_accelerators": [{"type": "constant_relaxation", **force, "alpha": c.theta}],
+        "convergence_criteria": [
+            {"type": "relative_norm_previous_residual", **force, "abs_tolerance": 1e-12, "rel_tolerance": TOLERANCE}
+        ],
+        "data_transfer_operators": {
+            "mapper": {"type": "kratos_mapping", "mapper_settings": {"mapper_type": "nearest_neighbor"}}
+        },
+        "coupling_sequence": [
+            {"name": one, "input_data_list": [], "output_data_list": []},
+            {
+                "name": other,
+                "input_data_list": [
+                    {
+                        "data": "displacement",
+                        "from_solver": one,
+                        "from_solver_data": "displacement",
+                        "data_transfer_operator": "mapper",
+                    }
+                ],
+                "output_data_list": [
+                    {
+                        "data": "force",
+                        "to_solver": one,
+                        "to_solver_data": "force",
+                        "data_transfer_operator": "mapper",
+                        "data_transfer_operator_options": ["use_transpose", "swap_sign"],
+                    }
+                ],
+            },
+        ],
+    }
+    return json.dumps({"solver_settings": settings}, indent=2)
+
+
+def norma(c: Coupling) -> str:
+    """The controller file and a boundary condition for each body; the domain listed first reads displacements."""
+    one, other = c.neumann.lower(), c.contact.lower()
+    contact = lambda source: (
+        f"""\
+boundary conditions:
+  Schwarz contact:
+    - side set: contact
+      source: {source}
+      source side set: contact
+      friction type: {"tied" if c.tied else "frictionless"}"""
+    )
+    return f"""\
+# the file of the controller; {other}, listed first, reads displacements,
+# {one} reads forces, and theta relaxes the displacements
+type: multi
+domains: ["{other}.yaml", "{one}.yaml"]
+initial time: 0.0
+final time: 1.0
+time step: 1.0
+minimum iterations: 1
+maximum iterations: {c.iterations}
+relative tolerance: {_with_point(TOLERANCE)}
+absolute tolerance: 1.0e-12
+relaxation parameter: {_with_point(c.theta)}
+---
+# into {other}.yaml, the contact body
+{contact(one)}
+---
+# into {one}.yaml, the Neumann body
+{contact(other)}"""
+
+
+def _with_point(number: float) -> str:
+    """A number as YAML reads one: 1e-05 is a text there.
+
+    >>> _with_point(1e-05), _with_point(0.808)
+    ('1.0e-05', '0.808')
+    """
+    mantissa, e, power = f"{number:g}".partition("e")
+    return f"{mantissa}.0{e}{power}" if e and "." not in mantissa else f"{mantissa}{e}{power}"
+
+
+#: The snippets by the name of the library.
+SNIPPETS: dict[str, Callable[[Coupling], str]] = {"preCICE": precice, "Kratos": kratos, "Norma": norma}
