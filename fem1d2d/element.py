@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem1d2d.material import Material
-from fem1d2d.mesh import Mesh, MeshError, measures
+from fem1d2d.mesh import Cells, MeshError, measures
 
 
 class Element(ABC):
@@ -23,14 +23,14 @@ class Element(ABC):
     """
 
     @abstractmethod
-    def points(self, mesh: Mesh) -> Sequence[tuple[NDArray[Any], NDArray[Any]]]:
+    def points(self, mesh: Cells) -> Sequence[tuple[NDArray[Any], NDArray[Any]]]:
         """For each quadrature point its share of the measure of each cell, (c,), and the gradients there, (c, k, d)."""
 
     @abstractmethod
-    def mass(self, mesh: Mesh) -> NDArray[Any]:
+    def mass(self, mesh: Cells) -> NDArray[Any]:
         """``int u v`` of the shape functions, shape (c, k, k), unit length^d."""
 
-    def volumes(self, mesh: Mesh) -> NDArray[Any]:
+    def volumes(self, mesh: Cells) -> NDArray[Any]:
         """``int v`` of the shape functions, shape (c, k), unit length^d."""
         return np.asarray(self.mass(mesh).sum(axis=2))
 
@@ -38,15 +38,15 @@ class Element(ABC):
 class P1(Element):
     """Hat functions on simplices: their gradients are constant on a cell."""
 
-    def points(self, mesh: Mesh) -> Sequence[tuple[NDArray[Any], NDArray[Any]]]:
+    def points(self, mesh: Cells) -> Sequence[tuple[NDArray[Any], NDArray[Any]]]:
         return [(measures(mesh.points, mesh.cells), gradients(mesh))]
 
-    def mass(self, mesh: Mesh) -> NDArray[Any]:
+    def mass(self, mesh: Cells) -> NDArray[Any]:
         d, size = mesh.dimension, measures(mesh.points, mesh.cells)
         pattern = np.ones((d + 1, d + 1), dtype=int) + np.eye(d + 1, dtype=int)
         return np.asarray(size[:, None, None] * pattern / ((d + 1) * (d + 2)))
 
-    def volumes(self, mesh: Mesh) -> NDArray[Any]:
+    def volumes(self, mesh: Cells) -> NDArray[Any]:
         d, size = mesh.dimension, measures(mesh.points, mesh.cells)
         return np.repeat(size[:, None] / (d + 1), d + 1, axis=1)
 
@@ -55,7 +55,7 @@ class P1(Element):
 ELEMENTS: dict[tuple[int, int], Element] = {(1, 2): P1(), (2, 3): P1()}
 
 
-def element_of(mesh: Mesh) -> Element:
+def element_of(mesh: Cells) -> Element:
     """The element of the cells of a mesh.
 
     Raises
@@ -70,7 +70,7 @@ def element_of(mesh: Mesh) -> Element:
     return ELEMENTS[mesh.dimension, nodes]
 
 
-def gradients(mesh: Mesh) -> NDArray[Any]:
+def gradients(mesh: Cells) -> NDArray[Any]:
     """Gradients of the hat functions, shape (c, d + 1, d), unit 1/length."""
     p = mesh.points[mesh.cells]
     size = measures(mesh.points, mesh.cells)
@@ -82,7 +82,7 @@ def gradients(mesh: Mesh) -> NDArray[Any]:
     return np.asarray(rotated / (2 * size)[:, None, None])
 
 
-def stiffness(mesh: Mesh, material: Material) -> NDArray[Any]:
+def stiffness(mesh: Cells, material: Material) -> NDArray[Any]:
     """``int lame_lambda div u div v + 2 lame_mu eps(u) : eps(v)``, shape (c, k, d, k, d).
 
     Unit: stress x length^(d - 2).  Entry (c, i, p, j, q) belongs to component p at node i and q at node j.
@@ -99,13 +99,13 @@ def _stiffness(size: NDArray[Any], g: NDArray[Any], material: Material) -> NDArr
     return np.asarray((material.lame_lambda * outer + material.lame_mu * shear) * size[:, None, None, None, None])
 
 
-def laplace(mesh: Mesh) -> NDArray[Any]:
+def laplace(mesh: Cells) -> NDArray[Any]:
     """``int grad u . grad v`` of scalar functions, shape (c, k, k), unit length^(d - 2)."""
     points = element_of(mesh).points(mesh)
     first, *others = (np.einsum("cip,cjp->cij", g, g) * size[:, None, None] for size, g in points)
     return np.asarray(sum(others, start=first))
 
 
-def mass(mesh: Mesh) -> NDArray[Any]:
+def mass(mesh: Cells) -> NDArray[Any]:
     """``int u v`` of scalar functions, shape (c, k, k), unit length^d."""
     return element_of(mesh).mass(mesh)

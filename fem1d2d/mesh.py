@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,22 @@ class MeshError(ValueError):
 
 #: Coordinates are not larger than this: beyond, products of a few overflow a double.
 LARGEST = 1e30
+
+
+class Cells(Protocol):
+    """What element matrices need of a mesh."""
+
+    @property
+    def points(self) -> NDArray[Any]:
+        """Coordinates of the nodes, shape (n, d)."""
+
+    @property
+    def cells(self) -> Ints:
+        """The nodes of each cell, shape (c, k)."""
+
+    @property
+    def dimension(self) -> int:
+        """1 or 2."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -250,6 +266,12 @@ def interval(x: Sequence[Any], cells: int) -> Mesh:
     )
 
 
+def rectangle_points(x: Sequence[Any], y: Sequence[Any], cells: tuple[int, int]) -> NDArray[Any]:
+    """The nodes of :func:`rectangle`, of the same parameters, shape (n, 2); exact for fractions."""
+    axes = [_grid(ends, n) for ends, n in zip((x, y), cells, strict=True)]
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+
+
 def rectangle(x: Sequence[Any], y: Sequence[Any], cells: tuple[int, int]) -> Mesh:
     """A rectangle in equal cells, each split into two triangles along alternating diagonals.
 
@@ -275,8 +297,7 @@ def rectangle(x: Sequence[Any], y: Sequence[Any], cells: tuple[int, int]) -> Mes
     (6, 4, ['bottom', 'left', 'right', 'top'])
     """
     nx, ny = cells
-    gx, gy = _grid(x, nx), _grid(y, ny)
-    points = np.stack(np.meshgrid(gx, gy, indexing="ij"), axis=-1).reshape(-1, 2)
+    points = rectangle_points(x, y, cells)
     node = np.arange((nx + 1) * (ny + 1)).reshape(nx + 1, ny + 1)
     sw, se, nw, ne = node[:-1, :-1], node[1:, :-1], node[:-1, 1:], node[1:, 1:]
     even = (np.add.outer(np.arange(nx), np.arange(ny)) % 2 == 0)[..., None]

@@ -95,5 +95,5 @@ def trapezoid(x: Floats) -> Floats:
     """
     if len(x) <= 1:
         return np.ones(len(x))
-    steps = np.diff(x) / 2
-    return np.asarray(np.concatenate([steps, [0.0]]) + np.concatenate([[0.0], steps]))
+    steps, zero = np.diff(x) / 2, np.zeros(1, dtype=x.dtype)
+    return np.asarray(np.concatenate([steps, zero]) + np.concatenate([zero, steps]))

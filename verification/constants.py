@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from ndtheory import Constants, EnergyConstants, Number, evaluate_sharp, exact
+from ndtheory.number import above, below, weakest
 from ndtheory.sharp import friction_multiple
 from verification.body_constants import BodyConstants, constants_of
 from verification.document import Document
@@ -77,6 +79,8 @@ class Measured(Document):
         The same on meshes halved 0, 1, .. times, where that was asked for.
     problem : Problem or None
         What was measured.
+    unverified : mapping or None
+        Where proved bounds were asked for: why a number has none.
     """
 
     schema: ClassVar[str] = "ndtheory.constants/1"
@@ -104,6 +108,7 @@ class Measured(Document):
     units: Mapping[str, str]
     levels: tuple[Measured, ...] = ()
     problem: Problem | None = None
+    unverified: Mapping[str, str] | None = None
 
     @property
     def summary(self) -> str:
@@ -124,13 +129,18 @@ class Measured(Document):
         """Nodes of both bodies; None where only matrices are known."""
         return None if self.body1 is None or self.body2 is None else self.body1.nodes + self.body2.nodes
 
+    @property
+    def _exact_friction(self) -> Fraction:
+        """k as the problem has it; 1/3 is no decimal."""
+        return exact(self.friction) if self.problem is None else self.problem.contact.friction
+
     def constants(self) -> Constants | None:
         """What enters the theorem; None where C_R or C_K does not exist, or m is 0."""
         if self.m is None or self.M is None or self.C_R is None or self.C_K is None or not self.m.value:
             return None
         friction: dict[str, Any] = {"C_K": 0}  # without a law of friction
         if self.C_s is not None and self.C_tr is not None:
-            friction = {"C_s": self.C_s, "C_tr": self.C_tr, "k": exact(self.friction)}
+            friction = {"C_s": self.C_s, "C_tr": self.C_tr, "k": self._exact_friction}
         # C_R >= 1 by definition; two identical bodies reach it up to rounding
         C_R = self.C_R if self.C_R.value >= 1 else Number.of_float(1.0)
         return Constants(m=self.m, M=self.M, C_R=C_R, **friction)
@@ -176,7 +186,10 @@ class Measured(Document):
         if not self.of_friction:
             return None
         C_s, C_t1, C_t2 = (value.value for value in self.of_friction)
-        return Number.of_float(friction_multiple(C_s * C_t1, C_s * C_t2))
+        if weakest(value.level for value in self.of_friction) == "float":
+            return Number.of_float(friction_multiple(C_s * C_t1, C_s * C_t2))
+        constants = self.with_friction(1.0).energy_constants()
+        return None if constants is None else evaluate_sharp(constants).friction_multiple
 
     @property
     def friction_limit(self) -> Number | None:
@@ -198,10 +211,10 @@ class Measured(Document):
         values: dict[str, Any] = {}
         if self.C_K is not None:
             C_s, C_tr = self.C_s, self.C_tr  # None without a law of friction
-            values["C_K"] = Number.of_float(0.0 if C_s is None or C_tr is None else k * C_s.value * C_tr.value)
+            values["C_K"] = Number.of_float(0.0) if C_s is None or C_tr is None else product(exact(k), C_s, C_tr)
         if self.of_friction:
-            c_s, C_t1, C_t2 = (value.value for value in self.of_friction)
-            values |= {"kappa_1": Number.of_float(k * c_s * C_t1), "kappa_2": Number.of_float(k * c_s * C_t2)}
+            c_s, C_t1, C_t2 = self.of_friction
+            values |= {"kappa_1": product(exact(k), c_s, C_t1), "kappa_2": product(exact(k), c_s, C_t2)}
         return replace(self, friction=k, problem=None, **values)
 
     def content(self) -> dict[str, Any]:
@@ -212,11 +225,27 @@ class Measured(Document):
             **{name: None if number is None else number.to_dict() for name, number in numbers.items()},
             "interface_nodes": self.interface_nodes,
             "reason": dict(self.reason),
+            **({} if self.unverified is None else {"unverified": dict(self.unverified)}),
             **({"levels": [level.content() for level in self.levels]} if self.levels else {}),
         }
 
 
-def measure(problem: Problem | ContactPair | Path | str, *, refine: int = 0, progress: Progress = silent) -> Measured:
+def product(k: Fraction, a: Number, b: Number) -> Number:
+    """``k a b`` of numbers >= 0 with what is known of them: each end that both have, rounded outwards."""
+    value = float(k) * a.value * b.value
+    low = None if a.lo is None or b.lo is None else below(k * Fraction(a.lo) * Fraction(b.lo))
+    high = None if a.hi is None or b.hi is None else above(k * Fraction(a.hi) * Fraction(b.hi))
+    if low is None and high is None:
+        return Number.of_float(value)
+    value = value if low is None else max(value, low)
+    value = value if high is None else min(value, high)
+    level = weakest([a.level, b.level, "exact" if low == value == high else "verified"])
+    return Number(value=value, lo=low, hi=high, level=level)
+
+
+def measure(
+    problem: Problem | ContactPair | Path | str, *, refine: int = 0, verified: bool = False, progress: Progress = silent
+) -> Measured:
     """Measure the constants of a problem.
 
     Parameters
@@ -224,6 +253,8 @@ def measure(problem: Problem | ContactPair | Path | str, *, refine: int = 0, pro
     problem : Problem, ContactPair or path
     refine : int
         With N > 0 the result lists the constants on meshes halved 0 to N times.
+    verified : bool
+        Whether to prove bounds of each constant, for the exact data of the problem: then its level is ``verified``.
     progress : callable
         Told which mesh is measured.
 
@@ -252,13 +283,13 @@ def measure(problem: Problem | ContactPair | Path | str, *, refine: int = 0, pro
     progress("measuring the constants", None)
     with one_thread():
         finer = [] if not refine else _halved(pair, refine)  # refused before any is measured
-        result = _measure(pair, progress)
+        result = _measure(pair, progress, verified)
         if refine:
             levels, reason = [result], dict(result.reason)
             try:
                 for halvings, halved in enumerate(finer, 1):
                     progress(f"measuring the constants, {halvings} of {refine} halvings", (halvings - 1) / refine)
-                    levels.append(_measure(pair_or_bodies(halved), progress))
+                    levels.append(_measure(pair_or_bodies(halved), progress, verified))
             except KeyboardInterrupt:
                 reason["levels"] = f"interrupted after {len(levels) - 1} of {refine} halvings"
             result = replace(result, levels=tuple(levels), reason=reason)
@@ -271,9 +302,16 @@ def _halved(pair: ContactPair | TwoBodies, refine: int) -> list[Problem]:
     return [pair.problem.refined(level) for level in range(1, refine + 1)]
 
 
-def _measure(pair: ContactPair | TwoBodies, progress: Progress = silent) -> Measured:
-    if isinstance(pair, TwoBodies):
-        return _without_matrices(pair, progress)
+def _measure(pair: ContactPair | TwoBodies, progress: Progress, verified: bool) -> Measured:
+    plain = _without_matrices(pair, progress) if isinstance(pair, TwoBodies) else _with_matrices(pair)
+    if not verified:
+        return plain
+    from verification.certificate.constants import verify  # it proves what is measured here
+
+    return verify(plain, pair, progress=progress)
+
+
+def _with_matrices(pair: ContactPair) -> Measured:
     friction = float(pair.friction)
     values: dict[str, float | None] = dict.fromkeys((*NAMES, *ENERGY_NAMES))
     reason: dict[str, str] = {}

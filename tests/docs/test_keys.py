@@ -194,6 +194,7 @@ def documents(folder: Path, small: vf.Problem) -> list[dict[str, Any]]:
         *(vf.solve(problem) for problem in (small, bars, of_mesh, vf.example("signorini"))),
         *(vf.measure(problem) for problem in (bars, matrices)),
         vf.measure(small, refine=1),
+        vf.measure(matrices, verified=True),
         *(vf.advise(problem) for problem in (small, bars)),
         vf.advise_matrices(np.diag([2.0, 3.0]), np.eye(2)),
         vf.advise_matrices(np.diag([2.0, 3.0]), np.eye(2), transfer=np.eye(1)),

@@ -10,6 +10,7 @@ import sys
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from typing import TYPE_CHECKING, Any, Literal, TextIO
 
 import click
@@ -308,6 +309,19 @@ def figures(value: float | Number | None, digits: int = 3) -> str:
     if not 1e-3 <= abs(number) < 1e5:
         return f"{number:.{digits - 1}e}"
     return f"{number:#.{digits}g}".rstrip(".")
+
+
+def between(number: Number | None, digits: int = 12) -> tuple[str, str]:
+    """The ends of an enclosure, each rounded away from the number; a dash where there is none.
+
+    >>> between(Number(value=1 / 3, lo=0.333, hi=1 / 3, level="verified"), 4)
+    ('0.3330', '0.3334')
+    """
+    ends = (None, None) if number is None else (number.lo, number.hi)
+    away = (Context(prec=digits, rounding=ROUND_FLOOR), Context(prec=digits, rounding=ROUND_CEILING))
+    shown = (None if x is None else c.create_decimal(Decimal(x)) for x, c in zip(ends, away, strict=True))
+    low, high = ("-" if x is None else "0" if not x else f"{x:.{digits}g}" for x in shown)
+    return low, high
 
 
 def near_one(value: float) -> str:

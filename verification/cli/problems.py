@@ -163,8 +163,9 @@ def load_problem(
 @FILE
 @SET
 @click.option("--refine", type=click.IntRange(0, 8), default=0, metavar="N", help="Also on meshes halved 1 to N times.")
+@click.option("--verified", is_flag=True, help="Prove bounds of each constant, for the exact data of FILE on its mesh.")
 @JSON
-def constants(file: Path, keys: dict[str, str], refine: int, as_json: bool) -> None:
+def constants(file: Path, keys: dict[str, str], refine: int, verified: bool, as_json: bool) -> None:
     """Measure m, M, C_R, C_s, C_tr, C_K and rho on the mesh of FILE.
 
     m, M and C_K come in the file's unit of stress.
@@ -172,6 +173,7 @@ def constants(file: Path, keys: dict[str, str], refine: int, as_json: bool) -> N
     \b
     Example:
       ndtheory constants my.toml --refine 2
+      ndtheory constants my.toml --verified
       ndtheory constants my.toml --set body1.young=2e4
     """
     from verification.cli import screens
@@ -179,7 +181,7 @@ def constants(file: Path, keys: dict[str, str], refine: int, as_json: bool) -> N
 
     problem = load_problem(file, keys)
     with stages() as tell:
-        measured = measure(problem, refine=refine, progress=tell)
+        measured = measure(problem, refine=refine, verified=verified, progress=tell)
     deliver(measured, lambda: screens.constants(measured, Typed(file=file, keys=keys)), as_json)
     if "levels" in measured.reason:
         complain(f"{measured.reason['levels']}: what was computed is shown")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from shlex import quote
 
@@ -14,7 +14,7 @@ from verification.bounds.bound import BoundResult
 from verification.bounds.losses import Losses
 from verification.bounds.region import MOST_STEPS, Plane
 from verification.cli.calculator import bounds_table
-from verification.cli.console import figures, heading, near_one, note, part, printable, say, table
+from verification.cli.console import between, figures, heading, near_one, note, part, printable, say, table
 from verification.cli.typed import Typed
 from verification.comparison import Comparison, Listener
 from verification.constants import ENERGY_NAMES, NAMES, Measured
@@ -62,20 +62,41 @@ def constants(measured: Measured, typed: Typed | None = None) -> None:
     _setting(problem, measured.nodes, measured.interface_nodes)
     heading("WHAT DOES THE THEOREM NEED TO KNOW?")
     units = {"m": stress, "M": stress, "C_K": stress}
-    rows = [["nodes", *(str(level.nodes) for level in levels), "unit"]]
-    for name in (*NAMES, *ENERGY_NAMES):
-        rows.append([name, *(figures(getattr(level, name), 6) for level in levels), units.get(name, "")])
-    table(rows, right=range(1, len(levels) + 1))
+    verified = measured.unverified is not None
+    if verified:
+        for level in levels:
+            _between_bounds(level, units)
+    else:
+        rows = [["nodes", *(str(level.nodes) for level in levels), "unit"]]
+        for name in (*NAMES, *ENERGY_NAMES):
+            rows.append([name, *(figures(getattr(level, name), 6) for level in levels), units.get(name, "")])
+        table(rows, right=range(1, len(levels) + 1))
     for reason in dict.fromkeys(measured.reason.values()):
         names = ", ".join(name for name, why in measured.reason.items() if why == reason)
         note(f"{names}: {reason}", "  ")
     say()
-    note("Exact for this mesh, up to rounding.")
+    if verified:
+        note("exact, verified: proved for the exact data of the file on this mesh, all rounding errors bounded.")
+    else:
+        note("Exact for this mesh, up to rounding.")
     note(
         "On a mesh m is above and M below its continuous value: for the continuous theorem both err on the unsafe side."
     )
     if typed is not None:
         typed.suggest("advise" if measured.interface_nodes > assembly.MOST_CONTACT_NODES else "compare")
+
+
+def _between_bounds(measured: Measured, units: Mapping[str, str]) -> None:
+    """The constants with the bounds that are proved of them, and why there are none."""
+    rows = [[f"{measured.nodes} nodes", "about", "at least", "at most", "level", "unit"]]
+    for name in (*NAMES, *ENERGY_NAMES):
+        number = getattr(measured, name)
+        level = "" if number is None else number.level
+        rows.append([name, figures(number, 4), *between(number), level, units.get(name, "")])
+    table(rows, right=(1, 2, 3))
+    why = measured.unverified or {}
+    for reason in dict.fromkeys(why.values()):
+        note(f"not proved, {', '.join(name for name in why if why[name] == reason)}: {reason}", "  ")
 
 
 def _happened(run: Run, *, alone: bool) -> None:

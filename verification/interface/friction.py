@@ -85,7 +85,7 @@ def hat(t: Floats, radius: float) -> Floats:
     >>> hat(np.array([0.0, 0.5, 2.0]), 1.0)
     array([1. , 0.5, 0. ])
     """
-    return np.maximum(0.0, 1.0 - np.abs(t) / radius) / radius
+    return np.maximum(0, 1 - np.abs(t) / radius) / radius
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -163,7 +163,7 @@ class Local(Law):
         return "local law"
 
     def operator(self, interface: Interface) -> Floats:
-        stress = np.diag(1.0 / interface.neumann.weights)
+        stress = np.diag(1 / interface.neumann.weights)
         return stress if interface.transfer is None else interface.transfer @ stress
 
 
@@ -182,7 +182,7 @@ class LocalOfContact(Law):
         return "local law, pressure of the contact grid"
 
     def operator(self, interface: Interface) -> Floats:
-        return np.diag(1.0 / interface.contact.weights)
+        return np.diag(1 / interface.contact.weights)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

@@ -1,0 +1,173 @@
+"""The discrete problem as the exact rationals of a problem have it: matrices with radii, and what joins the grids.
+
+Which nodes lie on which side, and which unknowns they hold, is that of the bodies in doubles.  The numbers are not:
+ends, moduli, length and radius are the rationals of the problem, the nodes of a rectangle divide its exact sides, and
+the nodes of a mesh file are the doubles read from it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem1d2d import Material, bar, exact, interval, mortar, plane_strain, rectangle_points, trapezoid
+from fem1d2d.enclosed import Enclosed, nearest
+from fem1d2d.exact import Shapes
+from verification.interface.body import Body
+from verification.interface.friction import LAWS, Nonlocal
+from verification.interface.grid import Grid
+from verification.interface.interface import Interface
+from verification.interface.pair import ContactPair
+from verification.problem.specification import BodySpec, Problem
+
+
+class NotExact(ValueError):
+    """Why nothing can be proved: data that are not rational, or not of ordinary size."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ExactBody:
+    """A body whose stiffness and Gram matrices are known up to a radius.
+
+    Attributes
+    ----------
+    body : Body
+        The same in doubles: its unknowns, its interface and its order of elimination.
+    stiffness, gram : Enclosed
+        Of the unknowns.
+    x : array of Fraction, shape (contact nodes,)
+        Positions of the contact nodes.
+    """
+
+    body: Body
+    stiffness: Enclosed
+    gram: Enclosed
+    x: NDArray[Any]
+
+    @classmethod
+    def of(cls, problem: Problem, body: Body) -> ExactBody:
+        """The body of a problem.
+
+        Raises
+        ------
+        NotExact
+            An element that computes in doubles, or entries that are not of ordinary size.
+        """
+        spec: BodySpec = getattr(problem, body.name)
+        points, mesh = _points(spec, body), body.mesh
+        try:
+            shapes = Shapes.of(points, mesh.cells)
+            stiffness = exact.stiffness(mesh, _material(problem, spec), shapes)
+            gram = exact.gram(mesh, problem.length, shapes)
+        except (TypeError, ValueError) as error:
+            raise NotExact(f"{body.name}: {error}") from None
+        free = body.free
+        return cls(
+            body=body, stiffness=stiffness.block(free, free), gram=gram.block(free, free), x=points[body.nodes, 0]
+        )
+
+
+def _material(problem: Problem, spec: BodySpec) -> Material:
+    return plane_strain(spec.young, spec.poisson) if problem.dimension == 2 else bar(spec.young)
+
+
+def _points(spec: BodySpec, body: Body) -> NDArray[Any]:
+    """The exact nodes of a body, in the order of its mesh."""
+    if spec.mesh is not None:
+        return exact.fractions(body.mesh.points)
+    assert spec.x is not None
+    assert spec.cells is not None
+    if spec.y is None:
+        return interval(spec.x, spec.cells[0]).points
+    return rectangle_points(spec.x, spec.y, (spec.cells[0], spec.cells[1]))
+
+
+class ExactInterface:
+    """What joins the two grids, in rationals.
+
+    Parameters
+    ----------
+    pair : ContactPair
+        Made from a problem.
+    contact, neumann : array of Fraction
+        Positions of the contact nodes of both bodies.
+    """
+
+    def __init__(self, pair: ContactPair, contact: NDArray[Any], neumann: NDArray[Any]) -> None:
+        self.pair = pair
+        one_grid = pair.interface.transfer is None
+        # one grid has the positions of body 1, as in doubles
+        x = (contact if pair.contact_body == 1 else neumann) if one_grid else contact
+        self.grid = Grid(x=x, weights=trapezoid(x), dimension=pair.interface.contact.dimension)
+        self.other, self.exact_transfer = self.grid, None
+        if not one_grid:
+            x = neumann.copy()
+            x[0], x[-1] = min(x[0], contact[0]), max(x[-1], contact[-1])
+            self.exact_transfer = mortar(contact, x)
+            self.other = Grid(x=x, weights=self.exact_transfer.T @ self.grid.weights)
+
+    @cached_property
+    def weights(self) -> Enclosed:
+        """w on the diagonal, for the contact nodes."""
+        return Enclosed.rounded(np.diag(self.grid.weights))
+
+    @cached_property
+    def inverse_weights(self) -> Enclosed:
+        """1/w on the diagonal."""
+        return Enclosed.rounded(np.diag(1 / self.grid.weights))
+
+    @cached_property
+    def transfer(self) -> Enclosed | None:
+        """P; None where the grids are one."""
+        return None if self.exact_transfer is None else Enclosed.rounded(self.exact_transfer)
+
+    @cached_property
+    def transfer_of_traces(self) -> Enclosed | None:
+        """P on all components of a trace."""
+        P, d = self.transfer, self.grid.dimension
+        if P is None:
+            return None
+        return Enclosed(middle=np.kron(np.eye(d), P.middle), radius=np.kron(np.eye(d), P.radius))
+
+    @cached_property
+    def kernel(self) -> Enclosed | None:
+        """S; None without a law of friction.
+
+        Raises
+        ------
+        NotExact
+            A law that is not the problem's, or one that computes in doubles.
+        """
+        law, problem = self.pair.interface.law, self.pair.problem
+        assert problem is not None
+        if law is None or self.grid.dimension == 1:
+            return None
+        contact = problem.contact
+        if law != LAWS[contact.law].of(contact.radius):
+            raise NotExact("the law of friction was given from Python, and not by exact numbers")
+        if isinstance(law, Nonlocal):
+            law = replace(law, radius=contact.radius)  # type: ignore[arg-type]  # its formula takes any scalar
+        interface = Interface(
+            contact=self.grid, neumann=self.other, gap=self.pair.interface.gap, law=law, transfer=self.exact_transfer
+        )
+        try:
+            return Enclosed.rounded(law.operator(interface))
+        except (TypeError, ValueError) as error:
+            raise NotExact(f"law of friction: {error}") from None
+
+    def felt(self, form: Enclosed, *, normal: bool = False) -> Enclosed:
+        """``P' X P``: a form of the contact body on the Neumann grid, of all components or of the normal ones."""
+        P = self.transfer if normal else self.transfer_of_traces
+        return form if P is None else P.T.times(form).times(P).symmetric()
+
+    def tangential_mass(self, tangential: NDArray[np.bool_]) -> Enclosed:
+        """B_T on the free components of the contact grid."""
+        free = self.pair.contact.free[self.pair.contact.grid.tangential]
+        entries = np.zeros(len(tangential), dtype=object)
+        entries[tangential] = self.grid.weights[free]
+        middle = nearest(entries)
+        return Enclosed(middle=np.diag(middle), radius=np.diag(np.abs(middle)) * 2.0**-53)
