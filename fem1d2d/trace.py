@@ -88,6 +88,8 @@ def _between(mesh: Mesh, edges: Ints, ends: tuple[float, float]) -> Ints:
 def trapezoid(x: Floats) -> Floats:
     """Weights w_j of the trapezoid rule on ordered points, shape (n,), unit of length; one point has weight 1.
 
+    Rational points (an object array) have rational weights.
+
     Examples
     --------
     >>> trapezoid(np.array([0.0, 1.0, 3.0]))

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from verification.algorithm.iterate import Iterate
     from verification.algorithm.relaxation import Rule
     from verification.algorithm.runs import Run, run
+    from verification.certificate.contraction import certify, check_again
     from verification.comparison import Comparison, compare
     from verification.constants import Measured, measure
     from verification.contact import ContactError
@@ -70,6 +71,8 @@ _HOME = {
     "advise_moduli": "advice.from_moduli",
     "advise_run": "advice.from_runs",
     "build": "interface.build",
+    "certify": "certificate.contraction",
+    "check_again": "certificate.contraction",
     "compare": "comparison",
     "example": "problem.examples",
     "iterate": "algorithm.fixed_point",
@@ -103,6 +106,8 @@ __all__ = [
     "advise_moduli",
     "advise_run",
     "build",
+    "certify",
+    "check_again",
     "compare",
     "example",
     "iterate",

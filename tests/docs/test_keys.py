@@ -170,6 +170,15 @@ def falling(folder: Path) -> list[tuple[Path, str]]:
     return [(log, "0.9")]
 
 
+def certified(*problems: vf.Problem) -> Iterator[Any]:
+    """Certificates, and what comes of checking them again."""
+    for problem in problems:
+        of_small, of_sharp = vf.certify(problem), vf.certify(problem.changed(friction=0), edition="sharp")
+        yield from (of_small, of_sharp)
+        yield vf.check_again(of_small.to_dict())
+        yield vf.check_again(of_sharp.to_dict(), problem)
+
+
 @pytest.fixture(scope="module")
 def documents(folder: Path, small: vf.Problem) -> list[dict[str, Any]]:
     """Documents of every schema: with and without friction, in one dimension, from matrices, of mesh files, of runs."""
@@ -209,6 +218,9 @@ def documents(folder: Path, small: vf.Problem) -> list[dict[str, Any]]:
         vf.sweep(matrices, theta=["auto"], rule=["anderson"]),
         vf.verify(["5.30", "2.1", "thm-5.9"]),
         reproduce(["fig5", "fig11"], readings=READINGS[:2]),
+        *certified(
+            small, vf.Problem.from_dict({**small.to_dict(), "body2": {**small.to_dict()["body2"], "cells": [5, 2]}})
+        ),
     ]
     return [result.to_dict() for result in results]
 

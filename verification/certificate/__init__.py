@@ -1,1 +1,1 @@
-"""Numbers that are proved: what a problem's exact data say of its mesh, with all rounding errors bounded."""
+"""What is proved of a mesh from the exact data of a problem: constants, and certificates that others can check."""

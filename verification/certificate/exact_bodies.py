@@ -58,7 +58,7 @@ class ExactBody:
             An element that computes in doubles, or entries that are not of ordinary size.
         """
         spec: BodySpec = getattr(problem, body.name)
-        points, mesh = _points(spec, body), body.mesh
+        points, mesh = exact_points(spec, body), body.mesh
         try:
             shapes = Shapes.of(points, mesh.cells)
             stiffness = exact.stiffness(mesh, _material(problem, spec), shapes)
@@ -75,8 +75,8 @@ def _material(problem: Problem, spec: BodySpec) -> Material:
     return plane_strain(spec.young, spec.poisson) if problem.dimension == 2 else bar(spec.young)
 
 
-def _points(spec: BodySpec, body: Body) -> NDArray[Any]:
-    """The exact nodes of a body, in the order of its mesh."""
+def exact_points(spec: BodySpec, body: Body) -> NDArray[Any]:
+    """The nodes of a body in rationals, in the order of its mesh, shape (n, d)."""
     if spec.mesh is not None:
         return exact.fractions(body.mesh.points)
     assert spec.x is not None
@@ -134,8 +134,8 @@ class ExactInterface:
         return Enclosed(middle=np.kron(np.eye(d), P.middle), radius=np.kron(np.eye(d), P.radius))
 
     @cached_property
-    def kernel(self) -> Enclosed | None:
-        """S; None without a law of friction.
+    def exact_kernel(self) -> NDArray[Any] | None:
+        """S in rationals; None without a law of friction.
 
         Raises
         ------
@@ -155,7 +155,21 @@ class ExactInterface:
             contact=self.grid, neumann=self.other, gap=self.pair.interface.gap, law=law, transfer=self.exact_transfer
         )
         try:
-            return Enclosed.rounded(law.operator(interface))
+            return np.asarray(law.operator(interface))
+        except (TypeError, ValueError) as error:
+            raise NotExact(f"law of friction: {error}") from None
+
+    @cached_property
+    def kernel(self) -> Enclosed | None:
+        """S; None without a law of friction.
+
+        Raises
+        ------
+        NotExact
+            As for :attr:`exact_kernel`, or entries that are no rationals.
+        """
+        try:
+            return None if self.exact_kernel is None else Enclosed.rounded(self.exact_kernel)
         except (TypeError, ValueError) as error:
             raise NotExact(f"law of friction: {error}") from None
 

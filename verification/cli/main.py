@@ -16,7 +16,7 @@ import click
 import ndtheory
 import verification
 from ndtheory import HypothesisError
-from verification.cli import calculator, choices, ledger, problems, reproducing, sweeping
+from verification.cli import calculator, certifying, choices, ledger, problems, reproducing, sweeping
 from verification.cli.console import (
     NOTHING,
     SHOWN,
@@ -59,6 +59,7 @@ for command in (
     choices.advise,
     choices.region,
     sweeping.sweep,
+    certifying.certify,
     reproducing.reproduce,
     ledger.verify,
 ):

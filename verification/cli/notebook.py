@@ -9,7 +9,8 @@ from ndtheory import SharpBounds
 from verification.advice.roles import Advice
 from verification.algorithm.runs import Run
 from verification.bounds.region import Plane
-from verification.cli import screens
+from verification.certificate.contraction import Certificate, Checked
+from verification.cli import certifying, screens
 from verification.cli.advice_screen import advice
 from verification.cli.calculator import thetas
 from verification.cli.console import Part, heard, parted
@@ -25,6 +26,8 @@ SCREENS: dict[type, Callable[[Any], None]] = {
     Solution: screens.solution,
     Comparison: screens.comparison,
     Advice: advice,
+    Certificate: certifying.show,
+    Checked: certifying.show_checked,
     Plane: screens.plane,
     Sweep: sweep,
 }
@@ -33,7 +36,7 @@ SCREENS: dict[type, Callable[[Any], None]] = {
 def screen(result: Any) -> str:
     """The screen of the command that makes such a result; empty where there is none, as one of matrices alone."""
     show = SCREENS.get(type(result))
-    if show is None or (result.problem is None and not isinstance(result, Advice)):
+    if show is None or (result.problem is None and not isinstance(result, (Advice, Checked))):
         return ""
     with heard() as lines:
         show(result)

@@ -1,0 +1,321 @@
+"""Certificates of contraction: what they prove is so, what is false is refused, and the checker stands alone."""
+
+import ast
+import copy
+import json
+import random
+import subprocess
+import sys
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from flint import ctx
+from problem_list import blocks, changed, plates, small
+
+import verification as vf
+from verification.bounds.bound import Subject
+from verification.bounds.exact import enclose
+from verification.bounds.multipliers import QuadraticForms
+from verification.bounds.table import BOUNDS
+from verification.certificate import check
+from verification.certificate.contraction import NoCertificate, certify, check_again, describe
+
+GRIDS_DIFFER = changed(small(), body2={"cells": [5, 2]})
+PROBLEMS = {
+    "small": small(),
+    "grids that differ": GRIDS_DIFFER,
+    "without friction": small(contact={"friction": 0}),
+    "roles exchanged": small(iteration={"neumann_body": 2, "theta": "0.1"}),
+    "another side held": small(body1={"fixed": ["bottom", "right"]}),
+    "grids that differ without friction": changed(GRIDS_DIFFER, contact={"friction": 0}),
+}
+
+
+@pytest.fixture(scope="module")
+def made(shared):
+    return lambda name, **options: shared(
+        ("certificate", name, *options.items()),
+        lambda: json.loads(certify(vf.Problem.from_dict(PROBLEMS[name]), **options).to_json()),
+    )
+
+
+@pytest.fixture(params=PROBLEMS)
+def certificate(request, made):
+    return made(request.param)
+
+
+def factor(document):
+    return Fraction(document["claim"]["factor"])
+
+
+def test_what_is_proved_lies_between_the_largest_factor_found_and_the_bound_in_doubles(certificate):
+    problem = vf.Problem.from_dict(certificate["problem"])
+    pair = vf.build(problem)
+    theta = float(Fraction(certificate["claim"]["theta"]))
+    forms = QuadraticForms(pair, vf.measure(pair))
+    found = enclose(pair, forms, theta, gap=np.inf, programs=1)
+    assert found.lower * (1 - 1e-12) <= factor(certificate) <= found.upper.value * (1 + 1e-8)
+    assert certificate["lower"] == pytest.approx(found.lower, rel=1e-12)
+
+
+def test_a_claim_below_a_factor_that_occurs_is_refused(certificate):
+    certificate["claim"]["factor"] = str(Fraction(certificate["lower"]) * (1 - Fraction(1, 10**9)))
+    assert not check_again(certificate).accepted
+
+
+@pytest.mark.parametrize("edition", ["sharp", "repaired"])
+def test_other_bounds_have_certificates_with_one_number_for_all_nodes(edition):
+    problem = (
+        vf.example("inside") if edition == "repaired" else vf.Problem.from_dict(small(contact={"friction": "0.1"}))
+    )
+    found = certify(problem, edition=edition)
+    assert all(isinstance(value, str) for value in found.claim["multipliers"].values())
+    pair = vf.build(problem)
+    bound = BOUNDS[edition].evaluate(Subject.of(pair, vf.measure(pair)), problem.iteration.theta)
+    assert 1 - found.factor == pytest.approx(bound.one_minus_factor.value, rel=1e-8)
+    assert found.lower is None
+
+
+def test_the_checker_imports_nothing_of_ours_and_says_the_same_in_an_empty_folder(tmp_path, made):
+    source = Path(check.__file__).read_text(encoding="utf-8")
+    imported = {
+        name.name if isinstance(node, ast.Import) else node.module
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, (ast.Import, ast.ImportFrom))
+        for name in node.names
+    }
+    assert {name.split(".")[0] for name in imported} <= {*sys.stdlib_module_names, "flint"}
+    (tmp_path / "alone.py").write_text(source, encoding="utf-8")
+    document = made("small")
+    below = copy.deepcopy(document)
+    below["claim"]["factor"] = str(factor(document) / 2)
+    for given, status, word in ((document, 0, "ACCEPTED"), (below, 1, "REFUSED")):
+        (tmp_path / "certificate.json").write_text(json.dumps(given), encoding="utf-8")
+        call = [sys.executable, "-I", "alone.py", "certificate.json"]
+        ended = subprocess.run(call, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert (ended.returncode, ended.stderr) == (status, "")
+        assert word in ended.stdout
+
+
+def test_the_checker_condenses_the_bodies_as_the_library_does(certificate):
+    pair = vf.build(vf.Problem.from_dict(certificate["problem"]))
+    ctx.prec = 200
+    for i, side in enumerate(pair.along_y, 1):
+        found = check.surface_stiffness(certificate["discrete"][f"body{i}"], both=True)
+        doubles = np.array([[float(entry.mid()) for entry in row] for row in found.tolist()])
+        widest = max(float(entry.rad()) for row in found.tolist() for entry in row)
+        assert doubles == pytest.approx(side.stiffness, rel=0, abs=1e-12 * np.abs(side.stiffness).max())
+        assert widest < 1e-30 * np.abs(doubles).max()
+
+
+def in_fractions(document):
+    """Whether the form of a certificate is positive definite, by another path: full meshes and elimination, exactly."""
+    discrete, claim = document["discrete"], document["claim"]
+    theta, bound, k = (Fraction(v) for v in (claim["theta"], claim["factor"], discrete["friction"]))
+    bodies = [discrete["body1"], discrete["body2"]]
+    if discrete["neumann_body"] == 2:
+        bodies.reverse()
+    S_n, S_c = (condensed(body) for body in bodies)
+    n = len(S_c) // 2
+    assert discrete["transfer"] is None
+    spread = lambda values: [Fraction(v) for v in (values if isinstance(values, list) else [values] * n)]
+    lam, tau, a, b = (spread(claim["multipliers"][name]) for name in ("lambda", "tau", "a", "b"))
+    w, kernel = spread(discrete["weights"]), [[Fraction(v) for v in row] for row in discrete["kernel"]]
+    size = 4 * n
+    unit = [[Fraction(int(i == j)) for j in range(size)] for i in range(size)]
+    rows = lambda S, first: [
+        [sum(S[i][j] * unit[first + j][c] for j in range(2 * n)) for c in range(size)] for i in range(2 * n)
+    ]
+    g, p = rows(S_n, 0), rows(S_c, 2 * n)
+    jump = [[-unit[i][c] - unit[2 * n + i][c] for c in range(size)] for i in range(2 * n)]
+    zeta = [[sum(kernel[i][j] * g[n + j][c] for j in range(n)) for c in range(size)] for i in range(n)]
+    step = [[theta * x + (1 - theta) * y for x, y in zip(*pair, strict=True)] for pair in zip(p, g, strict=True)]
+    form = [[Fraction(0)] * size for _ in range(size)]
+
+    def add(weight, one, other):
+        for i in range(size):
+            for j in range(size):
+                form[i][j] += weight * (one[i] * other[j] + one[j] * other[i]) / 2
+
+    for i in range(2 * n):
+        add(bound**2, unit[i], g[i])
+    inverse = inverted(S_n)
+    for i in range(2 * n):
+        for j in range(2 * n):
+            add(-inverse[i][j], step[i], step[j])
+    for i in range(n):
+        add(-lam[i], p[n + i], jump[n + i])
+        add(-tau[i], p[i], jump[i])
+        add(-k * w[i] * a[i], zeta[i], zeta[i])
+        add(-k * w[i] * b[i], jump[i], jump[i])
+    return definite(form)
+
+
+def condensed(body):
+    """The Schur complement of a body, eliminating one unknown after the other in fractions."""
+    points = [[Fraction(x) for x in point] for point in body["points"]]
+    E, nu = Fraction(body["young"]), Fraction(body["poisson"])
+    C = [[1 - nu, nu, 0], [nu, 1 - nu, 0], [0, 0, (1 - 2 * nu) / 2]]  # Voigt
+    A = {}
+    for cell in body["cells"]:
+        p = [points[i] for i in cell]
+        two = (p[1][0] - p[0][0]) * (p[2][1] - p[0][1]) - (p[2][0] - p[0][0]) * (p[1][1] - p[0][1])
+        strains = []
+        for i in range(3):
+            q, r = p[(i + 1) % 3], p[(i + 2) % 3]
+            gx, gy = (q[1] - r[1]) / two, (r[0] - q[0]) / two
+            strains += [((cell[i], 0), (gx, 0, gy)), ((cell[i], 1), (0, gy, gx))]
+        for s, e in strains:
+            for t, f in strains:
+                energy = sum(e[x] * C[x][y] * f[y] for x in range(3) for y in range(3))
+                A[s, t] = A.get((s, t), 0) + E / ((1 + nu) * (1 - 2 * nu)) * energy * two / 2
+    held = {tuple(h) for h in body["held"]}
+    keep = [(node, p) for p in (0, 1) for node in body["surface"]]
+    others = sorted({s for s, _ in A} - held - set(keep))
+    order = others + keep
+    full = [[A.get((s, t), Fraction(0)) for t in order] for s in order]
+    for i in range(len(others)):
+        for j in range(i + 1, len(order)):
+            if full[j][i]:
+                share = full[j][i] / full[i][i]
+                for m in range(i, len(order)):
+                    if full[i][m]:
+                        full[j][m] -= share * full[i][m]
+    return [row[len(others) :] for row in full[len(others) :]]
+
+
+def inverted(matrix):
+    n = len(matrix)
+    wide = [[*row, *(Fraction(int(i == j)) for j in range(n))] for i, row in enumerate(matrix)]
+    for i in range(n):
+        wide[i] = [x / wide[i][i] for x in wide[i]]
+        for j in range(n):
+            if j != i:
+                wide[j] = [x - wide[j][i] * y for x, y in zip(wide[j], wide[i], strict=True)]
+    return [row[n:] for row in wide]
+
+
+def definite(form):
+    """By the signs of the pivots."""
+    form = [row[:] for row in form]
+    for i in range(len(form)):
+        if not form[i][i] > 0:
+            return False
+        for j in range(i + 1, len(form)):
+            share = form[j][i] / form[i][i]
+            form[j] = [x - share * y for x, y in zip(form[j], form[i], strict=True)]
+    return True
+
+
+def test_fractions_decide_as_the_balls_do_next_to_the_least_factor():
+    tiny = blocks(cells=[[2, 1], [2, 1]], contact={"friction": "0.1", "radius": "0.6"}, iteration={"theta": "0.3"})
+    document = json.loads(certify(vf.Problem.from_dict(tiny)).to_json())
+    decided = set()
+    for share in ("-1/10", "-1/100000", "-1/1000000000", "0", "1/100000"):
+        tried = copy.deepcopy(document)
+        tried["claim"]["factor"] = str(factor(document) * (1 + Fraction(share)))
+        accepted = check_again(tried).accepted
+        assert accepted == in_fractions(tried)
+        decided.add(accepted)
+    assert decided == {True, False}
+
+
+def tampered(document, drawn):
+    """A certificate with one digit of its claim or of its bodies changed."""
+    text = json.dumps({"claim": document["claim"], "discrete": document["discrete"]})
+    places = [i for i, letter in enumerate(text) if letter.isdigit() and text[i - 1] not in "abcdeklmnrtuy_"]
+    at = drawn.choice(places)
+    changed_text = text[:at] + drawn.choice("0123456789") + text[at + 1 :]
+    try:
+        return {**document, **json.loads(changed_text)}
+    except ValueError:
+        return document
+
+
+def test_what_is_accepted_of_tampered_certificates_is_so(made):
+    document, drawn, accepted = made("small"), random.Random(7), 0
+    problem = vf.Problem.from_dict(document["problem"])
+    for _ in range(40):
+        given = tampered(document, drawn)
+        found = check_again(given, problem)
+        if found.accepted:
+            accepted += 1
+            assert found.same
+            same_theta = given["claim"]["theta"] == document["claim"]["theta"]
+            assert factor(given) >= Fraction(document["lower"]) * (1 - Fraction(1, 10**12)) or not same_theta
+    assert 0 < accepted < 40
+
+
+def test_a_certificate_of_a_changed_mesh_that_names_its_own_hash_is_about_that_mesh(made):
+    document = copy.deepcopy(made("small"))
+    document["discrete"]["body1"]["young"] = "70001"
+    assert "hash" in check_again(document).why
+    document["claim"]["factor"] = "9/10"
+    document["sha256"] = check.digest(document["discrete"])
+    found = check_again(document, vf.Problem.from_dict(PROBLEMS["small"]))
+    assert found.accepted
+    assert found.same is False
+
+
+def broken(document, edit):
+    document = copy.deepcopy(document)
+    edit(document["discrete"], document["claim"])
+    document["sha256"] = check.digest(document["discrete"])
+    return document
+
+
+BREAKS = {
+    "multipliers that are not negative": lambda d, c: c["multipliers"]["lambda"].__setitem__(0, "-1"),
+    "4 a b": lambda d, c: c["multipliers"].update(a="0"),
+    "a rational": lambda d, c: d["weights"].__setitem__(0, 0.5),
+    "a rational, ": lambda d, c: d["weights"].__setitem__(0, "0.5"),
+    "0 < theta": lambda d, c: c.update(theta="2"),
+    "-1 < nu < 1/2": lambda d, c: d["body1"].update(poisson="2/3"),
+    "E > 0": lambda d, c: d["body2"].update(young="-1"),
+    "anticlockwise": lambda d, c: d["body1"]["cells"][0].reverse(),
+    "contact nodes that are free": lambda d, c: d["body1"]["held"].append([d["body1"]["surface"][0], 1]),
+    "each once": lambda d, c: d["body2"]["surface"].__setitem__(0, d["body2"]["surface"][1]),
+    "node numbers": lambda d, c: d["body2"]["surface"].__setitem__(0, -1),
+    "positive weight": lambda d, c: d["weights"].__setitem__(0, "0"),
+    "a matrix of": lambda d, c: d["kernel"].pop(),
+    "multipliers of each kind": lambda d, c: c["multipliers"]["lambda"].pop(),
+    "neumann_body": lambda d, c: d.update(neumann_body=3),
+    "balls of these bits": lambda d, c: c.update(bits=50),
+}
+
+
+@pytest.mark.parametrize("said", BREAKS)
+def test_what_the_proof_does_not_allow_is_refused_with_what_is_needed(said, made):
+    found = check_again(broken(made("small"), BREAKS[said]))
+    assert not found.accepted
+    assert said.strip(", ") in found.why
+
+
+def test_a_weaker_claim_is_accepted_too(made):
+    assert check_again(broken(made("small"), lambda d, c: c.update(factor="9/10"))).accepted
+
+
+@pytest.mark.parametrize("data", [plates(), GRIDS_DIFFER], ids=["one grid", "grids that differ"])
+def test_a_problem_is_described_in_the_rationals_of_its_file(data):
+    problem = vf.Problem.from_dict(data)
+    pair, found = vf.build(problem), describe(problem)
+    numbers = lambda rows: np.array([[float(Fraction(x)) for x in row] for row in rows])
+    assert numbers([found["weights"]])[0] == pytest.approx(pair.contact.grid.weights, rel=1e-14)
+    assert numbers(found["kernel"]) == pytest.approx(pair.interface.kernel, rel=1e-12, abs=1e-12)
+    if pair.interface.transfer is None:
+        assert found["transfer"] is None
+    else:
+        assert numbers(found["transfer"]) == pytest.approx(pair.interface.transfer, abs=1e-14)
+        assert all(sum(map(Fraction, row)) == 1 for row in found["transfer"])
+    assert found["body1"]["young"] == "70000"
+
+
+def test_where_no_contraction_is_proved_there_is_no_certificate():
+    with pytest.raises(NoCertificate, match=r"no contraction at theta = 0\.7, k = 5"):
+        certify(vf.Problem.from_dict(small(contact={"friction": 5})))
+    with pytest.raises(NoCertificate, match="the theorem repaired"):
+        certify(vf.Problem.from_dict(small()), edition="repaired")
+    with pytest.raises(vf.ProblemError, match="outside the theorem"):
+        certify(vf.Problem.from_dict(small(contact={"law": "local", "radius": None})))

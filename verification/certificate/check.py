@@ -1,0 +1,216 @@
+"""Check a certificate of contraction; needs the standard library and python-flint alone: ``python check.py FILE``.
+
+A certificate describes two elastic bodies on meshes of triangles in rational numbers and claims that the map T_theta of
+the Neumann-Dirichlet iteration between them has a Lipschitz constant, whatever the loads and the gap.  S_a are the
+Schur complements of the stiffness matrices on the contact nodes, the form ``.' S_n^-1 .`` is the squared norm of forces
+on the Neumann body, and P carries its traces to the contact nodes.  Two forces g = S_n d differ by p = S_c c after step
+II, and the displacement of the contact body relative to the other one by v = -(P d + c).  Step II gives, node by node,
+
+    p_N v_N >= 0,      p_T v_T >= -w k |zeta| |v_T|  with  zeta = kernel g_N,
+
+so that for multipliers lambda, tau, a, b >= 0 with 4 a b >= tau^2 the sum over the nodes of
+``lambda p_N v_N + tau p_T v_T + w k (a zeta^2 + b v_T^2)`` is not negative.  The claim holds if
+
+    factor^2 |g|^2 - |theta P' p + (1 - theta) g|^2 - that sum
+
+is a positive definite form in (d, c).  Here it is enclosed in balls, from the rational data on, and decided.
+"""
+
+import hashlib
+import json
+import re
+import sys
+
+from flint import arb, arb_mat, ctx, fmpq
+
+#: What a certificate that is none, or proves nothing, raises.
+UNREADABLE = (OSError, ArithmeticError, AttributeError, LookupError, TypeError, ValueError, RecursionError, MemoryError)
+
+#: Unknowns eliminated at once.
+BLOCK = 32
+
+
+class Refused(ValueError):
+    """The claim is not proved by its certificate."""
+
+
+def check(discrete, claim):
+    """Raise Refused, KeyError or another ValueError unless the multipliers of a claim prove it."""
+    ctx.prec = min(int(claim["bits"]), 20000)
+    theta, factor, k = (rational(claim["theta"]), rational(claim["factor"]), rational(discrete["friction"]))
+    demand(0 < theta <= 1 and factor >= 0 and k >= 0, "0 < theta <= 1, a factor and a friction that are not negative")
+    demand(discrete["neumann_body"] in (1, 2), "neumann_body 1 or 2")
+    one, two = discrete["body1"], discrete["body2"]
+    neumann, contact = (two, one) if discrete["neumann_body"] == 2 else (one, two)
+    S_n, S_c = surface_stiffness(neumann, both=True), surface_stiffness(contact, both=k != 0)
+    n, m, t = len(contact["surface"]), len(neumann["surface"]), len(contact["surface"]) if k else 0
+    P = matrix(discrete["transfer"], n, m) if discrete["transfer"] else identity(n)
+    demand(P.ncols() == m, "a transfer between contact nodes that differ")
+    weights = [rational(w) for w in discrete["weights"]]
+    demand(len(weights) == n and all(w > 0 for w in weights), "a positive weight for each contact node")
+    lam, tau, a, b = (spread(claim["multipliers"][name], n) for name in ("lambda", "tau", "a", "b"))
+    demand(all(x >= 0 for x in lam + tau + a + b), "multipliers that are not negative")
+    demand(all(4 * x * y >= z * z for x, y, z in zip(a, b, tau, strict=True)), "4 a b >= tau^2")
+
+    # rows: forms in (d, c).  Without friction p_T = 0, and c stands for the normal trace alone
+    still = lambda rows, columns: arb_mat(rows, columns)
+    across = stacked([[P, still(n, m)], [still(n, m), P]]) if k else stacked([[still(n, m), P]])
+    force = stacked([[still(t + n, 2 * m), S_c]])
+    jump = -stacked([[across, identity(t + n)]])
+    moved = across.transpose() * S_c  # P' p
+    square = moved.transpose() * S_n.solve(moved)
+    form = stacked(
+        [
+            [(factor**2 - (1 - theta) ** 2) * S_n, -theta * (1 - theta) * moved],
+            [-theta * (1 - theta) * moved.transpose(), -(theta**2) * square],
+        ]
+    )
+    product = force.transpose() * diagonal((tau if k else []) + lam) * jump
+    form -= (product + product.transpose()) / 2
+    if k:
+        kernel = matrix(discrete["kernel"], n, m)
+        zeta = stacked([[kernel * part(S_n, range(m, 2 * m), range(2 * m)), still(n, 2 * n)]])
+        slip = part(jump, range(n), range(jump.ncols()))
+        for rows, values in ((zeta, a), (slip, b)):
+            form -= rows.transpose() * diagonal([k * w * x for w, x in zip(weights, values, strict=True)]) * rows
+    demand(definite(form), "multipliers for which the form is positive definite in balls of these bits")
+
+
+def surface_stiffness(body, both):
+    """The Schur complement on the contact nodes: tangential components first, then normal ones; or these alone."""
+    points = [[rational(x) for x in point] for point in body["points"]]
+    young, nu = rational(body["young"]), rational(body["poisson"])
+    demand(young > 0 and -1 < nu < fmpq(1, 2), "E > 0 and -1 < nu < 1/2")
+    first, second = young * nu / ((1 - 2 * nu) * (1 + nu)), young / (2 * (1 + nu))  # Lame
+    held = {(node, p) for node, p in body["held"]}
+    named = {i for cell in body["cells"] for i in cell} | set(body["surface"]) | {node for node, _ in held}
+    demand(all(type(i) is int and 0 <= i < len(points) for i in named), "node numbers")
+    rows = {}
+    for cell in body["cells"]:
+        (x0, y0), (x1, y1), (x2, y2) = (points[i] for i in cell)
+        twice = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
+        demand(twice > 0, f"cell {cell} anticlockwise, of positive area")
+        slope = [(y1 - y2, x2 - x1), (y2 - y0, x0 - x2), (y0 - y1, x1 - x0)]  # gradients times twice the area
+        for i, g in zip(cell, slope, strict=True):
+            for j, h in zip(cell, slope, strict=True):
+                dot = g[0] * h[0] + g[1] * h[1]
+                for p in (0, 1):
+                    for q in (0, 1):
+                        if (i, p) not in held and (j, q) not in held:
+                            value = first * g[p] * h[q] + second * (g[q] * h[p] + (dot if p == q else 0))
+                            row = rows.setdefault((i, p), {})
+                            row[j, q] = row.get((j, q), 0) + value / (2 * twice)
+    keep = [(node, p) for p in ((0, 1) if both else (1,)) for node in body["surface"]]
+    demand(len(set(keep)) == len(keep) and not held & set(keep), "contact nodes that are free, each once")
+    inside = sorted(set(rows) - set(keep), key=lambda unknown: (points[unknown[0]], unknown))
+    for start in range(0, len(inside), BLOCK):
+        block = inside[start : start + BLOCK]
+        near = sorted(set().union(*(rows[i] for i in block)) - set(block))
+        coupling = gathered(rows, block, near)
+        less = coupling.transpose() * gathered(rows, block, block).solve(coupling)
+        for i in block:
+            del rows[i]
+        for a, i in enumerate(near):
+            row = rows[i]
+            for j in block:
+                row.pop(j, None)
+            for b, j in enumerate(near):
+                row[j] = row.get(j, 0) - less[a, b]
+    return gathered(rows, keep, keep)
+
+
+def definite(form):
+    """Whether every symmetric matrix in these balls is positive definite: by halves and their Schur complement."""
+    n = form.nrows()
+    if n == 1:
+        return bool(form[0, 0] > 0)
+    head, tail = range(n // 2), range(n // 2, n)
+    A, B, C = part(form, head, head), part(form, head, tail), part(form, tail, tail)
+    return definite(A) and definite(C - B.transpose() * A.solve(B))
+
+
+def demand(holds, needed):
+    if not holds:
+        raise Refused(f"needed {needed}")
+
+
+def rational(text):
+    demand(isinstance(text, str) and re.fullmatch(r"-?\d{1,2000}(/\d{1,2000})?", text), f"a rational, not {text!r}")
+    return fmpq(*(int(part) for part in text.split("/")))
+
+
+def spread(values, n):
+    """A multiplier for each node, or one for all of them."""
+    found = [rational(x) for x in (values if isinstance(values, list) else [values] * n)]
+    demand(len(found) == n, f"{n} multipliers of each kind")
+    return found
+
+
+def matrix(rows, n, m):
+    demand(len(rows) == n and all(len(row) == m for row in rows), f"a matrix of {n} x {m}")
+    return arb_mat([[arb(rational(x)) for x in row] for row in rows])
+
+
+def diagonal(values):
+    return arb_mat([[arb(x) if i == j else arb(0) for j in range(len(values))] for i, x in enumerate(values)])
+
+
+def identity(n):
+    return diagonal([1] * n)
+
+
+def part(whole, rows, columns):
+    return arb_mat([[whole[i, j] for j in columns] for i in rows])
+
+
+def gathered(rows, wanted, columns):
+    return arb_mat([[arb(rows[i].get(j, 0)) for j in columns] for i in wanted])
+
+
+def stacked(blocks):
+    """A matrix from rows of matrices side by side."""
+    beside = lambda row: zip(*(block.tolist() for block in row), strict=True)
+    return arb_mat([[entry for line in lines for entry in line] for row in blocks for lines in beside(row)])
+
+
+def digest(discrete):
+    """A hash of the bodies and all else that the claim is about."""
+    return hashlib.sha256(json.dumps(discrete, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+
+
+def words(document):
+    """What is checked, for a reader."""
+    discrete, claim = document["discrete"], document["claim"]
+    bodies = [
+        f"{name}: {len(body['points'])} nodes, {len(body['cells'])} triangles, E {body['young']}, nu {body['poisson']}"
+        for name, body in ((name, discrete[name]) for name in ("body1", "body2"))
+    ]
+    at = f"Neumann problem: body {discrete['neumann_body']}, k {discrete['friction']}, theta {claim['theta']}"
+    spare = 1 - rational(claim["factor"])
+    return "; ".join([*bodies, at, f"Lipschitz constant at most 1 - {float(arb(spare).mid()):.10g}"])
+
+
+def examine(document):
+    """Raise one of UNREADABLE unless a certificate proves its claim."""
+    demand(document["sha256"] == digest(document["discrete"]), "the hash of its own bodies")
+    check(document["discrete"], document["claim"])
+
+
+def main(path):
+    try:
+        with open(path, encoding="utf-8") as file:
+            document = json.load(file)
+        print(words(document))
+        print("sha256 of the bodies and what joins them:", digest(document["discrete"]))
+        examine(document)
+    except UNREADABLE as error:
+        print(f"REFUSED: {type(error).__name__}: {error}")
+        return 1
+    print(
+        "ACCEPTED:", "T_theta contracts" if rational(document["claim"]["factor"]) < 1 else "no contraction is claimed"
+    )
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1]) if len(sys.argv) == 2 else "needed: python check.py certificate.json")
