@@ -17,6 +17,7 @@ import pytest
 from coupling_logs import linear_run, precice
 
 import verification as vf
+from verification.certificate.continuum import certify_continuum
 from verification.cli import main
 from verification.reproduce import READINGS, reproduce
 
@@ -79,7 +80,9 @@ class Reader:
         self.tables, self.wrong, self.seen = tables(page), [], set()
 
     def read(self, document: Mapping[str, Any]) -> None:
-        self.object(document["schema"], "", document, document["schema"])
+        name, kind = document["schema"], document.get("kind")
+        name = f"{name}, {kind}" if f"{name}, {kind}" in self.tables else name  # a table for one kind
+        self.object(name, "", document, name)
 
     def rows(self, name: str) -> Iterator[tuple[str, str, Row]]:
         """The rows of a table with those it includes: which table has the row, its path, its type and meaning."""
@@ -221,6 +224,7 @@ def documents(folder: Path, small: vf.Problem) -> list[dict[str, Any]]:
         *certified(
             small, vf.Problem.from_dict({**small.to_dict(), "body2": {**small.to_dict()["body2"], "cells": [5, 2]}})
         ),
+        *(certify_continuum(problem) for problem in (small, small.swapped(), small.changed(theta="auto", friction=0))),
     ]
     return [result.to_dict() for result in results]
 

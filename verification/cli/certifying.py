@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,7 @@ from verification.cli.typed import Typed
 
 if TYPE_CHECKING:
     from verification.certificate.contraction import Certificate, Checked
+    from verification.document import Document
 
 #: A certificate of a hundred contact nodes has a few megabytes.
 MOST_BYTES = 100_000_000
@@ -28,9 +30,10 @@ MOST_BYTES = 100_000_000
 @click.option(
     "--edition",
     type=click.Choice(["lmi", "sharp", "repaired"]),
-    default="lmi",
-    show_default=True,
-    help="Which bound proposes the factor: semidefinite, energy norms, Section 5 repaired.",
+    help="Which bound proposes the factor: semidefinite (by default), energy norms, Section 5 repaired.",
+)
+@click.option(
+    "--continuum", is_flag=True, help="Of FILE without its mesh: two rectangles, each held at its outer side."
 )
 @click.option("-o", "--output", "target", type=click.Path(path_type=Path), metavar="CERTIFICATE", help="A .json file.")
 @click.option(
@@ -47,60 +50,90 @@ def certify(
     theta: str | None,
     swap: bool,
     edition: Any,
+    continuum: bool,
     target: Path | None,
     given: Path | None,
     as_json: bool,
 ) -> int:
-    """Prove that one step contracts on the meshes of FILE, in exact numbers.
+    """Prove that one step contracts on the meshes of FILE in exact numbers, or in the continuum.
 
-    The certificate holds the bodies in rational numbers and the multipliers that prove the factor.  Whoever doubts it
-    checks it with a script of some 200 lines, verification/certificate/check.py, which imports nothing of this program
-    (python-flint alone, for balls).  Needs the extra `certify`.  Exit 1 where contraction is not proved.
+    The certificate of a mesh holds the bodies in rational numbers and the multipliers that prove the factor.  Whoever
+    doubts it checks it with a script of some 200 lines, verification/certificate/check.py, which imports nothing of
+    this program (python-flint alone, for balls).  Needs the extra `certify`; --continuum does not.  Exit 1 where
+    contraction is not proved.
 
     \b
     Examples:
       ndtheory certify my.toml --theta 0.5 -o certificate.json
       ndtheory certify --check certificate.json
       ndtheory certify --check certificate.json my.toml
+      ndtheory certify --continuum my.toml --theta 0.4
     """
     context = click.get_current_context()
+    for first, used, second, also in (
+        ("--theta", theta, "--check", given),
+        ("-o", target, "--check", given),
+        ("--edition", edition, "--check", given),
+        ("--continuum", continuum or None, "--check", given),
+        ("--edition", edition, "--continuum", continuum or None),
+    ):
+        if used is not None and also is not None:
+            raise click.UsageError(f"received {first} with {second}: needed one of both", context)
+    if file is None and given is None:
+        raise click.UsageError("received nothing: needed FILE, or --check CERTIFICATE", context)
+    if target is not None:
+        _check_target(target, context)
+    if continuum:
+        from verification.cli.continuum_screen import prove as prove_continuum
+
+        assert file is not None
+        return prove_continuum(file, keys, theta=theta, swap=swap, target=target, as_json=as_json)
     if find_spec("flint") is None:
         needed = "needed the extra `certify` (pip install 'ndtheory[certify]')"
         raise click.UsageError(f"python-flint is not installed: {needed}", context)
     if given is not None:
-        for name, value in (("--theta", theta), ("-o", target)):
-            if value is not None:
-                raise click.UsageError(f"received {name} with --check: it makes a certificate", context)
         return _check(given, None if file is None else load_problem(file, keys, swap=swap), as_json)
-    if file is None:
-        raise click.UsageError("received nothing: needed FILE, or --check CERTIFICATE", context)
+    assert file is not None
     from verification.certificate.contraction import NoCertificate
     from verification.certificate.contraction import certify as prove
-    from verification.output.folder import check_ours, staged
-    from verification.problem.tables import ProblemError
 
     problem = load_problem(file, keys, theta=theta, swap=swap)
-    if target is not None:
-        if target.suffix != ".json":
-            raise click.UsageError(f"-o {target}: needed a name ending in .json", context)
-        if not target.parent.is_dir():
-            raise ProblemError(str(target), "", None, "needed a name in a folder that exists (-o)")
-        check_ours(target)
     try:
         with stages() as tell:
-            found = prove(problem, edition=edition, progress=tell)
+            found = prove(problem, edition=edition or "lmi", progress=tell)
     except NoCertificate as error:
         complain(f"ndtheory: no certificate: {error}")
         return 1
 
+    typed = Typed(file=file, keys=keys, theta=theta, swap=swap)
+    deliver(found, lambda: show(found, target, typed), as_json, writing(found, target), target)
+    return 0
+
+
+def _check_target(target: Path, context: click.Context) -> None:
+    """Refuse a name under which nothing can be written."""
+    from verification.output.folder import check_ours
+    from verification.problem.tables import ProblemError
+
+    if target.suffix != ".json":
+        raise click.UsageError(f"-o {target}: needed a name ending in .json", context)
+    if not target.parent.is_dir():
+        raise ProblemError(str(target), "", None, "needed a name in a folder that exists (-o)")
+    check_ours(target)
+
+
+def writing(found: Document, target: Path | None) -> Callable[[], None] | None:
+    """What writes a certificate; None where no name was given."""
+    from verification.output.folder import staged
+
+    if target is None:
+        return None
+
     def write() -> None:
-        assert target is not None
         with staged(target.parent, shown=target) as room:
             (room / target.name).write_text(found.to_json(), encoding="utf-8")
 
-    typed = Typed(file=file, keys=keys, theta=theta, swap=swap)
-    deliver(found, lambda: show(found, target, typed), as_json, None if target is None else write, target)
-    return 0
+    return write
 
 
 def show(found: Certificate, target: Path | None = None, typed: Typed | None = None) -> None:

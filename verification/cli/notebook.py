@@ -9,11 +9,13 @@ from ndtheory import SharpBounds
 from verification.advice.roles import Advice
 from verification.algorithm.runs import Run
 from verification.bounds.region import Plane
+from verification.certificate.continuum import ContinuumCertificate
 from verification.certificate.contraction import Certificate, Checked
 from verification.cli import certifying, screens
 from verification.cli.advice_screen import advice
 from verification.cli.calculator import thetas
 from verification.cli.console import Part, heard, parted
+from verification.cli.continuum_screen import show as continuum
 from verification.cli.sweep_screen import sweep
 from verification.comparison import Comparison
 from verification.constants import Measured
@@ -28,6 +30,7 @@ SCREENS: dict[type, Callable[[Any], None]] = {
     Advice: advice,
     Certificate: certifying.show,
     Checked: certifying.show_checked,
+    ContinuumCertificate: continuum,
     Plane: screens.plane,
     Sweep: sweep,
 }

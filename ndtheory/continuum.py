@@ -1,0 +1,263 @@
+r"""The theorem in energy norms for two rectangles in the continuum: its constants bounded with no finite element.
+
+Two rectangles touch along the interval Gamma_c of a straight line; of each the side opposite Gamma_c is clamped, or
+moved as given, and no other one is held.  S is the convolution with the hat kernel of radius r on Gamma_c.  Then
+
+* ``C_s^2 <= sup over xi of S_NN(xi) sinc^4(r xi/2)`` with the strip of the Neumann body (:mod:`ndtheory.strip`),
+* ``C_ta^2 <= (d/G) K`` with a rational K (:mod:`ndtheory.segments`),
+* ``rho <= (1 + eps) R`` with R the largest ratio of both strips' forms, and eps the energy of a cut-off,
+* ``rho_normal <= s`` where the mirror image of the contact body fits (:func:`ndtheory.moduli.mirror`).
+
+The proofs are in ``docs/continuum.md``.  Every number here is exact or rounded outward, so what follows from them is
+guaranteed for the continuum.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from ndtheory.energy import EnergyConstants
+from ndtheory.errors import HypothesisError
+from ndtheory.intervals import Interval
+from ndtheory.moduli import Moduli, mirror
+from ndtheory.number import Number, above, below
+from ndtheory.segments import bound, bound_at_end, zones
+from ndtheory.sharp import evaluate_sharp
+from ndtheory.sharp_bounds import SharpBounds
+from ndtheory.strip import Strip, largest_ratio_of_strips, largest_smoothed
+
+#: A little more than 4/pi^2.
+FOUR_OVER_PI_SQUARE = Fraction(40529, 100000)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rectangle:
+    """A body whose side opposite Gamma_c is clamped and no other one held.
+
+    Attributes
+    ----------
+    left, right : Fraction
+        Its ends along Gamma_c, unit length.
+    thickness : Fraction
+        d, from Gamma_c to the clamped side.
+    body : Moduli
+        Not incompressible, kappa > 1.
+
+    Raises
+    ------
+    HypothesisError
+    """
+
+    left: Fraction
+    right: Fraction
+    thickness: Fraction
+    body: Moduli
+
+    def __post_init__(self) -> None:
+        if not self.left < self.right:
+            raise HypothesisError("x", f"[{self.left}, {self.right}]", "a first end below the second one")
+        if not self.thickness > 0:
+            raise HypothesisError("d", self.thickness, "a thickness d > 0")
+        if not self.body.kappa > 1:
+            raise HypothesisError("nu", self.body.poisson, "a compressible body, nu < 1/2")
+
+    @property
+    def strip(self) -> Strip:
+        """The strip that contains it."""
+        return Strip(body=self.body, thickness=self.thickness)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TwoRectangles:
+    """Two rectangles in contact.
+
+    Attributes
+    ----------
+    contact, neumann : Rectangle
+        The body of step II, and the one of step I.
+    interval : tuple of Fraction
+        Ends of Gamma_c, inside both.
+    radius : Fraction
+        r > 0 of the hat kernel.
+
+    Raises
+    ------
+    HypothesisError
+
+    Examples
+    --------
+    Section 6 with its own friction:
+
+    >>> tenths = lambda *values: (Fraction(value, 10) for value in values)
+    >>> def body(left, right, young):
+    ...     left, right, thickness = tenths(left, right, 3)
+    ...     return Rectangle(left=left, right=right, thickness=thickness, body=Moduli(young=young, poisson="0.3"))
+    >>> upper_body, lower_body, ends = body(4, 16, 20000), body(0, 20, 70000), tuple(tenths(4, 16))
+    >>> model = TwoRectangles(contact=upper_body, neumann=lower_body, interval=ends, radius=Fraction(1, 10))
+    >>> found = continuum_constants(model)
+    >>> says = statement(found, friction="0.2", theta="0.4")
+    >>> says.verdict, says.factor.level, round(says.factor.hi, 3)
+    ('contraction', 'guaranteed', 0.947)
+    """
+
+    contact: Rectangle
+    neumann: Rectangle
+    interval: tuple[Fraction, Fraction]
+    radius: Fraction
+
+    def __post_init__(self) -> None:
+        lo, hi = self.interval
+        for body in (self.contact, self.neumann):
+            if not body.left <= lo < hi <= body.right:
+                needed = f"an interval on both bodies, inside [{body.left}, {body.right}]"
+                raise HypothesisError("Gamma_c", f"[{lo}, {hi}]", needed)
+        if not self.radius > 0:
+            raise HypothesisError("r", self.radius, "a radius r > 0")
+
+    @property
+    def margins(self) -> tuple[Fraction, Fraction]:
+        """How far the Neumann body goes on beyond both ends of Gamma_c."""
+        return self.interval[0] - self.neumann.left, self.neumann.right - self.interval[1]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContinuumConstants:
+    """Upper bounds of the constants in energy norms, exact rationals.
+
+    Attributes
+    ----------
+    C_s_square : Fraction
+        Unit stress/length.
+    C_t1_square, C_t2_square : Fraction
+        Contact body and Neumann body, unit length/stress.
+    segments : tuple of Fraction
+        K of both: ``C_ta^2 G/d``.
+    strips : Fraction
+        R.
+    cut_off : Fraction or None
+        eps; None where Gamma_c reaches an end of the Neumann body.
+    rho : Fraction or None
+        ``(1 + eps) R``; None where eps is.
+    rho_normal : Fraction or None
+        s; None where the mirror image does not fit.
+    reason : dict
+        Why a bound is None.
+    """
+
+    C_s_square: Fraction
+    C_t1_square: Fraction
+    C_t2_square: Fraction
+    segments: tuple[Fraction, Fraction]
+    strips: Fraction
+    cut_off: Fraction | None
+    rho: Fraction | None
+    rho_normal: Fraction | None
+    reason: dict[str, str]
+
+    def kappa(self, friction: Fraction) -> tuple[Fraction, Fraction]:
+        """Upper bounds of kappa_1 and kappa_2."""
+        return tuple(  # type: ignore[return-value]
+            friction * Fraction(Interval.of(self.C_s_square * square).sqrt().hi)
+            for square in (self.C_t1_square, self.C_t2_square)
+        )
+
+
+def cut_off(model: TwoRectangles) -> Fraction | None:
+    """eps with ``a(chi v) <= (1 + eps) a(v)`` for lifts v into the Neumann body, chi falling to 0 beside Gamma_c.
+
+    None where Gamma_c reaches an end of the Neumann body.
+    """
+    body, (lo, hi) = model.neumann, model.interval
+    if min(model.margins) <= 0:
+        return None
+    # each side's segments stay on their side of the middle of Gamma_c, so that they meet no strain of the other side
+    room = (hi - lo) / 2 / body.thickness
+    steepest = (body.thickness / min(model.margins)) ** 2
+    kappa = body.body.kappa
+    along = (kappa + 1) / (kappa - 1) * bound_at_end(room, kappa) / 2
+    across = FOUR_OVER_PI_SQUARE * (kappa + 1) / 8
+    return (along + across) * steepest
+
+
+def continuum_constants(model: TwoRectangles) -> ContinuumConstants:
+    """Bound C_s, C_t1, C_t2 and rho for the continuum.
+
+    Raises
+    ------
+    Unproved
+        A search among intervals found no answer.
+    """
+    reason: dict[str, str] = {}
+    factors, squares = [], []
+    for body in (model.contact, model.neumann):
+        length, lo, hi = ((end - body.left) / body.thickness for end in (body.right, *model.interval))
+        factors.append(bound(zones(length, lo, hi, body.body.kappa), body.body.kappa))
+        squares.append(factors[-1] * body.thickness / body.body.shear)
+    strips = largest_ratio_of_strips(model.contact.strip, model.neumann.strip)
+    eps = cut_off(model)
+    if eps is None:
+        text = "Gamma_c reaches an end of the Neumann body: there is no room for a cut-off"
+        reason |= {"cut_off": text, "rho": text}
+    contact, neumann = model.contact, model.neumann
+    mirrored = mirror(contact.body, neumann.body)
+    fits = neumann.left <= contact.left and contact.right <= neumann.right and contact.thickness >= neumann.thickness
+    if not fits:
+        mirrored = None
+        reason["rho_normal"] = "needed a contact body that is as thick and goes beyond no end of the Neumann body"
+    return ContinuumConstants(
+        C_s_square=Fraction(largest_smoothed(neumann.strip, model.radius).hi),
+        C_t1_square=squares[0],
+        C_t2_square=squares[1],
+        segments=(factors[0], factors[1]),
+        strips=strips,
+        cut_off=eps,
+        rho=None if eps is None else (1 + eps) * strips,
+        rho_normal=mirrored,
+        reason=reason,
+    )
+
+
+def upper(value: Any) -> Number:
+    """A number that is proved to be at most a rational."""
+    hi = above(value)
+    return Number(value=hi, hi=hi, level="guaranteed")
+
+
+def lower(value: Any) -> Number:
+    """A number that is proved to be at least a rational."""
+    lo = below(value)
+    return Number(value=lo, lo=lo, level="guaranteed")
+
+
+def friction_threshold(constants: ContinuumConstants) -> Number:
+    """A friction below which every small theta contracts; rho enters only how small."""
+    first, second = (Interval.of(value) for value in constants.kappa(Fraction(1)))
+    return lower(Fraction((2 / (second + (second.square() + first.square()).sqrt())).lo))
+
+
+def statement(constants: ContinuumConstants, *, friction: Any, theta: Any = None) -> SharpBounds | None:
+    """What the theorem in energy norms says of the continuum; None where rho is not bounded.
+
+    q grows with its constants, so the values for upper bounds are bounds: ``factor`` and ``factor_proved`` from above,
+    ``theta_max_proved`` and both multiples of friction from below.
+
+    Parameters
+    ----------
+    constants : ContinuumConstants
+    friction : number
+        An upper bound of k, >= 0.
+    theta : number, optional
+    """
+    k = Fraction(friction)
+    rho = constants.rho_normal if k == 0 and constants.rho_normal is not None else constants.rho
+    if rho is None:
+        return None
+
+    def proved(value: Fraction) -> Number:
+        hi = above(value)
+        return Number(value=hi, lo=hi, hi=hi, level="guaranteed")
+
+    kappa_1, kappa_2 = map(proved, constants.kappa(k))
+    return evaluate_sharp(EnergyConstants(rho=proved(rho), kappa_1=kappa_1, kappa_2=kappa_2), theta)
