@@ -6,8 +6,14 @@
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
-PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint requirements.lock
-NEEDS  := pyproject.toml requirements.lock ndtheory/__init__.py
+PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+# A lock holds all that is needed: pip resolves nothing, and a module is compiled when it is first imported.
+LOCKED := $(PIP) --no-deps --no-compile --editable . --requirement
+LOCKS  := requirements.lock requirements-test.lock requirements-run.lock
+NEEDS  := pyproject.toml $(LOCKS) ndtheory/__init__.py
+
+# Tests and pages start many processes: each would compile the packages anew.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo test check lint docs nightly bench lock clean
 .NOTPARALLEL:  # one pip at a time; pytest uses the processors itself
@@ -36,9 +42,13 @@ nightly: $(VENV)/.test
 bench: $(VENV)/.test
 	for b in benchmarks/bench_*.py; do $(BIN)/python $$b --record benchmarks/records $(if $(FULL),--full) || exit 1; done
 
+COMPILE := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --no-header
+
 lock: $(VENV)/.venv
 	$(PIP) uv
-	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --all-extras --no-header --output-file requirements.lock pyproject.toml
+	$(COMPILE) --all-extras --output-file requirements.lock pyproject.toml
+	$(COMPILE) --constraint requirements.lock --no-annotate --output-file requirements-run.lock pyproject.toml
+	$(COMPILE) --constraint requirements.lock --no-annotate --extra test --output-file requirements-test.lock pyproject.toml
 
 $(VENV)/.venv:
 	$(PYTHON) -c 'import sys; sys.exit("Python 3.11 or later is needed, this is " + sys.version.split()[0] if sys.version_info < (3, 11) else 0)'
@@ -46,15 +56,18 @@ $(VENV)/.venv:
 	touch $@
 
 $(VENV)/.run: $(VENV)/.venv $(NEEDS)
-	$(PIP) --editable .
+	$(LOCKED) requirements-run.lock
+	$(BIN)/python -m pip check
 	touch $@
 
 $(VENV)/.test: $(VENV)/.venv $(NEEDS)
-	$(PIP) --editable '.[test]'
+	$(LOCKED) requirements-test.lock
+	$(BIN)/python -m pip check
 	touch $(VENV)/.run $@
 
 $(VENV)/.docs: $(VENV)/.venv $(NEEDS)
-	$(PIP) --editable '.[test,docs]'
+	$(LOCKED) requirements.lock
+	$(BIN)/python -m pip check
 	touch $(VENV)/.run $(VENV)/.test $@
 
 clean:

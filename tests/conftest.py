@@ -1,16 +1,21 @@
 """Hypothesis profiles: `dev` by default, `ci` where CI is set, any by name in HYPOTHESIS_PROFILE."""
 
+import gc
 import os
 import signal
 
 import pytest
 from hypothesis import settings
 
+# Read when numpy is imported: the workers of a session share the processors, and threads of one would wait for another.
+if "PYTEST_XDIST_WORKER" in os.environ:
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 # Read when sympy is imported: with its 1000 entries the algebra of the paper is expanded again and again.
 os.environ.setdefault("SYMPY_CACHE_SIZE", "100000")
 
-settings.register_profile("dev", deadline=None, max_examples=50)
-settings.register_profile("ci", deadline=None, derandomize=True, max_examples=50)
+settings.register_profile("dev", deadline=None, max_examples=25)
+settings.register_profile("ci", deadline=None, derandomize=True, max_examples=25)
 settings.register_profile("nightly", deadline=None, max_examples=2000)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE") or ("ci" if os.environ.get("CI") else "dev"))
 
@@ -19,6 +24,11 @@ pytest.register_assert_rewrite("complaints", "section_5", "pieces")
 
 # A shell that runs the tests in its background lets them ignore Ctrl-C, and their children inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_collection_finish(session):
+    """What was collected lives to the end: the garbage collector need not look through it again and again."""
+    gc.freeze()
 
 
 @pytest.fixture(scope="session")

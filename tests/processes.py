@@ -18,6 +18,25 @@ PATIENCE = 900
 #: The command line, for a fresh interpreter.
 COMMAND = "import sys; from verification.cli import main; sys.exit(main())"
 
+#: The same without what takes long and has no part in most of what a process shows: matplotlib and cvxpy.
+SKETCHED = """
+    import sys
+    from types import SimpleNamespace
+    from verification import comparison
+    from verification.cli import main
+    from verification.contact import ContactError
+
+    def none(run):
+        raise ContactError("not asked for")
+
+    comparison.by_cvxpy_alone = none
+    drawn = lambda *args: None
+    figures = dict.fromkeys(("draw_bodies", "draw_residuals", "draw_waterfall"), drawn)
+    save = lambda figure, path: path.write_bytes(b"<svg/>")
+    sys.modules["verification.figures"] = SimpleNamespace(save=save, **figures)
+    sys.exit(main())
+"""
+
 
 @contextmanager
 def running(code: str, *arguments: object, flags: Sequence[str] = (), **options) -> Iterator[subprocess.Popen]:
@@ -37,6 +56,26 @@ def ended(code: str, *arguments: object, **options) -> subprocess.CompletedProce
     with running(code, *arguments, **options) as process:
         out, err = process.communicate(timeout=PATIENCE)
     return subprocess.CompletedProcess(process.args, process.returncode, out, err)
+
+
+#: Builds a site in each folder, warnings as errors, and prints a line: folder, status, what was said.
+SITES = """
+    import contextlib, io, sys
+    from pathlib import Path
+    from sphinx.cmd.build import build_main
+
+    for folder in map(Path, sys.argv[1:]):
+        with contextlib.redirect_stderr(io.StringIO()) as err:
+            status = build_main(["-W", "-q", "-b", "html", str(folder), str(folder / "built")])
+        print(folder.name, status, *err.getvalue().split())
+"""
+
+
+def sites(*folders: os.PathLike) -> str:
+    """A line for each folder once its site is built, by one process: its name, the status, what was said on stderr."""
+    answer = ended(SITES, *folders)
+    assert answer.returncode == 0, answer.stderr
+    return answer.stdout
 
 
 def on_a_terminal(*arguments: object, columns: int = 120, streams: Sequence[str] = ("stderr",)) -> str:

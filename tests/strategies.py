@@ -214,7 +214,10 @@ def held_bodies(draw, most: int = 4):
 
 
 #: What the profiles for every day ask of a property, at most.
-EVERY_DAY = 50
+EVERY_DAY = 25
+
+#: What they ask of a property whose examples cost much, at least.
+LEAST = 5
 
 #: Whether the profile asks for more than that.
 AT_NIGHT = settings.default.max_examples > EVERY_DAY
@@ -226,7 +229,7 @@ def fewer(share: int, at_night: int | None = None) -> settings:
     By `at_night`, where that is given, in profiles that ask for more than those for every day.
     """
     most = settings.default.max_examples
-    return settings(max_examples=max(1, most // (at_night if at_night and AT_NIGHT else share)))
+    return settings(max_examples=max(LEAST, most // (at_night if at_night and AT_NIGHT else share)))
 
 
 # --- end of elastic bodies --------------------------------------------------------------------------------------------

@@ -6,7 +6,7 @@ import os
 import signal
 
 import pytest
-from processes import ended, on_a_terminal
+from processes import SKETCHED, ended, on_a_terminal
 
 import verification as vf
 from verification import comparison
@@ -200,26 +200,6 @@ def test_a_broken_import_by_ctrl_c_after_the_first_tables_does_not_deny_them(cal
 )
 def test_bad_input_is_told_before_anything_is_shown(call, write, options):
     assert call("compare", write(), *options).complaint
-
-
-#: Without what takes long and has no part in it: matplotlib and cvxpy.
-SKETCHED = """
-    import sys
-    from types import SimpleNamespace
-    from verification import comparison
-    from verification.cli import main
-    from verification.contact import ContactError
-
-    def none(run):
-        raise ContactError("not asked for")
-
-    comparison.by_cvxpy_alone = none
-    drawn = lambda *args: None
-    figures = dict.fromkeys(("draw_bodies", "draw_residuals", "draw_waterfall"), drawn)
-    save = lambda figure, path: path.write_bytes(b"<svg/>")
-    sys.modules["verification.figures"] = SimpleNamespace(save=save, **figures)
-    sys.exit(main())
-"""
 
 
 def test_a_reader_that_goes_away_costs_no_file(write, tmp_path):

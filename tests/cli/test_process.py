@@ -3,12 +3,14 @@
 import json
 import os
 import re
+import textwrap
 import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
-from processes import COMMAND, PATIENCE, ended, running
+from processes import COMMAND, PATIENCE, SKETCHED, ended, running
+from strategies import AT_NIGHT
 
 from verification.output.folder import FILES
 
@@ -89,7 +91,7 @@ def test_a_reader_that_goes_away_is_neither_a_crash_nor_a_failed_run(write, argu
     reader, writer = os.pipe()
     os.close(reader)
     file = write("without friction")
-    found = start(*(file if a == "FILE" else a for a in arguments), stdout=writer)
+    found = start(*(file if a == "FILE" else a for a in arguments), code=SKETCHED, stdout=writer)
     os.close(writer)
     assert found.stderr == ""
     assert found.returncode in (0, 141)  # 141: as if ended by SIGPIPE
@@ -99,7 +101,7 @@ def test_a_reader_that_goes_away_is_neither_a_crash_nor_a_failed_run(write, argu
 @pytest.mark.parametrize("arguments", [BOUNDS, ["compare", "FILE"]])
 def test_a_stream_that_is_closed_is_no_crash(write, arguments, stream):
     file = write("without friction")
-    code = f"import sys; {stream} = None; from verification.cli import main; sys.exit(main())"
+    code = f"import sys\n{stream} = None\n" + textwrap.dedent(SKETCHED)
     found = start(*(file if a == "FILE" else a for a in arguments), code=code)
     assert "Traceback" not in found.stderr
     assert found.returncode == 0
@@ -124,29 +126,37 @@ def test_a_full_disk_behind_stdout_is_told_in_one_line(write):
     assert "No space left on device" in found.stderr
 
 
-@pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
-@pytest.mark.parametrize("arguments", [["run", "FILE"], ["run", "FILE", "--json"]], ids=["screen", "json"])
-def test_a_title_beyond_the_encoding_of_the_terminal_is_no_crash(write, arguments, encoding):
+@pytest.mark.parametrize(
+    ("options", "encoding"),
+    [([], "ascii"), (["--json"], "latin-1"), *[([], "latin-1"), (["--json"], "ascii")] * AT_NIGHT],
+)
+def test_a_title_beyond_the_encoding_of_the_terminal_is_no_crash(write, options, encoding):
     file = write({"title": '"Kontakt \N{GREEK SMALL LETTER MU} \N{CJK UNIFIED IDEOGRAPH-63A5}"'})
     environment = os.environ | {"PYTHONIOENCODING": encoding}
-    found = start(*(file if a == "FILE" else a for a in arguments), env=environment, text=False)
+    found = start("run", file, *options, env=environment, text=False)
     assert (found.returncode, found.stderr) == (0, b"")
     assert b"Kontakt" in found.stdout
 
 
-@pytest.mark.parametrize(
-    ("indices", "indptr"),
-    [([0, 10**6], [0, 1, 2]), ([0, -(10**6)], [0, 1, 2]), ([0, 1], [0, 10**6, 2]), ([0, 1], [0, 2, 10**6])],
-    ids=["a column outside", "a negative column", "a row that ends outside", "a last row that ends outside"],
-)
-def test_a_sparse_matrix_that_points_outside_itself_is_refused_and_not_followed(tmp_path, indices, indptr):
-    good, bad = tmp_path / "good.npz", tmp_path / "bad.npz"
-    np.savez(good, np.eye(2))
-    np.savez(bad, format="csr", shape=(2, 2), data=np.ones(2), indices=np.array(indices), indptr=np.array(indptr))
-    found = start("advise", "--S1", good, "--S2", bad)
-    assert (found.returncode, found.stdout) == (2, "")
-    assert found.stderr.count("\n") == 1
-    assert "bad.npz" in found.stderr
+#: A column outside, a negative one, a row that ends outside, a last row that does.
+OUTSIDE = [([0, 10**6], [0, 1, 2]), ([0, -(10**6)], [0, 1, 2]), ([0, 1], [0, 10**6, 2]), ([0, 1], [0, 2, 10**6])]
+
+
+def test_a_sparse_matrix_that_points_outside_itself_is_refused_and_not_followed(tmp_path):
+    """In a process, which would end by a signal."""
+    np.savez(tmp_path / "good.npz", np.eye(2))
+    bad = [tmp_path / f"bad{i}.npz" for i in range(len(OUTSIDE))]
+    for file, (indices, indptr) in zip(bad, OUTSIDE, strict=True):
+        np.savez(file, format="csr", shape=(2, 2), data=np.ones(2), indices=np.array(indices), indptr=np.array(indptr))
+    each = """
+        import sys
+        from verification.cli import main
+        good, *bad = sys.argv[1:]
+        sys.exit({main(["advise", "--S1", good, "--S2", file]) for file in bad} != {2})
+    """
+    found = start(tmp_path / "good.npz", *bad, code=each)
+    assert (found.returncode, found.stdout) == (0, "")
+    assert [file.name in line for file, line in zip(bad, found.stderr.splitlines(), strict=True)] == [True] * len(bad)
 
 
 def test_a_folder_that_was_removed_underneath_is_no_crash(write, tmp_path):
@@ -162,7 +172,7 @@ def test_a_folder_that_was_removed_underneath_is_no_crash(write, tmp_path):
 
 def test_two_comparisons_at_once_in_one_folder_leave_whole_files(write, tmp_path):
     command = ["compare", write("without friction"), "-o", tmp_path / "results"]
-    with running(COMMAND, *command) as one, running(COMMAND, *command) as other:
+    with running(SKETCHED, *command) as one, running(SKETCHED, *command) as other:
         said = [process.communicate(timeout=PATIENCE)[1] for process in (one, other)]
     assert said == [f"written: {tmp_path / 'results'}\n"] * 2
     assert (one.returncode, other.returncode) == (0, 0)

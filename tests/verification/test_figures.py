@@ -7,6 +7,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from matplotlib.collections import PolyCollection
+from strategies import AT_NIGHT
 
 import verification as vf
 from verification.cli.problems import examples
@@ -38,7 +39,9 @@ def drawings(comparison):
     return {"bodies": draw_bodies(comparison.run), "residuals": draw_residuals(comparison.run, comparison.computed)}
 
 
-@pytest.mark.parametrize(("name", "ending"), [("inside", "svg"), ("two-bars", "svg"), ("two-bars", "png")])
+@pytest.mark.parametrize(
+    ("name", "ending"), [("inside", "svg"), ("two-bars", "png"), *[("two-bars", "svg")] * AT_NIGHT]
+)
 def test_the_same_run_gives_the_same_file(comparisons, tmp_path, name, ending):
     files = []
     for attempt in range(2):

@@ -11,6 +11,7 @@ import pytest
 from browser import chromium, needs_browser
 from problem_list import small
 from small_result import ONE_STEP, problem
+from strategies import AT_NIGHT
 
 import verification as vf
 from verification import figures
@@ -26,17 +27,20 @@ ROOT = Path(__file__).parents[2]
 #: Titles that could leave their place in a file.
 TITLES = {
     "markup": "</title><script>alert(1)</script><img src=http://example.org/x>",
-    "entities": "a < b & c > d \"quoted\" 'twice'",
-    "formula": r"modulus ratio $E_1/E_2 = \frac{7}{2}$",
     "unknown formula": r"$\text{kN}$ and $\frac$",
     "one dollar": "costs 5 $ and 3 $",
     "template": "{{ 7 * 7 }} {% raw %}",
     "control characters": "a\x1b[31mb\x07c\x00d",
     "line break": "a\nb",
-    "another script": "\u63a5\u89e6 \u03bc",
-    "long": "long title " * 60,
-    "empty": "",
 }
+if AT_NIGHT:
+    TITLES |= {
+        "entities": "a < b & c > d \"quoted\" 'twice'",
+        "formula": r"modulus ratio $E_1/E_2 = \frac{7}{2}$",
+        "another script": "\u63a5\u89e6 \u03bc",
+        "long": "long title " * 60,
+        "empty": "",
+    }
 
 
 class Reader(HTMLParser):
