@@ -34,7 +34,7 @@ FORMULAS = {
 STRESS, SHARE = st.floats(0.01, 100), st.floats(0.001, 0.999)
 FRICTION = st.one_of(st.just(0.0), st.floats(0.001, 10), SHARE)
 DRAWN = {
-    **dict.fromkeys(("m", "M", "C_R", "u", "y", "rho", "a", "b"), STRESS),
+    **dict.fromkeys(("m", "M", "C_R", "u", "y", "rho", "rho_min", "a", "b"), STRESS),
     **dict.fromkeys(("x", "kappa_1", "kappa_2", "P", "D", "Q"), FRICTION),
     **dict.fromkeys(("theta", "low", "high", "gain"), SHARE),
     "margin": st.just(1e-9),
