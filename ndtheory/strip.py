@@ -127,10 +127,8 @@ class Strip:
 
 def _sinh_over(x: Interval) -> Interval:
     """``sinh(x)/x``, which grows from 1."""
-    lo, hi = (
-        Interval.of(1) if end == 0 else (Interval.of(end).exp() - Interval.of(-end).exp()) / (2 * end)
-        for end in (x.lo, x.hi)
-    )
+    ends = (Interval(end, end) for end in (x.lo, x.hi))  # as operations on a bare Decimal round to the nearest
+    lo, hi = (Interval.of(1) if not e.hi else (e.exp() - (-e).exp()) / (2 * e) for e in ends)
     return Interval(max(lo.lo, Decimal(1)), max(hi.hi, Decimal(1)))
 
 

@@ -1,6 +1,6 @@
 """The bounds for the continuum: each formula derived again, each bound held against grids, meshes and fields."""
 
-from decimal import Decimal
+from decimal import Decimal, localcontext
 from fractions import Fraction as F
 from itertools import pairwise
 
@@ -126,6 +126,20 @@ def test_intervals_of_wave_numbers_enclose_the_symbols(poisson):
                 for enclosure, value in zip(strip.over_wave_number((lo, hi)), exact, strict=True):
                     there = Decimal(str(value * float(strip.body.shear)))
                     assert enclosure.lo * (1 - Decimal("1e-12")) <= there <= enclosure.hi * (1 + Decimal("1e-12"))
+
+
+@given(st.fractions(F(1, 100), 20, max_denominator=10**6), st.sampled_from([3, 28]))
+def test_a_wave_number_is_enclosed_to_the_last_digit_whatever_the_precision_of_the_caller(x, digits):
+    """A Decimal between intervals would be rounded to the nearest in the caller's context."""
+    strip = Strip(body=HARD, thickness=F(1))
+    with localcontext() as context, mpmath.workdps(60):
+        context.prec = digits
+        found = strip.form((x, x))
+        number = mpmath.mpf(x.numerator) / x.denominator
+        exact = symbols(mpmath.mpf(9) / 5, mpmath.sinh(2 * number), mpmath.sinh(number) ** 2, number, number**2)
+        unit = mpmath.mpf(strip.body.shear.numerator) / strip.body.shear.denominator * number
+        for enclosed, value in zip(found, exact, strict=True):
+            assert mpmath.mpf(str(enclosed.lo)) <= unit * value <= mpmath.mpf(str(enclosed.hi))
 
 
 @pytest.mark.parametrize("radius", ["0.02", "0.1", "1", "7"])

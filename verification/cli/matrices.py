@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 _FILES = {
     "--S1": "Interface stiffness of body 1: .npy, .npz, .mtx, .mat, .csv or .txt; one file may hold both, by name.",
     "--S2": "Interface stiffness of body 2.",
-    "--map": "Transfer P, from the unknowns or nodes of the Neumann body to those of the contact body, as P.npz of a run.",
+    "--map": "Transfer P from the unknowns or nodes of the Neumann body to those of the contact body: P.npz of a run.",
     "--x": "Positions of the nodes of the contact body, increasing.",
     "--kernel": "Operator S of the law of friction: normal nodal forces of the Neumann body to stress at these nodes.",
     "--weights": "Weights of the quadrature on these nodes; those of the trapezoid rule by default.",
