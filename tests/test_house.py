@@ -19,6 +19,9 @@ DOORS = {
     "rich": ("verification.cli",),
     "hypothesis": ("verification.testing",),
     "flint": ("verification.certificate",),
+    "sqlite3": ("verification.sweeps.store",),
+    "distributed": ("verification.sweeps.cluster",),
+    "xarray": ("verification.sweeps.export",),
 }
 #: what the theory may know beside the standard library and itself
 THEORY = {"ndtheory.symbolic": "sympy"}

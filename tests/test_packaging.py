@@ -28,8 +28,8 @@ def test_every_promised_python_runs_the_whole_suite_in_the_workflow():
 
 
 def pinned(lock: str) -> dict[str, str]:
-    """Name -> version and on which machines, of all that a lock holds."""
-    return dict(line.split("==", 1) for line in read(lock).splitlines() if "==" in line)
+    """Name -> version of all that a lock holds, on every machine or on some."""
+    return dict(line.partition(" ;")[0].split("==", 1) for line in read(lock).splitlines() if "==" in line)
 
 
 def named(requirements: Iterable[str]) -> set[str]:

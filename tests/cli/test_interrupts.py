@@ -281,12 +281,12 @@ def test_constants_keep_the_meshes_that_were_measured(call, write, monkeypatch):
 
 def test_region_draws_the_runs_that_were_made(call, write, tmp_path, monkeypatch):
     from verification.bounds import region as plane
-    from verification.sweeps import sweep
+    from verification.sweeps import workers
 
     monkeypatch.setattr(plane, "THETAS", (0.2, 0.4))
     monkeypatch.setattr(plane, "FRICTIONS", (0.1, 0.3))
     monkeypatch.setattr("verification.bounds.semidefinite.LARGEST", 0)  # without the semidefinite bound
-    row, rows = sweep.row, []
+    row, rows = workers.row, []
 
     def interrupt(*args):
         rows.append(args)
@@ -294,7 +294,7 @@ def test_region_draws_the_runs_that_were_made(call, write, tmp_path, monkeypatch
             signal.raise_signal(signal.SIGINT)
         return row(*args)
 
-    monkeypatch.setattr(sweep, "row", interrupt)
+    monkeypatch.setattr(workers, "row", interrupt)
     answer = call("region", write(), "-o", tmp_path / "plane.svg", "--json")
     assert answer.status == 130
     assert len(answer.document["points"]) == 2

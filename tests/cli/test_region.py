@@ -16,7 +16,7 @@ from verification.bounds import region as plane
 from verification.bounds.bound import NotComputed
 from verification.bounds.semidefinite import SemidefiniteBound
 from verification.cli.problems import examples
-from verification.sweeps import sweep
+from verification.sweeps import workers
 
 #: A mesh of 20 nodes, the roles such that runs converge, stall and run away.
 COARSE = {"body1.cells": "[5, 1]", "body2.cells": "[3, 1]", "contact.radius": "0.5", "iteration.neumann_body": "2"}
@@ -251,16 +251,24 @@ def test_region_runs_a_constant_theta_whatever_the_file_says(call, short, write,
 
 @pytest.mark.parametrize("last", [1, 4])
 def test_ctrl_c_ends_region(call, short, write, tmp_path, monkeypatch, last):
-    row, seen = sweep.row, itertools.count(1)
+    row, seen = workers.row, itertools.count(1)
 
     def interrupted(*args):
         if next(seen) == last:
             signal.raise_signal(signal.SIGINT)
         return row(*args)
 
-    monkeypatch.setattr(sweep, "row", interrupted)
+    monkeypatch.setattr(workers, "row", interrupted)
     answer = call("region", write(COARSE), "-o", tmp_path / "plane.svg")
     assert answer.status == 130
     assert answer.err.strip().startswith("interrupted")
     assert answer.err.strip().count("\n") == 0
     assert next(seen) == last + 1  # no other run was begun
+
+
+def test_with_a_store_the_plane_is_drawn_again_without_a_run(call, short, write, tmp_path, monkeypatch):
+    arguments = ("region", write(COARSE), "-o", tmp_path / "plane.svg", "--store", tmp_path / "runs.sqlite", "--json")
+    first = call(*arguments).document
+    monkeypatch.setattr(workers, "row", None)
+    assert call(*arguments).document == first
+    assert first["points"]

@@ -1,13 +1,18 @@
 """`sweep`: its file, its screen, its table and what ends it."""
 
 import csv
+import re
 import signal
 from fractions import Fraction
 
 import pytest
+from processes import ended
+from strategies import AT_NIGHT
 
 import verification as vf
-from verification.sweeps import sweep
+from verification.cli.sweeping import every
+from verification.sweeps import workers
+from verification.sweeps.keeping import plan
 from verification.sweeps.sweep_file import read_sweep
 
 GRID = "theta = [0.4, 0.6]\nfriction = [0.1, 0.2]"
@@ -89,14 +94,14 @@ def test_a_bad_sweep_file_is_one_line(call, sweep_file, tmp_path, grid, problem,
 
 def test_a_table_of_somebody_else_stays(call, sweep_file, tmp_path, monkeypatch):
     (tmp_path / "grid.csv").write_text("mine")
-    monkeypatch.setattr(sweep, "row", None)
+    monkeypatch.setattr(workers, "row", None)
     assert "not written by this program" in call("sweep", sweep_file()).complaint
     assert (tmp_path / "grid.csv").read_text() == "mine"
 
 
 @pytest.mark.parametrize("last", [1, 3])
 def test_ctrl_c_writes_the_rows_that_are_done(call, sweep_file, tmp_path, monkeypatch, last):
-    row, seen = sweep.row, []
+    row, seen = workers.row, []
 
     def interrupted(*args):
         seen.append(1)
@@ -104,7 +109,7 @@ def test_ctrl_c_writes_the_rows_that_are_done(call, sweep_file, tmp_path, monkey
             signal.raise_signal(signal.SIGINT)
         return row(*args)
 
-    monkeypatch.setattr(sweep, "row", interrupted)
+    monkeypatch.setattr(workers, "row", interrupted)
     answer = call("sweep", sweep_file(), "--jobs", 1, "--json")
     assert answer.status == 130
     assert len(seen) == last
@@ -115,3 +120,163 @@ def test_ctrl_c_writes_the_rows_that_are_done(call, sweep_file, tmp_path, monkey
     assert answer.out.count('"schema"') == 1
     rows = [line for line in (tmp_path / "grid.csv").read_text("utf-8").splitlines() if not line.startswith("#")]
     assert len(rows) == last
+
+
+# --- the store ---
+
+
+def test_a_second_call_runs_nothing_and_says_so(call, sweep_file, tmp_path, monkeypatch):
+    first = call("sweep", sweep_file(), "--jobs", 1)
+    text = (tmp_path / "grid.csv").read_text("utf-8")
+    monkeypatch.setattr(workers, "row", None)
+    again = call("sweep", sweep_file(), "--jobs", 1)
+    assert (again.status, again.out) == (0, first.out)
+    assert again.err.splitlines()[0] == f"{tmp_path / 'grid.sqlite'}: 4 of 4 rows were there"
+    assert (tmp_path / "grid.csv").read_text("utf-8") == text
+
+
+def test_after_ctrl_c_the_same_command_goes_on(call, sweep_file, tmp_path, monkeypatch):
+    row, seen = workers.row, []
+
+    def interrupted(*args):
+        seen.append(args[1])
+        if len(seen) == 3:
+            signal.raise_signal(signal.SIGINT)
+        return row(*args)
+
+    monkeypatch.setattr(workers, "row", interrupted)
+    answer = call("sweep", sweep_file(), "--jobs", 1)
+    assert answer.status == 130
+    assert answer.err.splitlines()[-1].startswith("interrupted after 2 of 4 rows: those are in ")
+    assert answer.err.endswith("; the same command goes on from there\n")
+    assert call("sweep", sweep_file(), "--jobs", 1).status == 0
+    assert len(seen) == 5
+    assert seen[2] == seen[3]
+    monkeypatch.undo()
+    text = (tmp_path / "grid.csv").read_text("utf-8")
+    assert call("sweep", sweep_file(), "--jobs", 1, "--fresh").status == 0
+    assert (tmp_path / "grid.csv").read_text("utf-8") == text
+
+
+def test_a_dry_run_counts_and_runs_nothing(call, sweep_file, tmp_path, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr(workers, "row", None)
+        answer = call("sweep", sweep_file(), "--dry-run")
+        assert (answer.status, answer.err) == (0, "")
+        assert "4 runs" in answer.out
+        assert "0 are in the store, 4 are left; nothing was run" in answer.out
+        assert list(tmp_path.glob("grid.*")) == [tmp_path / "grid.toml"]
+    call("sweep", sweep_file(GRID.replace("0.1, 0.2", "0.1")), "--jobs", 1)
+    document = call("sweep", sweep_file(), "--dry-run", "--json").document
+    assert [document[name] for name in ("asked", "stored", "left")] == [4, 2, 2]
+    assert document["store"] == str(tmp_path / "grid.sqlite")
+    assert call("sweep", sweep_file(), "--dry-run", "--fresh", "--json").document["left"] == 4
+
+
+@pytest.mark.parametrize(
+    ("options", "fragments"),
+    [
+        (["--store", "."], ["needed the name of a file for the store"]),
+        (["--store", "nowhere/rows.sqlite"], ["nowhere", "needed a folder that exists"]),
+        (["--store", "grid.toml"], ["grid.toml", "not a store of this program"]),
+        (["--plot", "theta"], ["--plot", "X,Y or X,Y,CURVES"]),
+        (["--plot", "theta,nonsense"], ["--plot", "iterations_paper"]),
+        (["--log", "nowhere/log"], ["nowhere/log", "--log"]),
+        (["--export", "grid.toml"], ["grid.toml", "needed a folder to write to (--export)"]),
+        (["--dask", "nonsense", "--jobs", "2"], ["either --jobs", "or --dask"]),
+    ],
+    ids=str,
+)
+def test_what_serves_for_no_sweep_is_one_line(call, sweep_file, tmp_path, monkeypatch, options, fragments):
+    path = sweep_file()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(workers, "row", None)
+    before = path.read_bytes()
+    complaint = call("sweep", path, *options).complaint
+    assert [fragment for fragment in fragments if fragment not in complaint] == []
+    assert path.read_bytes() == before
+
+
+def test_without_dask_the_extra_is_named(call, sweep_file, monkeypatch):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    assert "pip install 'ndtheory[cluster]'" in call("sweep", sweep_file(), "--dask", "tcp://host:8786").complaint
+
+
+#: The command in a process group that gets Ctrl-C so many seconds after the workers were asked for, as on a terminal.
+INTERRUPTED = """
+    import os, signal, sys, threading
+    import joblib
+    from verification.cli import main
+
+    call = joblib.Parallel.__call__
+    waits = [float(sys.argv.pop(1))]
+
+    def called(*args, **named):
+        if waits:
+            threading.Timer(waits.pop(), os.killpg, (0, signal.SIGINT)).start()
+        return call(*args, **named)
+
+    joblib.Parallel.__call__ = called
+    sys.exit(main())
+"""
+
+
+@pytest.mark.parametrize("wait", [0.02, 0.6, 2.5, *[0.05, 0.1, 0.2, 0.4, 0.8, 1.0, 1.2, 1.5, 2.0, 3.0] * AT_NIGHT])
+def test_ctrl_c_on_a_terminal_is_one_line_whatever_the_workers_do(sweep_file, tmp_path, wait):
+    path = sweep_file("theta = { start = 0.01, stop = 0.99, step = 0.01 }\nfriction = [0.1, 0.2, 0.3, 0.4, 0.5]")
+    answer = ended(INTERRUPTED, wait, "sweep", path, "--jobs", 2)
+    assert "Traceback" not in answer.stderr
+    if answer.returncode == 0:  # too late
+        return
+    assert answer.returncode == 130
+    *_, last = answer.stderr.splitlines()
+    if not answer.stdout:
+        assert last == "interrupted before anything was computed"
+        return
+    count = int(re.match(r"interrupted after (\d+) of 495 rows", last)[1])
+    assert plan(*read_sweep(path), tmp_path / "grid.sqlite").stored == count
+
+
+# --- plots, exports, progress ---
+
+
+def test_plots_are_drawn_beside_the_table(call, sweep_file, tmp_path):
+    options = ("--plot", "theta,iterations", "--plot", "friction,rho,theta", "--plot", "theta,law")
+    answer = call("sweep", sweep_file(), "--jobs", 1, *options)
+    assert answer.status == 0
+    assert sorted(path.name for path in tmp_path.glob("*.svg")) == [
+        "grid-friction-rho-theta.svg",
+        "grid-theta-iterations.svg",
+    ]
+    assert b"relaxation factor theta" in (tmp_path / "grid-theta-iterations.svg").read_bytes()
+    assert "grid-theta-law.svg is not drawn: no row has a number for law" in answer.err
+
+
+def test_without_the_extra_a_csv_file_is_exported_and_the_extra_is_named(call, sweep_file, tmp_path, monkeypatch):
+    monkeypatch.setattr("verification.sweeps.export.importlib.util.find_spec", lambda name: None)
+    answer = call("sweep", sweep_file(), "--jobs", 1, "--export", tmp_path / "results")
+    assert answer.status == 0
+    assert "pip install 'ndtheory[dataset]'" in answer.err
+    assert [path.name for path in (tmp_path / "results").iterdir()] == ["grid.csv"]
+    assert (tmp_path / "results" / "grid.csv").read_bytes() == (tmp_path / "grid.csv").read_bytes()
+
+
+def test_a_log_has_lines_about_rows_done_failed_and_left(call, sweep_file, tmp_path):
+    grid = "theta = [0.4, 0.6]\nrefine = [0, 8]"
+    assert call("sweep", sweep_file(grid), "--jobs", 1, "--log", tmp_path / "log").status == 0
+    first, *_, last = (tmp_path / "log").read_text("utf-8").splitlines()
+    when = r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d "
+    assert re.fullmatch(when + "0 done, 0 failed, 4 left", first)
+    assert re.fullmatch(when + "4 done, 2 failed, 0 left, about 0 s to go", last)
+
+
+def test_lines_about_progress_keep_their_distance():
+    now, lines = 0.0, []
+    tell = every(10, lines.append, at_once=True, clock=lambda: now)
+    later = every(10, lines.append, clock=lambda: now)
+    for now in range(25):
+        tell(f"{now} done", now / 24)
+        later(f"later {now}", now / 24)
+    assert [line.split(" ", 2)[2] for line in lines] == [
+        *("0 done", "10 done", "later 10", "20 done", "later 20", "24 done")
+    ]

@@ -146,6 +146,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def small(folder: Path) -> vf.Problem:
     problem = vf.example("section6").changed(cells=((10, 2), (6, 2)))
     (folder / "small.toml").write_text(problem.to_toml(), "utf-8")
+    (folder / "grid.toml").write_text('problem = "small.toml"\n[grid]\ntheta = [0.5]\n', "utf-8")
     return problem
 
 
@@ -254,6 +255,7 @@ def test_the_page_lists_every_key_of_every_document_and_no_other(documents, comp
         "bounds --rho 2",
         "example",
         "example section6",
+        f"sweep {folder / 'grid.toml'} --dry-run",
         f"region {folder / 'small.toml'} -o {folder / 'plane.svg'}",
     ):
         documents = [*documents, printed(arguments)]

@@ -254,3 +254,14 @@ def test_unknown_figures_are_refused_and_every_claim_says_when_it_holds():
         reproduce(["fig7"])
     assert tuple(CLAIMS) == FIGURES
     assert all(claim.says and claim.criterion for claim in CLAIMS.values())
+
+
+def test_with_a_store_a_figure_is_drawn_again_without_a_run(tmp_path, monkeypatch):
+    from verification.sweeps import workers
+
+    place = tmp_path / "runs.sqlite"
+    first = reproduce(["fig11"], readings=[CLAMPED], store=place)
+    monkeypatch.setattr(workers, "row", None)
+    again = reproduce(["fig11"], readings=[CLAMPED], store=place)
+    assert [result.rows for result in again.results] == [result.rows for result in first.results]
+    assert again.to_json() == first.to_json()

@@ -15,7 +15,7 @@ from ndtheory import evaluate_sharp
 from verification.algorithm.relaxation import RULES
 from verification.contact import ContactError, active_set
 from verification.interface import body
-from verification.sweeps import course, grid, sweep
+from verification.sweeps import course, grid, workers
 from verification.sweeps.bodies import Bodies
 from verification.sweeps.lean import KnownPieces
 from verification.sweeps.row import RESULTS, row
@@ -116,7 +116,7 @@ def test_several_processes_give_the_same_rows_to_the_last_digit(wide):
     told = []
     together = vf.sweep(SMALL, **WIDE, jobs=2, progress=lambda what, share: told.append((what, share)))
     assert together.rows == wide.rows
-    assert told[-1] == (f"runs: {len(wide.rows)} of {len(wide.rows)} rows, about 0 s left", 1.0)
+    assert told[-1] == (f"{len(wide.rows)} done, 0 failed, 0 left, about 0 s to go", 1.0)
     assert [share for _, share in told] == sorted(share for _, share in told)
 
 
@@ -370,7 +370,7 @@ def test_ctrl_c_keeps_the_rows_that_are_done(monkeypatch):
             raise KeyboardInterrupt
         return found
 
-    monkeypatch.setattr(sweep, "row", interrupted)
+    monkeypatch.setattr(workers, "row", interrupted)
     found = vf.sweep(SMALL, theta=[0.3, 0.4, 0.5, 0.6])
     assert [each["theta"] for each in found.rows] == [0.3, 0.4]
     assert found.to_dict()["reason"] == {"rows": "interrupted after 2 of 4 rows"}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -97,19 +98,21 @@ class Plane(Document):
         }
 
 
-def chart(problem: Problem, *, progress: Progress = silent) -> Plane:
+def chart(problem: Problem, *, store: Path | None = None, progress: Progress = silent) -> Plane:
     """Trace the regions of all bounds for a problem's bodies, and run a grid of theta and k.
 
     Parameters
     ----------
     problem : Problem
+    store : path, optional
+        A file that keeps the runs, and has those that were made before.
     progress : callable
         Told what is being done.
 
     Raises
     ------
     ProblemError
-        A problem outside the theorem, or without a law of friction.
+        A problem outside the theorem, or without a law of friction; a store that cannot be used.
     KeyboardInterrupt
         Before the first region was traced; later it leaves out what was still to come.
     """
@@ -141,7 +144,7 @@ def chart(problem: Problem, *, progress: Progress = silent) -> Plane:
                 del reason[bound.name]
             except NotComputed as error:
                 reason[bound.name] = str(error)
-        found = sweep_grid(replace(pair, settings=limited), grid, progress=progress)
+        found = sweep_grid(replace(pair, settings=limited), grid, store=store, progress=progress)
         points = [_point(row) for row in found.rows]
         if found.interrupted:
             reason["points"] = f"interrupted after {len(points)} of {len(grid)} runs"

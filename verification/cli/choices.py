@@ -15,6 +15,7 @@ from verification.cli.matrices import advice_from_files, matrix_options
 from verification.cli.moduli import NAMES as OF_MODULI
 from verification.cli.moduli import advice_from_moduli, moduli_options, of_moduli
 from verification.cli.problems import FILE, JSON, SET, load_problem
+from verification.cli.sweeping import STORE
 from verification.cli.typed import Typed
 
 
@@ -175,8 +176,9 @@ def _picture(context: click.Context, parameter: click.Parameter, value: Path) ->
     metavar="PICTURE",
     help="Where to draw it: a name ending in .svg or .png.",
 )
+@STORE
 @JSON
-def region(file: Path, keys: dict[str, str], target: Path, as_json: bool) -> None:
+def region(file: Path, keys: dict[str, str], target: Path, store: Path | None, as_json: bool) -> None:
     """Draw the plane of theta and k: where one step is proved to contract, and what runs do there.
 
     Both axes are logarithmic; theta and k have no unit.  The regions are those of the printed, the repaired, the sharp
@@ -198,7 +200,7 @@ def region(file: Path, keys: dict[str, str], target: Path, as_json: bool) -> Non
         raise ProblemError(str(target), "", None, "needed a name in a folder that exists (-o)")
     check_ours(target)
     with stages() as tell:
-        plane = chart(problem, progress=tell)
+        plane = chart(problem, store=store, progress=tell)
     deliver(plane, lambda: screens.plane(plane, target), as_json)
     with stages() as tell, staged(target.parent, shown=target) as room:
         tell("drawing", None)

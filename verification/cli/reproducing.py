@@ -9,6 +9,7 @@ import click
 
 from verification.cli.console import deliver, heading, note, say, stages, table
 from verification.cli.problems import FOLDER, JSON
+from verification.cli.sweeping import JOBS, STORE
 
 if TYPE_CHECKING:
     from verification.reproduce import Reproduction
@@ -19,17 +20,17 @@ NAMES = ("fig5", "fig10", "fig11", "fig12", "all")
 
 @click.command()
 @click.argument("figure", type=click.Choice(NAMES))
-@click.option(
-    "--jobs", type=click.IntRange(1), metavar="N", help="How many processes run at once; one for each core by default."
-)
+@JOBS
+@STORE
 @FOLDER
 @JSON
-def reproduce(figure: str, jobs: int | None, folder: Path | None, as_json: bool) -> None:
+def reproduce(figure: str, jobs: int | None, store: Path | None, folder: Path | None, as_json: bool) -> None:
     """Run the experiment behind a figure of Section 6, beside what the paper says of it.
 
     The text leaves open where the upper body sits (2 x 0.3 mm and 1.2 x 0.3 mm, E in MPa), whether its top may slide,
     and names the roles of the bodies in two ways.  Every combination was named before any was run; each gets its
     verdict, and the one that comes nearest is told.  -o writes the rows behind each figure as CSV, and the figures.
+    With --store runs are kept: figures 10 to 12 are then drawn again without one.
 
     \b
     Examples:
@@ -42,7 +43,7 @@ def reproduce(figure: str, jobs: int | None, folder: Path | None, as_json: bool)
 
     target = None if folder is None else Folder(folder, "reproduce")
     with stages() as tell:
-        found = run_again(FIGURES if figure == "all" else (figure,), jobs=jobs or -1, progress=tell)
+        found = run_again(FIGURES if figure == "all" else (figure,), jobs=jobs or -1, store=store, progress=tell)
     write = None if target is None else lambda: target.write_reproduction(found)
     deliver(found, lambda: show(found), as_json, write, folder)
 

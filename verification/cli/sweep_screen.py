@@ -7,6 +7,7 @@ from typing import Any
 
 from verification.cli.console import figures, heading, near_one, note, printable, say, table
 from verification.cli.typed import Typed
+from verification.sweeps.keeping import Plan
 from verification.sweeps.row import Row
 from verification.sweeps.sweep import Sweep
 
@@ -44,6 +45,13 @@ def sweep(found: Sweep, target: Path | None = None) -> None:
         Typed(file=Path(found.problem.source)).suggest("compare")
     elif target is not None:
         say("Next: ndtheory example")
+
+
+def plan(found: Plan) -> None:
+    """The screen of ``sweep --dry-run``."""
+    title = "matrices" if found.problem is None else printable(found.problem.title)
+    say(f"{title} | {found.asked} runs")
+    say(f"  {found.stored} are in the store, {found.left} are left; nothing was run")
 
 
 def _best(rows: list[Row]) -> list[str]:

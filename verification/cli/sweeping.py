@@ -2,28 +2,83 @@
 
 from __future__ import annotations
 
+import contextlib
+import sys
 import tempfile
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from verification.cli.console import Interrupted, complain, deliver, stages
 from verification.cli.problems import FILE, FOLDER, JSON
 
+if TYPE_CHECKING:
+    from verification.progress import Progress
+    from verification.sweeps.sweep import Sweep
+
+#: Seconds between two lines about progress: in a file of their own, and on a stderr that is no terminal.
+IN_LOG, ON_STDERR = 10, 60
+
+JOBS = click.option(
+    "--jobs", type=click.IntRange(1), metavar="N", help="How many processes run at once; one for each core by default."
+)
+STORE = click.option(
+    "--store", type=click.Path(path_type=Path), metavar="STORE", help="File that keeps the rows of runs (SQLite)."
+)
+
+
+def _axes(context: click.Context, parameter: click.Parameter, given: tuple[str, ...]) -> list[tuple[str, ...]]:
+    from verification.sweeps.row import GIVEN, RESULTS
+
+    plots = [tuple(part.strip() for part in words.split(",")) for words in given]
+    for words, names in zip(given, plots, strict=True):
+        unknown = [name for name in names if name not in (*GIVEN, *RESULTS)]
+        if unknown or len(names) not in (2, 3):
+            needed = f"needed X,Y or X,Y,CURVES with columns of {', '.join((*GIVEN, *RESULTS))}"
+            raise click.BadParameter(f"{words!r}: {needed}", context, parameter)
+    return plots
+
 
 @click.command()
 @FILE
+@JOBS
+@click.option("--dask", metavar="ADDRESS", help="A dask scheduler whose workers run, as tcp://host:8786.")
+@STORE
+@click.option("--fresh", is_flag=True, help="Make all rows again, those in the store too.")
+@click.option("--dry-run", is_flag=True, help="Say how many runs there are and how many the store has; run nothing.")
 @click.option(
-    "--jobs", type=click.IntRange(1), metavar="N", help="How many processes run at once; one for each core by default."
+    "--export", type=click.Path(path_type=Path), metavar="DIR", help="Write NAME.csv and NAME.nc (netCDF) into DIR."
 )
+@click.option(
+    "--plot", "plots", multiple=True, callback=_axes, metavar="X,Y[,CURVES]", help="Draw column Y over X as SVG."
+)
+@click.option("--log", type=click.Path(path_type=Path), metavar="LOG", help="Append lines about progress to this file.")
 @FOLDER
 @JSON
-def sweep(file: Path, jobs: int | None, folder: Path | None, as_json: bool) -> None:
+def sweep(
+    file: Path,
+    jobs: int | None,
+    dask: str | None,
+    store: Path | None,
+    fresh: bool,
+    dry_run: bool,
+    export: Path | None,
+    plots: list[tuple[str, ...]],
+    log: Path | None,
+    folder: Path | None,
+    as_json: bool,
+) -> None:
     """Run a problem at every point of a grid, and write a CSV file of one row a run.
 
     FILE names the problem, beside it or built in, and the values of each axis: theta, friction, radius (length of the
     file), young (pairs E1, E2, stress of the file), neumann_body, refine (halvings of the mesh), law, rule.  The rows
     go to NAME.csv beside FILE, or into DIR.  Exit 0 also where runs failed: their rows say why.
+
+    Each row is kept in NAME.sqlite beside NAME.csv once it is made, and is not made again: after Ctrl-C, or whatever
+    ended the command, the same command goes on.
 
     \b
     Example of FILE:
@@ -33,33 +88,144 @@ def sweep(file: Path, jobs: int | None, folder: Path | None, as_json: bool) -> N
       friction = [0.1, 0.2, 0.4]
       young = [[7.0e4, 2.0e4], [2.0e4, 7.0e4]]
     \b
-    Example:
+    Examples:
       ndtheory sweep grid.toml --jobs 2
+      ndtheory sweep grid.toml --dry-run
+      ndtheory sweep grid.toml --plot theta,iterations,friction --export results
     """
-    from verification.cli.sweep_screen import sweep as show
-    from verification.output.folder import check_ours, staged
-    from verification.problem.tables import ProblemError
+    from verification.cli import sweep_screen
+    from verification.output.folder import check_ours
+    from verification.sweeps.keeping import plan
     from verification.sweeps.sweep import sweep_grid
     from verification.sweeps.sweep_file import read_sweep
+    from verification.sweeps.workers import work_of
 
+    if dask is not None and jobs is not None:
+        raise click.UsageError("needed either --jobs, for this machine, or --dask, for a cluster")
     problem, grid = read_sweep(file)
     room = file.parent if folder is None else folder
-    target = room / f"{file.stem}.csv"
+    target, kept = room / f"{file.stem}.csv", store or room / f"{file.stem}.sqlite"
+    if dry_run:
+        planned = plan(problem, grid, kept, fresh=fresh)
+        deliver(planned, lambda: sweep_screen.plan(planned), as_json)
+        _tell(planned.notes)
+        return
+    targets = _targets(file.stem, target, plots, export)
+    for one in targets:
+        _check_folder(one.parent, "--export" if one.parent == export else "-o")
+        check_ours(one)
+    with _progress(log) as tell:
+        work = work_of(jobs or -1, dask)
+        found = sweep_grid(problem, grid, work=work, store=kept, fresh=fresh, progress=tell)
+    _tell(found.notes)
+    if found.stored:
+        complain(f"{kept}: {found.stored} of {found.asked} rows were there")
+    deliver(found, lambda: sweep_screen.sweep(found, target), as_json, lambda: _write(found, targets), target)
+    if found.interrupted:
+        complain(f"{found.reason['rows']}: those are in {target}; the same command goes on from there")
+        raise Interrupted
+
+
+def _targets(
+    stem: str, target: Path, plots: list[tuple[str, ...]], export: Path | None
+) -> dict[Path, Callable[[Sweep, Path], None]]:
+    """What is written, and how."""
+
+    def csv(found: Sweep, path: Path) -> None:
+        path.write_text(found.to_csv(), encoding="utf-8")
+
+    def picture(names: tuple[str, ...]) -> Callable[[Sweep, Path], None]:
+        from verification.figures import save
+
+        return lambda found, path: save(found.plot(*names), path)
+
+    targets: dict[Path, Callable[[Sweep, Path], None]] = {target: csv}
+    targets |= {target.parent / f"{'-'.join((stem, *names))}.svg": picture(names) for names in plots}
+    if export is not None:
+        from verification.sweeps.export import write_dataset
+
+        targets |= {export / f"{stem}.csv": csv, export / f"{stem}.nc": write_dataset}
+    return targets
+
+
+def _write(found: Sweep, targets: dict[Path, Callable[[Sweep, Path], None]]) -> None:
+    """Write each file; what cannot be drawn or has no library is said, and costs no other file."""
+    from verification.output.folder import staged
+    from verification.problem.tables import ProblemError
+
+    for path, write in targets.items():
+        with staged(path.parent, shown=path) as place:
+            try:
+                write(found, place / path.name)
+            except ProblemError as error:
+                if path.suffix != ".nc":
+                    raise
+                complain(f"{path} is not written: {error}")
+            except ValueError as error:
+                if path.suffix != ".svg":
+                    raise
+                complain(f"{path} is not drawn: {error}")
+
+
+def _check_folder(room: Path, option: str) -> None:
+    from verification.problem.tables import ProblemError
+
     try:
         room.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=room).close()
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or error
-        raise ProblemError(str(room), "", None, f"needed a folder to write to (-o): {why}") from None
-    check_ours(target)
-    with stages() as tell:
-        found = sweep_grid(problem, grid, jobs=jobs or -1, progress=tell)
+        raise ProblemError(str(room), "", None, f"needed a folder to write to ({option}): {why}") from None
 
-    def write() -> None:
-        with staged(room, shown=target) as place:
-            (place / target.name).write_text(found.to_csv(), encoding="utf-8")
 
-    deliver(found, lambda: show(found, target), as_json, write, target)
-    if found.interrupted:
-        complain(f"{found.reason['rows']}: those are in {target}")
-        raise Interrupted
+def _tell(notes: tuple[str, ...]) -> None:
+    for note in notes:
+        complain(note)
+
+
+@contextlib.contextmanager
+def _progress(log: Path | None) -> Iterator[Progress]:
+    """Progress on a terminal as one live line, in a log and on another stderr as lines with the time."""
+    from verification.problem.tables import ProblemError
+
+    with contextlib.ExitStack() as stack:
+        tell = stack.enter_context(stages())
+        lines: Progress | None = None
+        if log is not None:
+            try:
+                stream = stack.enter_context(log.open("a", encoding="utf-8"))
+            except (OSError, ValueError) as error:
+                why = getattr(error, "strerror", None) or error
+                raise ProblemError(str(log), "", None, f"needed a file to write to (--log): {why}") from None
+
+            def write(line: str) -> None:
+                with contextlib.suppress(OSError):  # a full disk: the rows matter more
+                    stream.write(line + "\n")
+                    stream.flush()
+
+            lines = every(IN_LOG, write, at_once=True)
+        elif sys.stderr is None or not sys.stderr.isatty():
+            lines = every(ON_STDERR, complain)
+
+        def both(what: str, share: float | None) -> None:
+            tell(what, share)
+            if lines is not None:
+                lines(what, share)
+
+        yield both
+
+
+def every(
+    seconds: float, write: Callable[[str], None], *, at_once: bool = False, clock: Callable[[], float] = time.monotonic
+) -> Progress:
+    """Progress as lines, one after so many seconds at the earliest; ``at_once``: the first and the last one too."""
+    last = clock() - seconds if at_once else clock()
+
+    def tell(what: str, share: float | None) -> None:
+        nonlocal last
+        now = clock()
+        if now - last >= seconds or (at_once and share == 1):
+            last = now
+            write(f"{time.strftime('%Y-%m-%d %H:%M:%S')} {what}")
+
+    return tell

@@ -56,6 +56,7 @@ MARKS = {
     ".html": b'name="generator" content="ndtheory ',
     ".md": b"<!-- ndtheory verify -->",
     ".csv": b"# ndtheory ",
+    ".nc": b"ndtheory sweep, version ",
     ".npz": b"ndtheory.npy",
     ".toml": b"# ndtheory: the problem as it was computed",
 }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from verification.document import Document
@@ -182,6 +183,7 @@ def reproduce(
     *,
     readings: Sequence[ModelReading] = READINGS,
     jobs: int = 1,
+    store: Path | None = None,
     progress: Progress = silent,
 ) -> Reproduction:
     """Run the experiments behind figures of Section 6 in every reading.
@@ -192,6 +194,8 @@ def reproduce(
     readings : sequence of ModelReading
     jobs : int
         Processes for the runs.
+    store : path, optional
+        A file that keeps the runs, and has those that were made before.  Figure 5 has no run: it is solved anew.
     progress : callable
         Told what is run.
 
@@ -212,7 +216,7 @@ def reproduce(
         outcomes, rows = [], []
         for reading in readings:
             progress(f"{name}: {reading.name}", done / total)
-            outcome, behind = _zones(reading) if name == "fig5" else _curves(name, reading, jobs)
+            outcome, behind = _zones(reading) if name == "fig5" else _curves(name, reading, jobs, store)
             outcomes.append(outcome)
             rows += [{"reading": reading.name, **row} for row in behind]
             done += 1
@@ -233,12 +237,15 @@ def _zones(reading: ModelReading) -> tuple[Outcome, list[dict[str, Any]]]:
     ), rows
 
 
-def _curves(name: str, reading: ModelReading, jobs: int) -> tuple[Outcome, list[dict[str, Any]]]:
+def _curves(name: str, reading: ModelReading, jobs: int, store: Path | None) -> tuple[Outcome, list[dict[str, Any]]]:
     """A figure of steps over theta."""
     from verification.sweeps.sweep import sweep
 
     claim = CLAIMS[name]
-    rows = [dict(row) for row in sweep(reading.problem(60), theta=THETAS, jobs=jobs, **claim.axes).rows]
+    found = sweep(reading.problem(60), theta=THETAS, jobs=jobs, store=store, **claim.axes)
+    if found.interrupted:
+        raise KeyboardInterrupt
+    rows = [dict(row) for row in found.rows]
     of_curve = [rows[i : i + len(THETAS)] for i in range(0, len(rows), len(THETAS))]  # theta changes fastest
     for label, some in zip(claim.labels, of_curve, strict=True):
         for row in some:

@@ -21,6 +21,12 @@ from verification.threads import one_thread
 
 Row = dict[str, Any]
 
+#: The columns of a row that the grid may vary.
+GIVEN = ("theta", "friction", "young1", "young2", "neumann_body", "refine", "law", "radius", "rule")
+
+#: Outcomes of a row that has no run.
+FAILED = ("refused", "error")
+
 #: The columns of a row after the values of the grid.
 RESULTS = (
     *("iterations", "iterations_paper", "steps", "outcome", "observed_rate", "linearised_rate", "sharp_factor"),
@@ -53,7 +59,10 @@ def row(problem: Problem | ContactPair, values: Mapping[str, Any], bodies: Bodie
             setting = shared.setting(values)
             found |= _of_pair(setting.pair)
             why |= _run(found, setting, values)
-    except (ProblemError, HypothesisError) as error:
+    except ProblemError as error:
+        found["outcome"] = "refused"
+        why["outcome"] = str(ProblemError("", error.key, error.value, error.needed))  # wherever the file lies
+    except HypothesisError as error:
         found["outcome"] = "refused"
         why["outcome"] = str(error)
     except (ContactError, SolveError) as error:
@@ -62,6 +71,15 @@ def row(problem: Problem | ContactPair, values: Mapping[str, Any], bodies: Bodie
     except Exception as error:  # the fault of one row costs no other row
         found["outcome"] = "error"
         why["outcome"] = f"{type(error).__name__}: {error}"
+    return _closed(found, why)
+
+
+def lost(problem: Problem | ContactPair, values: Mapping[str, Any], words: str) -> Row:
+    """The row of a run that ended with the process that made it."""
+    return _closed(_given(Bodies(problem), values) | dict.fromkeys(RESULTS) | {"outcome": "error"}, {"outcome": words})
+
+
+def _closed(found: Row, why: Mapping[str, str]) -> Row:
     found["reason"] = "; ".join(f"{name}: {' '.join(words.split())}" for name, words in why.items()) or None
     # in a CSV file a "#" begins a comment, in quotes too
     return {name: value.replace("#", "%23") if isinstance(value, str) else value for name, value in found.items()}

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
-import signal
-import time
-import uuid
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import lru_cache
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -20,15 +18,14 @@ from verification.interface.pair import UNITS, ContactPair
 from verification.problem.reading import load
 from verification.problem.specification import Problem
 from verification.progress import Progress, silent
-from verification.sweeps.bodies import Bodies
 from verification.sweeps.grid import SweepGrid
-from verification.sweeps.row import Row, row
+from verification.sweeps.keeping import Kept
+from verification.sweeps.row import FAILED, Row
+from verification.sweeps.tally import Tally
+from verification.sweeps.workers import Work, work_of
 
 if TYPE_CHECKING:
     from verification.figures import Figure
-
-#: Rows that a worker takes at once, at most: what it returns together is what progress tells of.
-MOST_AT_ONCE = 32
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -43,6 +40,14 @@ class Sweep(Document):
         How many rows the grid has; Ctrl-C may have left some out.
     axes : tuple of str
         The columns that vary.
+    grid : SweepGrid
+        What was asked.
+    places : tuple of int
+        The place of each row among the rows of the grid.
+    stored : int
+        How many rows a store had already.
+    notes : tuple of str
+        What the store has that was not used, in words.
     """
 
     schema: ClassVar[str] = "ndtheory.sweep/1"
@@ -51,6 +56,10 @@ class Sweep(Document):
     asked: int
     axes: tuple[str, ...]
     units: Mapping[str, str]
+    grid: SweepGrid
+    places: tuple[int, ...]
+    stored: int = 0
+    notes: tuple[str, ...] = ()
     problem: Problem | None = None
 
     @property
@@ -135,6 +144,9 @@ def sweep(
     radius: Sequence[Any] | None = None,
     rule: Sequence[Any] | None = None,
     jobs: int = 1,
+    store: Path | str | None = None,
+    fresh: bool = False,
+    dask: str | None = None,
     progress: Progress = silent,
 ) -> Sweep:
     """Run a problem at every point of a grid: the product of the lists that are given.
@@ -156,6 +168,12 @@ def sweep(
     rule : list of Rule or str, optional
     jobs : int
         Processes; 0 or less counts back from all cores, -1 is all.
+    store : path, optional
+        A file that keeps each row once it is made, and has those that were made before; made where there is none.
+    fresh : bool
+        Whether rows that the store has are made again.
+    dask : str, optional
+        The address of a dask scheduler, whose workers make the rows; ``jobs`` is not used then.
     progress : callable
         Told how many rows are done.
 
@@ -167,6 +185,8 @@ def sweep(
     ------
     ProblemError
         A value that fits no problem.  A run that fails is a row that says why.
+    StoreError, Stopped
+        The store does not take a row; no worker is left.  Both are problem errors, and the store keeps what it has.
     KeyboardInterrupt
         Before the first row; later the sweep holds the rows that are done.
 
@@ -187,102 +207,64 @@ def sweep(
     of = start.source if start.source else "<dict>"
     axes = {"theta": theta, "friction": friction, "young": young, "neumann_body": neumann_body, "refine": refine}
     grid = SweepGrid.of(axes | {"law": law, "radius": radius, "rule": rule}, of)
-    return sweep_grid(start, grid, jobs=jobs, progress=progress)
+    place = None if store is None else Path(store)
+    return sweep_grid(start, grid, work=work_of(jobs, dask), store=place, fresh=fresh, progress=progress)
 
 
-def sweep_grid(start: Problem | ContactPair, grid: SweepGrid, *, jobs: int = 1, progress: Progress = silent) -> Sweep:
-    """As :func:`sweep`, over a grid that is read already."""
+def sweep_grid(
+    start: Problem | ContactPair,
+    grid: SweepGrid,
+    *,
+    work: Work | None = None,
+    store: Path | None = None,
+    fresh: bool = False,
+    progress: Progress = silent,
+) -> Sweep:
+    """As :func:`sweep`, over a grid that is read already.
+
+    Parameters
+    ----------
+    start, grid, store, fresh, progress
+        As :func:`sweep` has them.
+    work : callable, optional
+        Who makes the rows, as :func:`verification.sweeps.workers.work_of` says; this process by default.
+    """
     wanted = list(grid.rows())
-    done: dict[int, Row] = {}
-    work = _alone if jobs == 1 else _together
-    begun = time.monotonic()
-    try:
-        progress(f"runs: 0 of {len(wanted)} rows", 0.0)
-        for index, found in work(start, wanted, jobs):
-            done[index] = found
-            left = (time.monotonic() - begun) * (len(wanted) / len(done) - 1)
-            progress(f"runs: {len(done)} of {len(wanted)} rows, {_duration(left)} left", len(done) / len(wanted))
-    except KeyboardInterrupt:
-        if not done:
-            raise
+    done: dict[int, Row | bytes] = {}
+    with contextlib.ExitStack() as stack:
+        kept = None if store is None else stack.enter_context(Kept(store, start, grid))
+        if kept is not None and not fresh:
+            done |= kept.known.rows
+        stored = len(done)
+        todo = [(i, values) for i, values in enumerate(wanted) if i not in done]
+        failed = kept.known.failed if stored and kept is not None else 0
+        tally = Tally(asked=len(wanted), stored=stored, failed=failed, progress=progress)
+        try:
+            tally.tell()
+            made = stack.enter_context(contextlib.closing((work or work_of(1))(start, todo)))
+            for rows in made:
+                if kept is not None:
+                    kept.add(rows)
+                done |= rows
+                tally.count(len(rows), sum(row["outcome"] in FAILED for _, row in rows))
+        except KeyboardInterrupt:
+            if not done:
+                raise
     axes = tuple(name for axis in grid.axes for name in (("young1", "young2") if axis == "young" else (axis,)))
+    places = tuple(sorted(done))
     return Sweep(
-        rows=tuple(done[i] for i in sorted(done)),
+        rows=tuple(_read(done[i]) for i in places),
         asked=len(wanted),
         axes=axes,
+        grid=grid,
+        places=places,
+        stored=stored,
+        notes=() if kept is None else kept.notes,
         units=start.units if start.units else UNITS,
         problem=start if isinstance(start, Problem) else start.problem,
     )
 
 
-def _duration(seconds: float) -> str:
-    """An estimate of a time.
-
-    >>> _duration(4.2), _duration(80), _duration(8000)
-    ('about 4 s', 'about 1 min', 'about 2.2 h')
-    """
-    if seconds < 60:
-        return f"about {seconds:.0f} s"
-    return f"about {seconds / 60:.0f} min" if seconds < 3600 else f"about {seconds / 3600:.1f} h"
-
-
-def _alone(start: Problem | ContactPair, wanted: Sequence[Row], jobs: int) -> Iterator[tuple[int, Row]]:
-    bodies = Bodies(start)
-    for index, values in enumerate(wanted):
-        yield index, row(start, values, bodies)
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Start:
-    """What a sweep varies, known to a worker by the name of the sweep."""
-
-    name: str
-    start: Any = field(compare=False)
-
-
-@lru_cache(maxsize=1)
-def _bodies(start: _Start) -> Bodies:
-    """What the rows of a worker share."""
-    return Bodies(start.start)
-
-
-def _some(start: _Start, some: Sequence[tuple[int, Row]]) -> list[tuple[int, Row]]:
-    """Rows in a worker, which leaves Ctrl-C to its parent."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    bodies = _bodies(start)
-    return [(index, row(start.start, values, bodies)) for index, values in some]
-
-
-def _together(start: Problem | ContactPair, wanted: Sequence[Row], jobs: int) -> Iterator[tuple[int, Row]]:
-    from joblib import Parallel, delayed, effective_n_jobs, parallel_config
-
-    named = _Start(name=uuid.uuid4().hex, start=start)
-    at_once = max(1, min(MOST_AT_ONCE, len(wanted) // (4 * effective_n_jobs(jobs))))
-    pieces = _pieces(list(enumerate(wanted)), at_once)
-    with parallel_config(backend="loky", inner_max_num_threads=1):
-        results = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1)(
-            delayed(_some)(named, piece) for piece in pieces
-        )
-        try:
-            for rows in results:
-                yield from rows
-        except BaseException:
-            _stop()
-            raise
-
-
-def _stop() -> None:
-    """End the workers at once: what they compute is not wanted any more."""
-    from joblib.externals.loky import get_reusable_executor
-
-    get_reusable_executor().shutdown(wait=True, kill_workers=True)
-
-
-def _pieces(rows: Sequence[tuple[int, Row]], at_once: int) -> Iterator[Sequence[tuple[int, Row]]]:
-    """Rows that stand together and have one mesh, so many at once."""
-    first = 0
-    for last in range(1, len(rows) + 1):
-        mesh: Callable[[int], Any] = lambda i: rows[i][1].get("refine")
-        if last == len(rows) or last - first == at_once or mesh(last) != mesh(first):
-            yield rows[first:last]
-            first = last
+def _read(row: Row | bytes) -> Row:
+    found: Row = json.loads(row) if isinstance(row, bytes) else row
+    return found

@@ -1,0 +1,134 @@
+"""The rows of a sweep on the workers of a dask scheduler."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import importlib.util
+import threading
+from collections.abc import Generator, Sequence
+from itertools import islice
+from typing import Any
+
+from verification.interface.pair import ContactPair
+from verification.interrupts import undisturbed
+from verification.problem.specification import Problem
+from verification.problem.tables import ProblemError
+from verification.sweeps.row import Row, lost
+from verification.sweeps.workers import Origin, Pieces, Placed, Stopped, Work, some
+
+#: Seconds to wait for a scheduler.
+PATIENCE = 10
+
+#: Pieces that a thread of a worker has before it, so that it need not wait.
+AHEAD = 2
+
+
+def on_cluster(address: str) -> Work:
+    """On the workers of the scheduler at an address.
+
+    A worker condenses the bodies of a mesh once.  The pieces of a worker that dies go to another one; a row that takes
+    four workers with it is a row that says so.
+
+    Raises
+    ------
+    ProblemError
+        No dask here, or no scheduler there.
+    """
+    if not importlib.util.find_spec("distributed"):
+        needed = "needed the extra `cluster`: pip install 'ndtheory[cluster]'"
+        raise ProblemError("--dask", "address", address, needed)
+
+    def work(start: Problem | ContactPair, wanted: Sequence[tuple[int, Row]]) -> Generator[Placed, None, None]:
+        from distributed import Client
+
+        if not wanted:
+            return
+        _ask(address)
+        with contextlib.ExitStack() as stack:
+            with undisturbed():
+                client = Client(address, timeout=PATIENCE, set_as_default=False)
+            stack.callback(_close, client)
+            yield from _rows(client, start, wanted, address)
+
+    return work
+
+
+def _ask(address: str) -> None:
+    """Knock at a scheduler: a client that finds none says so by many lines.
+
+    Raises
+    ------
+    ProblemError
+        Nobody answers.
+    """
+    from distributed.comm.core import connect
+
+    async def knock() -> None:
+        comm = await connect(address, timeout=PATIENCE)
+        await comm.close()
+
+    def ask() -> None:
+        try:
+            asyncio.run(knock())
+        except Exception as error:  # of the address, of the network or of TLS: each has its own
+            wrong.append(error)
+
+    wrong: list[Exception] = []
+    asking = threading.Thread(target=ask, daemon=True)  # a notebook has a loop in its own thread already
+    asking.start()
+    asking.join()
+    if wrong:
+        needed = "needed the address of a dask scheduler that answers, as tcp://host:8786"
+        raise ProblemError("--dask", "address", address, f"{needed} ({wrong[0]})")
+
+
+def _close(client: Any) -> None:
+    with undisturbed(), contextlib.suppress(Exception):  # the scheduler may have gone
+        client.close(timeout=2)
+
+
+def _rows(
+    client: Any, start: Problem | ContactPair, wanted: Sequence[tuple[int, Row]], address: str
+) -> Generator[Placed, None, None]:
+    from distributed import KilledWorker, as_completed
+    from distributed.comm.core import CommClosedError
+
+    threads = max(1, sum(client.ncores().values()))
+    pieces = Pieces(wanted, threads)
+    source = iter(pieces)
+    # a future, so that a pair of large matrices goes to each worker once, and is made again where a worker dies
+    origin = client.submit(_same, Origin.of(start), pure=False)
+    sent: dict[str, Sequence[tuple[int, Row]]] = {}
+
+    def submit(piece: Sequence[tuple[int, Row]]) -> Any:
+        future = client.submit(some, origin, piece, pure=False)
+        sent[future.key] = piece
+        return future
+
+    try:
+        coming = as_completed((submit(piece) for piece in islice(source, AHEAD * threads)), loop=client.loop)
+        for future in coming:
+            piece = sent.pop(future.key)
+            if future.status not in ("finished", "error"):
+                raise Stopped(address, "the scheduler has gone")
+            error = future.exception()
+            if isinstance(error, KilledWorker) and len(piece) > 1:
+                for one in piece:  # each alone: which of them was it?
+                    coming.add(submit([one]))
+                continue
+            if isinstance(error, KilledWorker):
+                index, values = piece[0]
+                yield [(index, lost(start, values, "the workers that ran it were killed, perhaps as memory ran out"))]
+            elif error is not None:
+                raise Stopped(address, f"a worker cannot make rows: {type(error).__name__}: {error}")
+            else:
+                yield pieces.taken(future.result())
+            for piece in islice(source, 1):
+                coming.add(submit(piece))
+    except (CommClosedError, TimeoutError) as error:
+        raise Stopped(address, f"the scheduler has gone ({error})") from None
+
+
+def _same(origin: Origin) -> Origin:
+    return origin

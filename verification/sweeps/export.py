@@ -1,0 +1,125 @@
+"""A sweep as a labelled dataset: one dimension for each axis of the grid, one variable for each result."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ndtheory import __version__
+from verification.algorithm.relaxation import Rule
+from verification.problem.tables import ProblemError
+from verification.sweeps.row import RESULTS
+from verification.sweeps.sweep import Sweep
+
+if TYPE_CHECKING:
+    import xarray
+
+#: Results that are words; the others are numbers, with NaN where a row has none.
+TEXTS = ("outcome", "reason")
+
+#: What the results and the axes are called in full.
+NAMES = {
+    "theta": "relaxation factor",
+    "friction": "coefficient of friction k",
+    "young1": "Young's modulus of body 1",
+    "young2": "Young's modulus of body 2",
+    "neumann_body": "body of the Neumann problem",
+    "refine": "halvings of the mesh",
+    "law": "law of friction",
+    "radius": "radius of the kernel of S",
+    "rule": "rule of relaxation",
+    "iterations": "steps to the tolerance of the unrelaxed residual",
+    "iterations_paper": "steps by the test of Section 6.3",
+    "steps": "steps done",
+    "outcome": "how the run ended",
+    "observed_rate": "rate at the end of the run",
+    "linearised_rate": "rate of the linearisation",
+    "sharp_factor": "q(theta) of the theorem in energy norms",
+    "proved_rate": "proved rate",
+    "rho": "rho",
+    "reason": "why results are missing",
+}
+
+#: What is said where a library is missing.
+NEEDED = "needed the extra `dataset`: pip install 'ndtheory[dataset]'"
+
+#: The outcome of a row that was not made.
+MISSING = "missing"
+
+
+def dataset(sweep: Sweep) -> xarray.Dataset:
+    """The sweep as an :class:`xarray.Dataset`.
+
+    Dimensions are the axes of the grid, in its order; ``young`` counts pairs, with the coordinates ``young1`` and
+    ``young2``.  A row that was not made has the outcome ``missing``.  What has a unit has it as the attribute
+    ``units``, 1 where it is a number without one; the dataset itself has version, units and the problem as JSON.
+
+    Raises
+    ------
+    ProblemError
+        xarray is not there.
+    """
+    if not importlib.util.find_spec("xarray"):
+        raise ProblemError("--export", "", None, NEEDED)
+    import xarray
+
+    axes = sweep.grid.axes
+    shape = tuple(len(values) for values in axes.values())
+    units = {"young1": sweep.units["stress"], "young2": sweep.units["stress"], "radius": sweep.units["length"]}
+    attributes = lambda name, words: {"long_name": NAMES[name]} | ({} if words else {"units": units.get(name, "1")})
+
+    coordinates: dict[str, Any] = {}
+    for name, values in axes.items():
+        if name == "young":
+            coordinates["young"] = ("young", np.arange(len(values)), {"long_name": "pair of moduli"})
+            for i in (1, 2):
+                of_body = [float(pair[i - 1]) for pair in values]
+                coordinates[f"young{i}"] = ("young", of_body, attributes(f"young{i}", False))
+        else:
+            plain = [_plain(value) for value in values]
+            if any(isinstance(value, str) for value in plain):
+                plain = [str(value) for value in plain]
+            coordinates[name] = (name, plain, attributes(name, isinstance(plain[0], str)))
+
+    variables: dict[str, Any] = {}
+    for name in RESULTS:
+        words = name in TEXTS
+        flat: Any = np.full(len(sweep.grid), "" if words else np.nan, dtype=object if words else float)
+        if name == "outcome":
+            flat[:] = MISSING
+        for place, row in zip(sweep.places, sweep.rows, strict=True):
+            if row[name] is not None:
+                flat[place] = row[name]
+        variables[name] = (tuple(axes), flat.reshape(shape), attributes(name, words))
+    about = {
+        "title": sweep.summary,
+        "source": f"ndtheory sweep, version {__version__}",
+        "unit_of_length": sweep.units["length"],
+        "unit_of_stress": sweep.units["stress"],
+    }
+    if sweep.problem is not None:
+        about["problem"] = json.dumps(sweep.problem.to_dict())
+    return xarray.Dataset(variables, coordinates, about)
+
+
+def write_dataset(sweep: Sweep, path: Path) -> None:
+    """Write the dataset as netCDF 4.
+
+    Raises
+    ------
+    ProblemError
+        xarray or netCDF4 is not there.
+    """
+    if not importlib.util.find_spec("netCDF4"):
+        raise ProblemError("--export", "", None, NEEDED)
+    dataset(sweep).to_netcdf(path, engine="netcdf4")
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Rule):
+        return value.name
+    return value if isinstance(value, (int, str)) else float(value)

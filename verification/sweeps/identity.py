@@ -1,0 +1,165 @@
+"""What tells one row from all others: the problem, the values, how it is solved, and the version of this library."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import json
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from ndtheory import __version__
+from verification.algorithm.relaxation import RULES, Rule, rule_of
+from verification.interface.friction import LAWS, Given, Law
+from verification.interface.pair import ContactPair
+from verification.problem.specification import Problem
+from verification.problem.tables import ProblemError
+from verification.sweeps.grid import SweepGrid
+
+#: How step II is solved in a row: by the active set, and by the model where that does not settle.
+SOLVER = "auto"
+
+#: Bytes of a key: at a million rows two of them agree by chance once in 1e26 stores.
+LENGTH = 16
+
+
+@dataclass(frozen=True, kw_only=True)
+class Identity:
+    """What the rows of a sweep have in common, as far as a digit of them can depend on it.
+
+    Attributes
+    ----------
+    of : str
+        The problem or the pair, as JSON; numbers exactly, mesh files and matrices by their content.
+    source : str
+        What errors name.
+    version : str
+        Of this library.
+    """
+
+    of: str
+    source: str
+    version: str = __version__
+
+    @classmethod
+    def read(cls, start: Problem | ContactPair) -> Identity:
+        """That of a problem or of a pair.
+
+        Raises
+        ------
+        ProblemError
+            The pair has a law of friction of its own, of which nothing tells two versions apart.
+        """
+        if isinstance(start, Problem):
+            return cls(of=json.dumps({"problem": start.digest}), source=start.source)
+        return cls(of=json.dumps(_of_pair(start), sort_keys=True), source=start.source)
+
+    def at(self, version: str) -> Identity:
+        """The same in another version of this library."""
+        return replace(self, version=version)
+
+    @property
+    def digest(self) -> str:
+        """SHA-256, in hexadecimal digits."""
+        digest: str = self._hash().hexdigest()
+        return digest
+
+    def _hash(self) -> Any:
+        return hashlib.sha256(json.dumps({"version": self.version, "solver": SOLVER, "of": self.of}).encode("ascii"))
+
+    def keys(self, grid: SweepGrid) -> list[bytes]:
+        """The key of each row of a grid, in the order of its rows.
+
+        Raises
+        ------
+        ProblemError
+            A relaxation rule of one's own, of which nothing tells two versions apart.
+
+        Examples
+        --------
+        >>> bars = Problem.from_dict({"dimension": 1,
+        ...     "body1": {"shape": "interval", "x": [0, 1], "cells": 4, "young": 2, "fixed": ["left"]},
+        ...     "body2": {"shape": "interval", "x": [1, 2], "cells": 4, "young": 1, "prescribed": {"right": -0.1}}})
+        >>> keys = lambda *theta: Identity.read(bars).keys(SweepGrid.of({"theta": theta}))
+        >>> keys("1/3", 0.5)[1] == keys("1/2")[0] != keys("1/3")[0]
+        True
+        """
+        axes = [[f"{name}={self._text(name, value)};".encode() for value in grid.axes[name]] for name in grid.axes]
+        return list(self._keys(axes))
+
+    def _keys(self, axes: list[list[bytes]]) -> Iterator[bytes]:
+        start = self._hash()
+        for values in itertools.product(*axes):
+            one = start.copy()
+            one.update(b"".join(values))
+            yield one.digest()[:LENGTH]
+
+    def _text(self, name: str, value: Any) -> str:
+        if name == "rule":
+            return self._rule(value)
+        if isinstance(value, tuple):
+            return ",".join(exactly(v) for v in value)
+        return exactly(value) if isinstance(value, Fraction) else str(value)
+
+    def _rule(self, value: Rule | str) -> str:
+        rule = rule_of(value)
+        if RULES.get(rule.name) != rule:
+            raise ProblemError(
+                self.source,
+                "rule",
+                rule.name,
+                "needed a rule of this library, as nothing tells two versions of another one apart; or no store",
+            )
+        return rule.name
+
+
+def exactly(value: Fraction) -> str:
+    """A rational as a text, of whatever length.
+
+    >>> exactly(Fraction(1, 10))
+    '1/a'
+    """
+    return f"{value.numerator:x}/{value.denominator:x}"
+
+
+def _of_pair(pair: ContactPair) -> dict[str, Any]:
+    """A pair by its matrices, bit by bit, and by what else a run of it depends on."""
+    settings = asdict(pair.settings) | {"theta": str(pair.settings.theta)}
+    interface = pair.interface
+    arrays: dict[str, Any] = {"gap": interface.gap, "transfer": interface.transfer}
+    for name, side in (("contact", pair.contact), ("neumann", pair.neumann)):
+        for part in ("stiffness", "load", "known", "free", "motions"):
+            arrays[f"{name}.{part}"] = getattr(side, part)
+        arrays |= {f"{name}.x": side.grid.x, f"{name}.weights": side.grid.weights}
+    return {
+        "matrices": {name: None if array is None else _content(array) for name, array in arrays.items()},
+        "upward": [pair.contact.upward, pair.neumann.upward],
+        "dimension": pair.contact.grid.dimension,
+        "law": None if interface.law is None else _law(interface.law, pair.source),
+        "friction": exactly(pair.friction),
+        "neumann_body": pair.neumann_body,
+        "settings": {name: str(value) for name, value in settings.items()},
+        "problem": None if pair.problem is None else pair.problem.digest,
+    }
+
+
+def _content(array: Any) -> str:
+    plain = np.ascontiguousarray(array)
+    return f"{plain.dtype.str} {plain.shape} {hashlib.sha256(plain.tobytes()).hexdigest()}"
+
+
+def _law(law: Law, source: str) -> dict[str, str]:
+    if isinstance(law, Given):
+        return {"name": law.name, "words": law.words, "outside": law.outside, "matrix": _content(law.matrix)}
+    if type(law) not in LAWS.values():
+        raise ProblemError(
+            source,
+            "law",
+            type(law).__name__,
+            "needed a law of this library, as nothing tells two versions of another one apart; or no store",
+        )
+    return {"name": law.name} | {name: str(value) for name, value in vars(law).items()}

@@ -1,0 +1,157 @@
+"""The rows of one sweep in a store: which are there, which are not used, and how new ones get in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+from verification.document import Document
+from verification.interface.pair import UNITS, ContactPair
+from verification.problem.specification import Problem
+from verification.sweeps.grid import SweepGrid
+from verification.sweeps.identity import Identity
+from verification.sweeps.row import Row
+from verification.sweeps.store import Known, Store
+
+
+class Kept:
+    """A store for the time of one sweep; a context that lets go of the file at its end.
+
+    Parameters
+    ----------
+    path : Path
+        Made where there is none.
+    start : Problem or ContactPair
+    grid : SweepGrid
+
+    Raises
+    ------
+    ProblemError
+        A law or a rule that no store can tell from another one.
+    StoreError
+    """
+
+    def __init__(self, path: Path, start: Problem | ContactPair, grid: SweepGrid) -> None:
+        identity = Identity.read(start)
+        self._keys = identity.keys(grid)
+        self._store = Store(path)
+        try:
+            self.known: Known = self._store.known(self._keys)
+            #: The rows of this sweep that other versions of this library have made, by version.
+            self.others: dict[str, int] = {}
+            for version in self._store.others():
+                if count := self._store.count(identity.at(version).keys(grid)):
+                    self.others[version] = count
+            self._study = self._store.begin(identity, start if isinstance(start, Problem) else start.problem)
+        except BaseException:
+            self._store.close()
+            raise
+
+    def __enter__(self) -> Kept:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._store.close()
+
+    def add(self, rows: Sequence[tuple[int, Row]]) -> None:
+        """Keep rows by their places in the grid.
+
+        Raises
+        ------
+        StoreError
+        """
+        self._store.add(self._study, [(self._keys[i], row) for i, row in rows])
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is there and is not used, in words."""
+        return notes(self._store.path, self.others, self.known.damaged)
+
+
+def notes(path: Path, others: Mapping[str, int], damaged: int) -> tuple[str, ...]:
+    """What a store has that is not used, in words."""
+    found = [
+        f"{path}: {count} of these rows are there from version {version}; they are not used, and stay"
+        for version, count in others.items()
+    ]
+    if damaged:
+        found.append(f"{path}: {damaged} of these rows are damaged: they are made again")
+    return tuple(found)
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Plan(Document):
+    """What a sweep would do.
+
+    Attributes
+    ----------
+    asked : int
+        How many rows the grid has.
+    stored : int
+        How many of them the store has.
+    damaged : int
+        How many more it has damaged.
+    others : mapping from a version of this library to a number
+        Rows of this sweep that another version has made: they are not used.
+    store : Path or None
+        Where rows are kept.
+    """
+
+    schema: ClassVar[str] = "ndtheory.sweep-plan/1"
+
+    asked: int
+    stored: int
+    damaged: int
+    store: Path | None
+    others: Mapping[str, int] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=lambda: UNITS)
+    problem: Problem | None = None
+
+    @property
+    def left(self) -> int:
+        """How many rows would be made."""
+        return self.asked - self.stored
+
+    @property
+    def summary(self) -> str:
+        return f"{self.asked} runs, {self.stored} of them are there, {self.left} are left"
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the store has that would not be used, in words."""
+        return () if self.store is None else notes(self.store, self.others, self.damaged)
+
+    def content(self) -> dict[str, Any]:
+        return {
+            "asked": self.asked,
+            "stored": self.stored,
+            "left": self.left,
+            "damaged": self.damaged,
+            "other_versions": dict(self.others),
+            "store": None if self.store is None else str(self.store),
+        }
+
+
+def plan(start: Problem | ContactPair, grid: SweepGrid, store: Path | None = None, *, fresh: bool = False) -> Plan:
+    """What a sweep would do; nothing is run, and no store is made.
+
+    Raises
+    ------
+    ProblemError
+        As for a sweep.
+    """
+    stored, damaged, others = 0, 0, dict[str, int]()
+    if store is not None and store.exists():
+        with Kept(store, start, grid) as kept:
+            stored, damaged, others = len(kept.known.rows), kept.known.damaged, kept.others
+    return Plan(
+        asked=len(grid),
+        stored=0 if fresh else stored,
+        damaged=damaged,
+        others=others,
+        store=store,
+        units=start.units if start.units else UNITS,
+        problem=start if isinstance(start, Problem) else start.problem,
+    )

@@ -1,0 +1,255 @@
+"""The store of a sweep: rows in an SQLite file, which outlive the process that made them.
+
+One process holds the file and is its only writer.  It writes ahead into a log beside the file, one transaction for the
+rows that come together: whatever ends the process, the file holds every transaction that was begun and ended, and none
+in part.  A power cut may cost the last of them, as SQLite does not wait for the disk after each.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import sqlite3
+import zlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ndtheory import __version__
+from verification.interrupts import undisturbed
+from verification.problem.specification import Problem
+from verification.problem.tables import ProblemError
+from verification.sweeps.identity import Identity
+from verification.sweeps.row import FAILED, Row
+
+#: Tells a store from other files of SQLite: "ndth".
+APPLICATION = 0x6E647468
+
+#: What the tables look like.
+FORMAT = 1
+
+TABLES = """
+CREATE TABLE studies (id INTEGER PRIMARY KEY, identity TEXT UNIQUE NOT NULL, version TEXT NOT NULL, problem TEXT);
+CREATE TABLE rows (key BLOB PRIMARY KEY, study INTEGER NOT NULL, outcome TEXT, row TEXT NOT NULL, crc INTEGER NOT NULL);
+"""
+
+#: Seconds to wait for a process that is about to let go of a store.
+PATIENCE = 2.0
+
+#: What SQLite says, in the words of a user; what stands here for no error of it is repeated as it stands.
+WORDS = {
+    "database is locked": "another sweep is at work on it: needed another store (--store), or wait until that one ends",
+    "database or disk is full": "the disk is full: needed room on it",
+    "disk I/O error": "the disk does not take it: needed room on it, or another place (--store)",
+    "attempt to write a readonly database": "it may only be read: needed another place (--store)",
+    "unable to open database file": "needed a folder that exists and can be written to (--store)",
+    "file is not a database": "not a store of this program: needed another name (--store)",
+    "database disk image is malformed": "the file is damaged; it is left as it is: needed another name (--store), or"
+    " move the file away",
+}
+
+
+class StoreError(ProblemError):
+    """A store that cannot be opened, read or written."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Known:
+    """What a store has of some keys.
+
+    Attributes
+    ----------
+    rows : dict from the number of a key to its row as :func:`written` has it
+    failed : int
+        How many of them have no run.
+    damaged : int
+        How many rows are there that do not agree with their checksum; they count as missing.
+    """
+
+    rows: dict[int, bytes]
+    failed: int
+    damaged: int
+
+
+class Store:
+    """Rows by their keys, in a file that this process alone holds.
+
+    Parameters
+    ----------
+    path : Path
+        Made where there is none.
+
+    Raises
+    ------
+    StoreError
+        The file is no store, is damaged, cannot be written, or another process holds it.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.kept = 0
+        if path.exists() and not path.is_file():
+            raise StoreError(str(path), "", None, "needed the name of a file for the store (--store)")
+        with self._told():
+            self._file = sqlite3.connect(path, timeout=PATIENCE, isolation_level=None)
+        try:
+            with self._told():
+                self._open()
+        except BaseException:
+            self._file.close()
+            raise
+
+    def _open(self) -> None:
+        run = self._file.execute
+        run("PRAGMA locking_mode = EXCLUSIVE")  # held until it is closed, or the process ends
+        number = run("PRAGMA application_id").fetchone()[0]
+        form = run("PRAGMA user_version").fetchone()[0]
+        new = number == 0 and run("SELECT count(*) FROM sqlite_master").fetchone()[0] == 0
+        if not new and number != APPLICATION:
+            raise sqlite3.DatabaseError("file is not a database")
+        if not new and form != FORMAT:
+            needed = f"a store of format {form}, made by another version: this one reads format {FORMAT} (--store)"
+            raise StoreError(str(self.path), "", None, needed)
+        run("PRAGMA journal_mode = WAL")
+        run("PRAGMA synchronous = NORMAL")
+        run("PRAGMA temp_store = MEMORY")
+        with self._transaction():
+            if new:
+                run(f"PRAGMA application_id = {APPLICATION}")
+                run(f"PRAGMA user_version = {FORMAT}")
+                for table in filter(str.strip, TABLES.split(";")):
+                    run(table)
+        run("CREATE TEMP TABLE wanted (number INTEGER PRIMARY KEY, key BLOB NOT NULL)")
+
+    def __enter__(self) -> Store:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Let go of the file, and leave one plain file that can be read where nothing can be written."""
+        with undisturbed():
+            with contextlib.suppress(sqlite3.Error):  # a full disk: the log stays beside the file
+                self._file.execute("PRAGMA journal_mode = DELETE")
+            self._file.close()
+
+    def known(self, keys: Sequence[bytes]) -> Known:
+        """The rows of some keys.
+
+        Raises
+        ------
+        StoreError
+        """
+        found: dict[int, bytes] = {}
+        damaged = failed = 0
+        with self._told(), self._wanted(keys):
+            for number, key, outcome, text, crc in self._file.execute(
+                "SELECT number, rows.key, outcome, CAST(row AS BLOB), crc"
+                " FROM temp.wanted JOIN rows ON rows.key = wanted.key"
+            ):
+                if crc == _crc(key, text):
+                    found[number] = text
+                    failed += outcome in FAILED
+                else:
+                    damaged += 1
+        return Known(rows=found, failed=failed, damaged=damaged)
+
+    def count(self, keys: Sequence[bytes]) -> int:
+        """How many of the keys have a row.
+
+        Raises
+        ------
+        StoreError
+        """
+        with self._told(), self._wanted(keys):
+            row = self._file.execute("SELECT count(*) FROM temp.wanted JOIN rows ON rows.key = wanted.key").fetchone()
+        return int(row[0])
+
+    def others(self) -> list[str]:
+        """The other versions of this library that have made rows of this store.
+
+        Raises
+        ------
+        StoreError
+        """
+        with self._told():
+            rows = self._file.execute(
+                "SELECT DISTINCT version FROM studies WHERE version != ? ORDER BY version", [__version__]
+            )
+            return [str(row[0]) for row in rows]
+
+    def begin(self, identity: Identity, problem: Problem | None) -> int:
+        """The number of a study: what rows are made from, with the problem as its file has it.
+
+        Raises
+        ------
+        StoreError
+        """
+        written = None if problem is None else json.dumps(problem.to_dict())
+        with self._told(), self._transaction():
+            self._file.execute(
+                "INSERT OR IGNORE INTO studies (identity, version, problem) VALUES (?, ?, ?)",
+                [identity.digest, identity.version, written],
+            )
+            row = self._file.execute("SELECT id FROM studies WHERE identity = ?", [identity.digest]).fetchone()
+        return int(row[0])
+
+    def add(self, study: int, rows: Sequence[tuple[bytes, Row]]) -> None:
+        """Keep rows, all of them or none; a row that is there already is replaced.
+
+        Raises
+        ------
+        StoreError
+        """
+        values = [(key, study, row["outcome"], text := written(row), _crc(key, text)) for key, row in rows]
+        with self._told(), self._transaction():
+            self._file.executemany(
+                "INSERT OR REPLACE INTO rows (key, study, outcome, row, crc) VALUES (?, ?, ?, CAST(? AS TEXT), ?)",
+                values,
+            )
+        self.kept += len(rows)
+
+    @contextlib.contextmanager
+    def _wanted(self, keys: Sequence[bytes]) -> Iterator[None]:
+        self._file.execute("DELETE FROM temp.wanted")
+        self._file.execute("BEGIN")
+        try:
+            self._file.executemany("INSERT INTO temp.wanted VALUES (?, ?)", enumerate(keys))
+            yield
+        finally:
+            self._file.execute("COMMIT")
+
+    @contextlib.contextmanager
+    def _transaction(self) -> Iterator[None]:
+        with undisturbed():
+            self._file.execute("BEGIN IMMEDIATE")
+            try:
+                yield
+                self._file.execute("COMMIT")
+            except BaseException:
+                if self._file.in_transaction:  # some errors have ended it
+                    self._file.execute("ROLLBACK")
+                raise
+
+    @contextlib.contextmanager
+    def _told(self) -> Iterator[None]:
+        """Say in words what SQLite complains of."""
+        try:
+            yield
+        except sqlite3.Error as error:
+            words = WORDS.get(str(error), str(error))
+            if self.kept:
+                words += (
+                    f"; the {self.kept} rows that it took before are in it, and the same command goes on from there"
+                )
+            raise StoreError(str(self.path), "", None, words) from None
+
+
+def written(row: Row) -> bytes:
+    """A row as text; it reads back to the last digit."""
+    return json.dumps(row, separators=(",", ":")).encode("ascii")
+
+
+def _crc(key: bytes, text: bytes) -> int:
+    return zlib.crc32(text, zlib.crc32(key))
