@@ -36,7 +36,7 @@ def charted(tmp_path_factory):
 @pytest.fixture
 def region(call, charted, monkeypatch):
     """`region` on that plane, as often as one likes."""
-    monkeypatch.setattr(plane, "chart", lambda problem, progress: charted[2])
+    monkeypatch.setattr(plane, "chart", lambda problem, store, progress: charted[2])
     return lambda *arguments: call("region", charted[0], *arguments)
 
 
