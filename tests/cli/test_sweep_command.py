@@ -266,8 +266,8 @@ def test_a_log_has_lines_about_rows_done_failed_and_left(call, sweep_file, tmp_p
     assert call("sweep", sweep_file(grid), "--jobs", 1, "--log", tmp_path / "log").status == 0
     first, *_, last = (tmp_path / "log").read_text("utf-8").splitlines()
     when = r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d "
-    assert re.fullmatch(when + "0 done, 0 failed, 4 left", first)
-    assert re.fullmatch(when + "4 done, 2 failed, 0 left, about 0 s to go", last)
+    assert re.fullmatch(when + "runs: 0 done, 0 failed, 4 left", first)
+    assert re.fullmatch(when + "runs: 4 done, 2 failed, 0 left, about 0 s to go", last)
 
 
 def test_lines_about_progress_keep_their_distance():

@@ -116,7 +116,7 @@ def test_several_processes_give_the_same_rows_to_the_last_digit(wide):
     told = []
     together = vf.sweep(SMALL, **WIDE, jobs=2, progress=lambda what, share: told.append((what, share)))
     assert together.rows == wide.rows
-    assert told[-1] == (f"{len(wide.rows)} done, 0 failed, 0 left, about 0 s to go", 1.0)
+    assert told[-1] == (f"runs: {len(wide.rows)} done, 0 failed, 0 left, about 0 s to go", 1.0)
     assert [share for _, share in told] == sorted(share for _, share in told)
 
 

@@ -222,7 +222,7 @@ def test_rows_that_were_kept_when_the_process_is_killed_are_there(place):
         import verification as vf
 
         def killed(what, share):
-            if what.startswith("10 done"):
+            if what.startswith("runs: 10 done"):
                 os.kill(os.getpid(), signal.SIGKILL)
 
         vf.sweep(vf.Problem.from_dict({SMALL.to_dict()!r}), **{LONG!r}, store={str(place)!r}, progress=killed)

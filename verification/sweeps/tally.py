@@ -37,7 +37,7 @@ class Tally:
         """Say how far the sweep is."""
         done = self.stored + self.made
         left = self.asked - done
-        says = f"{done} done, {self.failed} failed, {left} left"
+        says = f"runs: {done} done, {self.failed} failed, {left} left"
         if self.made:
             says += f", {duration((time.monotonic() - self.begun) * left / self.made)} to go"
         self.progress(says, done / self.asked)
