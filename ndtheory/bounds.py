@@ -31,7 +31,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any, Literal
 
-from ndtheory.constants import Constants, Corner, relaxation_factor
+from ndtheory.constants import Constants, Corner, inside, relaxation_factor
 from ndtheory.errors import HypothesisError
 from ndtheory.number import (
     DIGITS,
@@ -48,6 +48,9 @@ from ndtheory.number import (
 )
 
 Conclusion = Literal["contraction", "no conclusion"]
+
+#: Why there is no ``interval_proved``.
+NO_PROVED_INTERVAL = "the constants have no enclosures, or some of those enclosed have no interval"
 
 #: The ends of the open intervals count as outside, decided with a margin far above the rounding of the evaluation.
 MARGIN = Decimal(10) ** -(DIGITS // 2)
@@ -221,6 +224,9 @@ class Bounds:
         None unless a' < -1.
     interval : tuple of float or None
         Contraction for lo < theta < hi, the four cases of Proposition 5.6 in one; None when k is at or above C2.
+    interval_proved : tuple of float or None
+        Thetas that contract whichever of the constants enclosed are the true ones; None where there are none, or no
+        enclosures.
     theta : float or None
         The one asked about; None where none was given.
     factor, one_minus_factor : Number or None
@@ -229,7 +235,7 @@ class Bounds:
     verdict : {'contraction', 'no conclusion'} or None
         Whether theta lies in the interval; None without theta.
     proved : bool
-        Whether the proof behind this edition holds for these constants.
+        Whether the proof behind this edition holds for these constants, all that are enclosed.
     threshold_on : {'k', 'C_K'}
         What C2 to C5 are thresholds of.
     """
@@ -246,6 +252,7 @@ class Bounds:
     C5: Number | None
     C6: Number | None
     interval: tuple[float, float] | None
+    interval_proved: tuple[float, float] | None
     theta: float | None
     factor: Number | None
     one_minus_factor: Number | None
@@ -264,6 +271,8 @@ class Bounds:
             reasons["C6"] = "a' >= -1: no lower end but 0"
         if self.interval is None:
             reasons["interval"] = "friction at or above C2"
+        if self.interval_proved is None:
+            reasons["interval_proved"] = NO_PROVED_INTERVAL
         if self.factor is None:
             why = "no theta given" if self.theta is None else "theta outside the interval: no conclusion"
             reasons |= dict.fromkeys(["factor", "one_minus_factor"], why)
@@ -272,6 +281,7 @@ class Bounds:
         return {
             **{name: None if number is None else number.to_dict() for name, number in numbers.items()},
             "interval": None if self.interval is None else list(self.interval),
+            "interval_proved": None if self.interval_proved is None else list(self.interval_proved),
             "theta": self.theta,
             "verdict": self.verdict,
             "proved": self.proved,
@@ -301,7 +311,7 @@ def evaluate(edition: Edition, constants: Constants, theta: Any = None) -> Bound
         was given as an enclosure, and the others as one or exactly, the numbers have enclosures too, at the weakest
         level (``verified`` at best).  Not those that some of the constants enclosed do not have: C1, ``factor``
         and ``one_minus_factor`` have one only if there is a contraction interval, with theta inside it, throughout.
-        ``interval``, ``verdict`` and ``proved`` are those of the values.
+        ``interval`` and ``verdict`` are those of the values.
 
     Raises
     ------
@@ -337,15 +347,17 @@ def evaluate(edition: Edition, constants: Constants, theta: Any = None) -> Bound
         verdict: Conclusion | None = None
         if chosen is not None:
             verdict = "no conclusion" if found["factor"] is None else "contraction"
+        least = constants.ends("m")
         names = ("C_K", "C_T", "C_T_tilde", "C0", "C2", "C3", "C4", "C5", "C6", "factor", "one_minus_factor")
         return Bounds(
             edition=edition,
             C1=number("C1", end="high"),
             **{name: number(name) for name in names},
             interval=interval,
+            interval_proved=inside(corners, level, "low", "high"),
             theta=None if chosen is None else float(chosen),
             verdict=verdict,
-            proved=edition.proved(constants.m),
+            proved=edition.proved(constants.m if least is None else least[0]),
             threshold_on="C_K" if scale is None else "k",
         )
 

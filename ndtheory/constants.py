@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, ClassVar
 
 from ndtheory.errors import HypothesisError
-from ndtheory.number import Level, Number, exact, weakest
+from ndtheory.number import Level, Number, exact, rounded, weakest
 
 #: m, M, C_R, C_K and C_s C_tr, the last None where C_K alone is known.
 Corner = tuple[Fraction, Fraction, Fraction, Fraction, Fraction | None]
@@ -135,6 +135,26 @@ class Given:
     def level(self) -> Level:
         """The weakest level of the constants given."""
         return weakest(number.level for _, number in self.numbers)
+
+
+def inside(corners: Sequence[Mapping[str, Any]], level: Level, low: str, high: str) -> tuple[float, float] | None:
+    """The interval where a theorem says least, each end moved inward to a double; None where there is none.
+
+    Parameters
+    ----------
+    corners : sequence of mapping
+        What the theorem says for the constants with which it says most, and with which it says least; or nothing.
+    level : {'exact', 'verified', 'guaranteed', 'float'}
+        Of the constants.
+    low, high : str
+        Names of the ends.
+    """
+    if not corners or any(corner[high] is None for corner in corners):
+        return None
+    first, last = (rounded(corners[-1][end], [corners[-1][end]], level) for end in (low, high))
+    if first is None or last is None or first.hi is None or last.lo is None or not first.hi < last.lo:
+        return None
+    return first.hi, last.lo
 
 
 def plain(value: Any) -> Any:

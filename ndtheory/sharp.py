@@ -28,7 +28,7 @@ from fractions import Fraction
 from typing import Any
 
 from ndtheory.bounds import MARGIN, Conclusion, factor_and_rest
-from ndtheory.constants import relaxation_factor
+from ndtheory.constants import inside, relaxation_factor
 from ndtheory.energy import EnergyConstants
 from ndtheory.number import SLACK, absolute, decimal, maximum, minimum, rounded, sqrt, weakest, where, working_precision
 from ndtheory.sharp_bounds import SharpBounds
@@ -350,6 +350,7 @@ def evaluate_sharp(constants: EnergyConstants, theta: Any = None) -> SharpBounds
         return SharpBounds(
             **{name: number(name) for name in (*names, *proved)},
             interval=None if found["low"] is None else (float(found["low"]), float(found["theta_max_proved"])),
+            interval_proved=inside(corners, level, "low", "theta_max_proved"),
             theta_proved=nearest("theta_proved"),
             theta_predicted=float(predicted_theta(decimal(constants.at_work))),
             rate_predicted=float(predicted_rate(decimal(constants.at_work))),

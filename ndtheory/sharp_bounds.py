@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ndtheory.bounds import Conclusion
+from ndtheory.bounds import NO_PROVED_INTERVAL, Conclusion
 from ndtheory.number import Number
 
 
@@ -28,6 +28,9 @@ class SharpBounds:
         friction.
     interval : tuple of float or None
         q < 1 for lo < theta < hi, capped at 1; None where q >= 1 everywhere.
+    interval_proved : tuple of float or None
+        The same whichever of the constants enclosed are the true ones; None where there are no such thetas, or no
+        enclosures.
     theta_proved : float or None
         The theta of least q; None where q >= 1 everywhere.
     factor_proved : Number or None
@@ -51,6 +54,7 @@ class SharpBounds:
     friction_multiple: Number | None
     friction_limit_multiple: Number | None
     interval: tuple[float, float] | None
+    interval_proved: tuple[float, float] | None
     theta_proved: float | None
     factor_proved: Number | None
     theta_max_proved: Number | None
@@ -70,6 +74,8 @@ class SharpBounds:
         if self.interval is None:
             names = ("interval", "theta_proved", "factor_proved", "theta_max_proved")
             reasons |= dict.fromkeys(names, "q >= 1 for every theta")
+        if self.interval_proved is None:
+            reasons["interval_proved"] = NO_PROVED_INTERVAL
         if self.theta is None:
             reasons |= dict.fromkeys(("theta", "factor", "one_minus_factor", "verdict"), "no theta given")
         elif self.factor is None:
@@ -82,5 +88,6 @@ class SharpBounds:
         for name in self.__dataclass_fields__:
             value = getattr(self, name)
             result[name] = value.to_dict() if isinstance(value, Number) else value
-        result["interval"] = None if self.interval is None else list(self.interval)
+        for name in ("interval", "interval_proved"):
+            result[name] = None if result[name] is None else list(result[name])
         return {**result, "reason": self.reason}

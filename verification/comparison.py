@@ -187,6 +187,7 @@ def compare(
     theta: Any = None,
     solver: Solver = "auto",
     exact: bool = False,
+    verified: bool = False,
     watch: Callable[[Iterate], None] = lambda state: None,
     progress: Progress = silent,
     listener: Listener | None = None,
@@ -205,6 +206,9 @@ def compare(
         Who takes step II.
     exact : bool
         Bring the semidefinite bound to within 0.1 % of a factor that occurs, however many programs that takes.
+    verified : bool
+        Prove bounds of the constants for the exact data of the problem, of what follows from them, and the factor that
+        one semidefinite program gives (with python-flint).  What could not be proved keeps the level ``float``.
     watch : callable
         Called with every iterate.
     progress : callable
@@ -235,7 +239,7 @@ def compare(
     """
     pair, listener = pair_of(problem), listener or Listener()
     check_memory(pair)  # nothing is told of a run that would be refused
-    measured = measure(pair, progress=progress)
+    measured = measure(pair, verified=verified, progress=progress)
     choice, subject = begin(pair, theta, None, measured)[1], Subject.of(pair, measured, exact=exact)
     results = {
         name: bound.evaluate(subject, choice.theta) if bound.calculated else bound.absent(INTERRUPTED)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from decimal import ROUND_CEILING, Context, Decimal
 from typing import Literal
 
 from verification.algorithm.rates import StepRatio
@@ -26,7 +27,7 @@ class Judgement:
     reason: str
 
 
-def judge(bound: float | None, seen: StepRatio | None, why_none: str) -> Judgement:
+def judge(bound: float | None, seen: StepRatio | None, why_none: str, *, proved: bool = False) -> Judgement:
     """Hold a bound on the factor of one step against the largest factor seen.
 
     A bound may be attained: what lies above it by less than :data:`TIGHT` of ``1 - bound`` is not told from it.
@@ -37,6 +38,8 @@ def judge(bound: float | None, seen: StepRatio | None, why_none: str) -> Judgeme
         None: the bound draws no conclusion; ``why_none`` says why.
     seen : StepRatio or None
         None: no step stands clear of rounding.
+    proved : bool
+        Whether the bound is the upper end of an enclosure; then it is told as proved, and rounded upwards.
 
     Examples
     --------
@@ -50,7 +53,10 @@ def judge(bound: float | None, seen: StepRatio | None, why_none: str) -> Judgeme
     if seen.steps == 0:
         return Judgement(verdict="NOT_COMPUTED", reason="no step was taken")
     digits = 4 if seen.hi <= bound else 6  # six where the bound is attained or violated
-    says = f"ratios <= {seen.value:.{digits}g} in {seen.steps} steps, bound {bound:.{digits}g}"
+    shown = f"bound {bound:.{digits}g}"
+    if proved:
+        shown = f"proved bound {Context(digits, ROUND_CEILING).create_decimal(Decimal(bound)):.{digits}g}"
+    says = f"ratios <= {seen.value:.{digits}g} in {seen.steps} steps, {shown}"
     if seen.hi <= bound:
         return Judgement(verdict="CONSISTENT", reason=says)
     slack = TIGHT * (1 - bound)
@@ -84,4 +90,9 @@ def judge_bound(result: BoundResult, seen: StepRatio | None, outside: str) -> Ju
         return Judgement(verdict="HYPOTHESES_NOT_MET", reason=outside)
     if result.not_computed:
         return Judgement(verdict="NOT_COMPUTED", reason=result.not_computed)
-    return judge(None if result.factor is None else result.factor.value, seen, result.why)
+    factor = result.factor
+    if factor is None:
+        return judge(None, seen, result.why)
+    if factor.hi is None or not result.proved:
+        return judge(factor.value, seen, result.why)
+    return judge(factor.hi, seen, result.why, proved=True)

@@ -1,9 +1,12 @@
-"""`ndtheory constants --verified`: what the screen shows lies outside what was proved, and the document keeps it."""
+"""`constants --verified`, `compare --verified`: screens show ends outside what was proved, and documents keep it."""
 
+import re
 from fractions import Fraction as F
 
+import pytest
+
 from ndtheory import Number
-from verification.cli.console import between
+from verification.cli.levels import between
 from verification.constants import ENERGY_NAMES, NAMES
 
 
@@ -37,3 +40,44 @@ def test_an_end_is_rounded_away_from_the_number_in_every_digit():
         assert F(high) >= F(2 / 3)
         assert F(high) - F(2 / 3) < F(10) ** -digits
     assert between(Number.of_float(1.0)) == between(None) == ("-", "-")
+
+
+# --- compare --verified -----------------------------------------------------------------------------------------------
+
+
+def numbers_of(line):
+    """The numbers of a line that have the mark of level verified."""
+    return [F(text) for text in re.findall(r"([0-9.]+(?:[eE][+-]?\d+)?) v", line)]
+
+
+def test_compare_shows_proved_ends_with_their_mark_and_its_legend(call, write):
+    file = write()
+    document = call("compare", file, "--verified", "--json").document
+    screen = call("compare", file, "--verified").out
+    lines = screen.splitlines()
+    assert max(map(len, lines[:-1])) <= 80
+    assert "v (verified): proved for the exact data" in " ".join(screen.split())
+    row = lambda name: next(line for line in lines if line.startswith(f"  {name} ") and " contracts v" in line)
+    sharp, lmi = document["sharp"], document["lmi"]
+    every, some, factor = numbers_of(row("sharp"))
+    assert every <= F(sharp["friction_threshold"]["lo"])
+    assert some <= F(sharp["friction_limit"]["lo"])
+    assert factor >= F(sharp["factor"]["hi"])
+    assert numbers_of(row("lmi")) == [pytest.approx(lmi["lipschitz"]["hi"], abs=1e-3)]
+    assert numbers_of(row("lmi"))[0] >= F(lmi["lipschitz"]["hi"])
+    assert document["lmi"]["certified"]
+    rows = {line.split()[0]: line.split() for line in lines if line.startswith("  ") and "verified" in line.split()}
+    for name in ("m", "M", "C_R", "rho_max"):
+        assert F(rows[name][2]) <= F(document["constants"][name]["lo"])
+
+
+def test_compare_without_the_word_has_no_marks(call, write):
+    screen = call("compare", write()).out
+    assert " v " not in screen
+    assert "verified" not in screen
+
+
+def test_what_is_not_certified_is_told_on_the_screen(call, write, monkeypatch):
+    monkeypatch.setattr("verification.certificate.contraction.find_spec", lambda name: None)
+    screen = " ".join(call("compare", write(), "--verified").out.split())
+    assert "lmi is not proved: python-flint is not installed" in screen

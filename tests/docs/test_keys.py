@@ -243,7 +243,7 @@ def printed() -> Callable[[str], dict[str, Any]]:
 
 @pytest.fixture(scope="module")
 def compared(folder: Path, small: vf.Problem, printed: Callable[[str], dict[str, Any]]) -> dict[str, Any]:
-    return printed(f"compare {folder / 'small.toml'} -o {folder / 'results'}")
+    return printed(f"compare {folder / 'small.toml'} --verified -o {folder / 'results'}")
 
 
 def test_the_page_lists_every_key_of_every_document_and_no_other(documents, compared, printed, folder):

@@ -48,6 +48,10 @@ def verdict(*kinds):
         ([("symbolic", "printed", False), ("symbolic", "repaired", False)], "INCONCLUSIVE"),
         ([("symbolic", "step", False), ("symbolic", "repaired", None), ("reading", "repaired", True)], "INCONCLUSIVE"),
         ([("symbolic", "printed", None), ("symbolic", "step", True)], "INCONCLUSIVE"),
+        ([("verified", "printed", False)], "REFUTED"),
+        ([("verified", "printed", False), ("symbolic", "repaired", True)], "REPAIRED"),
+        ([("verified", "printed", True)], "NUMERICAL"),  # on one problem alone
+        ([("verified", "printed", True), ("reading", "printed", True)], "ASSUMED"),
         ([("discrete", "printed", None)], "INCONCLUSIVE"),
         ([("discrete", "printed", None), ("reading", "printed", True)], "INCONCLUSIVE"),
         ([("symbolic", "printed", True), ("discrete", "printed", None)], "PROVED"),

@@ -7,6 +7,7 @@ from fractions import Fraction as F
 import numpy as np
 import precise_oracle
 import pytest
+import scipy.sparse as sp
 from mpmath import mp
 
 import verification as vf
@@ -136,6 +137,39 @@ def test_factors_that_are_wrong_prove_nothing_that_is_false():
                     found += 1
                     assert side * (F(1, n + 1) - F(bound[0, 0])) > 0
     assert found > 50
+
+
+class Uncoupled(Elimination):
+    """An elimination that is wrong by ``off`` in the rows of the interface alone."""
+
+    off = 0.0
+
+    def factors(self, shift):
+        found = super().factors(shift)
+        if found is None:
+            return None
+        L, pivots, solve = found
+        wrong = L.copy() if isinstance(L, np.ndarray) else L.toarray()
+        wrong[self.interface] += self.off
+        return (wrong if isinstance(L, np.ndarray) else sp.csr_array(wrong)), pivots, solve
+
+
+@pytest.mark.parametrize("make", [np.array, sp.csc_array])
+@pytest.mark.parametrize("coupling", [0.0, 0.5, -0.5])
+def test_factors_that_are_wrong_on_the_interface_alone_prove_nothing_that_is_false(make, coupling):
+    found = 0
+    matrix = Enclosed.exactly(make([[1.0, coupling], [coupling, 2.0]]))
+    truth = 2 - F(coupling) ** 2
+    for off in (1e-3, -1e-3, 1e-6, -1e-6):
+        for slack in (1e-7, 1e-4, 1e-2):
+            uncoupled = Uncoupled(matrix, np.array([1]), errors=np.full(2, slack))
+            uncoupled.off = off
+            for side in (1, -1):
+                bound = uncoupled.bound(side)
+                if bound is not None:
+                    found += 1
+                    assert side * (truth - F(bound[0, 0])) >= 0
+    assert found >= 8
 
 
 # --- what is not proved ---------------------------------------------------------------------------------------------

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ndtheory import Constants, EnergyConstants, Number
+from ndtheory.number import Level
 from verification.progress import Progress, silent
 
 if TYPE_CHECKING:
@@ -116,6 +117,8 @@ class BoundResult:
         No step changes the distance of two forces by more; None where there is no conclusion.
     interval : pair of float or None
         The thetas that contract.
+    interval_level : {'exact', 'verified', 'guaranteed', 'float'}
+        Of the interval: at any level but ``float`` each theta in it is proved to contract.
     friction : Thresholds
     why : str
         Why there is no factor.
@@ -131,10 +134,30 @@ class BoundResult:
     factor: Number | None = None
     one_minus_factor: Number | None = None
     interval: tuple[float, float] | None = None
+    interval_level: Level = "float"
     friction: Thresholds = field(default_factory=Thresholds)
     why: str = ""
     not_computed: str = ""
     detail: Any = None
+
+    @property
+    def level(self) -> Level:
+        """That of the factor; ``float`` where there is none."""
+        return "float" if self.factor is None else self.factor.level
+
+    @property
+    def marked(self) -> bool:
+        """Whether some number is more than one in doubles."""
+        numbers = (self.factor, self.friction.every, self.friction.some)
+        levels = [self.interval_level, *(number.level for number in numbers if number is not None)]
+        return any(level != "float" for level in levels)
+
+    def in_doubles(self) -> BoundResult:
+        """The same without enclosures: what an edition says whose own proof does not hold is not proved by them."""
+        plain = lambda number: None if number is None else Number.of_float(number.value)
+        friction = replace(self.friction, every=plain(self.friction.every), some=plain(self.friction.some))
+        factor, rest = plain(self.factor), plain(self.one_minus_factor)
+        return replace(self, factor=factor, one_minus_factor=rest, interval_level="float", friction=friction)
 
     def to_dict(self) -> dict[str, Any] | None:
         """The bound's own document; None where nothing was worked out."""

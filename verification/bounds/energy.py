@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ndtheory import evaluate_sharp
+from ndtheory.number import weakest
 from verification.bounds.bound import Bound, BoundResult, Subject, Thresholds, why_not
 from verification.progress import Progress, silent
 
@@ -34,7 +35,8 @@ class Sharp(Bound):
             theta=found.theta,
             factor=found.factor,
             one_minus_factor=found.one_minus_factor,
-            interval=found.interval,
+            interval=found.interval_proved or found.interval,
+            interval_level=weakest([subject.energy.level, "verified"]) if found.interval_proved else "float",
             friction=Thresholds() if friction.every is None and not without else friction,
             why=why,
             detail=found,

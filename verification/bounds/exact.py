@@ -58,6 +58,8 @@ class Enclosure:
     ----------
     upper : Certified
         What multipliers prove for every set of pieces.
+    whole : Certified
+        What those of one program prove for all pieces together.
     lower : float
         The largest ``|J|`` found.
     piece : Piece
@@ -69,6 +71,7 @@ class Enclosure:
     """
 
     upper: Certified
+    whole: Certified
     lower: float
     piece: Piece
     programs: int
@@ -162,7 +165,7 @@ def enclose(
                             best = max(best, search.climb(start), key=lambda found: found.value)
                 bounded[part.key] = leaf
                 heapq.heappush(leaves, (-leaf.upper.value, next(order), leaf))
-    return Enclosure(upper=worst.upper, lower=lower, piece=best.piece, programs=solved, why_apart=why)
+    return Enclosure(upper=worst.upper, whole=root.upper, lower=lower, piece=best.piece, programs=solved, why_apart=why)
 
 
 def _solved(forms: QuadraticForms, parent: Leaf, part: Pieces, theta: float, accuracy: float) -> Leaf:

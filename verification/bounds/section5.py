@@ -6,6 +6,7 @@ from typing import Any
 
 from ndtheory import PRINTED, REPAIRED, evaluate
 from ndtheory.bounds import Edition
+from ndtheory.number import weakest
 from verification.bounds.bound import Bound, BoundResult, Subject, Thresholds, why_not
 from verification.progress import Progress, silent
 
@@ -34,7 +35,8 @@ class Section5(Bound):
             theta=found.theta,
             factor=found.factor,
             one_minus_factor=found.one_minus_factor,
-            interval=found.interval,
+            interval=found.interval_proved or found.interval,
+            interval_level=weakest([subject.constants.level, "verified"]) if found.interval_proved else "float",
             friction=Thresholds(every=found.C4, some=found.C2, on="any" if found.C2 is None else found.threshold_on),
             why=why,
             detail=found,

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from ndtheory import Number
 from ndtheory.constants import relaxation_factor
+from ndtheory.number import above, below
 from verification.bounds.bound import LARGEST, Bound, BoundResult, NotComputed, Region, Subject, Thresholds
 from verification.progress import Progress, silent
 
 if TYPE_CHECKING:
+    from verification.bounds.multipliers import Certified
     from verification.constants import Measured
     from verification.interface.pair import ContactPair
 
@@ -44,6 +47,12 @@ class Semidefinite:
         empty where it did.
     no_threshold : str
         Why there is no friction threshold.
+    whole : Certified or None
+        What the multipliers of one program prove for all pieces of T together.
+    divided : Number or None
+        Where ``lipschitz`` is proved: the smaller one in doubles that dividing the pieces of T gives.
+    not_proved : str
+        Why ``lipschitz`` is not proved; empty where it is.
     """
 
     lipschitz: Number
@@ -54,6 +63,9 @@ class Semidefinite:
     friction_threshold: Number | None
     gave_up: str = ""
     no_threshold: str = "no law of friction"
+    whole: Certified | None = None
+    divided: Number | None = None
+    not_proved: str = NOT_CERTIFIED
 
     @property
     def factor(self) -> Number | None:
@@ -97,8 +109,36 @@ class Semidefinite:
             "gap": self.gap,
             "programs": self.programs,
             "certified": self.certified,
-            "reason": reason if self.certified else reason | {"certified": NOT_CERTIFIED},
+            **({} if self.divided is None else {"divided": self.divided.to_dict()}),
+            "reason": reason if self.certified else reason | {"certified": self.not_proved},
         }
+
+    def proved(self, pair: ContactPair, theta: Fraction, *, progress: Progress = silent) -> Semidefinite:
+        """The same with a Lipschitz constant that is proved for the rational data, or the reason why there is none.
+
+        The one that is proved is that of a single program: its multipliers hold for all pieces of T at once, and one
+        quadratic form decides.  What dividing the pieces gives beyond it stays in ``divided``.
+
+        Parameters
+        ----------
+        pair : ContactPair
+            Of which this is said.
+        theta : Fraction
+            At which it is.
+        progress : callable
+        """
+        from verification.certificate.contraction import NoCertificate, confirm  # it lists the bounds
+
+        assert self.whole is not None
+        try:
+            found = confirm(pair, theta, self.whole.value, self.whole.multipliers, progress=progress)
+        except NoCertificate as error:
+            return replace(self, not_proved=str(error))
+        most = above(found)
+        if not most < 1:
+            return replace(self, not_proved=f"1 - {float(1 - found):.3g} is proved, which no double tells from 1")
+        number = Number(value=min(self.whole.value, most), hi=most, level="verified")
+        return replace(self, lipschitz=number, divided=self.lipschitz, not_proved="")
 
 
 def work_out(
@@ -135,6 +175,7 @@ def work_out(
     found = enclose(pair, forms, theta, **asked, progress=progress)
     return Semidefinite(
         lipschitz=Number.of_float(found.upper.value),
+        whole=found.whole,
         lower=found.lower,
         programs=found.programs,
         why_apart=found.why_apart,
@@ -143,6 +184,14 @@ def work_out(
         gave_up=found.upper.gave_up,
         no_threshold=measured.why_no_threshold,
     )
+
+
+def _rest(factor: Number) -> Number:
+    """What a factor is below 1."""
+    if factor.hi is None:
+        return Number.of_float(1 - factor.value)
+    least = below(1 - Fraction(factor.hi))
+    return Number(value=max(1 - factor.value, least), lo=least, level=factor.level)
 
 
 class SemidefiniteBound(Bound):
@@ -160,18 +209,21 @@ class SemidefiniteBound(Bound):
             return self.absent(f"{subject.pair.contact.grid.n} contact nodes: worked out up to {LARGEST}")
         from verification.bounds.program import LMIError
 
-        theta = float(relaxation_factor(theta))
+        chosen = relaxation_factor(theta)
+        theta = float(chosen)
         try:
             found = work_out(subject.pair, subject.measured, theta, exact=subject.exact, progress=progress)
         except (LMIError, ValueError) as error:
             return self.absent(str(error))
+        if subject.measured.unverified is not None:  # proofs were asked for
+            found = found.proved(subject.pair, chosen, progress=progress)
         factor, allowed = found.factor, found.friction_threshold
         return BoundResult(
             name=self.name,
             proved=True,
             theta=theta,
             factor=factor,
-            one_minus_factor=None if factor is None else Number.of_float(1 - factor.value),
+            one_minus_factor=None if factor is None else _rest(factor),
             interval=None if found.theta_max is None else (0.0, found.theta_max.value),
             friction=Thresholds(
                 every=allowed, on="k" if allowed is not None or subject.measured.C_t1 is None else "any"

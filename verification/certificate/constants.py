@@ -72,7 +72,7 @@ def verify(measured: Measured, of: ContactPair | TwoBodies, *, progress: Progres
     if of.problem is None:
         return replace(measured, unverified=dict.fromkeys(_known(measured), FROM_MATRICES))
     with one_thread():
-        return _Proof(measured, of, progress).result()
+        return Proof(measured, of, progress).result()
 
 
 def _known(measured: Measured) -> list[str]:
@@ -92,8 +92,20 @@ def _join(ends: list[Ends], combine: Callable[[Any], float]) -> Ends:
     return low, high
 
 
-class _Proof:
-    """One problem whose constants are proved one after the other."""
+class Proof:
+    """One problem whose constants are proved one after the other.
+
+    Parameters
+    ----------
+    measured, of, progress
+        As for :func:`verify`; ``of.problem`` is not None.
+
+    Attributes
+    ----------
+    bodies : mapping from name to ExactBody
+    S, E : mapping from the name of a body to Between
+        Schur complements of its stiffness and of its Gram matrix on the interface, after :meth:`result`.
+    """
 
     def __init__(self, measured: Measured, of: ContactPair | TwoBodies, progress: Progress) -> None:
         self.measured, self.of, self.progress = measured, of, progress
@@ -194,23 +206,25 @@ class _Proof:
         found = elimination.bound(1), elimination.bound(-1)
         return None if found[0] is None or found[1] is None else _between(found[0], found[1])
 
-    def _largest(self, X: Between | None, Y: Between | None) -> Ends:
+    def largest(self, X: Between | None, Y: Between | None) -> Ends:
+        """Bounds of the largest eigenvalue of a pencil of two forms between others."""
         if X is None or Y is None:
             return NOTHING
         return enclose_largest((X[1], Y[0]), (X[0], Y[1]))
 
-    def _felt(self, X: Between | None, *, normal: bool = False) -> Between | None:
+    def felt(self, X: Between | None, *, normal: bool = False) -> Between | None:
+        """A form of the contact body on the Neumann grid."""
         return None if X is None else (self.joint.felt(X[0], normal=normal), self.joint.felt(X[1], normal=normal))
 
     def _of_rho(self) -> None:
-        carried, neumann = self._felt(self.S[self.contact]), self.S[self.neumann]
-        self._keep("rho_max", self._largest(carried, neumann))
+        carried, neumann = self.felt(self.S[self.contact]), self.S[self.neumann]
+        self._keep("rho_max", self.largest(carried, neumann))
         if self.pair.contact.grid.n < self.pair.neumann.grid.n:  # P has a kernel
             self.numbers["rho_min"] = ZERO
         elif not self.pair.contact.loose:
-            self._keep("rho_min", inverse(self._largest(neumann, carried)))
-        contact = self._felt(self._normal(self.S[self.contact], self.contact), normal=True)
-        self._keep("rho_normal", self._largest(contact, self._normal(neumann, self.neumann)))
+            self._keep("rho_min", inverse(self.largest(neumann, carried)))
+        contact = self.felt(self._normal(self.S[self.contact], self.contact), normal=True)
+        self._keep("rho_normal", self.largest(contact, self._normal(neumann, self.neumann)))
 
     def _count(self, name: Name) -> int:
         """Contact nodes of a body, which are the last of its interface components."""
@@ -227,13 +241,13 @@ class _Proof:
 
     def _of_traces(self) -> None:
         mass = self.joint.tangential_mass(self.tangential)
-        B = {self.contact: (mass, mass), self.neumann: self._felt((mass, mass))}
+        B = {self.contact: (mass, mass), self.neumann: self.felt((mass, mass))}
         for key, name in (("C_t1", self.contact), ("C_t2", self.neumann)):
-            self._keep(key, root(self._largest(B[name], self.S[name])))
-        self._keep("C_tr", root(_join([self._largest(B[name], self.E[name]) for name in self.bodies], max)))
+            self._keep(key, root(self.largest(B[name], self.S[name])))
+        self._keep("C_tr", root(_join([self.largest(B[name], self.E[name]) for name in self.bodies], max)))
         halves: dict[str, list[Ends]] = {name: [] for name in self.bodies}
         for a, b in self._fits():
-            halves[b].append(self._largest(self._in(self._slides(a), a, b), self.E[b]))
+            halves[b].append(self.largest(self._in(self._slides(a), a, b), self.E[b]))
         self._keep("C_tr_half", root(_join([_join(ends, min) for ends in halves.values()], max)))
 
     def _fits(self) -> list[tuple[Name, Name]]:
@@ -242,7 +256,7 @@ class _Proof:
         return [(a, b) for b in names for a in names if one_grid or a == b or b == self.neumann]
 
     def _in(self, X: Between | None, a: Name, b: Name) -> Between | None:
-        return X if a == b else self._felt(X)
+        return X if a == b else self.felt(X)
 
     def _slides(self, name: Name) -> Between | None:
         """``T' E T``: T keeps the tangential part."""
@@ -263,7 +277,7 @@ class _Proof:
             normal = np.arange(S[0].middle.shape[0])[-self._count(self.neumann) :]
             stress = [kernel.times(X.block(normal, normal)).times(kernel.T).symmetric() for X in S]
             inverse_weights = self.joint.inverse_weights
-            found = self._largest((stress[0], stress[1]), (inverse_weights, inverse_weights))
+            found = self.largest((stress[0], stress[1]), (inverse_weights, inverse_weights))
             self._keep("C_s_energy", root(found))
         self._keep("C_s", root(_join([self._stress(name, kernel) for name in self.bodies], max)))
 
@@ -272,22 +286,20 @@ class _Proof:
         S = self.S[name]
         if S is None:
             return NOTHING
-        gap = np.maximum(np.diag(S[1].middle) - np.diag(S[0].middle), 0.0) * (1 + 4 * UNIT)
-        radius = np.sqrt(np.outer(gap, gap)) * (1 + 8 * UNIT)
-        forces = Enclosed(middle=S[0].middle, radius=radius)
-        rows = np.arange(len(gap))[-self._count(name) :]
-        normal = forces.block(rows, np.arange(len(gap)))
+        forces = entries(S)
+        every = np.arange(len(forces.middle))
+        normal = forces.block(every[-self._count(name) :], every)
         if name == self.contact and self.joint.transfer is not None:
             normal = self.joint.transfer.T.times(normal)
         z = kernel.times(normal)
         square = z.T.times(self.joint.weights).times(z).symmetric()
-        return self._largest((square, square), self.E[name])
+        return self.largest((square, square), self.E[name])
 
     def _lifts(self) -> Ends:
-        forms = {name: self._lift(body) for name, body in self.bodies.items()}
-        return _join([self._largest(self._in(forms[a], a, b), self.E[b]) for a, b in self._fits()], max)
+        forms = {name: self.lift(body) for name, body in self.bodies.items()}
+        return _join([self.largest(self._in(forms[a], a, b), self.E[b]) for a, b in self._fits()], max)
 
-    def _lift(self, body: ExactBody) -> Between | None:
+    def lift(self, body: ExactBody) -> Between | None:
         """``R' H R`` with the elastic lift R."""
         own, A, H = body.body, body.stiffness, body.gram
         interface, inside = own.interface, np.setdiff1d(np.arange(A.middle.shape[0]), own.interface)
@@ -329,6 +341,13 @@ class _Proof:
 
 def _between(low: Floats, high: Floats) -> Between:
     return Enclosed.exactly(low), Enclosed.exactly(high)
+
+
+def entries(form: Between) -> Enclosed:
+    """A form between two others, entry by entry."""
+    low, high = (X.middle for X in form)
+    gap = np.maximum(np.diag(high) - np.diag(low), 0.0) * (1 + 4 * UNIT)
+    return Enclosed(middle=low, radius=np.sqrt(np.outer(gap, gap)) * (1 + 8 * UNIT))
 
 
 def _product(A: Enclosed, V: Floats) -> Enclosed:

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from decimal import ROUND_DOWN, ROUND_UP, Context, Decimal
 from fractions import Fraction
+from importlib.util import find_spec
 from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
@@ -21,8 +22,8 @@ from verification.algorithm.theta import choose
 from verification.bounds.bound import Subject
 from verification.bounds.program import LMIError, Weights
 from verification.bounds.table import BOUNDS
-from verification.certificate.exact_bodies import ExactInterface, exact_points
-from verification.constants import Measured, measure
+from verification.certificate.exact_bodies import ExactInterface, NotExact, exact_points
+from verification.constants import FROM_MATRICES, Measured, measure
 from verification.document import Document
 from verification.interface.assembly import build
 from verification.interface.body import Body
@@ -41,6 +42,8 @@ BITS = (320, 640, 1280)
 
 #: Digits of a multiplier and of a factor.
 DIGITS = 12
+
+NOT_CONFIRMED = "gives 1 - {:.3g} in doubles, which is not confirmed in rationals"
 
 
 class NoCertificate(RuntimeError):
@@ -182,8 +185,8 @@ def certify(
     >>> found.lower < found.factor < 1
     True
     """
-    from verification.certificate.check import check
-
+    if find_spec("flint") is None:
+        raise ModuleNotFoundError("python-flint is not installed", name="flint")
     refuse = lambda key, needed: ProblemError(problem.source, key, None, needed)
     if edition not in get_args(Edition):
         raise ValueError(f"edition {edition!r}: needed one of {', '.join(get_args(Edition))}")
@@ -198,19 +201,67 @@ def certify(
     progress(f"{BOUNDS[edition].words} proposes multipliers", None)
     spare, multipliers, lower = _proposed(pair, measured, chosen, edition)
     discrete = describe(problem, pair)
+    claim = _confirmed(discrete, chosen, spare, multipliers, progress)
+    if claim is None:
+        raise NoCertificate(f"{BOUNDS[edition].words} {NOT_CONFIRMED.format(spare)}")
+    return Certificate(edition=edition, discrete=discrete, claim=claim, problem=problem, lower=lower)
+
+
+def confirm(
+    pair: ContactPair, theta: Fraction, factor: float, multipliers: Weights, *, progress: Progress = silent
+) -> Fraction:
+    """A factor of one step that multipliers prove for the rational data of a problem, as a certificate would.
+
+    Parameters
+    ----------
+    pair, theta, progress
+        As for :func:`certify`.
+    factor : float
+        What the multipliers prove in doubles; the result is larger by a small share of what it is below 1.
+    multipliers : tuple of arrays
+        lambda, tau, a, b by node; lambda alone without friction.
+
+    Raises
+    ------
+    NoCertificate
+    """
+    if find_spec("flint") is None:
+        raise NoCertificate("python-flint is not installed: needed the extra `certify`")
+    if pair.problem is None:
+        raise NoCertificate(FROM_MATRICES)
+    if pair.problem.dimension != 2:
+        raise NoCertificate("needed a plane problem: in 1D rho is a ratio of exact numbers")
+    if pair.outside:
+        raise NoCertificate(f"outside the theorem: {pair.outside[0]}")
+    if not factor < 1:
+        raise NoCertificate(f"the factor of one program is {factor:.4g}, which is no contraction")
+    try:
+        discrete = describe(pair.problem, pair)
+    except NotExact as error:
+        raise NoCertificate(str(error)) from None
+    claim = _confirmed(discrete, theta, 1 - factor, _written(multipliers), progress)
+    if claim is None:
+        raise NoCertificate(f"the factor of one program {NOT_CONFIRMED.format(1 - factor)}")
+    return Fraction(claim["factor"])
+
+
+def _confirmed(
+    discrete: dict[str, Any], theta: Fraction, spare: float, multipliers: dict[str, Any], progress: Progress
+) -> dict[str, Any] | None:
+    """A claim that the checker accepts, its factor below 1 by nearly ``spare``; None where it accepts none."""
+    from verification.certificate.check import check
+
     for margin in MARGINS:
         wanted = 1 - _decimal(spare * (1 - margin), ROUND_DOWN)
         for bits in BITS:
-            claim = {"theta": str(chosen), "factor": str(wanted), "bits": bits, "multipliers": multipliers}
+            claim = {"theta": str(theta), "factor": str(wanted), "bits": bits, "multipliers": multipliers}
             progress(f"checking the factor {float(wanted):.10g} in balls of {bits} bits", None)
             try:
                 check(discrete, claim)
             except (ValueError, ZeroDivisionError):
                 continue
-            return Certificate(edition=edition, discrete=discrete, claim=claim, problem=problem, lower=lower)
-    raise NoCertificate(
-        f"{BOUNDS[edition].words} gives 1 - {spare:.3g} in doubles, which is not confirmed in rationals"
-    )
+            return claim
+    return None
 
 
 def check_again(document: Any, problem: Problem | None = None) -> Checked:

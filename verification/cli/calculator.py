@@ -9,10 +9,12 @@ import click
 
 from ndtheory import Bounds, Constants, EnergyConstants, HypothesisError, SharpBounds, relaxation_factor
 from ndtheory.constants import take
+from ndtheory.number import Level
 from verification.bounds.bound import BoundResult, Subject, bounded
 from verification.bounds.section5 import Section5
 from verification.bounds.table import BOUNDS
-from verification.cli.console import factor, figures, heading, note, say, table
+from verification.cli.console import figures, heading, note, say, table
+from verification.cli.levels import LEGEND, at_least, factor, marked, rounded
 from verification.document import Document
 from verification.ledger.record import on_the_printed_proof
 
@@ -141,6 +143,7 @@ def bounds_table(rows: Sequence[BoundResult], unit: str) -> None:
     unit : str
         "MPa", or what the unit of stress is that of.
     """
+    rows = [row if row.proved else row.in_doubles() for row in rows]
     friction, theta = bounded(rows), rows[0].theta
     end = [] if theta is None else [f"theta = {theta:.4g}"]
     lines = [
@@ -148,10 +151,10 @@ def bounds_table(rows: Sequence[BoundResult], unit: str) -> None:
         ["bound", f"theta {friction} <", f"theta {friction} <", "theta allowed", "factor", *end],
     ]
     for row in rows:
-        interval = "-" if row.interval is None else f"({row.interval[0]:.3g}, {figures(row.interval[1])})"
+        interval = "-" if row.interval is None else marked(_ends(*row.interval, row.interval_level), row.interval_level)
         line = [row.name, *_allowed(row), interval, factor(row.factor, row.one_minus_factor)]
         if theta is not None:
-            line.append("contracts" if row.factor is not None else "no conclusion")
+            line.append("no conclusion" if row.factor is None else marked("contracts", row.level))
         lines.append(line)
     table(lines, heads=2)
     notes = [f"printed: with stresses in {unit}" for row in rows if row.name == "printed"]
@@ -159,6 +162,12 @@ def bounds_table(rows: Sequence[BoundResult], unit: str) -> None:
     notes += [f"lmi: {found.lower:.3f} occurs for some loads, {found.gap:.2%} less" for found in attained]
     if notes:
         note("; ".join(notes) if attained else f"{notes[0]}; in another unit its figures are others", "  ")
+    for found in attained:
+        if found.divided is not None:
+            doubles = figures(found.divided, 4)
+            note(f"lmi: proved is the factor of one program; dividing the pieces of T gives {doubles} in doubles", "  ")
+    if any(row.marked for row in rows):
+        note(LEGEND, "  ")
 
 
 def _allowed(row: BoundResult) -> list[str]:
@@ -167,7 +176,14 @@ def _allowed(row: BoundResult) -> list[str]:
     if friction.on == "any":
         return ["any", "any"]
     times = " x this" if friction.on == "multiple" else ""
-    return ["-" if value is None else figures(value) + times for value in (friction.every, friction.some)]
+    return ["-" if value is None else at_least(value) + times for value in (friction.every, friction.some)]
+
+
+def _ends(low: float, high: float, level: Level) -> str:
+    """An interval, its ends rounded inward where each theta in it is proved to contract."""
+    if level == "float":
+        return f"({low:.3g}, {figures(high)})"
+    return f"({rounded(low, 3, up=True)}, {rounded(high, 3, up=False)})"
 
 
 def _screen(constants: Constants | None, results: Mapping[str, BoundResult]) -> None:

@@ -10,7 +10,6 @@ import sys
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from typing import TYPE_CHECKING, Any, Literal, TextIO
 
 import click
@@ -311,19 +310,6 @@ def figures(value: float | Number | None, digits: int = 3) -> str:
     return f"{number:#.{digits}g}".rstrip(".")
 
 
-def between(number: Number | None, digits: int = 12) -> tuple[str, str]:
-    """The ends of an enclosure, each rounded away from the number; a dash where there is none.
-
-    >>> between(Number(value=1 / 3, lo=0.333, hi=1 / 3, level="verified"), 4)
-    ('0.3330', '0.3334')
-    """
-    ends = (None, None) if number is None else (number.lo, number.hi)
-    away = (Context(prec=digits, rounding=ROUND_FLOOR), Context(prec=digits, rounding=ROUND_CEILING))
-    shown = (None if x is None else c.create_decimal(Decimal(x)) for x, c in zip(ends, away, strict=True))
-    low, high = ("-" if x is None else "0" if not x else f"{x:.{digits}g}" for x in shown)
-    return low, high
-
-
 def near_one(value: float) -> str:
     """A rate; near 1 as its distance from 1.
 
@@ -331,17 +317,6 @@ def near_one(value: float) -> str:
     ('0.3071', '1 - 1.5e-05')
     """
     return f"1 - {1 - value:.2g}" if 0 < 1 - value < 1e-3 else f"{value:.4g}"
-
-
-def factor(value: Number | None, one_minus: Number | None) -> str:
-    """A contraction factor; near 1 as its distance from 1.
-
-    >>> factor(Number.of_float(1 - 2e-11), Number.of_float(2e-11))
-    '1 - 2.0e-11'
-    """
-    if value is None or one_minus is None:
-        return "-"
-    return f"1 - {one_minus.value:.1e}" if one_minus.value < 1e-3 else figures(value)
 
 
 @contextlib.contextmanager

@@ -270,9 +270,12 @@ def solve(file: Path, keys: dict[str, str], folder: Path | None, as_json: bool) 
 @SWAP
 @SOLVER
 @click.option("--exact", is_flag=True, help="Bring the semidefinite bound within 0.1 % of a factor that occurs.")
+@click.option("--verified", is_flag=True, help="Prove constants and bounds, for the exact data of FILE on its mesh.")
 @FOLDER
 @JSON
-def compare(file: Path, solver: Any, exact: bool, folder: Path | None, as_json: bool, **changes: Any) -> int:
+def compare(
+    file: Path, solver: Any, exact: bool, verified: bool, folder: Path | None, as_json: bool, **changes: Any
+) -> int:
     """Constants, bounds, a run, and one verdict for each bound.
 
     Exit 1 where a proved bound is violated or the run stalls or diverges, 3 where rounding hides the answer.  Reaching
@@ -282,9 +285,10 @@ def compare(file: Path, solver: Any, exact: bool, folder: Path | None, as_json: 
     Example:
       ndtheory compare my.toml -o results
       ndtheory compare my.toml --set contact.friction=0.4
+      ndtheory compare my.toml --verified
     """
     problem = load_problem(file, **changes)
-    return _compare(problem, Typed(file=file, **changes), folder, solver, as_json, exact=exact)
+    return _compare(problem, Typed(file=file, **changes), folder, solver, as_json, exact=exact, verified=verified)
 
 
 @click.command()
@@ -317,9 +321,7 @@ def demo(folder: Path, as_json: bool) -> int:
     return status
 
 
-def _compare(
-    problem: Problem, typed: Typed, folder: Path | None, solver: Any, as_json: bool, *, exact: bool = False
-) -> int:
+def _compare(problem: Problem, typed: Typed, folder: Path | None, solver: Any, as_json: bool, **asked: bool) -> int:
     from verification import comparison as verdicts
     from verification.cli import screens
     from verification.interface.assembly import build
@@ -330,7 +332,7 @@ def _compare(
     _warn(pair.warnings)
     parts = None if as_json else screens.Parts(pair, needed=target is not None)
     with stages() as tell, progress(tell, problem.iteration.tolerance) as watch:
-        comparison = verdicts.compare(pair, solver=solver, exact=exact, watch=watch, progress=tell, listener=parts)
+        comparison = verdicts.compare(pair, solver=solver, watch=watch, progress=tell, listener=parts, **asked)
     _warn(comparison.run.choice.warnings)
     write = None if target is None else lambda: target.write_comparison(comparison)
     deliver(comparison, lambda: screens.verdicts(comparison, typed), as_json, write, folder)

@@ -14,7 +14,8 @@ from verification.bounds.bound import BoundResult
 from verification.bounds.losses import Losses
 from verification.bounds.region import MOST_STEPS, Plane
 from verification.cli.calculator import bounds_table
-from verification.cli.console import between, figures, heading, near_one, note, part, printable, say, table
+from verification.cli.console import figures, heading, near_one, note, part, printable, say, table
+from verification.cli.levels import between
 from verification.cli.typed import Typed
 from verification.comparison import Comparison, Listener
 from verification.constants import ENERGY_NAMES, NAMES, Measured
@@ -25,6 +26,9 @@ from verification.interface.interface import Interface
 from verification.interface.pair import ContactPair
 from verification.monolithic import Solution
 from verification.problem.specification import Problem
+
+#: The constants that ``compare`` shows.
+COMPARED = ("m", "M", "C_R", "C_s", "C_tr", "C_K", "rho_max")
 
 
 def _setting(problem: Problem, nodes: int | None = None, interface: int | None = None) -> None:
@@ -86,15 +90,17 @@ def constants(measured: Measured, typed: Typed | None = None) -> None:
         typed.suggest("advise" if measured.interface_nodes > assembly.MOST_CONTACT_NODES else "compare")
 
 
-def _between_bounds(measured: Measured, units: Mapping[str, str]) -> None:
-    """The constants with the bounds that are proved of them, and why there are none."""
+def _between_bounds(
+    measured: Measured, units: Mapping[str, str], names: Sequence[str] = (*NAMES, *ENERGY_NAMES)
+) -> None:
+    """Constants with the bounds that are proved of them, and why there are none."""
     rows = [[f"{measured.nodes} nodes", "about", "at least", "at most", "level", "unit"]]
-    for name in (*NAMES, *ENERGY_NAMES):
+    for name in names:
         number = getattr(measured, name)
         level = "" if number is None else number.level
         rows.append([name, figures(number, 4), *between(number), level, units.get(name, "")])
     table(rows, right=(1, 2, 3))
-    why = measured.unverified or {}
+    why = {name: reason for name, reason in (measured.unverified or {}).items() if name in names}
     for reason in dict.fromkeys(why.values()):
         note(f"not proved, {', '.join(name for name in why if why[name] == reason)}: {reason}", "  ")
 
@@ -211,17 +217,19 @@ class Parts(Listener):
     """
 
     def __init__(self, pair: ContactPair, *, needed: bool = False) -> None:
-        self.pair, self.needed = pair, needed
+        self.pair, self.needed, self.verified = pair, needed, False
 
     def constants(self, measured: Measured, choice: Choice) -> None:
         assert self.pair.problem is not None  # see `show`
         stress = self.pair.units["stress"]
-        m, M, C_R, C_s, C_tr, C_K, rho = (
-            figures(getattr(measured, name), 4) for name in ("m", "M", "C_R", "C_s", "C_tr", "C_K", "rho_max")
-        )
+        m, M, C_R, C_s, C_tr, C_K, rho = (figures(getattr(measured, name), 4) for name in COMPARED)
+        self.verified = measured.unverified is not None
         with part(needed=self.needed):
             _setting(self.pair.problem.with_theta(choice.theta), measured.nodes, measured.interface_nodes)
             heading("HOW LARGE ARE THE CONSTANTS?")
+            if measured.unverified is not None:
+                _between_bounds(measured, {"m": stress, "M": stress, "C_K": stress}, COMPARED)
+                return
             say(f"  m = {m} {stress}, M = {M} {stress}, C_R = {C_R}")
             say(f"  C_s = {C_s}, C_tr = {C_tr}, C_K = {C_K} {stress}, rho = {rho}")
 
@@ -271,6 +279,8 @@ class Parts(Listener):
             for result in results:
                 if result.detail is None:
                     note(f"{result.name}: {result.not_computed}", "  ")
+                elif self.verified and not result.detail.certified:
+                    note(f"{result.name} is not proved: {result.detail.not_proved}", "  ")
 
 
 def comparison(result: Comparison) -> None:

@@ -9,11 +9,11 @@ from typing import Any, Literal
 from verification.threads import one_thread
 
 Level = Literal["quick", "full"]
-Method = Literal["symbolic", "dimension", "discrete", "reading"]
+Method = Literal["symbolic", "dimension", "verified", "discrete", "reading"]
 Verdict = Literal["PROVED", "REPAIRED", "REFUTED", "NUMERICAL", "ASSUMED", "INCONCLUSIVE"]
 
 #: Strongest first.
-METHODS: tuple[Method, ...] = ("symbolic", "dimension", "discrete", "reading")
+METHODS: tuple[Method, ...] = ("symbolic", "dimension", "verified", "discrete", "reading")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,9 +22,10 @@ class Evidence:
 
     Attributes
     ----------
-    method : {'symbolic', 'dimension', 'discrete', 'reading'}
-        Exact arithmetic over all admissible values, or an exact counterexample; units on both sides; floating point on
-        random problems; a definition, a cited result, a proof in words or one case computed exactly.
+    method : {'symbolic', 'dimension', 'verified', 'discrete', 'reading'}
+        Exact arithmetic over all admissible values, or an exact counterexample; units on both sides; proved enclosures
+        of both sides on one problem; floating point on random problems; a definition, a cited result, a proof in words
+        or one case computed exactly.
     of : {'printed', 'step', 'repaired'}
         What was checked: the statement as printed, the step by which the paper reaches it, or its repaired form.
     holds : bool or None
@@ -80,7 +81,8 @@ def settle(evidence: Sequence[Evidence]) -> tuple[Verdict, Method | None]:
     A printed form or a step that fails makes the statement REPAIRED where a repaired form is proved in exact
     arithmetic or by reading, else REFUTED.  Units decide nothing: in one fixed unit of stress numbers may be added, and
     sides of one unit may still differ.  What exact arithmetic leaves undecided stays INCONCLUSIVE, and a repaired form
-    that fails is a fault of ours.  Floating point proves nothing: at best a statement is NUMERICAL.  Nor does it add
+    that fails is a fault of ours.  Enclosures on one problem prove that a statement fails, but not that it holds on
+    others; floating point proves nothing: at best a statement is NUMERICAL.  Nor does it add
     anything to a definition or to a theorem of others, which stay ASSUMED on however many problems they were seen.
 
     Examples
@@ -103,5 +105,10 @@ def settle(evidence: Sequence[Evidence]) -> tuple[Verdict, Method | None]:
     stands = {e.method for e in ordered if e.holds}
     if differ or (undecided and "symbolic" not in stands):
         return "INCONCLUSIVE", (*differ, *undecided)[0].method
-    verdicts: dict[Method, Verdict] = {"symbolic": "PROVED", "reading": "ASSUMED", "discrete": "NUMERICAL"}
+    verdicts: dict[Method, Verdict] = {
+        "symbolic": "PROVED",
+        "reading": "ASSUMED",
+        "verified": "NUMERICAL",
+        "discrete": "NUMERICAL",
+    }
     return next(((verdict, method) for method, verdict in verdicts.items() if method in stands), ("INCONCLUSIVE", None))

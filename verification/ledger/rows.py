@@ -163,6 +163,7 @@ Source = Callable[[Collection[str], Level, Callable[[float], None]], Mapping[str
 
 def sources() -> dict[str, Source]:
     """What gathers evidence, by the name that a watcher is told."""
+    from verification.ledger.enclosures import enclosed
     from verification.ledger.experiments import experiments
     from verification.ledger.large_friction import large_friction
     from verification.ledger.solutions import solutions
@@ -171,6 +172,7 @@ def sources() -> dict[str, Source]:
     return {
         "exact arithmetic and units": exact,
         "inequalities on random problems": discrete,
+        "inequalities with enclosures": enclosed,
         "large friction": large_friction,
         "solutions": solutions,
         "experiments of Section 6": experiments,

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
-from verification.ledger.evidence import Evidence
+from verification.ledger.evidence import Evidence, Method
 from verification.ledger.rows import Ledger, Row
 
 #: By this our files are known (:mod:`verification.output.folder`).
@@ -37,6 +37,19 @@ WORDS = {
 }
 
 
+#: Kinds of evidence: at which level their numbers are, and what they are.
+METHODS: Mapping[Method, tuple[str, str]] = {
+    "symbolic": ("exact", "exact arithmetic for all admissible values, or an exact counterexample"),
+    "dimension": ("exact", "the units of both sides"),
+    "verified": (
+        "verified",
+        "both sides on one problem, each between proved bounds; what fails so is refuted by proof",
+    ),
+    "discrete": ("float", "both sides in floating point on many problems"),
+    "reading": ("-", "a definition, a result of others, a proof in words or one case computed exactly"),
+}
+
+
 def _section(id: str) -> str:
     for title, prefixes in SECTIONS:
         if any(id.startswith(prefix) for prefix in prefixes.split()):
@@ -58,6 +71,9 @@ def page(ledger: Ledger) -> str:
         *(f"| {verdict} | {count} | {WORDS[verdict]} |" for verdict, count in ledger.counts().items()),
         "",
     ]
+    lines += ["| kind of evidence | level | is |", "|---|---|---|"]
+    lines += [f"| {method} | {level} | {means} |" for method, (level, means) in METHODS.items()]
+    lines += ["", "A level says what is known of the numbers: the glossary explains all four.", ""]
     current = ""
     for row in ledger.rows:
         section = _section(row.statement.id)

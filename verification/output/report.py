@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 #: What the table below a heading of the screen shows.
 TABLES = {
+    "HOW LARGE ARE THE CONSTANTS?": "The constants of the theorem on this mesh, with the bounds proved of them.",
     "DOES ONE STEP CONTRACT?": "Each bound that follows from the constants: the friction k below which every small "
     "theta, and some theta, contracts; the theta allowed at the friction of this problem; by which factor one step of "
     "this run multiplies the error at most.",
@@ -57,6 +58,8 @@ GLOSSARY = {
     "sharp": "The same proof in energy norms.",
     "lmi": "The bound by semidefinite programs, from the conditions of contact and friction node by node. Its "
     "quadratic form is checked in floating point.",
+    "verified, v": "The level of a number: it is proved for the exact data on this mesh, with all rounding errors "
+    "bounded. A number without a mark was computed in doubles.",
     "factor": "The number by which a bound says that one step multiplies the error at most.",
     "rate": "The number by which one step multiplies the error in the long run, observed or predicted.",
     "ratio": "The quotient of two successive residuals of the run.",

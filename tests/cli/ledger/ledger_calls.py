@@ -12,7 +12,7 @@ from verification import ledger
 STATEMENTS = statements()
 
 VERDICTS = {"PROVED", "REPAIRED", "REFUTED", "NUMERICAL", "ASSUMED", "INCONCLUSIVE"}
-METHODS = {"symbolic", "dimension", "discrete", "reading"}
+METHODS = {"symbolic", "dimension", "verified", "discrete", "reading"}
 OF = {"printed", "step", "repaired"}
 KEYS = {"id", "label", "kind", "title", "verdict", "method", "evidence", "note"}
 WHOLE = {"ledger.json", "ledger.md", "errata.md", "verdicts.json"}

@@ -74,7 +74,7 @@ def test_every_piece_of_evidence_has_a_method_an_object_an_outcome_and_a_text(do
 
 
 def test_the_evidence_of_a_statement_comes_strongest_first_and_holds_what_decided(document):
-    order = ["symbolic", "dimension", "discrete", "reading"]
+    order = ["symbolic", "dimension", "verified", "discrete", "reading"]
     for s in document["statements"]:
         places = [order.index(e["method"]) for e in s["evidence"]]
         assert places == sorted(places)

@@ -1,0 +1,104 @@
+"""What the ledger decides with enclosures: what is refuted fails by proof, and doubles lie between the bounds."""
+
+import numpy as np
+import pytest
+
+from verification.ledger.cases import NAMED
+from verification.ledger.differences import along, uniform_piece
+from verification.ledger.enclosed_pairs import Bodies
+from verification.ledger.enclosures import LAYER, OF_BODIES, OF_PAIRS, PLATE, Constants, decide, enclosed
+from verification.ledger.inequalities import INEQUALITIES
+from verification.ledger.worst import Tally
+from verification.problem.specification import Problem
+
+REFUTED = [("4.7", "printed"), ("5.13", "printed"), ("5.30", "printed")]
+
+#: E is N where the lift of least energy is that of least norm too, and no enclosure tells equality.
+EQUAL = ("4.7", "repaired")
+
+#: Of one term on each side, so that doubles and enclosures form the same quotient.
+QUOTIENTS = [
+    ("5.11", "printed"), ("5.13", "printed"), ("5.13", "repaired"), ("prop-5.4", "printed"), ("5.18", "printed"),
+    ("5.19", "printed"), ("5.22", "printed"), ("5.23", "printed"), ("x-root-M", "printed"), ("5.30", "printed"),
+    ("5.30", "repaired"), ("x-reaction", "printed"), ("x-friction-energy", "printed"), ("5.14", "printed"),
+]  # fmt: skip
+
+ENTRY = {(inequality.id, inequality.of): inequality for inequality in INEQUALITIES}
+
+
+@pytest.fixture(scope="module")
+def found(shared):
+    return shared("enclosures", enclosed)
+
+
+@pytest.fixture(scope="module")
+def bodies():
+    return {name: Bodies(name) for name in (PLATE, LAYER)}
+
+
+def of(found, key):
+    return next((one for one in found.get(key[0], []) if one.of == key[1]), None)
+
+
+@pytest.mark.parametrize("key", REFUTED)
+def test_what_is_refuted_as_printed_is_refuted_by_proof(found, key):
+    evidence = of(found, key)
+    assert (evidence.method, evidence.holds) == ("verified", False)
+    low, high = evidence.data["ratio"]
+    assert 1 < low <= high
+    assert "between proved bounds" in evidence.text
+    named = {Problem.from_dict(table) for table in NAMED.values()}
+    assert Problem.from_dict(evidence.data["problem"]) in named
+
+
+@pytest.mark.parametrize("key", [*OF_BODIES, *OF_PAIRS], ids=" ".join)
+def test_everything_else_holds_by_proof(found, key):
+    if key == EQUAL:
+        assert of(found, key) is None
+    elif key not in REFUTED:
+        assert of(found, key).holds is True
+        assert of(found, key).data["ratio"][1] <= 1
+
+
+@pytest.mark.parametrize("key", [key for key in OF_BODIES if key != EQUAL], ids=" ".join)
+def test_the_ratio_of_two_bodies_in_doubles_lies_between_the_bounds(found, bodies, key):
+    evidence = of(found, key)
+    case = bodies[LAYER if key in REFUTED else PLATE].case
+    tally = Tally(inequality=ENTRY[key])
+    tally.take(case, [case])
+    squared = 1 if key[0].startswith("x-") else 2
+    low, high = evidence.data["ratio"]
+    assert low * (1 - 1e-9) <= tally.by_unit[1.0][0] ** squared <= high * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("key", QUOTIENTS, ids=" ".join)
+def test_the_ratio_of_a_pair_in_doubles_lies_between_the_bounds(found, bodies, key):
+    """Forces through the affine piece of T, where the enclosures solve with Schur complements."""
+    evidence, inequality = of(found, key), ENTRY[key]
+    one = bodies[LAYER if key == ("5.30", "printed") else PLATE]
+    case, setting = one.case, one.case.setting
+    piece = uniform_piece(case.pair, touching=False, sliding=1)
+    force = np.linalg.solve(setting.forms.inverse, one.slides.u)
+    pair = along(setting, piece, np.linalg.solve(setting.forms.root, force))
+    reading = inequality.reading(case.reading.in_unit(evidence.data.get("unit", 1.0)))
+    low, high = evidence.data["ratio"]
+    assert low * (1 - 1e-7) <= inequality.ratio(pair, reading) <= high * (1 + 1e-7)
+
+
+def test_where_the_enclosures_overlap_nothing_is_said(bodies, monkeypatch):
+    both = lambda d, r: (d.norm.square(), d.norm.square())
+    monkeypatch.setitem(OF_PAIRS, ("5.11", "printed"), both)
+    assert decide(bodies[PLATE], "5.11", "printed") is None
+
+
+def test_what_cannot_be_enclosed_is_not_decided(bodies, monkeypatch):
+    def fail(slides: object, reading: Constants) -> None:
+        raise ArithmeticError("made up")
+
+    monkeypatch.setitem(OF_PAIRS, ("5.11", "printed"), fail)
+    assert decide(bodies[PLATE], "5.11", "printed") is None
+
+
+def test_only_what_is_asked_for_is_decided():
+    assert set(enclosed(["5.30", "2.1"])) == {"5.30"}
+    assert enclosed([]) == {}
