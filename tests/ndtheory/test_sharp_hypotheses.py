@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from sharp_oracle import FIELDS, energies
 
 from ndtheory import EnergyConstants, HypothesisError, Number, evaluate_sharp
+from ndtheory.bounds import NO_PROVED_INTERVAL
 
 pytestmark = pytest.mark.usefixtures("many_digits")
 
@@ -73,7 +74,9 @@ def test_the_hypotheses_of_the_energy_constants_are_kept_with_equality(small):
 def test_what_is_null_has_a_reason_and_nothing_else_has_one(constants, theta):
     found = evaluate_sharp(EnergyConstants(**constants), theta)
     document = json.loads(json.dumps(found.to_dict()))
-    assert list(document) == [*FIELDS, "reason"] == [*(field.name for field in fields(found)), "reason"]
+    proved = [*FIELDS]
+    proved.insert(proved.index("interval") + 1, "interval_proved")  # of constants that have enclosures
+    assert list(document) == [*proved, "reason"] == [*(field.name for field in fields(found)), "reason"]
     assert {name for name, value in document.items() if value is None} == set(document["reason"])
     assert all(document["reason"].values())
 
@@ -91,7 +94,11 @@ def test_the_written_form_holds_the_numbers_themselves(constants, theta):
 
 
 def test_each_reason_says_what_is_missing():
-    reason = lambda theta=None, **given: evaluate_sharp(EnergyConstants(rho=1, **given), theta).reason
+    def reason(theta=None, **given):
+        found = dict(evaluate_sharp(EnergyConstants(rho=1, **given), theta).reason)
+        assert found.pop("interval_proved") == NO_PROVED_INTERVAL
+        return found
+
     none, outside = "no theta given", "theta outside the interval: no conclusion"
     still = dict.fromkeys(["friction_multiple", "friction_limit_multiple"], "no friction")
     assert reason() == {**still, **dict.fromkeys(["theta", "factor", "one_minus_factor", "verdict"], none)}

@@ -11,6 +11,7 @@ from ndtheory.constants import relaxation_factor
 from ndtheory.number import above, below
 from verification.bounds.bound import LARGEST, Bound, BoundResult, NotComputed, Region, Subject, Thresholds
 from verification.progress import Progress, silent
+from verification.value import freeze
 
 if TYPE_CHECKING:
     from verification.bounds.multipliers import Certified
@@ -162,6 +163,8 @@ def work_out(
     ValueError
         As :class:`verification.bounds.multipliers.QuadraticForms`.
     """
+    import numpy as np
+
     from verification.bounds.exact import CLOSE, GAP, budget, enclose
     from verification.bounds.multipliers import QuadraticForms, friction_threshold
 
@@ -175,7 +178,7 @@ def work_out(
     found = enclose(pair, forms, theta, **asked, progress=progress)
     return Semidefinite(
         lipschitz=Number.of_float(found.upper.value),
-        whole=found.whole,
+        whole=replace(found.whole, multipliers=freeze(tuple(map(np.array, found.whole.multipliers)))),
         lower=found.lower,
         programs=found.programs,
         why_apart=found.why_apart,
