@@ -50,6 +50,9 @@ napoleon_use_ivar = True
 autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented"
 autodoc_member_order = "bysource"
+# An attribute that a docstring lists is looked for by its bare name in all classes, of which two may have it.  Nothing
+# else warns under this name; references to what does not exist are found by the tests.
+suppress_warnings = ["ref.python"]
 
 # Viewed offline the site asks no other host: no web fonts, no intersphinx, and its own copy of the one MathJax file.
 MATHJAX = "tex-svg-full.js"
