@@ -11,6 +11,7 @@ from typing import Any
 
 from ndtheory.constants import take
 from ndtheory.energy import SMALLEST
+from ndtheory.number import below
 from ndtheory.sharp import predicted_rate, predicted_theta
 from verification.advice.ends import DEAR, SETTLED, Box, cheapest, common, of_ratio, of_stiffest, telling
 from verification.advice.from_runs import role_of_run
@@ -25,7 +26,6 @@ from verification.advice.readings import (
     NextRun,
     Observed,
     RunReading,
-    double_below,
     level,
     read_observed,
     read_plateau,
@@ -265,7 +265,7 @@ def _together(
             why = f"close to {float(best):.4g}, {why}, and known to converge"
         left = f"between {float(min(lo.value, hi.value)):.4g} and {float(rho):.4g}"
         says = f"the logs leave rho {left} if all of Gamma_c stays closed"
-        only = RunReading(kind="mode-high", value=float(rho), lo=double_below(lo.value), says=says)
+        only = RunReading(kind="mode-high", value=float(rho), lo=below(lo.value), says=says)
         following = NextRun(theta=rounded_down(min(best, base.theta)), why=why)
         return (only,), _fastest(falling, rho) or _robust(logs, following), rho
     if falling and (found := _by_ends(logs, base, None if lo is None else lo.value, tied)) is not None:
@@ -306,7 +306,7 @@ def _by_ends(
     theta, dear = cheapest(boxes, most if tied else float(base.theta))
     if dear <= DEAR:
         says = f"the logs together leave one reading: {_ends(boxes)}; rho is taken at its upper end"
-        only = RunReading(kind="mode-high", value=stiffest - 1, lo=None if lo is None else double_below(lo), says=says)
+        only = RunReading(kind="mode-high", value=stiffest - 1, lo=None if lo is None else below(lo), says=says)
         following = NextRun(theta=rounded_down(Fraction(theta)), why=_left(boxes, dear))
         return (only,), following, Fraction(stiffest) - 1
     rising = [float(log.theta) for log in logs if log.diverges]

@@ -11,8 +11,9 @@ from typing import Any, Literal, get_args
 from ndtheory import HypothesisError, Number
 from ndtheory.constants import take
 from ndtheory.moduli import Moduli, Plane, column, end, free_end, half_planes, layer, mirror
+from ndtheory.number import above, below
 from ndtheory.sharp import predicted_rate, predicted_theta
-from verification.advice.readings import LARGEST_TO_PASTE, NextRun, double_below, rounded_down
+from verification.advice.readings import LARGEST_TO_PASTE, NextRun, rounded_down
 from verification.advice.role import Role
 from verification.advice.roles import UNITS, Advice
 from verification.problem.writing import written_number
@@ -94,7 +95,7 @@ class Start:
 
     def to_dict(self) -> dict[str, Any]:
         """The object ``start``."""
-        s = -double_below(-self.s)  # not below the bound
+        s = above(self.s)  # not below the bound
         return {
             "s": Number(value=s, hi=s, level="exact").to_dict(),
             "theta_frictionless": self.theta_free,
@@ -337,8 +338,8 @@ def _larger(exact: Fraction, computed: float) -> Number:
     """A rational bound from below as a double that is one too, or the computed one where that is larger."""
     if computed > exact * (1 + Fraction(1, 10**12)):
         return Number.of_float(computed)
-    below = double_below(exact)
-    return Number(value=below, lo=below, level="exact")
+    bound = below(exact)
+    return Number(value=bound, lo=bound, level="exact")
 
 
 def _exactly(value: Fraction) -> Number:

@@ -8,6 +8,7 @@ from decimal import ROUND_DOWN, ROUND_UP, Context, Decimal
 from fractions import Fraction
 from typing import Any, Literal
 
+from ndtheory.number import below
 from ndtheory.sharp import predicted_theta
 
 #: The largest theta that is offered to paste.
@@ -189,7 +190,7 @@ def read_plateau(theta: Fraction, plateau: Observed) -> tuple[tuple[RunReading, 
             f"a tied run diverges, its relative residual at {_few(plateau.value)} = 1 + 1/rho: nothing opens or slides"
         )
         lo = max(1 / (plateau.most - 1), least)
-        found.append(RunReading(kind="plateau", value=float(rho), lo=double_below(lo), says=says))
+        found.append(RunReading(kind="plateau", value=float(rho), lo=below(lo), says=says))
         following = 2 / (rho + Fraction(7, 4))
         why = f"smaller; a ratio of {_few(following * (1 + rho) - 1)} there confirms plateau"
     found.append(level(theta))
@@ -206,7 +207,7 @@ def level(theta: Fraction, bounds: bool = True) -> RunReading:
         )
     else:
         says += ", or the solvers of both sides are no more accurate: this says nothing of rho"
-    return RunReading(kind="level", lo=double_below(least) if bounds else None, says=says)
+    return RunReading(kind="level", lo=below(least) if bounds else None, says=says)
 
 
 def _readings(theta: Fraction, ratio: Observed, value: Fraction) -> tuple[RunReading, ...]:
@@ -221,12 +222,12 @@ def _readings(theta: Fraction, ratio: Observed, value: Fraction) -> tuple[RunRea
         says = f"the stiffest mode changes its sign in every step: {proved}"
     else:
         says = f"the stiffest mode changes its sign in every step and is the slowest: {proved}"
-    found.append(RunReading(kind="mode-high", value=float(value), lo=double_below(high), says=says))
+    found.append(RunReading(kind="mode-high", value=float(value), lo=below(high), says=says))
     if ratio.least <= 1 - theta:
         low = max(low, Fraction(0))
         bound = f"without friction, or tied, rho is at least {_few(low)}"
         says = f"the softest mode keeps its sign and is the slowest: {bound}; {fastest}"
-        found.append(RunReading(kind="mode-low", lo=double_below(low), says=says))
+        found.append(RunReading(kind="mode-low", lo=below(low), says=says))
     sure = max(ratio.most - r, r - ratio.least)
     open_too = abs(r - (1 - theta)) <= SAME * min(theta, 1 - theta) + sure
     if open_too:
@@ -244,12 +245,6 @@ def spread(theta: Fraction) -> Fraction:
 
 def _few(value: Fraction) -> str:
     return f"{float(value):.4g}"
-
-
-def double_below(value: Fraction) -> float:
-    """The largest double that is not above a bound from below."""
-    near = float(value)
-    return near if Fraction(near) <= value else math.nextafter(near, -math.inf)
 
 
 def rounded_down(theta: Fraction) -> float:
