@@ -76,7 +76,8 @@ class Record:
     place : int
         Among the others on the page.
     title, ours, other : str
-        What is compared; the other side is a peer, the work at the core of ours, or a yardstick.
+        What is compared; the other side is a peer, the work at the core of ours, or a yardstick.  Empty where there is
+        none: then the rows have none, either.
     peer : str
         The other side in one or two words.
     apart : str
@@ -95,9 +96,9 @@ class Record:
     place: int
     title: str
     ours: str
-    other: str
-    peer: str
     rows: tuple[Row, ...]
+    other: str = ""
+    peer: str = ""
     apart: str = ""
     size: str = ""
     since: int = 0
@@ -166,12 +167,10 @@ def three(value: float | None) -> str:
 
 def table(record: Record) -> str:
     """The record for a terminal."""
-    lines = [
-        f"{record.title}: {record.quantity}",
-        f"  ours:  {record.ours}",
-        f"  other: {record.other}",
-        f"  {record.size:>26}  {'ours':>9}  {'other':>9}  {'ours/other':>10}  {'rounds':>6}  {'apart':>7}",
-    ]
+    lines = [f"{record.title}: {record.quantity}", f"  ours:  {record.ours}"]
+    if record.other:
+        lines.append(f"  other: {record.other}")
+    lines.append(f"  {record.size:>26}  {'ours':>9}  {'other':>9}  {'ours/other':>10}  {'rounds':>6}  {'apart':>7}")
     for r in record.rows:
         size, apart = "" if r.size is None else f"{r.size:,}", "" if r.apart is None else f"{r.apart:.0e}"
         sides = f"{shown(r.ours, record.unit):>9}  {shown(r.other, record.unit):>9}"

@@ -108,18 +108,22 @@ def measured_on(record: dict[str, Any]) -> str:
 
 
 def section(record: dict[str, Any]) -> Iterator[str]:
-    """One comparison: what, its table, the growth, what was wanted."""
-    rows, unit = record["rows"], record["unit"]
+    """One comparison: what, its table, the growth, what was wanted; without another side, ours alone."""
+    rows, unit, peer = record["rows"], record["unit"], record["peer"]
     sized, compared = any(row["size"] is not None for row in rows), any(row["apart"] is not None for row in rows)
     yield from (f"## {record['title']}", "")
     yield f"- *ours*: {record['ours']}."
-    yield f"- *{record['peer']}*: {record['other']}."
+    if peer:
+        yield f"- *{peer}*: {record['other']}."
     yield from (f"- Measured is the {record['quantity']}." if record["quantity"] != "CPU time" else "", "")
-    head = [record["size"]] * sized + ["ours", record["peer"], "ours / other", "rounds"] + ["apart"] * compared
+    against = [peer, "ours / other"] if peer else []
+    head = [record["size"]] * sized + ["ours", *against, "rounds"] + ["apart"] * compared
     yield from (line(head), line(["--:"] * len(head)))
     for row in rows:
         cells = [f"{row['size']:,}"] if sized else []
-        cells += [shown(row["ours"], unit), shown(row["other"], unit), three(row["ratio"]), str(row["rounds"])]
+        cells.append(shown(row["ours"], unit))
+        cells += [shown(row["other"], unit), three(row["ratio"])] if peer else []
+        cells.append(str(row["rounds"]))
         cells += ["-" if row["apart"] is None else f"{row['apart']:.0e}"] * compared
         yield line(cell.translate(UNBROKEN) for cell in cells)
     yield ""

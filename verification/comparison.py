@@ -231,10 +231,9 @@ def compare(
 
     Examples
     --------
-    >>> bars = {"dimension": 1,
-    ...     "body1": {"shape": "interval", "x": [0, 1], "cells": 2, "young": 1, "fixed": ["left"]},
-    ...     "body2": {"shape": "interval", "x": [1, 2], "cells": 2, "young": 3, "prescribed": {"right": -0.1}}}
-    >>> compare(Problem.from_dict(bars)).verdicts["sharp"].verdict
+    >>> from verification.problem.examples import example
+    >>> bars = example("two-bars").changed(young=(1, 3))
+    >>> compare(bars).verdicts["sharp"].verdict
     'CONSISTENT'
     """
     pair, listener = pair_of(problem), listener or Listener()

@@ -273,10 +273,9 @@ def measure(
 
     Examples
     --------
-    >>> bars = {"dimension": 1,
-    ...     "body1": {"shape": "interval", "x": [0, 1], "cells": 8, "young": 3, "fixed": ["left"]},
-    ...     "body2": {"shape": "interval", "x": [1, 2], "cells": 8, "young": 2, "fixed": ["right"]}}
-    >>> round(measure(Problem.from_dict(bars)).rho_max.value, 12)
+    >>> from verification.problem.examples import example
+    >>> bars = example("two-bars").changed(young=(3, 2))
+    >>> round(measure(bars).rho_max.value, 12)
     1.5
     """
     pair = pair_or_bodies(problem)

@@ -136,10 +136,8 @@ def solve(problem: Problem | TwoBodies | ContactPair | Path | str) -> Solution:
 
     Examples
     --------
-    >>> bars = {"dimension": 1,
-    ...     "body1": {"shape": "interval", "x": [0, 1], "cells": 4, "young": 3, "fixed": ["left"]},
-    ...     "body2": {"shape": "interval", "x": [1, 2], "cells": 4, "young": 1, "prescribed": {"right": -0.1}}}
-    >>> round(float(solve(Problem.from_dict(bars)).contact.pressure[0]), 12)
+    >>> from verification.problem.examples import example
+    >>> round(float(solve(example("two-bars")).contact.pressure[0]), 12)
     0.075
     """
     bodies = _bodies(problem)

@@ -32,7 +32,7 @@ from verification.interface.assembly import TooManyContactNodes, held_bodies
 from verification.interface.body import Body
 from verification.interface.build import pair_of
 from verification.interface.pair import ContactPair, TwoBodies
-from verification.problem import Problem, load
+from verification.problem import Problem, ProblemError, load
 from verification.progress import Progress, silent
 from verification.threads import one_thread
 
@@ -107,9 +107,21 @@ class Pencils:
         Both elastic and held, as :func:`verification.interface.assembly.held_bodies` returns them.
     progress : callable
         Told the number of Lanczos steps.
+
+    Raises
+    ------
+    ProblemError
+        The grids of the bodies differ.
     """
 
     def __init__(self, bodies: TwoBodies, progress: Progress = silent) -> None:
+        if bodies.interface.transfer is not None:
+            counts = " and ".join(map(str, bodies.interface.counts.values()))
+            needed = (
+                f"needed one grid for both bodies, these have {counts} nodes: between grids that differ rho is found"
+                f" with interface matrices, up to {assembly.MOST_CONTACT_NODES} contact nodes"
+            )
+            raise ProblemError(bodies.problem.source, "contact", None, needed)
         self.bodies, self.progress = bodies, progress
         self._held: tuple[bool, list[Traces]] | None = None
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +15,20 @@ FIRST = "# Needs ndtheory (see its README) and Jupyter; figures are drawn below 
 
 GLUE = re.compile(r"\{glue:text\}`([^`:]+)(?::[^`]*)?`")
 LEDGER = re.compile(r"\{(?:verdict|ledger)\}`([^`]+)`")
-ROLE = re.compile(r"\{[a-z:]+\}`(?:([^`<]*?) ?<[^`>]*>|([^`]*))`")
+ROLE = re.compile(r"\{([a-z:]+)\}`(?:([^`<]*?) ?<([^`>]*)>|([^`]*))`")
+EQUATION = re.compile(r"(\s?)\$\$ \(([\w-]+)\)[ \t]*$", re.MULTILINE)
+LABEL = re.compile(r"^:label: *([\w-]+)$", re.MULTILINE)
 TARGET = re.compile(r"^\([\w-]+\)=\n", re.MULTILINE)
 FENCE = re.compile(
     r"^([:`]{3,}) ?\{([a-z:]+)\}(?: +([^\n]*))?\n(?P<options>(?::[\w-]+:[^\n]*\n)*)(.*?)^\1 *$",
     re.DOTALL | re.MULTILINE,
 )
+
+#: Roles whose words stand elsewhere on the site; the others show their target.
+REFERENCES = ("doc", "ref", "numref", "eq", "prf:ref", "cite", "cite:t")
+
+#: From a role, its target and the words that the page gives it to Markdown.
+Shown = Callable[[str, str, str], str]
 
 
 def glued(path: Path) -> dict[str, str]:
@@ -31,34 +39,65 @@ def glued(path: Path) -> dict[str, str]:
     return {name: output["data"]["text/plain"].strip("'") for name, output in found.items()}
 
 
-def plain(text: str, values: Mapping[str, str]) -> str:
+def plain(text: str, values: Mapping[str, str], shown: Shown) -> str:
     """Text of a page as any notebook shows it: numbers and verdicts in place, no roles, no directives, no solutions.
+
+    Parameters
+    ----------
+    text : str
+        In MyST Markdown.
+    values : mapping
+        The numbers of the text, as :func:`glued` returns them.
+    shown : callable
+        What a reference says, as :class:`builder.references.References`; asked for :data:`REFERENCES`.
 
     Examples
     --------
-    >>> plain("rho is {glue:text}`rho`, see {doc}`theory`.", {"rho": "3"})
-    'rho is 3, see theory.'
-    >>> plain("(5.12) is {verdict}`5.12`.", {})
+    >>> shown = lambda role, target, title: title or {"thm-zero": "Theorem 3", "eq-K": "(7)"}[target]
+    >>> plain("rho is {glue:text}`rho`, by {prf:ref}`thm-zero` and the {term}`trace <traces>`.", {"rho": "3"}, shown)
+    'rho is 3, by Theorem 3 and the trace.'
+    >>> plain("(5.12) is {verdict}`5.12`.", {}, shown)
     '(5.12) is PROVED.'
+    >>> print(plain(":::{prf:theorem} Small\\n:label: thm-zero\\n\\n$$ K < 1 $$ (eq-K)\\n:::", {}, shown))
+    **Theorem 3** (Small)
+    <BLANKLINE>
+    <BLANKLINE>
+    $$ K < 1 \\tag{7} $$
+    <BLANKLINE>
     """
 
     def fence(match: re.Match[str]) -> str:
-        _, kind, title, _, body = match.groups()
+        _, kind, title, options, body = match.groups()
         if kind == "dropdown":
             return ""
         if kind == "widget":
             return f"*The page has a picture to move here: {title}.*"
-        inner = plain(body, values)
+        inner = plain(body, values, shown)
+        if kind.startswith("prf:"):
+            label = LABEL.search(options)
+            name = shown("prf:ref", label[1], "") if label else kind.removeprefix("prf:").title()
+            return f"**{name}**{f' ({title})' if title else ''}\n\n{inner}"
         return f"**{title}**\n\n{inner}" if title else inner
+
+    def role(match: re.Match[str]) -> str:
+        name, title, target, alone = match.groups()
+        if name in REFERENCES:
+            return shown(name, alone or target, title or "")
+        return title or alone.rsplit("/", 1)[-1]
+
+    def equation(match: re.Match[str]) -> str:
+        space, label = match.groups()
+        return f"{space}\\tag{{{shown('eq', label, '').strip('()')}}}{space}$$"
 
     text = FENCE.sub(fence, text)
     text = TARGET.sub("", text)
     text = GLUE.sub(lambda match: values[match[1]], text)
     text = LEDGER.sub(lambda match: quote(*match[1].split()), text)
-    return ROLE.sub(lambda match: match[1] or match[2].rsplit("/", 1)[-1], text)
+    text = EQUATION.sub(equation, text)
+    return ROLE.sub(role, text)
 
 
-def portable(executed: Mapping[str, Any], values: Mapping[str, str]) -> dict[str, Any]:
+def portable(executed: Mapping[str, Any], values: Mapping[str, str], shown: Shown) -> dict[str, Any]:
     """A notebook without outputs and hidden cells from one that was executed.
 
     Parameters
@@ -67,18 +106,20 @@ def portable(executed: Mapping[str, Any], values: Mapping[str, str]) -> dict[str
         The notebook as its file holds it.
     values : mapping
         The numbers of the text, as :func:`glued` returns them.
+    shown : callable
+        As for :func:`plain`.
 
     Raises
     ------
     KeyError
-        A number in the text that no cell has computed.
+        A number in the text that no cell has computed, or a reference to nothing.
     """
     cells: list[dict[str, Any]] = []
     above = FIRST
     for cell in executed["cells"]:
         source = "".join(cell["source"])
         if cell["cell_type"] == "markdown":
-            cells.append({"cell_type": "markdown", "metadata": {}, "source": plain(source, values)})
+            cells.append({"cell_type": "markdown", "metadata": {}, "source": plain(source, values, shown)})
         elif cell["cell_type"] == "code" and "remove-cell" not in cell["metadata"].get("tags", ()):
             cells.append(_code(above + source))
             above = ""
@@ -92,14 +133,14 @@ def _code(source: str) -> dict[str, Any]:
     return {"cell_type": "code", "metadata": {}, "source": source, "execution_count": None, "outputs": []}
 
 
-def write(source: Path, target: Path) -> None:
+def write(source: Path, target: Path, shown: Shown) -> None:
     """Write the portable notebook of an executed one.
 
     Raises
     ------
     KeyError
-        A number in the text that no cell has computed.
+        A number in the text that no cell has computed, or a reference to nothing.
     """
     executed = json.loads(source.read_text(encoding="utf-8"))
-    notebook = portable(executed, glued(source.with_suffix(".glue.json")))
+    notebook = portable(executed, glued(source.with_suffix(".glue.json")), shown)
     target.write_text(json.dumps(notebook, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")

@@ -14,6 +14,7 @@ from sphinx.util.docutils import SphinxDirective
 from sphinx_proof.domain import ProofDomain
 
 from builder import equations, notebooks, widgets
+from builder.references import References
 
 
 class Proofs(ProofDomain):
@@ -121,7 +122,7 @@ def write_notebooks(app: Sphinx, failed: Exception | None) -> None:
     Raises
     ------
     ExtensionError
-        A number in the text that no cell has computed.
+        A number in the text that no cell has computed, or a reference to nothing.
     """
     if failed is not None or app.builder.format != "html":
         return
@@ -131,9 +132,9 @@ def write_notebooks(app: Sphinx, failed: Exception | None) -> None:
         executed = site.parent / "jupyter_execute" / f"{page}.ipynb"
         if is_notebook(app, page) and executed.exists():
             try:
-                notebooks.write(executed, site / name_of(page))
+                notebooks.write(executed, site / name_of(page), References(app, page))
             except KeyError as error:
-                raise ExtensionError(f"{page}: no cell glues {error}") from None
+                raise ExtensionError(f"{page}: no cell glues this, and no reference leads to it: {error}") from None
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

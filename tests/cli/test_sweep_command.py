@@ -173,6 +173,18 @@ def test_a_dry_run_counts_and_runs_nothing(call, sweep_file, tmp_path, monkeypat
     assert call("sweep", sweep_file(), "--dry-run", "--fresh", "--json").document["left"] == 4
 
 
+def test_rows_that_ended_in_an_error_stay_until_retry(call, sweep_file, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr("verification.sweeps.row.course", lambda *given: 1 / 0)
+        assert call("sweep", sweep_file(), "--jobs", 1).status == 0
+    answer = call("sweep", sweep_file(), "--jobs", 1)
+    assert "4 of these rows ended in an error and stay as they are; --retry makes them again" in answer.err
+    assert "4 error" in answer.out
+    assert call("sweep", sweep_file(), "--dry-run", "--retry", "--json").document["left"] == 4
+    answer = call("sweep", sweep_file(), "--jobs", 1, "--retry")
+    assert ("error" in answer.err, "4 converged" in answer.out) == (False, True)
+
+
 @pytest.mark.parametrize(
     ("options", "fragments"),
     [

@@ -151,7 +151,7 @@ def test_the_notebook_of_a_page_says_what_the_page_says_without_its_solutions(pa
     text = re.sub(r"\A---\n.*?^---$", "", page.read_text("utf-8"), flags=re.DOTALL | re.MULTILINE)
     text = CELL.sub("", text)
     values = dict.fromkeys(re.findall(r"\{glue:text\}`([^`:]+)", text), "7")
-    told = notebooks.plain(text, values)
+    told = notebooks.plain(text, values, lambda role, target, title: title or f"[{target}]")
     assert re.findall(r"\{[a-z:]+\}`", told) == []
     for quoted in re.findall(r"\{(?:verdict|ledger)\}`([^`]+)`", SOLUTION.sub("", text)):
         assert quote(*quoted.split()) in told
@@ -175,7 +175,7 @@ def test_the_first_cell_of_a_notebook_is_that_of_its_page(notebooks):
         cell("code", "x = 1"),
         cell("code", "x"),
     ]
-    title, first, second = notebooks.portable({"cells": of_page}, {})["cells"]
+    title, first, second = notebooks.portable({"cells": of_page}, {}, str)["cells"]
     assert title["source"] == "# A page"
     assert "%matplotlib inline" in first["source"].splitlines()
     assert first["source"].endswith("\nx = 1")

@@ -115,6 +115,19 @@ def test_the_figure_has_both_sides_on_logarithmic_axes_with_their_powers(bench):
     assert lines == {"ours, $n^{1.50}$": [8e-3, 8e-3, 64e-3, 512e-3], "the peer, $n^{0.50}$": [5e-4, 1e-3, 2e-3, 4e-3]}
 
 
+def test_a_record_without_another_side_has_no_columns_for_one(bench, tmp_path):
+    rows = tuple(bench.recording.row(n, [(1e-3 * n, None)]) for n in (100, 1000))
+    alone = made_up(bench, other="", peer="", rows=rows, since=0, wanted="")
+    bench.recording.report(alone, tmp_path)
+    page = rendered(bench, tmp_path, tmp_path / "out").replace("\N{NO-BREAK SPACE}", " ")
+    assert "| unknowns | ours | rounds |\n| --: | --: | --: |\n| 100 | 100 ms | 1 |\n| 1,000 | 1.00 s | 1 |" in page
+    assert [line for line in page.splitlines() if line.startswith("- ")] == ["- *ours*: this."]
+    assert "the CPU time grows like $n^{1.00}$ (ours)." in page
+    assert "other:" not in bench.recording.table(alone)
+    [axes] = bench.speed_page.draw(bench.recording.document(alone)).axes
+    assert [line.get_label() for line in axes.lines] == ["ours, $n^{1.00}$"]
+
+
 def test_records_of_two_machines_each_name_their_own(bench, tmp_path):
     for place, name, cpu in ((2, "one", "Abacus"), (1, "two", "Slide rule")):
         document = bench.recording.document(made_up(bench, name=name, place=place, title=name))

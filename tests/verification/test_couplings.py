@@ -197,6 +197,17 @@ def test_the_recorded_table_keeps_what_its_page_says():
     assert sum(one["good"] for one in record["first"][0]["couplings"]) >= 27
 
 
+@pytest.mark.parametrize("full", [False, True])
+def test_a_record_of_some_first_thetas_alone_never_takes_the_place_of_all(made, tmp_path, monkeypatch, capsys, full):
+    bench = import_module("bench_couplings")
+    monkeypatch.setattr(bench, "followed", lambda *given: iter(()))
+    monkeypatch.setattr("sys.argv", ["bench_couplings.py", "--record", str(tmp_path), *["--full"] * full])
+    bench.main()
+    found = [json.loads(path.read_text("utf-8")) for path in tmp_path.glob("advice/*.json")]
+    assert [[row["theta"] for row in record["first"]] for record in found] == [[0.5, 0.1, 0.3, 0.9]] * full
+    assert ("no record" in capsys.readouterr().out) != full
+
+
 def test_bodies_of_the_record_are_of_both_dimensions_roles_and_kinds_with_noise_in_each():
     record = json.loads((BENCHMARKS / "records" / "advice" / "couplings.json").read_text("utf-8"))
     rows = record["first"][0]["couplings"]

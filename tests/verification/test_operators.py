@@ -198,6 +198,19 @@ def test_bodies_that_hold_different_components_have_no_rho_at_any_size(few):
         vf.advise(vf.Problem.from_dict(held))
 
 
+@pytest.mark.parametrize("answer", [vf.measure, vf.advise])
+@pytest.mark.parametrize(
+    ("nodes", "body2"),
+    [("31 and 25", {"cells": [30, 6]}), ("25 and 26", {"x": ["0.41", "1.61"]})],
+    ids=["finer", "moved aside"],
+)
+def test_on_grids_that_differ_one_line_says_that_rho_needs_matrices(few, nodes, body2, answer):
+    problem = vf.Problem.from_dict(changed(vf.example("section6").to_dict(), body2=body2, contact={"interval": None}))
+    needed = rf"^<dict>: contact: needed one grid for both bodies, these have {nodes} nodes: .* up to 20 contact nodes$"
+    with pytest.raises(vf.ProblemError, match=needed):
+        answer(problem)
+
+
 @pytest.mark.parametrize("answer", [vf.build, vf.run, vf.solve, vf.compare])
 def test_what_needs_interface_matrices_refuses_in_one_line(few, answer):
     with pytest.raises(TooManyContactNodes, match=r"^<dict>: contact: needed at most 20 contact nodes, these are 41$"):

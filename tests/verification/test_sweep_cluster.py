@@ -110,7 +110,7 @@ def test_a_scheduler_that_goes_away_leaves_what_is_done_in_the_store(cluster, tm
 
 
 @at_night
-def test_a_row_that_takes_its_worker_with_it_is_a_row_that_says_so(cluster, tmp_path, monkeypatch):
+def test_of_the_rows_on_a_worker_that_dies_only_the_one_that_kills_it_is_an_error(cluster, tmp_path, monkeypatch):
     text = """
         import os
         from dataclasses import dataclass
@@ -129,12 +129,14 @@ def test_a_row_that_takes_its_worker_with_it_is_a_row_that_says_so(cluster, tmp_
     monkeypatch.syspath_prepend(tmp_path)
     from deadly_rule import Deadly
 
-    # alone, as the scheduler also blames rows that wait for the same worker
-    up = cluster(1, PYTHONPATH=str(tmp_path), DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES="0")
-    (row,) = vf.sweep(SMALL, theta=["0.5"], rule=[Deadly()], dask=up.address).rows
-    assert row["outcome"] == "error"
-    assert row["reason"] == "outcome: the workers that ran it were killed, perhaps as memory ran out"
-    assert (row["theta"], row["rule"]) == (0.5, "deadly")
+    # one death is enough for the scheduler: it gives up the row that runs and those that wait for the same worker
+    up = cluster(3, PYTHONPATH=str(tmp_path), DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES="0")
+    deadly, *rest = vf.sweep(SMALL, theta=["0.5", *GRID["theta"][:19]], rule=[Deadly()], dask=up.address).rows
+    assert deadly["outcome"] == "error"
+    assert deadly["reason"] == "outcome: the workers that ran it were killed, perhaps as memory ran out"
+    assert (deadly["theta"], deadly["rule"]) == (0.5, "deadly")
+    assert tuple(rest) == vf.sweep(SMALL, theta=GRID["theta"][:19], rule=[Deadly()]).rows
+    assert [worker.poll() is None for worker in up.workers].count(True) == 1  # among others, and alone
 
 
 @at_night

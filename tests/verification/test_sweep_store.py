@@ -16,6 +16,7 @@ import verification as vf
 from verification.algorithm.relaxation import Constant
 from verification.interface.friction import Local
 from verification.sweeps import identity, keeping, store, workers
+from verification.sweeps import row as row_module
 from verification.sweeps.grid import SweepGrid
 from verification.sweeps.identity import Identity
 from verification.sweeps.keeping import plan
@@ -92,6 +93,33 @@ def test_what_raises_is_a_row_with_its_reason_and_is_not_made_again(place, monke
     [found] = vf.sweep(SMALL, theta=["0.3"], store=place).rows
     assert (found["outcome"], found["reason"]) == ("error", "outcome: ZeroDivisionError: made up")
     assert read(place, "SELECT outcome FROM rows") == [("error",)]
+
+
+def test_what_ended_in_an_error_is_told_and_made_again_when_asked(place, made, monkeypatch):
+    grid = {"theta": ["0.3", "0.7"], "refine": [0, 8]}  # a mesh of refine = 8 is refused
+    course, thetas = row_module.course, []
+
+    def broken_once(pair, rule, choice, *given):
+        thetas.append(float(choice.theta))
+        if thetas == [0.3]:
+            raise MemoryError("made up")
+        return course(pair, rule, choice, *given)
+
+    monkeypatch.setattr(row_module, "course", broken_once)
+    first = vf.sweep(SMALL, **grid, store=place)
+    assert sorted(each["outcome"] for each in first.rows) == ["converged", "error", "refused", "refused"]
+    told = f"{place}: 1 of these rows ended in an error and stay as they are; --retry makes them again"
+    asked = SweepGrid.of(grid)
+    del made[:]
+    again = vf.sweep(SMALL, **grid, store=place)
+    assert (again.rows, again.notes, made) == (first.rows, (told,), [])
+    assert (plan(SMALL, asked, place).errors, plan(SMALL, asked, place).notes) == (1, (told,))
+    assert (plan(SMALL, asked, place, retry=True).left, plan(SMALL, asked, place, fresh=True).left) == (1, 4)
+    mended = vf.sweep(SMALL, **grid, store=place, retry=True)
+    assert made == [{"theta": Fraction(3, 10), "refine": 0}]
+    assert (mended.stored, mended.notes) == (3, ())
+    assert mended.rows == vf.sweep(SMALL, **grid).rows
+    assert vf.sweep(SMALL, **grid, store=place).rows == mended.rows
 
 
 def test_a_plan_counts_and_makes_neither_rows_nor_a_file(place, made):

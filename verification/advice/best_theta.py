@@ -154,10 +154,9 @@ def best_theta(
 
     Examples
     --------
-    >>> bars = {"dimension": 1,
-    ...     "body1": {"shape": "interval", "x": [0, 1], "cells": 4, "young": 2, "fixed": ["left"]},
-    ...     "body2": {"shape": "interval", "x": [1, 2], "cells": 4, "young": 1, "prescribed": {"right": -0.1}}}
-    >>> found = best_theta(Problem.from_dict(bars))
+    >>> from verification.problem.examples import example
+    >>> bars = example("two-bars").changed(young=(2, 1))
+    >>> found = best_theta(bars)
     >>> round(found.predicted, 12), round(found.sharp.theta, 12), round(found.sharp.factor, 12)
     (0.5, 0.5, 0.5)
 

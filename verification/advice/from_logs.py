@@ -33,8 +33,9 @@ from verification.advice.readings import (
     spread,
     steps_needed,
 )
-from verification.advice.roles import UNITS, Advice
+from verification.advice.roles import Advice
 from verification.advice.seen import Interval, LogBound, SeenColumn, SeenLog, bounds
+from verification.interface.pair import UNITS
 from verification.problem.tables import ProblemError
 
 #: Bounds of 1 + rho that differ by less do not contradict each other: a ratio has not wholly settled.

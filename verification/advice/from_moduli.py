@@ -15,7 +15,8 @@ from ndtheory.number import above, below
 from ndtheory.sharp import predicted_rate, predicted_theta
 from verification.advice.readings import LARGEST_TO_PASTE, NextRun, rounded_down
 from verification.advice.role import Role
-from verification.advice.roles import UNITS, Advice
+from verification.advice.roles import Advice
+from verification.interface.pair import UNITS
 from verification.problem.writing import written_number
 
 Body = Literal[1, 2]

@@ -11,7 +11,8 @@ from ndtheory.energy import LARGEST, SMALLEST
 from ndtheory.sharp import predicted_rate, predicted_theta
 from verification.advice.readings import LARGEST_TO_PASTE, OF_OPEN_NODES, NextRun, read_ratio, rounded_down, spread
 from verification.advice.role import Role
-from verification.advice.roles import UNITS, Advice
+from verification.advice.roles import Advice
+from verification.interface.pair import UNITS
 
 
 def advise_run(theta: Any, ratio: Any, *, tied: bool = False) -> Advice:

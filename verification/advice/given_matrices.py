@@ -11,9 +11,10 @@ from scipy.sparse.linalg import LinearOperator
 
 from fem1d2d.mesh import Floats
 from verification.advice.role import Role, best_of
-from verification.advice.roles import UNITS, Advice
+from verification.advice.roles import Advice
 from verification.advice.seen_matrices import ORDERING, SeenLanczos, SeenMatrices, SeenMatrix
 from verification.interface.matrices import ASYMMETRY, size
+from verification.interface.pair import UNITS
 
 #: Up to this asymmetry the symmetric part of a matrix is taken, and that is told.
 TOLD = 1e-3

@@ -10,15 +10,17 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from ndtheory import EnergyConstants, Number, evaluate_sharp
 from ndtheory.sharp import predicted_rate, predicted_theta
+from verification.advice.quote import reason as quoted_reason
 from verification.advice.readings import LARGEST_TO_PASTE, NextRun, RunReading, SeenRun, rounded_down
 from verification.advice.role import Role, best_of, fewer, steps, with_both_ends
 from verification.advice.seen import Interval, SeenLog
 from verification.advice.seen_matrices import SeenMatrices
+from verification.advice.snippets import Coupling, snippet
 from verification.algorithm.theta import automatic, by_prediction, sharp_bounds
 from verification.constants import measure
 from verification.document import Document
 from verification.interface.build import build
-from verification.interface.pair import ContactPair, SingularRole, TwoBodies
+from verification.interface.pair import UNITS, ContactPair, SingularRole, TwoBodies
 from verification.operators import Pencils, needs_matrices, pair_or_bodies
 from verification.problem import Problem, load
 from verification.problem.tables import ProblemError
@@ -27,9 +29,6 @@ from verification.progress import Progress, silent
 if TYPE_CHECKING:
     from verification.advice.from_moduli import SeenModuli
     from verification.figures import Figure
-
-#: What is unknown of matrices and runs from elsewhere.
-UNITS = {"length": "any", "stress": "any"}
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -127,9 +126,7 @@ class Advice(Document):
     @property
     def quote(self) -> str | None:
         """The reason for the advice, to be quoted; None where there is no theta to paste."""
-        from verification.advice.quote import reason
-
-        return None if self.theta is None else reason(self)
+        return None if self.theta is None else quoted_reason(self)
 
     def snippet(self, library: str) -> str:
         """What to paste into the configuration of a coupling library: preCICE, Kratos or Norma.
@@ -139,8 +136,6 @@ class Advice(Document):
         ValueError
             Several readings are left, or no such library.
         """
-        from verification.advice.snippets import Coupling, snippet
-
         if self.theta is None:
             raise ValueError(self.why_no_theta)
         count = steps(self.chosen(self.best)[1])
@@ -234,10 +229,8 @@ def advise(problem: Problem | ContactPair | Path | str, *, tied: bool = False, p
 
     Examples
     --------
-    >>> bars = {"dimension": 1,
-    ...     "body1": {"shape": "interval", "x": [0, 1], "cells": 8, "young": 3, "fixed": ["left"]},
-    ...     "body2": {"shape": "interval", "x": [1, 2], "cells": 8, "young": 1, "fixed": ["right"]}}
-    >>> found = advise(Problem.from_dict(bars))
+    >>> from verification.problem.examples import example
+    >>> found = advise(example("two-bars"))
     >>> found.neumann_body, round(found.best.theta_predicted, 6)
     (1, 0.857143)
     """

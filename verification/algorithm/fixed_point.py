@@ -132,10 +132,9 @@ def iterate(
     Examples
     --------
     >>> from itertools import islice
-    >>> bars = {"dimension": 1,
-    ...     "body1": {"shape": "interval", "x": [0, 1], "cells": 4, "young": 2, "fixed": ["left"]},
-    ...     "body2": {"shape": "interval", "x": [1, 2], "cells": 4, "young": 1, "prescribed": {"right": -0.1}}}
-    >>> [round(float(step.g[0]), 4) for step in islice(iterate(Problem.from_dict(bars), theta="1/2"), 3)]
+    >>> from verification.problem.examples import example
+    >>> bars = example("two-bars").changed(young=(2, 1))
+    >>> [round(float(step.g[0]), 4) for step in islice(iterate(bars, theta="1/2"), 3)]
     [0.0, 0.1, 0.05]
     """
     pair = pair_of(problem)

@@ -363,10 +363,9 @@ def run(
 
     Examples
     --------
-    >>> bars = {"dimension": 1,
-    ...     "body1": {"shape": "interval", "x": [0, 1], "cells": 4, "young": 2, "fixed": ["left"]},
-    ...     "body2": {"shape": "interval", "x": [1, 2], "cells": 4, "young": 1, "prescribed": {"right": -0.1}}}
-    >>> finished = run(Problem.from_dict(bars), theta="1/3")
+    >>> from verification.problem.examples import example
+    >>> bars = example("two-bars").changed(young=(2, 1))
+    >>> finished = run(bars, theta="1/3")
     >>> finished.outcome, finished.iterations
     ('converged', 1)
     """

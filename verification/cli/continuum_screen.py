@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -44,8 +45,6 @@ def _at_least(number: dict[str, float] | None) -> str:
 
 def _outward(value: float, side: int) -> str:
     """Four figures, rounded up (1) or down (-1)."""
-    from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
-
     rounding = ROUND_CEILING if side > 0 else ROUND_FLOOR
     return f"{float(Context(prec=4, rounding=rounding).plus(Decimal(value))):.4g}"
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ndtheory import HypothesisError, exact
 from verification.cli.console import figures, heading, note
 
 if TYPE_CHECKING:
@@ -66,7 +67,6 @@ def advice_from_files(given: Mapping[str, Any], tell: Progress, *, tied: bool) -
     ------
     ProblemError, click.UsageError
     """
-    from ndtheory import HypothesisError
     from verification.advice.from_matrices import advise_matrices
     from verification.advice.matrix_files import is_interface, names_in, read_matrix
     from verification.advice.roles import advise
@@ -121,8 +121,6 @@ def _grids(transfer: Path, given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _radius(text: str, context: click.Context) -> float:
-    from ndtheory import exact
-
     try:
         radius = float(exact(text))
     except (ValueError, OverflowError):

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ndtheory import HypothesisError
+
 if TYPE_CHECKING:
     from verification.advice.roles import Advice
 
@@ -60,7 +62,6 @@ def advice_from_moduli(given: Mapping[str, Any]) -> Advice:
     ------
     click.UsageError
     """
-    from ndtheory import HypothesisError
     from verification.advice.from_moduli import advise_moduli
 
     context = click.get_current_context()

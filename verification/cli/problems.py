@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -72,6 +72,13 @@ SOLVER = click.option(
     show_default=True,
     help="Who solves step II.",
 )
+
+
+def of_a_run(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command FILE and what changes its run."""
+    for option in reversed((FILE, SET, THETA, RELAXATION, SWAP, SOLVER)):
+        command = option(command)
+    return command
 
 
 def _folder(context: click.Context, parameter: click.Parameter, value: str | None) -> Path | None:
@@ -189,12 +196,7 @@ def constants(file: Path, keys: dict[str, str], refine: int, verified: bool, as_
 
 
 @click.command()
-@FILE
-@SET
-@THETA
-@RELAXATION
-@SWAP
-@SOLVER
+@of_a_run
 @FOLDER
 @JSON
 def run(file: Path, solver: Any, folder: Path | None, as_json: bool, **changes: Any) -> int:
@@ -263,12 +265,7 @@ def solve(file: Path, keys: dict[str, str], folder: Path | None, as_json: bool) 
 
 
 @click.command()
-@FILE
-@SET
-@THETA
-@RELAXATION
-@SWAP
-@SOLVER
+@of_a_run
 @click.option("--exact", is_flag=True, help="Bring the semidefinite bound within 0.1 % of a factor that occurs.")
 @click.option("--verified", is_flag=True, help="Prove constants and bounds, for the exact data of FILE on its mesh.")
 @FOLDER

@@ -48,6 +48,7 @@ def _axes(context: click.Context, parameter: click.Parameter, given: tuple[str, 
 @click.option("--dask", metavar="ADDRESS", help="A dask scheduler whose workers run, as tcp://host:8786.")
 @STORE
 @click.option("--fresh", is_flag=True, help="Make all rows again, those in the store too.")
+@click.option("--retry", is_flag=True, help="Make those rows of the store again that ended in an error.")
 @click.option("--dry-run", is_flag=True, help="Say how many runs there are and how many the store has; run nothing.")
 @click.option(
     "--export", type=click.Path(path_type=Path), metavar="DIR", help="Write NAME.csv and NAME.nc (netCDF) into DIR."
@@ -64,6 +65,7 @@ def sweep(
     dask: str | None,
     store: Path | None,
     fresh: bool,
+    retry: bool,
     dry_run: bool,
     export: Path | None,
     plots: list[tuple[str, ...]],
@@ -78,7 +80,7 @@ def sweep(
     go to NAME.csv beside FILE, or into DIR.  Exit 0 also where runs failed: their rows say why.
 
     Each row is kept in NAME.sqlite beside NAME.csv once it is made, and is not made again: after Ctrl-C, or whatever
-    ended the command, the same command goes on.
+    ended the command, the same command goes on.  A row that ended in an error stays, too, until --retry or --fresh.
 
     \b
     Example of FILE:
@@ -106,7 +108,7 @@ def sweep(
     room = file.parent if folder is None else folder
     target, kept = room / f"{file.stem}.csv", store or room / f"{file.stem}.sqlite"
     if dry_run:
-        planned = plan(problem, grid, kept, fresh=fresh)
+        planned = plan(problem, grid, kept, fresh=fresh, retry=retry)
         deliver(planned, lambda: sweep_screen.plan(planned), as_json)
         _tell(planned.notes)
         return
@@ -116,7 +118,7 @@ def sweep(
         check_ours(one)
     with _progress(log) as tell:
         work = work_of(jobs or -1, dask)
-        found = sweep_grid(problem, grid, work=work, store=kept, fresh=fresh, progress=tell)
+        found = sweep_grid(problem, grid, work=work, store=kept, fresh=fresh, retry=retry, progress=tell)
     _tell(found.notes)
     if found.stored:
         complain(f"{kept}: {found.stored} of {found.asked} rows were there")

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from verification.advice.best_theta import BestTheta
-from verification.figures.style import BODY1, BODY2, new_figure, plain, styled
+from verification.figures.style import BODY1, BODY2, THETA, new_figure, plain, styled
 
 #: What the moduli alone say is drawn in these, one after the other: thin, as it knows no mesh.
 OF_MODULI = (("0.35", ":"), ("0.35", (0, (6, 2, 1, 2))))
@@ -66,7 +66,7 @@ def draw_best_theta(panels: list[Panel], x: str) -> Figure:
             ax.set_yticks(TICKS, [f"{theta:g}" for theta in TICKS])
             ax.set_yticks([], minor=True)
             ax.grid(color="0.9", linewidth=0.6)
-        grid[0].set_ylabel("relaxation factor theta")
+        grid[0].set_ylabel(THETA)
         entries: dict[str, Artist] = {}
         for ax in grid:
             for line, label in zip(*ax.get_legend_handles_labels(), strict=True):

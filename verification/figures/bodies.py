@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from fem1d2d.mesh import Floats
 from verification.algorithm.runs import Run
-from verification.figures.style import BODY1, BODY2, PRESSURE, SHEAR, STATES, new_figure, plain, styled
+from verification.figures.style import BODY1, BODY2, PRESSURE, SHEAR, STATES, legend_beside, new_figure, plain, styled
 from verification.interface.fields import ContactFields
 from verification.interface.pair import TwoBodies
 from verification.monolithic import Solution
@@ -84,7 +84,7 @@ def _draw_meshes(ax: Axes, bodies: TwoBodies, displacements: tuple[Floats | None
         ax.set_yticks([])
         ax.set_xlabel(f"x [{plain(length)}]")
     ax.set_title(f"{plain(bodies.problem.title)}: deformed, displacements x {scale:g}")
-    ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    legend_beside(ax)
 
 
 def _obstacle(bodies: TwoBodies) -> float:
@@ -107,4 +107,4 @@ def _draw_stresses(ax: Axes, contact: ContactFields, units: Mapping[str, str]) -
             )
     ax.set_xlabel(f"x along $\\Gamma_c$ [{plain(units['length'])}]")
     ax.set_ylabel(f"stress [{plain(units['stress'])}]")
-    ax.legend(ncols=1, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    legend_beside(ax)

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from ndtheory import EnergyConstants, evaluate_sharp
 from ndtheory.sharp import predicted_factor
-from verification.figures.style import BODY1, BODY2, new_figure, styled
+from verification.figures.style import BODY1, BODY2, THETA, legend_beside, new_figure, styled
 
 #: How many thetas a curve has.
 POINTS = 80
@@ -40,8 +40,8 @@ def draw_factor(roles: Mapping[str, EnergyConstants]) -> Figure:
         ax.axhline(1.0, color="0.4", linewidth=0.8, linestyle=":")
         ax.set_xlim(0, 1)
         ax.set_ylim(0, 1.5)
-        ax.set_xlabel("relaxation factor theta")
+        ax.set_xlabel(THETA)
         ax.set_ylabel("factor of one step")
         ax.set_title("How much one step changes the distance of two forces")
-        ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        legend_beside(ax)
     return figure

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from verification.bounds.region import Plane
 from verification.bounds.table import BOUNDS
-from verification.figures.style import OUTCOMES, new_figure, plain, styled
+from verification.figures.style import OUTCOMES, THETA, legend_beside, new_figure, plain, styled
 
 #: The enlarged part ends this much above the largest friction of which something is proved.
 ROOM = 1.3
@@ -34,10 +34,10 @@ def draw_region(plane: Plane) -> Figure:
             _draw(ax, plane, *least)
             ax.set(ylabel="coefficient of friction k")
         whole.set(xlim=(left, 1.3), ylim=(bottom, 2 * highest))
-        enlarged.set(xlim=(0, 1), ylim=(0, ROOM * max(frictions)), xlabel="relaxation factor theta")
+        enlarged.set(xlim=(0, 1), ylim=(0, ROOM * max(frictions)), xlabel=THETA)
         whole.set_title(f"{plain(plane.title)}: where one step is proved to contract")
         enlarged.set_title("enlarged, on linear axes")
-        whole.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        legend_beside(whole)
     return figure
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from verification.figures.style import STATES, new_figure, styled
+from verification.figures.style import STATES, THETA, legend_beside, new_figure, styled
 from verification.reproduce.claims import PRINTED_THETA, ZONES
 from verification.reproduce.experiments import Reproduction, Result
 
@@ -39,7 +39,7 @@ def _zones(result: Result, ax: Any) -> None:
         ax.axvline(end, color="0.6", linestyle=":", label="printed ends of zones" if end == ZONES[0][1] else None)
     ax.set_xlabel("x from the left end of Gamma_c (mm)")
     ax.set_ylabel("pressure (MPa)")
-    ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    legend_beside(ax)
 
 
 def _curves(result: Result, ax: Any) -> None:
@@ -50,6 +50,6 @@ def _curves(result: Result, ax: Any) -> None:
             ax.plot(*zip(*points, strict=True), f"{marker}-", color=shade, markersize=3.5, label=curve.label)
     ax.set_xlim(0, 1)
     ax.set_yscale("log")
-    ax.set_xlabel("relaxation factor theta")
+    ax.set_xlabel(THETA)
     ax.set_ylabel("steps, increment test")
-    ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    legend_beside(ax)

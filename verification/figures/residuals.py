@@ -12,7 +12,7 @@ from verification.algorithm.rates import noise
 from verification.algorithm.runs import Run
 from verification.bounds.bound import BoundResult
 from verification.bounds.table import BOUNDS
-from verification.figures.style import PRESSURE, new_figure, plain, styled
+from verification.figures.style import PRESSURE, legend_beside, new_figure, plain, styled
 
 
 def draw_residuals(run: Run, bounds: Sequence[BoundResult] = ()) -> Figure:
@@ -48,5 +48,5 @@ def draw_residuals(run: Run, bounds: Sequence[BoundResult] = ()) -> Figure:
         ax.set_ylabel("|||T g - g||| / |||T g|||")
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
         ax.set_title(f"{plain(run.pair.title)}: theta = {float(run.theta):g}")
-        ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        legend_beside(ax)
     return figure

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
@@ -23,6 +24,9 @@ OUTCOMES = {
     "stalled": ("#D55E00", "s"),
     "diverged": ("#000000", "X"),
 }
+
+#: The axis of theta.
+THETA = "relaxation factor theta"
 
 _PARAMETERS: Any = {
     "font.size": 9,
@@ -52,6 +56,11 @@ def styled() -> Iterator[None]:
         mpl.rcdefaults()
         mpl.rcParams.update(_PARAMETERS)
         yield
+
+
+def legend_beside(ax: Axes) -> None:
+    """The legend to the right of the axes, where it covers nothing."""
+    ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
 def plain(text: str) -> str:

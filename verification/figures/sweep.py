@@ -8,12 +8,12 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from verification.figures.style import new_figure, plain, styled
+from verification.figures.style import THETA, legend_beside, new_figure, plain, styled
 from verification.sweeps.sweep import Sweep
 
 #: What is written beside an axis; the others have the name of their column.
 WORDS = {
-    "theta": "relaxation factor theta",
+    "theta": THETA,
     "friction": "coefficient of friction k",
     "iterations": "steps to the tolerance of the residual",
     "iterations_paper": "steps by the test of Section 6.3",
@@ -71,7 +71,7 @@ def draw_sweep(sweep: Sweep, x: str, y: str, curves: str | None = None) -> Figur
         ax.set_ylabel(_label(y, sweep))
         ax.set_title(plain(sweep.summary))
         if any(key for key in colours):
-            ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+            legend_beside(ax)
     return figure
 
 

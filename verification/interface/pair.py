@@ -48,7 +48,7 @@ class SingularRole(ProblemError):
         )
 
 
-#: What is unknown of matrices from elsewhere.
+#: What is unknown of matrices and runs from elsewhere.
 UNITS = {"length": "any", "stress": "any"}
 
 

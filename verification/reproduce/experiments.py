@@ -25,6 +25,8 @@ from verification.reproduce.claims import (
     zones_hold,
 )
 from verification.reproduce.readings import READINGS, ModelReading
+from verification.sweeps.row import FAILED as FAILED  # the ledger takes it from here
+from verification.sweeps.sweep import sweep
 
 if TYPE_CHECKING:
     from verification.figures import Figure
@@ -33,9 +35,6 @@ FIGURES = tuple(CLAIMS)
 
 #: 0.05 to 0.95.
 THETAS = tuple(f"{n / 20:.2f}" for n in range(1, 20))
-
-#: Outcomes of a row that say nothing of steps.
-FAILED = ("refused", "error")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -239,8 +238,6 @@ def _zones(reading: ModelReading) -> tuple[Outcome, list[dict[str, Any]]]:
 
 def _curves(name: str, reading: ModelReading, jobs: int, store: Path | None) -> tuple[Outcome, list[dict[str, Any]]]:
     """A figure of steps over theta."""
-    from verification.sweeps.sweep import sweep
-
     claim = CLAIMS[name]
     found = sweep(reading.problem(60), theta=THETAS, jobs=jobs, store=store, **claim.axes)
     if found.interrupted:

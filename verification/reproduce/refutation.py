@@ -13,11 +13,11 @@ from typing import Any
 
 from verification.interface.pair import ContactPair
 from verification.reproduce.claims import NODES, PRINTED_THETA, SERVES, Claim
-from verification.reproduce.experiments import FAILED, THETAS, Outcome, curve_of, outcome_of
+from verification.reproduce.experiments import THETAS, Outcome, curve_of, outcome_of
 from verification.reproduce.readings import ModelReading
 from verification.sweeps.bodies import Bodies
 from verification.sweeps.grid import SweepGrid
-from verification.sweeps.row import Row, row
+from verification.sweeps.row import FAILED, REFUSED, Row, row
 
 #: The mesh of 190 nodes with the friction and the moduli of the text: a curve that Figures 10 to 12 have in common.
 COMMON: Mapping[str, Any] = {"refine": NODES.index(190)}
@@ -105,7 +105,7 @@ def decide(claim: Claim, runs: Runs, meshes: Collection[int] | None = None) -> O
     rows: dict[str, Sequence[Row]] = {}
     for label, values in chosen:
         rows[label] = some = runs.until_refuted(values)
-        if some[0]["outcome"] == "refused" or refuted(some):
+        if some[0]["outcome"] == REFUSED or refuted(some):
             break
     left = "" if len(chosen) == len(curves) else f"not refuted by {', '.join(rows)}; the other curves were not run"
     return outcome_of(claim.name, runs.reading, rows, left)

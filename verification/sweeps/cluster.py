@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import importlib.util
 import threading
+from collections import deque
 from collections.abc import Generator, Sequence
 from itertools import islice
 from typing import Any
@@ -27,8 +28,9 @@ AHEAD = 2
 def on_cluster(address: str) -> Work:
     """On the workers of the scheduler at an address.
 
-    A worker condenses the bodies of a mesh once.  The pieces of a worker that dies go to another one; a row that takes
-    four workers with it is a row that says so.
+    A worker condenses the bodies of a mesh once.  The pieces of a worker that dies go to another one.  The scheduler
+    gives a piece up that was on four workers when they died, also where it only waited there behind another one.  The
+    rows of such pieces are tried again one at a time, once nothing else runs; one that is given up then says so.
 
     Raises
     ------
@@ -100,24 +102,27 @@ def _rows(
     # a future, so that a pair of large matrices goes to each worker once, and is made again where a worker dies
     origin = client.submit(_same, Origin.of(start), pure=False)
     sent: dict[str, Sequence[tuple[int, Row]]] = {}
+    together: set[str] = set()  # of what is sent, all that was not alone all the time
+    suspects: deque[tuple[int, Row]] = deque()
 
     def submit(piece: Sequence[tuple[int, Row]]) -> Any:
         future = client.submit(some, origin, piece, pure=False)
+        if sent:
+            together.update((*sent, future.key))
         sent[future.key] = piece
         return future
 
     try:
         coming = as_completed((submit(piece) for piece in islice(source, AHEAD * threads)), loop=client.loop)
         for future in coming:
-            piece = sent.pop(future.key)
+            piece, alone = sent.pop(future.key), future.key not in together
+            together.discard(future.key)
             if future.status not in ("finished", "error"):
                 raise Stopped(address, "the scheduler has gone")
             error = future.exception()
-            if isinstance(error, KilledWorker) and len(piece) > 1:
-                for one in piece:  # each alone: which of them was it?
-                    coming.add(submit([one]))
-                continue
-            if isinstance(error, KilledWorker):
+            if isinstance(error, KilledWorker) and not (alone and len(piece) == 1):
+                suspects.extend(piece)
+            elif isinstance(error, KilledWorker):
                 index, values = piece[0]
                 yield [(index, lost(start, values, "the workers that ran it were killed, perhaps as memory ran out"))]
             elif error is not None:
@@ -126,6 +131,8 @@ def _rows(
                 yield pieces.taken(future.result())
             for piece in islice(source, 1):
                 coming.add(submit(piece))
+            if suspects and not sent:
+                coming.add(submit([suspects.popleft()]))
     except (CommClosedError, TimeoutError) as error:
         raise Stopped(address, f"the scheduler has gone ({error})") from None
 

@@ -12,7 +12,7 @@ from verification.interface.pair import UNITS, ContactPair
 from verification.problem.specification import Problem
 from verification.sweeps.grid import SweepGrid
 from verification.sweeps.identity import Identity
-from verification.sweeps.row import Row
+from verification.sweeps.row import ERROR, Row
 from verification.sweeps.store import Known, Store
 
 
@@ -25,6 +25,10 @@ class Kept:
         Made where there is none.
     start : Problem or ContactPair
     grid : SweepGrid
+    fresh : bool
+        Whether all rows count as missing; they are replaced once they are made again.
+    retry : bool
+        Whether those do that ended in an error.
 
     Raises
     ------
@@ -33,12 +37,15 @@ class Kept:
     StoreError
     """
 
-    def __init__(self, path: Path, start: Problem | ContactPair, grid: SweepGrid) -> None:
+    def __init__(
+        self, path: Path, start: Problem | ContactPair, grid: SweepGrid, *, fresh: bool = False, retry: bool = False
+    ) -> None:
         identity = Identity.read(start)
         self._keys = identity.keys(grid)
         self._store = Store(path)
         try:
-            self.known: Known = self._store.known(self._keys)
+            again = lambda outcome: fresh or (retry and outcome == ERROR)
+            self.known: Known = self._store.known(self._keys, again)
             #: The rows of this sweep that other versions of this library have made, by version.
             self.others: dict[str, int] = {}
             for version in self._store.others():
@@ -66,18 +73,20 @@ class Kept:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is there and is not used, in words."""
-        return notes(self._store.path, self.others, self.known.damaged)
+        """What is there and is not used, or ended in an error, in words."""
+        return notes(self._store.path, self.others, self.known.damaged, self.known.errors)
 
 
-def notes(path: Path, others: Mapping[str, int], damaged: int) -> tuple[str, ...]:
-    """What a store has that is not used, in words."""
+def notes(path: Path, others: Mapping[str, int], damaged: int, errors: int) -> tuple[str, ...]:
+    """What a store has that is not used, or may not be wanted, in words."""
     found = [
         f"{path}: {count} of these rows are there from version {version}; they are not used, and stay"
         for version, count in others.items()
     ]
     if damaged:
         found.append(f"{path}: {damaged} of these rows are damaged: they are made again")
+    if errors:
+        found.append(f"{path}: {errors} of these rows ended in an error and stay as they are; --retry makes them again")
     return tuple(found)
 
 
@@ -90,9 +99,11 @@ class Plan(Document):
     asked : int
         How many rows the grid has.
     stored : int
-        How many of them the store has.
+        How many of them the store has and would not be made again.
     damaged : int
         How many more it has damaged.
+    errors : int
+        How many of the stored rows ended in an error.
     others : mapping from a version of this library to a number
         Rows of this sweep that another version has made: they are not used.
     store : Path or None
@@ -105,6 +116,7 @@ class Plan(Document):
     stored: int
     damaged: int
     store: Path | None
+    errors: int = 0
     others: Mapping[str, int] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=lambda: UNITS)
     problem: Problem | None = None
@@ -120,8 +132,8 @@ class Plan(Document):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the store has that would not be used, in words."""
-        return () if self.store is None else notes(self.store, self.others, self.damaged)
+        """What the store has that would not be used, or ended in an error, in words."""
+        return () if self.store is None else notes(self.store, self.others, self.damaged, self.errors)
 
     def content(self) -> dict[str, Any]:
         return {
@@ -129,12 +141,20 @@ class Plan(Document):
             "stored": self.stored,
             "left": self.left,
             "damaged": self.damaged,
+            "errors": self.errors,
             "other_versions": dict(self.others),
             "store": None if self.store is None else str(self.store),
         }
 
 
-def plan(start: Problem | ContactPair, grid: SweepGrid, store: Path | None = None, *, fresh: bool = False) -> Plan:
+def plan(
+    start: Problem | ContactPair,
+    grid: SweepGrid,
+    store: Path | None = None,
+    *,
+    fresh: bool = False,
+    retry: bool = False,
+) -> Plan:
     """What a sweep would do; nothing is run, and no store is made.
 
     Raises
@@ -142,14 +162,15 @@ def plan(start: Problem | ContactPair, grid: SweepGrid, store: Path | None = Non
     ProblemError
         As for a sweep.
     """
-    stored, damaged, others = 0, 0, dict[str, int]()
+    known, others = Known(rows={}, failed=0, errors=0, damaged=0), dict[str, int]()
     if store is not None and store.exists():
-        with Kept(store, start, grid) as kept:
-            stored, damaged, others = len(kept.known.rows), kept.known.damaged, kept.others
+        with Kept(store, start, grid, fresh=fresh, retry=retry) as kept:
+            known, others = kept.known, kept.others
     return Plan(
         asked=len(grid),
-        stored=0 if fresh else stored,
-        damaged=damaged,
+        stored=len(known.rows),
+        damaged=known.damaged,
+        errors=known.errors,
         others=others,
         store=store,
         units=start.units if start.units else UNITS,

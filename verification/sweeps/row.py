@@ -24,8 +24,9 @@ Row = dict[str, Any]
 #: The columns of a row that the grid may vary.
 GIVEN = ("theta", "friction", "young1", "young2", "neumann_body", "refine", "law", "radius", "rule")
 
-#: Outcomes of a row that has no run.
-FAILED = ("refused", "error")
+#: Outcomes of a row that has no run.  What is refused is refused again; an error may have had a reason that passes.
+REFUSED, ERROR = "refused", "error"
+FAILED = (REFUSED, ERROR)
 
 #: The columns of a row after the values of the grid.
 RESULTS = (
@@ -60,23 +61,23 @@ def row(problem: Problem | ContactPair, values: Mapping[str, Any], bodies: Bodie
             found |= _of_pair(setting.pair)
             why |= _run(found, setting, values)
     except ProblemError as error:
-        found["outcome"] = "refused"
+        found["outcome"] = REFUSED
         why["outcome"] = str(ProblemError("", error.key, error.value, error.needed))  # wherever the file lies
     except HypothesisError as error:
-        found["outcome"] = "refused"
+        found["outcome"] = REFUSED
         why["outcome"] = str(error)
     except (ContactError, SolveError) as error:
-        found["outcome"] = "error"
+        found["outcome"] = ERROR
         why["outcome"] = str(error)
     except Exception as error:  # the fault of one row costs no other row
-        found["outcome"] = "error"
+        found["outcome"] = ERROR
         why["outcome"] = f"{type(error).__name__}: {error}"
     return _closed(found, why)
 
 
 def lost(problem: Problem | ContactPair, values: Mapping[str, Any], words: str) -> Row:
     """The row of a run that ended with the process that made it."""
-    return _closed(_given(Bodies(problem), values) | dict.fromkeys(RESULTS) | {"outcome": "error"}, {"outcome": words})
+    return _closed(_given(Bodies(problem), values) | dict.fromkeys(RESULTS) | {"outcome": ERROR}, {"outcome": words})
 
 
 def _closed(found: Row, why: Mapping[str, str]) -> Row:

@@ -11,7 +11,7 @@ import contextlib
 import json
 import sqlite3
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,7 +20,7 @@ from verification.interrupts import undisturbed
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
 from verification.sweeps.identity import Identity
-from verification.sweeps.row import FAILED, Row
+from verification.sweeps.row import ERROR, FAILED, Row
 
 #: Tells a store from other files of SQLite: "ndth".
 APPLICATION = 0x6E647468
@@ -62,12 +62,15 @@ class Known:
     rows : dict from the number of a key to its row as :func:`written` has it
     failed : int
         How many of them have no run.
+    errors : int
+        How many of those ended in an error.
     damaged : int
         How many rows are there that do not agree with their checksum; they count as missing.
     """
 
     rows: dict[int, bytes]
     failed: int
+    errors: int
     damaged: int
 
 
@@ -134,26 +137,33 @@ class Store:
                 self._file.execute("PRAGMA journal_mode = DELETE")
             self._file.close()
 
-    def known(self, keys: Sequence[bytes]) -> Known:
+    def known(self, keys: Sequence[bytes], again: Callable[[str], bool] = lambda outcome: False) -> Known:
         """The rows of some keys.
+
+        Parameters
+        ----------
+        keys : sequence of bytes
+        again : callable
+            From an outcome to whether rows that have it count as missing.
 
         Raises
         ------
         StoreError
         """
         found: dict[int, bytes] = {}
-        damaged = failed = 0
+        damaged = failed = errors = 0
         with self._told(), self._wanted(keys):
             for number, key, outcome, text, crc in self._file.execute(
                 "SELECT number, rows.key, outcome, CAST(row AS BLOB), crc"
                 " FROM temp.wanted JOIN rows ON rows.key = wanted.key"
             ):
-                if crc == _crc(key, text):
+                if crc != _crc(key, text):
+                    damaged += 1
+                elif not again(outcome):
                     found[number] = text
                     failed += outcome in FAILED
-                else:
-                    damaged += 1
-        return Known(rows=found, failed=failed, damaged=damaged)
+                    errors += outcome == ERROR
+        return Known(rows=found, failed=failed, errors=errors, damaged=damaged)
 
     def count(self, keys: Sequence[bytes]) -> int:
         """How many of the keys have a row.

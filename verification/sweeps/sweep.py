@@ -47,7 +47,7 @@ class Sweep(Document):
     stored : int
         How many rows a store had already.
     notes : tuple of str
-        What the store has that was not used, in words.
+        What the store has that was not used, or ended in an error, in words.
     """
 
     schema: ClassVar[str] = "ndtheory.sweep/1"
@@ -146,6 +146,7 @@ def sweep(
     jobs: int = 1,
     store: Path | str | None = None,
     fresh: bool = False,
+    retry: bool = False,
     dask: str | None = None,
     progress: Progress = silent,
 ) -> Sweep:
@@ -172,6 +173,8 @@ def sweep(
         A file that keeps each row once it is made, and has those that were made before; made where there is none.
     fresh : bool
         Whether rows that the store has are made again.
+    retry : bool
+        Whether those of them are made again that ended in an error: its reason may have passed.
     dask : str, optional
         The address of a dask scheduler, whose workers make the rows; ``jobs`` is not used then.
     progress : callable
@@ -192,10 +195,9 @@ def sweep(
 
     Examples
     --------
-    >>> bars = {"dimension": 1,
-    ...     "body1": {"shape": "interval", "x": [0, 1], "cells": 4, "young": 2, "fixed": ["left"]},
-    ...     "body2": {"shape": "interval", "x": [1, 2], "cells": 4, "young": 1, "prescribed": {"right": -0.1}}}
-    >>> found = sweep(Problem.from_dict(bars), theta=["1/3", 0.5])
+    >>> from verification.problem.examples import example
+    >>> bars = example("two-bars").changed(young=(2, 1))
+    >>> found = sweep(bars, theta=["1/3", 0.5])
     >>> [(round(row["theta"], 3), row["iterations"], round(row["rho"], 12)) for row in found.rows]
     [(0.333, 1, 2.0), (0.5, 30, 2.0)]
     """
@@ -208,7 +210,7 @@ def sweep(
     axes = {"theta": theta, "friction": friction, "young": young, "neumann_body": neumann_body, "refine": refine}
     grid = SweepGrid.of(axes | {"law": law, "radius": radius, "rule": rule}, of)
     place = None if store is None else Path(store)
-    return sweep_grid(start, grid, work=work_of(jobs, dask), store=place, fresh=fresh, progress=progress)
+    return sweep_grid(start, grid, work=work_of(jobs, dask), store=place, fresh=fresh, retry=retry, progress=progress)
 
 
 def sweep_grid(
@@ -218,13 +220,14 @@ def sweep_grid(
     work: Work | None = None,
     store: Path | None = None,
     fresh: bool = False,
+    retry: bool = False,
     progress: Progress = silent,
 ) -> Sweep:
     """As :func:`sweep`, over a grid that is read already.
 
     Parameters
     ----------
-    start, grid, store, fresh, progress
+    start, grid, store, fresh, retry, progress
         As :func:`sweep` has them.
     work : callable, optional
         Who makes the rows, as :func:`verification.sweeps.workers.work_of` says; this process by default.
@@ -232,12 +235,12 @@ def sweep_grid(
     wanted = list(grid.rows())
     done: dict[int, Row | bytes] = {}
     with contextlib.ExitStack() as stack:
-        kept = None if store is None else stack.enter_context(Kept(store, start, grid))
-        if kept is not None and not fresh:
+        kept = None if store is None else stack.enter_context(Kept(store, start, grid, fresh=fresh, retry=retry))
+        if kept is not None:
             done |= kept.known.rows
         stored = len(done)
         todo = [(i, values) for i, values in enumerate(wanted) if i not in done]
-        failed = kept.known.failed if stored and kept is not None else 0
+        failed = 0 if kept is None else kept.known.failed
         tally = Tally(asked=len(wanted), stored=stored, failed=failed, progress=progress)
         try:
             tally.tell()

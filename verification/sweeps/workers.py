@@ -47,7 +47,7 @@ class Stopped(ProblemError):
 def work_of(jobs: int, dask: str | None = None) -> Work:
     """Who makes rows: the workers of a dask scheduler, this process for one job, else processes of this machine."""
     if dask is not None:
-        from verification.sweeps.cluster import on_cluster
+        from verification.sweeps.cluster import on_cluster  # it sends what stands here
 
         return on_cluster(dask)
     return alone if jobs == 1 else together(jobs)

@@ -1,0 +1,127 @@
+"""The references of a page, in its notebook, say what they say on the site."""
+
+from pathlib import Path
+
+import pytest
+from processes import sites
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+#: A site that writes the text of one page as its notebook has it.
+CONF = """
+import sys
+from pathlib import Path
+
+sys.path.append({docs!r})
+from builder.notebooks import plain
+from builder.references import References
+
+project, extensions = "references", ["myst_parser", "sphinx_proof", "sphinxcontrib.bibtex"]
+myst_enable_extensions, bibtex_bibfiles = ["colon_fence", "dollarmath"], [{bibliography!r}]
+html_baseurl = {base!r}
+
+
+def write(app, failed):
+    text = (Path(app.srcdir) / "examples" / "page.md").read_text("utf-8")
+    (Path(app.outdir) / "told.md").write_text(plain(text, {{}}, References(app, "examples/page")), "utf-8")
+
+
+def setup(app):
+    app.connect("build-finished", write)
+"""
+
+INDEX = """\
+# The theory
+
+(small-friction)=
+## Small friction
+
+:::{prf:theorem} One step contracts
+:label: thm-one
+
+$$ K < 1 $$ (eq-one)
+:::
+
+:::{figure} dot.svg
+:name: fig-dot
+
+A dot.
+:::
+
+```{toctree}
+examples/page
+```
+
+```{bibliography}
+```
+"""
+
+DOT = '<svg xmlns="http://www.w3.org/2000/svg" width="1" height="1"/>'
+
+PAGE = """\
+# A page
+
+:::{prf:lemma} Two norms
+:label: lem-two
+
+$$
+a \\le b
+$$ (eq-two)
+:::
+
+See {doc}`../index`, {doc}`the theory <../index>`, {ref}`small-friction`, {ref}`that part <small-friction>`;
+by {prf:ref}`thm-one`, {prf:ref}`lem-two`, {prf:ref}`the theorem <thm-one>`, {eq}`eq-one` and {eq}`eq-two`,
+seen in {numref}`fig-dot`.
+{cite:t}`BayadaSabilSassi2008` and {cite:t}`HueberWohlmuth2005` prove it {cite}`EckWohlmuth2003`.
+"""
+
+TOLD = """\
+# A page
+
+**Lemma 1** (Two norms)
+
+
+$$
+a \\le b
+\\tag{2}
+$$
+
+
+See *The theory*, the theory, *Small friction*, that part;
+by Theorem 1, Lemma 1, the theorem, (1) and (2),
+seen in Fig. 1.
+Bayada, Sabil and Sassi (2008) and Hüeber and Wohlmuth (2005) prove it (Eck and Wohlmuth 2003).
+"""
+
+LINKS = (
+    "See [The theory](https://a.org/b/index.html), [the theory](https://a.org/b/index.html),"
+    " [Small friction](https://a.org/b/index.html#small-friction)"
+)
+
+
+@pytest.fixture
+def told(tmp_path):
+    """From the place of a site to the text of its page; without the tools of the site there is none."""
+    pytest.importorskip("sphinx_proof", reason="the tools of the site are not installed: make docs")
+
+    def build(name, base):
+        folder = tmp_path / name
+        (folder / "examples").mkdir(parents=True)
+        conf = CONF.format(docs=str(DOCS), bibliography=str(DOCS / "references.bib"), base=base)
+        files = {"conf.py": conf, "index.md": INDEX, "examples/page.md": PAGE, "dot.svg": DOT}
+        for path, text in files.items():
+            (folder / path).write_text(text, encoding="utf-8")
+        return folder
+
+    folders = [build("here", ""), build("hosted", "https://a.org/b")]
+    assert sites(*folders) == "here 0\nhosted 0\n"
+    return {folder.name: (folder / "built" / "told.md").read_text("utf-8") for folder in folders}
+
+
+def test_references_are_words_in_a_notebook_and_links_once_the_site_has_an_address(told):
+    assert told["here"] == TOLD
+    assert LINKS in told["hosted"]
+    assert (
+        "by [Theorem 1](https://a.org/b/index.html#thm-one), [Lemma 1](https://a.org/b/examples/page.html#lem-two)"
+        in (told["hosted"])
+    )
