@@ -6,7 +6,7 @@ A small core in which every matrix is exact for its mesh.  It knows nothing of c
 from fem1d2d.assembly import body_load, facet_weights, gram, side_load, stiffness
 from fem1d2d.condense import Condensation, elimination_order, solver, solver_with_inertia
 from fem1d2d.material import Material, bar, plane_strain
-from fem1d2d.mesh import Mesh, MeshError, interval, rectangle, rectangle_points
+from fem1d2d.mesh import Mesh, MeshError, interval, rectangle, rectangle_points, sector
 from fem1d2d.mesh_files import from_file
 from fem1d2d.pencil import Eigenvalue, Extremes, extremes_by_solves, largest, largest_of, largest_sparse
 from fem1d2d.supports import Supports, rigid_motions, supports
@@ -38,6 +38,7 @@ __all__ = [
     "rectangle",
     "rectangle_points",
     "rigid_motions",
+    "sector",
     "side_load",
     "solver",
     "solver_with_inertia",

@@ -309,3 +309,49 @@ def rectangle(x: Sequence[Any], y: Sequence[Any], cells: tuple[int, int]) -> Mes
         cells=np.concatenate([first.reshape(-1, 3), second.reshape(-1, 3)]),
         sides={"left": edge(node[0]), "right": edge(node[-1]), "bottom": edge(node[:, 0]), "top": edge(node[:, -1])},
     )
+
+
+def sector(angles: Sequence[float], radii: Sequence[float], cells: int) -> Mesh:
+    """A sector of a disc around the origin: triangles at its apex, and split quadrilaterals between the other radii.
+
+    Radii that grow like powers of one number give cells of one shape, as small as wanted at the apex.  Nodes are
+    numbered from the apex outwards, on each arc from the first angle to the second.  Sides: ``first`` and ``second``
+    at both angles, ``arc``.
+
+    Parameters
+    ----------
+    angles : pair of float
+        In radians, the first the smaller, less than 2 pi apart.
+    radii : sequence of float
+        Growing, positive; unit length.
+    cells : int
+        Cells along an arc.
+
+    Raises
+    ------
+    MeshError
+        No cell, angles or radii in the wrong order, or a whole turn.
+
+    Examples
+    --------
+    >>> mesh = sector((0.0, 2.0), (0.5, 1.0), 3)
+    >>> len(mesh.points), len(mesh.cells), sorted(mesh.sides)
+    (9, 9, ['arc', 'first', 'second'])
+    """
+    turns, r = _grid([float(angle) for angle in angles], cells), np.array(radii, float)
+    if not angles[1] - angles[0] < 2 * np.pi:
+        raise MeshError(f"angles {angles[0]}, {angles[1]}: less than 2 pi apart is needed")
+    if r.ndim != 1 or not len(r) or not (np.diff(r, prepend=0.0) > 0).all():
+        raise MeshError(f"radii {list(radii)}: growing positive numbers are needed")
+    around = np.multiply.outer(r, np.stack([np.cos(turns), np.sin(turns)], axis=-1)).reshape(-1, 2)
+    node = 1 + np.arange(len(around)).reshape(len(r), cells + 1)
+    fan = np.column_stack([np.zeros(cells, dtype=np.int64), node[0, :-1], node[0, 1:]])
+    near, far, far_next, near_next = node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]
+    halves = [np.stack(corners, -1).reshape(-1, 3) for corners in ((near, far, far_next), (near, far_next, near_next))]
+    edge = lambda line: np.column_stack([line[:-1], line[1:]])
+    rays = [edge(np.concatenate([[0], node[:, j]])) for j in (0, -1)]
+    return Mesh(
+        points=np.concatenate([np.zeros((1, 2)), around]),
+        cells=np.concatenate([fan, *halves]),
+        sides={"first": rays[0], "second": rays[1], "arc": edge(node[-1])},
+    )

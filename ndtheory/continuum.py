@@ -6,6 +6,7 @@ moved as given, and no other one is held.  S is the convolution with the hat ker
 * ``C_s^2 <= sup over xi of S_NN(xi) sinc^4(r xi/2)`` with the strip of the Neumann body (:mod:`ndtheory.strip`),
 * ``C_ta^2 <= (d/G) K`` with a rational K (:mod:`ndtheory.segments`),
 * ``rho <= (1 + eps) R`` with R the largest ratio of both strips' forms, and eps the energy of a cut-off,
+* ``rho`` is at least what the wedges at both ends of Gamma_c dictate (:mod:`ndtheory.wedges`),
 * ``rho_normal <= s`` where the mirror image of the contact body fits (:func:`ndtheory.moduli.mirror`).
 
 The proofs are in ``docs/continuum.md``.  Every number here is exact or rounded outward, so what follows from them is
@@ -27,6 +28,7 @@ from ndtheory.segments import bound, bound_at_end, zones
 from ndtheory.sharp import evaluate_sharp
 from ndtheory.sharp_bounds import SharpBounds
 from ndtheory.strip import Strip, largest_ratio_of_strips, largest_smoothed
+from ndtheory.wedges import Wedge, end_bound
 
 #: A little more than 4/pi^2.
 FOUR_OVER_PI_SQUARE = Fraction(40529, 100000)
@@ -124,7 +126,7 @@ class TwoRectangles:
 
 @dataclass(frozen=True, kw_only=True)
 class ContinuumConstants:
-    """Upper bounds of the constants in energy norms, exact rationals.
+    """Upper bounds of the constants in energy norms, exact rationals, and a lower bound of rho.
 
     Attributes
     ----------
@@ -140,6 +142,8 @@ class ContinuumConstants:
         eps; None where Gamma_c reaches an end of the Neumann body.
     rho : Fraction or None
         ``(1 + eps) R``; None where eps is.
+    rho_ends : Fraction
+        What the wedges at the ends of Gamma_c dictate: rho is at least this.
     rho_normal : Fraction or None
         s; None where the mirror image does not fit.
     reason : dict
@@ -153,6 +157,7 @@ class ContinuumConstants:
     strips: Fraction
     cut_off: Fraction | None
     rho: Fraction | None
+    rho_ends: Fraction
     rho_normal: Fraction | None
     reason: dict[str, str]
 
@@ -181,8 +186,28 @@ def cut_off(model: TwoRectangles) -> Fraction | None:
     return (along + across) * steepest
 
 
+def ends(model: TwoRectangles) -> Fraction:
+    """The larger one of the lower bounds of rho from both ends of Gamma_c.
+
+    There a rectangle is a wedge of 90 degrees where it ends with Gamma_c, and of 180 degrees where it goes on; the side
+    beyond Gamma_c is free.
+    """
+    lo, hi = model.interval
+    openings = {
+        tuple(180 if goes_on else 90 for goes_on in sides)
+        for sides in (
+            (model.contact.left < lo, model.neumann.left < lo),
+            (hi < model.contact.right, hi < model.neumann.right),
+        )
+    }
+    contact, neumann = model.contact.body, model.neumann.body
+    return max(
+        end_bound(Wedge(body=contact, degrees=one), Wedge(body=neumann, degrees=other)).least for one, other in openings
+    )
+
+
 def continuum_constants(model: TwoRectangles) -> ContinuumConstants:
-    """Bound C_s, C_t1, C_t2 and rho for the continuum.
+    """Bound C_s, C_t1, C_t2 from above and rho from both sides for the continuum.
 
     Raises
     ------
@@ -214,6 +239,7 @@ def continuum_constants(model: TwoRectangles) -> ContinuumConstants:
         strips=strips,
         cut_off=eps,
         rho=None if eps is None else (1 + eps) * strips,
+        rho_ends=ends(model),
         rho_normal=mirrored,
         reason=reason,
     )

@@ -154,7 +154,8 @@ def end(contact: Moduli, neumann: Moduli, openings: tuple[float, float]) -> tupl
     ``d' K^-1 d log(1/e) + O(1)`` on each body.  For every force rho is at least the work on the Neumann body over that
     on the contact body: as e tends to 0, at least the largest eigenvalue of ``(K_c, K_n)``.  The mesh approaches the
     values like ``1/log^2 h``, from inside.  In space an end is an edge, and forces along it add
-    ``(G_c alpha_c)/(G_n alpha_n)``.
+    ``(G_c alpha_c)/(G_n alpha_n)``.  In the plane :func:`ndtheory.wedges.end_bound` looks at every power of r, of
+    which a force at the apex is a limit, and may find a larger ratio; ``docs/continuum.md`` has the proof of both.
 
     Parameters
     ----------

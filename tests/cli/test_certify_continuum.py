@@ -20,7 +20,7 @@ def test_the_document_has_one_proved_end_for_each_bound(call, write):
     for name, number in document["constants"].items():
         if name != "segments":
             assert number["level"] == "guaranteed"
-            assert number["value"] == (number["lo"] if name == "rho_least" else number["hi"])
+            assert number["value"] == (number["lo"] if name in ("rho_least", "rho_ends") else number["hi"])
     assert document["factor"]["lo"] is None
     assert document["factor"]["hi"] < 0.947
     assert document["friction_threshold"]["hi"] is None
@@ -42,6 +42,7 @@ def test_where_gamma_c_reaches_an_end_small_theta_are_proved_and_none_in_numbers
     assert answer.status == 1
     assert "Every small theta contracts for k < 0.3076" in said
     assert "For no single theta is anything proved" in said
+    assert "rho >= 19.26 wedges at the ends of Gamma_c" in said
 
 
 def test_the_mesh_plays_no_part(call, write):

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import fewer, in_floats, lines, meshes, numbers, plane_meshes, renumbered
 
-from fem1d2d import Mesh, MeshError, interval, rectangle
+from fem1d2d import Mesh, MeshError, interval, rectangle, sector
 from fem1d2d.mesh import measures
 
 sizes = numbers(Fraction(1, 4), 3, 12)
@@ -136,6 +136,22 @@ def test_the_boundary_of_an_annulus_has_two_circles():
     assert edges(hollow.boundary) == edges(mesh.boundary) | inner_edges
 
 
+@given(st.floats(-6, 6), st.floats(0.1, 6.2), st.integers(1, 4), counts)
+def test_a_sector_has_the_area_of_its_polygon_and_its_sides_lie_on_both_rays_and_the_arc(first, opening, arcs, n):
+    radii = np.geomspace(1e-12, 1, arcs)
+    n += 2 * int(opening)  # at most half a turn for each cell
+    mesh = sector((first, first + opening), radii, n)
+    assert measures(mesh.points, mesh.cells).sum() == pytest.approx(n * np.sin(opening / n) / 2 * radii[-1] ** 2)
+    assert set().union(*[edges(facets) for facets in mesh.sides.values()]) == edges(mesh.boundary)
+    for side, angle in (("first", first), ("second", first + opening)):
+        inner, outer = mesh.points[mesh.sides[side]].transpose(1, 0, 2)
+        assert np.hypot(*outer.T) == pytest.approx(radii)
+        assert np.hypot(*inner.T) == pytest.approx([0, *radii[:-1]])
+        assert outer @ [-np.sin(angle), np.cos(angle)] == pytest.approx(0 * radii, abs=1e-12)
+        assert (outer @ [np.cos(angle), np.sin(angle)] > 0).all()
+    assert np.hypot(*mesh.points[mesh.sides["arc"]].reshape(-1, 2).T) == pytest.approx(radii[-1])
+
+
 # --- frozen -----------------------------------------------------------------------------------------------------------
 
 
@@ -232,6 +248,22 @@ def test_ends_that_are_not_in_order_are_refused(ends):
     for pair in [(ends, (0.0, 1.0)), ((0.0, 1.0), ends)]:
         with pytest.raises(MeshError, match=message):
             rectangle(*pair, (2, 2))
+
+
+@pytest.mark.parametrize(
+    ("angles", "radii", "cells", "message"),
+    [
+        ((0, 1), (1.0,), 0, "0 cells: at least one is needed"),
+        ((1, 0), (1.0,), 2, "the first must be the smaller"),
+        ((0, 7), (1.0,), 2, "less than 2 pi apart"),
+        ((0, 1), (), 2, "growing positive numbers"),
+        ((0, 1), (0.0, 1.0), 2, "growing positive numbers"),
+        ((0, 1), (1.0, 0.5), 2, "growing positive numbers"),
+    ],
+)
+def test_a_sector_that_is_none_is_refused(angles, radii, cells, message):
+    with pytest.raises(MeshError, match=message):
+        sector(angles, radii, cells)
 
 
 def test_an_interval_too_short_for_its_floats_is_refused():

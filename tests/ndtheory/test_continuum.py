@@ -306,6 +306,19 @@ def test_the_bounds_of_section_6_lie_above_what_is_known_of_its_constants(sectio
     assert section6.C_t2_square * shear == pytest.approx(0.3)
 
 
+def test_an_end_bounds_rho_by_the_wedges_that_the_rectangles_are_there(section6):
+    def ends(**changes):
+        return float(continuum_constants(model(**changes)).rho_ends)
+
+    assert section6.rho_ends == half_planes(SOFT, HARD).high < section6.rho  # 90 degrees on a flat body add nothing
+    upper, lower = body("0.4", "1.6", SOFT), body(0, 2, HARD)
+    assert ends(contact=lower, neumann=upper) == pytest.approx(3.5 * np.pi / (np.pi / 2 - 1), rel=1e-9)
+    assert ends(neumann=body("0.4", 2, HARD)) == pytest.approx(2 / 7 * (np.pi + 2) / (np.pi - 2), rel=1e-9)
+    assert ends(neumann=body(0, "1.6", HARD)) == ends(neumann=body("0.4", 2, HARD))  # either end
+    inside = ends(contact=lower, neumann=upper, interval=(F("0.5"), F("1.5")))
+    assert inside == pytest.approx(float(half_planes(HARD, SOFT).high))  # both go on
+
+
 def test_the_statement_is_that_of_the_theorem_for_the_upper_bounds(section6):
     k = F("0.2")
     first, second = section6.kappa(k)

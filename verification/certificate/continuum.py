@@ -126,6 +126,7 @@ class ContinuumCertificate(Document):
                 "cut_off": one(c.cut_off),
                 "rho": one(c.rho),
                 "rho_least": lower(half_planes(*moduli).high).to_dict(),
+                "rho_ends": lower(c.rho_ends).to_dict(),
                 "rho_normal": one(c.rho_normal),
                 "kappa_1": one(kappas[0]),
                 "kappa_2": one(kappas[1]),

@@ -69,6 +69,7 @@ def show(found: ContinuumCertificate, typed: Typed | None = None) -> None:
             ("eps", _at_most(constants["cut_off"]), "", "cut-off beside Gamma_c, segments"),
             ("rho", _at_most(constants["rho"]), "", "(1 + eps) R"),
             ("rho", _at_least(constants["rho_least"]), "", "half-planes"),
+            ("rho", _at_least(constants["rho_ends"]), "", "wedges at the ends of Gamma_c"),
             ("rho_normal", _at_most(constants["rho_normal"]), "", "mirror image"),
             ("kappa_1", _at_most(constants["kappa_1"]), "", "k C_s C_t1"),
             ("kappa_2", _at_most(constants["kappa_2"]), "", "k C_s C_t2"),
