@@ -6,9 +6,8 @@
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
-PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check
-# A lock holds all that is needed: pip resolves nothing, and a module is compiled when it is first imported.
-LOCKED := $(PIP) --no-deps --no-compile --editable . --requirement
+UV     := uv==0.13.9
+INSTALL = $(BIN)/python .ci/install.py $(1) $(UV)
 LOCKS  := requirements.lock requirements-test.lock requirements-run.lock
 NEEDS  := pyproject.toml $(LOCKS) ndtheory/__init__.py
 
@@ -45,7 +44,7 @@ bench: $(VENV)/.test
 COMPILE := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --no-header
 
 lock: $(VENV)/.venv
-	$(PIP) uv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check $(UV)
 	$(COMPILE) --all-extras --output-file requirements.lock pyproject.toml
 	$(COMPILE) --constraint requirements.lock --no-annotate --output-file requirements-run.lock pyproject.toml
 	$(COMPILE) --constraint requirements.lock --no-annotate --extra test --output-file requirements-test.lock pyproject.toml
@@ -56,18 +55,15 @@ $(VENV)/.venv:
 	touch $@
 
 $(VENV)/.run: $(VENV)/.venv $(NEEDS)
-	$(LOCKED) requirements-run.lock
-	$(BIN)/python -m pip check
+	$(call INSTALL,requirements-run.lock)
 	touch $@
 
 $(VENV)/.test: $(VENV)/.venv $(NEEDS)
-	$(LOCKED) requirements-test.lock
-	$(BIN)/python -m pip check
+	$(call INSTALL,requirements-test.lock)
 	touch $(VENV)/.run $@
 
 $(VENV)/.docs: $(VENV)/.venv $(NEEDS)
-	$(LOCKED) requirements.lock
-	$(BIN)/python -m pip check
+	$(call INSTALL,requirements.lock)
 	touch $(VENV)/.run $(VENV)/.test $@
 
 clean:

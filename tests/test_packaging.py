@@ -1,10 +1,14 @@
 """Which Pythons are promised, tried and run: the same in the classifiers, the workflow, the Makefile and the README."""
 
 import re
+import runpy
+import subprocess
+import sys
 import tomllib
 from collections.abc import Iterable
 from itertools import chain
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -22,9 +26,14 @@ def test_every_promised_python_runs_the_whole_suite_in_the_workflow():
     [matrix] = re.findall(r"python: \[(.*)\]", workflow)
     assert re.findall(r'"(3\.\d+)"', matrix) == PROMISED
     assert "run: bash .ci/run" in workflow
-    assert {"make check", ".venv/bin/python .ci/packages.py"} <= set(read(".ci/run").splitlines())
     [check] = re.findall(r"(?m)^check: (.*)$", read("Makefile"))
     assert {"lint", "test", "docs"} <= set(check.split())
+    commands = " ".join(line for line in read(".ci/run").splitlines() if not line.lstrip().startswith("#"))
+    assert ".venv/bin/python .ci/packages.py" in commands
+    for target in check.split():
+        assert re.search(rf"\bmake {re.escape(target).replace(re.escape('$(VENV)'), '.venv')}(?![\w-])", commands), (
+            target
+        )
 
 
 def pinned(lock: str) -> dict[str, str]:
@@ -45,6 +54,60 @@ def test_a_lock_holds_what_its_extras_need_in_the_versions_of_the_whole_lock(loc
     needed = named(PROJECT["dependencies"]).union(*(named(optional[extra]) for extra in extras))
     assert needed <= set(found)
     assert (named(chain.from_iterable(optional.values())) - needed) & set(found) <= {"mpmath"}  # sympy needs it too
+
+
+INSTALL = SimpleNamespace(**runpy.run_path(str(ROOT / ".ci" / "install.py")))
+
+
+def test_what_pip_is_told_of_indexes_and_certificates_is_handed_on_to_uv():
+    listed = """\
+global.index-url='https://a.example.org/simple'
+global.trusted-host='a.example.org b.example.org'
+install.find-links='one two'
+:env:.cert='/etc/ours.pem'
+:env:.index-url='https://b.example.org/simple'
+:env:.disable-pip-version-check='1'
+"""
+    assert INSTALL.settings(listed) == {
+        "UV_DEFAULT_INDEX": "https://b.example.org/simple",
+        "UV_INSECURE_HOST": "a.example.org b.example.org",
+        "UV_FIND_LINKS": "one,two",
+        "SSL_CERT_FILE": "/etc/ours.pem",
+    }
+    assert INSTALL.settings("") == {}
+
+
+@pytest.mark.parametrize("name", ["extra-index-url", "no-binary", "target", "a-setting-of-tomorrow"])
+def test_a_setting_that_uv_lacks_is_named(name):
+    with pytest.raises(ValueError, match=name):
+        INSTALL.settings(f"global.index-url='https://a.example.org'\nglobal.{name}='x'\n")
+
+
+@pytest.mark.parametrize(
+    ("fails", "listed", "told"),
+    [
+        (None, "", ""),
+        (None, "global.no-binary=':all:'\n", "uv has no setting like pip's no-binary"),
+        ("--only-binary", "", "pip finds no wheel of uv==1.2"),
+        ("--python", "", "uv: no route to the index"),
+    ],
+    ids=["uv installs", "a setting of pip", "no wheel", "uv fails"],
+)
+def test_pip_installs_the_lock_where_uv_does_not_and_says_why_in_one_line(monkeypatch, capsys, fails, listed, told):
+    ran = []
+
+    def run(command, **options):
+        ran.append(command)
+        return SimpleNamespace(returncode=int(fails in command), stdout=listed, stderr="no route\n  to the index\n")
+
+    monkeypatch.setattr(subprocess, "run", run)
+    monkeypatch.setattr(sys, "argv", ["install.py", "some.lock", "uv==1.2"])
+    INSTALL.main()
+    by = [command[2] for command in ran if "some.lock" in command]
+    assert by == (["uv"] if not told else ["uv", "pip"] if fails == "--python" else ["pip"])
+    assert all("--no-deps" in command for command in ran if "some.lock" in command)
+    assert ran[-1][-1] == "check"
+    assert capsys.readouterr().out == (f"{told}; pip installs some.lock, which takes longer\n" if told else "")
 
 
 def test_the_least_promised_python_is_the_one_that_is_needed():

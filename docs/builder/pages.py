@@ -1,8 +1,9 @@
-"""What the pages need of Sphinx: widgets, notebooks to download, the index of equations, several processes."""
+"""What the pages need of Sphinx: widgets, notebooks, the index of equations, several processes, a shared navigation."""
 
 from __future__ import annotations
 
 from collections.abc import Set
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -97,6 +98,31 @@ def load_scripts(app: Sphinx, page: str, template: str, context: dict[str, Any],
         app.add_css_file("widgets.css")
 
 
+def share_navigation(
+    known: dict[tuple[Any, ...], str], app: Sphinx, page: str, template: str, context: dict[str, Any], doctree: Any
+) -> None:
+    """Make the navigation once for all pages of source code that lie equally deep.
+
+    They stand in no table of contents, and no document in their folder: marks and relative links are the same.  Sphinx
+    would copy all headings of the site for each of them, a quarter of a second a page.
+
+    Parameters
+    ----------
+    known : dict
+        What was made before: depth and options -> HTML.
+    """
+    if page.startswith("_modules/"):
+        make = context["toctree"]
+
+        def toctree(**options: Any) -> str:
+            key = (page.count("/"), *sorted(options.items()))
+            if key not in known:
+                known[key] = make(**options)
+            return known[key]
+
+        context["toctree"] = toctree
+
+
 def is_notebook(app: Sphinx, page: str) -> bool:
     """Whether a page is offered as a notebook: it has code cells, and its head does not say ``notebook: none``."""
     head = app.env.metadata.get(page, {})
@@ -148,5 +174,6 @@ def setup(app: Sphinx) -> dict[str, bool]:
     app.connect("builder-inited", write_equations)
     app.connect("html-page-context", link_notebook)
     app.connect("html-page-context", load_scripts)
+    app.connect("html-page-context", partial(share_navigation, {}), priority=400)  # before the theme asks for it
     app.connect("build-finished", write_notebooks)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
