@@ -110,9 +110,9 @@ class Interval:
 
 
 def _rounded(value: Any, context: Context) -> Decimal:
-    if isinstance(value, Decimal):
-        return context.plus(value)
-    exact = Fraction(value)
+    if isinstance(value, (Decimal, int)):
+        return context.create_decimal(value)
+    exact = value if isinstance(value, Fraction) else Fraction(value)
     return context.divide(Decimal(exact.numerator), Decimal(exact.denominator))
 
 
@@ -136,7 +136,16 @@ def sinc(t: Interval) -> Interval:
 def _sinc(t: Decimal) -> Interval:
     square = Interval.of(t).square()
     term = total = Interval.of(1)
-    for j in range(1, 26):
-        term = term * square / (2 * j * (2 * j + 1))
-        before, total = total, (total - term if j % 2 else total + term)
+    for j, ratio in enumerate(_RATIOS, start=1):
+        term = term * square * ratio
+        before, total = total, (total + -term if j % 2 else total + term)
+        if term.hi < _SMALL:
+            break
     return Interval(min(before.lo, total.lo), max(before.hi, total.hi))
+
+
+#: Each term of the series over ``t^2`` times the one before: 25 of them reach all digits at t = 3.
+_RATIOS = [Interval.of(Fraction(1, 2 * j * (2 * j + 1))) for j in range(1, 26)]
+
+#: A term that adds no digit to sinc, which is at least 0.04 up to t = 3.
+_SMALL = Decimal(10) ** -(DIGITS + 2)

@@ -26,9 +26,15 @@ pytest.register_assert_rewrite("complaints", "section_5", "pieces")
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-def pytest_collection_finish(session):
-    """What was collected lives to the end: the garbage collector need not look through it again and again."""
-    gc.freeze()
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """What is collected lives to the end: the garbage collector need not look through it again and again."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 @pytest.fixture(scope="session")
@@ -68,9 +74,25 @@ def evidence(shared):
 
 
 @pytest.fixture
+def known_continuum(monkeypatch, shared):
+    """The constants of the continuum are computed once for the same two rectangles."""
+    from verification.certificate import continuum
+
+    compute = continuum.continuum_constants
+    known = lambda model: shared(("continuum", model), lambda: compute(model))
+    monkeypatch.setattr(continuum, "continuum_constants", known)
+
+
+@pytest.fixture
 def known_bounds(monkeypatch, shared):
-    """Losses and semidefinite bounds of the same bodies are computed once, where a test is not about them."""
-    from known import DEAR, once
+    """Losses and semidefinite bounds of the same bodies are computed once, where a test is not about them.
+
+    So is what cvxpy makes of the same run.
+    """
+    from known import DEAR, once, repeated_once
+
+    from verification import comparison
 
     for module, name in DEAR:
         monkeypatch.setattr(module, name, once(getattr(module, name), shared))
+    monkeypatch.setattr(comparison, "by_cvxpy_alone", repeated_once(comparison.by_cvxpy_alone, shared))

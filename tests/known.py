@@ -1,4 +1,4 @@
-"""What does not depend on a run is computed once: the bounds of one pair of bodies, for all processes of a session."""
+"""Bounds of one pair of bodies, and one run repeated by cvxpy, are computed once for all processes of a session."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from typing import Any
 from shared import Shared
 
 from verification import comparison
+from verification.algorithm.reference import Reference
+from verification.algorithm.runs import Run
 from verification.bounds import multipliers, semidefinite
 from verification.constants import Measured
 from verification.interface.pair import ContactPair
@@ -31,5 +33,18 @@ def once(compute: Callable[..., Any], shared: Shared) -> Callable[..., Any]:
         key = (compute.__name__, pair.friction, pair.neumann_body, given, *options.items(), *bytes_, *meshes)
         told = {"progress": progress} if progress else {}
         return shared(key, lambda: compute(pair, measured, *given, **options | told))
+
+    return answer
+
+
+def repeated_once(repeat: Callable[[Run], Reference], shared: Shared) -> Callable[[Run], Reference]:
+    """A function of a run that keeps its answers by the bodies, the rule, theta and every iterate."""
+
+    def answer(run: Run) -> Reference:
+        pair = run.pair
+        arrays = [pair.contact.stiffness, pair.neumann.stiffness, *(each.g for each in run.iterates)]
+        given = (pair.settings, pair.friction, pair.neumann_body, run.rule, run.theta, run.evaluations)
+        key = (repeat.__name__, *given, *(array.tobytes() for array in arrays))
+        return shared(key, lambda: repeat(run))
 
     return answer

@@ -18,24 +18,32 @@ PATIENCE = 900
 #: The command line, for a fresh interpreter.
 COMMAND = "import sys; from verification.cli import main; sys.exit(main())"
 
-#: The same without what takes long and has no part in most of what a process shows: matplotlib and cvxpy.
-SKETCHED = """
+#: The same without matplotlib: figures that nobody looks at.
+UNDRAWN = """
     import sys
     from types import SimpleNamespace
-    from verification import comparison
     from verification.cli import main
-    from verification.contact import ContactError
 
-    def none(run):
-        raise ContactError("not asked for")
-
-    comparison.by_cvxpy_alone = none
     drawn = lambda *args: None
     figures = dict.fromkeys(("draw_bodies", "draw_residuals", "draw_waterfall"), drawn)
     save = lambda figure, path: path.write_bytes(b"<svg/>")
     sys.modules["verification.figures"] = SimpleNamespace(save=save, **figures)
     sys.exit(main())
 """
+
+#: The same without cvxpy too, which repeats the run.
+SKETCHED = (
+    """
+    from verification import comparison
+    from verification.contact import ContactError
+
+    def none(run):
+        raise ContactError("not asked for")
+
+    comparison.by_cvxpy_alone = none
+"""
+    + UNDRAWN
+)
 
 
 @contextmanager
@@ -78,13 +86,15 @@ def sites(*folders: os.PathLike) -> str:
     return answer.stdout
 
 
-def on_a_terminal(*arguments: object, columns: int = 120, streams: Sequence[str] = ("stderr",)) -> str:
+def on_a_terminal(
+    *arguments: object, code: str = COMMAND, columns: int = 120, streams: Sequence[str] = ("stderr",)
+) -> str:
     """What the command writes to a terminal, without its movements; ``streams`` of stdout and stderr lead there."""
     leader, follower = pty.openpty()
     environment = os.environ | {"TERM": "xterm", "COLUMNS": str(columns)}
     to = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL} | dict.fromkeys(streams, follower)
     written = b""
-    with running(COMMAND, *arguments, env=environment, **to) as process:
+    with running(code, *arguments, env=environment, **to) as process:
         os.close(follower)
         with suppress(OSError):  # the other end was closed
             while chunk := os.read(leader, 4096):

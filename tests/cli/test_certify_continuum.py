@@ -2,6 +2,8 @@
 
 import pytest
 
+pytestmark = pytest.mark.usefixtures("known_continuum")
+
 
 def test_the_screen_says_that_section_6_contracts_at_its_own_friction(call, write):
     answer = call("certify", "--continuum", write({"contact.radius": "0.1"}), "--theta", "0.4")

@@ -12,6 +12,7 @@ import verification as vf
 from verification import comparison
 from verification.bounds import semidefinite
 from verification.cli import main
+from verification.contact import ContactError
 
 #: Says on the same stdout when something slow begins, unbuffered: the order of its lines is what a reader sees.  The
 #: process ends where figures begin, so that what was not written by then is never written.
@@ -211,10 +212,14 @@ def test_a_reader_that_goes_away_costs_no_file(write, tmp_path):
     assert (tmp_path / "results" / "report.html").exists()
 
 
-def test_the_live_line_of_a_terminal_makes_room_for_each_part(call, write):
+def test_the_live_line_of_a_terminal_makes_room_for_each_part(call, write, monkeypatch):
+    def none(run):
+        raise ContactError("not asked for")
+
+    monkeypatch.setattr(comparison, "by_cvxpy_alone", none)
     file = write("without friction")
     expected = call("compare", file).out.splitlines()
-    text = on_a_terminal("compare", file, columns=200, streams=["stdout", "stderr"])
+    text = on_a_terminal("compare", file, code=SKETCHED, columns=200, streams=["stdout", "stderr"])
     lines = [line.split("\r")[-1] for line in text.replace("\r\n", "\n").split("\n")]  # what a line ends as
     assert "measuring" in text
     assert [line for line in lines if line in expected and line] == [line for line in expected if line]

@@ -67,7 +67,7 @@ def test_region_writes_the_same_over_its_own_picture(region, tmp_path, ending):
     assert len(list(tmp_path.iterdir())) == 1
 
 
-def test_the_screen_of_region_counts_runs_and_gives_each_edition_its_line(region, charted, tmp_path):
+def test_the_screen_of_region_counts_runs_and_gives_each_edition_its_line(region, quick, charted, tmp_path):
     lines = region("-o", tmp_path / "plane.svg").out.splitlines()
     outcomes = [point.outcome for point in charted[2].points]
     assert any(f"{outcomes.count('converged')} converged" in line for line in lines)
@@ -79,7 +79,7 @@ def test_the_screen_of_region_counts_runs_and_gives_each_edition_its_line(region
     assert [line for line in lines[:-1] if len(line) > 80] == []
 
 
-def test_the_document_of_region_is_its_plane(region, charted, tmp_path):
+def test_the_document_of_region_is_its_plane(region, quick, charted, tmp_path):
     answer = region("-o", tmp_path / "plane.svg", "--json")
     found = answer.document
     assert (answer.status, answer.err, found["schema"]) == (0, "", "ndtheory.region/1")
@@ -217,19 +217,19 @@ def test_region_needs_the_name_of_a_picture(call, write):
 
 
 @pytest.fixture
-def short(monkeypatch):
-    """Few points on the borders, no semidefinite bound: what matters is the runs."""
+def short(monkeypatch, quick):
+    """Few points on the borders, no semidefinite bound, few runs, no picture: what matters is which are made."""
 
     def fail(self, subject, progress):
         raise NotComputed("made up")
 
     monkeypatch.setattr(bound, "TRACED", 4)
+    monkeypatch.setattr(plane, "THETAS", (0.1, 0.5, 0.9))
+    monkeypatch.setattr(plane, "FRICTIONS", (0.1, 1.0))
     monkeypatch.setattr(SemidefiniteBound, "region", fail)
 
 
-def test_a_bound_without_a_region_says_why(call, short, write, tmp_path, monkeypatch):
-    monkeypatch.setattr(plane, "THETAS", (0.1,))
-    monkeypatch.setattr(plane, "FRICTIONS", (0.1,))
+def test_a_bound_without_a_region_says_why(call, short, write, tmp_path):
     found = call("region", write(COARSE), "-o", tmp_path / "plane.svg", "--json").document
     assert "lmi" not in found["regions"]
     assert found["reason"] == {"lmi": "made up"}
@@ -238,7 +238,6 @@ def test_a_bound_without_a_region_says_why(call, short, write, tmp_path, monkeyp
 
 @pytest.mark.parametrize("relaxation", ["newton", "momentum"])
 def test_region_runs_a_constant_theta_whatever_the_file_says(call, short, write, tmp_path, monkeypatch, relaxation):
-    monkeypatch.setattr(plane, "THETAS", (0.1, 0.9))
     monkeypatch.setattr(plane, "FRICTIONS", (0.1,))
     chosen = COARSE | {"iteration.relaxation": f'"{relaxation}"', "iteration.theta": '"auto"'}
     points = [
@@ -246,7 +245,7 @@ def test_region_runs_a_constant_theta_whatever_the_file_says(call, short, write,
         for edits in (COARSE, chosen)
     ]
     assert points[0] == points[1]
-    assert [point["theta"] for point in points[0]] == [0.1, 0.9]
+    assert [point["theta"] for point in points[0]] == [0.1, 0.5, 0.9]
 
 
 @pytest.mark.parametrize("last", [1, 4])
