@@ -16,8 +16,9 @@ from fem1d2d.mesh import Floats, Ints
 #: Right-hand sides solved at once; more of them leave the cache.
 BLOCK = 16
 
-#: SuperLU for a matrix whose diagonal can be trusted as pivots.
-SYMMETRIC: dict[str, Any] = {"diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
+#: SuperLU for a matrix whose diagonal can be trusted as pivots.  Panels of 8 columns stay in the cache: a tenth faster
+#: than its own 20.
+SYMMETRIC: dict[str, Any] = {"diag_pivot_thresh": 0.0, "panel_size": 8, "options": {"SymmetricMode": True}}
 
 #: The step of a derivative taken along the imaginary axis, relative to the matrix: its square is far below rounding.
 STEP = 2.0**-70
@@ -82,8 +83,11 @@ class Condensation:
         """``A_BB + A_BI lift``, shape (b, b)."""
         if len(self.inside) == 0:
             return _symmetric(self._on_interface.toarray())
-        schur = self._rest(_factor(self._shifted(self.matrix), self.order))
-        return _symmetric(schur - self._shift * np.eye(len(schur))) if self._shift else schur
+        return self._unshifted(self._rest(_factor(self._shifted(self.matrix), self.order)))
+
+    def _unshifted(self, schur: Floats) -> Floats:
+        """The Schur complement of the matrix from that of the shifted one."""
+        return _symmetric(schur - self._shift * np.eye(len(schur)))
 
     def _shifted(self, matrix: Any) -> Any:
         """The matrix with the shift on the diagonal of its interface."""
@@ -140,6 +144,8 @@ class Condensation:
     def condense(self, load: Floats) -> Floats:
         """The load as the interface feels it: ``load_B + lift' load_I``, shape (b,), of its unit.
 
+        Where the Schur complement is not known yet, the factorisation that this takes gives it too.
+
         Parameters
         ----------
         load : float array, shape (n,)
@@ -148,6 +154,12 @@ class Condensation:
         inner = load[self.inside]
         if not inner.any():  # without a load there is nothing to factorise for
             return np.asarray(load[self.interface])
+        if "schur" not in vars(self):  # one elimination gives both: the load is the last row and column
+            column = sp.csc_array(load[:, None])
+            bordered = sp.block_array([[self._shifted(self.matrix), column], [column.T, None]], format="csc")
+            rest = self._rest(_factor(bordered, np.append(self.order, len(load))))
+            self.schur = self._unshifted(rest[:-1, :-1])
+            return rest[:-1, -1].copy()
         return np.asarray(load[self.interface] - self._coupling.T @ self._solve_inside(inner))
 
     def extend(self, trace: Floats, load: Floats | None = None) -> Floats:
@@ -165,6 +177,73 @@ class Condensation:
         inner = -(self._coupling @ trace)
         full[self.inside] = self._solve_inside(inner if load is None else inner + load[self.inside])
         return full
+
+
+class Uncoupled(Condensation):
+    """A condensation of a matrix that couples no two components of the unknowns, as that of a norm.
+
+    Each component is eliminated alone, and those with the same matrix share one factorisation.
+
+    Parameters
+    ----------
+    matrix, interface, order
+        As for :class:`Condensation`.
+    component : int array, shape (n,)
+        The component of each unknown.
+
+    Examples
+    --------
+    >>> matrix = sp.csc_array(np.kron([[2.0, -1.0], [-1.0, 2.0]], np.eye(2)))
+    >>> Uncoupled(matrix, np.array([2, 3]), np.array([0, 1, 0, 1])).schur
+    array([[1.5, 0. ],
+           [0. , 1.5]])
+    """
+
+    def __init__(self, matrix: sp.csc_array, interface: Ints, component: Ints, order: Ints | None = None) -> None:
+        super().__init__(matrix, interface, order)
+        self.component = component
+
+    @cached_property
+    def _parts(self) -> list[tuple[Ints, Ints, Condensation]]:
+        """For each component its unknowns, its rows on the interface, and its condensation."""
+        parts: list[tuple[Ints, Ints, Condensation]] = []
+        place = np.empty(len(self.component), dtype=np.int64)
+        for component in np.unique(self.component):
+            own = np.flatnonzero(self.component == component)
+            rows = np.flatnonzero(self.component[self.interface] == component)
+            place[own] = np.arange(len(own))
+            matrix, interface = self.matrix[:, own][own], place[self.interface[rows]]
+            same = (part for _, _, part in parts if _equal(part.matrix, matrix, part.interface, interface))
+            order = place[self.order[self.component[self.order] == component]]
+            parts.append((own, rows, next(same, None) or Condensation(matrix, interface, order)))
+        return parts
+
+    @cached_property
+    def schur(self) -> Floats:
+        """``A_BB + A_BI lift``, shape (b, b)."""
+        schur = np.zeros((len(self.interface),) * 2)
+        for _, rows, part in self._parts:
+            schur[np.ix_(rows, rows)] = part.schur
+        return _symmetric(schur)
+
+    def solver(self) -> Callable[[Floats], Floats]:
+        """As :meth:`Condensation.solver`."""
+        solvers = {part: part.solver() for part in {part for _, _, part in self._parts}}
+        parts = [(own, solvers[part]) for own, _, part in self._parts]
+
+        def solve(right: Floats) -> Floats:
+            result = np.empty(right.shape)
+            for own, solve_part in parts:
+                result[own] = solve_part(right[own])
+            return result
+
+        return solve
+
+
+def _equal(one: sp.csc_array, other: sp.csc_array, *places: Ints) -> bool:
+    """Whether two matrices are stored alike, and two lists of places are the same."""
+    pairs = [(one.data, other.data), (one.indices, other.indices), (one.indptr, other.indptr), places]
+    return all(bool(np.array_equal(a, b)) for a, b in pairs)
 
 
 def _symmetric(matrix: NDArray[Any]) -> NDArray[Any]:
@@ -197,7 +276,9 @@ def _factor(matrix: sp.csc_array, order: Ints | None) -> Any:
     """``L U`` of the matrix with its unknowns in the given order; without one, in an order that SuperLU finds."""
     if order is None:
         return splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", **SYMMETRIC)
-    return splu(matrix[:, order][order].tocsc(), permc_spec="NATURAL", **SYMMETRIC)
+    ordered = matrix[:, order][order].tocsc()
+    ordered.eliminate_zeros()
+    return splu(ordered, permc_spec="NATURAL", **SYMMETRIC)
 
 
 def solver(matrix: sp.csc_array, order: Ints | None = None) -> Callable[[Floats], Floats]:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.linalg import cho_factor, cho_solve, eigh
+from scipy.linalg import cho_factor, cho_solve, eigh, eigh_tridiagonal
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from fem1d2d.condense import solver
@@ -23,6 +23,10 @@ LANCZOS = 1e-10
 
 #: Vectors that Lanczos keeps; when they are full it restarts from what they have found.
 BASIS = 24
+
+#: Most steps of the Lanczos without restart that is tried first on sparse matrices; from this one on it looks how far
+#: it is.
+PLAIN, SOON = 40, 8
 
 #: Where one product and one solve are all that is known, they are dearer than memory: vectors kept then, and those of
 #: them that a restart keeps from the lower and from the upper end.
@@ -270,5 +274,45 @@ def largest_sparse(
     n = A.shape[0]
     if n <= DENSE:
         return largest(A.toarray(), B.toarray())
-    nearest = None if above is None else (above, solver(above * B - A, order))
+    if above is None:
+        nearest, vector = None, _plain_lanczos(A, solve_B)
+    else:
+        nearest = (above, solver(above * B - A, order))
+        vector = _plain_lanczos(B, nearest[1])
+    found = rayleigh_quotient(A, B, vector, solve_B)
+    if found.residual <= LANCZOS * abs(found.value):
+        return found
     return largest_of(A.__matmul__, B.__matmul__, solve_B, n, above=nearest)
+
+
+def _plain_lanczos(A: sp.csc_array, solve_B: Callable[[Floats], Floats]) -> Floats:
+    """About an eigenvector of the largest eigenvalue of (A, B): Lanczos for ``B^-1 A`` that never restarts.
+
+    It costs one product and one solve a step, where ARPACK costs three products, and it ends at the step at which the
+    residual is small enough, which ARPACK sees only where its basis is full.
+    """
+    n = A.shape[0]
+    room = min(n, PLAIN)
+    Y, X = np.empty((room, n)), np.empty((room, n))  # y and x = B^-1 y, orthonormal: Y X' = 1
+    diagonal, beside = np.empty(room), np.empty(room)
+    y: Floats = np.random.default_rng(0).standard_normal(n)
+    x = solve_B(y)
+    beta = math.sqrt(max(float(x @ y), 0.0))
+    if not beta:
+        return y
+    for j in range(room):
+        np.divide(y, beta, out=Y[j])
+        np.divide(x, beta, out=X[j])
+        y = A @ X[j]
+        size = np.linalg.norm(y)
+        part = X[: j + 1] @ y
+        y -= part @ Y[: j + 1]
+        diagonal[j] = part[j]
+        x = solve_B(y)
+        exhausted = np.linalg.norm(y) <= n * np.finfo(float).eps * size
+        beside[j] = beta = 0.0 if exhausted else math.sqrt(max(float(x @ y), 0.0))
+        if j >= SOON or not beta or j + 1 == room:
+            value, vector = eigh_tridiagonal(diagonal[: j + 1], beside[:j], select="i", select_range=(j, j))
+            if beta * abs(vector[-1, 0]) <= LANCZOS / 2 * abs(value[0]):
+                break
+    return np.asarray(vector[:, 0] @ X[: j + 1])

@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from fem1d2d import largest_sparse, solver
+import numpy as np
+
+from fem1d2d import elimination_order, largest_sparse, solver
 from ndtheory import Number
 from verification.interface.body import Body
 
@@ -40,7 +42,9 @@ def constants_of(body: Body, *, dense: bool = True) -> BodyConstants:
         Whether the Schur complement of the norm is wanted too, which one factorisation gives with the solves; False
         where there are too many contact nodes for it.
     """
-    A, H, order = body.stiffness, body.gram_matrix, body.order if dense else None
+    A, H = body.stiffness, body.gram_matrix
+    # the interface need not come last here, which saves fill, and with it time at each solve of Lanczos
+    order = elimination_order(A, np.arange(0)) if dense else None
     solve_H = body.gram.solver() if dense else solver(H)
     loose = body.motions.shape[1] > 0
     # 1/m, so that products with A^-1 find it

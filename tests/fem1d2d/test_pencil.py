@@ -81,6 +81,31 @@ def test_the_residual_at_a_multiple_eigenvalue_is_as_small_as_at_a_simple_one(mu
         assert found.residual <= 1e-10 * 20
 
 
+@pytest.mark.parametrize(("others", "most"), [(0.01, 12), (0.5, 24)])
+def test_lanczos_ends_at_the_step_at_which_the_residual_is_small_enough(others, most):
+    """The farther the other eigenvalues lie, the fewer solves; ARPACK with its 24 vectors takes 24 always."""
+    n = 500
+    diagonal = np.append(np.linspace(0, others, n - 1), 1.0)
+    solves = []
+
+    def solve(r):
+        solves.append(1)
+        return r / 2
+
+    found = largest_sparse(sp.diags_array(diagonal, format="csc"), 2 * sp.eye_array(n, format="csc"), solve)
+    assert found.value == pytest.approx(0.5, rel=1e-14)
+    assert found.residual <= 1e-10 * 0.5
+    assert len(solves) <= most
+
+
+def test_a_spectrum_that_the_plain_lanczos_cannot_resolve_is_left_to_the_one_that_restarts():
+    n = 1000
+    diagonal = np.linspace(0.0, 1.0, n) ** 0.5
+    found = largest_sparse(*sparse(np.diag(diagonal), np.eye(n)))
+    assert found.value == pytest.approx(1, rel=1e-12)
+    assert found.residual <= 1e-10
+
+
 @given(pencils())
 def test_the_eigenvector_has_norm_one_and_its_residual_is_the_one_reported(pencil):
     A, B, _, _ = pencil

@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.linalg import cholesky, qr
 
-from fem1d2d import Condensation, Material, Mesh, Supports, elimination_order, solver
+from fem1d2d import Condensation, Material, Mesh, Supports, Uncoupled, elimination_order, solver
 from fem1d2d.mesh import Floats, Ints
 from verification.dense import STILL, Cholesky
 from verification.interface.grid import Grid
@@ -105,9 +105,9 @@ class Body(Value):
         return Condensation(self.stiffness, self.interface, self.order, singular=self.motions.shape[1] > 0)
 
     @cached_property
-    def gram(self) -> Condensation:
+    def gram(self) -> Uncoupled:
         """The Gram matrix condensed onto the interface."""
-        return Condensation(self.gram_matrix, self.interface, self.order)
+        return Uncoupled(self.gram_matrix, self.interface, self.free % self.mesh.dimension, self.order)
 
     @cached_property
     def lift_gram(self) -> Floats:
@@ -224,8 +224,8 @@ class Condensed(Value):
         size = len(body.unknown)
         matrix, load = np.zeros((size, size)), np.zeros(size)
         with one_thread():
+            load[rows] = elastic.condense(body.load)  # before the Schur complement, which its factorisation gives too
             matrix[np.ix_(rows, rows)] = elastic.schur if times is None else times * elastic.schur
-            load[rows] = elastic.condense(body.load)
         return cls(
             grid=grid,
             stiffness=matrix,
