@@ -3,7 +3,8 @@
 Where all cells are positively oriented and each inner edge lies in two cells with opposite directions, the number of
 cells over a point changes across boundary edges only: on the left of one it is larger by 1 than on its right.  So no
 point lies in two cells if and only if every boundary edge has no cell on its right.  Edges that meet in end points
-alone have the same number of cells along their whole right side, and one point of each is enough.
+alone have the same number of cells along their whole right side, and one point of each is enough.  Where the boundary
+is one convex polygon, as of a rectangle, that number is its winding number, and nothing is left to look at.
 """
 
 from __future__ import annotations
@@ -64,6 +65,8 @@ def fault(points: NDArray[Any], edges: Ints) -> str | None:
     if not rounding:  # in whole numbers: the same digits, and quicker than fractions
         unit = math.lcm(*(Fraction(x).denominator for x in points.ravel()))
         start, end = (np.frompyfunc(lambda x: int(x * unit), 1, 1)(ends) for ends in (start, end))
+    if _convex(edges, (start, end), floats):
+        return None
     for i, j in _near(*floats):
         crossing, touching = _meet(start[i], end[i], start[j], end[j], rounding)
         if crossing.any():
@@ -80,6 +83,28 @@ def fault(points: NDArray[Any], edges: Ints) -> str | None:
         if covered.any():
             return f"the boundary edge {of(np.argmax(covered))} lies inside another cell"
     return None
+
+
+def _convex(edges: Ints, exactly: tuple[NDArray[Any], NDArray[Any]], floats: tuple[Floats, Floats]) -> bool:
+    """Whether all edges follow each other in one polygon that turns left or goes straight on, once round."""
+    following, ends = {node: edge for edge, node in enumerate(edges[:, 0].tolist())}, edges[:, 1].tolist()
+    order, edge = [0], following.get(ends[0])
+    while edge and len(order) < len(edges):
+        order.append(edge)
+        edge = following.get(ends[edge])
+    if edge != 0 or len(order) < len(edges):
+        return False
+
+    def corners(start: NDArray[Any], end: NDArray[Any]) -> tuple[Any, Any]:
+        """How far the next edge turns left of each, and how far it goes ahead."""
+        u = (end - start)[order]
+        v = np.roll(u, -1, axis=0)
+        return u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0], (u * v).sum(axis=1)
+
+    left, ahead = corners(*exactly)
+    if not ((left > 0) | ((left == 0) & (ahead > 0))).all():
+        return False
+    return bool(np.arctan2(*corners(*floats)).sum() < 3 * np.pi)  # a multiple of 2 pi, but for rounding
 
 
 def _meet(a: NDArray[Any], b: NDArray[Any], c: NDArray[Any], d: NDArray[Any], rounding: float) -> tuple[Bools, Bools]:

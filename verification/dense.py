@@ -7,8 +7,8 @@ where they come in; here nothing is.
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.blas import dsymv, dtrsv
+from scipy.linalg.lapack import dpotrf, dpotrs
 
 from fem1d2d.mesh import Floats, Ints
 
@@ -80,7 +80,9 @@ class Cholesky:
                 block = pinned(S, rows, motions)
             else:
                 block = S if self._all else S[np.ix_(rows, rows)]
-            self._factor = np.asfortranarray(cho_factor(block)[0])
+            self._factor, minor = dpotrf(np.asarray_chkfinite(block), clean=0)
+            if minor:
+                raise np.linalg.LinAlgError(f"the leading minor {minor} is not positive: needed a definite matrix")
 
     def solve(self, right: Floats) -> Floats:
         """``S^-1 right`` for a vector, shape (n,), or columns, shape (n, m)."""
@@ -96,5 +98,5 @@ class Cholesky:
         if right.ndim == 1:  # LAPACK's own solve is written for many columns, and takes three times as long for one
             found = dtrsv(self._factor, dtrsv(self._factor, right, trans=1), overwrite_x=1)
         else:
-            found = np.ascontiguousarray(cho_solve((self._factor, False), right, check_finite=False))
+            found = np.ascontiguousarray(dpotrs(self._factor, right)[0])
         return found

@@ -8,11 +8,12 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from hypothesis import given, settings
+from strategies import AT_NIGHT
 
 import verification as vf
 from ndtheory import Number
 from verification.algorithm.fixed_point import FixedPointMap
-from verification.algorithm.relaxation import RULES, Constant, Momentum, Rule, momentum_rate
+from verification.algorithm.relaxation import RULES, Momentum, Rule, momentum_rate
 from verification.bounds.bound import Subject
 from verification.bounds.energy import Sharp
 from verification.bounds.pattern_search import largest_factor
@@ -46,8 +47,9 @@ def nearly_as_found(monkeypatch):
 
 
 @pytest.mark.parametrize("rule", RULES.values(), ids=list(RULES))
-def test_a_registered_rule_passes(rule):
-    check_rule(rule, examples=3)
+def test_a_registered_rule_passes_and_the_rate_of_momentum_is_attained(rule):
+    found = check_rule(rule, examples=4 if rule.name == "momentum" else 3)
+    assert found["keeps its proved rate"].verdict == ("attained" if rule.name == "momentum" else "not asked")
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=list(LAWS))
@@ -57,7 +59,7 @@ def test_a_registered_law_passes(law):
 
 @pytest.mark.parametrize("bound", BOUNDS.values(), ids=list(BOUNDS))
 def test_a_registered_bound_passes(bound):
-    check_bound(bound, examples=5 if bound.calculated else 2)
+    check_bound(bound, examples=2 if not bound.calculated else 5 if AT_NIGHT else 3)
 
 
 MATRICES = {
@@ -200,10 +202,7 @@ def test_a_rule_that_is_wrong_in_one_way_is_refused(rule, property):
     assert rule.name in str(error.value)
 
 
-def test_a_rate_that_is_attained_is_reported_as_such_and_a_generous_one_is_not():
-    assert check_rule(Momentum(), examples=4)["keeps its proved rate"].verdict == "attained"
-    assert check_rule(Constant(), examples=2)["keeps its proved rate"].verdict == "not asked"
-
+def test_a_rate_that_is_too_generous_is_reported_as_not_attained():
     class Modest(Momentum):
         def proved_rate(self, rho):
             return momentum_rate(rho) / 0.8 if momentum_rate(rho) < 0.8 else None
@@ -429,14 +428,29 @@ def python(code):
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
 
 
-def test_without_hypothesis_the_kit_says_what_to_install_and_all_else_works():
-    without = "import sys; sys.modules['hypothesis'] = None; import verification as vf; vf.Rule; "
-    assert python(without).returncode == 0
-    done = python(without + "import verification.testing")
-    assert done.returncode == 1
+#: Python without hypothesis, which says how often it was asked for.
+WITHOUT = """
+import sys
+
+class Missing:
+    asked = 0
+
+    def find_spec(self, name, path=None, target=None):
+        if name == "hypothesis":
+            Missing.asked += 1
+            raise ModuleNotFoundError(name)
+
+sys.meta_path.insert(0, Missing())
+import verification as vf
+
+for name in vf.__all__:
+    getattr(vf, name)
+print(Missing.asked)
+import verification.testing
+"""
+
+
+def test_nothing_but_the_kit_asks_for_hypothesis_and_it_says_what_to_install():
+    done = python(WITHOUT)
+    assert (done.returncode, done.stdout.strip()) == (1, "0")
     assert "verification.testing needs hypothesis: pip install 'ndtheory[test]'" in done.stderr.splitlines()[-1]
-
-
-def test_hypothesis_is_not_loaded_by_the_rest_of_the_package():
-    loaded = "import sys, verification as vf; [getattr(vf, n) for n in vf.__all__]; print('hypothesis' in sys.modules)"
-    assert python(loaded).stdout.strip() == "False"

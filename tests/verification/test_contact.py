@@ -98,14 +98,15 @@ def test_the_active_set_closes_on_the_minimiser_or_says_that_it_does_not(random)
 
 def test_the_active_set_rarely_gives_up_on_random_matrices():
     random, outcomes = np.random.default_rng(11), Counter()
-    for _ in range(4000):
+    count = 4000 if strategies.AT_NIGHT else 1000
+    for _ in range(count):
         S, q, bound = random_program(random)
         try:
             ContactStep(S, everywhere(S), len(bound), "active-set").solve(q, bound)
             outcomes["closed"] += 1
         except ContactError:
             outcomes["gave up"] += 1
-    assert outcomes["gave up"] <= 4
+    assert outcomes["gave up"] <= count / 1000
 
 
 @strategies.fewer(2)

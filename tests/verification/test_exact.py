@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from chain_problems import case, every_piece
 from problem_list import blocks
+from strategies import AT_NIGHT
 
 import verification as vf
 from verification.bounds.conditions import Pieces
@@ -24,7 +25,7 @@ def sides(piece):
     return piece.pattern.sliding * piece.sign
 
 
-@pytest.mark.parametrize("seed", SMALL)
+@pytest.mark.parametrize("seed", SMALL if AT_NIGHT else SMALL[:6])
 def test_the_largest_norm_of_all_pieces_lies_between_the_bounds(seed):
     pair, measured, theta, _ = case(seed)
     most = max(piece.factor(theta) for piece in every_piece(pair))
@@ -109,7 +110,7 @@ def test_an_answer_is_the_same_each_time_and_says_why_it_is_no_closer():
     assert one.programs <= 5
     assert one.gap > 1e-9
     assert one.why_apart == f"{one.programs} programs were solved"
-    more = enclose(pair, forms, 0.5, gap=1e-9, programs=25)
+    more = enclose(pair, forms, 0.5, gap=1e-9, programs=12)
     assert more.upper.value <= one.upper.value
     assert more.lower >= one.lower
 

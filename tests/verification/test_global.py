@@ -177,7 +177,7 @@ def hertz(tmp_path: Path, n: int) -> tuple[float, float]:
 
 @pytest.mark.slow
 def test_a_cylinder_on_a_plane_has_the_half_width_and_peak_pressure_of_hertz(tmp_path: Path) -> None:
-    errors = [hertz(tmp_path, n) for n in (32, 64, 128)]
+    errors = [hertz(tmp_path, n) for n in (32, 128)]
     width, peak = (np.array(column) for column in zip(*errors, strict=True))
     assert width[-1] <= 0.001
     assert peak[-1] <= 0.015

@@ -45,7 +45,7 @@ def test_section_5_holds_for_two_forces(kind, data, share, random):
             assert_all_hold(ratios(case, forces, theta))
 
 
-@strategies.fewer(1)
+@strategies.fewer(2, at_night=1)
 @given(
     data=strategies.contact_problems(),
     share=st.sampled_from([0.0, 0.1, 0.5, 0.9, 0.99]),
@@ -68,13 +68,17 @@ def test_T_theta_contracts_by_the_proved_factor_wherever_it_is_proved(data, shar
                 assert seen <= forces.norm * (factor.value + RELATIVE * (1 - factor.value) + 4 * EPS)
 
 
+#: On the second the search comes closest to every inequality.
 SEARCHED = {
-    "thin on thick": lambda: plates(heights=("1/50", "1")),
-    "thick on thin": lambda: plates(heights=("2", "1/30"), young=(1, 40), contact={"friction": 1}),
-    "columns": lambda: plates(heights=("5", "3"), cells=((2, 5), (2, 3)), contact={"friction": 2}),
     "stiff and huge units": lambda: plates(young=(50_000_000_000, 1_000_000_000), contact={"friction": "1/2"}),
     "nearly no slope": lambda: plates(heights=("1/10", "1/10"), poisson=("-0.5", "-0.5"), norm={"length": 100}),
 }
+if strategies.AT_NIGHT:
+    SEARCHED |= {
+        "thin on thick": lambda: plates(heights=("1/50", "1")),
+        "thick on thin": lambda: plates(heights=("2", "1/30"), young=(1, 40), contact={"friction": 1}),
+        "columns": lambda: plates(heights=("5", "3"), cells=((2, 5), (2, 3)), contact={"friction": 2}),
+    }
 
 
 def climb(case: Case, name: str, theta: float, random: np.random.Generator, steps: int) -> TwoForces:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from copy import deepcopy
 from dataclasses import replace
+from functools import cache
 from itertools import islice
 
 import numpy as np
@@ -102,11 +104,22 @@ def test_the_constants_are_those_of_the_definitions_with_the_trace_of_body_2_car
 # --- Section 5 for two forces, with dense matrices --------------------------------------------------------------------
 
 
+@cache
+def drawn_dense(seed: int) -> tuple[section_5.Case, np.random.Generator]:
+    random = np.random.default_rng(seed)
+    return section_5.Case(problem(random, matching=False)), random
+
+
+def dense_case(seed: int) -> tuple[section_5.Case, np.random.Generator]:
+    """The problem of a seed, made once, and the generator that drew it."""
+    case, random = drawn_dense(seed)
+    return case, deepcopy(random)
+
+
 @pytest.mark.parametrize("kind", PAIRS)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_section_5_holds_for_two_forces(seed, kind):
-    random = np.random.default_rng(seed)
-    case = section_5.Case(problem(random, matching=False))
+    case, random = dense_case(seed)
     for _ in range(3):
         forces = draw_pair(case, kind, random)
         for theta in thetas_for(case, random):

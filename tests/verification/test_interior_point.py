@@ -46,8 +46,8 @@ def test_a_conic_solver_finds_the_same_value(seed):
             assert own.s == pytest.approx(other.s, rel=1e-5, abs=1e-6)
 
 
-def test_a_first_order_solver_finds_the_same_value_at_25_contact_nodes():
-    pair = vf.build(vf.example("section6"))
+def test_a_first_order_solver_finds_the_same_value_at_13_contact_nodes():
+    pair = vf.build(vf.example("section6").changed(cells=((20, 3), (12, 3))))
     *_, program = programs_of(pair, vf.measure(pair), 0.7)[:1]
     other = model.solve(program, solver="SCS", eps=1e-5, max_iters=20_000)
     assert interior_point.solve(program).s == pytest.approx(other.s, rel=1e-4)

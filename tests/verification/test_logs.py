@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from coupling_logs import contact_run, linear_run, noisy, precice
 from problem_list import changed
+from strategies import AT_NIGHT
 
 import verification as vf
 from verification.advice.from_logs import advise_logs
@@ -245,9 +246,14 @@ def couplings():
 
 @pytest.mark.parametrize("noise", [0, 0.02])
 def test_following_the_logs_pastes_a_theta_that_converges_in_few_steps(tmp_path, noise):
-    """Of 20 couplings and three first thetas: none diverges, nine of ten take 1.4 times the steps of 2/(2 + rho)."""
+    """Of 20 couplings and three first thetas: none diverges, nine of ten take 1.4 times the steps of 2/(2 + rho).
+
+    Every other one with noise and the rest without; at night all of both.
+    """
     decided, costs = 0, []
-    for (name, modes), start in itertools.product(couplings(), (0.05, 0.3, 0.9)):
+    cases = list(itertools.product(couplings(), (0.05, 0.3, 0.9)))
+    cases = cases if AT_NIGHT else cases[bool(noise) :: 2]
+    for (name, modes), start in cases:
         logs, theta, rho = [], start, max(modes)
         for n in range(12):
             series = linear_run(modes, theta, 60 + 3 * max(10, math.ceil(5 / theta)))[0]
@@ -263,7 +269,7 @@ def test_following_the_logs_pastes_a_theta_that_converges_in_few_steps(tmp_path,
         if found.roles:
             decided += 1
             costs.append(math.log(max(abs(1 - min(2 / (2 + rho), 0.99) * (1 + m)) for m in modes)) / math.log(factor))
-    assert decided >= 54
+    assert decided >= 0.9 * len(cases)
     assert np.quantile(costs, 0.9) <= 1.4
 
 
@@ -277,7 +283,8 @@ def test_following_the_logs_of_two_bodies_in_contact_ends_in_a_theta_that_conver
         contact={"friction": friction}, iteration={"neumann_body": neumann_body},
     )  # fmt: skip
     pair = build(vf.Problem.from_dict(data))
-    for start, noise in itertools.product((0.9, 0.3), (0, 0.01)):
+    noises = (0, 0.01) if friction == "0" else (0.01, 0)
+    for start, noise in itertools.product((0.9, 0.3), noises) if AT_NIGHT else zip((0.9, 0.3), noises, strict=True):
         logs, theta = [], start
         for n in range(10):
             series = contact_run(pair, theta, 60 + 3 * max(10, math.ceil(5 / theta)))[0]

@@ -6,6 +6,7 @@ import pickle
 import numpy as np
 import pytest
 from problem_list import blocks, changed, small
+from strategies import AT_NIGHT
 
 import verification as vf
 from verification.cli.main import main
@@ -49,13 +50,20 @@ def few(monkeypatch):
 # --- the same digits --------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("neumann", [1, 2])
-@pytest.mark.parametrize(
-    ("width", "heights", "cells"),
-    [(2, ("0.3", "0.1"), 60), (2, ("0.1", "0.3"), 60), (20, ("0.1", "0.3"), 200), (1, (2, 1), 25), (2, (1, 1), 12)],
-    ids=["thin upper", "thin lower", "long", "tall", "few nodes"],
-)
-def test_solves_with_the_bodies_give_rho_to_the_digits_of_dense_interface_matrices(neumann, width, heights, cells):
+#: By name: width, heights, cells, and the Neumann body; at night both.
+SHAPES = {
+    "thin upper": (2, ("0.3", "0.1"), 60, 1),
+    "thin lower": (2, ("0.1", "0.3"), 60, 2),
+    "long": (20, ("0.1", "0.3"), 200, 1),
+    "tall": (1, (2, 1), 25, 2),
+    "few nodes": (2, (1, 1), 12, 1),
+}
+if AT_NIGHT:
+    SHAPES |= {f"{name}, other roles": (*shape, 3 - neumann) for name, (*shape, neumann) in SHAPES.items()}
+
+
+@pytest.mark.parametrize(("width", "heights", "cells", "neumann"), SHAPES.values(), ids=SHAPES)
+def test_solves_with_the_bodies_give_rho_to_the_digits_of_dense_interface_matrices(width, heights, cells, neumann):
     problem = unequal(cells, width=width, heights=heights).changed(neumann_body=neumann)
     dense = vf.measure(problem)
     for name, value in by_operators(problem).items():

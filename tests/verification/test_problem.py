@@ -366,12 +366,14 @@ def meshed(folder, version="2.2", order=None):
     return vf.Problem.from_dict(data, source=str(folder / "problem.toml"))
 
 
+@pytest.mark.usefixtures("known_bounds")
 @pytest.mark.parametrize("version", ["2.2", "4.1"])
 def test_a_rectangle_from_a_mesh_file_is_the_built_in_one(tmp_path, version):
     from_file, built_in = vf.compare(meshed(tmp_path, version)), vf.compare(plane())
     assert from_file.content() == built_in.content()
 
 
+@pytest.mark.usefixtures("known_bounds")
 def test_the_numbering_of_a_mesh_file_does_not_matter(tmp_path):
     renumbered = vf.compare(meshed(tmp_path, order=np.random.default_rng(7).permutation)).to_dict()
     expected = vf.compare(plane()).to_dict()

@@ -17,6 +17,7 @@ from chain_problems import case
 from hypothesis import given
 from hypothesis import strategies as st
 from problem_list import bars
+from strategies import AT_NIGHT
 
 import verification as vf
 from verification.algorithm.fixed_point import FixedPointMap, iterates
@@ -296,6 +297,12 @@ def in_units(problem: vf.Problem, stress: Fraction, length: Fraction) -> vf.Prob
     return replace(problem, body1=body(problem.body1), body2=body(problem.body2), contact=contact)
 
 
+@cache
+def elsewhere(seed: int, stress: Fraction, length: Fraction) -> ContactPair:
+    """The problem of a seed in other units."""
+    return build(in_units(case(seed)[0].problem, stress, length))
+
+
 UNITS = [(Fraction(4) ** 9, Fraction(1)), (Fraction(1), Fraction(4) ** -5), (Fraction(10) ** 6, Fraction(254, 10))]
 
 
@@ -304,9 +311,10 @@ UNITS = [(Fraction(4) ** 9, Fraction(1)), (Fraction(1), Fraction(4) ** -5), (Fra
 def test_no_rule_knows_the_units(relaxation, stress, length):
     """Forces go with stress times length (per thickness), and nothing else changes."""
     factor, compared = float(stress * length), 0
-    for seed in range(8):
+    seeds = 8 if AT_NIGHT else 4
+    for seed in range(seeds):
         pair, measured, theta, _ = case(seed)
-        other = build(in_units(pair.problem, stress, length))
+        other = elsewhere(seed, stress, length)
         steps = [RULES[relaxation].begin(p, theta, measured.rho_max.value) for p in (pair, other)]
         norm = pair.neumann.dual_norm
         both = [islice(iterates(FixedPointMap(p, "auto"), s), 8) for p, s in zip((pair, other), steps, strict=True)]
@@ -318,7 +326,7 @@ def test_no_rule_knows_the_units(relaxation, stress, length):
                 break  # what is left is a difference of nearly equal numbers
             assert two.relative_residual == pytest.approx(one.relative_residual, rel=1e-2)
             compared += 1
-    assert compared > 12
+    assert compared > 1.5 * seeds
 
 
 @by_combination

@@ -9,6 +9,7 @@ from itertools import islice, pairwise
 import numpy as np
 import pytest
 from problem_list import PROBLEMS
+from strategies import AT_NIGHT
 
 import verification as vf
 from ndtheory import evaluate_sharp
@@ -62,7 +63,7 @@ def steps_of_the_paper(pair, theta, most):
 
 def test_rows_show_what_single_runs_show(wide):
     outcomes = set()
-    for found in wide.rows:
+    for found in wide.rows[:: 1 if AT_NIGHT else 3]:  # four thetas change fastest: every third row has each of them
         problem = changed(SMALL, found)
         run, measured = vf.run(problem).linearise(), vf.measure(problem)
         outcomes.add(found["outcome"])
@@ -229,9 +230,9 @@ def test_without_a_grid_there_is_one_row():
         ({"law": ["coulomb"]}, "law", "one of"),
         ({"rule": ["newtonn"]}, "rule", "one of"),
         ({"radius": [0]}, "radius", "> 0"),
-        ({"theta": [i / 10**6 for i in range(1, 10**5)], "neumann_body": [1, 2], "refine": [0, 1]}, "grid", "rows"),
+        ({"friction": list(range(500)), "radius": list(range(1, 501))}, "grid", "rows"),
     ],
-    ids=str,
+    ids=lambda value: str(value)[:40],
 )
 def test_a_value_that_fits_no_problem_is_refused_by_name(axes, key, needed):
     with pytest.raises(vf.ProblemError) as refused:
@@ -285,15 +286,11 @@ def test_bodies_are_condensed_once_a_mesh(monkeypatch):
     made = []
     condensation = body.Condensation
     monkeypatch.setattr(body, "Condensation", lambda *args, **kw: made.append(args) or condensation(*args, **kw))
-    axes = {"theta": [0.4, 0.6], "friction": [0.1, 0.3], "law": ["nonlocal", "local"], "radius": [0.2, 0.3]}
-    vf.sweep(
-        SMALL.changed(max_iterations=5),
-        refine=[0, 1],
-        young=[(7e4, 2e4), (2e4, 7e4), (1, 1)],
-        neumann_body=[1, 2],
-        **axes,
-    )
+    short = SMALL.changed(max_iterations=5)
+    vf.sweep(short, refine=[0, 1], friction=[0.1, 0.3], law=["nonlocal", "local"], radius=[0.2, 0.3])
     assert len(made) == 4  # two bodies, two meshes
+    vf.sweep(short, refine=[0, 1], theta=[0.4, 0.6], young=[(7e4, 2e4), (2e4, 7e4), (1, 1)], neumann_body=[1, 2])
+    assert len(made) == 8
 
 
 # --- the document ---

@@ -228,14 +228,14 @@ KILLED = """
 LONG = {"theta": [f"{n}/40" for n in range(1, 40)], "friction": [0, "1/5", "2/5"]}
 
 
-@pytest.mark.parametrize("moments", [50 if AT_NIGHT else 20])
+@pytest.mark.parametrize("moments", [50 if AT_NIGHT else 12])
 def test_a_sweep_killed_at_random_moments_ends_with_the_table_of_one_that_was_not(place, moments):
     random = np.random.default_rng(moments)
     code = KILLED.format(problem=SMALL.to_dict(), grid=LONG, store=str(place))
     chosen = random.exponential(120, size=moments).round(1)
     answer = ended(code, *chosen, env=os.environ | {"OPENBLAS_NUM_THREADS": "1"})
     assert answer.returncode == 0, answer.stderr
-    assert int(answer.stdout) >= 5  # the others came when all rows were there; a fast machine gets there soon
+    assert int(answer.stdout) >= moments // 4  # the others came when all rows were there, as they soon are
     found = vf.sweep(SMALL, **LONG, store=place)
     assert found.stored > 0
     assert found.to_csv().encode() == vf.sweep(SMALL, **LONG).to_csv().encode()
