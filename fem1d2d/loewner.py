@@ -237,10 +237,20 @@ def _remainder(block: Matrix, rest: Floats, errors: Floats, side: Side) -> Float
 def positive_definite(matrix: Enclosed, order: Ints | None = None) -> bool:
     """Whether every symmetric matrix within the radius is proved to be positive definite; False says nothing.
 
+    Rows and columns of a dense one are scaled first, so that what is large does not hide what is small.
+
     Examples
     --------
     >>> A = Enclosed(middle=np.array([[2.0, 1.0], [1.0, 2.0]]), radius=np.full((2, 2), 0.25))
     >>> positive_definite(A), positive_definite(A.plus(-1.0, Enclosed.exactly(np.eye(2))))
     (True, False)
     """
+    middle = matrix.middle
+    if isinstance(middle, np.ndarray):
+        own = np.diag(middle)
+        if not (np.isfinite(middle).all() and (own > 0).all()):
+            return False
+        scale = 2.0 ** -np.round(np.log2(own) / 2)  # powers of two: rounding does not enter
+        both = np.outer(scale, scale)
+        matrix = Enclosed(middle=middle * both, radius=matrix.radius * both)
     return Elimination(matrix, order=order).bound(1) is not None

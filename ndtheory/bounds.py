@@ -10,8 +10,8 @@ adds a stress to the number 1: from (5.11), (5.13), (5.19) and (5.23) it is a *s
 an overall factor 1/u with it.  The printed edition is ``u = 1`` with ``m~ = min(m, 1)`` for m; the repaired one is
 ``u = m`` with m itself.  They agree in the unit of stress in which m = 1.
 
-In both editions every number is monotone in m, M, C_R and x = C_K, so an enclosure of the constants gives one of the
-results: their values where m is largest and the others least, and the other way round.
+In both editions every number but C1 is monotone in m, M, C_R and x = C_K, so an enclosure of the constants gives one
+of the results: their values where m is largest and the others least, and the other way round.
 
 * C_T, P and Q grow with M, C_R and x and fall with m, as each of their terms does (with u = 1 and with u = m; m~ does
   not fall with m).  C0 = 1/(1 + A^2/(2 m^2)) grows with m and falls with M and C_R; C6 = 1 - 1/(2P - 1) grows with P.
@@ -21,6 +21,8 @@ results: their values where m is largest and the others least, and the other way
   ``(1 - theta)^2 + 2 theta (1 - theta) P + max(0, theta^2 - 2 theta (1 - theta) m^2/A^2) Q`` for 0 < theta <= 1, which
   grows with P, Q and A/m.  So K grows with M, C_R and x and falls with m, and the thetas with K < 1, an interval that
   ends at C1, become fewer.
+* Where there are none, C1 need not be monotone.  D grows with M, C_R and x and falls with m, as P and Q do, and
+  ``C1 = 2 (1 + D)/(1 + 2 D + Q)`` grows with D and falls with Q as long as Q > 1: D and Q at opposite ends enclose it.
 """
 
 from __future__ import annotations
@@ -309,8 +311,8 @@ def evaluate(edition: Edition, constants: Constants, theta: Any = None) -> Bound
     Bounds
         Right to the last place of a double: evaluated with 200 decimal digits, comparisons included.  Where a constant
         was given as an enclosure, and the others as one or exactly, the numbers have enclosures too, at the weakest
-        level (``verified`` at best).  Not those that some of the constants enclosed do not have: C1, ``factor``
-        and ``one_minus_factor`` have one only if there is a contraction interval, with theta inside it, throughout.
+        level (``verified`` at best).  Not those that some of the constants enclosed do not have: ``factor`` and
+        ``one_minus_factor`` have one only if there is a contraction interval, with theta inside it, throughout.
         ``interval`` and ``verdict`` are those of the values.
 
     Raises
@@ -340,9 +342,14 @@ def evaluate(edition: Edition, constants: Constants, theta: Any = None) -> Bound
         corners = [_figures(edition, corner, t, SLACK) for corner in constants.corners or ()]
         level = weakest([constants.level, "verified"])
 
-        def number(name: str, end: str | None = None) -> Any:
-            return rounded(found[name], [corner[end or name] for corner in corners], level)
+        def number(name: str) -> Any:
+            return rounded(found[name], [corner[name] for corner in corners], level)
 
+        inside_all = all(corner["high"] is not None for corner in corners)
+        crossed = [_crossed(one, other) for one, other in zip(corners, reversed(corners), strict=True)]
+        ends = [corner["high"] for corner in corners] if inside_all else crossed
+        c1 = rounded(found["C1"], ends, level)
+        assert c1 is not None
         interval = None if found["high"] is None else (float(found["low"]), float(found["high"]))
         verdict: Conclusion | None = None
         if chosen is not None:
@@ -351,7 +358,7 @@ def evaluate(edition: Edition, constants: Constants, theta: Any = None) -> Bound
         names = ("C_K", "C_T", "C_T_tilde", "C0", "C2", "C3", "C4", "C5", "C6", "factor", "one_minus_factor")
         return Bounds(
             edition=edition,
-            C1=number("C1", end="high"),
+            C1=c1,
             **{name: number(name) for name in names},
             interval=interval,
             interval_proved=inside(corners, level, "low", "high"),
@@ -360,6 +367,11 @@ def evaluate(edition: Edition, constants: Constants, theta: Any = None) -> Bound
             proved=edition.proved(constants.m if least is None else least[0]),
             threshold_on="C_K" if scale is None else "k",
         )
+
+
+def _crossed(one: dict[str, Any], other: dict[str, Any]) -> Decimal | None:
+    """An end of an enclosure of C1, with D at one end of that of the constants and Q at the other."""
+    return C1(one["D"], other["Q"]) if min(one["Q"], other["Q"]) > 1 else None
 
 
 def _figures(edition: Edition, at: Corner, theta: Decimal | None, margin: Decimal) -> dict[str, Any]:
@@ -386,6 +398,7 @@ def _figures(edition: Edition, at: Corner, theta: Decimal | None, margin: Decima
         "C_K": x,
         "C_T": lipschitz(m, M, C_R, x),
         "C_T_tilde": lipschitz(*shared, x),
+        "D": d,
         "Q": q,
         "C0": C0(*shared),
         "C1": c1,

@@ -248,6 +248,10 @@ def test_an_enclosure_ends_at_the_results_of_its_corners(edition, data):
     for name, number in numbers(found).items():
         if number.level != "float":
             low, high = sorted(getattr(at, name).value for at in (best, worst))
+            if name == "C1" and None in (best.interval, worst.interval):  # not monotone there
+                assert contains(number, best.C1, number.level)
+                assert contains(number, worst.C1, number.level)
+                continue
             assert number.lo == pytest.approx(low, rel=4e-16, abs=0)
             assert number.hi == pytest.approx(high, rel=4e-16, abs=0)
 
@@ -282,8 +286,22 @@ def test_what_some_of_the_constants_enclosed_do_not_have_has_no_enclosure():
     friction = Number(value=0.01, lo=0.0, hi=0.5, level="verified")
     found = evaluate(REPAIRED, Constants(m=1, M=2, C_R=1, C_K=friction), "1/10")
     assert found.verdict == "contraction"
-    assert [found.C1.level, found.factor.level, found.one_minus_factor.level] == ["float"] * 3
-    assert [found.C0.level, found.C2.level, found.C_T.level] == ["verified"] * 3
+    assert [found.factor.level, found.one_minus_factor.level] == ["float"] * 2
+    assert [found.C0.level, found.C1.level, found.C2.level, found.C_T.level] == ["verified"] * 4
+
+
+@pytest.mark.parametrize("edition", EDITIONS, ids=lambda edition: edition.name)
+def test_C1_has_an_enclosure_on_both_sides_of_C2_and_beyond_it(edition):
+    """From no friction to five times C2; C1 is not monotone there."""
+    threshold = F(evaluate(edition, Constants(m="1/2", M=2, C_R=2, C_K="1/10")).C2.value)
+    for low, high in ((0, F(1, 2)), (F(9, 10), F(11, 10)), (2, 5)):
+        ends = [float(share * threshold) for share in (low, high)]
+        friction = Number(value=sum(ends) / 2, lo=ends[0], hi=ends[1], level="verified")
+        found = evaluate(edition, Constants(m="1/2", M=2, C_R=2, C_K=friction)).C1
+        assert found.level == "verified"
+        for i in range(21):
+            at = F(ends[0]) + F(i, 20) * (F(ends[1]) - F(ends[0]))
+            assert contains(found, evaluate(edition, Constants(m="1/2", M=2, C_R=2, C_K=at)).C1, "verified")
 
 
 def test_theta_must_be_inside_the_interval_throughout_for_an_enclosure_of_the_factor():

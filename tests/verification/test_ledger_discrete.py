@@ -18,7 +18,16 @@ from scipy.linalg import eigh
 
 from verification.ledger import inequalities
 from verification.ledger.cases import NAMED
-from verification.ledger.differences import Difference, Setting, along, between, directions, pieces, uniform_piece
+from verification.ledger.differences import (
+    Difference,
+    Differences,
+    Setting,
+    along,
+    between,
+    directions,
+    pieces,
+    uniform_piece,
+)
 from verification.ledger.evidence import Evidence
 from verification.ledger.inequalities import ALLOWANCE, INEQUALITIES, LEVELS, SHARES, Inequality, Reading
 from verification.ledger.worst import Tally, Trial, discrete, draw_cases, pairs_of
@@ -79,7 +88,7 @@ def pool_of(kind: str) -> dict[str, Subjects]:
     result: dict[str, Subjects] = {"bodies": [], "pairs": [], "contraction": []}
     with one_thread():
         for case, random in POOLS[kind]():
-            result["bodies"].append((case, [case]))
+            result["bodies"].append((case, case))
             result["pairs"].append((case, pairs_of(case, random, starts=1, realised=4)))
             slight = case.at_share(SHARES[-1])
             result["contraction"].append((slight, pairs_of(slight, random, starts=0, realised=4)))
@@ -273,14 +282,14 @@ def test_a_right_side_smaller_than_the_worst_ratio_is_found_out(inequality, kind
     def shrunk(subject: Any, reading: Reading, theta: float) -> Any:
         right = inequality.right(subject, reading, theta)
         if isinstance(right, tuple):
-            return tuple(share * term if term > 0 else term for term in right)
-        return right * share if inequality.about == "bodies" or right > 0 else right / share
+            return tuple(np.where(term > 0, share * term, term) for term in right)
+        return right * share if inequality.about == "bodies" else np.where(right > 0, right * share, right / share)
 
     assert worst(replace(inequality, right=shrunk), pool) > 1 + ALLOWANCE
 
 
 FLIPPED: dict[str, Callable[[Difference, float], Any]] = {
-    "5.17": lambda d, t: d.setting.coordinates @ d.setting.felt_1 @ d.d_1,
+    "5.17": lambda d, t: d.d_1 @ d.setting.felt_1.T @ d.setting.coordinates.T,
     "5.24": lambda d, t: t**2 * d.norm_T**2 + (1 - t) ** 2 * d.norm**2 - 2 * t * (1 - t) * d.inner,
     "5.25": lambda d, t: -d.mixed_2,
     "5.26": lambda d, t: -d.work,
@@ -329,7 +338,7 @@ MUTANTS: list[tuple[str, str, str, Callable[[Any, Reading, float], Any]]] = [
     ("5.36", "repaired", "no T", lambda d, r, t: (1 - t) ** 2 * d.norm**2),
     ("5.44", "repaired", "P halved", lambda d, r, t: (1 - t) ** 2 * d.norm**2 * 0.99),
     ("x-reaction", "printed", "half of rho", lambda d, r, t: r.energy[0] / 2 * d.energy_1),
-    ("x-friction-energy", "printed", "no kappa_2", lambda d, r, t: r.energy[1] * math.sqrt(d.energy_1) * d.norm),
+    ("x-friction-energy", "printed", "no kappa_2", lambda d, r, t: r.energy[1] * np.sqrt(d.energy_1) * d.norm),
     ("x-friction-energy", "printed", "no kappa_1", lambda d, r, t: r.energy[2] * d.norm**2),
     ("x-ratio", "printed", "no friction", lambda d, r, t: math.sqrt(r.energy[0]) * d.norm),
     (
@@ -379,9 +388,9 @@ def test_what_cannot_be_compared_is_not_called_true(id, side):
     piece = uniform_piece(case.pair, touching=True, sliding=0)
     pair = along(case.setting, piece, np.ones(case.pair.contact.grid.n * 2))
     tally = Tally(inequality=replace(entry, **unknown))
-    tally.take(case, [case] if entry.about == "bodies" else [pair])
+    tally.take(case, case if entry.about == "bodies" else Differences([pair]))
     tally.inequality = entry  # what follows does not cover it up
-    tally.take(case, [case] if entry.about == "bodies" else [pair])
+    tally.take(case, case if entry.about == "bodies" else Differences([pair]))
     assert tally.evidence.holds is False
     assert tally.evidence.data["worst_ratio"] is None
 

@@ -1,17 +1,33 @@
 """What the ledger decides with enclosures: what is refuted fails by proof, and doubles lie between the bounds."""
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 
 from verification.ledger.cases import NAMED
 from verification.ledger.differences import along, uniform_piece
 from verification.ledger.enclosed_pairs import Bodies
-from verification.ledger.enclosures import LAYER, OF_BODIES, OF_PAIRS, PLATE, Constants, decide, enclosed
+from verification.ledger.enclosures import (
+    CONTRACTION,
+    LAYER,
+    OF_BODIES,
+    OF_MUCH,
+    OF_PAIRS,
+    OF_STICKING,
+    ON_LAYER,
+    PLATE,
+    Constants,
+    decide,
+    enclosed,
+)
 from verification.ledger.inequalities import INEQUALITIES
 from verification.ledger.worst import Tally
 from verification.problem.specification import Problem
 
-REFUTED = [("4.7", "printed"), ("5.13", "printed"), ("5.30", "printed")]
+REFUTED = [("4.7", "printed"), ("5.13", "printed"), ("5.30", "printed"), *OF_MUCH]
+
+EVERY = [*OF_BODIES, *OF_PAIRS, *OF_MUCH, *OF_STICKING]
 
 #: E is N where the lift of least energy is that of least norm too, and no enclosure tells equality.
 EQUAL = ("4.7", "repaired")
@@ -51,7 +67,7 @@ def test_what_is_refuted_as_printed_is_refuted_by_proof(found, key):
     assert Problem.from_dict(evidence.data["problem"]) in named
 
 
-@pytest.mark.parametrize("key", [*OF_BODIES, *OF_PAIRS], ids=" ".join)
+@pytest.mark.parametrize("key", EVERY, ids=" ".join)
 def test_everything_else_holds_by_proof(found, key):
     if key == EQUAL:
         assert of(found, key) is None
@@ -65,7 +81,7 @@ def test_the_ratio_of_two_bodies_in_doubles_lies_between_the_bounds(found, bodie
     evidence = of(found, key)
     case = bodies[LAYER if key in REFUTED else PLATE].case
     tally = Tally(inequality=ENTRY[key])
-    tally.take(case, [case])
+    tally.take(case, case)
     squared = 1 if key[0].startswith("x-") else 2
     low, high = evidence.data["ratio"]
     assert low * (1 - 1e-9) <= tally.by_unit[1.0][0] ** squared <= high * (1 + 1e-9)
@@ -83,6 +99,48 @@ def test_the_ratio_of_a_pair_in_doubles_lies_between_the_bounds(found, bodies, k
     reading = inequality.reading(case.reading.in_unit(evidence.data.get("unit", 1.0)))
     low, high = evidence.data["ratio"]
     assert low * (1 - 1e-7) <= inequality.ratio(pair, reading) <= high * (1 + 1e-7)
+
+
+@pytest.mark.parametrize("holds", [True, False])
+@pytest.mark.parametrize("key", [key for key in EVERY if key != EQUAL], ids=" ".join)
+def test_a_right_side_that_is_too_small_is_refuted_and_one_that_is_large_enough_is_not(
+    found, bodies, monkeypatch, key, holds
+):
+    """Whatever the statement: with a constant in its right side that is off by enough the evidence turns."""
+    low, high = of(found, key).data["ratio"]
+    factor = Fraction(high * (1 + 1e-3) if holds else low * (1 - 1e-3))
+    table = next(table for table in (OF_BODIES, OF_PAIRS, OF_MUCH, OF_STICKING) if key in table)
+    own = table[key]
+    scaled = lambda sides: (sides[0], sides[1] * factor)
+    both = (lambda b: [*map(scaled, own(b))]) if table is OF_BODIES else (lambda d, r: scaled(own(d, r)))
+    monkeypatch.setitem(table, key, both)
+    assert decide(bodies[LAYER if key in ON_LAYER else PLATE], *key).holds is holds
+
+
+def test_the_energy_of_sticking_nodes_lies_between_its_bounds(bodies):
+    """What a pair where all nodes stick consists of, by solves in doubles with the matrices of the program."""
+    for one in bodies.values():
+        u, pair, d = one.sticks.u, one.case.pair, one.sticks
+        S_1, S_2 = pair.contact.stiffness, pair.neumann.stiffness
+        p = -S_1 @ u
+        expected = {"energy_1": u @ S_1 @ u, "work": p @ u, "norm": np.sqrt(u @ S_2 @ u)}
+        expected["norm_T"] = np.sqrt(p @ np.linalg.solve(S_2, p))
+        for name, value in expected.items():
+            ends = getattr(d, name)
+            assert float(ends.lo) == pytest.approx(value, rel=1e-7) == float(ends.hi)
+
+
+def test_a_step_is_bounded_below_C_2_alone(bodies):
+    """At the friction of the bodies, which is far above, nothing is said of contraction."""
+    r = Constants(bodies=bodies[LAYER])
+    slight = r.contracting()
+    assert float(r.P.lo) > 1 + float(r.give.hi)
+    assert float(slight.P.hi) < 1 + float(slight.give.lo)
+    for share in CONTRACTION.values():
+        theta = slight.inside(share)
+        assert 0 < slight.gain(theta).lo < 2 / theta
+    with pytest.raises(ArithmeticError):
+        slight.inside(Fraction(101, 100))
 
 
 def test_where_the_enclosures_overlap_nothing_is_said(bodies, monkeypatch):

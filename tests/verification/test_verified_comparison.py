@@ -11,7 +11,12 @@ import verification as vf
 from ndtheory import PRINTED, Constants, EnergyConstants, Number, evaluate, evaluate_sharp
 from verification.algorithm.rates import StepRatio
 from verification.bounds.bound import BoundResult
-from verification.certificate.contraction import certify
+from verification.bounds.multipliers import QuadraticForms
+from verification.bounds.semidefinite import work_out
+from verification.certificate.constants import verify
+from verification.certificate.contraction import Claims, Confirmation, NoCertificate, certify, describe
+from verification.constants import measure
+from verification.interface.assembly import build
 from verification.verdicts import judge, judge_bound
 
 SMALL = vf.Problem.from_dict(small())
@@ -74,6 +79,66 @@ def test_the_semidefinite_factor_is_that_of_a_certificate(whole, plain):
     assert F(rest.lo) <= 1 - F(lmi.lipschitz.hi)
 
 
+def test_the_largest_theta_and_the_friction_threshold_are_proved_from_below(whole, plain):
+    proved, doubles = whole.bounds["lmi"].detail, plain.bounds["lmi"].detail
+    assert proved.unverified == {}
+    assert doubles.unverified is None
+    for name in ("theta_max", "friction_threshold"):
+        number, other = getattr(proved, name), getattr(doubles, name)
+        assert (number.level, other.level) == ("verified", "float"), name
+        assert number.hi is None
+        assert 0.98 * number.value < number.lo <= number.value == pytest.approx(other.value, rel=1e-9), name
+    assert whole.bounds["lmi"].interval == (0.0, proved.theta_max.lo)
+    assert whole.bounds["lmi"].interval_level == "verified"
+
+
+def semidefinite(problem, theta):
+    pair = build(problem)
+    measured = measure(pair)
+    return pair, measured, work_out(pair, measured, theta)
+
+
+def test_the_largest_theta_is_that_of_the_exact_constant_where_this_is_known():
+    """Without friction every theta below 2/(1 + rho_N) contracts, and none above."""
+    problem = vf.Problem.from_dict(changed(small(), body1={"young": "9"}, contact={"friction": "0"}))
+    pair, measured, found = semidefinite(problem, 0.1)
+    least = found.proved(pair, measured, F(1, 10)).theta_max.lo
+    rho = verify(measured, pair).rho_normal
+    assert rho.lo > 1
+    assert F(least) < 2 / (1 + F(rho.lo))
+    assert least == pytest.approx(2 / (1 + rho.value), rel=1e-6)
+
+
+def test_a_theta_or_a_friction_that_the_multipliers_do_not_prove_is_refused():
+    pair, measured, found = semidefinite(
+        vf.Problem.from_dict(changed(small(), body1={"young": "9"}, contact={"friction": "1/5"})), 0.1
+    )
+    confirmation = Confirmation(pair)
+    multipliers = lambda k: QuadraticForms(pair, measured, friction=k).friction_number().multipliers
+    twice = lambda k: tuple(2 * values for values in multipliers(k))
+    theta, k = found.theta_max.value, found.friction_threshold.value
+    assert theta < 0.9
+    assert 0.999 * theta < confirmation.theta_max(theta, found.largest) <= F(theta)
+    assert 0.999 * k < confirmation.friction_threshold(k, twice) <= F(k)
+    with pytest.raises(NoCertificate, match="not confirmed"):
+        confirmation.theta_max(1.02 * theta, found.largest)
+    with pytest.raises(NoCertificate, match="not confirmed"):
+        confirmation.friction_threshold(1.1 * k, twice)
+    with pytest.raises(NoCertificate, match="not confirmed"):
+        confirmation.friction_threshold(k, lambda k: tuple(values / 100 for values in multipliers(k)))
+
+
+def test_the_multipliers_of_the_largest_theta_prove_every_smaller_one():
+    pair, measured, found = semidefinite(SMALL, 0.5)
+    claims = Claims(describe(SMALL, pair), lambda text, share: None)
+    least = F(found.proved(pair, measured, F(1, 2)).theta_max.lo)
+    for share in (F(1), F(1, 2), F(1, 1000)):
+        theta = least * share
+        lam, tau, a, b = ([str(F(float(theta * F(float(v))))) for v in values] for values in found.largest)
+        written = {"lambda": lam, "tau": [str(F(x) * (1 - F(1, 10**12))) for x in tau], "a": a, "b": b}
+        assert claims.accepted(theta, F(1), written) is not None
+
+
 def test_the_verdicts_hold_the_run_against_the_proved_ends(whole, plain):
     for name in ("sharp", "lmi"):
         assert "proved bound" in whole.verdicts[name].reason
@@ -113,10 +178,12 @@ def test_what_cannot_be_certified_says_why(compared, name):
 def test_without_python_flint_the_factor_stays_one_in_doubles(whole, plain, monkeypatch):
     monkeypatch.setattr("verification.certificate.contraction.find_spec", lambda name: None)
     lmi, pair = plain.bounds["lmi"].detail, plain.run.pair
-    found = lmi.proved(pair, F(7, 10))
+    found = lmi.proved(pair, plain.measured, F(7, 10))
     assert not found.certified
     assert found.lipschitz == lmi.lipschitz
     assert "python-flint is not installed" in found.to_dict()["reason"]["certified"]
+    assert set(found.to_dict()["unverified"]) == {"theta_max", "friction_threshold"}
+    assert found.theta_max == lmi.theta_max
 
 
 def test_of_matrices_nothing_is_proved_and_the_comparison_says_why():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,7 @@ from verification.value import freeze
 
 if TYPE_CHECKING:
     from verification.bounds.multipliers import Certified
+    from verification.bounds.program import Weights
     from verification.constants import Measured
     from verification.interface.pair import ContactPair
 
@@ -52,8 +54,12 @@ class Semidefinite:
         What the multipliers of one program prove for all pieces of T together.
     divided : Number or None
         Where ``lipschitz`` is proved: the smaller one in doubles that dividing the pieces of T gives.
+    largest : tuple of arrays
+        The multipliers behind ``theta_max``, over theta.
     not_proved : str
         Why ``lipschitz`` is not proved; empty where it is.
+    unverified : mapping or None
+        Why ``theta_max`` or ``friction_threshold`` is not proved, where that was tried; None where it was not.
     """
 
     lipschitz: Number
@@ -66,7 +72,9 @@ class Semidefinite:
     no_threshold: str = "no law of friction"
     whole: Certified | None = None
     divided: Number | None = None
+    largest: Weights = ()
     not_proved: str = NOT_CERTIFIED
+    unverified: Mapping[str, str] | None = None
 
     @property
     def factor(self) -> Number | None:
@@ -111,35 +119,69 @@ class Semidefinite:
             "programs": self.programs,
             "certified": self.certified,
             **({} if self.divided is None else {"divided": self.divided.to_dict()}),
+            **({} if self.unverified is None else {"unverified": dict(self.unverified)}),
             "reason": reason if self.certified else reason | {"certified": self.not_proved},
         }
 
-    def proved(self, pair: ContactPair, theta: Fraction, *, progress: Progress = silent) -> Semidefinite:
-        """The same with a Lipschitz constant that is proved for the rational data, or the reason why there is none.
+    def proved(
+        self, pair: ContactPair, measured: Measured, theta: Fraction, *, progress: Progress = silent
+    ) -> Semidefinite:
+        """The same with numbers that are proved for the rational data, or the reasons why some are not.
 
-        The one that is proved is that of a single program: its multipliers hold for all pieces of T at once, and one
-        quadratic form decides.  What dividing the pieces gives beyond it stays in ``divided``.
+        The Lipschitz constant that is proved is that of a single program: its multipliers hold for all pieces of T at
+        once, and one quadratic form decides.  What dividing the pieces gives beyond it stays in ``divided``.
 
         Parameters
         ----------
         pair : ContactPair
             Of which this is said.
+        measured : Measured
+            Its constants.
         theta : Fraction
             At which it is.
         progress : callable
         """
-        from verification.certificate.contraction import NoCertificate, confirm  # it lists the bounds
+        from verification.bounds.multipliers import QuadraticForms
+        from verification.bounds.program import LMIError
+        from verification.certificate.contraction import Confirmation, NoCertificate  # it lists the bounds
 
         assert self.whole is not None
         try:
-            found = confirm(pair, theta, self.whole.value, self.whole.multipliers, progress=progress)
+            confirmation = Confirmation(pair, progress=progress)
         except NoCertificate as error:
-            return replace(self, not_proved=str(error))
+            return replace(self, not_proved=str(error), unverified=dict.fromkeys(self._found_beside(), str(error)))
+
+        def multipliers(k: float) -> Weights:
+            found = QuadraticForms(pair, measured, friction=k).friction_number()
+            return tuple(2 * values for values in found.multipliers)
+
+        proofs: dict[str, Callable[[Number], Fraction]] = {
+            "theta_max": lambda number: confirmation.theta_max(number.value, self.largest),
+            "friction_threshold": lambda number: confirmation.friction_threshold(number.value, multipliers),
+        }
+        kept: dict[str, Any] = {}
+        why: dict[str, str] = {}
+        for name, number in self._found_beside().items():
+            try:
+                least = below(proofs[name](number))
+                kept[name] = Number(value=max(number.value, least), lo=least, level="verified")
+            except (NoCertificate, LMIError) as error:
+                why[name] = str(error)
+        beside = replace(self, **kept, unverified=why)
+        try:
+            found = confirmation.factor(theta, self.whole.value, self.whole.multipliers)
+        except NoCertificate as error:
+            return replace(beside, not_proved=str(error))
         most = above(found)
         if not most < 1:
-            return replace(self, not_proved=f"1 - {float(1 - found):.3g} is proved, which no double tells from 1")
+            return replace(beside, not_proved=f"1 - {float(1 - found):.3g} is proved, which no double tells from 1")
         number = Number(value=min(self.whole.value, most), hi=most, level="verified")
-        return replace(self, lipschitz=number, divided=self.lipschitz, not_proved="")
+        return replace(beside, lipschitz=number, divided=self.lipschitz, not_proved="")
+
+    def _found_beside(self) -> dict[str, Number]:
+        """The largest theta and the friction threshold, where there are any."""
+        found = {"theta_max": self.theta_max, "friction_threshold": self.friction_threshold}
+        return {name: number for name, number in found.items() if number is not None}
 
 
 def work_out(
@@ -179,6 +221,7 @@ def work_out(
     return Semidefinite(
         lipschitz=Number.of_float(found.upper.value),
         whole=replace(found.whole, multipliers=freeze(tuple(map(np.array, found.whole.multipliers)))),
+        largest=() if largest is None else freeze(tuple(map(np.array, largest.multipliers))),
         lower=found.lower,
         programs=found.programs,
         why_apart=found.why_apart,
@@ -219,15 +262,16 @@ class SemidefiniteBound(Bound):
         except (LMIError, ValueError) as error:
             return self.absent(str(error))
         if subject.measured.unverified is not None:  # proofs were asked for
-            found = found.proved(subject.pair, chosen, progress=progress)
-        factor, allowed = found.factor, found.friction_threshold
+            found = found.proved(subject.pair, subject.measured, chosen, progress=progress)
+        factor, allowed, largest = found.factor, found.friction_threshold, found.theta_max
         return BoundResult(
             name=self.name,
             proved=True,
             theta=theta,
             factor=factor,
             one_minus_factor=None if factor is None else _rest(factor),
-            interval=None if found.theta_max is None else (0.0, found.theta_max.value),
+            interval=None if largest is None else (0.0, largest.value if largest.lo is None else largest.lo),
+            interval_level="float" if largest is None else largest.level,
             friction=Thresholds(
                 every=allowed, on="k" if allowed is not None or subject.measured.C_t1 is None else "any"
             ),

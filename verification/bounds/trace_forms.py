@@ -14,8 +14,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import block_diag
 
+from fem1d2d.enclosed import Enclosed, gamma, upwards
+from fem1d2d.loewner import positive_definite
 from fem1d2d.mesh import Floats
-from verification.bounds.rounding import gamma, positive_definite
 from verification.interface.pair import ContactPair
 
 
@@ -71,9 +72,13 @@ class TraceForms:
             sizes += [(of(open_),) * 2, (of(press),) * 2, (of(shear),) * 2, (of(shear), zeta_size)]
         self._families, self._sizes = families, sizes
         # inner products over nodes (a transfer has them too), over traces twice, and the scalars and sums
-        self._error = gamma(4 * (2 * size + len(S_1)) + (2 if interface.transfer is None else 4) * contact.n + 20)
+        self._terms = 4 * (2 * size + len(S_1)) + (2 if interface.transfer is None else 4) * contact.n + 20
         self._free = _changed(S_2, self._near_2)
-        self._free_error = self._error * _changed(np.abs(S_2), np.abs(self._near_2))
+        self._free_error = self._error(np.abs(S_2), self._near_2)
+
+    def _error(self, size: Floats, near: Floats) -> Floats:
+        """A bound of the rounding errors of a form in the coordinates of some columns, from the moduli of its terms."""
+        return np.asarray(upwards(gamma(self._terms) * _changed(size, np.abs(near)), self._terms))
 
     def with_multipliers(
         self,
@@ -107,14 +112,14 @@ class TraceForms:
             form = np.block([[self._S_2 / weight, row], [row.T, form]])
             size = np.block([[np.abs(self._S_2) / weight, row_size], [row_size.T, size]])
             near, first = block_diag(np.sqrt(weight) * self._near_2, near), len(row)
-        form, size = _changed(form, near), self._error * _changed(size, np.abs(near))
+        form, size = _changed(form, near), self._error(size, near)
         d = slice(first, first + len(self._S_2))
 
         def definite(square: float) -> bool:
             matrix, error = form.copy(), size.copy()
             matrix[d, d] += square * self._free
             error[d, d] += abs(square) * self._free_error
-            return positive_definite(matrix, error)
+            return positive_definite(Enclosed(middle=matrix, radius=error))
 
         return definite
 

@@ -34,15 +34,19 @@ class Refused(ValueError):
     """The claim is not proved by its certificate."""
 
 
-def check(discrete, claim):
-    """Raise Refused, KeyError or another ValueError unless the multipliers of a claim prove it."""
+def check(discrete, claim, eliminated=None):
+    """Raise Refused, KeyError or another ValueError unless the multipliers of a claim prove it.
+
+    ``eliminated`` may stand in for surface_stiffness where several claims are checked: it keeps what that returned.
+    """
+    stiffness = eliminated or surface_stiffness
     ctx.prec = min(int(claim["bits"]), 20000)
     theta, factor, k = (rational(claim["theta"]), rational(claim["factor"]), rational(discrete["friction"]))
     demand(0 < theta <= 1 and factor >= 0 and k >= 0, "0 < theta <= 1, a factor and a friction that are not negative")
     demand(discrete["neumann_body"] in (1, 2), "neumann_body 1 or 2")
     one, two = discrete["body1"], discrete["body2"]
     neumann, contact = (two, one) if discrete["neumann_body"] == 2 else (one, two)
-    S_n, S_c = surface_stiffness(neumann, both=True), surface_stiffness(contact, both=k != 0)
+    S_n, S_c = stiffness(neumann, both=True), stiffness(contact, both=k != 0)
     n, m, t = len(contact["surface"]), len(neumann["surface"]), len(contact["surface"]) if k else 0
     P = matrix(discrete["transfer"], n, m) if discrete["transfer"] else identity(n)
     demand(P.ncols() == m, "a transfer between contact nodes that differ")

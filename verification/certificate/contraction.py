@@ -7,9 +7,10 @@ this library, then decides in balls whether these multipliers prove the factor f
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
 from decimal import ROUND_DOWN, ROUND_UP, Context, Decimal
 from fractions import Fraction
 from importlib.util import find_spec
@@ -43,7 +44,14 @@ BITS = (320, 640, 1280)
 #: Digits of a multiplier and of a factor.
 DIGITS = 12
 
+#: By which share a theta or a friction is smaller than in doubles, in turn, until the checker accepts it.
+LESS = (0.0, 1e-9, 1e-6, 1e-4, 1e-3, 1e-2)
+
+#: Thetas at which a friction is tried that every small theta is to bear, in turn.
+SMALL = (Fraction(1, 10**3), Fraction(1, 10**6), Fraction(1, 10**9))
+
 NOT_CONFIRMED = "gives 1 - {:.3g} in doubles, which is not confirmed in rationals"
+NOT_BELOW = f"is not confirmed in rationals, nor what is smaller by a share of {LESS[-1]:g}"
 
 
 class NoCertificate(RuntimeError):
@@ -201,67 +209,161 @@ def certify(
     progress(f"{BOUNDS[edition].words} proposes multipliers", None)
     spare, multipliers, lower = _proposed(pair, measured, chosen, edition)
     discrete = describe(problem, pair)
-    claim = _confirmed(discrete, chosen, spare, multipliers, progress)
+    claim = Claims(discrete, progress).confirmed(chosen, spare, multipliers)
     if claim is None:
         raise NoCertificate(f"{BOUNDS[edition].words} {NOT_CONFIRMED.format(spare)}")
     return Certificate(edition=edition, discrete=discrete, claim=claim, problem=problem, lower=lower)
 
 
-def confirm(
-    pair: ContactPair, theta: Fraction, factor: float, multipliers: Weights, *, progress: Progress = silent
-) -> Fraction:
-    """A factor of one step that multipliers prove for the rational data of a problem, as a certificate would.
+class Confirmation:
+    """Claims about the rational data of one pair of bodies, decided as a certificate's would be.
 
     Parameters
     ----------
-    pair, theta, progress
-        As for :func:`certify`.
-    factor : float
-        What the multipliers prove in doubles; the result is larger by a small share of what it is below 1.
-    multipliers : tuple of arrays
-        lambda, tau, a, b by node; lambda alone without friction.
+    pair : ContactPair
+    progress : callable
 
     Raises
     ------
     NoCertificate
+        No claim about this pair can be proved.
     """
-    if find_spec("flint") is None:
-        raise NoCertificate("python-flint is not installed: needed the extra `certify`")
-    if pair.problem is None:
-        raise NoCertificate(FROM_MATRICES)
-    if pair.problem.dimension != 2:
-        raise NoCertificate("needed a plane problem: in 1D rho is a ratio of exact numbers")
-    if pair.outside:
-        raise NoCertificate(f"outside the theorem: {pair.outside[0]}")
-    if not factor < 1:
-        raise NoCertificate(f"the factor of one program is {factor:.4g}, which is no contraction")
-    try:
-        discrete = describe(pair.problem, pair)
-    except NotExact as error:
-        raise NoCertificate(str(error)) from None
-    claim = _confirmed(discrete, theta, 1 - factor, _written(multipliers), progress)
-    if claim is None:
-        raise NoCertificate(f"the factor of one program {NOT_CONFIRMED.format(1 - factor)}")
-    return Fraction(claim["factor"])
+
+    def __init__(self, pair: ContactPair, *, progress: Progress = silent) -> None:
+        if find_spec("flint") is None:
+            raise NoCertificate("python-flint is not installed: needed the extra `certify`")
+        if pair.problem is None:
+            raise NoCertificate(FROM_MATRICES)
+        if pair.problem.dimension != 2:
+            raise NoCertificate("needed a plane problem: in 1D rho is a ratio of exact numbers")
+        if pair.outside:
+            raise NoCertificate(f"outside the theorem: {pair.outside[0]}")
+        try:
+            claims = Claims(describe(pair.problem, pair), progress)
+        except NotExact as error:
+            raise NoCertificate(str(error)) from None
+        self.pair, self.problem, self._claims = pair, pair.problem, claims
+
+    def factor(self, theta: Fraction, factor: float, multipliers: Weights) -> Fraction:
+        """A factor of one step, larger than the one in doubles by a small share of what that is below 1.
+
+        Parameters
+        ----------
+        theta : Fraction
+        factor : float
+            What the multipliers prove in doubles.
+        multipliers : tuple of arrays
+            lambda, tau, a, b by node; lambda alone without friction.
+
+        Raises
+        ------
+        NoCertificate
+        """
+        if not factor < 1:
+            raise NoCertificate(f"the factor of one program is {factor:.4g}, which is no contraction")
+        claim = self._claims.confirmed(theta, 1 - factor, _written(multipliers))
+        if claim is None:
+            raise NoCertificate(f"the factor of one program {NOT_CONFIRMED.format(1 - factor)}")
+        return Fraction(claim["factor"])
+
+    def theta_max(self, theta: float, multipliers: Weights) -> Fraction:
+        """A theta up to which every one contracts, a little below that in doubles.
+
+        Over theta the form with q = 1 is ``2 |g|^2 - 2 <g, p> - theta |p - g|^2`` minus the multiplied conditions: it
+        grows as theta falls, so that one certificate answers for all smaller ones.
+
+        Parameters
+        ----------
+        theta : float
+            What the multipliers prove in doubles.
+        multipliers : tuple of arrays
+            Over theta.
+
+        Raises
+        ------
+        NoCertificate
+        """
+        for share in LESS:
+            found = _decimal(theta * (1 - share), ROUND_DOWN)
+            if self._claims.accepted(found, Fraction(1), _written(_times(float(found), multipliers))):
+                return found
+        raise NoCertificate(f"theta = {theta:.6g} in doubles {NOT_BELOW}")
+
+    def friction_threshold(self, k: float, propose: Callable[[float], Weights]) -> Fraction:
+        """A friction up to which every small theta contracts, a little below that in doubles.
+
+        The multiplied conditions grow with k, so that one certificate answers for all that is smaller, and with one
+        theta for all smaller ones: see :meth:`theta_max`.
+
+        Parameters
+        ----------
+        k : float
+            What was found in doubles.
+        propose : callable
+            Friction -> multipliers over theta, as of ``2 |g|^2 - 2 <g, p>``.
+
+        Raises
+        ------
+        NoCertificate
+        LMIError
+        """
+        for share in LESS:
+            found = _decimal(k * (1 - share), ROUND_DOWN)
+            claims = self._claims.at(describe(self.problem, replace(self.pair, friction=found)))
+            multipliers = propose(float(found))
+            for theta in SMALL:
+                if claims.accepted(theta, Fraction(1), _written(_times(float(theta), multipliers))):
+                    return found
+        raise NoCertificate(f"k = {k:.6g} in doubles {NOT_BELOW}")
 
 
-def _confirmed(
-    discrete: dict[str, Any], theta: Fraction, spare: float, multipliers: dict[str, Any], progress: Progress
-) -> dict[str, Any] | None:
-    """A claim that the checker accepts, its factor below 1 by nearly ``spare``; None where it accepts none."""
-    from verification.certificate.check import check
+class Claims:
+    """The checker for some bodies, each of which is eliminated once for all claims.
 
-    for margin in MARGINS:
-        wanted = 1 - _decimal(spare * (1 - margin), ROUND_DOWN)
+    Parameters
+    ----------
+    discrete : dict
+        The bodies as :func:`describe` gives them.
+    progress : callable
+    """
+
+    def __init__(self, discrete: dict[str, Any], progress: Progress, known: dict[Any, Any] | None = None) -> None:
+        self.discrete, self.progress = discrete, progress
+        self._known: dict[Any, Any] = {} if known is None else known
+
+    def at(self, discrete: dict[str, Any]) -> Claims:
+        """Claims about the same bodies, joined otherwise."""
+        return Claims(discrete, self.progress, self._known)
+
+    def accepted(self, theta: Fraction, factor: Fraction, multipliers: dict[str, Any]) -> dict[str, Any] | None:
+        """The claim of a factor with the bits in which the checker accepts it; None where it does not."""
+        from verification.certificate.check import check, surface_stiffness
+
         for bits in BITS:
-            claim = {"theta": str(theta), "factor": str(wanted), "bits": bits, "multipliers": multipliers}
-            progress(f"checking the factor {float(wanted):.10g} in balls of {bits} bits", None)
+            claim = {"theta": str(theta), "factor": str(factor), "bits": bits, "multipliers": multipliers}
+            self.progress(f"checking the factor {float(factor):.10g} in balls of {bits} bits", None)
+
+            def eliminated(body: dict[str, Any], both: bool, bits: int = bits) -> Any:
+                key = (json.dumps(body), both, bits)
+                if key not in self._known:
+                    self._known[key] = surface_stiffness(body, both=both)
+                return self._known[key]
+
             try:
-                check(discrete, claim)
+                check(self.discrete, claim, eliminated)
             except (ValueError, ZeroDivisionError):
                 continue
             return claim
-    return None
+        return None
+
+    def confirmed(self, theta: Fraction, spare: float, multipliers: dict[str, Any]) -> dict[str, Any] | None:
+        """A claim that is accepted, its factor below 1 by nearly ``spare``; None where none is."""
+        wanted = (1 - _decimal(spare * (1 - margin), ROUND_DOWN) for margin in MARGINS)
+        return next(filter(None, (self.accepted(theta, factor, multipliers) for factor in wanted)), None)
+
+
+def _times(factor: float, multipliers: Weights) -> Weights:
+    return tuple(factor * values for values in multipliers)
 
 
 def check_again(document: Any, problem: Problem | None = None) -> Checked:

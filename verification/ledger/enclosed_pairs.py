@@ -1,8 +1,9 @@
 """Named bodies, and a pair of forces on them, with all that Sections 4 and 5 compare between proved bounds.
 
-The pair of forces is a difference of two on the piece of T where all nodes are open and slip one way: with d_2 = u, a
-vector of doubles, ``g = S_n u`` and ``p_T = w k sign S g_N``, ``p_N = 0`` follow, and ``d_1 = -S_c^-1 p``.  An inverse
-is met in two ways, for a vector y that a solver gives and its residual ``r = x - Y y``:
+A pair of forces is a difference of two on a piece of T, with d_2 = u, a vector of doubles, and ``g = S_n u``.  Where
+all nodes are open and slip one way ``p_T = w k sign S g_N``, ``p_N = 0``, and ``d_1 = -S_c^-1 p``; where all stick
+``d_1 = u`` and ``p = -S_c u``.  An inverse is met in two ways, for a vector y that a solver gives and its residual
+``r = x - Y y``:
 
     x' Y^-1 x = 2 x' y - y' Y y + r' Y^-1 r,      |Y^-1 x - y|_Y^2 = r' Y^-1 r <= |r|^2 / least eigenvalue of Y.
 """
@@ -14,6 +15,7 @@ from fractions import Fraction
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import eigh
 
 from fem1d2d.enclosed import Enclosed, upwards
 from fem1d2d.mesh import Floats
@@ -21,8 +23,6 @@ from fem1d2d.proved import Ends
 from ndtheory import Number
 from ndtheory.intervals import Interval
 from verification.certificate.constants import Between, Proof, entries
-from verification.constants import measure
-from verification.interface.assembly import build
 from verification.interface.body import Condensed
 from verification.ledger.cases import NAMED
 from verification.ledger.differences import directions, uniform_piece
@@ -30,6 +30,9 @@ from verification.ledger.inequalities import SEED
 from verification.ledger.worst import Trial
 from verification.problem.specification import Problem
 from verification.progress import silent
+
+#: So many times the friction of its problems, what Section 5 prints from (5.31) on fails in a small unit of stress.
+MUCH = Fraction(10**8)
 
 
 class Bodies:
@@ -43,9 +46,8 @@ class Bodies:
 
     def __init__(self, name: str) -> None:
         self.name, self.problem = name, Problem.from_dict(NAMED[name])
-        pair = build(self.problem)
-        self.case = Trial(name=name, pair=pair, measured=measure(pair))
-        self.proof = Proof(self.case.measured, pair, silent)
+        self.case = Trial.of(name, self.problem)
+        self.proof = Proof(self.case.measured, self.case.pair, silent)
         self.measured = self.proof.result()
         self.names = self.proof.contact, self.proof.neumann
 
@@ -97,9 +99,76 @@ class Bodies:
         """A pair of forces on which the friction term is large."""
         return Slides(self)
 
+    @cached_property
+    def slides_much(self) -> Slides:
+        """The same at much more friction."""
+        return Slides(self, MUCH)
 
-class Slides:
-    """The difference of two solutions where all nodes are open and slip one way.
+    @cached_property
+    def sticks(self) -> Sticks:
+        """A pair of forces to which T answers with a large difference."""
+        return Sticks(self)
+
+
+class Apart:
+    """The difference of two solutions on a piece of T.
+
+    Parameters
+    ----------
+    bodies : Bodies
+    u : array
+        d_2.
+
+    Attributes
+    ----------
+    energy_1, work, friction : Interval
+        ``a^1(w^1 - w~^1, w^1 - w~^1)``, ``<T psi - T psi~, w^2 - w~^2>`` and the friction term.
+    size_1, size_2 : Interval
+        ``|w^a - w~^a|_a`` in H1.
+    norm, norm_T, dual, dual_T : Interval
+        The norm (5.21) of ``psi - psi~`` and of ``T psi - T psi~``, and their norms in the dual of V^2.
+    """
+
+    energy_1: Interval
+    work: Interval
+    friction: Interval
+    size_1: Interval
+    norm_T: Interval
+    dual_T: Interval
+
+    def __init__(self, bodies: Bodies, u: Floats) -> None:
+        self.u, self._proof, pair = u, bodies.proof, bodies.case.pair
+        sides = (pair.contact, pair.neumann)
+        self._S_1, self._S_2 = (_turned(form, side) for form, side in zip(bodies.S, sides, strict=True))
+        self._N_1, N_2 = (_turned(form, side) for form, side in zip(bodies.N, sides, strict=True))
+        self._E_2 = _turned(bodies.E[1], pair.neumann)
+        self._force = entries(self._S_2).times(Enclosed.exactly(u[:, None]))
+        self.size_2, self.norm = _form(N_2, u).sqrt(), _form(self._S_2, u).sqrt()
+        self.dual = self._inverse_form(self._E_2, self._force)[0].sqrt()
+
+    def _inverse_form(self, form: Between, x: Enclosed) -> tuple[Interval, Floats, Decimal]:
+        identity = Enclosed.exactly(np.eye(len(self.u)))
+        return _inverse_form(form, x, self._proof.largest((identity, identity), form)[1])  # 1/least eigenvalue
+
+    def _answer(self, reaction: Enclosed) -> None:
+        """Take ``T psi - T psi~``, the inner product of whose forces with those of psi is the work."""
+        self.work = _scalar(reaction.T.times(Enclosed.exactly(self.u[:, None])))
+        self.norm_T = self._inverse_form(self._S_2, reaction)[0].sqrt()
+        self.dual_T = self._inverse_form(self._E_2, reaction)[0].sqrt()
+
+    def step(self, theta: Fraction) -> Interval:
+        """``|||T_theta psi - T_theta psi~|||^2`` (5.7)."""
+        rest = 1 - theta
+        return theta**2 * self.norm_T.square() + rest**2 * self.norm.square() + 2 * theta * rest * self.work
+
+    def gain(self, theta: Fraction) -> Interval:
+        """``(|||psi - psi~|||^2 - |||T_theta psi - T_theta psi~|||^2)/theta``, in which small thetas lose nothing."""
+        norm, norm_T = self.norm.square(), self.norm_T.square()
+        return 2 * (norm - self.work) - theta * (norm - 2 * self.work + norm_T)
+
+
+class Sticks(Apart):
+    """Where all nodes touch and stick, in the direction in which the contact body is the stiffest beside the other.
 
     Parameters
     ----------
@@ -107,6 +176,27 @@ class Slides:
     """
 
     def __init__(self, bodies: Bodies) -> None:
+        pair = bodies.case.pair
+        n = len(pair.neumann.stiffness)
+        u = eigh(pair.contact.stiffness, pair.neumann.stiffness, subset_by_index=[n - 1] * 2)[1][:, 0]
+        super().__init__(bodies, u)
+        back = entries(self._S_1).times(Enclosed.exactly(u[:, None]))
+        self.energy_1, self.size_1 = _form(self._S_1, u), _form(self._N_1, u).sqrt()
+        self.friction = Interval.of(0)
+        self._answer(Enclosed(middle=-back.middle, radius=back.radius))
+
+
+class Slides(Apart):
+    """Where all nodes are open and slip one way, in the direction in which the friction term is the largest.
+
+    Parameters
+    ----------
+    bodies : Bodies
+    more : Fraction
+        How many times their friction.
+    """
+
+    def __init__(self, bodies: Bodies, more: Fraction = Fraction(1)) -> None:
         pair, case = bodies.case.pair, bodies.case
         piece = uniform_piece(pair, touching=False, sliding=1)
         random = np.random.default_rng(SEED)
@@ -117,38 +207,21 @@ class Slides:
                 float((piece.bound @ g) @ -(piece.jump @ g)[: pair.contact.grid.t]) / float(g @ forms.inverse @ g)
             ),
         )
-        sides = (pair.contact, pair.neumann)
-        S_1, S_2 = (_turned(form, side) for form, side in zip(bodies.S, sides, strict=True))
-        N_1, N_2 = (_turned(form, side) for form, side in zip(bodies.N, sides, strict=True))
-        E_2 = _turned(bodies.E[1], pair.neumann)
-        self.u = forms.inverse @ worst
-        identity = Enclosed.exactly(np.eye(len(self.u)))
-        inverse = lambda form: bodies.proof.largest((identity, identity), form)[1]  # 1 over its least eigenvalue
-        column = Enclosed.exactly(self.u[:, None])
-        force = entries(S_2).times(column)
+        super().__init__(bodies, forms.inverse @ worst)
         t, kernel = pair.contact.grid.t, bodies.proof.joint.kernel
         assert kernel is not None
-        zeta = kernel.times(force.block(np.arange(t, len(self.u)), np.arange(1)))
+        zeta = kernel.times(self._force.block(np.arange(t, len(self.u)), np.arange(1)))
         signed = Enclosed(middle=piece.sign[:, None] * zeta.middle, radius=zeta.radius)
-        friction = _times(bodies.problem.contact.friction)
+        friction = _times(more * bodies.problem.contact.friction)
         bound = bodies.proof.joint.weights.times(signed).times(friction)
         nothing = np.zeros((len(self.u) - t, 1))
         reaction = Enclosed(middle=np.vstack([bound.middle, nothing]), radius=np.vstack([bound.radius, nothing]))
-        self.work = _scalar(reaction.T.times(column))  # <T psi - T psi~, d_2>, and the inner product of both forces
-        self.energy_1, y, off = _inverse_form(S_1, reaction, inverse(S_1))
+        self._answer(reaction)
+        self.energy_1, y, off = self._inverse_form(self._S_1, reaction)
         self.friction = self.energy_1 + self.work
         error = (Interval.of(off) / bodies.of_bodies("m")[0]).sqrt()  # of the H1 norm
-        size = _form(N_1, y).sqrt()
+        size = _form(self._N_1, y).sqrt()
         self.size_1 = Interval.between(max((size - error).lo, Decimal(0)), (size + error).hi)
-        self.size_2, self.norm = _form(N_2, self.u).sqrt(), _form(S_2, self.u).sqrt()
-        self.norm_T = _inverse_form(S_2, reaction, inverse(S_2))[0].sqrt()
-        self.dual = _inverse_form(E_2, force, inverse(E_2))[0].sqrt()
-        self.dual_T = _inverse_form(E_2, reaction, inverse(E_2))[0].sqrt()
-
-    def step(self, theta: Fraction) -> Interval:
-        """``|||T_theta psi - T_theta psi~|||^2`` (5.7)."""
-        rest = 1 - theta
-        return theta**2 * self.norm_T.square() + rest**2 * self.norm.square() + 2 * theta * rest * self.work
 
 
 def _interval(number: Number) -> Interval:

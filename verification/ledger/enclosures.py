@@ -1,24 +1,26 @@
 """Inequalities of Sections 4 and 5 on named bodies, both sides between proved bounds for the exact data.
 
 Where the bounds of the sides do not overlap, the inequality is decided on these bodies: one that fails there is
-refuted by proof, and of one that holds this is one case.  Where they overlap nothing is said.  Equalities cannot be
-decided so.
+refuted by proof, and of one that holds this is one case.  Where they overlap nothing is said.  Equalities, which cannot
+be decided so, are left to :mod:`verification.ledger.rational_pairs`.  In all units taken m is below 1, so that m~ is m.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from fractions import Fraction
+from functools import partial
 from typing import Any, Literal
 
 from fem1d2d import plane_strain
 from ndtheory import bounds as formulas
+from ndtheory import sharp
 from ndtheory.intervals import Interval
-from ndtheory.number import SLACK, working_precision
-from verification.ledger.cases import NAMED
-from verification.ledger.enclosed_pairs import Bodies, Slides
+from ndtheory.number import SLACK, decimal, working_precision
+from verification.ledger.cases import NAMED, three_digits
+from verification.ledger.enclosed_pairs import MUCH, Apart, Bodies
 from verification.ledger.evidence import Evidence, Level
 from verification.threads import one_thread
 
@@ -28,7 +30,14 @@ PLATE, LAYER = "plate of thickness 0.01 clamped at one end", "layer of a ten-tho
 #: Of stress, in units of the file: the one in which (5.30) as printed fails, and that of the file.
 SMALL, OWN = Fraction(1, 10**6), Fraction(1)
 
+#: The unit of stress in which what is printed from (5.31) on fails on the layer with much friction, as it does on any
+#: pair of bodies (:mod:`verification.ledger.large_friction`).
+TINY = Fraction(1, 10**14)
+
 HALF = Fraction(1, 2)
+
+#: The share of C_0 and of C_2 that is just below it.
+JUST_BELOW = Fraction(99, 100)
 
 #: An inequality with both sides; several that are to hold together.
 Sides = list[tuple[Interval, Interval]]
@@ -48,15 +57,18 @@ class Constants:
         Whether the bracket of (5.30) adds a stress to 1.
     unit : Fraction
         Of stress, in units of the file.
+    share : Fraction
+        Of the friction of the bodies, at which the constants are read.
     """
 
     bodies: Bodies
     printed: bool = False
     unit: Fraction = OWN
+    share: Fraction = Fraction(1)
 
     def stress(self, name: str) -> Interval:
         """A constant that is a stress, in that unit."""
-        return self.bodies.number(name) * self.unit
+        return self.bodies.number(name) * self.unit * (self.share if name == "C_K" else 1)
 
     @property
     def C_R(self) -> Interval:
@@ -102,9 +114,78 @@ class Constants:
         """The coefficient of ``|||T psi - T psi~|||^2`` in (5.32)."""
         return theta**2 - 2 * theta * (1 - theta) * self.give
 
+    def h_1(self, theta: Fraction) -> Interval:
+        """After (5.39)."""
+        gain: Interval = formulas.one_minus_h1(theta, self.D, self.Q)
+        return 1 - gain
+
     def h_2(self, theta: Fraction) -> Interval:
         """(5.45)."""
-        return (1 - theta) ** 2 + 2 * theta * (1 - theta) * self.P
+        gain: Interval = formulas.one_minus_h2(theta, self.P)
+        return 1 - gain
+
+    @property
+    def D(self) -> Interval:
+        """``C_T^2/C_R^2 - P``."""
+        return self.grows(formulas.D)
+
+    @property
+    def Q(self) -> Interval:
+        """The Lipschitz constant of T squared, as h_1 has it."""
+        return (self.C_T * self.stress("M") / self.stress("m")).square()
+
+    @property
+    def C_0(self) -> Interval:
+        """(5.37)."""
+        return 2 * self.give / (1 + 2 * self.give)
+
+    @property
+    def below_C_0(self) -> Fraction:
+        """A theta that is proved to lie below C_0."""
+        return three_digits(float(JUST_BELOW) * float(self.C_0.lo))
+
+    @property
+    def at_C_0(self) -> Fraction:
+        """The smallest theta that is proved not to lie below C_0."""
+        return Fraction(self.C_0.hi)
+
+    def contracting(self) -> Constants:
+        """The same at a friction below C_2, as repaired."""
+        slight = three_digits(float(JUST_BELOW) * self.bodies.case.reading.threshold / float(self.stress("C_K").hi))
+        found = replace(self, share=slight)
+        if not found.P.hi < (1 + found.give).lo:
+            raise ArithmeticError("the friction is not proved to lie below C_2")
+        return found
+
+    def inside(self, share: Fraction) -> Fraction:
+        """A theta between the ends of Proposition 5.6, the upper one C_1; share is about that of the way."""
+        low = Interval.of(0) if self.P.hi <= 1 else formulas.C6(self.P)
+        high = formulas.C1(self.D, self.Q)
+        theta = three_digits(float(low.hi) + float(share) * (float(high.lo) - float(low.hi)))
+        if not low.hi < theta < high.lo:
+            raise ArithmeticError(f"theta = {theta} is not proved to lie inside the interval")
+        return theta
+
+    def gain(self, theta: Fraction) -> Interval:
+        """``(1 - K(theta)^2)/theta``."""
+        h_1, h_2 = (2 * (1 + self.D) - theta * (1 + 2 * self.D + self.Q), (2 - theta) - 2 * (1 - theta) * self.P)
+        return Interval(min(h_1.lo, h_2.lo), min(h_1.hi, h_2.hi))
+
+    def _energy(self, formula: Callable[..., Any]) -> Interval:
+        """A formula of rho, kappa_1 and kappa_2 that grows with each (:mod:`ndtheory.sharp`)."""
+        constants = [self.bodies.number(name) for name in ("rho_max", "kappa_1", "kappa_2")]
+        with working_precision():
+            low, high = formula(*(c.lo for c in constants)), formula(*(c.hi for c in constants))
+            return Interval.between(low * (1 - SLACK), high * (1 + SLACK))
+
+    @property
+    def ratio(self) -> Interval:
+        """r, the largest ``|w^1 - w~^1|/|w^2 - w~^2|`` in energy norms."""
+        return self._energy(sharp.largest_ratio)
+
+    def q_squared(self, theta: Fraction) -> Interval:
+        """``q(theta)^2`` of the theorem in energy norms."""
+        return self._energy(lambda *constants: 1 - sharp.one_minus_square(decimal(theta), *constants))
 
 
 ONE = Interval.of(1)
@@ -128,8 +209,53 @@ OF_BODIES: Mapping[Key, Callable[[Bodies], Sides]] = {
     ("x-lift-bound", "printed"): lambda b: [(b.top(N, E), c) for N, E, c in zip(b.N, b.E, b.contrast, strict=True)],
 }
 
-#: Of a pair of forces, at theta = 1/2 where there is one.
-OF_PAIRS: Mapping[Key, Callable[[Slides, Constants], tuple[Interval, Interval]]] = {
+Pairs = Mapping[Key, Callable[[Apart, Constants], tuple[Interval, Interval]]]
+
+
+def contracts(d: Apart, r: Constants, share: Fraction) -> tuple[Interval, Interval]:
+    """``1 - K(theta)^2`` is at most what a step takes away, both over theta; share as for ``inside``."""
+    slight = r.contracting()
+    theta = slight.inside(share)
+    return slight.gain(theta) * d.norm.square(), d.gain(theta)
+
+
+def of_step(d: Apart, r: Constants, theta: Fraction) -> tuple[Interval, Interval]:
+    """(5.32), with the term of ``|||T psi - T psi~|||^2`` on the side on which it is positive."""
+    term, weight = d.norm_T.square(), r.weight(theta)
+    left, right = d.step(theta), r.h_2(theta) * d.norm.square()
+    return (left, right + weight * term) if weight.lo >= 0 else (left - weight * term, right)
+
+
+#: What follows from (5.30), close to C_0 where it says most.
+STEPS: Mapping[str, Callable[[Apart, Constants], tuple[Interval, Interval]]] = {
+    "5.31": lambda d, r: (d.work + r.give * d.norm_T.square(), r.P * d.norm.square()),
+    **{id: lambda d, r: of_step(d, r, r.below_C_0) for id in ("5.32", "5.33", "5.36")},
+    "5.39": lambda d, r: (d.step(r.at_C_0), r.h_1(r.at_C_0) * d.norm.square()),
+    "5.44": lambda d, r: (d.step(r.below_C_0), r.h_2(r.below_C_0) * d.norm.square()),
+}
+
+#: Of a pair of forces at much friction, in a small unit of stress.
+OF_MUCH: Pairs = {(id, "printed"): sides for id, sides in STEPS.items()}
+
+#: A friction just below C_2, and theta at this share of the way through the interval of Proposition 5.6.
+CONTRACTION: Mapping[Key, Fraction] = {
+    ("prop-5.6.1", "printed"): Fraction(9, 10),
+    ("prop-5.6.1", "repaired"): Fraction(9, 10),
+    ("5.47", "printed"): HALF,
+    ("5.47", "repaired"): HALF,
+    ("x-merged-interval", "repaired"): Fraction(1, 10),
+}
+
+#: Of a pair of forces where all nodes stick.
+OF_STICKING: Pairs = {
+    ("5.38", "printed"): lambda d, r: (r.weight(HALF) * d.norm_T.square(), r.weight(HALF) * r.Q * d.norm.square()),
+    ("x-ratio", "printed"): lambda d, r: (d.energy_1, (r.ratio * d.norm).square()),
+    ("x-sharp", "printed"): lambda d, r: (d.step(HALF), r.q_squared(HALF) * d.norm.square()),
+    **{key: partial(contracts, share=share) for key, share in CONTRACTION.items()},
+}
+
+#: Of a pair of forces where all nodes are open and slip one way, at theta = 1/2 where none is said.
+OF_PAIRS: Pairs = {
     ("5.11", "printed"): lambda d, r: (d.size_1, r.X * d.size_2),
     ("5.13", "printed"): lambda d, r: (
         d.friction,
@@ -143,6 +269,10 @@ OF_PAIRS: Mapping[Key, Callable[[Slides, Constants], tuple[Interval, Interval]]]
         r.stress("m") * d.size_1.square(),
         (r.A + r.stress("C_K")) * d.size_1 * d.size_2 + r.stress("C_K") * d.size_2.square(),
     ),
+    ("5.15", "printed"): lambda d, r: (
+        r.stress("m") * (d.size_1 - (r.A + r.stress("C_K")) / (2 * r.stress("m")) * d.size_2).square(),
+        ((r.A + r.stress("C_K")).square() / (4 * r.stress("m")) + r.stress("C_K")) * d.size_2.square(),
+    ),
     ("prop-5.4", "printed"): lambda d, r: (d.dual_T, r.C_T * d.dual),
     ("5.18", "printed"): lambda d, r: (d.dual_T, r.A * d.size_1),
     ("5.19", "printed"): lambda d, r: (d.size_2, d.dual / r.stress("m")),
@@ -152,6 +282,7 @@ OF_PAIRS: Mapping[Key, Callable[[Slides, Constants], tuple[Interval, Interval]]]
     ("5.29", "printed"): lambda d, r: (r.give * d.norm_T.square(), d.energy_1),
     ("5.30", "printed"): lambda d, r: (d.friction, r.P * d.norm.square()),
     ("5.30", "repaired"): lambda d, r: (d.friction, r.P * d.norm.square()),
+    **{(id, "repaired"): STEPS[id] for id in ("5.39", "5.44")},
     ("5.31", "repaired"): lambda d, r: (d.work + r.give * d.norm_T.square(), r.P * d.norm.square()),
     **{
         (id, "repaired"): lambda d, r: (
@@ -167,33 +298,21 @@ OF_PAIRS: Mapping[Key, Callable[[Slides, Constants], tuple[Interval, Interval]]]
     ),
 }
 
+#: On the layer: what fails as printed, and where the interval of Proposition 5.6 is the widest.
+ON_LAYER = {("4.7", "printed"), ("5.30", "printed"), *OF_MUCH, *CONTRACTION}
+
 
 def enclosed(
     ids: Collection[str] | None = None, level: Level = "quick", watch: Callable[[float], None] = lambda done: None
 ) -> dict[str, list[Evidence]]:
-    """Decide inequalities on named bodies by enclosures of both sides.
-
-    Parameters
-    ----------
-    ids : collection of str, optional
-        Statements; all by default, unknown ones have no evidence here.
-    level : {'quick', 'full'}
-        The same at both.
-    watch : callable
-        Called with the share done.
-
-    Returns
-    -------
-    dict
-        Statement -> evidence.
-    """
-    wanted = [key for key in (*OF_BODIES, *OF_PAIRS) if ids is None or key[0] in ids]
+    """Decide inequalities on named bodies by enclosures of both sides: a ``Source``, the same at both levels."""
+    wanted = [key for key in (*OF_BODIES, *OF_PAIRS, *OF_MUCH, *OF_STICKING) if ids is None or key[0] in ids]
     found: dict[str, list[Evidence]] = {}
     with one_thread():
         known: dict[str, Bodies] = {}
         for done, key in enumerate(wanted):
             watch(done / len(wanted))
-            name = LAYER if key in (("4.7", "printed"), ("5.30", "printed")) else PLATE
+            name = LAYER if key in ON_LAYER else PLATE
             bodies = known[name] = known.get(name) or Bodies(name)
             if (evidence := decide(bodies, *key)) is not None:
                 found.setdefault(key[0], []).append(evidence)
@@ -212,13 +331,22 @@ def decide(bodies: Bodies, id: str, of: Literal["printed", "step", "repaired"]) 
     of : {'printed', 'step', 'repaired'}
     """
     key: Key = (id, of)
-    unit = SMALL if key == ("5.30", "printed") else OWN
+    unit = SMALL if key == ("5.30", "printed") else TINY if key in OF_MUCH else OWN
+    share = MUCH if key in OF_MUCH else Fraction(1)
     where = bodies.name
     try:
+        reading = Constants(bodies=bodies, printed=of == "printed", unit=unit, share=share)
         if key in OF_BODIES:
             sides = OF_BODIES[key](bodies)
+        elif key in OF_STICKING:
+            sides = [OF_STICKING[key](bodies.sticks, reading)]
+            where += ", all nodes sticking"
+            if key in CONTRACTION:
+                where += f", k just below C_2, theta at {float(CONTRACTION[key]):g} of the interval"
+        elif key in OF_MUCH:
+            sides = [OF_MUCH[key](bodies.slides_much, reading)]
+            where += f", all nodes open and slipping one way, k = {float(share * bodies.problem.contact.friction):g}"
         else:
-            reading = Constants(bodies=bodies, printed=of == "printed", unit=unit)
             sides = [OF_PAIRS[key](bodies.slides, reading)]
             where += ", all nodes open and slipping one way"
     except ArithmeticError:  # a bound that was not proved
@@ -238,6 +366,7 @@ def decide(bodies: Bodies, id: str, of: Literal["printed", "step", "repaired"]) 
         "problem": {name: dict(table) for name, table in NAMED[bodies.name].items()},
         "ratio": [at_least(6), at_most(6)],
         **({} if unit == OWN else {"unit": float(unit)}),
+        **({} if share == 1 else {"friction": float(share)}),
     }
     text = f"{said}{squares} ({where}{in_unit}): both sides between proved bounds, for the exact data"
     return Evidence(method="verified", of=of, holds=not fails, text=text, data=data)

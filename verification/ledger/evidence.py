@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 from verification.threads import one_thread
 
@@ -23,9 +23,9 @@ class Evidence:
     Attributes
     ----------
     method : {'symbolic', 'dimension', 'verified', 'discrete', 'reading'}
-        Exact arithmetic over all admissible values, or an exact counterexample; units on both sides; proved enclosures
-        of both sides on one problem; floating point on random problems; a definition, a cited result, a proof in words
-        or one case computed exactly.
+        Exact arithmetic over all admissible values, or an exact counterexample; units on both sides; both sides on one
+        problem, between proved bounds or rational; floating point on random problems; a definition, a cited result, a
+        proof in words or one case computed exactly.
     of : {'printed', 'step', 'repaired'}
         What was checked: the statement as printed, the step by which the paper reaches it, or its repaired form.
     holds : bool or None
@@ -51,6 +51,29 @@ class Evidence:
             "text": self.text,
             **({"data": dict(self.data)} if self.data else {}),
         }
+
+
+class Source(Protocol):
+    """What gathers evidence: each module that does has a function like this one.
+
+    Parameters
+    ----------
+    ids : collection of str or None
+        Statements; None for all.  Those it knows nothing of are left out of the answer.
+    level : {'quick', 'full'}
+        How many problems are taken, where that matters.
+    watch : callable
+        Called with the share done.
+
+    Returns
+    -------
+    mapping
+        Statement -> evidence.
+    """
+
+    def __call__(
+        self, ids: Collection[str], level: Level, watch: Callable[[float], None], /
+    ) -> Mapping[str, Sequence[Evidence]]: ...
 
 
 def figure(value: float, digits: int = 6) -> float:

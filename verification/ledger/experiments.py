@@ -321,15 +321,8 @@ CHECKS: dict[str, Callable[[Section6], list[Evidence]]] = {
 def experiments(
     ids: Collection[str] | None = None, level: Level = "quick", watch: Callable[[float], None] = lambda done: None
 ) -> dict[str, list[Evidence]]:
-    """Evidence for the numerical results of Section 6.
+    """Evidence for the numerical results of Section 6: a ``Source``.
 
-    Parameters
-    ----------
-    ids : collection of str, optional
-        Statements; all by default, unknown ones have no evidence here.
-    level : {'quick', 'full'}
-        Quick takes the mesh of 190 nodes, full all four.
-    watch : callable
-        Called with the share done.
+    Quick takes the mesh of 190 nodes, full all four.
     """
     return gather(CHECKS, Section6(level), ids, watch)

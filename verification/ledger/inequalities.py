@@ -16,7 +16,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-from fem1d2d.mesh import Floats
 from ndtheory import sharp
 from verification.bounds.losses import top
 from verification.ledger.differences import Difference
@@ -43,7 +42,8 @@ THETAS = (0.1, 0.5, 0.9)
 SHARES = (Fraction(1, 100), Fraction(99, 100))
 
 
-Terms = float | tuple[float, ...] | Floats
+#: Numbers, or arrays of them.
+Terms = Any
 Side = Callable[[Any, Reading, float], Terms]
 
 everywhere = lambda r: THETAS
@@ -62,7 +62,7 @@ class Inequality:
     of : {'printed', 'step', 'repaired'}
     left, right : callable
         Difference (or :class:`verification.ledger.worst.Trial`), constants, theta -> a number; several numbers are
-        added, or compared one by one where ``about`` is 'bodies'.
+        added, or compared one by one where ``about`` is 'bodies'.  Of several differences: arrays of them.
     equality : bool
         Then both sides may be vectors whose Euclidean norm is (5.21).
     about : {'pairs', 'contraction', 'bodies'}
@@ -91,7 +91,7 @@ class Inequality:
     one_grid: bool = False
     remark: str = ""
 
-    def ratio(self, subject: Any, reading: Reading, theta: float = 0.0) -> float:
+    def ratio(self, subject: Any, reading: Reading, theta: float = 0.0) -> Any:
         """Left over right.
 
         Negative terms change sides first, so that the ratio is at most 1 exactly where the inequality holds.  Of an
@@ -99,7 +99,8 @@ class Inequality:
 
         Parameters
         ----------
-        subject : Difference or Trial
+        subject : Difference, Differences or Trial
+            Of several differences: an array.
         reading : Reading
             As this inequality reads the constants.
         theta : float
@@ -108,27 +109,23 @@ class Inequality:
         if self.about == "bodies":
             return float(np.max(np.asarray(left) / np.asarray(right)))
         if self.equality:
-            if isinstance(left, float):
-                return float(1 + abs(left - float(np.asarray(right))) / subject.size)
-            return float(1 + np.linalg.norm(np.asarray(left) - np.asarray(right)) / math.sqrt(subject.size))
+            apart, size = np.abs(left - right), subject.size
+            if np.ndim(apart) > np.ndim(size):
+                apart, size = np.linalg.norm(apart, axis=-1), np.sqrt(size)
+            return 1 + apart / size
         terms = [*_terms(left), *(-term for term in _terms(right))]
-        positive = negative = 0.0
-        for term in terms:
-            if term > 0:
-                positive += term
-            else:
-                negative -= term
-        if not math.isfinite(positive + negative):
-            return math.inf
+        positive = sum(np.maximum(term, 0.0) for term in terms)
+        negative = sum(np.maximum(-term, 0.0) for term in terms)
+        infinite = ~np.isfinite(positive + negative)  # also what is not a number
         if len(terms) > 2:
-            positive -= ROUNDING * subject.size
-        if positive <= 0:
-            return 0.0
-        return positive / negative if negative > 0 else math.inf
+            positive = positive - ROUNDING * subject.size
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = np.where(positive > 0, positive / np.asarray(negative), 0.0)
+        return np.where(infinite, math.inf, ratio)[()]
 
 
-def _terms(side: Terms) -> tuple[float, ...]:
-    return side if isinstance(side, tuple) else (float(side),)
+def _terms(side: Terms) -> tuple[Any, ...]:
+    return side if isinstance(side, tuple) else (side,)
 
 
 def _editions(id: str, left: Side, right: Side, *, early: bool = False, **options: Any) -> list[Inequality]:
@@ -225,8 +222,8 @@ INEQUALITIES: tuple[Inequality, ...] = (
     Inequality(
         id="5.17",
         equality=True,
-        left=lambda d, r, _: d.setting.coordinates @ d.reaction,
-        right=lambda d, r, _: -d.setting.coordinates @ d.setting.felt_1 @ d.d_1,
+        left=lambda d, r, _: d.reaction @ d.setting.coordinates.T,
+        right=lambda d, r, _: -(d.d_1 @ d.setting.felt_1.T) @ d.setting.coordinates.T,
     ),
     Inequality(id="5.18", left=lambda d, r, _: d.dual_T, right=lambda d, r, _: r.A * d.size_1),
     Inequality(id="5.19", left=lambda d, r, _: d.size_2, right=lambda d, r, _: d.dual / r.m),
@@ -270,11 +267,11 @@ INEQUALITIES: tuple[Inequality, ...] = (
     Inequality(
         id="x-friction-energy",
         left=lambda d, r, _: d.friction,
-        right=lambda d, r, _: r.energy[1] * math.sqrt(max(d.energy_1, 0.0)) * d.norm + r.energy[2] * d.norm**2,
+        right=lambda d, r, _: r.energy[1] * np.sqrt(np.maximum(d.energy_1, 0.0)) * d.norm + r.energy[2] * d.norm**2,
     ),
     Inequality(
         id="x-ratio",
-        left=lambda d, r, _: math.sqrt(max(d.energy_1, 0.0)),
+        left=lambda d, r, _: np.sqrt(np.maximum(d.energy_1, 0.0)),
         right=lambda d, r, _: float(sharp.largest_ratio(*r.energy)) * d.norm,
     ),
     Inequality(id="x-sharp", thetas=everywhere, left=_square_of_step, right=lambda d, r, t: r.q_squared(t) * d.norm**2),

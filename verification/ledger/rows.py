@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 from ndtheory.statements import Statement, statements
 from verification.document import Document
-from verification.ledger.evidence import METHODS, Evidence, Level, Method, Verdict, settle
+from verification.ledger.evidence import METHODS, Evidence, Level, Method, Source, Verdict, settle
 from verification.ledger.record import recorded
 
 #: A statement cannot be proved from one of these.
@@ -158,14 +158,12 @@ def verify(
     return Ledger(rows=tuple(_grounded(rows)), level=level, units={"length": "any", "stress": "any"})
 
 
-Source = Callable[[Collection[str], Level, Callable[[float], None]], Mapping[str, Sequence[Evidence]]]
-
-
 def sources() -> dict[str, Source]:
     """What gathers evidence, by the name that a watcher is told."""
     from verification.ledger.enclosures import enclosed
     from verification.ledger.experiments import experiments
     from verification.ledger.large_friction import large_friction
+    from verification.ledger.rational_pairs import in_rationals
     from verification.ledger.solutions import solutions
     from verification.ledger.worst import discrete
 
@@ -173,6 +171,7 @@ def sources() -> dict[str, Source]:
         "exact arithmetic and units": exact,
         "inequalities on random problems": discrete,
         "inequalities with enclosures": enclosed,
+        "equalities in rationals": in_rationals,
         "large friction": large_friction,
         "solutions": solutions,
         "experiments of Section 6": experiments,
@@ -180,7 +179,7 @@ def sources() -> dict[str, Source]:
 
 
 def exact(ids: Collection[str], level: Level, watch: Callable[[float], None]) -> dict[str, list[Evidence]]:
-    """Symbolic evidence, and that of units."""
+    """Symbolic evidence, and that of units: a ``Source``, the same at both levels."""
     from ndtheory.symbolic import checks
     from ndtheory.symbolic.dimension import consistent
     from ndtheory.symbolic.symbols import DIMENSIONS

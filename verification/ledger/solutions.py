@@ -279,16 +279,9 @@ CHECKS: dict[str, Check] = {
 def solutions(
     ids: Collection[str] | None = None, level: Level = "quick", watch: Callable[[float], None] = lambda done: None
 ) -> dict[str, list[Evidence]]:
-    """Evidence for statements about solutions, iterates and their limit.
+    """Evidence for statements about solutions, iterates and their limit: a ``Source``.
 
-    Parameters
-    ----------
-    ids : collection of str, optional
-        Statements; all by default, unknown ones have no evidence here.
-    level : {'quick', 'full'}
-        Full halves the meshes too, draws problems at random and runs to the end.
-    watch : callable
-        Called with the share done.
+    Full halves the meshes too, draws problems at random and runs to the end.
 
     Examples
     --------

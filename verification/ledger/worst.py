@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
@@ -19,7 +19,7 @@ from verification.interface.assembly import build
 from verification.interface.body import Body
 from verification.interface.pair import ContactPair
 from verification.ledger.cases import NAMED, problem
-from verification.ledger.differences import Difference, Setting, draw_pairs
+from verification.ledger.differences import Differences, Setting, draw_pairs
 from verification.ledger.evidence import Evidence, figure
 from verification.ledger.inequalities import ALLOWANCE, INEQUALITIES, LEVELS, ONE_TRACE_SPACE, SEED, SHARES, Inequality
 from verification.ledger.reading import Reading
@@ -152,28 +152,34 @@ class Tally:
     by_unit: dict[float, tuple[float, str, float | None, str]] = field(default_factory=dict)
     worst_apart: float = -math.inf
 
-    def take(self, case: Trial, subjects: Sequence[Any]) -> None:
+    def take(self, case: Trial, subjects: Trial | Differences) -> None:
         """Compare both sides on the pairs of a problem, where the inequality speaks of its grids."""
         inequality = self.inequality
         if inequality.one_grid and case.grids_differ:
             return
         self.problems += 1
         self.apart += case.grids_differ
-        self.pairs += len(subjects)
+        self.pairs += 1 if isinstance(subjects, Trial) else len(subjects)
         for unit in inequality.units:
             reading = inequality.reading(case.reading.in_unit(unit))
             thetas = (None,) if inequality.thetas is None else inequality.thetas(reading)
-            for number, subject in enumerate(subjects, start=1):
-                for theta in thetas:
-                    ratio = inequality.ratio(subject, reading, theta or 0.0)
-                    if math.isnan(ratio):
-                        ratio = math.inf
-                    if case.grids_differ:
-                        self.worst_apart = max(ratio, self.worst_apart)
-                    # equal but for rounding: the first one stays, on any machine
-                    if unit not in self.by_unit or not ratio <= self.by_unit[unit][0] * (1 + ALLOWANCE):
-                        where = case.name if inequality.about == "bodies" else f"{case.name}, pair {number}"
-                        self.by_unit[unit] = (ratio, where, theta, case.name)
+            ratios = [np.atleast_1d(inequality.ratio(subjects, reading, theta or 0.0)) for theta in thetas]
+            if not ratios or not len(ratios[0]):
+                continue
+            by_pair = np.nan_to_num(np.stack(ratios, axis=1), nan=math.inf, posinf=math.inf)
+            if case.grids_differ:
+                self.worst_apart = max(float(by_pair.max()), self.worst_apart)
+            for place in np.flatnonzero(by_pair > self._to_beat(unit)).tolist():
+                ratio = float(by_pair.ravel()[place])
+                # equal but for rounding: the first one stays, on any machine
+                if ratio > self._to_beat(unit):
+                    number, which = divmod(place, len(thetas))
+                    where = case.name if inequality.about == "bodies" else f"{case.name}, pair {number + 1}"
+                    self.by_unit[unit] = (ratio, where, thetas[which], case.name)
+
+    def _to_beat(self, unit: float) -> float:
+        """What a ratio must exceed to be the worst."""
+        return self.by_unit[unit][0] * (1 + ALLOWANCE) if unit in self.by_unit else -math.inf
 
     @property
     def evidence(self) -> Evidence | None:
@@ -244,24 +250,10 @@ def discrete(
     level: Literal["quick", "full"] = "quick",
     watch: Callable[[float], None] = lambda done: None,
 ) -> dict[str, list[Evidence]]:
-    """Search random problems for a pair that breaks an inequality.
+    """Search random problems for a pair that breaks an inequality: a ``Source``, which takes 30 or, at full, 400.
 
     One pass over the problems serves all inequalities, and what is found of one does not depend on which others were
     asked for.
-
-    Parameters
-    ----------
-    ids : collection of str, optional
-        Statements; all by default, unknown ones have no evidence here.
-    level : {'quick', 'full'}
-        30 or 400 random problems.
-    watch : callable
-        Called with the share done.
-
-    Returns
-    -------
-    dict
-        Statement -> evidence, in the order of the table.
     """
     tallies = [Tally(inequality=inequality) for inequality in INEQUALITIES if ids is None or inequality.id in ids]
     if not tallies:  # no problem need be built
@@ -273,7 +265,7 @@ def discrete(
     with one_thread():
         for done, (case, random) in enumerate(draw_cases(count), start=1):
             for tally in about("bodies"):
-                tally.take(case, [case])
+                tally.take(case, case)
             if about("pairs"):
                 found = pairs_of(case, random, starts=starts, realised=realised)
                 for tally in about("pairs"):
@@ -292,7 +284,7 @@ def discrete(
     return result
 
 
-def pairs_of(case: Trial, random: np.random.Generator, *, starts: int, realised: int) -> list[Difference]:
+def pairs_of(case: Trial, random: np.random.Generator, *, starts: int, realised: int) -> Differences:
     """The pairs of a problem; a named one has no loads worth trying."""
     realised = 0 if case.name in NAMED else realised
-    return list(draw_pairs(case.setting, random, starts=starts, realised=realised))
+    return Differences(list(draw_pairs(case.setting, random, starts=starts, realised=realised)))

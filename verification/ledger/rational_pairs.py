@@ -1,0 +1,307 @@
+"""Equalities of Section 5, and inequalities that come close to them, decided in rationals on one pair of bodies.
+
+The data of a problem are rational, so are its stiffness matrices and what their elimination leaves on Gamma_c.  Step II
+is solved in doubles first; the state of each node that comes out turns it into a linear system, whose solution in
+rationals is taken only where it satisfies every condition of step II exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem1d2d import element
+from fem1d2d.exact import Shapes
+from fem1d2d.material import plane_strain
+from verification.algorithm.fixed_point import FixedPointMap
+from verification.certificate.exact_bodies import ExactInterface, exact_points
+from verification.interface.assembly import build
+from verification.interface.body import Condensed
+from verification.ledger.evidence import Evidence, Level
+from verification.problem.specification import Problem
+from verification.threads import one_thread
+
+#: Rationals.
+Exact = NDArray[Any]
+
+#: Two blocks with three contact nodes and a body inside, on one grid.
+BLOCKS: Mapping[str, Any] = {
+    "body1": {
+        "shape": "rectangle",
+        "x": [0, 2],
+        "y": [-1, 0],
+        "cells": [2, 2],
+        "young": 3,
+        "poisson": "1/4",
+        "fixed": ["bottom"],
+    },
+    "body2": {
+        "shape": "rectangle",
+        "x": [0, 2],
+        "y": [0, 1],
+        "cells": [2, 2],
+        "young": 2,
+        "poisson": "1/3",
+        "fixed": ["top"],
+    },
+    "contact": {"friction": "1/2", "radius": 1},
+}
+
+#: Two forces on the Neumann body: tangential components from left to right, then normal ones.
+FORCES = tuple(
+    np.array([Fraction(text) for text in texts.split()], dtype=object)
+    for texts in ("1/3 1/5 -2/3 1/2 1/7 -1/2", "-1/2 1/20 2/5 1/3 1/2 1/4")
+)
+
+THETA = Fraction(2, 7)
+
+
+def solved(A: Exact, B: Exact) -> Exact:
+    """``A^-1 B`` in rationals, for a positive definite A.
+
+    Examples
+    --------
+    >>> solved(np.array([[Fraction(2), Fraction(1)], [Fraction(1), Fraction(2)]]), np.array([Fraction(3), Fraction(0)]))
+    array([Fraction(2, 1), Fraction(-1, 1)], dtype=object)
+    """
+    n = len(A)
+    rows = np.concatenate([A, B.reshape(n, -1)], axis=1)
+    for i in range(n):
+        rows[i] = rows[i] / rows[i, i]
+        for j in range(n):
+            if j != i and rows[j, i]:
+                rows[j] = rows[j] - rows[j, i] * rows[i]
+    return rows[:, n:].reshape(B.shape)
+
+
+class ExactSide:
+    """A body in rationals, as its contact nodes feel it.
+
+    Parameters
+    ----------
+    problem : Problem
+    side : Condensed
+        The same in doubles.
+
+    Attributes
+    ----------
+    S : array of Fraction
+        What elimination leaves of the stiffness matrix on Gamma_c.
+    energy : array of Fraction
+        ``a(R phi, R chi)`` of the lifted fields: the same matrix by another way.
+    """
+
+    def __init__(self, problem: Problem, side: Condensed) -> None:
+        body = side.mesh_body
+        spec = getattr(problem, body.name)
+        cells = body.mesh.cells
+        shapes = Shapes.of(exact_points(spec, body), cells)
+        local = element.stiffness(shapes, plane_strain(spec.young, spec.poisson))[shapes.of_cell]
+        A = np.full((2 * len(body.mesh.points),) * 2, Fraction(0), dtype=object)
+        for corners, entries in zip(cells, local, strict=True):
+            unknowns = (2 * corners[:, None] + np.arange(2)).ravel()
+            A[np.ix_(unknowns, unknowns)] += entries.reshape(len(unknowns), -1)
+        A = A[np.ix_(body.free, body.free)]
+        b = body.interface
+        inside = np.setdiff1d(np.arange(len(A)), b)
+        lift = np.full((len(A), len(b)), Fraction(0), dtype=object)
+        lift[b] = np.eye(len(b), dtype=int)
+        lift[inside] = -solved(A[np.ix_(inside, inside)], A[np.ix_(inside, b)])
+        turn = np.ones(len(b), dtype=int)  # normal components as step II has them
+        turn[side.grid.normal] = 1 if side.upward else -1
+        self.S: Exact = np.outer(turn, turn) * (A[np.ix_(b, b)] + A[np.ix_(b, inside)] @ lift[inside])
+        self.energy: Exact = np.outer(turn, turn) * (lift.T @ A @ lift)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Solution:
+    """Steps I and II for one force, in rationals.
+
+    Attributes
+    ----------
+    g, reaction : array of Fraction
+        psi and T psi.
+    w_1, w_2 : array of Fraction
+        Traces of both bodies.
+    slip, bound : array of Fraction
+        Tangential jump, and ``w k |S sigma_N|``, by node.
+    state : str
+        What the nodes do.
+    """
+
+    g: Exact
+    reaction: Exact
+    w_1: Exact
+    w_2: Exact
+    slip: Exact
+    bound: Exact
+    state: str
+
+
+class RationalPair:
+    """The difference of two solutions of steps I and II, every number of which is rational.
+
+    Parameters
+    ----------
+    table : mapping
+        A problem without loads, whose grids are one.
+    forces : pair of arrays of Fraction
+        psi and psi~.
+    """
+
+    def __init__(self, table: Mapping[str, Any] = BLOCKS, forces: tuple[Exact, ...] = FORCES) -> None:
+        problem = Problem.from_dict(table)
+        self.pair = pair = build(problem)
+        self.one, self.two = (ExactSide(problem, side) for side in (pair.contact, pair.neumann))
+        x = [exact_points(getattr(problem, s.mesh_body.name), s.mesh_body) for s in (pair.contact, pair.neumann)]
+        nodes = [p[s.mesh_body.nodes, 0] for p, s in zip(x, (pair.contact, pair.neumann), strict=True)]
+        joined = ExactInterface(pair, *nodes)
+        k: Any = problem.contact.friction
+        self.kernel, self.limits = joined.exact_kernel, k * joined.grid.weights
+        self.n = pair.contact.grid.n
+        self.solutions = tuple(map(self.solve, forces))
+        one, other = self.solutions
+        self.force, self.reaction = one.g - other.g, one.reaction - other.reaction
+        self.d_1, self.d_2 = one.w_1 - other.w_1, one.w_2 - other.w_2
+        self.friction = -((one.bound - other.bound) @ (abs(one.slip) - abs(other.slip)))
+
+    def solve(self, g: Exact) -> Solution:
+        """Steps I and II.
+
+        Raises
+        ------
+        ArithmeticError
+            What doubles say of the nodes leads to no exact solution.
+        """
+        n, S = self.n, self.one.S
+        assert self.kernel is not None
+        _, found = FixedPointMap(self.pair, "active-set")(g.astype(float))
+        touching, sliding = found.pattern.touching, found.pattern.sliding.astype(int)
+        w_2, bound = solved(self.two.S, g), self.limits * abs(self.kernel @ g[n:])
+        moves = np.concatenate([sliding != 0, ~touching])
+        given = np.concatenate([sliding * bound, np.full(n, Fraction(0))])  # forces where a node moves
+        v = np.full(2 * n, Fraction(0), dtype=object)
+        load = -S @ w_2 - given
+        v[moves] = solved(S[np.ix_(moves, moves)], load[moves])
+        force = -S @ (w_2 + v)
+        slip, press = v[:n], force[n:]
+        satisfied = (
+            (v[n:] <= 0).all()
+            and (press >= 0).all()
+            and not (press * v[n:]).any()
+            and (abs(force[:n]) <= bound).all()
+            and (force[:n] * slip == bound * abs(slip)).all()
+        )
+        if not satisfied:
+            raise ArithmeticError("what doubles say of the nodes leads to no exact solution of step II")
+        state = f"{int(touching.sum())} of {n} nodes touch, {int((sliding != 0).sum())} slip"
+        return Solution(g=g, reaction=force, w_1=w_2 + v, w_2=w_2, slip=slip, bound=bound, state=state)
+
+    @cached_property
+    def lifts(self) -> tuple[Exact, Exact]:
+        """The traces of ``R^2 (T psi - T psi~)`` and of ``R^2 (psi - psi~)`` (5.20)."""
+        return solved(self.two.S, self.reaction), solved(self.two.S, self.force)
+
+    def square(self, force: Exact) -> Fraction:
+        """The square of the norm (5.21)."""
+        return _number(force @ solved(self.two.S, force))
+
+    @property
+    def inner(self) -> Fraction:
+        """``a^2(R^2 (T psi - T psi~), R^2 (psi - psi~))``."""
+        return _number(self.lifts[0] @ self.two.energy @ self.lifts[1])
+
+    @property
+    def mixed_2(self) -> Fraction:
+        """``a^2(R^2 (T psi - T psi~), w^2 - w~^2)``."""
+        return _number(self.lifts[0] @ self.two.energy @ self.d_2)
+
+    @property
+    def work(self) -> Fraction:
+        """``<T psi - T psi~, w^2 - w~^2>``."""
+        return _number(self.reaction @ self.d_2)
+
+    @property
+    def energy_1(self) -> Fraction:
+        """``a^1(w^1 - w~^1, w^1 - w~^1)``."""
+        return _number(self.d_1 @ self.one.energy @ self.d_1)
+
+    @property
+    def mixed_1(self) -> Fraction:
+        """``a^1(w^1 - w~^1, R_D^1 (w^2 - w~^2))``."""
+        return _number(self.d_2 @ self.one.energy @ self.d_1)
+
+    def relaxed(self, theta: Fraction) -> Fraction:
+        """``|||T_theta psi - T_theta psi~|||^2`` (5.7)."""
+        return self.square(theta * self.reaction + (1 - theta) * self.force)
+
+
+def _number(product: Any) -> Fraction:
+    """A product of vectors of rationals: what numpy makes of it is no array."""
+    return Fraction(product)
+
+
+Sides = Callable[[RationalPair], tuple[Any, Any]]
+
+#: Both sides of an equality: numbers or vectors.
+EQUAL: Mapping[str, Sides] = {
+    "5.17": lambda d: (d.reaction, -d.one.energy @ d.d_1),
+    "5.24": lambda d: (
+        d.relaxed(THETA),
+        THETA**2 * d.square(d.reaction) + (1 - THETA) ** 2 * d.square(d.force) + 2 * THETA * (1 - THETA) * d.inner,
+    ),
+    "5.25": lambda d: (d.inner, d.mixed_2),
+    "5.26": lambda d: (d.mixed_2, d.work),
+    "5.27": lambda d: (d.work, -d.mixed_1),
+}
+
+#: Left is to be at most right.
+AT_MOST: Mapping[str, Sides] = {
+    "5.12": lambda d: (d.energy_1, d.mixed_1 + d.friction),
+    "5.28": lambda d: (-d.mixed_1, d.friction - d.energy_1),
+}
+
+
+def in_rationals(
+    ids: Collection[str] | None = None, level: Level = "quick", watch: Callable[[float], None] = lambda done: None
+) -> dict[str, list[Evidence]]:
+    """Decide equalities on one pair of bodies in rationals: a ``Source``, the same at both levels."""
+    wanted = [id for id in (*EQUAL, *AT_MOST) if ids is None or id in ids]
+    found: dict[str, list[Evidence]] = {}
+    if wanted:
+        with one_thread():
+            pair = RationalPair()
+            found = {id: [decide(pair, id)] for id in wanted}
+    watch(1.0)
+    return found
+
+
+def decide(pair: RationalPair, id: str) -> Evidence:
+    """The evidence of an equality or inequality; nothing is rounded, so that there always is some.
+
+    Parameters
+    ----------
+    pair : RationalPair
+    id : str
+        Of the statement.
+    """
+    left, right = EQUAL[id](pair) if id in EQUAL else AT_MOST[id](pair)
+    holds = bool(np.all(left == right) if id in EQUAL else left <= right)
+    apart = max(map(abs, np.atleast_1d(left - right)))
+    said = "both sides are equal" if not apart else f"left {'<' if np.all(left <= right) else '>'} right"
+    states = "; ".join(solution.state for solution in pair.solutions)
+    where = f"two blocks of {len(pair.one.S) // 2} contact nodes, one force: {states.replace('; ', '; the other: ')}"
+    data = {
+        "where": where,
+        "problem": {name: dict(table) for name, table in BLOCKS.items()},
+        "forces": [[str(value) for value in solution.g] for solution in pair.solutions],
+        "difference": str(apart),
+    }
+    text = f"{said} ({where}), computed in rationals"
+    return Evidence(method="verified", of="printed", holds=holds, text=text, data=data)
