@@ -71,7 +71,7 @@ class Elimination:
             self.errors = errors
         self.interface: Ints = np.empty(0, dtype=np.int64) if interface is None else interface
         n = matrix.middle.shape[0]
-        self.inside: Ints = np.setdiff1d(np.arange(n), self.interface)
+        self.inside: Ints = np.delete(np.arange(n), self.interface)
         self._order = order
 
     @cached_property
