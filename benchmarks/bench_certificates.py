@@ -22,7 +22,7 @@ from timing import in_turn
 import verification as vf
 from verification.bounds.multipliers import QuadraticForms
 from verification.certificate import check
-from verification.certificate.contraction import NoCertificate
+from verification.certificate.claims import NoCertificate
 from verification.ledger.cases import problem as random_problem
 
 #: Contact nodes and rounds.

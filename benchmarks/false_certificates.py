@@ -33,7 +33,7 @@ import verification as vf
 from verification.bounds.multipliers import QuadraticForms
 from verification.bounds.program import LMIError
 from verification.certificate import check
-from verification.certificate.contraction import NoCertificate
+from verification.certificate.claims import NoCertificate
 from verification.threads import one_thread
 
 # --- the truth --------------------------------------------------------------------------------------------------------

@@ -11,18 +11,8 @@ an overall factor 1/u with it.  The printed edition is ``u = 1`` with ``m~ = min
 ``u = m`` with m itself.  They agree in the unit of stress in which m = 1.
 
 In both editions every number but C1 is monotone in m, M, C_R and x = C_K, so an enclosure of the constants gives one
-of the results: their values where m is largest and the others least, and the other way round.
-
-* C_T, P and Q grow with M, C_R and x and fall with m, as each of their terms does (with u = 1 and with u = m; m~ does
-  not fall with m).  C0 = 1/(1 + A^2/(2 m^2)) grows with m and falls with M and C_R; C6 = 1 - 1/(2P - 1) grows with P.
-* C2 to C5 solve ``P(x) = 1 + m^2/A^2, 1/2, 1, 1 + m^2/A^2``.  P grows with x and M, C_R and falls with m, and the right
-  sides do not fall with m or grow with A: the thresholds grow with m, fall with M and C_R.
-* By ``D = Q m^2/A^2 - P``, ``K^2 = max(h1, h2)`` is
-  ``(1 - theta)^2 + 2 theta (1 - theta) P + max(0, theta^2 - 2 theta (1 - theta) m^2/A^2) Q`` for 0 < theta <= 1, which
-  grows with P, Q and A/m.  So K grows with M, C_R and x and falls with m, and the thetas with K < 1, an interval that
-  ends at C1, become fewer.
-* Where there are none, C1 need not be monotone.  D grows with M, C_R and x and falls with m, as P and Q do, and
-  ``C1 = 2 (1 + D)/(1 + 2 D + Q)`` grows with D and falls with Q as long as Q > 1: D and Q at opposite ends enclose it.
+of the results: their values where m is largest and the others least, and the other way round.  Beyond C2, where C1 need
+not be monotone, D and Q at opposite ends enclose it.  ``docs/verified.md`` has the proof.
 """
 
 from __future__ import annotations
@@ -208,6 +198,10 @@ def factor_and_rest(gain: Any) -> tuple[Any, Any]:
     return q, gain / (1 + q)
 
 
+#: The numbers of an edition.
+NAMES = ("C_K", "C_T", "C_T_tilde", "C0", "C1", "C2", "C3", "C4", "C5", "C6", "factor", "one_minus_factor")
+
+
 @dataclass(frozen=True, kw_only=True)
 class Bounds:
     """What one edition of the theorem says.
@@ -264,8 +258,7 @@ class Bounds:
 
     def to_dict(self) -> dict[str, Any]:
         """The object ``editions.<name>`` of ``ndtheory.bounds/1``; what is null has a reason beside it."""
-        names = ["C_K", "C_T", "C_T_tilde", "C0", "C1", "C2", "C3", "C4", "C5", "C6", "factor", "one_minus_factor"]
-        numbers: dict[str, Number | None] = {name: getattr(self, name) for name in names}
+        numbers: dict[str, Number | None] = {name: getattr(self, name) for name in NAMES}
         reasons: dict[str, str] = {}
         if self.C2 is None:
             reasons |= dict.fromkeys(["C2", "C3", "C4", "C5"], "C_s C_tr = 0: every friction coefficient is below")
@@ -343,23 +336,17 @@ def evaluate(edition: Edition, constants: Constants, theta: Any = None) -> Bound
         level = weakest([constants.level, "verified"])
 
         def number(name: str) -> Any:
-            return rounded(found[name], [corner[name] for corner in corners], level)
+            ends = _ends_of_C1(corners) if name == "C1" else [corner[name] for corner in corners]
+            return rounded(found[name], ends, level)
 
-        inside_all = all(corner["high"] is not None for corner in corners)
-        crossed = [_crossed(one, other) for one, other in zip(corners, reversed(corners), strict=True)]
-        ends = [corner["high"] for corner in corners] if inside_all else crossed
-        c1 = rounded(found["C1"], ends, level)
-        assert c1 is not None
         interval = None if found["high"] is None else (float(found["low"]), float(found["high"]))
         verdict: Conclusion | None = None
         if chosen is not None:
             verdict = "no conclusion" if found["factor"] is None else "contraction"
         least = constants.ends("m")
-        names = ("C_K", "C_T", "C_T_tilde", "C0", "C2", "C3", "C4", "C5", "C6", "factor", "one_minus_factor")
         return Bounds(
             edition=edition,
-            C1=c1,
-            **{name: number(name) for name in names},
+            **{name: number(name) for name in NAMES},
             interval=interval,
             interval_proved=inside(corners, level, "low", "high"),
             theta=None if chosen is None else float(chosen),
@@ -369,9 +356,12 @@ def evaluate(edition: Edition, constants: Constants, theta: Any = None) -> Bound
         )
 
 
-def _crossed(one: dict[str, Any], other: dict[str, Any]) -> Decimal | None:
-    """An end of an enclosure of C1, with D at one end of that of the constants and Q at the other."""
-    return C1(one["D"], other["Q"]) if min(one["Q"], other["Q"]) > 1 else None
+def _ends_of_C1(corners: list[dict[str, Any]]) -> list[Decimal | None]:
+    """Ends of an enclosure of C1: those of the intervals; where there are none, from D and Q at opposite ends."""
+    if all(corner["high"] is not None for corner in corners):
+        return [corner["high"] for corner in corners]
+    pairs = zip(corners, reversed(corners), strict=True)
+    return [C1(one["D"], other["Q"]) if min(one["Q"], other["Q"]) > 1 else None for one, other in pairs]
 
 
 def _figures(edition: Edition, at: Corner, theta: Decimal | None, margin: Decimal) -> dict[str, Any]:

@@ -81,6 +81,6 @@ def test_compare_without_the_word_has_no_marks(call, write):
 
 
 def test_what_is_not_certified_is_told_on_the_screen(call, write, monkeypatch):
-    monkeypatch.setattr("verification.certificate.contraction.find_spec", lambda name: None)
+    monkeypatch.setattr("verification.certificate.claims.find_spec", lambda name: None)
     screen = " ".join(call("compare", write(), "--verified").out.split())
     assert "lmi is not proved: python-flint is not installed" in screen

@@ -34,8 +34,6 @@ from verification.testing import (
 from verification.testing import properties as kit
 from verification.testing.transforms import in_units, mirrored, reflect, upside_down
 
-# --- helpers ----------------------------------------------------------------------------------------------------------
-
 
 @pytest.fixture
 def nearly_as_found(monkeypatch):
@@ -423,11 +421,6 @@ def test_T_of_an_image_is_the_image_of_T(pair, data):
 
 # --- hypothesis is asked for here alone -------------------------------------------------------------------------------
 
-
-def python(code):
-    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-
-
 #: Python without hypothesis, which says how often it was asked for.
 WITHOUT = """
 import sys
@@ -451,6 +444,6 @@ import verification.testing
 
 
 def test_nothing_but_the_kit_asks_for_hypothesis_and_it_says_what_to_install():
-    done = python(WITHOUT)
+    done = subprocess.run([sys.executable, "-c", WITHOUT], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout.strip()) == (1, "0")
     assert "verification.testing needs hypothesis: pip install 'ndtheory[test]'" in done.stderr.splitlines()[-1]

@@ -18,16 +18,8 @@ from scipy.linalg import eigh
 
 from verification.ledger import inequalities
 from verification.ledger.cases import NAMED
-from verification.ledger.differences import (
-    Difference,
-    Differences,
-    Setting,
-    along,
-    between,
-    directions,
-    pieces,
-    uniform_piece,
-)
+from verification.ledger.differences import Difference, Differences, Setting, along, between
+from verification.ledger.draws import directions, pieces, uniform_piece
 from verification.ledger.evidence import Evidence
 from verification.ledger.inequalities import ALLOWANCE, INEQUALITIES, LEVELS, SHARES, Inequality, Reading
 from verification.ledger.worst import Tally, Trial, discrete, draw_cases, pairs_of

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from verification.ledger.cases import NAMED
-from verification.ledger.differences import along, uniform_piece
+from verification.ledger.differences import along
+from verification.ledger.draws import uniform_piece
 from verification.ledger.enclosed_pairs import Bodies
 from verification.ledger.enclosures import (
     CONTRACTION,

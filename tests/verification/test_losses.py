@@ -25,7 +25,7 @@ from verification.bounds.losses import Losses, locate
 from verification.bounds.pattern_search import Found, size, worst_piece
 from verification.constants import Measured, measure
 from verification.interface.assembly import ContactPair, build
-from verification.ledger.differences import uniform_piece
+from verification.ledger.draws import uniform_piece
 
 #: Labels whose worst pair is an eigenvector; of the others it is searched.
 EIGENVALUES = ("(5.18)", "(5.19)", "(5.22)", "(5.23)", "(5.29)")

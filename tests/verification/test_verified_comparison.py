@@ -13,8 +13,10 @@ from verification.algorithm.rates import StepRatio
 from verification.bounds.bound import BoundResult
 from verification.bounds.multipliers import QuadraticForms
 from verification.bounds.semidefinite import work_out
+from verification.certificate.claims import Claims, Confirmation, NoCertificate
 from verification.certificate.constants import verify
-from verification.certificate.contraction import Claims, Confirmation, NoCertificate, certify, describe
+from verification.certificate.contraction import certify
+from verification.certificate.description import describe
 from verification.constants import measure
 from verification.interface.assembly import build
 from verification.verdicts import judge, judge_bound
@@ -176,7 +178,7 @@ def test_what_cannot_be_certified_says_why(compared, name):
 
 
 def test_without_python_flint_the_factor_stays_one_in_doubles(whole, plain, monkeypatch):
-    monkeypatch.setattr("verification.certificate.contraction.find_spec", lambda name: None)
+    monkeypatch.setattr("verification.certificate.claims.find_spec", lambda name: None)
     lmi, pair = plain.bounds["lmi"].detail, plain.run.pair
     found = lmi.proved(pair, plain.measured, F(7, 10))
     assert not found.certified

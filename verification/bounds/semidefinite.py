@@ -143,7 +143,7 @@ class Semidefinite:
         """
         from verification.bounds.multipliers import QuadraticForms
         from verification.bounds.program import LMIError
-        from verification.certificate.contraction import Confirmation, NoCertificate  # it lists the bounds
+        from verification.certificate.claims import Confirmation, NoCertificate  # it lists the bounds
 
         assert self.whole is not None
         try:

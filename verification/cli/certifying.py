@@ -94,7 +94,7 @@ def certify(
     if given is not None:
         return _check(given, None if file is None else load_problem(file, keys, swap=swap), as_json)
     assert file is not None
-    from verification.certificate.contraction import NoCertificate
+    from verification.certificate.claims import NoCertificate
     from verification.certificate.contraction import certify as prove
 
     problem = load_problem(file, keys, theta=theta, swap=swap)

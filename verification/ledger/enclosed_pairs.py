@@ -25,7 +25,7 @@ from ndtheory.intervals import Interval
 from verification.certificate.constants import Between, Proof, entries
 from verification.interface.body import Condensed
 from verification.ledger.cases import NAMED
-from verification.ledger.differences import directions, uniform_piece
+from verification.ledger.draws import directions, uniform_piece
 from verification.ledger.inequalities import SEED
 from verification.ledger.worst import Trial
 from verification.problem.specification import Problem

@@ -17,7 +17,8 @@ from fem1d2d.mesh import Floats
 from verification.bounds.losses import square
 from verification.interface.pair import ContactPair
 from verification.ledger.cases import three_digits
-from verification.ledger.differences import Difference, Setting, along, between, uniform_piece
+from verification.ledger.differences import Difference, Setting, along, between
+from verification.ledger.draws import uniform_piece
 from verification.ledger.evidence import Evidence, Level, figure
 from verification.ledger.inequalities import SEED
 from verification.ledger.reading import Reading

@@ -19,7 +19,8 @@ from verification.interface.assembly import build
 from verification.interface.body import Body
 from verification.interface.pair import ContactPair
 from verification.ledger.cases import NAMED, problem
-from verification.ledger.differences import Differences, Setting, draw_pairs
+from verification.ledger.differences import Differences, Setting
+from verification.ledger.draws import draw_pairs
 from verification.ledger.evidence import Evidence, figure
 from verification.ledger.inequalities import ALLOWANCE, INEQUALITIES, LEVELS, ONE_TRACE_SPACE, SEED, SHARES, Inequality
 from verification.ledger.reading import Reading
