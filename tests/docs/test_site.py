@@ -13,7 +13,6 @@ from pathlib import Path
 import pytest
 
 DOCS = Path(__file__).parents[2] / "docs"
-SITE = DOCS / "_build" / "html"
 
 #: Packages whose names on the notation page must exist.
 NAMED = ("fem1d2d", "ndtheory", "verification")
@@ -130,13 +129,6 @@ def test_a_planted_request_to_another_host_is_found(tmp_path, name, text):
 def test_links_namespaces_and_local_files_are_no_requests(tmp_path, name, text):
     (tmp_path / name).write_text(text)
     assert external_requests(tmp_path) == []
-
-
-def test_the_built_site_asks_no_other_host():
-    if not (SITE / "index.html").exists():
-        pytest.skip("the site is not built: run `make docs`")
-    assert external_requests(SITE) == []
-    assert pictures_without_words(SITE) == []
 
 
 def test_a_slow_machine_and_a_stream_in_pieces_build_the_same_site():

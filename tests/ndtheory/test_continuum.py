@@ -15,7 +15,15 @@ from hypothesis import strategies as st
 
 from fem1d2d import plane_strain, rectangle, stiffness
 from ndtheory import HypothesisError, evaluate_sharp
-from ndtheory.continuum import Rectangle, TwoRectangles, continuum_constants, cut_off, friction_threshold, statement
+from ndtheory.continuum import (
+    Rectangle,
+    TwoRectangles,
+    continuum_constants,
+    cut_off,
+    ends,
+    friction_threshold,
+    statement,
+)
 from ndtheory.energy import EnergyConstants
 from ndtheory.intervals import Interval, sinc
 from ndtheory.moduli import Moduli, half_planes, mirror
@@ -157,7 +165,7 @@ def test_no_wave_number_exceeds_the_supremum_and_one_comes_near(radius):
 
 
 @pytest.mark.parametrize(
-    ("thin", "thick", "nu"), [("0.3", "0.3", "0.3"), ("0.1", "0.5", "0.3"), ("0.5", "0.1", "0.45")]
+    ("thin", "thick", "nu"), [("0.3", "0.3", "0.3"), ("0.2", "0.5", "0.3"), ("0.5", "0.1", "0.45")]
 )
 def test_the_ratio_of_two_strips_bounds_every_wave_number_and_the_half_planes(thin, thick, nu):
     contact = Strip(body=Moduli(young=20000, poisson=nu), thickness=F(thin))
@@ -307,15 +315,15 @@ def test_the_bounds_of_section_6_lie_above_what_is_known_of_its_constants(sectio
 
 
 def test_an_end_bounds_rho_by_the_wedges_that_the_rectangles_are_there(section6):
-    def ends(**changes):
-        return float(continuum_constants(model(**changes)).rho_ends)
+    def rho_of(**changes):
+        return float(ends(model(**changes)))
 
     assert section6.rho_ends == half_planes(SOFT, HARD).high < section6.rho  # 90 degrees on a flat body add nothing
     upper, lower = body("0.4", "1.6", SOFT), body(0, 2, HARD)
-    assert ends(contact=lower, neumann=upper) == pytest.approx(3.5 * np.pi / (np.pi / 2 - 1), rel=1e-9)
-    assert ends(neumann=body("0.4", 2, HARD)) == pytest.approx(2 / 7 * (np.pi + 2) / (np.pi - 2), rel=1e-9)
-    assert ends(neumann=body(0, "1.6", HARD)) == ends(neumann=body("0.4", 2, HARD))  # either end
-    inside = ends(contact=lower, neumann=upper, interval=(F("0.5"), F("1.5")))
+    assert rho_of(contact=lower, neumann=upper) == pytest.approx(3.5 * np.pi / (np.pi / 2 - 1), rel=1e-9)
+    assert rho_of(neumann=body("0.4", 2, HARD)) == pytest.approx(2 / 7 * (np.pi + 2) / (np.pi - 2), rel=1e-9)
+    assert rho_of(neumann=body(0, "1.6", HARD)) == rho_of(neumann=body("0.4", 2, HARD))  # either end
+    inside = rho_of(contact=lower, neumann=upper, interval=(F("0.5"), F("1.5")))
     assert inside == pytest.approx(float(half_planes(HARD, SOFT).high))  # both go on
 
 
