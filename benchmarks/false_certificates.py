@@ -147,6 +147,8 @@ class Truth:
     def __init__(self, discrete: dict[str, Any], theta: str) -> None:
         bodies = [condensed(discrete[name]) for name in ("body1", "body2")]
         S_c, S_n = bodies if discrete["neumann_body"] == 2 else bodies[::-1]
+        if not S_n.det():  # in doubles it may look definite
+            raise ZeroDivisionError("the Neumann body is not held")
         self.n, m = n, m = S_c.nrows() // 2, S_n.nrows() // 2
         P, k = matrix(discrete["transfer"] or np.eye(n, dtype=int).astype(str).tolist()), number(discrete["friction"])
         transfer = fmpq_mat([[*row, *[0] * m] for row in P.tolist()] + [[*[0] * m, *row] for row in P.tolist()])
