@@ -217,6 +217,7 @@ def test_without_dask_the_extra_is_named(call, sweep_file, monkeypatch):
 #: The command in a process group that gets Ctrl-C so many seconds after the workers were asked for, as on a terminal.
 INTERRUPTED = """
     import os, signal, sys, threading
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"  # as the command sets it before numpy comes: threads would take the signal
     import joblib
     from verification.cli import main
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
 import time
@@ -128,8 +129,10 @@ def some(origin: Origin, piece: Sequence[tuple[int, Row]]) -> Handed:
         return Handed(rows=rows, seconds=time.monotonic() - begun)
 
 
-def _begun() -> None:
-    """The first task of a process."""
+def _begun() -> int:
+    """The first task of a process, which tells its number; it lasts until another process can take the next one."""
+    time.sleep(0.01)
+    return os.getpid()
 
 
 def _quietly(origin: Origin, piece: Sequence[tuple[int, Row]]) -> Handed:
@@ -156,8 +159,10 @@ def together(jobs: int) -> Work:
         with parallel_config(backend="loky", inner_max_num_threads=1):
             with undisturbed():
                 # Ctrl-C on a terminal reaches all processes: those that start here do not see it, and are all up
-                # before one may be ended
-                Parallel(n_jobs=jobs, batch_size=1)(delayed(_begun)() for _ in range(effective_n_jobs(jobs)))
+                # before one may be ended, for one that starts when its parent ends says so at length
+                count, up = effective_n_jobs(jobs), set[int]()
+                while len(up) < count:
+                    up.update(Parallel(n_jobs=jobs, batch_size=1)(delayed(_begun)() for _ in range(count)))
             try:
                 found = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1)(
                     delayed(_quietly)(origin, piece) for piece in pieces
