@@ -283,6 +283,16 @@ def test_in_one_dimension_a_facet_is_a_point_that_takes_the_whole_force():
     assert side_load(mesh, mesh.sides["right"], [7.0]).tolist() == [[0], [0], [0], [7]]
 
 
+@given(st.integers(1, 4), numbers(-1, 5), numbers(-1, 5), st.booleans(), vectors(size=2))
+def test_the_weights_between_two_positions_integrate_linear_functions_over_what_lies_there(n, one, other, turned, v):
+    mesh = rectangle((0.0, 4.0), (0.0, 1.0), (n, 1))
+    facets = mesh.sides["top"][:, :: -1 if turned else 1]
+    low, high = (min(max(end, Fraction(0)), Fraction(4)) for end in (min(one, other), max(one, other)))
+    found = facet_weights(mesh, facets, between=(float(one), float(other))) @ (v[0] + v[1] * mesh.points[:, 0])
+    expected = float((high - low) * (v[0] + v[1] * (low + high) / 2))
+    assert found == pytest.approx(expected, rel=0, abs=1e-13)
+
+
 @fewer(3, at_night=1)
 @given(plane_meshes())
 def test_no_facets_carry_no_load(mesh):

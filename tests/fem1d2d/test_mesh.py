@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from strategies import fewer, in_floats, lines, meshes, numbers, plane_meshes, renumbered
 
 from fem1d2d import Mesh, MeshError, interval, rectangle, sector
-from fem1d2d.mesh import measures
+from fem1d2d.mesh import LARGEST, measures
 
 sizes = numbers(Fraction(1, 4), 3, 12)
 counts = st.integers(1, 5)
@@ -264,6 +264,13 @@ def test_ends_that_are_not_in_order_are_refused(ends):
 def test_a_sector_that_is_none_is_refused(angles, radii, cells, message):
     with pytest.raises(MeshError, match=message):
         sector(angles, radii, cells)
+
+
+def test_the_largest_coordinate_is_taken_and_the_double_beyond_it_is_refused():
+    for sign in (1.0, -1.0):
+        make([[0.0], [sign * LARGEST]], [[0, 1] if sign > 0 else [1, 0]])
+        with pytest.raises(MeshError, match="at most"):
+            make([[0.0], [sign * np.nextafter(LARGEST, np.inf)]], [[0, 1] if sign > 0 else [1, 0]])
 
 
 def test_an_interval_too_short_for_its_floats_is_refused():

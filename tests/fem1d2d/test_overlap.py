@@ -315,6 +315,7 @@ def test_triangles_make_a_mesh_if_and_only_if_each_two_meet_as_a_mesh_defines(gi
         ([0, 1, 2], [[0, 1], [0, 2]], r"cells 0 and 1 lie on the same side of the facet at \(0\)"),
         ([0, 1, 2, 3], [[0, 2], [1, 3]], "cells 0 and 1 lie on each other"),
         ([0, 1, 1, 2], [[0, 1], [2, 3]], "without a common node"),
+        ([1, 2, 0, 1], [[0, 1], [2, 3]], "without a common node"),
         ([0, 3, 1, 2], [[0, 1], [2, 3]], "cells 0 and 1 lie on each other"),
     ],
 )

@@ -165,11 +165,17 @@ def test_no_wave_number_exceeds_the_supremum_and_one_comes_near(radius):
 
 
 @pytest.mark.parametrize(
-    ("thin", "thick", "nu"), [("0.3", "0.3", "0.3"), ("0.2", "0.5", "0.3"), ("0.5", "0.1", "0.45")]
+    ("thin", "thick", "nu", "nu_neumann"),
+    [
+        ("0.3", "0.3", "0.3", "0.3"),
+        ("0.2", "0.5", "0.3", "0.3"),
+        ("0.5", "0.1", "0.45", "0.3"),
+        ("0.25", "2", "0.45", "-0.5"),  # NT of the two has different signs where the ratio is largest
+    ],
 )
-def test_the_ratio_of_two_strips_bounds_every_wave_number_and_the_half_planes(thin, thick, nu):
+def test_the_ratio_of_two_strips_bounds_every_wave_number_and_the_half_planes(thin, thick, nu, nu_neumann):
     contact = Strip(body=Moduli(young=20000, poisson=nu), thickness=F(thin))
-    neumann = Strip(body=HARD, thickness=F(thick))
+    neumann = Strip(body=Moduli(young=70000, poisson=nu_neumann), thickness=F(thick))
     ratio = float(largest_ratio_of_strips(contact, neumann))
     seen = []
     for wave in np.geomspace(1e-2, 300, 200):
@@ -241,6 +247,7 @@ def largest_trace(length, lo, hi, poisson, cells):
         (0.5, 0, 0.5, 0.3, (12, 24)),
         (3, 0, 2, 0.3, (36, 12)),
         (3, 0.5, 2, -0.4, (36, 12)),
+        (2, 0.5, 2, 0.3, (24, 12)),
     ],
 )
 def test_no_mesh_shows_a_larger_tangential_trace_than_the_bound(length, lo, hi, poisson, cells):
@@ -248,6 +255,8 @@ def test_no_mesh_shows_a_larger_tangential_trace_than_the_bound(length, lo, hi, 
     kappa = 3 - 4 * F(str(poisson))
     chosen = zones(*exact, kappa)
     assert all(zone.inside(exact[0]) for zone in chosen)
+    ends = [x + slope for zone in chosen for x in (zone.lo, zone.hi) for slope in (zone.left, zone.right)]
+    assert 0 <= min(ends) <= max(ends) <= exact[0]
     assert [zone.hi for zone in chosen[:-1]] == [zone.lo for zone in chosen[1:]]
     assert (chosen[0].lo, chosen[-1].hi) == tuple(exact[1:])
     proved, seen = float(bound(chosen, kappa)), largest_trace(length, lo, hi, poisson, cells)
@@ -378,6 +387,17 @@ def test_a_mirror_image_that_does_not_fit_proves_nothing(changes):
 def test_the_cut_off_costs_less_where_the_neumann_body_is_longer():
     short, long = (cut_off(model(neumann=body(F("0.4") - m, F("1.6") + m, HARD))) for m in (F("0.4"), F(2)))
     assert long == short / 25
+
+
+@pytest.mark.parametrize("poisson", ["-0.4", "0", "0.3", "0.45"])
+def test_the_cut_off_costs_what_both_components_are_stretched_and_sheared_by_at_most(poisson):
+    """``(lambda + 2 G) (chi' v_T)^2`` over depths y, each with the bound y/G, and ``G (chi' v_N)^2`` by Poincare."""
+    young, nu, d, margin = 7.0, float(poisson), 0.3, 0.4
+    shear, stretched = young / 2 / (1 + nu), young * (1 - nu) / (1 + nu) / (1 - 2 * nu)
+    along = stretched * d**2 / 2 / shear * float(bound_at_end(F(2), 3 - 4 * F(poisson)))
+    across = shear * (2 * d / np.pi) ** 2 / (young / (1 - nu**2))
+    found = cut_off(model(neumann=body(0, 2, Moduli(young=7, poisson=poisson))))
+    assert float(found) == pytest.approx((along + across) / margin**2, rel=1e-6)
 
 
 def test_the_cut_off_bounds_its_energy_for_every_field_of_a_mesh():

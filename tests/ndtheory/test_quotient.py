@@ -2,7 +2,7 @@
 
 import pytest
 import sympy as sp
-from hypothesis import assume, given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from ndtheory.symbolic.engine import nonnegative, positive
@@ -39,6 +39,8 @@ def of_factors(quotient, at):
 
 
 @given(TREES, VALUES, VALUES, VALUES)
+@example((1 + 1 / (1 + x)) ** 2, sp.Integer(1), sp.Integer(1), sp.Integer(1))  # a power of a quotient with a factor
+@example((x / (1 + p) + 1) / (1 + p), sp.Integer(1), sp.Integer(1), sp.Integer(1))  # a product with a factor in common
 def test_a_quotient_and_its_cancelled_form_have_the_values_of_the_expression(tree, at_x, at_p, at_t):
     at = {x: at_x, p: at_p, real: -at_t}
     quotient = read(tree)

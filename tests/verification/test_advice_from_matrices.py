@@ -140,6 +140,9 @@ def test_a_body_that_contact_alone_holds_is_refused_as_neumann_body_alone(singul
     expected = vf.advise(problem).best
     assert roles[3 - singular].rho.value == pytest.approx(expected.rho.value, rel=1e-9)
     assert roles[3 - singular].theta_predicted == pytest.approx(expected.theta_predicted, rel=1e-9)
+    assert roles[3 - singular].rho_tied == roles[3 - singular].rho
+    if friction is None:
+        assert roles[3 - singular].rho_min.value == pytest.approx(0, abs=1e-9)  # in its motion it costs nothing
     with pytest.raises(ValueError, match=r"S1 is singular.*S2 is singular"):
         vf.advise_matrices(upper, upper)
 

@@ -85,6 +85,7 @@ def test_corners_only_raise_the_bounds_and_s_is_above_those_of_sliding(E1, E2, n
             assert bounds.stick.value >= every.stick.value
             assert bounds.slide.value >= every.slide.value
         assert role.start.s >= Fraction(every.slide.lo)
+        assert 0 <= Fraction(role.start.to_dict()["s"]["hi"]) - role.start.s <= role.start.s * Fraction(2, 2**53)
         assert role.corners["both"].slide == every.slide  # both ends yield alike to a normal force
         assert role.start.guess >= max(role.corners["none"].stick.value, role.corners["both"].stick.value) * (1 - 1e-12)
 

@@ -268,9 +268,17 @@ def broken(document, edit):
     return document
 
 
+def a_little_short(claim):
+    """The first a a millionth below ``tau^2/(4 b)``."""
+    tau, b = (next(iter([values] if isinstance(values, str) else values)) for values in map(claim.get, ("tau", "b")))
+    short = Fraction(tau) ** 2 / (4 * Fraction(b)) * (1 - Fraction(1, 10**6))
+    claim["a"] = str(short) if isinstance(claim["a"], str) else [str(short), *claim["a"][1:]]
+
+
 BREAKS = {
     "multipliers that are not negative": lambda d, c: c["multipliers"]["lambda"].__setitem__(0, "-1"),
     "4 a b": lambda d, c: c["multipliers"].update(a="0"),
+    "4 a b ": lambda d, c: a_little_short(c["multipliers"]),
     "a rational": lambda d, c: d["weights"].__setitem__(0, 0.5),
     "a rational, ": lambda d, c: d["weights"].__setitem__(0, "0.5"),
     "0 < theta": lambda d, c: c.update(theta="2"),

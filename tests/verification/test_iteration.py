@@ -180,6 +180,7 @@ def test_each_state_follows_from_the_one_before(data):
         rounding = 1e-15 * max(side.dual_norm(side.load) for side in (pair.contact, pair.neumann))
         expected = np.sqrt(state.image @ np.linalg.solve(S2, state.image))
         assert state.size == pytest.approx(expected, rel=1e-9, abs=rounding)
+        assert state.scale == max(one.size for one in states[: i + 1])
     for before, after in pairwise(states):
         assert np.array_equal(after.g, theta * before.image + (1 - theta) * before.g)
 

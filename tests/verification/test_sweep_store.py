@@ -154,7 +154,20 @@ def test_whatever_changes_a_number_changes_the_key():
     found = [key(SMALL), *(key(SMALL.changed(**change)) for change in CHANGES.values())]
     found += [key(SMALL, theta=["0.3"], friction=["0.2"]), key(SMALL, theta=["0.30000000000000000001"])]
     found += [key(vf.build(SMALL)), key(vf.build(SMALL, law=Local())), key(vf.build(SMALL).at(friction="0.3"))]
+    found += [key(SMALL, young=[young]) for young in ([1, 2], [2, 1])]
     assert len(set(found)) == len(found)
+
+
+def test_another_solver_of_step_ii_changes_the_key(monkeypatch):
+    before = key(SMALL)
+    monkeypatch.setattr(identity, "SOLVER", "active-set")
+    assert key(SMALL) != before
+
+
+def test_an_operator_given_as_a_matrix_counts_by_its_entries():
+    stiffness = {"S1": np.diag([3.0, 2.0, 3.0, 2.0]), "S2": np.eye(4), "x": np.array([0.0, 1.0]), "friction": "0.1"}
+    kernels = (np.eye(2), 2 * np.eye(2), np.eye(2)[::-1])
+    assert len({key(vf.build(**stiffness, kernel=kernel)) for kernel in kernels}) == len(kernels)
 
 
 def test_title_units_and_place_do_not():
@@ -358,6 +371,16 @@ def test_a_digit_that_was_changed_on_the_disk_is_found_and_the_row_made_again(pl
     assert again.notes == (f"{place}: 1 of these rows are damaged: they are made again",)
     assert again.to_csv() == first.to_csv()
     assert vf.sweep(SMALL, theta=["0.3", "0.7"], store=place).notes == ()
+
+
+def test_a_row_that_stands_under_the_key_of_another_one_is_found(place):
+    vf.sweep(SMALL, theta=["0.3", "0.7"], store=place)
+    with closing(sqlite3.connect(place)) as file:
+        rows = file.execute("SELECT key, CAST(row AS BLOB), crc FROM rows").fetchall()
+        for (key, _, _), (_, row, crc) in zip(rows, rows[::-1], strict=True):
+            file.execute("UPDATE rows SET row = CAST(? AS TEXT), crc = ? WHERE key = ?", [row, crc, key])
+        file.commit()
+    assert plan(SMALL, SweepGrid.of({"theta": ["0.3", "0.7"]}), place).damaged == 2
 
 
 def table_or_words(place):
