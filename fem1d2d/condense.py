@@ -87,7 +87,7 @@ class Condensation:
 
     def _unshifted(self, schur: Floats) -> Floats:
         """The Schur complement of the matrix from that of the shifted one."""
-        return _symmetric(schur - self._shift * np.eye(len(schur)))
+        return _symmetric(schur - self._shift * np.eye(len(schur)) if self._shift else schur)
 
     def _shifted(self, matrix: Any) -> Any:
         """The matrix with the shift on the diagonal of its interface."""

@@ -1,8 +1,8 @@
 """What Section 5 compares: the difference of two solutions of steps I and II for two forces psi and psi~.
 
-"1" is the contact body and "2" the Neumann body, whatever their numbers in the file.  They come from two
-sources: forces pushed through steps I and II, and directions on the affine pieces of T
-(:mod:`verification.algorithm.affine_piece`), each of which occurs for suitable loads.
+"1" is the contact body and "2" the Neumann body, whatever their numbers in the file.  A pair of forces is
+pushed through steps I and II, or is a direction on an affine piece of T (:mod:`verification.algorithm.affine_piece`),
+each of which occurs for suitable loads.  Which pairs are drawn says :mod:`verification.ledger.draws`.
 """
 
 from __future__ import annotations
