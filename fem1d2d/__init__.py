@@ -5,6 +5,7 @@ A small core in which every matrix is exact for its mesh.  It knows nothing of c
 
 from fem1d2d.assembly import body_load, facet_weights, gram, side_load, stiffness
 from fem1d2d.condense import Condensation, Uncoupled, elimination_order, solver, solver_with_inertia
+from fem1d2d.lifted import FEW, Lifted
 from fem1d2d.material import Material, bar, plane_strain
 from fem1d2d.mesh import Mesh, MeshError, interval, rectangle, rectangle_points, sector
 from fem1d2d.mesh_files import from_file
@@ -14,9 +15,11 @@ from fem1d2d.trace import facing, surface, trapezoid
 from fem1d2d.transfer import mortar
 
 __all__ = [
+    "FEW",
     "Condensation",
     "Eigenvalue",
     "Extremes",
+    "Lifted",
     "Material",
     "Mesh",
     "MeshError",

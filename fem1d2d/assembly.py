@@ -43,9 +43,11 @@ def gram(mesh: Mesh, length: float = 1.0) -> sp.csc_array:
     """
     if not length > 0:
         raise ValueError(f"length {length}: a positive number is needed")
-    local = element.laplace(mesh) + element.mass(mesh) / length**2
-    scalar = _assemble(mesh.cells, local.astype(float), len(mesh.points))
-    return sp.kron(scalar, sp.eye_array(mesh.dimension), format="csc")
+    d = mesh.dimension
+    local = (element.laplace(mesh) + element.mass(mesh) / length**2).astype(float)
+    # each component has a copy of every cell
+    cells = np.concatenate([d * mesh.cells + p for p in range(d)])
+    return _assemble(cells, np.concatenate([local] * d), d * len(mesh.points))
 
 
 def body_load(mesh: Mesh, force: Sequence[float]) -> Floats:

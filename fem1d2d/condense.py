@@ -56,20 +56,23 @@ class Condensation:
         inside[interface] = False
         self.inside: Ints = np.flatnonzero(inside)
 
-    @cached_property
-    def _coupling(self) -> sp.csc_array:
-        """``A_IB``."""
-        return self.matrix[:, self.interface][self.inside]
+    def _block(self, rows: Ints, columns: Ints) -> Any:
+        return self.matrix[:, columns][rows]
 
     @cached_property
-    def _on_interface(self) -> sp.csc_array:
+    def _coupling(self) -> Any:
+        """``A_IB``."""
+        return self._block(self.inside, self.interface)
+
+    @cached_property
+    def _on_interface(self) -> Any:
         """``A_BB``."""
-        return self.matrix[:, self.interface][self.interface]
+        return self._block(self.interface, self.interface)
 
     @cached_property
     def _solve_inside(self) -> Callable[[Floats], Floats]:
         order = np.searchsorted(self.inside, self.order[: len(self.inside)])
-        return solver(self.matrix[:, self.inside][self.inside], order)
+        return solver(self._block(self.inside, self.inside), order)
 
     @cached_property
     def lift(self) -> Floats:
@@ -82,12 +85,12 @@ class Condensation:
     def schur(self) -> Floats:
         """``A_BB + A_BI lift``, shape (b, b)."""
         if len(self.inside) == 0:
-            return _symmetric(self._on_interface.toarray())
+            return symmetric(self._on_interface.toarray())
         return self._unshifted(self._rest(_factor(self._shifted(self.matrix), self.order)))
 
     def _unshifted(self, schur: Floats) -> Floats:
         """The Schur complement of the matrix from that of the shifted one."""
-        return _symmetric(schur - self._shift * np.eye(len(schur)) if self._shift else schur)
+        return symmetric(schur - self._shift * np.eye(len(schur)) if self._shift else schur)
 
     def _shifted(self, matrix: Any) -> Any:
         """The matrix with the shift on the diagonal of its interface."""
@@ -107,6 +110,10 @@ class Condensation:
         """
         return np.asarray(self._on_interface @ trace - self._coupling.T @ self._solve_inside(self._coupling @ trace))
 
+    def _needs_definite(self) -> None:
+        if self._shift:
+            raise ValueError("the matrix is singular: needed a definite one")
+
     def solver(self) -> Callable[[Floats], Floats]:
         """``load -> A^-1 load`` on all unknowns, as :func:`solver`; its factorisation gives the Schur complement too.
 
@@ -117,8 +124,7 @@ class Condensation:
         ValueError
             The matrix is singular.
         """
-        if self._shift:
-            raise ValueError("the matrix is singular: needed a definite one")
+        self._needs_definite()
         factor = _factor(self.matrix, self.order)
         if len(self.inside):
             self.schur = self._rest(factor)
@@ -139,7 +145,7 @@ class Condensation:
         # the last rows and columns, unless SuperLU moved some that do not depend on each other
         last = factor.perm_c[len(self.inside) :]
         L, U = (part[:, last][last].toarray() for part in (factor.L, factor.U))
-        return _symmetric(L @ U)
+        return symmetric(L @ U)
 
     def condense(self, load: Floats) -> Floats:
         """The load as the interface feels it: ``load_B + lift' load_I``, shape (b,), of its unit.
@@ -224,7 +230,7 @@ class Uncoupled(Condensation):
         schur = np.zeros((len(self.interface),) * 2)
         for _, rows, part in self._parts:
             schur[np.ix_(rows, rows)] = part.schur
-        return _symmetric(schur)
+        return symmetric(schur)
 
     def solver(self) -> Callable[[Floats], Floats]:
         """As :meth:`Condensation.solver`."""
@@ -246,7 +252,7 @@ def _equal(one: sp.csc_array, other: sp.csc_array, *places: Ints) -> bool:
     return all(bool(np.array_equal(a, b)) for a, b in pairs)
 
 
-def _symmetric(matrix: NDArray[Any]) -> NDArray[Any]:
+def symmetric(matrix: NDArray[Any]) -> NDArray[Any]:
     """The symmetric part, read-only."""
     result: NDArray[Any] = (matrix + matrix.T) / 2
     result.setflags(write=False)

@@ -214,7 +214,8 @@ def _line_fault(points: NDArray[Any], cells: Ints) -> str | None:
 
 def edges(cells: Ints) -> Ints:
     """The edges of plane cells, each with its cell to the left, shape (k c, 2): one edge of all cells, the next, .."""
-    return np.concatenate([np.roll(cells, -i, axis=1)[:, :2] for i in range(1, cells.shape[1] + 1)])
+    k = cells.shape[1]
+    return np.concatenate([cells[:, [i % k, (i + 1) % k]] for i in range(1, k + 1)])
 
 
 def measures(points: NDArray[Any], cells: Ints) -> NDArray[Any]:

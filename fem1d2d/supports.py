@@ -103,19 +103,17 @@ def rigid_motions(mesh: Mesh, known: NDArray[np.bool_]) -> Floats:
     pairs = np.column_stack(np.divmod(np.unique(mesh.cells * pieces + piece[:, None]), pieces))
     home = np.full(n, -1)  # one piece of each node; the others must agree with it there
     home[pairs[::-1, 0]] = pairs[::-1, 1]
-    conditions = []
-    for node, other in pairs[pairs[:, 1] != home[pairs[:, 0]]]:
-        row = np.zeros((d, pieces, per_piece))
-        row[:, home[node]], row[:, other] = modes[node], -modes[node]
-        conditions.append(row)
-    for node, p in np.argwhere(known):
-        row = np.zeros((1, pieces, per_piece))
-        row[0, home[node]] = modes[node, p]
-        conditions.append(row)
+    hinge, other = pairs[pairs[:, 1] != home[pairs[:, 0]]].T
+    hinged = np.zeros((len(hinge), d, pieces, per_piece))
+    each = np.arange(len(hinge))
+    hinged[each, :, home[hinge]], hinged[each, :, other] = modes[hinge], -modes[hinge]
+    node, component = np.nonzero(known)
+    held = np.zeros((len(node), pieces, per_piece))
+    held[np.arange(len(node)), home[node]] = modes[node, component]
     unknowns = pieces * per_piece
+    matrix = np.concatenate([hinged.reshape(-1, unknowns), held.reshape(-1, unknowns)])
     kernel = np.eye(unknowns)
-    if conditions:
-        matrix = np.concatenate(conditions).reshape(-1, unknowns)
+    if len(matrix):
         if len(matrix) > unknowns:
             matrix = np.asarray(np.linalg.qr(matrix, mode="r"))  # the same kernel, without the size of a long support
         _, values, right = np.linalg.svd(matrix)

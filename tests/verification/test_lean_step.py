@@ -297,6 +297,7 @@ CHANGES = {
 
 
 def factorisations(monkeypatch):
+    monkeypatch.setattr(body, "FEW", 0)
     return counted(monkeypatch, body, "Condensation")
 
 

@@ -284,6 +284,7 @@ def test_a_pair_from_matrices_varies_theta_friction_and_roles():
 
 def test_bodies_are_condensed_once_a_mesh(monkeypatch):
     made = []
+    monkeypatch.setattr(body, "FEW", 0)
     condensation = body.Condensation
     monkeypatch.setattr(body, "Condensation", lambda *args, **kw: made.append(args) or condensation(*args, **kw))
     short = SMALL.changed(max_iterations=5)

@@ -294,7 +294,7 @@ def _body(problem: Problem, name: Name, mesh: Mesh, nodes: Ints, ends: Floats) -
             )
         load += loaded[:, None] * plain(force)
     free = np.flatnonzero(~known.known.ravel())
-    right = load.ravel()[free] - matrix[free] @ known.values.ravel()
+    right = load.ravel()[free] - (matrix @ known.values.ravel())[free]
     position = np.full(known.known.size, -1)
     position[free] = np.arange(len(free))
     interface = np.concatenate([position[d * nodes + p] for p in range(d)])

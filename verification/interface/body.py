@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.linalg import cholesky, qr
 
-from fem1d2d import Condensation, Material, Mesh, Supports, Uncoupled, elimination_order, solver
+from fem1d2d import FEW, Condensation, Lifted, Material, Mesh, Supports, Uncoupled, elimination_order, solver
 from fem1d2d.mesh import Floats, Ints
 from verification.dense import STILL, Cholesky
 from verification.interface.grid import Grid
@@ -99,14 +99,24 @@ class Body(Value):
         """An order of elimination that ends with the interface, one for all matrices of the mesh."""
         return elimination_order(self.stiffness, self.interface)
 
+    @property
+    def few(self) -> bool:
+        """Whether it has so few unknowns that dense matrices cost less than sparse ones."""
+        return len(self.free) <= FEW
+
     @cached_property
     def elastic(self) -> Condensation:
         """The stiffness matrix condensed onto the interface."""
-        return Condensation(self.stiffness, self.interface, self.order, singular=self.motions.shape[1] > 0)
+        loose = self.motions.shape[1] > 0
+        if self.few:
+            return Lifted(self.stiffness, self.interface, singular=loose)
+        return Condensation(self.stiffness, self.interface, self.order, singular=loose)
 
     @cached_property
-    def gram(self) -> Uncoupled:
+    def gram(self) -> Condensation:
         """The Gram matrix condensed onto the interface."""
+        if self.few:
+            return Lifted(self.gram_matrix, self.interface)
         return Uncoupled(self.gram_matrix, self.interface, self.free % self.mesh.dimension, self.order)
 
     @cached_property
