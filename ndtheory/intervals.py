@@ -42,7 +42,7 @@ class Interval:
     @classmethod
     def of(cls, value: Any) -> Interval:
         """The smallest enclosure of a number that is known exactly: int, Fraction, Decimal."""
-        return value if isinstance(value, Interval) else cls.between(value, value)
+        return value if isinstance(value, Interval) else cls(_rounded(value, _down), _rounded(value, _up))
 
     @classmethod
     def between(cls, lo: Any, hi: Any) -> Interval:
@@ -101,7 +101,9 @@ class Interval:
 
     def exp(self) -> Interval:
         """The exponential, which grows."""
-        return Interval(_down.next_minus(_down.exp(self.lo)), _up.next_plus(_up.exp(self.hi)))
+        lo = _down.exp(self.lo)  # correctly rounded to the nearest, whatever the context
+        hi = lo if self.hi == self.lo else _down.exp(self.hi)
+        return Interval(_down.next_minus(lo), _up.next_plus(hi))
 
     def sqrt(self) -> Interval:
         """The square root of numbers >= 0."""
@@ -130,11 +132,13 @@ def sinc(t: Interval) -> Interval:
     """
     if not 0 <= t.lo <= t.hi <= 3:
         raise ValueError(f"sinc on [{t.lo}, {t.hi}]: needed numbers between 0 and 3")
-    return Interval(_sinc(t.hi).lo, _sinc(t.lo).hi)
+    if t.hi - t.lo <= _NARROW:
+        return _sinc(t)
+    return Interval(_sinc(Interval(t.hi, t.hi)).lo, _sinc(Interval(t.lo, t.lo)).hi)
 
 
-def _sinc(t: Decimal) -> Interval:
-    square = Interval.of(t).square()
+def _sinc(t: Interval) -> Interval:
+    square = t.square()
     term = total = Interval.of(1)
     for j, ratio in enumerate(_RATIOS, start=1):
         term = term * square * ratio
@@ -146,6 +150,9 @@ def _sinc(t: Decimal) -> Interval:
 
 #: Each term of the series over ``t^2`` times the one before: 25 of them reach all digits at t = 3.
 _RATIOS = [Interval.of(Fraction(1, 2 * j * (2 * j + 1))) for j in range(1, 26)]
+
+#: An interval of this length is all but a number: one evaluation encloses a function well.
+_NARROW = Decimal(10) ** (4 - DIGITS)
 
 #: A term that adds no digit to sinc, which is at least 0.04 up to t = 3.
 _SMALL = Decimal(10) ** -(DIGITS + 2)

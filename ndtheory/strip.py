@@ -127,9 +127,11 @@ class Strip:
 
 def _sinh_over(x: Interval) -> Interval:
     """``sinh(x)/x``, which grows from 1."""
-    ends = (Interval(end, end) for end in (x.lo, x.hi))  # as operations on a bare Decimal round to the nearest
-    lo, hi = (Interval.of(1) if not e.hi else (e.exp() - (-e).exp()) / (2 * e) for e in ends)
-    return Interval(max(lo.lo, Decimal(1)), max(hi.hi, Decimal(1)))
+    # as operations on a bare Decimal round to the nearest
+    ends = [Interval(end, end) for end in ((x.lo,) if x.lo == x.hi else (x.lo, x.hi))]
+    grown = [end.exp() for end in ends]
+    values = [(e - 1 / e) / (2 * end) if end.hi else Interval.of(1) for end, e in zip(ends, grown, strict=True)]
+    return Interval(max(values[0].lo, Decimal(1)), max(values[-1].hi, Decimal(1)))
 
 
 def largest_smoothed(strip: Strip, radius: Fraction) -> Interval:
