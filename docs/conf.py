@@ -50,6 +50,7 @@ napoleon_use_ivar = True
 autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented"
 autodoc_member_order = "bysource"
+autodoc_use_type_comments = False  # there are none: looking for them takes seconds
 # An attribute that a docstring lists is looked for by its bare name in all classes, of which two may have it.  Nothing
 # else warns under this name; references to what does not exist are found by the tests.
 suppress_warnings = ["ref.python"]

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Set
-from functools import partial
+from collections.abc import Callable, Set
 from pathlib import Path
 from typing import Any
 
 from docutils import nodes
+from sphinx import addnodes
 from sphinx.application import Sphinx
 from sphinx.config import Config
 from sphinx.errors import ExtensionError
@@ -98,27 +98,51 @@ def load_scripts(app: Sphinx, page: str, template: str, context: dict[str, Any],
         app.add_css_file("widgets.css")
 
 
-def share_navigation(
-    known: dict[tuple[Any, ...], str], app: Sphinx, page: str, template: str, context: dict[str, Any], doctree: Any
-) -> None:
-    """Make the navigation once for all pages of source code that lie equally deep.
+class Navigation:
+    """The navigation of a page, which shows the titles of the others; kept where it would be made anew for each page.
 
-    They stand in no table of contents, and no document in their folder: marks and relative links are the same.  Sphinx
-    would copy all headings of the site for each of them, a quarter of a second a page.
-
-    Parameters
-    ----------
-    known : dict
-        What was made before: depth and options -> HTML.
+    Sphinx copies all headings and all names of the API for every page, a quarter of a second, and drops them again:
+    here they are left out before.  Pages of source code stand in no table of contents, and no document in their folder:
+    those that lie equally deep share one navigation, as marks and relative links are the same.
     """
-    if page.startswith("_modules/"):
+
+    def __init__(self) -> None:
+        self.titles: dict[str, Any] = {}  # page -> its table of contents, without what lies below its titles
+        self.known: dict[tuple[Any, ...], str] = {}  # of source code: depth and options -> HTML
+
+    def of_titles(self, tocs: dict[str, Any]) -> dict[str, Any]:
+        """The tables of contents of all pages without what ``titles_only`` drops."""
+        for page, toc in tocs.items():
+            if page not in self.titles:
+                self.titles[page] = toc
+                if next(toc.findall(addnodes.toctree), None) is None:
+                    self.titles[page] = toc.copy()
+                    self.titles[page].extend(item.copy() for item in toc)
+                    for title, item in zip(self.titles[page], toc, strict=True):
+                        title.append(item[0].deepcopy())
+        return self.titles
+
+    def made(self, app: Sphinx, make: Callable[..., str], options: dict[str, Any]) -> str:
+        """What Sphinx makes, of titles alone where no more is asked for."""
+        if not options.get("titles_only"):
+            return make(**options)
+        whole = app.env.tocs
+        app.env.tocs = self.of_titles(whole)
+        try:
+            return make(**options)
+        finally:
+            app.env.tocs = whole
+
+    def __call__(self, app: Sphinx, page: str, template: str, context: dict[str, Any], doctree: Any) -> None:
         make = context["toctree"]
 
         def toctree(**options: Any) -> str:
+            if not page.startswith("_modules/"):
+                return self.made(app, make, options)
             key = (page.count("/"), *sorted(options.items()))
-            if key not in known:
-                known[key] = make(**options)
-            return known[key]
+            if key not in self.known:
+                self.known[key] = self.made(app, make, options)
+            return self.known[key]
 
         context["toctree"] = toctree
 
@@ -174,6 +198,6 @@ def setup(app: Sphinx) -> dict[str, bool]:
     app.connect("builder-inited", write_equations)
     app.connect("html-page-context", link_notebook)
     app.connect("html-page-context", load_scripts)
-    app.connect("html-page-context", partial(share_navigation, {}), priority=400)  # before the theme asks for it
+    app.connect("html-page-context", Navigation(), priority=400)  # before the theme asks for it
     app.connect("build-finished", write_notebooks)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

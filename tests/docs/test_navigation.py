@@ -1,26 +1,26 @@
-"""The navigation of the site is the same on pages of source code that lie equally deep, and is made once for them."""
+"""The navigation of a page is made of titles, and once for pages of source code that lie equally deep."""
 
 import sys
-from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.fixture(scope="module")
-def share():
+@pytest.fixture
+def navigation():
     pytest.importorskip("myst_nb", reason="the tools of the site are not installed: make docs")
     sys.path.append(str(ROOT / "docs"))
     try:
-        from builder.pages import share_navigation
+        from builder.pages import Navigation
     finally:
         sys.path.remove(str(ROOT / "docs"))
-    return partial(share_navigation, {})
+    return Navigation()
 
 
-def test_only_pages_of_source_code_that_lie_equally_deep_share_their_navigation(share):
+def test_only_pages_of_source_code_that_lie_equally_deep_share_their_navigation(navigation):
     made = []
 
     def shown(page, **options):
@@ -29,7 +29,7 @@ def test_only_pages_of_source_code_that_lie_equally_deep_share_their_navigation(
             return f"the tree as {page} links it, {given}"
 
         context = {"toctree": make}
-        share(None, page, "page.html", context, None)
+        navigation(None, page, "page.html", context, None)
         return context["toctree"](**options)
 
     first = shown("_modules/fem1d2d/mesh", collapse=False)
@@ -39,3 +39,28 @@ def test_only_pages_of_source_code_that_lie_equally_deep_share_their_navigation(
     for page, collapse in [*others, ("api/fem1d2d", False)]:
         assert page in shown(page, collapse=collapse)
     assert made == ["_modules/fem1d2d/mesh", *(page for page, _ in others), "api/fem1d2d"]
+
+
+def test_what_lies_below_titles_is_left_out_while_titles_alone_are_asked_for(navigation):
+    from docutils import nodes
+    from sphinx import addnodes
+
+    item = lambda text, *below: nodes.list_item("", nodes.paragraph("", text), *below)
+    leaf = nodes.bullet_list("", item("page", nodes.bullet_list("", item("section"))))
+    branch = nodes.bullet_list("", item("folder", nodes.bullet_list("", addnodes.toctree(), item("section"))))
+    whole = {"leaf": leaf, "branch": branch}
+    app = SimpleNamespace(env=SimpleNamespace(tocs=whole))
+    context = {"toctree": lambda **options: {page: toc.astext().split() for page, toc in app.env.tocs.items()}}
+    navigation(app, "leaf", "page.html", context, None)
+    assert context["toctree"](titles_only=True) == {"leaf": ["page"], "branch": ["folder", "section"]}
+    assert context["toctree"](titles_only=False) == {"leaf": ["page", "section"], "branch": ["folder", "section"]}
+    assert app.env.tocs is whole
+
+    def breaks(**options):
+        raise KeyError("leaf")
+
+    context = {"toctree": breaks}
+    navigation(app, "leaf", "page.html", context, None)
+    with pytest.raises(KeyError):
+        context["toctree"](titles_only=True)
+    assert app.env.tocs is whole
