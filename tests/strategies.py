@@ -1,6 +1,7 @@
 """Hypothesis strategies that draw valid cases by construction."""
 
 from fractions import Fraction
+from functools import cache
 
 import numpy as np
 import oracle
@@ -29,6 +30,7 @@ THINNEST = Fraction(1, 10**70)
 ANY_STRESS = log_uniform(-12, 12)
 
 
+@cache
 def offsets(smallest: int = 20) -> st.SearchStrategy[Fraction]:
     """Relative distances: 0.3 to 10^-smallest, of either sign."""
     return st.builds(lambda sign, j: sign * Fraction(3, 10**j), st.sampled_from([-1, 1]), st.integers(1, smallest))
@@ -102,17 +104,20 @@ def theory_cases(draw, edition: str, m=ANY_STRESS, thinnest=THINNEST):
 # --- elastic bodies: triangles, meshes, materials and supports, all with rational data --------------------------------
 
 
+@cache
 def numbers(low, high, denominator: int = 16) -> st.SearchStrategy[Fraction]:
     """Multiples of 1/denominator from low to high; with a power of two they are exact in floats."""
     ends = int(low * denominator), int(high * denominator)
     return st.integers(*ends).map(lambda n: Fraction(n, denominator))
 
 
+@cache
 def vectors(low=-4, high=4, denominator: int = 16, size: int = 2) -> st.SearchStrategy[np.ndarray]:
     """Vectors of rationals."""
     return st.tuples(*[numbers(low, high, denominator)] * size).map(lambda x: np.array(x, dtype=object))
 
 
+@cache
 def powers_of_two(low: int = -3, high: int = 3) -> st.SearchStrategy[Fraction]:
     """2^low to 2^high."""
     return st.integers(low, high).map(lambda k: Fraction(2) ** k)

@@ -9,6 +9,7 @@ from dataclasses import replace
 from decimal import Decimal
 from fractions import Fraction as F
 
+import numpy as np
 import oracle
 import pytest
 import strategies
@@ -365,10 +366,9 @@ def least_square(rho: float, kappa_1: float, kappa_2: float) -> float:
     """The least q^2 over theta, by looking: theta and x on grids, the definition of q^2 and nothing else."""
     s = rho**0.5 + kappa_1
     r = (s + (s * s + 4 * kappa_2) ** 0.5) / 2
-    xs, thetas = [r * i / 400 for i in range(401)], [i / 400 for i in range(1, 401)]
-    f = [kappa_2 + kappa_1 * x - x * x for x in xs]
-    square = lambda t: max((1 - t) ** 2 + 2 * t * (1 - t) * v + t * t * rho * x * x for v, x in zip(f, xs, strict=True))
-    return min(square(t) - 1 for t in thetas)
+    x, t = r * np.arange(401) / 400, np.arange(1, 401)[:, None] / 400
+    f = kappa_2 + kappa_1 * x - x * x
+    return float(((1 - t) ** 2 + 2 * t * (1 - t) * f + t * t * rho * x * x).max(axis=1).min() - 1)
 
 
 @pytest.mark.parametrize("rho", ["1/20", "1/2", 1, 3])

@@ -1,11 +1,13 @@
 """Hypothesis strategies for problems, pairs, forces and relaxation factors: every case drawn is valid.
 
-The dictionaries are those of a problem file; ``Problem.from_dict`` takes them.  Nothing is held on Gamma_c.
+The dictionaries are those of a problem file; ``Problem.from_dict`` takes them.  Nothing is held on Gamma_c.  Hypothesis
+examines each strategy that it has not seen before; those that a case asks for again and again are kept.
 """
 
 from __future__ import annotations
 
 from fractions import Fraction
+from functools import cache
 from typing import Any, Literal
 
 import numpy as np
@@ -22,11 +24,13 @@ Numbers = st.SearchStrategy[Fraction]
 SEEDS = st.integers(0, 2**32 - 1)
 
 
+@cache
 def log_uniform(low: float, high: float, digits: int = 7) -> st.SearchStrategy[Fraction]:
     """Rationals of a few digits between 10^low and 10^high, even in the exponent."""
     return st.floats(low, high).map(lambda exponent: Fraction(f"{10**exponent:.{digits - 1}e}"))
 
 
+@cache
 def thetas() -> st.SearchStrategy[Fraction]:
     """0 < theta < 1, also next to 0 and 1."""
     small = log_uniform(-12, -0.01)
@@ -41,11 +45,13 @@ def decimals(low: float, high: float) -> st.SearchStrategy[Fraction]:
     return log_uniform(low, high, digits=3)
 
 
+@cache
 def strains(largest: str = "1/20") -> st.SearchStrategy[Fraction]:
     """Small numbers of either sign, often zero."""
     return st.one_of(st.just(Fraction(0)), st.integers(-20, 20).map(lambda i: Fraction(i, 20) * Fraction(largest)))
 
 
+@cache
 def youngs() -> st.SearchStrategy[tuple[Fraction, Fraction]]:
     """E1, E2 between 1e-2 and 1e10, ratio within 1/50 to 50; equal moduli are common."""
     ratio = st.one_of(st.just(Fraction(1)), st.sampled_from([Fraction(1, 50), Fraction(50)]), decimals(-1.69, 1.69))
