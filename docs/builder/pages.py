@@ -116,10 +116,9 @@ class Navigation:
             if page not in self.titles:
                 self.titles[page] = toc
                 if next(toc.findall(addnodes.toctree), None) is None:
-                    self.titles[page] = toc.copy()
-                    self.titles[page].extend(item.copy() for item in toc)
-                    for title, item in zip(self.titles[page], toc, strict=True):
-                        title.append(item[0].deepcopy())
+                    self.titles[page] = toc.deepcopy()
+                    for item in self.titles[page]:
+                        del item[1:]
         return self.titles
 
     def made(self, app: Sphinx, make: Callable[..., str], options: dict[str, Any]) -> str:

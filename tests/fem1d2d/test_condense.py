@@ -101,6 +101,8 @@ def test_the_lift_solves_the_inner_equations_and_its_energy_is_the_schur_complem
     found = kind(floats, interface)
     basis = np.array([found.extend(row) for row in np.eye(len(interface))]).T  # columns: extended unit vectors
     assert np.array_equal(basis[interface], np.eye(len(interface)))
+    if kind is Condensation:
+        assert np.array_equal(basis[found.inside], found.lift)
     cond = np.linalg.cond(A.astype(float))
     assert norm(basis[found.inside] - found.lift) <= len(A) * EPS * cond * norm(found.lift)  # one by one or at once
     R = fem_oracle.exactly(basis)

@@ -142,5 +142,6 @@ def test_from_the_start_of_a_parent_the_solver_comes_to_the_same_bound_in_fewer_
             assert near[0].value == pytest.approx(cold[0].value, rel=1e-6)
             steps.append((near[1].steps, cold[1].steps))
             parent, proposal = pieces, near[1]
+    assert all(near < cold for near, cold in steps[:3]), steps
     fewer, more = np.sum(steps, axis=0)
     assert fewer < more, steps
