@@ -193,6 +193,21 @@ def test_a_form_with_less_weight_on_friction_is_refused(weight):
 # --- all theta at once ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("seed", CERTIFIED)
+def test_a_program_at_one_theta_bounds_the_square_of_the_factor_at_every_other(seed):
+    pair, measured, theta, _ = case(seed)
+    forms = QuadraticForms(pair, measured)
+    proved, found = forms.on(forms.everywhere, theta)
+    square = forms.square_from_below(found)
+    assert square(theta) == pytest.approx(proved.value**2, rel=1e-5)
+    shares = {
+        other: square(other) / forms.factor(other).value ** 2
+        for other in (0.2 * theta, 0.99 * theta, 1.01 * theta, 1.0)
+    }
+    assert all(share < 1 + 1e-5 for share in shares.values())
+    assert all(shares[other] > 0.999 for other in (0.99 * theta, 1.01 * theta))
+
+
 @pytest.mark.parametrize("seed", range(0, 40, 4))
 def test_below_the_largest_theta_of_the_edition_its_multipliers_prove_every_theta(seed):
     """Times theta, with q = 1; above it they do not."""

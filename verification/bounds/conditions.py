@@ -12,7 +12,7 @@ from scipy.linalg import block_diag, cho_factor, cho_solve, solve_triangular
 from fem1d2d.mesh import Floats
 from ndtheory.sharp import turning_theta, worst_ratio
 from verification.bounds.bound import LARGEST
-from verification.bounds.program import Program, Weights
+from verification.bounds.program import Optimum, Program, Weights
 from verification.bounds.trace_forms import TraceForms
 from verification.constants import Measured
 from verification.interface.pair import ContactPair
@@ -173,6 +173,17 @@ class Conditions:
         """The form ``<g, p>``."""
         cross = self.g.T @ self.p
         return np.asarray(cross + cross.T) / 2
+
+    def square_from_below(self, found: Optimum) -> np.polynomial.Polynomial:
+        """What a program at one theta says of all others: a parabola in theta below the square of what each can prove.
+
+        Its moments satisfy the dual constraints, in which theta does not stand.  At its own theta the parabola gives
+        what the solver found, up to its accuracy.
+        """
+        move = self.p - self.g
+        inner = lambda a, b: float(np.vdot(a @ found.moments, b))
+        coefficients = [inner(self.g, self.g), 2 * inner(self.g, move), inner(move, move)]
+        return np.polynomial.Polynomial(coefficients) / float(np.vdot(found.moments, self.free))
 
     def rows(self, multipliers: Weights, pieces: Pieces) -> tuple[Floats, Floats, Cones, Floats, Floats]:
         """The rows of the products, what of their multipliers lies in cones, these, and the most they may be.
