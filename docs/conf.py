@@ -6,6 +6,7 @@ from pathlib import Path
 
 from docutils import nodes
 from sphinx.application import Sphinx
+from sphinx.environment import BuildEnvironment
 from sphinx.errors import ExtensionError
 from sphinx.util.docutils import SphinxRole
 
@@ -16,6 +17,7 @@ BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
 sys.path += [str(BENCHMARKS), str(Path(__file__).resolve().parent)]  # folders of scripts, not packages
 
 import speed_page  # noqa: E402
+from builder.kernels import use_copies  # noqa: E402
 
 project = "ndtheory"
 author = "The ndtheory maintainers"
@@ -94,6 +96,12 @@ def write_ledger(app: Sphinx) -> None:
         (folder / f"{name}.md").write_text(text, encoding="utf-8")
 
 
+def prepare_kernels(app: Sphinx, env: BuildEnvironment, pages: list[str]) -> None:
+    """Before the first page is read, so that all processes that read have what the kernels need."""
+    if pages:
+        use_copies()
+
+
 def write_speed(app: Sphinx) -> None:
     """The tables and the figure of the page on speed, from the records that ``make bench`` has left.
 
@@ -126,5 +134,6 @@ class FromLedger(SphinxRole):
 def setup(app: Sphinx) -> None:
     app.connect("builder-inited", write_ledger)
     app.connect("builder-inited", write_speed)
+    app.connect("env-before-read-docs", prepare_kernels)
     for name in ("verdict", "ledger"):
         app.add_role(name, FromLedger())
