@@ -13,7 +13,6 @@ from fem1d2d import (
     body_load,
     facet_weights,
     from_file,
-    gram,
     interval,
     plane_strain,
     rectangle,
@@ -310,7 +309,7 @@ def _body(problem: Problem, name: Name, mesh: Mesh, nodes: Ints, ends: Floats) -
         unknown=unknown,
         interface=interface[unknown],
         stiffness=matrix[free][:, free].tocsc(),
-        gram_matrix=gram(mesh, float(problem.length))[free][:, free].tocsc(),
         load=right,
         motions=motions.reshape(known.known.size, motions.shape[2])[free],
+        length=float(problem.length),
     )

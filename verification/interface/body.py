@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cholesky, qr
 
 from fem1d2d import FEW, Condensation, Lifted, Material, Mesh, Supports, Uncoupled, elimination_order, solver
+from fem1d2d.assembly import gram
 from fem1d2d.mesh import Floats, Ints
 from verification.dense import STILL, Cholesky
 from verification.interface.grid import Grid
@@ -47,12 +48,14 @@ class Body(Value):
         Interface components that Gamma_u leaves free; a False one is held tangentially.
     interface : int array
         Positions of the unknown interface components among the unknowns.
-    stiffness, gram_matrix : sparse array
-        The stiffness matrix and the H1 Gram matrix of the unknowns.
+    stiffness : sparse array
+        The stiffness matrix of the unknowns.
     load : array
         Loads on the unknowns: body force, tractions, prescribed displacements.
     motions : array, shape (unknowns, k)
         Rigid motions that only contact can hold; in the iteration only the contact body may have some.
+    length : float
+        L of the norm of H1, unit length.
     """
 
     name: Name
@@ -65,13 +68,19 @@ class Body(Value):
     unknown: NDArray[np.bool_]
     interface: Ints
     stiffness: sp.csc_array
-    gram_matrix: sp.csc_array
     load: Floats
     motions: Floats
+    length: float
 
     @property
     def summary(self) -> str:
         return f"{self.name}, {len(self.mesh.points)} nodes, {len(self.nodes)} on Gamma_c"
+
+    @cached_property
+    def gram_matrix(self) -> sp.csc_array:
+        """The Gram matrix of H1 on the unknowns, which the constants of Section 5 alone need."""
+        whole = gram(self.mesh, self.length)
+        return freeze(whole[self.free][:, self.free].tocsc())
 
     @cached_property
     def solve(self) -> Callable[[Floats], Floats]:
@@ -136,7 +145,7 @@ class Body(Value):
 
     def equals(self, other: Body) -> bool:
         """Whether it is the same body, loads and norm included."""
-        rest = lambda body: (body.known.values, body.load, body.gram_matrix.data)
+        rest = lambda body: (body.known.values, body.load, body.length)
         return self.times_as_stiff(other) == 1.0 and all(map(np.array_equal, rest(self), rest(other)))
 
     @property
