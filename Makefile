@@ -7,6 +7,7 @@ PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 UV     := uv==0.13.9
+JOBS   ?= auto
 INSTALL = $(BIN)/python .ci/install.py $(1) $(UV)
 LOCKS  := requirements.lock requirements-test.lock requirements-run.lock
 NEEDS  := pyproject.toml $(LOCKS) ndtheory/__init__.py
@@ -31,7 +32,7 @@ lint: $(VENV)/.test
 	$(BIN)/mypy
 
 docs: $(VENV)/.docs
-	$(BIN)/python -m sphinx -j auto -W --keep-going -q -b html docs docs/_build/html
+	$(BIN)/python -m sphinx -j $(JOBS) -W --keep-going -q -b html docs docs/_build/html
 	$(BIN)/python tests/docs/test_site.py docs/_build/html
 	@echo "the site: docs/_build/html/index.html"
 
