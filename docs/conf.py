@@ -17,7 +17,6 @@ BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
 sys.path += [str(BENCHMARKS), str(Path(__file__).resolve().parent)]  # folders of scripts, not packages
 
 import speed_page  # noqa: E402
-from builder.kernels import use_copies  # noqa: E402
 
 project = "ndtheory"
 author = "The ndtheory maintainers"
@@ -99,6 +98,8 @@ def write_ledger(app: Sphinx) -> None:
 def prepare_kernels(app: Sphinx, env: BuildEnvironment, pages: list[str]) -> None:
     """Before the first page is read, so that all processes that read have what the kernels need."""
     if pages:
+        from builder.kernels import use_copies
+
         use_copies()
 
 
