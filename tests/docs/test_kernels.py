@@ -3,13 +3,16 @@
 import os
 from pathlib import Path
 
+import pytest
 from processes import ended
+
+pytest.importorskip("myst_nb", reason="the tools of the site are not installed: make docs")
 
 DOCS = Path(__file__).parents[2] / "docs"
 
 #: Executes pages of one cell each in copies, and prints what they print, or the name of what they raise.
 PAGES = """
-    import json, logging, multiprocessing, os, sys, warnings
+    import logging, multiprocessing, os, sys
     from pathlib import Path
 
     sys.path += [sys.argv[1], str(Path(sys.argv[1]).parent / "benchmarks")]
