@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.linalg import cho_factor, cho_solve, eigh, eigh_tridiagonal
+from scipy.linalg import eigh, eigh_tridiagonal
+from scipy.linalg.lapack import dpotrf, dpotrs, dsygvx, dsygvx_lwork
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from fem1d2d.condense import solver
@@ -68,13 +70,34 @@ def rayleigh_quotient(A: Any, B: Any, x: Floats, solve_B: Callable[[Floats], Flo
 
 
 def largest(A: Floats, B: Floats) -> Eigenvalue:
-    """Largest eigenvalue of a dense pencil, A symmetric, B symmetric positive definite, both of shape (n, n)."""
+    """Largest eigenvalue of a dense pencil, A symmetric, B symmetric positive definite, both of shape (n, n).
+
+    LAPACK is called directly: of a matrix of ten rows the checks on the way there take longer than the eigenvalue.
+
+    Raises
+    ------
+    ValueError
+        An entry is not finite.
+    numpy.linalg.LinAlgError
+        B is not positive definite.
+    """
+    if not (np.isfinite(A).all() and np.isfinite(B).all()):
+        raise ValueError("a pencil with entries that are not finite")
     n = len(A)
-    factor = cho_factor(B)
-    _, vectors = eigh(A, B, subset_by_index=[n - 1, n - 1], driver="gvx")
-    if vectors.shape[1] == 0:  # LAPACK's subsets miss an eigenvalue of high multiplicity
+    factor, failed = dpotrf(B)
+    if failed:
+        raise np.linalg.LinAlgError("a pencil whose second matrix is not positive definite")
+    _, vectors, count, _, failed = dsygvx(A, B, uplo="L", range="I", il=n, iu=n, lwork=_work(n))
+    if failed or not count:  # LAPACK's subsets miss an eigenvalue of high multiplicity
         _, vectors = eigh(A, B, driver="gvd")
-    return rayleigh_quotient(A, B, vectors[:, -1], lambda r: np.asarray(cho_solve(factor, r)))
+        count = n
+    return rayleigh_quotient(A, B, vectors[:, count - 1], lambda r: np.asarray(dpotrs(factor, r)[0]))
+
+
+@lru_cache(maxsize=256)
+def _work(n: int) -> int:
+    """The workspace with which LAPACK works in blocks."""
+    return int(dsygvx_lwork(n, uplo="L")[0])
 
 
 def largest_of(

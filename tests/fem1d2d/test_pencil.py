@@ -393,3 +393,27 @@ def test_a_limit_of_steps_ends_with_what_is_known_and_its_residual():
     assert found.largest.value < 2
     assert np.abs(D - found.largest.value).min() <= found.largest.residual
     assert found.largest.residual > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("A", "B", "error"),
+    [
+        (np.full((2, 2), np.nan), np.eye(2), ValueError),
+        (np.eye(2), np.diag([1.0, np.inf]), ValueError),
+        (np.eye(2), np.diag([1.0, -1.0]), np.linalg.LinAlgError),
+        (np.eye(2), np.diag([1.0, 0.0]), np.linalg.LinAlgError),
+    ],
+)
+def test_a_dense_pencil_without_a_largest_eigenvalue_is_refused(A, B, error):
+    with pytest.raises(error, match="a pencil"):
+        largest(A, B)
+
+
+@pytest.mark.parametrize("n", [1, 2, 9, 41])
+def test_the_largest_eigenvalue_of_a_dense_pencil_leaves_its_matrices_alone(n):
+    random = np.random.default_rng(n)
+    (A, B) = (M @ M.T + np.eye(n) for M in random.standard_normal((2, n, n)))
+    before = A.copy(), B.copy()
+    found = largest(A, B)
+    assert found.value == pytest.approx(scipy.linalg.eigvalsh(A, B)[-1], rel=1e-12)
+    assert np.array_equal((A, B), before)
