@@ -59,8 +59,8 @@ def _become_kernel(arguments: list[str], env: dict[str, str], cwd: str | os.Path
     logging.root.handlers.clear()  # which a style of code has configured
     logging.root.setLevel(logging.WARNING)
     asyncio.set_event_loop(asyncio.new_event_loop())
-    quiet = {"log_level": logging.ERROR}  # it is heard on this machine alone, unencrypted
-    launch_new_instance(argv=arguments, parent_handle=os.getppid(), **quiet)  # ends with the process that started it
+    # It ends with the process that started it, and need not warn that it talks to this machine unencrypted.
+    launch_new_instance(argv=arguments, parent_handle=os.getppid(), log_level=logging.ERROR)
 
 
 class CopyProvisioner(LocalProvisioner):

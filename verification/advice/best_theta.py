@@ -40,7 +40,7 @@ ODDS = tuple(2.0 ** (i / 4) for i in range(-5, 4))
 #: and what this is below 1 are known to this share.
 AROUND, CLOSE = 4.0, 1e-3
 
-#: Programs after which it ends anyway; three to five are usual.
+#: Programs after which it ends anyway; three to seven are usual.
 MOST = 12
 
 
@@ -234,21 +234,21 @@ def _semidefinite(pair: ContactPair, measured: Measured, predicted: float) -> Le
     """Each program bounds the square of all factors by a parabola; the next is solved where the highest is least."""
     forms = QuadraticForms(pair, measured)
     low, high = predicted / AROUND, min(1.0, predicted * AROUND)
+    theta = predicted
     found: list[Least] = []
-    theta = min(predicted, high)
     below: list[np.polynomial.Polynomial] = []
-    while True:
+    for _ in range(MOST):
         certified, proposal = forms.on(forms.everywhere, theta)
         found.append(Least(theta=theta, factor=certified.value))
-        best = min(found, key=lambda least: least.factor)
         if proposal is None:
             break
         below.append(forms.square_from_below(proposal))
         lowest = _least(lambda theta: max(float(parabola(theta)) for parabola in below), low, high, 1e-6)
-        square = best.factor**2
-        if square - lowest.factor <= CLOSE * min(square, abs(1 - square)) or len(found) == MOST:
+        square = min(each.factor for each in found) ** 2
+        if square - lowest.factor <= CLOSE * min(square, abs(1 - square)):
             break
         theta = lowest.theta
+    best = min(found, key=lambda each: each.factor)
     return best if best.factor < 1 else None
 
 

@@ -13,8 +13,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.linalg import cholesky, qr
 
-from fem1d2d import FEW, Condensation, Lifted, Material, Mesh, Supports, Uncoupled, elimination_order, solver
-from fem1d2d.assembly import gram
+from fem1d2d import FEW, Condensation, Lifted, Material, Mesh, Supports, Uncoupled, elimination_order, gram, solver
 from fem1d2d.mesh import Floats, Ints
 from verification.dense import STILL, Cholesky
 from verification.interface.grid import Grid
@@ -78,7 +77,7 @@ class Body(Value):
 
     @cached_property
     def gram_matrix(self) -> sp.csc_array:
-        """The Gram matrix of H1 on the unknowns, which the constants of Section 5 alone need."""
+        """The Gram matrix of H1 on the unknowns; a run goes without."""
         whole = gram(self.mesh, self.length)
         return freeze(whole[self.free][:, self.free].tocsc())
 
