@@ -3,10 +3,7 @@
 import os
 from pathlib import Path
 
-import pytest
 from processes import ended
-
-pytest.importorskip("myst_nb", reason="the tools of the site are not installed: make docs")
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -46,7 +43,7 @@ warnings.warn("seen")
 """
 
 
-def test_a_page_begins_as_in_a_new_kernel_and_ends_with_its_kernel(tmp_path):
+def test_a_page_begins_as_in_a_new_kernel_and_ends_with_its_kernel(site_tools, tmp_path):
     pages = (SHOWN, "unknown", "import os; os._exit(3)", "print('the next one')")
     answer = ended(PAGES, DOCS, tmp_path, *pages, env=os.environ | {"PAGE": "set"})
     assert answer.returncode == 0, answer.stderr

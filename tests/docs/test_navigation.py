@@ -10,8 +10,7 @@ ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture
-def navigation():
-    pytest.importorskip("myst_nb", reason="the tools of the site are not installed: make docs")
+def navigation(site_tools):
     sys.path.append(str(ROOT / "docs"))
     try:
         from builder.pages import Navigation

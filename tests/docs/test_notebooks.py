@@ -100,9 +100,8 @@ LINKS = (
 
 
 @pytest.fixture
-def told(tmp_path):
+def told(site_tools, tmp_path):
     """From the place of a site to the text of its page; without the tools of the site there is none."""
-    pytest.importorskip("sphinx_proof", reason="the tools of the site are not installed: make docs")
 
     def build(name, base):
         folder = tmp_path / name

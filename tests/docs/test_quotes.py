@@ -83,8 +83,7 @@ def test_only_a_check_fails_in_a_statement():
     assert [(id, s) for id, s in told if re.search(r"\b(?:fail|diverg|stall)", s)] == []
 
 
-def test_an_unknown_quotation_fails_the_build_of_the_site(tmp_path):
-    pytest.importorskip("myst_nb", reason="the tools of the site are not installed: make docs")
+def test_an_unknown_quotation_fails_the_build_of_the_site(site_tools, tmp_path):
     pages = {
         "known": "{verdict}`5.30`: {ledger}`5.30 wrong`",
         "unknown": "{verdict}`5.99`",

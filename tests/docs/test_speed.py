@@ -183,8 +183,7 @@ def test_no_time_is_typed_on_the_page():
     assert re.findall(r"\d[\d.,]*\s*(?:%|[µm]?s\b|seconds|minutes|times|MB)", text) == []
 
 
-def test_the_page_is_built_without_a_warning_with_records_and_without(tmp_path):
-    pytest.importorskip("myst_nb", reason="the tools of the site are not installed: make docs")
+def test_the_page_is_built_without_a_warning_with_records_and_without(site_tools, tmp_path):
     some = tmp_path / "some"
     some.mkdir()
     for name in ("setup", "sweep"):  # with another side and without; the site itself shows all
