@@ -10,9 +10,11 @@ from problem_list import blocks
 from strategies import AT_NIGHT
 
 import verification as vf
+from verification.bounds import interior_point
 from verification.bounds.conditions import Pieces
 from verification.bounds.exact import budget, enclose
 from verification.bounds.multipliers import QuadraticForms
+from verification.bounds.program import Stop
 
 THETA = 0.7
 
@@ -145,3 +147,23 @@ def test_from_the_start_of_a_parent_the_solver_comes_to_the_same_bound_in_fewer_
     assert all(near < cold for near, cold in steps[:3]), steps
     fewer, more = np.sum(steps, axis=0)
     assert fewer < more, steps
+
+
+def test_a_set_of_pieces_is_bounded_no_closer_than_is_enough_by_one_program():
+    pair = vf.build(vf.example("section6").changed(cells=((10, 2), (6, 2)), friction=0.4))
+    solved = []
+
+    def solve(program):
+        solved.append(interior_point.solve(program))
+        return solved[-1]
+
+    forms = QuadraticForms(pair, vf.measure(pair), solver=solve)
+    parent, pieces = forms.everywhere, forms.everywhere.where("signs", 3, 1)
+    for start in (None, (parent, forms.on(parent, THETA)[1])):
+        least, closest = forms.on(pieces, THETA, parent=start)
+        solved.clear()
+        stop = Stop(accuracy=0.0, enough=(1.1 * least.value) ** 2)
+        found, proposal = forms.on(pieces, THETA, stop=stop, parent=start)
+        assert least.value < found.value < 1.1 * least.value
+        assert proposal.steps < closest.steps
+        assert solved == [proposal]

@@ -10,7 +10,7 @@ from chain_problems import case
 import verification as vf
 from verification.bounds import interior_point, model
 from verification.bounds.multipliers import QuadraticForms
-from verification.bounds.program import LMIError, Optimum, Program
+from verification.bounds.program import LMIError, Optimum, Program, Stop
 
 SEEDS = list(islice((seed for seed in count() if case(seed)[0].contact.grid.n <= 4), 10))
 
@@ -40,7 +40,7 @@ def test_a_conic_solver_finds_the_same_value(seed):
     pair, measured, theta, random = case(seed)
     signs = random.choice([-1, 0, 1], size=pair.contact.grid.t).astype(np.int8) if pair.friction else 0
     for program in programs_of(pair, measured, theta, signs):
-        if program.enough == -np.inf:
+        if program.stop.enough == -np.inf:
             own, other = interior_point.solve(program), model.solve(program)
             assert own.converged
             assert own.s == pytest.approx(other.s, rel=1e-5, abs=1e-6)
@@ -92,7 +92,7 @@ def test_it_ends_at_any_value_below_what_is_enough():
     pair, measured, theta, _ = case(SEEDS[0])
     program = programs_of(pair, measured, theta)[0]
     least = interior_point.solve(program)
-    early = interior_point.solve(replace(program, enough=(least.s + program.s) / 2))
+    early = interior_point.solve(replace(program, stop=Stop(enough=(least.s + program.s) / 2)))
     assert early.steps < least.steps
     assert least.s < early.s < (least.s + program.s) / 2
     np.linalg.cholesky(matrix(program, early.s, early.y))

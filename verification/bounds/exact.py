@@ -22,7 +22,7 @@ from verification.bounds.conditions import TINY, Pieces, Signs
 from verification.bounds.mirror import Mirror
 from verification.bounds.multipliers import Certified, QuadraticForms
 from verification.bounds.pattern_search import factor_search
-from verification.bounds.program import LMIError, Optimum
+from verification.bounds.program import LMIError, Optimum, Stop
 from verification.interface.pair import ContactPair
 from verification.progress import Progress, silent
 from verification.threads import one_thread
@@ -153,12 +153,13 @@ def enclose(
             if programs is not None and solved + len(parts) > programs:
                 why = f"{solved} programs were solved"
                 break
+            stop = Stop(accuracy=gap / 100, enough=((1 + gap) * lower) ** 2 * (1 - SAME_BOUND))
             progress(f"semidefinite bound: {worst.upper.value / lower - 1:.2%} above a factor that occurs", None)
             heapq.heappop(leaves)
             for part in parts:
                 leaf = None if mirror is None else _mirrored(forms, mirror, bounded, part, theta)
                 if leaf is None:
-                    leaf, solved = _solved(forms, worst, part, theta, gap / 100), solved + 1
+                    leaf, solved = _solved(forms, worst, part, theta, stop), solved + 1
                     for pattern in _read_off(forms, leaf, search.sign):
                         start = search.above(PROMISING**2 * best.value, *pattern)
                         if start is not None:
@@ -168,13 +169,13 @@ def enclose(
     return Enclosure(upper=worst.upper, whole=root.upper, lower=lower, piece=best.piece, programs=solved, why_apart=why)
 
 
-def _solved(forms: QuadraticForms, parent: Leaf, part: Pieces, theta: float, accuracy: float) -> Leaf:
+def _solved(forms: QuadraticForms, parent: Leaf, part: Pieces, theta: float, stop: Stop) -> Leaf:
     """What is proved for a part of a set of pieces: by its own program, or for the whole set."""
     start = None
     if parent.proposal is not None and (part.signs != parent.pieces.signs).any():  # by what a node does is too far away
         start = parent.pieces, parent.proposal
     try:
-        upper, proposal = forms.on(part, theta, accuracy=accuracy, parent=start)
+        upper, proposal = forms.on(part, theta, stop=stop, parent=start)
     except LMIError:
         return replace(parent, pieces=part, proposal=None)
     return Leaf(pieces=part, upper=min(upper, parent.upper, key=lambda certified: certified.value), proposal=proposal)

@@ -148,10 +148,10 @@ def solve(program: Program) -> Optimum:
     while steps < MOST_STEPS:
         gap = _inner(X, Z)
         missing = float(np.abs(cost - _adjoint(blocks, X, len(cost))).max())
-        converged = gap <= program.accuracy * max(abs(y[0]), SMALL) and missing <= program.accuracy
+        converged = gap <= program.stop.accuracy * max(abs(y[0]), SMALL) and missing <= program.stop.accuracy
         if early is None and gap <= EARLY * max(abs(y[0]), SMALL):
             early = float(y[0]), y[1:] / size
-        if converged or y[0] < program.enough:
+        if converged or y[0] < program.stop.enough:
             break
         M = np.zeros((len(cost),) * 2)
         for block, x, z in zip(blocks, X, inverse, strict=True):

@@ -31,7 +31,7 @@ from fem1d2d.mesh import Floats
 from ndtheory.sharp import contraction_interval
 from verification.bounds import interior_point
 from verification.bounds.conditions import Conditions, Pieces, inside, mixed, times
-from verification.bounds.program import LMIError, Optimum, Program, Weights
+from verification.bounds.program import CLOSE, LMIError, Optimum, Program, Stop, Weights
 from verification.constants import Measured
 from verification.interface.pair import ContactPair
 from verification.progress import Progress, silent
@@ -130,7 +130,7 @@ class QuadraticForms(Conditions):
 
     @one_thread()
     def on(
-        self, pieces: Pieces, theta: float, *, accuracy: float = 1e-7, parent: tuple[Pieces, Optimum] | None = None
+        self, pieces: Pieces, theta: float, *, stop: Stop = CLOSE, parent: tuple[Pieces, Optimum] | None = None
     ) -> tuple[Certified, Optimum | None]:
         """The same for some of the affine pieces of T.
 
@@ -138,8 +138,8 @@ class QuadraticForms(Conditions):
         ----------
         pieces : Pieces
         theta : float
-        accuracy : float
-            Of the solver.
+        stop : Stop
+            Of the program, whose s is the square of the constant.
         parent : (Pieces, Optimum), optional
             A set of which these are the pieces with more signs fixed, and what the solver found for it: a start that
             saves half of its steps on Section 6.
@@ -155,7 +155,7 @@ class QuadraticForms(Conditions):
         """
         step = theta * self.p + (1 - theta) * self.g
         holds = lambda weights: self.traces.with_multipliers(weights, step=(theta, 1 - theta))
-        found, proposal = self._least(-step.T @ step, self.known(theta), theta, holds, pieces, accuracy, parent)
+        found, proposal = self._least(-step.T @ step, self.known(theta), theta, holds, pieces, stop, parent)
         return _root(found), proposal
 
     @one_thread()
@@ -198,7 +198,7 @@ class QuadraticForms(Conditions):
         proposals: list[tuple[float, Weights]] = []
         try:
             start = self._program(-self.cross, self.towards_zero, 1.0, self.everywhere)
-            below = self._solver(replace(start, enough=1.0))
+            below = self._solver(replace(start, stop=Stop(enough=1.0)))
             if below.s < 1:
                 found = self._solver(replace(start, fixed=still, free=-moving, s=0.0, y=2 * below.y, highest=1.01))
                 proposals.append((found.s, self.by_node(found.y, self.everywhere)))
@@ -235,7 +235,7 @@ class QuadraticForms(Conditions):
         theta: float,
         holds: Callable[[Weights], Callable[[float], bool]],
         pieces: Pieces,
-        accuracy: float = 1e-7,
+        stop: Stop = CLOSE,
         parent: tuple[Pieces, Optimum] | None = None,
     ) -> tuple[Certified, Optimum | None]:
         """The least s for which multipliers prove that ``s |g|^2 + fixed - conditions`` is positive definite.
@@ -246,7 +246,7 @@ class QuadraticForms(Conditions):
         proposal, gave_up = None, ""
         drawn: list[Weights] = []
         try:
-            proposal = self._proposed(fixed, known, theta, pieces, accuracy, parent)
+            proposal = self._proposed(fixed, known, theta, pieces, stop, parent)
             found, towards = self.by_node(proposal.y, pieces), self.by_node(self.rows(known, pieces)[3], pieces)
             drawn = [mixed(share, found, towards) for share in DRAWN]
         except LMIError as error:
@@ -280,7 +280,7 @@ class QuadraticForms(Conditions):
         known: Weights,
         theta: float,
         pieces: Pieces,
-        accuracy: float,
+        stop: Stop,
         parent: tuple[Pieces, Optimum] | None,
     ) -> Optimum:
         """What the solver proposes, from where it has been for a parent or, where that leads nowhere, from known ones.
@@ -291,12 +291,12 @@ class QuadraticForms(Conditions):
         """
         if parent is not None and parent[1].early is not None:
             try:
-                near = self._solver(replace(self.started(fixed, parent[1].early, parent[0], pieces), accuracy=accuracy))
-                if near.converged:
+                near = self._solver(replace(self.started(fixed, parent[1].early, parent[0], pieces), stop=stop))
+                if near.converged or near.s < stop.enough:
                     return near
             except LMIError:
                 pass
-        return self._solver(replace(self._program(fixed, known, theta, pieces), accuracy=accuracy))
+        return self._solver(replace(self._program(fixed, known, theta, pieces), stop=stop))
 
     def _least_value(self, form: Floats) -> float | None:
         """The least s for which ``s |g|^2 + form`` is positive semidefinite; None where the part of d_1 is not."""

@@ -19,6 +19,26 @@ class LMIError(RuntimeError):
     """No multipliers that certify anything were found."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Stop:
+    """Where a solver may end.
+
+    Attributes
+    ----------
+    accuracy : float
+        Where it knows s so well, relatively.
+    enough : float
+        At any s below.
+    """
+
+    accuracy: float = 1e-7
+    enough: float = -math.inf
+
+
+#: Where it ends that is asked for the least s alone.
+CLOSE = Stop()
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Program:
     """The least s for which ``fixed + s free - sum_i y_i (a_i b_i' + b_i a_i')/2`` is positive semidefinite.
@@ -40,10 +60,7 @@ class Program:
         Where a search may start: the matrix is positive definite there, and every inequality strict.
     highest : float or None
         Where given, the largest s up to it is wanted instead of the least.
-    enough : float
-        A solver may end at any s below.
-    accuracy : float
-        It may end where it knows s so well, relatively.
+    stop : Stop
     """
 
     fixed: Floats
@@ -55,8 +72,7 @@ class Program:
     s: float
     y: Floats
     highest: float | None = None
-    enough: float = -math.inf
-    accuracy: float = 1e-7
+    stop: Stop = CLOSE
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
