@@ -22,7 +22,8 @@ import verification as vf
 from ndtheory import PRINTED, REPAIRED, bounds
 from verification.algorithm.affine_piece import Piece
 from verification.bounds.losses import Losses, locate
-from verification.bounds.pattern_search import Found, size, worst_piece
+from verification.bounds.neighbours import squared
+from verification.bounds.pattern_search import Found, worst_piece
 from verification.constants import Measured, measure
 from verification.interface.assembly import ContactPair, build
 from verification.ledger.draws import uniform_piece
@@ -133,13 +134,13 @@ class Case:
         root = self.pair.neumann.root
         turned = lambda matrix: symmetric(root.T @ matrix @ root)
         against = turned(self.forms(label, uniform_piece(self.pair, touching=False, sliding=1))[1])  # of every piece
-        quick = {
-            "(5.11)": lambda found: size(found.d_1, self.N_1),
-            "(5.16)": lambda found: size(found.force, self.dual),
-            "(5.38)": lambda found: size(found.force, self.flexibility),
+        factors = {
+            "(5.11)": lambda found: squared(found.d_1, self.N_1),
+            "(5.16)": lambda found: squared(found.force, self.dual),
+            "(5.38)": lambda found: squared(found.force, self.flexibility),
         }.get(label, lambda found: found.friction)
         form, random = lambda piece: turned(self.forms(label, piece)[0]), np.random.default_rng(self.seed)
-        return worst_piece(self.pair, form, against=against, quick=quick, random=random, starts=starts)
+        return worst_piece(self.pair, form, against=against, factors=factors, random=random, starts=starts)
 
     def realised(self, label: str, piece: Piece, random: np.random.Generator) -> Sides:
         """Two forces in the worst direction of a piece, for loads that bring it about."""

@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 
 import verification as vf
 from verification.algorithm.affine_piece import Piece
 from verification.algorithm.fixed_point import FixedPointMap
-from verification.bounds.pattern_search import beside, factor_search, largest_factor, signs
+from verification.bounds.neighbours import Neighbours, Patterns, responses, squared
+from verification.bounds.pattern_search import factor_search, largest_factor, signs, worst_piece
 from verification.contact.active_set import Pattern
 
 N, THETA = 4, 0.6
@@ -87,24 +89,102 @@ PAIRS = {
 }
 
 
+def piece_of(pair, patterns, i):
+    pattern = Pattern(touching=patterns.touching[i], sliding=patterns.sliding[i])
+    return Piece(pair=pair, pattern=pattern, sign=signs(pair), still=np.zeros(pair.neumann.grid.n, dtype=bool))
+
+
 @pytest.mark.parametrize("name", PAIRS)
-def test_what_t_makes_of_a_force_beside_a_pattern_is_what_it_makes_of_it_on_each_piece(name):
+def test_what_t_makes_of_a_force_on_several_patterns_is_what_it_makes_of_it_on_each_piece(name):
     pair, random = PAIRS[name](), np.random.default_rng(7)
-    for _ in range(5):
-        base, sign = random_pattern(random, pair), signs(pair)
-        n = pair.contact.grid.n
-        node = random.integers(n, size=12)
-        touching, sliding = np.repeat(base.touching[None], 12, axis=0), np.repeat(base.sliding[None], 12, axis=0)
-        touching[np.arange(12), node] = random.random(12) < 0.5
-        sliding[np.arange(12), node] = random.integers(-1, 2, size=12)
-        g = random.standard_normal(pair.neumann.grid.size)
-        found = beside(pair, g, base, touching, sliding, node, sign)
-        for i in range(12):
-            pattern = Pattern(touching=touching[i], sliding=sliding[i])
-            piece = Piece(pair=pair, pattern=pattern, sign=sign, still=np.zeros(pair.neumann.grid.n, dtype=bool))
-            assert found.jump[i] == pytest.approx(piece.jump @ g, rel=1e-9, abs=1e-9 * np.abs(found.jump).max())
-            expected = piece.reaction @ g
-            assert found.reaction[i] == pytest.approx(expected, rel=1e-9, abs=1e-9 * np.abs(found.reaction).max())
+    several = [random_pattern(random, pair) for _ in range(12)]
+    patterns = Patterns(
+        touching=np.array([pattern.touching for pattern in several]),
+        sliding=np.array([pattern.sliding for pattern in several]),
+    )
+    g = random.standard_normal(pair.neumann.grid.size)
+    found = responses(pair, g, patterns, signs(pair))
+    for i in range(12):
+        piece = piece_of(pair, patterns, i)
+        for made, matrix in ((found.jump, piece.jump), (found.reaction, piece.reaction), (found.force, piece.force)):
+            assert made[i] == pytest.approx(matrix @ g, rel=1e-9, abs=1e-9 * np.abs(made).max())
+        assert found.d_1[i] == pytest.approx(pair.interface.carry(pair.neumann.inverse) @ g + piece.jump @ g, rel=1e-9)
+
+
+def forms_of(pair):
+    """Forms of Section 5 by pieces, in y with ``g = L y``, and by their factors."""
+    root, inverse, gram, t = pair.neumann.root, pair.neumann.inverse, pair.contact.stiffness, pair.contact.grid.t
+    force, trace = lambda piece: piece.force @ root, lambda piece: (pair.interface.carry(inverse) + piece.jump) @ root
+    slid = lambda piece: (piece.pattern.sliding[:, None] * piece.bound @ root).T @ piece.jump[:t] @ root
+    symmetric = lambda form: (form + form.T) / 2
+    return {
+        "T": (lambda piece: force(piece).T @ inverse @ force(piece), lambda made: squared(made.force, inverse)),
+        "trace": (lambda piece: trace(piece).T @ gram @ trace(piece), lambda made: squared(made.d_1, gram)),
+        "friction": (lambda piece: -symmetric(slid(piece)), lambda made: made.friction),
+        "work": (lambda piece: symmetric(root.T @ inverse @ force(piece)), lambda made: (made.force @ inverse, made.g)),
+    }
+
+
+def beside(random, pair, count=12):
+    """A pattern, and some that differ from it at one node each; some do not differ at all."""
+    base, row = random_pattern(random, pair), np.arange(count)
+    node = random.integers(pair.contact.grid.n, size=count)
+    touching, sliding = np.repeat(base.touching[None], count, axis=0), np.repeat(base.sliding[None], count, axis=0)
+    touching[row, node] = random.random(count) < 0.5
+    sliding[row, node] = random.integers(-1, 2, size=count)
+    return base, Patterns(touching=touching, sliding=sliding), node
+
+
+@pytest.mark.parametrize("kind", ["T", "trace", "friction", "work"])
+@pytest.mark.parametrize("name", PAIRS)
+def test_a_form_on_the_neighbours_of_a_pattern_is_the_one_on_each_piece(name, kind):
+    pair, random = PAIRS[name](), np.random.default_rng(7)
+    form, factors = forms_of(pair)[kind]
+    for _ in range(3):
+        base, patterns, node = beside(random, pair)
+        y = random.standard_normal(pair.neumann.grid.size)
+        found = Neighbours(pair, base, patterns, node, signs(pair), factors).values(pair.neumann.root @ y)
+        expected = [y @ form(piece_of(pair, patterns, i)) @ y for i in range(len(node))]
+        assert found == pytest.approx(expected, rel=1e-9, abs=1e-9 * max(map(abs, expected)) + 1e-15 * (y @ y))
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e9])
+@pytest.mark.parametrize("kind", ["T", "trace", "friction", "work"])
+@pytest.mark.parametrize("name", PAIRS)
+def test_the_neighbours_whose_form_is_above_a_level_are_known_without_it(name, kind, unit):
+    """At levels above the eigenvalues of the pattern: half way from there to the largest of a neighbour, and around."""
+    pair, random = PAIRS[name](), np.random.default_rng(11)
+    (form, factors), above = forms_of(pair)[kind], 0
+    scaled = lambda made: (unit * factors(made)[0], factors(made)[1])
+    against = np.diag(random.uniform(0.5, 2.0, size=pair.neumann.grid.size))
+    for _ in range(3):
+        base, patterns, node = beside(random, pair)
+        alone = Patterns(touching=base.touching[None], sliding=base.sliding[None])
+        values, vectors = eigh(unit * form(piece_of(pair, alone, 0)), against)
+        tops = np.array([eigh(unit * form(piece_of(pair, patterns, i)), against)[0][-1] for i in range(len(node))])
+        neighbours = Neighbours(pair, base, patterns, node, signs(pair), scaled)
+        size = np.abs(values).max()
+        for level in (values[-1] + 1e-9 * size, (values[-1] + max(tops.max(), values[-1])) / 2 + 1e-6 * size):
+            expected = tops > level
+            found = neighbours.exceed(level, values, pair.neumann.root @ vectors)
+            clear = np.abs(tops - level) > 1e-7 * size
+            assert (found == expected)[clear].all()
+            above += int(expected.sum())
+    assert above or pair.friction == 0
+
+
+@pytest.mark.parametrize("kind", ["T", "trace", "friction", "work"])
+def test_no_neighbour_of_what_the_search_finds_is_better(kind):
+    pair = PAIRS["matching grids"]()
+    form, factors = forms_of(pair)[kind]
+    found = worst_piece(pair, form, factors=factors, random=np.random.default_rng(0), starts=2)
+    touching, sliding = found.piece.pattern.touching, found.piece.pattern.sliding
+    for node in range(pair.contact.grid.n):
+        for touches in (True, False):
+            for slides in (-1, 0, 1):
+                pattern = Patterns(touching=touching[None].copy(), sliding=sliding[None].copy())
+                pattern.touching[0, node], pattern.sliding[0, node] = touches, slides
+                assert eigh(form(piece_of(pair, pattern, 0)))[0][-1] <= found.value * (1 + 2e-9)
 
 
 def test_a_piece_is_above_a_level_exactly_where_its_value_is():

@@ -20,7 +20,8 @@ from fem1d2d.mesh import Floats
 from ndtheory import PRINTED, REPAIRED
 from ndtheory import bounds as formulas
 from verification.algorithm.affine_piece import Piece
-from verification.bounds.pattern_search import Form, Quick, size, worst_piece
+from verification.bounds.neighbours import Factors, squared
+from verification.bounds.pattern_search import Form, worst_piece
 from verification.constants import Measured
 from verification.interface.pair import ContactPair
 from verification.progress import Progress, silent
@@ -160,19 +161,21 @@ def locate(pair: ContactPair, measured: Measured, *, seed: int = 0, progress: Pr
         felt = pair.interface.carry_back(S_1)  # the contact body's reaction, as the Neumann body receives it
         norm = square(forms.root, dual)
 
-        def found(form: Form, quick: Quick, against: Floats | None = None) -> float:
+        def found(form: Form, factors: Factors, against: Floats | None = None) -> float:
             """The largest value of a quadratic form against another one, the norm (5.21) by default."""
             progress("searching what the inequalities lose", next(done) / SEARCHES)
             random = np.random.default_rng(seed)
-            return worst_piece(pair, form, quick=quick, against=against, random=random, starts=STARTS).value
+            return worst_piece(pair, form, factors=factors, against=against, random=random, starts=STARTS).value
 
         def force(gram: Floats, against: Floats | None = None) -> float:
             """``|T psi - T psi~|`` in a norm, squared."""
-            return found(lambda piece: square(forms.force(piece), gram), lambda some: size(some.force, gram), against)
+            return found(
+                lambda piece: square(forms.force(piece), gram), lambda some: squared(some.force, gram), against
+            )
 
         def trace(against: Floats | None = None) -> float:
             """``|w^1 - w~^1|_1``, squared."""
-            return found(lambda piece: square(forms.d_1(piece), N_1), lambda some: size(some.d_1, N_1), against)
+            return found(lambda piece: square(forms.d_1(piece), N_1), lambda some: squared(some.d_1, N_1), against)
 
         # suprema against e = |||psi - psi~|||, squared
         F = found(forms.friction, lambda some: some.friction)

@@ -21,8 +21,8 @@ from scipy.linalg.lapack import dpotrf
 
 from fem1d2d.mesh import Floats
 from verification.algorithm.affine_piece import Piece
+from verification.bounds.neighbours import Factors, Neighbours, Patterns, Responses, responses, squared, values
 from verification.contact.active_set import Pattern
-from verification.dense import vanishing
 from verification.interface.pair import ContactPair
 from verification.threads import one_thread
 
@@ -31,9 +31,6 @@ CANCELLED = 1e-6
 
 #: Digits by which values are told apart: the way uphill is the same however a processor rounds.
 DIGITS = 9
-
-#: Candidates that are evaluated in full where no estimate promises anything.
-TRIED = 30
 
 Form = Callable[[Piece], Floats]
 
@@ -47,50 +44,19 @@ class Found:
     value : float
         The largest value of the quadratic form on it.
     piece : Piece
-    worst : array
-        Where the form takes it.
+    eigenvalues, eigenvectors : array
+        Of the form, the largest last.
     """
 
     value: float
     piece: Piece
-    worst: Floats
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Responses:
-    """What T makes of one change of force on several pieces; one row each.
-
-    Attributes
-    ----------
-    pair : ContactPair
-    g : array, shape (2 n,)
-        The change of the force on the Neumann grid.
-    jump : array, shape (c, 2 n)
-        That of v.
-    reaction : array, shape (c, 2 n)
-        That of the forces on the contact grid.
-    """
-
-    pair: ContactPair
-    g: Floats
-    jump: Floats
-    reaction: Floats
+    eigenvalues: Floats
+    eigenvectors: Floats
 
     @property
-    def force(self) -> Floats:
-        """The change of T g, shape (c, 2 n)."""
-        return self.pair.interface.carry_back(self.reaction.T).T
-
-    @property
-    def d_1(self) -> Floats:
-        """The change of the trace of the contact body, shape (c, 2 n)."""
-        return self.pair.interface.carry(self.pair.neumann.flexibility(self.g)) + self.jump
-
-    @property
-    def friction(self) -> Floats:
-        """The friction term of (5.12), shape (c,)."""
-        t = self.pair.contact.grid.t
-        return -np.asarray(np.einsum("ij,ij->i", self.reaction[:, :t], self.jump[:, :t]))
+    def size(self) -> float:
+        """Of its eigenvalues, the largest one: rounding is a share of it."""
+        return float(np.abs(self.eigenvalues).max())
 
 
 def signs(pair: ContactPair) -> NDArray[np.int8]:
@@ -106,9 +72,6 @@ def signs(pair: ContactPair) -> NDArray[np.int8]:
     return np.asarray(np.where(reached, np.sign(kernel @ pressed), 0), dtype=np.int8)
 
 
-Quick = Callable[[Responses], Floats]
-
-
 class Search:
     """The affine pieces of T, and the way uphill among them to a large value of a quadratic form.
 
@@ -120,15 +83,15 @@ class Search:
         Piece -> symmetric matrix, in y with ``g = L y`` (:attr:`verification.interface.body.Condensed.root`).
     against : array, optional
         The form whose value is 1: the identity, the norm (5.21), by default.
-    quick : callable, optional
-        Responses -> the values of the form there, shape (c,).  With it all pieces next to the best are estimated at
-        once, by the change of force that is worst on the best one.
+    factors : callable, optional
+        Of the same form (:data:`verification.bounds.neighbours.Factors`).  With it all pieces next to the best are
+        looked at together, and few of them one by one.
     """
 
     def __init__(
-        self, pair: ContactPair, form: Form, *, against: Floats | None = None, quick: Quick | None = None
+        self, pair: ContactPair, form: Form, *, against: Floats | None = None, factors: Factors | None = None
     ) -> None:
-        self.pair, self._form, self._against, self._quick = pair, form, against, quick
+        self.pair, self._form, self._against, self._factors = pair, form, against, factors
         tangential = (0, 1, -1) if pair.rubs else (1,)  # without friction every node slides
         self.states = [(touching, slide) for touching in (True, False) for slide in tangential]
         self.sign, self._still = signs(pair), np.zeros(pair.neumann.grid.n, dtype=bool)
@@ -168,45 +131,44 @@ class Search:
                 if dpotrf(level * against - form)[1] == 0:
                     self._below[visited] = level
                     return None
-            values, vectors = eigh(form, self._against, check_finite=False)
-            self._visited[visited] = Found(value=float(values[-1]), piece=piece, worst=vectors[:, -1])
-        found = self._visited[visited]
-        return found if found.value > level else None
+            found, vectors = eigh(form, self._against, check_finite=False)
+            self._visited[visited] = Found(value=float(found[-1]), piece=piece, eigenvalues=found, eigenvectors=vectors)
+        known = self._visited[visited]
+        return known if known.value > level else None
 
     def climb(self, best: Found) -> Found:
         """The best piece on the way up: what one node does is changed, or several do, as long as that helps."""
         better: Found | None = best
         while better is not None:
             best = better
-            level = best.value + 10.0**-DIGITS * abs(best.value)
-            tried = (self.above(level, *pattern) for pattern in self._tried(best))
+            level = best.value + 10.0**-DIGITS * best.size
+            tried = (self.above(level, *pattern) for pattern in self._tried(best, level))
             better = next((found for found in tried if found is not None), None)
         return best
 
-    def _tried(self, best: Found) -> Iterator[tuple[NDArray[np.bool_], NDArray[np.int8]]]:
-        """Patterns that may be better, the most promising first."""
-        touching, sliding, node = self._neighbours(best.piece.pattern)
-        if self._quick is None:
-            yield from zip(touching, sliding, strict=True)
+    def _tried(self, best: Found, level: float) -> Iterator[tuple[NDArray[np.bool_], NDArray[np.int8]]]:
+        """Patterns that may be better, the most promising first: by the change of force that is worst on the best."""
+        patterns, node = self._neighbours(best.piece.pattern)
+        if self._factors is None:
+            yield from zip(patterns.touching, patterns.sliding, strict=True)
             return
-        g = self.pair.neumann.root @ best.worst
-        rounded = lambda found: np.round(self._quick(found) / (abs(best.value) or 1.0), DIGITS)
-        values = rounded(beside(self.pair, g, best.piece.pattern, touching, sliding, node, self.sign))
-        order = np.argsort(-values, kind="stable")
-        helps = order[values[order] > np.round(best.value / (abs(best.value) or 1.0), DIGITS)]
-        each = helps[np.sort(np.unique(node[helps], return_index=True)[1])]  # what helps most at each node
-        if len(each) > 1:
-            several = [each[:count] for count in _halves(len(each))]
-            touches = np.repeat(best.piece.pattern.touching[None], len(several), axis=0)
-            slides = np.repeat(best.piece.pattern.sliding[None], len(several), axis=0)
-            for row, chosen in enumerate(several):
-                touches[row, node[chosen]] = touching[chosen, node[chosen]]
-                slides[row, node[chosen]] = sliding[chosen, node[chosen]]
-            most = int(np.argmax(rounded(responses(self.pair, g, touches, slides, self.sign))))
-            yield touches[most], slides[most]
-        yield from zip(touching[order[:TRIED]], sliding[order[:TRIED]], strict=True)
+        beside = Neighbours(self.pair, best.piece.pattern, patterns, node, self.sign, self._factors)
+        forces, size = self.pair.neumann.root @ best.eigenvectors, best.size or 1.0
+        promised = np.round(beside.values(forces[:, -1]) / size, DIGITS)
+        order = np.argsort(-promised, kind="stable")
+        helps = order[promised[order] > np.round(best.value / size, DIGITS)]
+        several = _several(best.piece.pattern, patterns, node, helps)
+        if len(several.touching):
+            made = responses(self.pair, forces[:, -1], several, self.sign)
+            most = int(np.argmax(np.round(values(self._factors(made)) / size, DIGITS)))
+            yield several.touching[most], several.sliding[most]
+        yield from ((patterns.touching[i], patterns.sliding[i]) for i in helps)
+        exceeds = order[beside.exceed(level, best.eigenvalues, forces)[order]]
+        several = _several(best.piece.pattern, patterns, node, exceeds)
+        yield from zip(several.touching, several.sliding, strict=True)
+        yield from ((patterns.touching[i], patterns.sliding[i]) for i in exceeds)
 
-    def _neighbours(self, pattern: Pattern) -> tuple[NDArray[np.bool_], NDArray[np.int8], NDArray[np.intp]]:
+    def _neighbours(self, pattern: Pattern) -> tuple[Patterns, NDArray[np.intp]]:
         """The patterns that differ at one node, and which."""
         touches, slides = (np.array(column) for column in zip(*self.states, strict=True))
         slides = np.where((slides != 0) | self._reached[:, None], slides, 1)
@@ -219,127 +181,7 @@ class Search:
         touching[np.arange(len(node)), node] = touches[state]
         if len(pattern.sliding):
             sliding[np.arange(len(node)), node] = slides[node, state]
-        return touching, sliding, node
-
-
-def responses(
-    pair: ContactPair, g: Floats, touching: NDArray[np.bool_], sliding: NDArray[np.int8], sign: NDArray[np.int8]
-) -> Responses:
-    """What T makes of a change of force on the pieces of several patterns; :class:`Piece` has the same by all forces.
-
-    Parameters
-    ----------
-    pair : ContactPair
-    g : array, shape (2 n,)
-    touching : bool array, shape (c, n)
-    sliding : int array, shape (c, t)
-    sign : int array, shape (t,)
-        Of S sigma_N.
-    """
-    contact = pair.contact
-    carried, rubbing = _given(pair, g, sliding, sign)
-    moves = _moves(pair, touching, sliding)
-    systems = contact.stiffness * (moves[:, :, None] & moves[:, None, :])
-    diagonal = np.einsum("cii->ci", systems)
-    diagonal[~moves] = 1.0
-    if contact.loose:  # motions that a pattern leaves free are pinned: its reaction does not know of them
-        for system, still in zip(systems, ~moves, strict=True):
-            free = vanishing(contact.motions, np.flatnonzero(still))
-            system += float(np.diag(contact.stiffness).max()) * free @ free.T
-    load = np.where(moves, -contact.stiffness @ carried - rubbing, 0.0)
-    jump = np.asarray(np.linalg.solve(systems, load[..., None])[..., 0], dtype=float)
-    jump[:, ~contact.free] = -carried[~contact.free]
-    return _responses(pair, g, jump, -(carried + jump) @ contact.stiffness, rubbing, touching, sliding)
-
-
-def beside(
-    pair: ContactPair,
-    g: Floats,
-    pattern: Pattern,
-    touching: NDArray[np.bool_],
-    sliding: NDArray[np.int8],
-    node: NDArray[np.intp],
-    sign: NDArray[np.int8],
-) -> Responses:
-    """The same on the pieces of patterns that differ from one at one node each.
-
-    Of each component of the trace d and of ``f = S_1 d`` step II gives one and asks for the other: f where the jump is
-    free, d where it is not.  One matrix, the principal pivot transform of S_1, takes what is given to what is asked
-    for, and a node that changes its mind leaves a system of its own components alone.
-
-    Parameters
-    ----------
-    pair, g, touching, sliding, sign
-        As in :func:`responses`.
-    pattern : Pattern
-        The one that they differ from.
-    node : int array, shape (c,)
-        Where.
-    """
-    contact, size = pair.contact, pair.contact.grid.size
-    carried, rubbing = _given(pair, g, np.vstack([pattern.sliding, sliding]), sign)
-    moves = _moves(pair, np.vstack([pattern.touching, touching]), np.vstack([pattern.sliding, sliding]))
-    given = np.where(moves, -rubbing, np.where(contact.free, carried, 0.0))
-    transform = _exchanged(contact.stiffness, moves[0])
-    asked = transform @ given[0]
-    at = node[:, None] + np.arange(0, size, contact.grid.n)  # the components of the node
-    row = np.arange(len(node))[:, None]
-    swapped = moves[1:][row, at] != moves[0][at]
-    systems = np.where(swapped[..., None], transform[at[:, :, None], at[:, None, :]], np.eye(at.shape[1]))
-    change = np.linalg.solve(systems, (given[1:][row, at] - np.where(swapped, asked[at], given[0][at]))[..., None])
-    answers = asked + np.einsum("ck,cki->ci", change[..., 0], transform.T[at])
-    inputs = np.repeat(given[:1], len(node), axis=0)
-    inputs[row, at] += change[..., 0]
-    d, f = np.where(moves[0], answers, inputs), np.where(moves[0], inputs, answers)
-    return _responses(pair, g, d - carried, -f, rubbing[1:], touching, sliding)
-
-
-def _given(pair: ContactPair, g: Floats, sliding: NDArray[np.int8], sign: NDArray[np.int8]) -> tuple[Floats, Floats]:
-    """The trace of the Neumann body on the contact grid, shape (2 n,), and the friction forces, shape (c, 2 n)."""
-    carried = pair.interface.carry(pair.neumann.flexibility(g))
-    rubbing = np.zeros((len(sliding), len(carried)))
-    if pair.rubs:
-        bound = float(pair.friction) * pair.contact.grid.weights * sign * pair.interface.stress(g)
-        rubbing[:, : pair.contact.grid.t] = sliding * bound
-    return carried, rubbing
-
-
-def _moves(pair: ContactPair, touching: NDArray[np.bool_], sliding: NDArray[np.int8]) -> NDArray[np.bool_]:
-    """Where step II leaves the jump free, shape (c, 2 n)."""
-    return np.concatenate([sliding != 0, ~touching], axis=1) & pair.contact.free
-
-
-def _responses(
-    pair: ContactPair,
-    g: Floats,
-    jump: Floats,
-    reaction: Floats,
-    rubbing: Floats,
-    touching: NDArray[np.bool_],
-    sliding: NDArray[np.int8],
-) -> Responses:
-    """Responses whose friction forces and open nodes are exact."""
-    t = pair.contact.grid.t
-    reaction[:, :t] = np.where(sliding != 0, rubbing[:, :t], reaction[:, :t])
-    reaction[:, t:][~touching] = 0.0
-    return Responses(pair=pair, g=g, jump=jump, reaction=reaction)
-
-
-def _exchanged(S: Floats, moves: NDArray[np.bool_]) -> Floats:
-    """The principal pivot transform of S: with ``f = S d`` it takes f where moves and d elsewhere to the others."""
-    free, fixed = np.flatnonzero(moves), np.flatnonzero(~moves)
-    inverse = np.linalg.inv(S[np.ix_(free, free)])
-    across = inverse @ S[np.ix_(free, fixed)]
-    result = np.empty_like(S)
-    result[np.ix_(free, free)], result[np.ix_(free, fixed)] = inverse, -across
-    result[np.ix_(fixed, free)] = across.T
-    result[np.ix_(fixed, fixed)] = S[np.ix_(fixed, fixed)] - S[np.ix_(fixed, free)] @ across
-    return result
-
-
-def size(vectors: Floats, gram: Floats) -> Floats:
-    """``v' gram v`` of each row."""
-    return np.asarray(np.einsum("ci,ci->c", vectors @ gram, vectors))
+        return Patterns(touching=touching, sliding=sliding), node
 
 
 def worst_piece(
@@ -348,20 +190,20 @@ def worst_piece(
     *,
     random: np.random.Generator,
     against: Floats | None = None,
-    quick: Quick | None = None,
+    factors: Factors | None = None,
     starts: int = 4,
 ) -> Found:
     """Search the affine pieces of T for the largest value of a quadratic form.
 
     Parameters
     ----------
-    pair, form, against, quick
+    pair, form, against, factors
         As in :class:`Search`.
     random : Generator
     starts : int
         The starts are: all nodes stick that can, all are open and slide one way, and random patterns.
     """
-    return _from_starts(Search(pair, form, against=against, quick=quick), random=random, starts=starts)
+    return _from_starts(Search(pair, form, against=against, factors=factors), random=random, starts=starts)
 
 
 def _from_starts(search: Search, *, random: np.random.Generator, starts: int) -> Found:
@@ -382,11 +224,10 @@ def factor_search(pair: ContactPair, theta: float) -> Search:
         J = piece.relaxed(theta)
         return J.T @ J
 
-    def quick(responses: Responses) -> Floats:
-        step = theta * responses.force + (1 - theta) * responses.g
-        return size(step, pair.neumann.inverse)
+    def factors(found: Responses) -> tuple[Floats, Floats]:
+        return squared(theta * found.force + (1 - theta) * found.g, pair.neumann.inverse)
 
-    return Search(pair, form, quick=quick)
+    return Search(pair, form, factors=factors)
 
 
 def largest_factor(pair: ContactPair, theta: float, *, random: np.random.Generator, starts: int = 4) -> Found:
@@ -395,6 +236,14 @@ def largest_factor(pair: ContactPair, theta: float, *, random: np.random.Generat
     return replace(found, value=found.piece.factor(theta))
 
 
-def _halves(count: int) -> list[int]:
-    """count, half of it, a quarter, .., 2."""
-    return [count >> k for k in range(count.bit_length()) if count >> k > 1]
+def _several(pattern: Pattern, patterns: Patterns, node: NDArray[np.intp], helps: NDArray[np.intp]) -> Patterns:
+    """A pattern changed at all nodes where something helps, at half of them, a quarter, .., two: what helps most."""
+    each = helps[np.sort(np.unique(node[helps], return_index=True)[1])]
+    counts = [len(each) >> k for k in range(len(each).bit_length()) if len(each) >> k > 1]
+    touching = np.repeat(pattern.touching[None], len(counts), axis=0)
+    sliding = np.repeat(pattern.sliding[None], len(counts), axis=0)
+    for row, count in enumerate(counts):
+        chosen = each[:count]
+        touching[row, node[chosen]] = patterns.touching[chosen, node[chosen]]
+        sliding[row, node[chosen]] = patterns.sliding[chosen, node[chosen]]
+    return Patterns(touching=touching, sliding=sliding)

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from verification.advice.best_theta import BestTheta
 from verification.figures.style import BODY1, BODY2, THETA, new_figure, plain, styled
+
+if TYPE_CHECKING:  # scipy.optimize, which no other figure needs, comes with it
+    from verification.advice.best_theta import BestTheta
 
 #: What the moduli alone say is drawn in these, one after the other: thin, as it knows no mesh.
 OF_MODULI = (("0.35", ":"), ("0.35", (0, (6, 2, 1, 2))))

@@ -12,7 +12,8 @@ from scipy.linalg import eigh
 from fem1d2d.mesh import Floats
 from verification.algorithm.affine_piece import Piece
 from verification.bounds.losses import Forms, square, top
-from verification.bounds.pattern_search import Form, Quick, signs, size, worst_piece
+from verification.bounds.neighbours import Factors, squared
+from verification.bounds.pattern_search import Form, signs, worst_piece
 from verification.contact.active_set import Pattern
 from verification.interface.pair import ContactPair
 from verification.ledger.differences import Difference, Setting, along, between
@@ -78,15 +79,15 @@ def pieces(setting: Setting, random: np.random.Generator, *, starts: int) -> lis
     friction = bool(pair.friction)
     found = [uniform_piece(pair, touching=True, sliding=0 if friction else 1)]
     found.append(uniform_piece(pair, touching=False, sliding=1))
-    objectives: list[tuple[Form, Quick]] = [
-        (lambda piece: square(forms.force(piece), forms.inverse), lambda found: size(found.force, forms.inverse)),
-        (lambda piece: work_form(forms, piece), lambda found: found.force @ forms.inverse @ found.g),
+    objectives: list[tuple[Form, Factors]] = [
+        (lambda piece: square(forms.force(piece), forms.inverse), lambda found: squared(found.force, forms.inverse)),
+        (lambda piece: work_form(forms, piece), lambda found: (found.force @ forms.inverse, found.g)),
     ]
     if friction:
         objectives.append((forms.friction, lambda found: found.friction))
     if starts:
         found += [
-            worst_piece(pair, form, quick=quick, random=random, starts=starts).piece for form, quick in objectives
+            worst_piece(pair, form, factors=factors, random=random, starts=starts).piece for form, factors in objectives
         ]
     return found
 

@@ -1,0 +1,248 @@
+"""Affine pieces of T side by side: what they make of a change of force, and which neighbour has a larger form.
+
+Of each component of the trace d and of ``f = S_1 d`` step II gives one and asks for the other: f where the jump is
+free, d where it is not.  One matrix, the principal pivot transform of S_1, takes what is given to what is asked for,
+and a node that changes its mind adds one direction for each of its components to the answers.  So a quadratic form of
+the answers changes by few ranks from a piece to its neighbours, and which of them have a larger one follows from the
+inertia of small matrices.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem1d2d.mesh import Floats
+from verification.contact.active_set import Pattern
+from verification.dense import vanishing
+from verification.interface.pair import ContactPair
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Patterns:
+    """What the contact nodes do on several pieces; one row each.
+
+    Attributes
+    ----------
+    touching : bool array, shape (c, n)
+    sliding : int array, shape (c, t)
+    """
+
+    touching: NDArray[np.bool_]
+    sliding: NDArray[np.int8]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Responses:
+    """What T makes of changes of force: of one on several pieces, or of several on one; a row each.
+
+    Attributes
+    ----------
+    pair : ContactPair
+    g : array, shape (c, 2 n)
+        The changes of the force on the Neumann grid.
+    jump : array, shape (c, 2 n)
+        Those of v.
+    reaction : array, shape (c, 2 n)
+        Those of the forces on the contact grid.
+    """
+
+    pair: ContactPair
+    g: Floats
+    jump: Floats
+    reaction: Floats
+
+    @property
+    def force(self) -> Floats:
+        """The changes of T g, shape (c, 2 n)."""
+        return self.pair.interface.carry_back(self.reaction.T).T
+
+    @property
+    def d_1(self) -> Floats:
+        """The changes of the trace of the contact body, shape (c, 2 n)."""
+        return self.pair.interface.carry(self.pair.neumann.flexibility(self.g.T)).T + self.jump
+
+    @property
+    def friction(self) -> tuple[Floats, Floats]:
+        """Two factors of the friction term of (5.12), shape (c, t)."""
+        t = self.pair.contact.grid.t
+        return -self.reaction[:, :t], self.jump[:, :t]
+
+
+#: Two factors, shape (c, m), of a quadratic form of the changes of force: its values are their products, row by row.
+Factors = Callable[[Responses], tuple[Floats, Floats]]
+
+
+def squared(rows: Floats, gram: Floats) -> tuple[Floats, Floats]:
+    """The factors of ``v' gram v`` of each row."""
+    return rows @ gram, rows
+
+
+def values(factors: tuple[Floats, Floats]) -> Floats:
+    """The values of a form, shape (c,)."""
+    return np.asarray(np.einsum("ij,ij->i", *factors))
+
+
+def responses(pair: ContactPair, g: Floats, patterns: Patterns, sign: NDArray[np.int8]) -> Responses:
+    """What T makes of a change of force on several pieces.
+
+    :class:`verification.algorithm.affine_piece.Piece` has the same by all forces.
+
+    Parameters
+    ----------
+    pair : ContactPair
+    g : array, shape (2 n,)
+    patterns : Patterns
+    sign : int array, shape (t,)
+        Of S sigma_N.
+    """
+    contact, t = pair.contact, pair.contact.grid.t
+    carried = pair.interface.carry(pair.neumann.flexibility(g))
+    rubbing = np.zeros((len(patterns.sliding), len(carried)))
+    rubbing[:, :t] = patterns.sliding * _bound(pair, g[:, None], sign)[:, 0]
+    moves = _moves(pair, patterns)
+    systems = contact.stiffness * (moves[:, :, None] & moves[:, None, :])
+    diagonal = np.einsum("cii->ci", systems)
+    diagonal[~moves] = 1.0
+    if contact.loose:  # motions that a pattern leaves free are pinned: its reaction does not know of them
+        for system, still in zip(systems, ~moves, strict=True):
+            free = vanishing(contact.motions, np.flatnonzero(still))
+            system += float(np.diag(contact.stiffness).max()) * free @ free.T
+    load = np.where(moves, -contact.stiffness @ carried - rubbing, 0.0)
+    jump = np.asarray(np.linalg.solve(systems, load[..., None])[..., 0], dtype=float)
+    jump[:, ~contact.free] = -carried[~contact.free]
+    reaction = -(carried + jump) @ contact.stiffness
+    reaction[:, :t] = np.where(patterns.sliding != 0, rubbing[:, :t], reaction[:, :t])
+    reaction[:, t:][~patterns.touching] = 0.0
+    return Responses(pair=pair, g=np.repeat(g[None], len(jump), axis=0), jump=jump, reaction=reaction)
+
+
+class Neighbours:
+    """A quadratic form on the pieces of patterns that differ from one at one node each.
+
+    Parameters
+    ----------
+    pair : ContactPair
+    pattern : Pattern
+        The one that they differ from.
+    patterns : Patterns
+    node : int array, shape (c,)
+        Where.
+    sign : int array, shape (t,)
+        Of S sigma_N.
+    factors : callable
+        Of the form.
+    """
+
+    def __init__(
+        self,
+        pair: ContactPair,
+        pattern: Pattern,
+        patterns: Patterns,
+        node: NDArray[np.intp],
+        sign: NDArray[np.int8],
+        factors: Factors,
+    ) -> None:
+        self._pair, self._pattern, self._node, self._sign, self._factors = pair, pattern, node, sign, factors
+        contact, row = pair.contact, np.arange(len(node))
+        each = np.arange(contact.grid.n)[:, None] + np.arange(0, contact.grid.size, contact.grid.n)
+        self._at = each[node]  # the components of the node
+        here = Patterns(touching=pattern.touching[None], sliding=pattern.sliding[None])
+        self._moves, self._moved = _moves(pair, here)[0], _moves(pair, patterns)[row[:, None], self._at]
+        self._slides = patterns.sliding[row, node] if contact.grid.t else np.zeros(len(node), dtype=np.int8)
+        self._swapped = self._moved != self._moves[self._at]
+        self._transform = transform = _exchanged(contact.stiffness, self._moves)
+        block = transform[self._at[:, :, None], self._at[:, None, :]]
+        self._systems = np.where(self._swapped[..., None], block, np.eye(each.shape[1]))
+        # what a unit of each component adds to the answers
+        size = contact.grid.size
+        self._left, self._right = self._made(np.zeros((pair.neumann.grid.size, size)), np.eye(size), transform)
+        squares = self._left[each] @ np.swapaxes(self._right[each], 1, 2)
+        self._squares = ((squares + np.swapaxes(squares, 1, 2)) / 2)[node]
+
+    def _made(self, forces: Floats, inputs: Floats, answers: Floats) -> tuple[Floats, Floats]:
+        """The factors of the form where step II takes columns of inputs to answers."""
+        carried = self._pair.interface.carry(self._pair.neumann.flexibility(forces))
+        d, f = np.where(self._moves[:, None], [answers, inputs], [inputs, answers])
+        return self._factors(Responses(pair=self._pair, g=forces.T, jump=(d - carried).T, reaction=-f.T))
+
+    def _changes(self, forces: Floats) -> tuple[Floats, Floats, tuple[Floats, Floats]]:
+        """What a node that changes its mind changes for columns of forces, shape (c, k, m), and what that is worth.
+
+        The third are the factors on the pattern itself, shape (m, ..).
+        """
+        pair, at = self._pair, self._at
+        carried, bound = pair.interface.carry(pair.neumann.flexibility(forces)), _bound(pair, forces, self._sign)
+        held = np.where(pair.contact.free[:, None], carried, 0.0)
+        given = np.where(self._moves[:, None], 0.0, held)
+        wanted = np.where(self._moved[..., None], 0.0, held[at])
+        if t := len(bound):
+            given[:t] -= self._pattern.sliding[:, None] * bound
+            wanted[:, 0] -= (self._slides * self._moved[:, 0])[:, None] * bound[self._node]
+        asked = self._transform @ given
+        change = np.linalg.solve(self._systems, wanted - np.where(self._swapped[..., None], asked[at], given[at]))
+        one, two = self._made(forces, given, asked)
+        return change, ((self._left @ two.T + self._right @ one.T) / 2)[at], (one, two)
+
+    def values(self, g: Floats) -> Floats:
+        """The form at one change of the force, shape (c,)."""
+        change, mixed, here = self._changes(g[:, None])
+        added = change * (2 * mixed + self._squares @ change)
+        return np.asarray(values(here) + added.sum(axis=(1, 2)))
+
+    def exceed(self, level: float, eigenvalues: Floats, eigenvectors: Floats) -> NDArray[np.bool_]:
+        """Whose largest eigenvalue is above a level, shape (c,); borderline cases fall either way.
+
+        On a neighbour the form is ``form + W K W'``, and it has as many eigenvalues above the level as
+        ``K^-1 - W' (level - form)^-1 W`` has negative ones beyond those of K; proof in ``docs/sharp.md``.
+
+        Parameters
+        ----------
+        level : float
+            Above the eigenvalues.
+        eigenvalues : array, shape (2 n,)
+            Of the form on the pattern itself, against any form whose value is to be 1.
+        eigenvectors : array, shape (2 n, 2 n)
+            Changes of the force, as columns of length 1 in that form.
+        """
+        if not level > eigenvalues[-1]:  # the form is 0 on the pattern itself
+            return np.ones(len(self._node), dtype=bool)
+        change, mixed, _ = self._changes(eigenvectors)
+        k, added = change.shape[1], np.concatenate([change, mixed], axis=1)
+        small = -(added / (level - eigenvalues)) @ np.swapaxes(added, 1, 2)
+        small[:, :k, k:] += np.eye(k)
+        small[:, k:, :k] += np.eye(k)
+        small[:, k:, k:] -= self._squares
+        for _ in range(2):  # rows of any unit
+            scale = 1 / np.sqrt(np.abs(small).max(axis=2, keepdims=True) + np.finfo(float).tiny)
+            small = scale * small * np.swapaxes(scale, 1, 2)
+        return np.asarray((np.linalg.eigvalsh(small) < 0).sum(axis=1) > k)
+
+
+def _bound(pair: ContactPair, forces: Floats, sign: NDArray[np.int8]) -> Floats:
+    """Changes of the friction bound by columns of forces, shape (t, m)."""
+    t = pair.contact.grid.t
+    if not pair.rubs:
+        return np.zeros((t, forces.shape[1]))
+    size = float(pair.friction) * pair.contact.grid.weights * sign
+    return np.asarray(size[:, None] * pair.interface.stress(forces))
+
+
+def _moves(pair: ContactPair, patterns: Patterns) -> NDArray[np.bool_]:
+    """Where step II leaves the jump free, shape (c, 2 n)."""
+    return np.concatenate([patterns.sliding != 0, ~patterns.touching], axis=1) & pair.contact.free
+
+
+def _exchanged(S: Floats, moves: NDArray[np.bool_]) -> Floats:
+    """The principal pivot transform of S: with ``f = S d`` it takes f where moves and d elsewhere to the others."""
+    free, fixed = np.flatnonzero(moves), np.flatnonzero(~moves)
+    inverse = np.linalg.inv(S[np.ix_(free, free)])
+    across = inverse @ S[np.ix_(free, fixed)]
+    result = np.empty_like(S)
+    result[np.ix_(free, free)], result[np.ix_(free, fixed)] = inverse, -across
+    result[np.ix_(fixed, free)] = across.T
+    result[np.ix_(fixed, fixed)] = S[np.ix_(fixed, fixed)] - S[np.ix_(fixed, free)] @ across
+    return result
