@@ -114,10 +114,8 @@ def responses(pair: ContactPair, g: Floats, patterns: Patterns, sign: NDArray[np
     load = np.where(moves, -contact.stiffness @ carried - rubbing, 0.0)
     jump = np.asarray(np.linalg.solve(systems, load[..., None])[..., 0], dtype=float)
     jump[:, ~contact.free] = -carried[~contact.free]
-    reaction = -(carried + jump) @ contact.stiffness
-    reaction[:, :t] = np.where(patterns.sliding != 0, rubbing[:, :t], reaction[:, :t])
-    reaction[:, t:][~patterns.touching] = 0.0
-    return Responses(pair=pair, g=np.repeat(g[None], len(jump), axis=0), jump=jump, reaction=reaction)
+    gs, reaction = np.repeat(g[None], len(jump), axis=0), -(carried + jump) @ contact.stiffness
+    return Responses(pair=pair, g=gs, jump=jump, reaction=reaction)
 
 
 class Neighbours:
