@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from problem_list import plates
 from scipy.linalg import eigh
 
 import verification as vf
@@ -81,7 +82,14 @@ def across_a_transfer():
     return vf.build(S1=S1, S2=S_2, x=x, weights=np.ones(N), kernel=kernel, transfer=P, friction="0.8")
 
 
+def lifted_not_slid():
+    """A contact body that can be lifted: some patterns leave it free."""
+    loose = {"prescribed": {"left": [0, "free"]}, "traction": {"top": [0, -3000]}}
+    return vf.build(vf.Problem.from_dict(plates(body2=loose, contact={"interval": ["0.6", "1.6"]})))
+
+
 PAIRS = {
+    "held by contact alone": lifted_not_slid,
     "a transfer between grids": across_a_transfer,
     "matching grids": lambda: vf.build(vf.example("section6").changed(cells=((10, 2), (6, 2)))),
     "without friction": lambda: vf.build(vf.example("section6").changed(cells=((10, 2), (6, 2)), friction=0)),
@@ -171,6 +179,24 @@ def test_the_neighbours_whose_form_is_above_a_level_are_known_without_it(name, k
             assert (found == expected)[clear].all()
             above += int(expected.sum())
     assert above or pair.friction == 0
+
+
+def test_a_neighbour_that_leaves_the_body_free_has_to_be_worked_out_alone():
+    pair = lifted_not_slid()
+    n = pair.contact.grid.n
+    form, factors = forms_of(pair)["T"]
+    one = Pattern(touching=np.arange(n) == 0, sliding=np.zeros(n, dtype=np.int8))
+    patterns = Patterns(touching=np.array([np.zeros(n, dtype=bool), np.arange(n) < 2]), sliding=np.zeros((2, n), "i1"))
+    beside = Neighbours(pair, one, patterns, np.array([0, 1]), signs(pair), factors)
+    y = np.ones(pair.neumann.grid.size)
+    free, held = beside.values(pair.neumann.root @ y)
+    assert free == -np.inf
+    assert held == pytest.approx(y @ form(piece_of(pair, patterns, 1)) @ y)
+    alone = Patterns(touching=one.touching[None], sliding=one.sliding[None])
+    values, vectors = eigh(form(piece_of(pair, alone, 0)))
+    assert beside.exceed(1e6 * values[-1], values, pair.neumann.root @ vectors).tolist() == [True, False]
+    largest = [largest_factor(pair, 0.5, random=np.random.default_rng(i), starts=5).value for i in range(3)]
+    assert 0.5 < min(largest) <= max(largest) < 1
 
 
 @pytest.mark.parametrize("kind", ["T", "trace", "friction", "work"])

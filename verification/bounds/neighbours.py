@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from fem1d2d.mesh import Floats
 from verification.contact.active_set import Pattern
-from verification.dense import vanishing
+from verification.dense import pinned, vanishing
+from verification.interface.body import Condensed
 from verification.interface.pair import ContactPair
 
 
@@ -152,9 +153,13 @@ class Neighbours:
         self._moves, self._moved = _moves(pair, here)[0], _moves(pair, patterns)[row[:, None], self._at]
         self._slides = patterns.sliding[row, node] if contact.grid.t else np.zeros(len(node), dtype=np.int8)
         self._swapped = self._moved != self._moves[self._at]
-        self._transform = transform = _exchanged(contact.stiffness, self._moves)
+        self._transform = transform = _exchanged(contact, self._moves)
         block = transform[self._at[:, :, None], self._at[:, None, :]]
         self._systems = np.where(self._swapped[..., None], block, np.eye(each.shape[1]))
+        self._unknown = np.zeros(len(node), dtype=bool)
+        if contact.loose:  # what leaves a motion free has an answer of its own
+            self._unknown |= _leave_free(contact, ~self._moves[None])[0] | _leave_free(contact, ~_moves(pair, patterns))
+            self._systems[self._unknown] = np.eye(each.shape[1])
         # what a unit of each component adds to the answers
         size = contact.grid.size
         self._left, self._right = self._made(np.zeros((pair.neumann.grid.size, size)), np.eye(size), transform)
@@ -186,13 +191,13 @@ class Neighbours:
         return change, ((self._left @ two.T + self._right @ one.T) / 2)[at], (one, two)
 
     def values(self, g: Floats) -> Floats:
-        """The form at one change of the force, shape (c,)."""
+        """The form at one change of the force, shape (c,); ``-inf`` where it would have to be worked out alone."""
         change, mixed, here = self._changes(g[:, None])
         added = change * (2 * mixed + self._squares @ change)
-        return np.asarray(values(here) + added.sum(axis=(1, 2)))
+        return np.where(self._unknown, -np.inf, values(here) + added.sum(axis=(1, 2)))
 
     def exceed(self, level: float, eigenvalues: Floats, eigenvectors: Floats) -> NDArray[np.bool_]:
-        """Whose largest eigenvalue is above a level, shape (c,); borderline cases fall either way.
+        """Whose largest eigenvalue is above a level, or may be, shape (c,); borderline cases fall either way.
 
         On a neighbour the form is ``form + W K W'``, and it has as many eigenvalues above the level as
         ``K^-1 - W' (level - form)^-1 W`` has negative ones beyond those of K; proof in ``docs/sharp.md``.
@@ -217,7 +222,7 @@ class Neighbours:
         for _ in range(2):  # rows of any unit
             scale = 1 / np.sqrt(np.abs(small).max(axis=2, keepdims=True) + np.finfo(float).tiny)
             small = scale * small * np.swapaxes(scale, 1, 2)
-        return np.asarray((np.linalg.eigvalsh(small) < 0).sum(axis=1) > k)
+        return np.asarray((np.linalg.eigvalsh(small) < 0).sum(axis=1) > k) | self._unknown
 
 
 def _bound(pair: ContactPair, forces: Floats, sign: NDArray[np.int8]) -> Floats:
@@ -234,10 +239,18 @@ def _moves(pair: ContactPair, patterns: Patterns) -> NDArray[np.bool_]:
     return np.concatenate([patterns.sliding != 0, ~patterns.touching], axis=1) & pair.contact.free
 
 
-def _exchanged(S: Floats, moves: NDArray[np.bool_]) -> Floats:
-    """The principal pivot transform of S: with ``f = S d`` it takes f where moves and d elsewhere to the others."""
-    free, fixed = np.flatnonzero(moves), np.flatnonzero(~moves)
-    inverse = np.linalg.inv(S[np.ix_(free, free)])
+def _leave_free(contact: Condensed, still: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Whether a rigid motion of the body leaves all components where they are that are still, shape (c,)."""
+    return np.array([vanishing(contact.motions, np.flatnonzero(row)).shape[1] > 0 for row in still])
+
+
+def _exchanged(contact: Condensed, moves: NDArray[np.bool_]) -> Floats:
+    """The principal pivot transform of S_1: with ``f = S_1 d`` it takes f where moves and d elsewhere to the others.
+
+    Motions that are left free are pinned.
+    """
+    S, free, fixed = contact.stiffness, np.flatnonzero(moves), np.flatnonzero(~moves)
+    inverse = np.linalg.inv(pinned(S, free, contact.motions) if contact.loose else S[np.ix_(free, free)])
     across = inverse @ S[np.ix_(free, fixed)]
     result = np.empty_like(S)
     result[np.ix_(free, free)], result[np.ix_(free, fixed)] = inverse, -across
