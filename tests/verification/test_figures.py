@@ -13,6 +13,9 @@ from strategies import AT_NIGHT
 import verification as vf
 from verification.cli.problems import examples
 from verification.figures import draw_bodies, draw_residuals, save
+from verification.figures.style import RAISED, new_figure
+
+LOWERED = {raised: plain for plain, raised in RAISED.items()}
 
 
 @pytest.fixture(scope="module")
@@ -140,3 +143,13 @@ def test_a_run_cut_short_can_be_drawn(comparisons, tmp_path, name, history):
     save(draw_residuals(short, comparison.computed), tmp_path / "residuals.svg")
     for figure in ("bodies", "residuals"):
         assert ElementTree.parse(tmp_path / f"{figure}.svg").getroot().tag.endswith("svg")
+
+
+def test_powers_of_ten_are_written_as_text(tmp_path):
+    figure = new_figure(4.0, 3.0)
+    ax = figure.subplots()
+    ax.set(xscale="log", yscale="log", xlim=(1e-12, 1e2), ylim=(0.2, 0.9))
+    save(figure, tmp_path / "powers.svg")
+    texts = {"".join(text.itertext()) for text in ElementTree.parse(tmp_path / "powers.svg").findall(".//{*}text")}
+    assert {"10⁻¹⁰", "10⁰", "2×10⁻¹", "4×10⁻¹"} <= texts
+    assert all(float(text.replace("×10", "e").replace("10", "1e").translate(LOWERED)) > 0 for text in texts)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,6 +13,7 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogFormatterSciNotation
 
 #: Blue, vermilion and their kin from the palette of Okabe and Ito; they differ in lightness too.
 BODY1, BODY2 = "#0072B2", "#D55E00"
@@ -27,6 +29,9 @@ OUTCOMES = {
 
 #: The axis of theta.
 THETA = "relaxation factor theta"
+
+#: Digits of an exponent.
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 _PARAMETERS: Any = {
     "font.size": 9,
@@ -68,11 +73,25 @@ def plain(text: str) -> str:
     return "".join(c if c.isprintable() else " " for c in text).replace("$", r"\$")
 
 
+class Powers(LogFormatterSciNotation):
+    """Powers of ten in the characters of the font: a fifth of writing a figure is setting them as mathematics."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        text = super().__call__(x, pos).removeprefix(r"$\mathdefault{").removesuffix("}$")
+        return re.sub(
+            r"\^{(.*)}", lambda power: power[1].translate(RAISED), text.replace(r"\times", "\N{MULTIPLICATION SIGN}")
+        )
+
+
 def save(figure: Figure, path: Path) -> None:
     """Write a figure; the ending of the path chooses SVG or PNG.
 
     The axes are laid out for the first file alone: that takes longer than to draw them.
     """
+    for axis in (axis for ax in figure.axes for axis in (ax.xaxis, ax.yaxis)):
+        if isinstance(axis.get_major_formatter(), LogFormatterSciNotation):
+            axis.set_major_formatter(Powers())
+            axis.set_minor_formatter(Powers(labelOnlyBase=False))
     metadata = {"Creator": "ndtheory", "Date": None} if path.suffix == ".svg" else {"Software": "ndtheory"}
     with styled():
         figure.savefig(path, dpi=160, metadata=metadata)
