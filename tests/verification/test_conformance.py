@@ -36,9 +36,17 @@ from verification.testing.transforms import in_units, mirrored, reflect, upside_
 
 
 @pytest.fixture
-def nearly_as_found(monkeypatch):
-    """A counterexample is made simpler by few draws: the property that fails is what counts."""
+def known_draws(monkeypatch):
+    """What shows a fault is drawn the same each time but at night, and made simpler by few draws: the property counts.
+
+    Drawn anew, the cases missed one of 18 faults in one of some four sessions.
+    """
     monkeypatch.setattr(kit, "SIMPLER", 4)
+    before = settings.get_current_profile_name()
+    settings.register_profile("known draws", settings.default, derandomize=not AT_NIGHT)
+    settings.load_profile("known draws")
+    yield
+    settings.load_profile(before)
 
 
 # --- what is registered passes ----------------------------------------------------------------------------------------
@@ -175,7 +183,7 @@ class Boasting(Momentum):
         return 0.9 * momentum_rate(rho)
 
 
-@pytest.mark.usefixtures("nearly_as_found")
+@pytest.mark.usefixtures("known_draws")
 @pytest.mark.parametrize(
     ("rule", "property"),
     [
@@ -252,6 +260,7 @@ class OfTheWrongGrid(Nonlocal):
         return super().operator(interface).T
 
 
+@pytest.mark.usefixtures("known_draws")
 @pytest.mark.parametrize(
     ("law", "property"),
     [
@@ -307,7 +316,7 @@ class OfALength(Sharp):
         return replace(found, factor=Number.of_float(1 - lost), one_minus_factor=Number.of_float(lost))
 
 
-@pytest.mark.usefixtures("nearly_as_found")
+@pytest.mark.usefixtures("known_draws")
 @pytest.mark.parametrize(
     ("bound", "property"),
     [
