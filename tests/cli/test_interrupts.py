@@ -105,6 +105,29 @@ def test_ctrl_c_while_a_module_is_imported_is_one_line(write, module):
     assert err == "interrupted before anything was computed\n"
 
 
+def test_ctrl_c_that_an_import_drops_comes_again(write):
+    """As Cython drops it where a module registers its classes."""
+    code = """
+        import os, signal, sys
+
+        class Drops:
+            def find_spec(self, name, path, target=None):
+                if name == "numpy.random":
+                    try:
+                        os.kill(os.getpid(), signal.SIGINT)
+                    except BaseException:
+                        pass
+
+        sys.meta_path.insert(0, Drops())
+        from verification.cli import main
+        sys.exit(main())
+    """
+    with started("run", write(LONG), "--json", code=code, mark=None) as process:
+        out, err = process.communicate(timeout=MINUTES)
+        told(process.returncode, out, err.splitlines())
+        assert process.returncode == 130
+
+
 @pytest.mark.parametrize(
     ("command", "moment"),
     [

@@ -1,7 +1,4 @@
-"""scipy.stats is loaded by the first call of what cvxpy takes from it, or at once where more is asked of it.
-
-Each case is a process of its own, as another test may have loaded it in this one.
-"""
+"""What is loaded when it is asked for, in processes of their own: another test may have loaded it in this one."""
 
 import subprocess
 import sys
@@ -46,3 +43,31 @@ def test_statistics_come_when_they_are_asked_for(case):
     source = f"import sys\nfrom verification.imports import statistics_later\n{case}"
     ended = subprocess.run([sys.executable, "-c", source], capture_output=True, text=True, check=False)
     assert ended.returncode == 0, ended.stderr
+
+
+#: Python without hypothesis, which says how often it was asked for.
+WITHOUT = """
+import sys
+
+class Missing:
+    asked = 0
+
+    def find_spec(self, name, path=None, target=None):
+        if name == "hypothesis":
+            Missing.asked += 1
+            raise ModuleNotFoundError(name)
+
+sys.meta_path.insert(0, Missing())
+import verification as vf
+
+for name in vf.__all__:
+    getattr(vf, name)
+print(Missing.asked)
+import verification.testing
+"""
+
+
+def test_nothing_but_the_kit_asks_for_hypothesis_and_it_says_what_to_install():
+    done = subprocess.run([sys.executable, "-c", WITHOUT], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout.strip()) == (1, "0")
+    assert "verification.testing needs hypothesis: pip install 'ndtheory[test]'" in done.stderr.splitlines()[-1]

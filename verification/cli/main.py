@@ -10,6 +10,7 @@ import sys
 import threading
 import traceback
 from collections.abc import Iterator, Sequence
+from types import FrameType
 
 import click
 
@@ -95,7 +96,7 @@ def _interrupts(last: bool) -> Iterator[list[int]]:
     """Take notice of Ctrl-C even where a library makes something else of it.
 
     Python drops what is raised in a finaliser: such a Ctrl-C comes again by an alarm.  An extension module that is
-    interrupted while it is imported raises an ImportError.
+    interrupted while it is imported raises an ImportError, or drops it: an alarm looks again until the import is over.
 
     Parameters
     ----------
@@ -108,9 +109,12 @@ def _interrupts(last: bool) -> Iterator[list[int]]:
         yield seen
         return
 
-    def note(number: int, frame: object) -> None:
+    def note(number: int, frame: FrameType | None) -> None:
         seen.append(number)
-        raise KeyboardInterrupt
+        if alarm and _importing(frame):
+            signal.setitimer(signal.ITIMER_REAL, 0.01)
+        else:
+            raise KeyboardInterrupt
 
     def again(dropped: sys.UnraisableHookArgs) -> None:
         if issubclass(dropped.exc_type, KeyboardInterrupt):
@@ -130,7 +134,15 @@ def _interrupts(last: bool) -> Iterator[list[int]]:
         signal.signal(signal.SIGINT, signal.SIG_IGN if last else signal.default_int_handler)
         sys.unraisablehook = hook
         if alarm:
+            signal.setitimer(signal.ITIMER_REAL, 0)
             signal.signal(signal.SIGALRM, before)
+
+
+def _importing(frame: FrameType | None) -> bool:
+    """Whether a module is being imported on this stack."""
+    while frame is not None and frame.f_code.co_filename != "<frozen importlib._bootstrap>":
+        frame = frame.f_back
+    return frame is not None
 
 
 def _run(arguments: Sequence[str] | None, seen: Sequence[int]) -> int:
