@@ -31,7 +31,7 @@ from fem1d2d.mesh import Floats
 from ndtheory.sharp import contraction_interval
 from verification.bounds import interior_point
 from verification.bounds.conditions import Conditions, Pieces, inside, mixed, times
-from verification.bounds.program import CLOSE, LMIError, Optimum, Program, Stop, Weights
+from verification.bounds.program import USUAL, LMIError, Optimum, Program, Stop, Weights
 from verification.constants import Measured
 from verification.interface.pair import ContactPair
 from verification.progress import Progress, silent
@@ -130,7 +130,7 @@ class QuadraticForms(Conditions):
 
     @one_thread()
     def on(
-        self, pieces: Pieces, theta: float, *, stop: Stop = CLOSE, parent: tuple[Pieces, Optimum] | None = None
+        self, pieces: Pieces, theta: float, *, stop: Stop = USUAL, parent: tuple[Pieces, Optimum] | None = None
     ) -> tuple[Certified, Optimum | None]:
         """The same for some of the affine pieces of T.
 
@@ -235,7 +235,7 @@ class QuadraticForms(Conditions):
         theta: float,
         holds: Callable[[Weights], Callable[[float], bool]],
         pieces: Pieces,
-        stop: Stop = CLOSE,
+        stop: Stop = USUAL,
         parent: tuple[Pieces, Optimum] | None = None,
     ) -> tuple[Certified, Optimum | None]:
         """The least s for which multipliers prove that ``s |g|^2 + fixed - conditions`` is positive definite.

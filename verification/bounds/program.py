@@ -35,8 +35,8 @@ class Stop:
     enough: float = -math.inf
 
 
-#: Where it ends that is asked for the least s alone.
-CLOSE = Stop()
+#: Of a solver that is asked for the least s alone.
+USUAL = Stop()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,7 +72,7 @@ class Program:
     s: float
     y: Floats
     highest: float | None = None
-    stop: Stop = CLOSE
+    stop: Stop = USUAL
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

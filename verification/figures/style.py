@@ -78,9 +78,8 @@ class Powers(LogFormatterSciNotation):
 
     def __call__(self, x: float, pos: int | None = None) -> str:
         text = super().__call__(x, pos).removeprefix(r"$\mathdefault{").removesuffix("}$")
-        return re.sub(
-            r"\^{(.*)}", lambda power: power[1].translate(RAISED), text.replace(r"\times", "\N{MULTIPLICATION SIGN}")
-        )
+        text = text.replace(r"\times", "\N{MULTIPLICATION SIGN}")
+        return re.sub(r"\^{(.*)}", lambda power: power[1].translate(RAISED), text)
 
 
 def save(figure: Figure, path: Path) -> None:
@@ -89,9 +88,9 @@ def save(figure: Figure, path: Path) -> None:
     The axes are laid out for the first file alone: that takes longer than to draw them.
     """
     for axis in (axis for ax in figure.axes for axis in (ax.xaxis, ax.yaxis)):
-        if isinstance(axis.get_major_formatter(), LogFormatterSciNotation):
+        if type(axis.get_major_formatter()) is LogFormatterSciNotation:  # not for a second file
             axis.set_major_formatter(Powers())
-            axis.set_minor_formatter(Powers(labelOnlyBase=False))
+            axis.set_minor_formatter(Powers())
     metadata = {"Creator": "ndtheory", "Date": None} if path.suffix == ".svg" else {"Software": "ndtheory"}
     with styled():
         figure.savefig(path, dpi=160, metadata=metadata)
