@@ -9,7 +9,9 @@ from fem1d2d.lifted import FEW, Lifted
 from fem1d2d.material import Material, bar, plane_strain
 from fem1d2d.mesh import Mesh, MeshError, interval, rectangle, rectangle_points, sector
 from fem1d2d.mesh_files import from_file
+from fem1d2d.outline import depths
 from fem1d2d.pencil import Eigenvalue, Extremes, extremes_by_solves, largest, largest_of, largest_sparse
+from fem1d2d.strain import largest_strains
 from fem1d2d.supports import Supports, rigid_motions, supports
 from fem1d2d.trace import facing, surface, trapezoid
 from fem1d2d.transfer import mortar
@@ -27,6 +29,7 @@ __all__ = [
     "Uncoupled",
     "bar",
     "body_load",
+    "depths",
     "elimination_order",
     "extremes_by_solves",
     "facet_weights",
@@ -37,6 +40,7 @@ __all__ = [
     "largest",
     "largest_of",
     "largest_sparse",
+    "largest_strains",
     "mortar",
     "plane_strain",
     "rectangle",

@@ -1,28 +1,39 @@
-"""Triangle meshes in files, in any format meshio reads."""
+"""Triangle meshes in files: Gmsh and Abaqus, read in a process with limits on memory and time."""
 
 from __future__ import annotations
 
-import contextlib
 import io
-import re
-import warnings
+import json
+import os
+import signal
+import subprocess
+import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from fem1d2d import mesh_reader
 from fem1d2d.mesh import Floats, Ints, Mesh, MeshError, measures
 
-#: Nodes of a file are not numbered beyond this: a table of them would fill the memory.
-LARGEST_NUMBER = 10**8
+#: Limits of the process that reads: seconds of processor time and bytes of memory, at least and for each byte of the
+#: file up to MOST_BYTES.  Half a million triangles in 36 MB take 5 s and 0.3 GB.
+SECONDS, SECONDS_PER_BYTE = 10, 1e-6
+MEMORY, MEMORY_PER_BYTE = 10**9, 10
+MOST_BYTES = 200_000_000
 
-#: The endings of TetGen's files.
-TETRAHEDRA = (".node", ".ele")
+#: Seconds on the clock for each second of processor time: the machine may do other work.
+PATIENCE = 6
+
+#: Folders of modules follow its arguments: the isolated mode leaves out the folders of the user and PYTHONPATH.
+START = (
+    "import runpy, sys; sys.path += sys.argv[5:]; del sys.argv[5:]; "
+    "runpy.run_path(sys.argv.pop(1), run_name='__main__')"
+)
 
 
 def from_file(path: Path | str) -> Mesh:
-    """A triangle mesh in any format meshio reads; its sides are the physical names of its lines.
+    """A triangle mesh from a Gmsh (``.msh``) or Abaqus (``.inp``) file; its sides are the names of its lines.
 
     A triangle that the file lists clockwise is turned over; points that no triangle uses and names without lines are
     left out.
@@ -30,120 +41,89 @@ def from_file(path: Path | str) -> Mesh:
     Raises
     ------
     MeshError
-        Unreadable, no triangles or other cells too, not plane, no named lines, or no mesh as :class:`Mesh` needs it.
+        Another format, unreadable, beyond the limits on memory and time, no triangles or other cells too, several
+        materials, not plane, no named lines, or no mesh as :class:`Mesh` needs it.
     """
-    import meshio
-
     path = Path(path)
     try:
-        if not path.is_file():
-            raise MeshError(f"{path}: no such mesh file")
-    except (OSError, ValueError) as error:
-        if isinstance(error, MeshError):
-            raise
-        raise MeshError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
-    if path.suffix.lower() in TETRAHEDRA:  # meshio's reader would not come back from a short one
-        raise MeshError(f"{path}: a TetGen file holds tetrahedra: triangles are needed")
-    largest = _largest_number(path)
-    if largest > LARGEST_NUMBER:
-        raise MeshError(f"{path}: a node has the number {largest:g}: at most {LARGEST_NUMBER} is needed")
-    words = io.StringIO()  # its readers print, and exit the interpreter on what they cannot read
-    try:
-        with contextlib.redirect_stdout(words), contextlib.redirect_stderr(words), warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # numpy's, about what does not parse
-            read = meshio.read(path)
-            triangles, lines = read.cells_dict.get("triangle"), _named_lines(read)
-    except (Exception, SystemExit) as error:
-        why = " ".join(words.getvalue().split()) or f"{type(error).__name__}: {error}"
-        raise MeshError(f"{path}: meshio cannot read it ({why})") from None
-    try:
-        if triangles is None or len(triangles) == 0:
-            raise MeshError(f"no triangles in it, only {', '.join(read.cells_dict) or 'nothing'}")
-        others = sorted(set(read.cells_dict) - {"triangle", "line", "vertex"})
-        if others:
-            raise MeshError(f"needed triangles alone, it has {', '.join(others)} too")
-        if not lines:
-            raise MeshError("no named lines; give the sides physical names")
-        try:
-            least = _least_number(path)
-        except (IndexError, KeyError, ValueError):
-            raise MeshError("its elements do not fit its format") from None
-        if least < 1:
-            raise MeshError(f"an element names node {least}: nodes are numbered from 1")
-        return _plane_mesh(np.asarray(read.points, dtype=float), np.asarray(triangles, dtype=np.int64), lines)
+        _check_kind(path)
+        return _plane_mesh(*read_in_process(path))
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from None
 
 
-def _named_lines(read: Any) -> dict[str, Ints]:
-    """The lines that a name of the file gathers; names without lines are left out."""
-    lines: dict[str, Ints] = {}
-    for name, blocks in read.cell_sets_dict.items():
-        if "line" in blocks and not name.startswith("gmsh:"):
-            lines[name] = read.cells_dict["line"][blocks["line"]]
-    if not lines and "gmsh:physical" in read.cell_data_dict and "line" in read.cells_dict:
-        tags = read.cell_data_dict["gmsh:physical"]["line"]
-        for name, (tag, dimension) in read.field_data.items():
-            if dimension == 1:
-                lines[name] = read.cells_dict["line"][tags == tag]
-    return {name: np.asarray(facets, dtype=np.int64) for name, facets in lines.items() if len(facets)}
+def _check_kind(path: Path) -> None:
+    """Refuse a path without a regular file, and endings of other formats."""
+    try:
+        if not path.exists():
+            raise MeshError("no such mesh file")
+        if not path.is_file():
+            raise MeshError("a regular file is needed, this is a folder, a pipe or a device")
+    except (OSError, ValueError) as error:
+        raise MeshError(f"cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    if path.suffix.lower() not in mesh_reader.FORMATS:
+        ending = f"the ending {path.suffix!r}" if path.suffix else "no ending"
+        raise MeshError(
+            f"needed a Gmsh file (.msh) or an Abaqus file (.inp), this one has {ending};"
+            " `meshio convert FILE out.msh` writes a Gmsh file"
+        )
 
 
-def _largest_number(path: Path) -> float:
-    """The largest number that a Gmsh text file gives a node; meshio fills a table as long."""
-    content = path.read_bytes()
-    nodes = re.search(rb"\$Nodes\s(.*?)\$EndNodes", content, re.DOTALL)
-    if not content.startswith(b"$MeshFormat") or nodes is None or content.split(None, 3)[2:3] != [b"0"]:
-        return 0
-    width = 4 if content.split(None, 2)[1].startswith(b"2") else 1  # beside its coordinates, or on a line of its own
-    first = (line.split() for line in nodes[1].splitlines())
-    with contextlib.suppress(ValueError):  # what is no number is meshio's to refuse
-        return max((float(words[0]) for words in first if len(words) == width), default=0)
-    return 0
+def read_in_process(path: Path) -> tuple[Floats, Ints, dict[str, Ints]]:
+    """Points, triangles and named lines of a file, read in a separate process.
 
+    The process ends when this one does: it waits for the end of its stdin.  Ctrl-C on a terminal does not reach it.
 
-def _least_number(path: Path) -> int:
-    """The least node number of points, lines and triangles of a Gmsh file; meshio counts 0 and below from the end.
-
-    1 for other formats, other elements and the binary variants of version 4.
+    Raises
+    ------
+    MeshError
+        :func:`fem1d2d.mesh_reader.contents` refuses the file, or the process meets a limit or ends in another way.
     """
-    content = path.read_bytes()
-    start = re.search(rb"\$Elements\s*?\n", content)
-    if not content.startswith(b"$MeshFormat") or start is None:
-        return 1
-    version, binary = content.split(None, 3)[1:3]
-    corners, least, at = {15: 1, 1: 2, 2: 3}, 1, 0
-    if binary == b"1":
-        if not version.startswith(b"2"):
-            return 1
-        data = content[content.index(b"\n", start.end()) + 1 :]
-        numbers = np.frombuffer(data[: len(data) // 4 * 4], dtype=np.int32)
-        left = int(content[start.end() :].split(None, 1)[0])
-        while left > 0:
-            kind, count, tags = numbers[at : at + 3].tolist()
-            if count < 1 or tags < 0:
-                raise ValueError("no block of elements")
-            width = 1 + tags + corners[kind]
-            rows = numbers[at + 3 : at + 3 + count * width].reshape(count, width)
-            least = min(least, int(rows[:, 1 + tags :].min(initial=1)))
-            at, left = at + 3 + count * width, left - count
-        return least
-    listed = content[start.end() :].partition(b"$EndElements")[0]
-    if version.startswith(b"2"):  # meshio takes the last numbers of a line for its nodes
-        for line in listed.splitlines()[1:]:
-            row = [int(word) for word in line.split()]
-            if row and len(row) != 3 + row[2] + corners[row[1]]:
-                raise ValueError("another number of tags and nodes than the line says")
-            least = min([least, *row[3 + row[2] :]]) if row else least
-        return least
-    numbers, at = np.array(listed.split(), dtype=np.int64), 2 if version == b"4" else 4
-    while at < len(numbers):
-        width, count = 1 + corners[int(numbers[at + 2])], int(numbers[at + 3])
-        if count < 0:
-            raise ValueError("no block of elements")
-        rows = numbers[at + 4 : at + 4 + count * width].reshape(count, width)
-        least, at = min(least, int(rows[:, 1:].min(initial=1))), at + 4 + count * width
-    return least
+    size = min(path.stat().st_size, MOST_BYTES)
+    seconds, memory = int(SECONDS + SECONDS_PER_BYTE * size), int(MEMORY + MEMORY_PER_BYTE * size)
+    folders = [folder for folder in sys.path if os.path.isdir(folder) and not os.path.samefile(folder, os.curdir)]
+    command = [
+        sys.executable,
+        "-I",
+        "-X",
+        "utf8",
+        "-c",
+        START,
+        mesh_reader.__file__,
+        str(path),
+        str(seconds),
+        str(memory),
+    ]
+    # one thread of BLAS: each would claim memory
+    environment = os.environ | dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+    stdin, held = os.pipe()
+    try:
+        ended = subprocess.run(
+            [*command, *folders],
+            stdin=stdin,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env=environment,
+            timeout=PATIENCE * seconds,
+            process_group=0,
+            creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),  # on Windows
+        )
+    except subprocess.TimeoutExpired:
+        raise MeshError(f"reading it takes longer than {PATIENCE * seconds:g} s") from None
+    except OSError as error:
+        raise MeshError(f"no process to read it could be started: {error.strerror}") from None
+    finally:
+        os.close(stdin)
+        os.close(held)
+    if ended.returncode == mesh_reader.REFUSED:
+        raise MeshError(ended.stdout.decode(errors="replace"))
+    if ended.returncode == -getattr(signal, "SIGXCPU", 0):
+        raise MeshError(f"reading it takes more than {seconds} s of processor time")
+    if ended.returncode:
+        raise MeshError(f"the process that read it ended with status {ended.returncode}")
+    with np.load(io.BytesIO(ended.stdout), allow_pickle=False) as found:
+        names = json.loads(found["names"].tobytes())
+        return found["points"], found["triangles"], {name: found[f"side{i}"] for i, name in enumerate(names)}
 
 
 def _plane_mesh(points: Floats, triangles: Ints, sides: Mapping[str, Ints]) -> Mesh:

@@ -184,11 +184,11 @@ def _near(start: Floats, end: Floats) -> Iterator[tuple[Ints, Ints]]:
 def _pairs(edge: Ints, box: Ints) -> Iterator[tuple[Ints, Ints]]:
     """Pairs of edges of the same box, which follow each other, some at a time."""
     after = np.searchsorted(box, box, side="right") - np.arange(len(box)) - 1  # how many follow in the same box
-    for one, other in _ranges(np.arange(1, len(box) + 1), after):
+    for one, other in ranges(np.arange(1, len(box) + 1), after):
         yield edge[one], edge[other]
 
 
-def _ranges(first: Ints, count: Ints) -> Iterator[tuple[Ints, Ints]]:
+def ranges(first: Ints, count: Ints) -> Iterator[tuple[Ints, Ints]]:
     """(i, j) for all i and first[i] <= j < first[i] + count[i], some at a time."""
     total = np.concatenate([[0], np.cumsum(count)])
     for begin in range(0, int(total[-1]), TOGETHER):
@@ -200,21 +200,40 @@ def _ranges(first: Ints, count: Ints) -> Iterator[tuple[Ints, Ints]]:
 def _covered(start: Floats, end: Floats, asked: Ints) -> Bools:
     """Whether a cell lies to the right of an edge's middle, for edges that meet in end points alone.
 
-    Cells over a point are counted by the edges below it, +1 where one runs rightwards and -1 where it runs leftwards.
     Asked of edges less steep than 45 degrees: the middle of a steep one may round to the abscissa of an end.
+    """
+    covered = np.zeros(len(start), dtype=bool)
+    leftwards = end[asked, 0] < start[asked, 0]
+    covered[asked] = cells_over((start[asked] + end[asked]) / 2, start, end, own=asked) != leftwards
+    return covered
+
+
+def cells_over(points: Floats, start: Floats, end: Floats, own: Ints | None = None) -> Ints:
+    """Count the cells over each point by the boundary edges below it: +1 where one runs rightwards, -1 leftwards.
+
+    Parameters
+    ----------
+    points : array, shape (n, 2)
+    start, end : array, shape (b, 2)
+        The ends of the boundary edges, the body to the left of each.
+    own : int array, shape (n,), optional
+        The edge on which a point lies: it is not counted.
+
+    Returns
+    -------
+    int array, shape (n,)
     """
     rightwards = np.sign(end[:, 0] - start[:, 0]).astype(int)
     left, right = np.where((rightwards > 0)[:, None], (start, end), (end, start))
-    asked = asked[np.argsort(start[asked, 0] + end[asked, 0], kind="stable")]
-    middle = (start[asked] + end[asked]) / 2
+    order = np.argsort(points[:, 0], kind="stable")
     spans = np.flatnonzero(rightwards)
-    first, last = (np.searchsorted(middle[:, 0], ends[spans, 0]) for ends in (left, right))
-    below = np.zeros(len(asked), dtype=np.int64)
-    for i, point in _ranges(first, last - first):
-        edge = spans[i]
-        u, v = right[edge] - left[edge], middle[point] - left[edge]
-        under = (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0] > 0) & (edge != asked[point])
-        np.add.at(below, point[under], rightwards[edge[under]])
-    covered = np.zeros(len(start), dtype=bool)
-    covered[asked] = below != (rightwards[asked] < 0)
-    return covered
+    first, last = (np.searchsorted(points[order, 0], ends[spans, 0]) for ends in (left, right))
+    count = np.zeros(len(points), dtype=np.int64)
+    for i, place in ranges(first, last - first):
+        edge, point = spans[i], order[place]
+        u, v = right[edge] - left[edge], points[point] - left[edge]
+        under = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0] > 0
+        if own is not None:
+            under &= edge != own[point]
+        np.add.at(count, point[under], rightwards[edge[under]])
+    return count

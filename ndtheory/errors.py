@@ -6,6 +6,7 @@ from fractions import Fraction
 from typing import Any
 
 from ndtheory.number import decimal
+from ndtheory.texts import printable
 
 #: Most characters of a value that a message repeats.
 LONGEST = 100
@@ -30,7 +31,7 @@ class HypothesisError(ValueError):
             shown = decimal(value)
         elif isinstance(value, int) and value.bit_length() > 1000:
             shown = f"an integer of {value.bit_length()} bits"
-        text = "".join(c if c.isprintable() else " " for c in str(shown))  # one line, whatever was received
+        text = printable(str(shown))  # one line, whatever was received
         text = text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
         super().__init__(f"{key} = {text}: needed {needed}")
         self.key = key

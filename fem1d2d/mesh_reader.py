@@ -1,0 +1,336 @@
+"""Read a mesh file with meshio: a script for a process with limits on memory and time.
+
+:mod:`fem1d2d.mesh_files` runs it by its path, in isolated mode.  It therefore imports nothing of this package.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import os
+import re
+import sys
+import threading
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Ints = NDArray[np.int64]
+
+#: Nodes of a file are not numbered beyond this: meshio fills a table as long, 80 MB here.
+LARGEST_NUMBER = 10**7
+
+#: What meshio calls the formats that are read.
+FORMATS = {".msh": "gmsh", ".inp": "abaqus"}
+
+#: Least bytes of an item that a section of a Gmsh file counts, as text and in the binary variants.
+LEAST_BYTES = {b"PhysicalNames": (6, 6), b"Entities": (8, 20), b"Nodes": (8, 28), b"Elements": (4, 8)}
+
+#: Sections of an Abaqus file that give an element set its material.
+SECTIONS = ("SOLIDSECTION", "SHELLSECTION", "MEMBRANESECTION")
+
+#: Why a file with an include is refused.
+ONE_FILE = "it includes another file: needed one file that holds the whole mesh"
+
+#: Exit status where the file is refused; stdout then holds the reason.
+REFUSED = 3
+
+
+class Refused(Exception):
+    """A file that is not read, with the reason."""
+
+
+def contents(path: Path) -> dict[str, Any]:
+    """Points, triangles and named lines of a mesh file.
+
+    Returns
+    -------
+    dict
+        ``points`` of shape (n, 2) or (n, 3), ``triangles`` of shape (c, 3), ``lines`` of shape (l, 2) by their names.
+
+    Raises
+    ------
+    Refused
+        Unreadable, no triangles or other cells too, several materials, or no named lines.
+    """
+    kind = FORMATS[path.suffix.lower()]
+    materials: set[str] | None = None
+    if kind == "gmsh":
+        content = path.read_bytes()
+        if not content.startswith(b"$MeshFormat"):
+            raise Refused("no Gmsh file: needed $MeshFormat on its first line")
+        _check_counts(content)
+        largest = _largest_number(content)
+        if largest > LARGEST_NUMBER:
+            raise Refused(f"a node has the number {largest:g}: at most {LARGEST_NUMBER} is needed")
+        del content
+    else:
+        try:
+            materials = _abaqus_materials(path)
+        except UnicodeDecodeError as error:
+            raise Refused(f"needed text in UTF-8: {error.reason}") from None
+    read, triangles, lines, groups = _by_meshio(path, kind)
+    if triangles is None or len(triangles) == 0:
+        raise Refused(f"no triangles in it, only {', '.join(read.cells_dict) or 'nothing'}")
+    others = sorted(set(read.cells_dict) - {"triangle", "line", "vertex"})
+    if others:
+        raise Refused(f"needed only triangles, it has {', '.join(others)} too")
+    if materials:
+        split = sorted(materials) if len(materials) > 1 else []
+    else:
+        split = _split(read, groups, len(triangles))
+    if split:
+        named = ", ".join(
+            [json.dumps(name[:40], ensure_ascii=False) for name in split[:5]] + ["..."] * (len(split) > 5)
+        )
+        what = "materials" if materials else "groups"
+        raise Refused(
+            f"needed one material: its triangles are split into the {what} {named}; write a file for each, or put all"
+            " triangles into one group"
+        )
+    if not lines:
+        raise Refused("no named lines; give the sides physical names")
+    if kind == "gmsh":
+        try:
+            least = _least_number(path.read_bytes())
+        except (IndexError, KeyError, ValueError):
+            raise Refused("its elements do not fit its format") from None
+        if least < 1:
+            raise Refused(f"an element names node {least}: nodes are numbered from 1")
+    points = np.asarray(read.points, dtype=float)
+    return {"points": points, "triangles": np.asarray(triangles, dtype=np.int64), "lines": lines}
+
+
+def _by_meshio(path: Path, kind: str) -> tuple[Any, Any, dict[str, Ints], dict[str, Ints]]:
+    """The mesh, its triangles, its named lines, and the numbers of the triangles of each named group."""
+    import meshio
+
+    words = io.StringIO()  # its readers print, and exit the interpreter on what they cannot read
+    try:
+        with contextlib.redirect_stdout(words), contextlib.redirect_stderr(words), warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # numpy's, about what does not parse
+            read = meshio.read(path, file_format=kind)
+            cells = read.cells_dict
+            lines = {name: cells["line"][members] for name, members in _groups(read, "line", 1).items()}
+            return read, cells.get("triangle"), lines, _groups(read, "triangle", 2)
+    except MemoryError:
+        raise
+    except (Exception, SystemExit) as error:
+        why = " ".join((words.getvalue() or f"{type(error).__name__}: {error}").split())
+        raise Refused(f"meshio cannot read it ({why})") from None
+
+
+def _groups(read: Any, kind: str, dimension: int) -> dict[str, Ints]:
+    """Numbers of the cells of a kind that a name of the file gathers; names without cells are left out."""
+    groups: dict[str, Any] = {}
+    for name, blocks in read.cell_sets_dict.items():
+        if kind in blocks and not name.startswith("gmsh:"):
+            groups[name] = blocks[kind]
+    if not groups and "gmsh:physical" in read.cell_data_dict and kind in read.cells_dict:
+        tags = read.cell_data_dict["gmsh:physical"][kind]
+        for name, (tag, of) in read.field_data.items():
+            if of == dimension:
+                groups[name] = np.flatnonzero(tags == tag)
+    return {name: np.asarray(members, dtype=np.int64) for name, members in groups.items() if len(members)}
+
+
+def _split(read: Any, groups: dict[str, Ints], count: int) -> list[str]:
+    """Names of the groups that split the triangles; none where one of them holds all.
+
+    Named surfaces of a Gmsh file are materials.  Element sets of an Abaqus file may also be neighbours of a side: they
+    are taken for materials only if each triangle lies in one of them.
+    """
+    covered = np.zeros(count, dtype=bool)
+    for members in groups.values():
+        holds = np.zeros(count, dtype=bool)
+        holds[members] = True
+        covered |= holds
+        if holds.all():
+            return []
+    names = sorted(groups)
+    tags = read.cell_data_dict.get("gmsh:physical", {}).get("triangle")
+    if names and tags is not None:
+        names += [f"physical surface {tag}" for tag in sorted({*tags[~covered].tolist()} - {0})]
+    elif not covered.all():
+        return []
+    return names if len(names) > 1 else []
+
+
+def _abaqus_materials(path: Path) -> set[str]:
+    """Materials of the sections of an Abaqus file; what meshio would read from elsewhere or mix up is refused."""
+    materials, blocks, lists, keyword = set(), [], [], ""
+    with path.open(encoding="utf-8") as file:
+        for line in file:
+            if line.startswith("**") or (keyword != "ELSET" and line.lstrip()[:1].isdigit()):
+                continue  # a comment; a node or an element, as almost all lines are
+            head, *options = line.split(",")
+            word = "".join(head.split()).replace("*", "").upper()
+            if word == "INCLUDE":  # meshio needs no star before it
+                raise Refused(ONE_FILE)
+            if not line.startswith("*"):
+                if keyword == "ELSET" and line.strip(" \t\r\n,") and not head.strip().isnumeric():
+                    raise Refused("an *ELSET lists names of other sets: needed numbers of elements")
+                continue
+            keyword = word
+            given = {key.strip().upper(): value.strip() for key, _, value in (pair.partition("=") for pair in options)}
+            if "INPUT" in given:
+                raise Refused(ONE_FILE)
+            if keyword in SECTIONS and given.get("MATERIAL"):
+                materials.add(given["MATERIAL"].upper())
+            elif keyword == "ELEMENT":
+                blocks.append(given.get("ELSET"))
+            elif keyword == "ELSET":
+                lists.append(given.get("ELSET"))
+    named = [name for name in blocks if name]
+    if len(set(named)) < len(named) or None in blocks[: len(named)]:  # meshio counts the sets for the blocks
+        raise Refused("needed a different ELSET for each *ELEMENT, or for none of them")
+    if len(set(lists)) < len(lists):  # meshio keeps the last
+        raise Refused("needed one *ELSET for each name")
+    return materials
+
+
+def _check_counts(content: bytes) -> None:
+    """Refuse a Gmsh file with a section that counts more items than the bytes behind it can hold."""
+    form = re.match(rb"\$MeshFormat\s+(\S+)\s+([01])\s+(\d{1,9})\s", content)
+    if form is None:
+        return  # meshio refuses it
+    version, binary, size = form[1], form[2] == b"1", int(form[3])
+    seen = set()
+    for section in re.finditer(rb"^\$(PhysicalNames|Entities|Nodes|Elements)[ \t\r]*\n", content, re.MULTILINE):
+        name, start = section[1], section.end()
+        if name in seen:
+            raise Refused(f"it has two sections ${name.decode()}: one is needed")
+        seen.add(name)
+        if name == b"PhysicalNames" or not binary or version.startswith(b"2"):
+            counts = [int(word) for word in content[start : start + 200].partition(b"\n")[0].split() if word.isdigit()]
+        else:
+            width = 8 if version == b"4.0" else size
+            at_most = content[start : start + 4 * width]
+            fits = width in (4, 8) and len(at_most) == 4 * width
+            counts = np.frombuffer(at_most, dtype=f"u{width}").tolist() if fits else []
+        if name == b"Nodes" or name == b"Elements":
+            counts = counts[:2]  # blocks and items; the least and the largest number follow
+        left, least = len(content) - start, LEAST_BYTES[name][binary]
+        if any(count * least > left for count in counts):
+            what = re.sub("([A-Z])", r" \1", name.decode()).strip().lower()
+            raise Refused(f"it promises {max(counts)} {what}, but only {left} bytes follow")
+
+
+def _largest_number(content: bytes) -> float:
+    """The largest number that a Gmsh text file gives a node."""
+    nodes = re.search(rb"\$Nodes\s(.*?)\$EndNodes", content, re.DOTALL)
+    if nodes is None or content.split(None, 3)[2:3] != [b"0"]:
+        return 0
+    beside = content.split(None, 2)[1].startswith((b"2", b"4.0"))
+    width = 4 if beside else 1  # beside its coordinates, or on a separate line
+    first = (line.split() for line in nodes[1].splitlines())
+    with contextlib.suppress(ValueError):  # meshio refuses what cannot be read as a number
+        return max((float(words[0]) for words in first if len(words) == width), default=0)
+    return 0
+
+
+def _least_number(content: bytes) -> int:
+    """The least node number of points, lines and triangles of a Gmsh file; meshio counts 0 and below from the end.
+
+    1 for other elements and the binary variants of version 4.
+    """
+    start = re.search(rb"\$Elements\s*?\n", content)
+    if start is None:
+        return 1
+    version, binary = content.split(None, 3)[1:3]
+    corners, least, at = {15: 1, 1: 2, 2: 3}, 1, 0
+    if binary == b"1":
+        if not version.startswith(b"2"):
+            return 1
+        data = content[content.index(b"\n", start.end()) + 1 :]
+        numbers = np.frombuffer(data[: len(data) // 4 * 4], dtype=np.int32)
+        left = int(content[start.end() :].split(None, 1)[0])
+        while left > 0:
+            kind, count, tags = numbers[at : at + 3].tolist()
+            if count < 1 or tags < 0:
+                raise ValueError("no block of elements")
+            width = 1 + tags + corners[kind]
+            rows = numbers[at + 3 : at + 3 + count * width].reshape(count, width)
+            least = min(least, int(rows[:, 1 + tags :].min(initial=1)))
+            at, left = at + 3 + count * width, left - count
+        return least
+    listed = content[start.end() :].partition(b"$EndElements")[0]
+    if version.startswith(b"2"):  # meshio takes the last numbers of a line for its nodes
+        for line in listed.splitlines()[1:]:
+            row = [int(word) for word in line.split()]
+            if row and len(row) != 3 + row[2] + corners[row[1]]:
+                raise ValueError("another number of tags and nodes than the line says")
+            least = min([least, *row[3 + row[2] :]]) if row else least
+        return least
+    numbers, at = np.array(listed.split(), dtype=np.int64), 2 if version == b"4.0" else 4
+    while at < len(numbers):
+        width, count = 1 + corners[int(numbers[at + 2])], int(numbers[at + 3])
+        if count < 0:
+            raise ValueError("no block of elements")
+        rows = numbers[at + 4 : at + 4 + count * width].reshape(count, width)
+        least, at = min(least, int(rows[:, 1:].min(initial=1))), at + 4 + count * width
+    return least
+
+
+def limit(seconds: int, memory: int) -> None:
+    """Let this process use no more than this processor time, in seconds, and memory, in bytes.
+
+    Windows offers neither, macOS no limit on memory.
+    """
+    try:
+        import resource
+    except ImportError:
+        return
+    # processor time beyond the first limit is a signal that says so, beyond the second one it is SIGKILL
+    for what, first, last in (
+        (resource.RLIMIT_CPU, seconds, seconds + 5),
+        (resource.RLIMIT_AS, memory, memory),
+        (resource.RLIMIT_CORE, 0, 0),
+    ):
+        most = resource.getrlimit(what)[1]
+        ends = (end if most == resource.RLIM_INFINITY else min(end, most) for end in (first, last))
+        with contextlib.suppress(OSError, ValueError):
+            resource.setrlimit(what, (next(ends), next(ends)))
+
+
+def _end_with_parent() -> None:
+    os.read(0, 1)  # nothing is ever written: this returns when the parent has ended
+    os._exit(1)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Write arrays of the mesh file to stdout, or the reason why it is refused.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        Path, and limits as :func:`limit` takes them.
+    """
+    path, seconds, memory = arguments
+    limit(int(seconds), int(memory))
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    try:
+        found = contents(Path(path))
+        out = io.BytesIO()
+        names = np.frombuffer(json.dumps(list(found["lines"])).encode(), dtype=np.uint8)
+        sides = {f"side{i}": facets for i, facets in enumerate(found["lines"].values())}
+        np.savez(out, points=found["points"], triangles=found["triangles"], names=names, **sides)
+        answer, status = out.getbuffer(), 0
+    except Refused as error:
+        answer, status = memoryview(str(error).encode(errors="replace")), REFUSED
+    except MemoryError:
+        answer, status = memoryview(f"reading it needs more than {int(memory) / 1e9:g} GB of memory".encode()), REFUSED
+    except OSError as error:
+        answer, status = memoryview(f"cannot be read: {error.strerror}".encode()), REFUSED
+    sys.stdout.buffer.write(answer)
+    sys.stdout.buffer.flush()
+    return status
+
+
+if __name__ == "__main__":
+    os._exit(main(sys.argv[1:]))
