@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.linalg.blas import dsymv, dtrsv
-from scipy.linalg.lapack import dpotrf, dpotrs
+from scipy.linalg.lapack import dpocon, dpotrf, dpotrs
 
 from fem1d2d.mesh import Floats, Ints
+from verification.threads import one_thread
 
 #: A component of an orthonormal rigid motion below this is 0.
 STILL = 1e-9
@@ -60,6 +61,29 @@ def worst(values: Floats) -> float:
     return float(np.maximum.reduce(values, initial=0.0))
 
 
+def _block(S: Floats, rows: Ints, motions: Floats | None) -> Floats:
+    """Some rows and columns of S, its kernel pinned."""
+    if motions is not None and motions.shape[1]:
+        return pinned(S, rows, motions)
+    return S if len(rows) == len(S) else S[np.ix_(rows, rows)]
+
+
+def reciprocal_condition(S: Floats, rows: Ints, motions: Floats | None = None) -> float:
+    """Estimate ``1 / (|S| |S^-1|)`` in the norm of the largest column sum, for what :class:`Cholesky` solves with.
+
+    Returns
+    -------
+    float
+        LAPACK's estimate, seldom more than three times too large; 0 where S is not positive definite in doubles, 1
+        without rows.
+    """
+    if not len(rows):
+        return 1.0
+    block = np.asarray_chkfinite(_block(S, rows, motions))
+    factor, minor = dpotrf(block, clean=0)
+    return 0.0 if minor else float(dpocon(factor, np.abs(block).sum(axis=0).max())[0])
+
+
 class Cholesky:
     """``S^-1`` on some rows of a symmetric S that is positive definite there, 0 on the others.
 
@@ -76,11 +100,7 @@ class Cholesky:
         self._rows, self._all = rows, len(rows) == len(S)
         self._factor = None
         if len(rows):
-            if motions is not None and motions.shape[1]:
-                block = pinned(S, rows, motions)
-            else:
-                block = S if self._all else S[np.ix_(rows, rows)]
-            self._factor, minor = dpotrf(np.asarray_chkfinite(block), clean=0)
+            self._factor, minor = dpotrf(np.asarray_chkfinite(_block(S, rows, motions)), clean=0)
             if minor:
                 raise np.linalg.LinAlgError(f"the leading minor {minor} is not positive: needed a definite matrix")
 
@@ -98,5 +118,6 @@ class Cholesky:
         if right.ndim == 1:  # LAPACK's own solve is written for many columns, and takes three times as long for one
             found = dtrsv(self._factor, dtrsv(self._factor, right, trans=1), overwrite_x=1)
         else:
-            found = np.ascontiguousarray(dpotrs(self._factor, right)[0])
+            with one_thread():  # with four threads OpenBLAS 0.3.28, of scipy 1.15, crashes here
+                found = np.ascontiguousarray(dpotrs(self._factor, right)[0])
         return found

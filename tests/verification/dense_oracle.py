@@ -269,3 +269,8 @@ class DensePair:
         """Stiffness and Gram matrix of both bodies together."""
         bodies = (self.body1, self.body2)
         return block_diag(*(b.A for b in bodies)), block_diag(*(b.H for b in bodies))
+
+
+def rounding(*bodies: DenseBody, solves: int = 1) -> float:
+    """1e-9, or on thin bodies what the condition of the stiffness matrix leaves of sixteen digits after some solves."""
+    return max(1e-9, *(20 * solves * np.finfo(float).eps * np.linalg.cond(body.A) for body in bodies))

@@ -141,8 +141,20 @@ def test_the_block_shears_what_it_is_loaded_with_and_no_less() -> None:
     assert run.relative_residual < 1e-10
     shear = run.contact.force[pair.contact.grid.tangential].sum()
     assert abs(shear) == pytest.approx(2 * 1.2 * 0.3, rel=1e-9)
-    with pytest.raises(ContactError, match="no minimiser: the loads move body 2 along Gamma_c, where friction holds 0"):
-        vf.run(pair)
+    held = vf.run(pair)
+    assert held.converged
+    assert held.start.source == "tied"
+    assert far(pair, held.last.g, start) < 1e-8
+    [said] = [warning for warning in held.warnings if "tied" in warning]
+    assert "no minimiser: the loads move body 2 along Gamma_c, where friction holds 0" in said
+    row = vf.sweep(pair, theta=[pair.settings.theta]).rows[0]
+    assert row["iterations"] == held.iterations
+
+
+def test_a_load_along_gamma_c_beyond_friction_has_no_solution_and_no_start() -> None:
+    pushed = vf.Problem.from_dict(plates(body2=PRESSED | {"body_force": [3000, 0]}))
+    with pytest.raises(ContactError, match="no minimiser: the loads move body 2 along Gamma_c"):
+        vf.run(pushed)
 
 
 @pytest.mark.parametrize("name", ["sliding top", "pressed by traction alone on another grid"])

@@ -230,7 +230,7 @@ def test_no_keys_are_no_change():
         ("a b", "1", "a b", "the name of a key"),
         ("contact.", "1", "contact.", "the name of a key"),
         ("title = 1 #", "1", "title = 1 #", "the name of a key"),
-        ("title\nx", "1", "title x", "the name of a key"),
+        ("title\nx", "1", r"title\nx", "the name of a key"),
         ("." * 5000, "1", None, "the name of a key"),
     ],
     ids=lambda v: str(v)[:20],

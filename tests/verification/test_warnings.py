@@ -1,6 +1,7 @@
 """Warnings: what linear triangles cannot do near nu = 1/2, and what the kernel of the friction law does to friction."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from verification.cli.problems import examples
 from verification.interface.assembly import discretise
 from verification.interface.friction import SHARE
 from verification.interface.pair import LOCKING
+from verification.monolithic import contact_system
 
 
 def warned(data):
@@ -168,3 +170,74 @@ def test_the_page_gives_the_friction_that_a_sliding_block_carries(radius, part):
     table = dict(zip(map(str.strip, heads), map(str.strip, values), strict=True))
     assert table[radius] == part
     assert carried(radius) == pytest.approx(float(part), abs=0.006)
+
+
+# --- a load that is taken back ----------------------------------------------------------------------------------------
+
+FULL, HALF = -0.015, -0.0075
+ONE_LINE = " ".join(PAGE.split())
+
+
+def pressed(name, down):
+    """A model of Section 6 with its top at a height."""
+    return vf.example(name).with_keys({"body2.prescribed.top": [0, down]})
+
+
+def step_by_step(name, path):
+    """Contact at the end of a path, each increment with friction against the slip since the last, by the iteration.
+
+    ``|v_T - v_T^before|`` is ``|v_T|`` for a contact body whose trace is counted from v_T^before on: its load becomes
+    ``l_c - S_c (v_T^before, 0)``.
+    """
+    before, found = 0.0, None
+    for down in path:
+        pair = vf.build(pressed(name, down))
+        contact, shift = pair.contact, np.zeros(pair.contact.grid.size)
+        shift[contact.grid.tangential] = pair.upward * before  # slip is u1_T - u2_T; the contact body is body 2
+        moved = replace(contact, load=contact.load - contact.stiffness @ shift)
+        run = vf.run(replace(pair, contact=moved, settings=replace(pair.settings, tolerance=1e-12)))
+        assert run.converged
+        found, before = run.contact, before + run.contact.slip
+    return found
+
+
+def step_by_step_at_once(name, path):
+    """The shear at the end of the same path by the global method, whose jump is counted from v_T^before on."""
+    before, force = 0.0, None
+    for down in path:
+        bodies = discretise(pressed(name, down))
+        system = contact_system(bodies)
+        system.d0[: system.t] -= before
+        solved = system.solve()
+        force = solved.force
+        before = before + system.jump(force, solved.motion)[: system.t]
+    return force[: system.t] / bodies.interface.contact.weights
+
+
+def off_after_unloading(name):
+    """By how much the static law is off at half load, at all nodes and away from the ends, in shares of its maximum."""
+    static = vf.solve(pressed(name, HALF)).contact
+    true = step_by_step(name, [FULL, HALF])
+    np.testing.assert_allclose(step_by_step_at_once(name, [FULL, HALF]), true.shear, atol=1e-8)
+    off = np.abs(true.shear - static.shear) / np.abs(static.shear).max()
+    x = static.x - static.x[0]
+    return off, off[(x >= 0.15) & (x <= 1.05)].max()
+
+
+def test_a_load_that_grows_in_proportion_needs_one_increment():
+    once, often = (step_by_step("section6", np.linspace(0, FULL, n + 1)[1:]).shear for n in (1, 5))
+    assert np.abs(once - often).max() <= 1e-12 * np.abs(once).max()
+    assert "(to $10^{-12}$)" in PAGE
+
+
+def test_the_page_gives_the_error_of_the_static_law_after_unloading():
+    told = re.search(r"off by (\d+) % of its largest value at both end nodes.*? by (\d+) % between", ONE_LINE)
+    off, inside = off_after_unloading("section6")
+    assert off.max() == pytest.approx(off[0]) == pytest.approx(off[-1])
+    assert [f"{100 * share:.0f}" for share in (off.max(), inside)] == list(told.groups())
+
+
+def test_the_page_says_that_the_error_after_unloading_depends_on_the_mesh():
+    told = re.search(r"`section6-666` the largest error is (\d+) %", ONE_LINE)
+    off, _ = off_after_unloading("section6-666")
+    assert f"{100 * off.max():.0f}" == told[1]

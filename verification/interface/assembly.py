@@ -22,7 +22,7 @@ from fem1d2d import (
 )
 from fem1d2d.mesh import Floats, Ints
 from fem1d2d.trace import SAME, extent
-from verification.dense import STILL
+from verification.dense import STILL, reciprocal_condition
 from verification.interface.body import Body, Condensed, Name
 from verification.interface.friction import Law
 from verification.interface.grid import Grid
@@ -33,6 +33,10 @@ from verification.problem.tables import ProblemError, short
 
 #: Interface matrices are dense; more contact nodes would fill the memory.
 MOST_CONTACT_NODES = 2000
+
+
+#: Condensation loses one digit of the least stiff motion of a body for each digit of 1/rcond: at 1e-13 three are left.
+LEAST_RCOND = 1e-13
 
 
 class TooManyContactNodes(ProblemError):
@@ -54,7 +58,8 @@ def build(problem: Problem, *, law: Law | None = None, like: ContactPair | None 
     Raises
     ------
     ProblemError
-        As :func:`discretise`, and where a body is rigid, or the one with the Neumann problem can move rigidly.
+        As :func:`discretise`, and where a body is rigid, the one with the Neumann problem can move rigidly, or rounding
+        leaves no digit of a stiffness on Gamma_c.
     """
     bodies, iteration = held_bodies(problem, law=law), problem.iteration
     known = (None, None) if like is None else (like.body1, like.body2)
@@ -63,6 +68,8 @@ def build(problem: Problem, *, law: Law | None = None, like: ContactPair | None 
         _condensed(body, grid, upward, side)
         for body, grid, side in zip(bodies.elastic, grids if upward else grids[::-1], known, strict=True)
     )
+    for name, side in (("body1", lower), ("body2", upper)):
+        _check_digits(problem, name, side)
     return ContactPair(
         contact=lower if upward else upper,
         neumann=upper if upward else lower,
@@ -134,6 +141,17 @@ def _check_supports(bodies: TwoBodies, *, dense: bool) -> None:
         if body.motion_traces.shape[1] < k:
             needed = f"{moves} where no contact node feels it: fix or prescribe more of its sides"
             raise ProblemError(problem.source, body.name, None, needed)
+
+
+def _check_digits(problem: Problem, name: str, side: Condensed) -> None:
+    """Refuse a body so slender, or of cells so stretched, that rounding takes its stiffness in the softest motion."""
+    found = reciprocal_condition(side.stiffness, np.flatnonzero(side.free), side.motions)
+    if not found > LEAST_RCOND:
+        needed = (
+            f"its stiffness on Gamma_c is lost in rounding (1/condition {found:.1g}): needed more than {LEAST_RCOND:g},"
+            " by a body less slender or cells less stretched; `ndtheory solve` needs no such matrix"
+        )
+        raise ProblemError(problem.source, name, None, needed)
 
 
 def _condensed(body: Body, grid: Grid, upward: bool, like: Condensed | None) -> Condensed:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
 
@@ -194,6 +194,8 @@ class Condensed(Value):
         Whether the normal components point along y, as those of ``body`` do.
     motions : array, shape (2 n, k)
         Orthonormal traces of the rigid motions that only contact holds: the kernel of S_a; of shape (0, 0) without.
+    own_load : array, shape (2 n,), or None
+        l_a as the loads of ``body`` give it; a ``load`` that differs has further forces on Gamma_c.
     """
 
     grid: Grid
@@ -204,6 +206,7 @@ class Condensed(Value):
     body: Body | None = None
     upward: bool = True
     motions: Floats = field(default_factory=lambda: NO_MOTIONS)
+    own_load: Floats | None = None
 
     @property
     def loose(self) -> bool:
@@ -252,6 +255,7 @@ class Condensed(Value):
             free=body.unknown.copy(),
             body=body,
             motions=body.motion_traces,
+            own_load=load,
         )
 
     def turned(self) -> Condensed:
@@ -266,6 +270,7 @@ class Condensed(Value):
             body=self.body,
             upward=not self.upward,
             motions=turn(self.motions) if self.loose else self.motions,
+            own_load=None if self.own_load is None else turn(self.own_load),
         )
 
     def orient(self, interface: Floats) -> Floats:
@@ -291,6 +296,22 @@ class Condensed(Value):
         if self.body is None:
             raise ValueError("this pair is made from matrices: needed the meshes of both bodies")
         return self.body
+
+    @property
+    def loaded_body(self) -> Body:
+        """The body on its mesh under the loads of this side.
+
+        Raises
+        ------
+        ValueError
+            Only matrices are known.
+        """
+        body = self.mesh_body
+        if self.own_load is None or np.array_equal(self.load, self.own_load):
+            return body
+        load = body.load.copy()
+        load[body.interface] += self.orient(self.load - self.own_load)[body.unknown]
+        return replace(body, load=load)
 
     @cached_property
     def _factor(self) -> Cholesky:

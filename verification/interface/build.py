@@ -58,7 +58,7 @@ def build(
     weights : array, shape (n,), optional
         Weights of the quadrature on them; those of the trapezoid rule by default.
     gap : float or array, shape (n,)
-        Initial distance at them.
+        Initial distance at them; negative where the bodies overlap.
     kernel : array, shape (n, nodes of the Neumann body), optional
         The operator S: normal nodal forces on the Neumann body to normal stress at the contact nodes.
     transfer : array, shape (n, nodes of the Neumann body), optional
@@ -115,7 +115,7 @@ def build(
     x = real_array("x", x, (n,))
     w = trapezoid(x) if weights is None else real_array("weights", weights, (n,))
     distance = real_array("gap", np.broadcast_to(gap, n), (n,))
-    check_nodes(x, w, distance)
+    check_nodes(x, w)
     P = None if transfer is None else real_array("transfer", transfer, (n, m))
     grid = Grid(x=x, weights=w)
     if P is not None and law is not None:

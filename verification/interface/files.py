@@ -10,14 +10,13 @@ components from left to right, then all normal ones along y.
 
 from __future__ import annotations
 
-from fractions import Fraction
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 import scipy.sparse as sp
 
-from ndtheory import HypothesisError, __version__
+from ndtheory import HypothesisError, __version__, exact
 from verification.dense import pinned
 from verification.interface.array_headers import headers
 from verification.interface.body import NO_MOTIONS, Condensed
@@ -27,14 +26,20 @@ from verification.interface.interface import Interface
 from verification.interface.matrices import ASYMMETRY, UNREADABLE, check_matrix, check_nodes, real_array
 from verification.interface.pair import ContactPair
 from verification.problem import ProblemError, Settings
-from verification.problem.specification import read_theta
-from verification.problem.tables import unreadable
+from verification.problem.reading import at_least_one, factor, tolerance
+from verification.problem.tables import Table, choice, label, non_negative, unreadable
 
 #: Largest size of an interface file, and of what it unpacks to: two matrices of 4000 rows, and what else there is.
 MOST_BYTES = 600_000_000
 
+#: Size of numbers in an interface file, at most.
+LARGEST = 1e60
+
 #: What every interface file has.
 NEEDED = ("S1", "S2", "load1", "load2", "x", "weights", "gap", "friction", "neumann_body", "dimension")
+
+#: What is a text in an interface file, or a single number.
+SCALARS = ("friction", "neumann_body", "dimension", "theta", "tolerance", "max_iterations", "law", "outside")
 
 
 def write_interface(pair: ContactPair, path: Path) -> None:
@@ -115,17 +120,55 @@ def read_interface(path: Path) -> ContactPair:
     if missing := [name for name in NEEDED if name not in arrays]:
         raise refuse(missing[0], f"needed an interface file with {', '.join(NEEDED)}")
     try:
-        return _pair(arrays)
+        return _pair(arrays, str(path))
     except HypothesisError as error:
         raise refuse(error.key, f"needed {error.needed}") from None
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, IndexError, ArithmeticError) as error:
+        if isinstance(error, ProblemError):
+            raise
         raise refuse("", str(error)) from None
 
 
-def _pair(arrays: dict[str, np.ndarray]) -> ContactPair:
-    text = lambda name, default: str(arrays[name]) if name in arrays else default
-    dimension: Literal[1, 2] = 1 if text("dimension", "2") == "1" else 2
-    neumann_body: Literal[1, 2] = 1 if text("neumann_body", "2") == "1" else 2
+def _check_sizes(arrays: dict[str, np.ndarray]) -> None:
+    """Refuse numbers of which a product of a few overflows a double, or vanishes.
+
+    Raises
+    ------
+    ValueError
+    """
+    for name, array in arrays.items():
+        if array.dtype.kind not in "fiu" or not np.isfinite(array).all():
+            continue
+        largest = float(np.abs(array.astype(float)).max(initial=0.0))
+        if largest > LARGEST:
+            raise ValueError(f"{name} has an entry of size {largest:.2g}: needed at most {LARGEST:g}, in another unit")
+        if name in ("S1", "S2") and 0 < largest < 1 / LARGEST:
+            needed = f"needed at least {1 / LARGEST:g}, in another unit"
+            raise ValueError(f"the largest entry of {name} is {largest:.2g}: {needed}")
+
+
+def _texts(arrays: dict[str, np.ndarray], source: str) -> Table:
+    """The texts of an interface file, to be read as the keys of a problem file are."""
+    return Table({name: _scalar(arrays[name]) for name in SCALARS if name in arrays}, source)
+
+
+def _scalar(array: np.ndarray) -> Any:
+    """A single value as a text or a whole number; several values as a list, which every key refuses."""
+    if array.shape != ():
+        return array.tolist()
+    text = str(array)
+    try:
+        found = exact(text)
+    except ValueError:
+        return text
+    return int(found) if found.denominator == 1 else text
+
+
+def _pair(arrays: dict[str, np.ndarray], source: str) -> ContactPair:
+    _check_sizes(arrays)
+    texts = _texts(arrays, source)
+    dimension: Literal[1, 2] = texts.take("dimension", choice(1, 2))
+    neumann_body: Literal[1, 2] = texts.take("neumann_body", choice(1, 2))
     x, n = arrays["x"], len(arrays["x"])
     transfer = arrays.get("transfer")
     grid = Grid(x=real_array("x", x, (n,)), weights=real_array("weights", arrays["weights"], (n,)), dimension=dimension)
@@ -139,16 +182,20 @@ def _pair(arrays: dict[str, np.ndarray]) -> ContactPair:
     law = None
     if "kernel" in arrays:
         kernel = real_array("kernel", arrays["kernel"], (n, other.n))
-        law = Given(matrix=kernel, words=text("law", "operator S given as a matrix"), outside=text("outside", ""))
+        law = Given(
+            matrix=kernel,
+            words=texts.take("law", label, "operator S given as a matrix"),
+            outside=texts.take("outside", label, ""),
+        )
     grids = (grid, other) if neumann_body == 2 else (other, grid)
     lower, upper = (_side(arrays, i, own) for i, own in enumerate(grids, 1))
     contact, neumann = (lower, upper) if neumann_body == 2 else (upper.turned(), lower.turned())
     settings = Settings(
-        theta=read_theta(text("theta", "1/2")),
-        tolerance=float(Fraction(text("tolerance", "1e-9"))),
-        max_iterations=int(text("max_iterations", "500")),
+        theta=texts.take("theta", factor, Settings.theta),
+        tolerance=float(texts.take("tolerance", tolerance, Settings.tolerance)),
+        max_iterations=texts.take("max_iterations", at_least_one, Settings.max_iterations),
     )
-    check_nodes(grid.x, grid.weights, real_array("gap", arrays["gap"], (n,)))
+    check_nodes(grid.x, grid.weights)
     if neumann.loose:
         raise ValueError(f"motions{neumann_body}: needed none of the body with the Neumann problem")
     interface = Interface(
@@ -157,7 +204,7 @@ def _pair(arrays: dict[str, np.ndarray]) -> ContactPair:
     pair = ContactPair(
         contact=contact, neumann=neumann, interface=interface, neumann_body=neumann_body, settings=settings
     )
-    return pair.at(friction=text("friction", "0"))
+    return pair.at(friction=texts.take("friction", non_negative))
 
 
 def _side(arrays: dict[str, np.ndarray], i: int, grid: Grid) -> Condensed:

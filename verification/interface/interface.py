@@ -90,6 +90,21 @@ class Interface(Value):
         blocks = forces.reshape(self.contact.dimension, self.contact.n, *forces.shape[1:])
         return np.concatenate([self.onto_neumann(block) for block in blocks])
 
+    def spread(self, forces: Floats) -> Floats:
+        """Nodal forces on the Neumann grid as nodal forces on the contact grid that have the same stresses there."""
+        if self.transfer is None:
+            return forces
+        blocks = forces.reshape(self.neumann.dimension, self.neumann.n)
+        weights = self.contact.weights
+        return np.concatenate([weights * (self.transfer @ (block / self.neumann.weights)) for block in blocks])
+
+    def reaches(self, components: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """True for the contact components whose forces act on some of the given components of the Neumann grid."""
+        if self.transfer is None:
+            return components
+        blocks = components.reshape(self.neumann.dimension, self.neumann.n)
+        return np.concatenate([(self.transfer != 0) @ block for block in blocks])
+
     def onto_neumann(self, forces: Floats) -> Floats:
         """``P' f`` of one component: nodal forces on the contact grid, one or columns of them."""
         return forces if self.transfer is None else np.asarray(self.transfer.T @ forces)

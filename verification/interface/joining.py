@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,12 @@ from verification.problem.tables import ProblemError
 
 #: The matrix of a transfer is dense; more nodes would fill the memory.
 MOST_NODES_APART = 2000
+
+#: The largest slope of the contact body's line: its normals are taken as vertical.
+STEEPEST = 0.02
+
+#: The deepest overlap of the bodies as they are drawn, relative to the smaller height: strains stay small.
+MOST_OVERLAP = 0.05
 
 #: Body 1 lies below, body 2 above.
 UPPER = (True, False)
@@ -46,8 +53,8 @@ def join(problem: Problem, meshes: list[Mesh | None], law: Law | None = None) ->
     Raises
     ------
     ProblemError
-        Bodies that do not meet, an interval outside the overlap or without nodes of the contact body at its ends, a
-        surface with a hole, too many nodes.
+        Bodies that do not lie opposite each other or lie deep in each other, an interval outside the overlap or without
+        nodes of the contact body at its ends, a surface with a hole, a steep contact body, too many nodes.
     """
     size = max(extent(mesh) for mesh in meshes if mesh is not None)
     contact = problem.contact_body - 1
@@ -58,8 +65,10 @@ def join(problem: Problem, meshes: list[Mesh | None], law: Law | None = None) ->
             nodes = _surfaces(problem, meshes, ends)
         _check_nodes(problem, meshes, nodes, ends, contact)
     points = [None if mesh is None else mesh.points[own].astype(float) for mesh, own in zip(meshes, nodes, strict=True)]
+    if problem.dimension == 2:
+        check_slopes(problem, points)
     levels = [
-        p[:, -1] if p is not None else _obstacle_level(spec, points[1 - i], upper=UPPER[i])
+        p[:, -1] if p is not None else obstacle_level(spec, points[1 - i], upper=UPPER[i])
         for i, (spec, p) in enumerate(zip((problem.body1, problem.body2), points, strict=True))
     ]
     positions = [p[:, 0] for p in points if p is not None]
@@ -79,7 +88,7 @@ def join(problem: Problem, meshes: list[Mesh | None], law: Law | None = None) ->
     interface = Interface(
         contact=grid,
         neumann=neumann,
-        gap=_gap(problem, np.broadcast_to(levels[1] - levels[0], grid.x.shape), levels, size),
+        gap=_gap(problem, meshes, grid, [np.broadcast_to(level, grid.x.shape) for level in levels], SAME * size),
         law=law or LAWS[problem.contact.law].of(problem.contact.radius),
         transfer=P,
     )
@@ -161,15 +170,17 @@ def _check_nodes(problem: Problem, meshes: list[Mesh | None], nodes: list[Ints],
         x = np.unique(mesh.points[nodes[contact], 0].astype(float))
         near = ", ".join(f"{value:g}" for value in (x if len(x) < 4 else x[[0, 1, -2, -1]]))
         swap = f"; body {2 - contact} has them: let body {contact + 1} have the Neumann problem"
+        other = meshes[1 - contact]
+        possible = fits[1 - contact] and other is not None and _flat(other.points[nodes[1 - contact]])
         needed = (
             f"Gamma_c = [{ends[0]:g}, {ends[1]:g}] must begin and end at nodes of the contact body, body {contact + 1},"
-            f" whose nodes near its ends lie at {near or 'no x'}{swap if fits[1 - contact] else ''}"
+            f" whose nodes near its ends lie at {near or 'no x'}{swap if possible else ''}"
         )
         raise _refuse(problem, "contact.interval", given, needed)
 
 
-def _obstacle_level(spec: BodySpec, other: Floats | None, *, upper: bool) -> Floats:
-    """Where the face of an obstacle lies; without coordinates it touches the other body."""
+def obstacle_level(spec: BodySpec, other: Floats | None, *, upper: bool) -> Floats:
+    """Level of the face of an obstacle; without coordinates it touches the other body."""
     assert other is not None
     ends = spec.x if other.shape[1] == 1 else spec.y
     if ends is not None:
@@ -177,19 +188,74 @@ def _obstacle_level(spec: BodySpec, other: Floats | None, *, upper: bool) -> Flo
     return np.array(other[:, -1].min() if upper else other[:, -1].max())
 
 
-def _gap(problem: Problem, distance: Floats, levels: list[Floats], size: float) -> Floats:
-    """The initial distance at the contact nodes: that of the surfaces as they are drawn, and ``contact.gap``."""
-    nearest, gap = float(distance.min()), float(problem.contact.gap)
-    if min(abs(nearest), abs(nearest - gap)) > SAME * size:
+def check_slopes(problem: Problem, points: Sequence[Floats | None]) -> None:
+    """Refuse a contact body whose line is steep along Gamma_c: its normals are taken as vertical.
+
+    Parameters
+    ----------
+    points : pair of array, shape (n, 2), or None
+        Contact nodes of body 1 and of body 2, from left to right; None where rigid.  The face of an obstacle is flat,
+        and gives the body opposite its normals.
+
+    Raises
+    ------
+    ProblemError
+    """
+    contact = problem.contact_body
+    own, other = points[contact - 1], points[2 - contact]
+    if own is None or other is None:
+        return
+    if _flat(own):
+        return
+    rise = _slopes(own)
+    j = int(np.argmax(np.abs(rise)))
+    (left, low), (right, high) = own[j : j + 2]
+    remedy = f"body {3 - contact} is steep too, so that no roles are possible"
+    if _flat(other):
+        remedy = f"body {3 - contact} is flat: give body {contact} the Neumann problem"
+        remedy += f" (iteration.neumann_body = {contact})"
+    raise _refuse(
+        problem,
+        f"body{contact}.mesh",
+        None,
+        f"body {contact} is the contact body, and its line has the slope {rise[j]:.3g} from ({left:g}, {low:g}) to"
+        f" ({right:g}, {high:g}); needed at most {STEEPEST:g} along Gamma_c, where its normals are taken as vertical;"
+        f" {remedy}",
+    )
+
+
+def _slopes(points: Floats) -> Floats:
+    """Slopes of a line between its nodes, which follow each other from left to right."""
+    dx, dy = np.diff(points.astype(float), axis=0).T
+    return np.asarray(dy / dx)
+
+
+def _flat(points: Floats) -> bool:
+    """True if a line is flat enough for vertical normals."""
+    return bool(np.abs(_slopes(points)).max() <= STEEPEST + SAME)
+
+
+def _gap(problem: Problem, meshes: Sequence[Mesh | None], grid: Grid, levels: list[Floats], rounding: float) -> Floats:
+    """Initial distance at the contact nodes: of the surfaces as they are drawn, plus ``contact.gap``.
+
+    It is negative where the bodies are drawn into each other.  Flat bodies have one distance: what differs from the
+    least one by rounding equals it, and what differs from 0 by rounding is 0.
+    """
+    distance = levels[1] - levels[0]
+    least = float(distance.min())
+    least = 0.0 if abs(least) <= rounding else least
+    gap = np.where(np.abs(distance - least) <= rounding, least, distance) + float(problem.contact.gap)
+    j = int(np.argmin(gap))
+    height = min(float(np.ptp(mesh.points[:, -1].astype(float))) for mesh in meshes if mesh is not None)
+    if gap[j] < -MOST_OVERLAP * height:
         axis = "x" if problem.dimension == 1 else "y"
-        low, high = float(np.max(levels[0])), float(np.min(levels[1]))
+        where = "" if problem.dimension == 1 else f"at x = {grid.x[j]:g} "
         needed = (
-            f"the bodies do not meet: body 1 ends at {axis} = {low:g}, body 2 begins at {axis} = {high:g}"
-            " (draw them touching; contact.gap sets the initial distance)"
+            f"the bodies lie in each other: {where}body 1 ends at {axis} = {levels[0][j]:g}, body 2 begins at {axis} ="
+            f" {levels[1][j]:g}; needed an overlap of at most {100 * MOST_OVERLAP:g} % of the height {height:g}"
         )
         raise _refuse(problem, f"body2.{axis}", None, needed)
-    # A distance within rounding of the nearest one is that one: flat bodies have one gap.
-    return np.where(distance - nearest <= SAME * size, 0.0, distance - nearest) + gap
+    return gap
 
 
 def _same(one: Floats, other: Floats, within: float) -> bool:

@@ -154,8 +154,8 @@ def check_matrix(name: str, matrix: Floats) -> None:
         )
 
 
-def check_nodes(x: Floats, weights: Floats, gap: Floats) -> None:
-    """Refuse what are no contact nodes from left to right, no quadrature on them, or no initial distance.
+def check_nodes(x: Floats, weights: Floats) -> None:
+    """Refuse what are no contact nodes from left to right, or no quadrature on them.
 
     Raises
     ------
@@ -165,5 +165,3 @@ def check_nodes(x: Floats, weights: Floats, gap: Floats) -> None:
         raise ValueError("x: needed positions that increase")
     if not np.all(weights > 0):
         raise ValueError("weights: needed positive ones")
-    if not np.all(gap >= 0):
-        raise ValueError("gap: needed numbers >= 0")

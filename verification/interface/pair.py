@@ -13,6 +13,7 @@ from fem1d2d.mesh import Floats
 from ndtheory.constants import take
 from verification.interface.body import Body, Condensed
 from verification.interface.interface import Interface
+from verification.interface.joining import check_slopes
 from verification.problem import Problem, Settings
 from verification.problem.specification import MOST_FRICTION
 from verification.problem.tables import ProblemError
@@ -214,7 +215,7 @@ class ContactPair(Value):
         SingularRole
             Contact alone holds the contact body, which would get the Neumann problem.
         ProblemError
-            The grids differ, and Gamma_c does not end at nodes of the other body.
+            The grids differ, and Gamma_c does not end at nodes of the other body; or that body's line is steep.
         ValueError
             The grids differ, and the pair is made from matrices.
         """
@@ -224,6 +225,9 @@ class ContactPair(Value):
             from verification.interface.assembly import build  # it makes pairs
 
             return build(self.problem.swapped(), law=self.interface.law, like=self)
+        if self.problem is not None and self.contact.grid.dimension == 2:
+            bodies = [side.mesh_body for side in (self.body1, self.body2)]
+            check_slopes(self.problem.swapped(), [body.mesh.points[body.nodes] for body in bodies])
         return replace(
             self,
             contact=self.neumann.turned(),
@@ -234,7 +238,7 @@ class ContactPair(Value):
         )
 
     def on_meshes(self) -> TwoBodies:
-        """The bodies on their meshes, as the global method takes them.
+        """The bodies on their meshes under the loads of this pair, as the global method takes them.
 
         Raises
         ------
@@ -244,8 +248,8 @@ class ContactPair(Value):
         if self.problem is None:
             raise ValueError("this pair is made from matrices: needed the meshes of both bodies")
         return TwoBodies(
-            body1=self.body1.mesh_body,
-            body2=self.body2.mesh_body,
+            body1=self.body1.loaded_body,
+            body2=self.body2.loaded_body,
             interface=self.interface,
             friction=self.friction,
             problem=self.problem,
@@ -333,6 +337,12 @@ def _warnings(interface: Interface, friction: Fraction, bodies: list[Body]) -> l
             f"{near}: near 1/2 linear triangles make a body too stiff and scatter the nodal"
             f" pressures (Section 6 at {LOCKING:g}: 5 %, at 0.499: 40 %); needed a finer mesh, or a mesh file whose"
             " rectangles are split by both diagonals"
+        )
+    if interface.gap.min() < 0:
+        j = int(np.argmin(interface.gap))
+        found.append(
+            f"the initial gap is {interface.gap[j]:.4g} at x = {interface.contact.x[j]:g}: the bodies overlap as they"
+            " are drawn, and press each other apart before any load acts"
         )
     if friction and interface.law is not None and interface.contact.dimension == 2:
         found += interface.law.warnings(interface)

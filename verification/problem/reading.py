@@ -147,7 +147,6 @@ def read_problem(data: Mapping[str, Any], source: str) -> Problem:
 
 def _read_shape(table: Table, dimension: int, source: str) -> dict[str, Any]:
     """The geometry of a body: a mesh file, or a shape with its cells."""
-    count = integer("a whole number >= 1", 1)
     if "mesh" in table:
         if dimension == 1:
             raise table.refuse("mesh", None, "in one dimension a body is an interval")
@@ -163,9 +162,9 @@ def _read_shape(table: Table, dimension: int, source: str) -> dict[str, Any]:
             read_rigid["y"] = table.take("y", ends, None)
         return {"shape": shape, **read_rigid}
     if dimension == 1:
-        read: dict[str, Any] = {"x": table.take("x", ends), "cells": (table.take("cells", count),)}
+        read: dict[str, Any] = {"x": table.take("x", ends), "cells": (table.take("cells", at_least_one),)}
     else:
-        pair = several(count, 2, "two whole numbers >= 1, along x and y")
+        pair = several(at_least_one, 2, "two whole numbers >= 1, along x and y")
         read = {"x": table.take("x", ends), "y": table.take("y", ends), "cells": table.take("cells", pair)}
     if math.prod(read["cells"]) > MOST_CELLS:
         raise table.refuse("cells", list(read["cells"]), f"needed at most {MOST_CELLS} cells")
@@ -314,7 +313,6 @@ def _read_body(table: Table, dimension: int, source: str) -> BodySpec:
 def _read_contact(table: Table, dimension: int) -> ContactSpec:
     from verification.interface.friction import LAWS  # the laws know problems, not the other way round
 
-    coefficient = number(f"a number >= 0, at most {float(MOST_FRICTION):g}", lambda v: 0 <= v <= MOST_FRICTION)
     friction = table.take("friction", coefficient, Fraction(0))
     law = table.take("law", choice(*LAWS), "nonlocal")
     radius = table.take("radius", positive, None)
@@ -335,6 +333,19 @@ def _read_contact(table: Table, dimension: int) -> ContactSpec:
     return ContactSpec(interval=interval, friction=friction, law=law, radius=radius, gap=gap)
 
 
+def factor(value: Any) -> Theta:
+    """Read theta, or "auto"."""
+    try:
+        return read_theta(value)
+    except HypothesisError as error:
+        raise Unfit(f"needed {error.needed}") from None
+
+
+coefficient = number(f"a number >= 0, at most {float(MOST_FRICTION):g}", lambda v: 0 <= v <= MOST_FRICTION)
+tolerance = number("a number with 0 < tolerance < 1", lambda v: 0 < v < 1)
+at_least_one = integer("a whole number >= 1", 1)
+
+
 def takes_theta(relaxation: Any) -> bool:
     """Whether a given theta is used by the rule of a name; what is no name of a rule is refused elsewhere."""
     from verification.algorithm.relaxation import RULES  # the one list of rules; it lies above, and is only asked
@@ -346,21 +357,13 @@ def takes_theta(relaxation: Any) -> bool:
 def _read_iteration(table: Table) -> IterationSpec:
     from verification.algorithm.relaxation import RULES
 
-    def theta(value: Any) -> Theta:
-        try:
-            return read_theta(value)
-        except HypothesisError as error:
-            raise Unfit(f"needed {error.needed}") from None
-
     relaxation: str = table.take("relaxation", choice(*RULES), "constant")
     spec = IterationSpec(
         neumann_body=table.take("neumann_body", choice(1, 2), 2),
-        theta=table.take("theta", theta, Fraction(1, 2) if takes_theta(relaxation) else "auto"),
+        theta=table.take("theta", factor, Fraction(1, 2) if takes_theta(relaxation) else "auto"),
         relaxation=relaxation,
-        tolerance=float(
-            table.take("tolerance", number("a number with 0 < tolerance < 1", lambda v: 0 < v < 1), Fraction(1, 10**9))
-        ),
-        max_iterations=table.take("max_iterations", integer("a whole number >= 1", 1), 500),
+        tolerance=float(table.take("tolerance", tolerance, Fraction(1, 10**9))),
+        max_iterations=table.take("max_iterations", at_least_one, 500),
     )
     table.close()
     return spec

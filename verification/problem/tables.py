@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 
 from ndtheory import exact
 from ndtheory.number import decimal
+from ndtheory.texts import CONTROL, printable
 
 V = TypeVar("V")
 _MISSING: Any = object()
@@ -51,7 +52,7 @@ class ProblemError(ValueError):
         received = "" if value is None else f" = {show(value)}"
         where = file if len(file) <= LONGEST_PATH else "..." + file[3 - LONGEST_PATH :]  # its end names the file
         message = ": ".join(part for part in (where, f"{short(key)}{received}", short(needed, 400)) if part)
-        super().__init__("".join(c if c.isprintable() else " " for c in message))  # one line, whatever was received
+        super().__init__(printable(message))  # one line, whatever was received
         self.file = file
         self.key = key
         self.value = value
@@ -160,11 +161,16 @@ def text(value: Any) -> str:
 
 
 def label(value: Any) -> str:
-    """Read a string that a file can hold: half of a surrogate pair, which a dictionary may bring, is none."""
+    """Read a string that a terminal and files of any kind can show: without characters of control.
+
+    Half of a surrogate pair, which a dictionary may bring, is none either.
+    """
     try:
         text(value).encode()
     except UnicodeEncodeError:
         raise Unfit("needed a text of whole characters, this one has half a surrogate pair") from None
+    if found := CONTROL.search(value):
+        raise Unfit(f"needed a text without control characters, this one has {found[0]!a}")
     return str(value)
 
 

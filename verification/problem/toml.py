@@ -6,8 +6,10 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-#: What a basic string of TOML cannot hold as it is, and the short escapes.
-ESCAPED = re.compile(r'[\x00-\x1f\x7f"\\]')
+from ndtheory.texts import CONTROL
+
+#: What a basic string of TOML cannot hold as it is, or should not, and the short escapes.
+ESCAPED = re.compile(rf'(?![\ud800-\udfff])(?:{CONTROL.pattern}|["\\])')  # TOML has no halves of surrogate pairs
 SHORT = {"\b": r"\b", "\t": r"\t", "\n": r"\n", "\f": r"\f", "\r": r"\r", '"': r"\"", "\\": r"\\"}
 
 

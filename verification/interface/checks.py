@@ -1,0 +1,216 @@
+"""Checks of a deformed state: what the conditions on Gamma_c leave out, and whether the strains are small."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from fem1d2d import Mesh, depths, largest_strains, rectangle, surface
+from fem1d2d.mesh import Floats, Ints
+from fem1d2d.trace import SAME, extent
+from verification.interface.body import Body
+from verification.interface.joining import obstacle_level
+from verification.interface.pair import ContactPair, TwoBodies
+from verification.problem.specification import BodySpec
+from verification.threads import one_thread
+from verification.value import Value
+
+#: Linear elasticity is for small strains; from here on a warning is given.
+LARGE_STRAIN = 0.05
+
+#: The bodies give way along Gamma_c by the order of the largest strain times its length.  A penetration below this part
+#: of it is no more than the strains of the second order, which linear elasticity drops, and the mesh leave open.
+SHARE = 0.01
+
+Place = tuple[float, ...]
+Displacements = Sequence[Floats | None]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Checks(Value):
+    """Two measures of a deformed state, and where they are largest.
+
+    Attributes
+    ----------
+    penetration_outside : float or None
+        Greatest depth of a surface node outside Gamma_c inside the other body, unit of length; 0 where none is inside.
+    penetration_at : tuple of float or None
+        Where that node is drawn; None where none is inside.
+    largest_strain : float or None
+        Largest absolute principal strain over the elements.
+    strain_at : tuple of float or None
+        Centre of that element as it is drawn.
+    reason : mapping of str
+        Why a measure is None.
+    warnings : tuple of str
+    """
+
+    penetration_outside: float | None = None
+    penetration_at: Place | None = None
+    largest_strain: float | None = None
+    strain_at: Place | None = None
+    reason: Mapping[str, str] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def summary(self) -> str:
+        return f"penetration outside Gamma_c {self.penetration_outside}, largest strain {self.largest_strain}"
+
+    @classmethod
+    def without(cls, why: str) -> Checks:
+        """No measures, for one reason."""
+        return cls(reason=dict.fromkeys(("penetration_outside", "largest_strain"), why))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object ``checks`` of runs and solutions."""
+        place = lambda at: None if at is None else list(at)
+        places = {
+            "penetration_at": self.reason.get("penetration_outside", "no node lies inside the other body"),
+            "strain_at": self.reason.get("largest_strain", "nothing is strained"),
+        }
+        return {
+            "penetration_outside": self.penetration_outside,
+            "penetration_at": place(self.penetration_at),
+            "largest_strain": self.largest_strain,
+            "strain_at": place(self.strain_at),
+            "reason": dict(self.reason) | {name: why for name, why in places.items() if getattr(self, name) is None},
+        }
+
+
+def check_state(bodies: TwoBodies | ContactPair, displacements: Callable[[], Displacements], why: str = "") -> Checks:
+    """Measure a deformed state.
+
+    Parameters
+    ----------
+    displacements : callable
+        Returns those of body 1 and of body 2, shape (nodes, d), unit of length; None where rigid.  It is not called
+        where nothing is measured.
+    why : str
+        Why nothing is to be measured.
+    """
+    if isinstance(bodies, ContactPair):
+        if bodies.problem is None:
+            return Checks.without("the pair is made from matrices, without meshes")
+        bodies = bodies.on_meshes()
+    if why:
+        return Checks.without(why)
+    with one_thread():
+        return _check(bodies, displacements())
+
+
+def _check(bodies: TwoBodies, moved: Displacements) -> Checks:
+    if not all(np.isfinite(u).all() for u in moved if u is not None):
+        return Checks.without("the displacements are not finite")
+    strain, strain_at = _strain(bodies, moved)
+    strained: tuple[str, ...] = ()
+    if strain > LARGE_STRAIN:
+        of_small = f"linear elasticity is for small strains, at most {100 * LARGE_STRAIN:g} %"
+        where = f"in the element at {_show(strain_at)}"
+        strained = (f"the largest principal strain is {100 * strain:.2g} %, {where}: {of_small}",)
+    if bodies.problem.dimension == 1:
+        reason = {"penetration_outside": "bars meet at one point, which is Gamma_c"}
+        return Checks(largest_strain=strain, strain_at=strain_at, reason=reason, warnings=strained)
+    depth, at = _penetration(bodies, moved)
+    low, high = bodies.interface.contact.x[[0, -1]]
+    crossed: tuple[str, ...] = ()
+    if depth > SHARE * strain * (high - low):
+        where = f"by {depth:.3g} {bodies.problem.units['length']} at {_show(at)}"
+        short = f"Gamma_c, from x = {low:g} to {high:g}, is too short, and the forces are wrong"
+        crossed = (f"outside Gamma_c the bodies lie in each other, {where}: {short}",)
+    return Checks(
+        penetration_outside=depth,
+        penetration_at=at,
+        largest_strain=strain,
+        strain_at=strain_at,
+        warnings=crossed + strained,
+    )
+
+
+def _show(place: Place | None) -> str:
+    return "" if place is None else f"({', '.join(f'{c:.6g}' for c in place)})"
+
+
+def _place(point: Floats) -> Place:
+    return tuple(float(c) for c in point)
+
+
+def _strain(bodies: TwoBodies, moved: Displacements) -> tuple[float, Place | None]:
+    """The largest absolute principal strain, and the centre of its element."""
+    largest, at = 0.0, None
+    for body, u in zip((bodies.body1, bodies.body2), moved, strict=True):
+        if body is not None and u is not None:
+            strains = largest_strains(body.mesh, u)
+            cell = int(np.argmax(strains))
+            if strains[cell] > largest:
+                largest, at = float(strains[cell]), _place(body.mesh.points[body.mesh.cells[cell]].mean(axis=0))
+    return largest, at
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class _Surface(Value):
+    """The surface of a body in the deformed state.
+
+    Attributes
+    ----------
+    drawn, moved : array, shape (n, 2)
+        Its nodes outside Gamma_c, as they are drawn and where they lie now.
+    start, end : array, shape (b, 2)
+        Where its edges begin and end now, the body to the left of each.
+    """
+
+    drawn: Floats
+    moved: Floats
+    start: Floats
+    end: Floats
+
+    @classmethod
+    def of(cls, mesh: Mesh, u: Floats, contact: Ints, ends: Floats) -> _Surface:
+        """Surface of a mesh with these contact nodes, some of which may lie beyond the ends of Gamma_c."""
+        points, slack = mesh.points.astype(float), SAME * extent(mesh)
+        x = points[contact, 0]
+        on_contact = contact[(x >= ends[0] - slack) & (x <= ends[1] + slack)]
+        outside = np.setdiff1d(mesh.boundary, on_contact)
+        now = points + u
+        start, end = now[mesh.boundary[:, 0]], now[mesh.boundary[:, 1]]
+        return cls(drawn=points[outside], moved=now[outside], start=start, end=end)
+
+
+def _penetration(bodies: TwoBodies, moved: Displacements) -> tuple[float, Place | None]:
+    """The greatest depth of a surface node outside Gamma_c inside the other body, and where it is drawn."""
+    problem, ends = bodies.problem, bodies.interface.contact.x[[0, -1]]
+    lift = np.array([0.0, float(problem.contact.gap)])  # of body 2
+    one, two = (
+        None if body is None or u is None else _Surface.of(body.mesh, u + i * lift, body.nodes, ends)
+        for i, (body, u) in enumerate(zip((bodies.body1, bodies.body2), moved, strict=True))
+    )
+    if one is None:
+        assert bodies.body2 is not None
+        assert two is not None
+        one = _obstacle(problem.body1, bodies.body2, two, ends, 0 * lift, upper=True)
+    if two is None:
+        assert bodies.body1 is not None
+        two = _obstacle(problem.body2, bodies.body1, one, ends, lift, upper=False)
+    deepest, at = 0.0, None
+    rounding = SAME * max(float(np.ptp(surface.start, axis=0).max()) for surface in (one, two))
+    for own, other in ((one, two), (two, one)):
+        depth = depths(own.moved, other.start, other.end)
+        if len(depth) and depth.max() > max(deepest, rounding):
+            deepest, at = float(depth.max()), _place(own.drawn[np.argmax(depth)])
+    return deepest, at
+
+
+def _obstacle(spec: BodySpec, body: Body, opposite: _Surface, ends: Floats, lift: Floats, *, upper: bool) -> _Surface:
+    """An obstacle as a rectangle that reaches beyond the other body wherever the problem gives it no end."""
+    low, high = opposite.start.min(axis=0), opposite.start.max(axis=0)
+    size = float((high - low).max())
+    x = (float(low[0]) - size, float(high[0]) + size) if spec.x is None else (float(spec.x[0]), float(spec.x[1]))
+    if spec.y is not None:
+        y = (float(spec.y[0]), float(spec.y[1]))
+    else:
+        face = float(obstacle_level(spec, body.mesh.points[body.nodes].astype(float), upper=upper))
+        y = (min(float(low[1]), face) - size, face) if upper else (face, max(float(high[1]), face) + size)
+    mesh = rectangle(x, y, (1, 1))
+    return _Surface.of(mesh, np.broadcast_to(lift, mesh.points.shape), surface(mesh, upper=upper), ends)
