@@ -28,6 +28,7 @@ from verification.contact.system import ContactSystem, SolveError
 from verification.document import Document
 from verification.interface.assembly import discretise
 from verification.interface.body import Body
+from verification.interface.checks import Checks, check_state
 from verification.interface.fields import ContactFields
 from verification.interface.pair import ContactPair, TwoBodies
 from verification.problem import Problem, load
@@ -101,6 +102,16 @@ class Solution(Document):
                 fields[i] = full.reshape(body.mesh.points.shape)
         return fields[0], fields[1]
 
+    @cached_property
+    def checks(self) -> Checks:
+        """The bodies outside Gamma_c, and their strains."""
+        return check_state(self.bodies, lambda: self.displacements)
+
+    @property
+    def warnings(self) -> list[str]:
+        """Why the numbers may be wrong."""
+        return [*self.bodies.warnings, *self.checks.warnings]
+
     def content(self) -> dict[str, Any]:
         return {
             "title": self.bodies.problem.title,
@@ -109,7 +120,8 @@ class Solution(Document):
             "kkt_residual": self.kkt_residual,
             "linear_solves": self.linear_solves,
             "outside_theorem": self.bodies.outside,
-            "warnings": self.bodies.warnings,
+            "checks": self.checks.to_dict(),
+            "warnings": self.warnings,
         }
 
 

@@ -142,7 +142,7 @@ def test_a_rule_says_itself_that_it_takes_its_step_from_rho(descent):
     kept = vf.run(problem.changed(relaxation="descent", theta=0.7))
     assert kept.choice.source == "descent"
     assert float(kept.theta) == pytest.approx(1 / (1 + kept.choice.rho), rel=1e-15)
-    assert kept.warnings == ["iteration.theta = 0.7 is not used: descent takes its step from rho"]
+    assert "iteration.theta = 0.7 is not used: descent takes its step from rho" in kept.warnings
 
 
 def test_the_command_line_refuses_a_theta_beside_any_such_rule(descent, tmp_path):
@@ -155,8 +155,9 @@ def test_the_command_line_refuses_a_theta_beside_any_such_rule(descent, tmp_path
 def test_a_warning_names_the_theta_of_the_rule_that_ran():
     """A rule of the call replaces the file's: its theta is not meant for it, and that of the call is."""
     problem = vf.Problem.from_dict(changed(contact={"friction": 0}, iteration={"theta": 0.7, "relaxation": "momentum"}))
-    assert vf.run(problem, rule="constant").warnings == []
+    of_theta = lambda run: [warning for warning in run.warnings if "not used" in warning]
+    assert of_theta(vf.run(problem, rule="constant")) == []
     constant = vf.Problem.from_dict(changed(contact={"friction": 0}, iteration={"theta": 0.7}))
-    assert vf.run(constant, rule="momentum").warnings == []
-    told = vf.run(constant, rule="momentum", theta=0.5).warnings
+    assert of_theta(vf.run(constant, rule="momentum")) == []
+    told = of_theta(vf.run(constant, rule="momentum", theta=0.5))
     assert told == ["theta = 0.5 is not used: momentum takes its step from rho"]

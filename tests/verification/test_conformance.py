@@ -30,6 +30,7 @@ from verification.testing import (
     thetas,
 )
 from verification.testing import properties as kit
+from verification.testing.rules import solution, steps
 from verification.testing.transforms import in_units, mirrored, reflect, upside_down
 
 
@@ -90,6 +91,31 @@ def test_the_step_of_this_project_passes_with_its_loads_and_without_them(neumann
     unloaded = {name: value for name, value in given.items() if name not in ("load1", "load2", "gap")}
     report = check_step(step_of(pair), **unloaded, examples=5)
     assert report["is the step of these matrices"].detail.endswith("far from its loads")
+
+
+@pytest.mark.parametrize(("n", "seed"), [(2, 10), (2, 38), (3, 2), (3, 19), (3, 24), (3, 41)])
+def test_newton_sees_no_side_where_a_step_ends_at_a_kink(n, seed):
+    """Without neighbours in reach S sigma_N becomes 0 at an open node after one step: rounding gives it a sign."""
+    random = np.random.default_rng([n, seed])
+    S1, S2 = (A @ A.T + n * np.eye(2 * n) for A in random.normal(size=(2, 2 * n, 2 * n)))
+    loads = {"load1": random.normal(size=2 * n), "load2": random.normal(size=2 * n)}
+    pair = vf.build(S1=4 * S1, S2=S2, **loads, x=np.arange(n), kernel=np.eye(n), friction=1, neumann_body=2)
+    start = random.normal(size=2 * n)
+    own = steps(RULES["newton"], pair, Fraction(1, 4), start)
+    image = steps(RULES["newton"], mirrored(pair), Fraction(1, 4), reflect(pair, start))
+    assert min(np.abs(pair.interface.stress(g)).min() for g in own) < 1e-14 * np.abs(own).max()
+    for g, h in zip(own, image, strict=True):
+        assert reflect(pair, h) == pytest.approx(g, abs=1e-6 * np.abs(own).max())
+
+
+def test_a_pair_whose_only_forces_are_rounding_has_a_solution_to_compare_with():
+    """Two blocks, pushed along Gamma_c without friction."""
+    side = {"shape": "rectangle", "x": [0, "0.05"], "cells": [1, 1], "young": 1, "poisson": "-0.5"}
+    bodies = {"body1": {**side, "y": ["-0.001", 0], "fixed": ["bottom"]}, "body2": {**side, "y": [0, "0.001"]}}
+    bodies["body2"]["prescribed"] = {"top": ["2.5e-05", 0]}
+    given = {"contact": {"friction": 0, "radius": "0.025"}, "iteration": {"neumann_body": 1, "theta": "0.01"}}
+    g, error = solution(vf.build(vf.Problem.from_dict(bodies | given)))
+    assert max(np.abs(g).max(), error) < 1e-15
 
 
 # --- rules that are wrong in one way ----------------------------------------------------------------------------------

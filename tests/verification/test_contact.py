@@ -96,6 +96,36 @@ def test_the_active_set_closes_on_the_minimiser_or_says_that_it_does_not(random)
             assert least <= energy(S, q, bound, other) + rounding
 
 
+def beside_a_large_force(
+    S: np.ndarray, q: np.ndarray, bound: np.ndarray, times: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The same program and one node more that it does not feel, with so much larger loads and no friction."""
+    t, size = len(bound), len(q)
+    order = [*range(t), size, *range(t, size), size + 1]  # tangential components first
+    larger = np.diag(np.concatenate([np.zeros(size), np.full(2, np.diag(S).max())]))
+    larger[:size, :size] = S
+    load = np.concatenate([q, np.full(2, times * np.abs(q).max())])
+    return larger[np.ix_(order, order)], load[order], np.append(bound, 0.0)
+
+
+@pytest.mark.parametrize("solver", ["active-set", "auto"])
+@pytest.mark.parametrize(("seed", "which"), [(21, 24), (45, 2), (65, 17), (103, 1)])
+def test_signs_that_turn_for_ever_below_the_tolerance_do_not_keep_a_step_from_its_certificate(seed, which, solver):
+    """Programs on which the active set goes round and round, made a 1e-12 part of a larger one.
+
+    The convex program does not resolve so small a part either, but each of the guesses meets all conditions to 1e-11 of
+    the largest force.  Drawn problems have such parts where friction is some 1e-14.
+    """
+    random = np.random.default_rng(seed)
+    *_, program = (random_program(random) for _ in range(which + 1))
+    with pytest.raises(ContactError):
+        ContactStep(program[0], everywhere(program[0]), len(program[2]), "active-set").solve(*program[1:])
+    S, q, bound = beside_a_large_force(*program, 1e12)
+    found = ContactStep(S, everywhere(S), len(bound), solver).solve(q, bound)
+    assert found.kkt == certify(S, q, bound, found.v, found.force)
+    assert found.kkt.residual <= TOLERANCE
+
+
 def test_the_active_set_rarely_gives_up_on_random_matrices():
     random, outcomes = np.random.default_rng(11), Counter()
     count = 4000 if strategies.AT_NIGHT else 1000

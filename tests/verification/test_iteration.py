@@ -18,8 +18,9 @@ from problem_list import PROBLEMS, SECTION_6, changed, loaded_bars
 from sample_runs import by_name, problem, relative
 
 import verification as vf
+from verification.algorithm.ending import PATIENCE, RUNAWAY
 from verification.algorithm.fixed_point import FixedPointMap, Iterate
-from verification.algorithm.runs import MOST_BYTES, PATIENCE, RUNAWAY, Run
+from verification.algorithm.runs import MOST_BYTES, Run
 from verification.contact import TOLERANCE, ContactError
 from verification.interface.assembly import build
 
@@ -180,7 +181,8 @@ def test_each_state_follows_from_the_one_before(data):
         rounding = 1e-15 * max(side.dual_norm(side.load) for side in (pair.contact, pair.neumann))
         expected = np.sqrt(state.image @ np.linalg.solve(S2, state.image))
         assert state.size == pytest.approx(expected, rel=1e-9, abs=rounding)
-        assert state.scale == max(one.size for one in states[: i + 1])
+        expected = np.sqrt(state.g @ np.linalg.solve(S2, state.g))
+        assert state.scale == pytest.approx(max(expected, state.size), rel=1e-9, abs=rounding)
     for before, after in pairwise(states):
         assert np.array_equal(after.g, theta * before.image + (1 - theta) * before.g)
 

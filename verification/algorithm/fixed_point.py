@@ -5,20 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from fem1d2d.mesh import Floats
 from verification.algorithm.iterate import Iterate
-from verification.algorithm.relaxation import Relaxation, Rule, Step
-from verification.algorithm.theta import begin
+from verification.algorithm.relaxation import Relaxation, Step
 from verification.contact import ContactSolution, ContactStep, Solver
 from verification.contact.active_set import Systems
 from verification.dense import times
-from verification.interface.build import pair_of
 from verification.interface.pair import ContactPair
-from verification.problem import Problem
 from verification.threads import one_thread
 
 #: After so many steps (I) is solved anew.  On the sample problems of the tests, 400 steps each, its displacement then
@@ -90,56 +86,11 @@ class FixedPointMap:
         v, force = solution.v.copy(), solution.force.copy()
         rows = np.flatnonzero(~self.pair.contact.free)
         v[rows] = self.pair.contact.known[rows] - obstacle[rows]
-        passes = self.pair.neumann.free[rows]
+        passes = self.pair.interface.reaches(self.pair.neumann.free)[rows]
         force[rows] = np.where(passes, bound[rows] * np.sign(v[rows]), 0.0)
         sliding = solution.pattern.sliding.copy()
         sliding[rows] = np.where(passes, np.sign(v[rows]), 0)
         return replace(solution, v=v, force=force, pattern=replace(solution.pattern, sliding=sliding))
-
-
-def iterate(
-    problem: Problem | ContactPair,
-    *,
-    theta: Any = None,
-    rule: Rule | str | None = None,
-    solver: Solver = "auto",
-    start: Floats | None = None,
-) -> Iterator[Iterate]:
-    """Run the algorithm without end; the caller decides when to stop.
-
-    Parameters
-    ----------
-    problem : Problem, ContactPair or path
-    theta : number or 'auto', optional
-        Relaxation factor, 0 < theta < 1; the problem's by default.
-    rule : Rule or str, optional
-        The relaxation rule, or the name of one; the problem's by default.
-    solver : {'auto', 'cvxpy', 'active-set'}
-    start : array, optional
-        g_0; zero by default.
-
-    Yields
-    ------
-    Iterate
-
-    Raises
-    ------
-    HypothesisError
-        theta outside (0, 1).
-    ContactError
-        Step II did not reach its KKT certificate.
-
-    Examples
-    --------
-    >>> from itertools import islice
-    >>> from verification.problem.examples import example
-    >>> bars = example("two-bars").changed(young=(2, 1))
-    >>> [round(float(step.g[0]), 4) for step in islice(iterate(bars, theta="1/2"), 3)]
-    [0.0, 0.1, 0.05]
-    """
-    pair = pair_of(problem)
-    _, _, step = begin(pair, theta, rule)
-    return iterates(FixedPointMap(pair, solver), step, start)
 
 
 def iterate_at(T: FixedPointMap, g: Floats) -> Iterate:
@@ -148,7 +99,9 @@ def iterate_at(T: FixedPointMap, g: Floats) -> Iterate:
         return _evaluate(T, g, T.displacement(g))[0]
 
 
-def _evaluate(T: FixedPointMap, g: Floats, u: Floats, before: Iterate | None = None) -> tuple[Iterate, Floats]:
+def _evaluate(
+    T: FixedPointMap, g: Floats, u: Floats, before: Iterate | None = None, least: float = 0.0
+) -> tuple[Iterate, Floats]:
     """T at g, which displaces the Neumann body by u, and ``S2^-1 (T g - g)``."""
     neumann = T.pair.neumann
     solution = T.contact(g, u)
@@ -156,7 +109,8 @@ def _evaluate(T: FixedPointMap, g: Floats, u: Floats, before: Iterate | None = N
     off = image - g
     change = neumann.flexibility(off)
     residual = _root(float(off @ change))
-    size = _root(float(image @ (u - neumann.unloaded + change)))  # S2^-1 T g = S2^-1 g + S2^-1 (T g - g)
+    moved = u - neumann.unloaded  # S2^-1 g
+    size = _root(float(image @ (moved + change)))  # S2^-1 T g = S2^-1 g + S2^-1 (T g - g)
     found = Iterate(
         iteration=0 if before is None else before.iteration + 1,
         g=g,
@@ -165,13 +119,13 @@ def _evaluate(T: FixedPointMap, g: Floats, u: Floats, before: Iterate | None = N
         contact=solution,
         residual=residual,
         size=size,
-        scale=size if before is None else max(before.scale, size),
+        scale=max(size, _root(float(g @ moved)), least),
     )
     return found, change
 
 
-def iterates(T: FixedPointMap, step: Step, start: Floats | None = None) -> Iterator[Iterate]:
-    """The iterates that a rule passes through, without end.
+def iterates(T: FixedPointMap, step: Step, start: Floats | None = None, least: float = 0.0) -> Iterator[Iterate]:
+    """The iterates that a rule passes through, without end; ``least`` is a scale that none falls below.
 
     Where (III) has one factor, what g displaces follows from what the residual needs, as
     ``S2^-1 g+ = S2^-1 g + theta S2^-1 (T g - g)``: a step takes one solve with S2.  Every :data:`RENEWED` steps, and
@@ -179,7 +133,7 @@ def iterates(T: FixedPointMap, step: Step, start: Floats | None = None) -> Itera
     """
     g = np.zeros(T.pair.neumann.grid.size) if start is None else np.array(start, dtype=float)
     with one_thread():
-        found, change = _evaluate(T, g, T.displacement(g))
+        found, change = _evaluate(T, g, T.displacement(g), None, least)
     while True:
         yield found
         with one_thread():
@@ -188,7 +142,7 @@ def iterates(T: FixedPointMap, step: Step, start: Floats | None = None) -> Itera
                 u = found.displacement + step.theta * change
             else:
                 u = T.displacement(g)
-            found, change = _evaluate(T, g, u, found)
+            found, change = _evaluate(T, g, u, found, least)
 
 
 def _root(square: float) -> float:

@@ -19,7 +19,7 @@ class Iterate(Value):
     Attributes
     ----------
     iteration : int
-        How many relaxations led to g.
+        Number of relaxations that led to g.
     g : array
         Nodal forces before the step.
     image : array
@@ -33,7 +33,10 @@ class Iterate(Value):
     size : float
         ``|||T g|||``.
     scale : float
-        The largest size so far, which the residual is compared with: T g itself may vanish where the bodies part.
+        ``max(|||g|||, |||T g|||)``, the present size of the forces, which the residual is compared with.  A size that
+        the forces had earlier says nothing: a stiff contact body may throw the bodies apart in the first step, and g
+        then decays without contact.  A run whose loads give no force has a fixed scale instead, that of
+        :func:`verification.algorithm.start.least_scale`.
     """
 
     iteration: int

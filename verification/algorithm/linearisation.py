@@ -147,7 +147,7 @@ def linearise(pair: ContactPair, iterate: Iterate, theta: float, history: Sequen
             predicted = (after / near.step(e)) ** (1 / steps) if near.step(e) > 0 else None
     size = pair.neumann.dual_norm(iterate.g)
     return Linearisation(
-        radius=float(np.abs(np.linalg.eigvals(J)).max(initial=0.0)),
+        radius=_radius(piece, theta),
         excited=excited,
         norm=float(np.linalg.norm(J, 2)) if len(J) else 0.0,
         margin=near.margin / size if size else float("inf"),
@@ -175,7 +175,7 @@ def linearised_rate(piece: Piece, iterate: Iterate, theta: float, first: Floats 
     """
     near = _near(piece.pair, iterate, theta, piece)
     if first is None:
-        return float(np.abs(1 - theta + theta * np.diagonal(piece.modes[0])).max(initial=0.0))
+        return _radius(piece, theta)
     start = near.error + piece.basis.T @ piece.pair.neumann.flexibility(first - iterate.g)
     return _excited(piece, theta, start)
 
@@ -284,14 +284,27 @@ def _excited(piece: Piece, theta: float, error: Floats) -> float:
     if size == 0.0:
         return 0.0
     form, vectors = piece.modes
+    moduli = _moduli(piece, theta)
     seen, modulus = 0.0, 0.0
     for first in range(len(form)):
-        moduli = np.abs(1 - theta + theta * np.diagonal(form)[first:])
-        largest = int(np.argmax(moduli))
+        largest = first + int(np.argmax(moduli[first:]))
         modulus = float(moduli[largest])
-        if largest:
-            form, vectors, _ = ztrexc(form, vectors, first + largest + 1, first + 1)
+        if largest > first:
+            form, vectors, _ = ztrexc(form, vectors, largest + 1, first + 1)
+            # those in between move down; the new diagonal is off by a root of eps where J is defective
+            moduli[first : largest + 1] = np.roll(moduli[first : largest + 1], 1)
         seen += float(abs(np.vdot(vectors[:, first], error))) ** 2
         if seen > (SHARE * size) ** 2:
             break
     return modulus
+
+
+def _moduli(piece: Piece, theta: float) -> Floats:
+    """Moduli of the eigenvalues of J in the order of ``piece.modes``."""
+    moduli: Floats = np.abs(1 - theta + theta * np.diagonal(piece.modes[0]))
+    return moduli
+
+
+def _radius(piece: Piece, theta: float) -> float:
+    """rho(J), from the same eigenvalues as what is excited: that is one of them, and never above the largest."""
+    return float(_moduli(piece, theta).max(initial=0.0))

@@ -11,7 +11,7 @@ import math
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import ClassVar, final
 
@@ -20,6 +20,7 @@ import numpy as np
 from fem1d2d.mesh import Floats
 from verification.algorithm.affine_piece import piece_of
 from verification.algorithm.iterate import Iterate
+from verification.contact.active_set import SLACK
 from verification.interface.pair import ContactPair
 
 #: How many earlier steps Anderson mixing remembers.
@@ -208,7 +209,11 @@ class Newton(Rule):
     @staticmethod
     def _direction(pair: ContactPair, iterate: Iterate, theta: float) -> Floats:
         r = iterate.image - iterate.g
-        T = piece_of(pair, iterate.g, iterate.contact.pattern).force
+        piece = piece_of(pair, iterate.g, iterate.contact.pattern)
+        if piece.sign.any():  # a step from where a node is open leads to S sigma_N = 0 there, with the sign of rounding
+            stress = np.abs(pair.interface.stress(iterate.g))
+            piece = replace(piece, sign=np.where(stress > SLACK * stress.max(), piece.sign, 0).astype(np.int8))
+        T = piece.force
         try:
             return np.asarray(np.linalg.solve(np.eye(len(r)) - T, r), dtype=float)
         except np.linalg.LinAlgError:  # the solution on this piece is not isolated

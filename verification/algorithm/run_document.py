@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from verification.algorithm.ending import NO_FORCE
+
 if TYPE_CHECKING:
     from verification.algorithm.runs import Run
 
@@ -27,6 +29,10 @@ def run_document(run: Run) -> dict[str, Any]:
             reason["predicted_rate"] = "the run did not end in a stretch of steps without a change of state"
         if not np.isfinite(linear.margin):
             reason["linearised_margin"] = "no change of g changes a state"
+    if run.coupled_residual is None:
+        reason["coupled_residual"] = NO_FORCE
+    if run.start.why:
+        reason["start"] = run.start.why
     few = "fewer than two step ratios stand clear of rounding"
     if rate is None:
         why = "the run diverged: it shows growth, not a rate" if run.outcome == "diverged" else few
@@ -41,6 +47,7 @@ def run_document(run: Run) -> dict[str, Any]:
         "theta_source": run.choice.source,
         "theta_reason": run.choice.why,
         "relaxation": run.relaxation,
+        "start": run.start.source,
         "neumann_body": run.pair.neumann_body,
         "grids": {"contact_body": run.pair.contact_body, **run.pair.interface.counts},
         "iterations": run.iterations,
@@ -58,9 +65,11 @@ def run_document(run: Run) -> dict[str, Any]:
         "linearised_margin": None if linear is None or not np.isfinite(linear.margin) else linear.margin,
         "predicted_rate": None if linear is None else linear.predicted,
         "unrelaxed_residual": _finite(run.last.relative_residual),
+        "coupled_residual": None if run.coupled_residual is None else _finite(run.coupled_residual),
         "kkt_residual": run.last.contact.kkt.residual,
         "solves": {"cvxpy": solvers.count("cvxpy"), "active_set": solvers.count("active-set")},
         **run.contact.to_dict(),
+        "checks": run.checks.to_dict(),
         "history": [_finite(r) for r in run.history],
         "outside_theorem": run.outside,
         "warnings": run.warnings,

@@ -1,51 +1,45 @@
-"""A run of the algorithm from g = 0 to its outcome."""
+"""A run of the algorithm from its start to its outcome."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from fem1d2d.mesh import Floats
 from ndtheory import Number
+from verification.algorithm.ending import Ending, Outcome, arrived, coupled_residual
 from verification.algorithm.fixed_point import FixedPointMap, iterate_at, iterates
 from verification.algorithm.iterate import Iterate
 from verification.algorithm.linearisation import Forecast, Linearisation, NotLinear, forecast, linearise
 from verification.algorithm.rates import ObservedRate, observed_rate
 from verification.algorithm.relaxation import Constant, Rule
 from verification.algorithm.run_document import run_document
+from verification.algorithm.start import Start, begin_at
 from verification.algorithm.theta import Choice, begin
 from verification.constants import Measured
 from verification.contact import ContactError, Solver
 from verification.document import Document
 from verification.interface.build import pair_of
+from verification.interface.checks import Checks, check_state
 from verification.interface.fields import ContactFields
 from verification.interface.pair import ContactPair, TwoBodies
 from verification.interrupts import INTERRUPTED
 from verification.monolithic import SolveError, solution_force
-from verification.problem import Problem, Settings
+from verification.problem import Problem
 from verification.problem.tables import ProblemError
 from verification.threads import one_thread
 
 if TYPE_CHECKING:
     from verification.figures import Figure
 
-Outcome = Literal["converged", "stalled", "limit", "diverged", "interrupted"]
-
 #: Linearising takes longer than a run, and is asked for.
 NOT_ASKED = "not worked out: linearise() does"
-
-#: A run without a new least residual over so many steps has stalled.
-PATIENCE = 50
-
-#: A residual grown by this factor over the first one has diverged.
-RUNAWAY = 1e8
 
 #: What the iterates of a run may fill, in bytes, and what each takes beside its four arrays, as measured.
 MOST_BYTES, ITERATE_BYTES = 2_000_000_000, 1600
@@ -63,6 +57,8 @@ class Run(Document):
         How each next g was chosen.
     choice : Choice
         theta and where it comes from.
+    start : Start
+        g_0 and where it comes from.
     iterates : tuple of Iterate
         At least one.
     outcome : {'converged', 'stalled', 'limit', 'diverged', 'interrupted'}
@@ -79,6 +75,7 @@ class Run(Document):
     pair: ContactPair
     rule: Rule
     choice: Choice
+    start: Start
     iterates: tuple[Iterate, ...]
     outcome: Outcome
     interrupted: bool = False
@@ -111,8 +108,16 @@ class Run(Document):
 
     @property
     def converged(self) -> bool:
-        """Whether the residual fell to the tolerance, relative to the largest ``|||T g|||`` seen."""
+        """True if the residual fell to the tolerance, relative to the present forces, in a state of contact."""
         return self.outcome == "converged"
+
+    @cached_property
+    def coupled_residual(self) -> float | None:
+        """Largest violation of a condition of contact by the joined state at the end, relative to its own traction.
+
+        In the norm (5.21), :func:`verification.algorithm.ending.coupled_residual`; None without a force.
+        """
+        return coupled_residual(self.pair, self.last)
 
     @property
     def last(self) -> Iterate:
@@ -195,13 +200,9 @@ class Run(Document):
         pair, solved = self.pair, iterate.contact
         turned = np.ones(len(solved.v))
         turned[pair.contact.grid.tangential] = pair.upward  # to body 1 against body 2
-        pattern = solved.pattern
+        pattern, force, jump = solved.pattern, turned * solved.force, turned * solved.v
         return ContactFields.of(
-            pair.contact.grid,
-            force=turned * solved.force,
-            jump=turned * solved.v,
-            touching=pattern.touching,
-            sliding=pattern.sliding,
+            pair.contact.grid, force=force, jump=jump, touching=pattern.touching, sliding=pattern.sliding
         )
 
     @property
@@ -230,6 +231,12 @@ class Run(Document):
         of_contact = contact.mesh_body.displacement(contact.orient(moved))
         of_neumann = neumann.mesh_body.displacement(neumann.orient(self.last.displacement))
         return (of_contact, of_neumann) if self.pair.neumann_body == 2 else (of_neumann, of_contact)
+
+    @cached_property
+    def checks(self) -> Checks:
+        """The bodies outside Gamma_c and their strains, at the last iterate."""
+        why = "the run diverged" if self.outcome == "diverged" else ""
+        return check_state(self.pair, lambda: self.displacements, why)
 
     @property
     def history(self) -> list[float]:
@@ -276,7 +283,8 @@ class Run(Document):
     @property
     def warnings(self) -> list[str]:
         """What a user should know before trusting the numbers."""
-        return self.pair.warnings + self.choice.warnings
+        tied = [self.start.why] if self.start.source == "tied" else []
+        return self.pair.warnings + self.choice.warnings + tied + (list(self.checks.warnings) if self.converged else [])
 
     def content(self) -> dict[str, Any]:
         return run_document(self)
@@ -296,43 +304,20 @@ def check_memory(pair: ContactPair) -> None:
         raise ProblemError(pair.source, "iteration.max_iterations", asked, needed)
 
 
-class Ending:
-    """When a run ends, told its residuals one by one.
-
-    Parameters
-    ----------
-    settings : Settings
-    """
-
-    def __init__(self, settings: Settings) -> None:
-        self._tolerance, self._most = settings.tolerance, settings.max_iterations
-        self._least, self._since, self._first = math.inf, 0, math.inf
-
-    def at(self, iteration: int, residual: float, scale: float) -> Outcome | None:
-        """The outcome where the run ends at this iterate."""
-        self._first = residual if iteration == 0 else self._first
-        self._least, self._since = (residual, 0) if residual < self._least else (self._least, self._since + 1)
-        return "converged" if residual <= self._tolerance * scale else self.given_up(iteration, residual)
-
-    def given_up(self, iteration: int, residual: float) -> Outcome | None:
-        """The outcome where it would end here, converged or not."""
-        if not residual <= RUNAWAY * self._first:
-            return "diverged"
-        if self._since >= PATIENCE:
-            return "stalled"
-        return "limit" if iteration >= self._most else None
-
-
 def run(
     problem: Problem | ContactPair | Path | str,
     *,
     theta: Any = None,
     rule: Rule | str | None = None,
+    start: Any = None,
     solver: Solver = "auto",
     watch: Callable[[Iterate], None] = lambda iterate: None,
     measured: Measured | None = None,
 ) -> Run:
-    """Run the algorithm from g = 0 until it converges, stalls, runs away, reaches its limit or Ctrl-C.
+    """Run the algorithm until it converges, stalls, runs away, reaches its limit or Ctrl-C.
+
+    It has converged where ``|||T g - g|||`` is at most the tolerance times the larger of ``|||g|||`` and ``|||T g|||``,
+    and the joined state is one of contact (:func:`verification.algorithm.ending.arrived`).
 
     Parameters
     ----------
@@ -341,6 +326,9 @@ def run(
         Relaxation factor, 0 < theta < 1; the problem's by default.
     rule : Rule or str, optional
         The relaxation rule, or the name of one; the problem's by default.
+    start : array, shape (2 n,), optional
+        g_0: nodal forces on the Neumann grid, tangential ones first, as ``run.last.g`` of an earlier run.  By default
+        0, or the solution of the tied bodies where step II has no minimiser at 0.
     solver : {'auto', 'cvxpy', 'active-set'}
         Who solves step II.
     watch : callable
@@ -357,7 +345,7 @@ def run(
     ProblemError, HypothesisError
         Bad input.
     ContactError
-        Step II did not reach its KKT certificate.
+        Step II did not reach its KKT certificate, or has no minimiser at the start.
     KeyboardInterrupt
         Before the first iterate; later it ends the run with what was computed.
 
@@ -372,14 +360,17 @@ def run(
     pair = pair_of(problem)
     check_memory(pair)
     relaxation, choice, step = begin(pair, theta, rule, measured)
+    T = FixedPointMap(pair, solver)
+    begun = begin_at(T, start)
     seen: list[Iterate] = []
     ending = Ending(pair.settings)
     outcome: Outcome | None = None
+    joined = lambda: arrived(pair, seen[-1])
     try:
-        for found in iterates(FixedPointMap(pair, solver), step):
+        for found in iterates(T, step, begun.g, begun.scale):
             seen.append(found)
             watch(found)
-            outcome = ending.at(found.iteration, found.residual, found.scale)
+            outcome = ending.at(found.iteration, found.residual, found.scale, joined)
             if outcome is not None:
                 break
     except KeyboardInterrupt:
@@ -391,6 +382,7 @@ def run(
         pair=pair,
         rule=relaxation,
         choice=choice,
+        start=begun,
         iterates=tuple(seen),
         outcome=outcome,
         interrupted=outcome == "interrupted",

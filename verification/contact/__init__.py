@@ -9,6 +9,6 @@ exactly, ``kkt`` certifies either.
 """
 
 from verification.contact.kkt import KKT, TOLERANCE, certify
-from verification.contact.step import ContactError, ContactSolution, ContactStep, Solver
+from verification.contact.step import ContactError, ContactSolution, ContactStep, NoMinimiser, Solver
 
-__all__ = ["KKT", "TOLERANCE", "ContactError", "ContactSolution", "ContactStep", "Solver", "certify"]
+__all__ = ["KKT", "TOLERANCE", "ContactError", "ContactSolution", "ContactStep", "NoMinimiser", "Solver", "certify"]

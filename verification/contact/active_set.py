@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -155,23 +156,43 @@ class ActiveSet:
     def solve(self, q: Floats, bound: Floats, start: Pattern) -> tuple[Floats, Floats, Pattern] | None:
         """Mend the pattern until every sign agrees.
 
-        A touching node that pulls opens, an open one that penetrates touches; a sticking node above its bound slides
-        the way it is pushed; a sliding one of the wrong sign goes to stick, never straight to the opposite slip, which
-        would cycle.  A node whose bound is zero slides.
-
         Returns
         -------
         v, force : array, shape (t + n,)
         pattern : Pattern
             None instead of the three where the pattern does not settle.
         """
+        seen: set[bytes] = set()
+        for v, force, pattern, agrees in islice(self._guesses(q, bound, start), LIMIT):
+            if agrees:
+                return v, force, pattern
+            if pattern.key in seen:
+                return None
+            seen.add(pattern.key)
+        return None
+
+    def repeated(self, q: Floats, bound: Floats, start: Pattern) -> Iterator[tuple[Floats, Floats, Pattern]]:
+        """The guesses that come again and again where the pattern does not settle; none where it does."""
+        seen: set[bytes] = set()
+        for v, force, pattern, agrees in islice(self._guesses(q, bound, start), LIMIT, 2 * LIMIT):
+            if agrees or pattern.key in seen:
+                return
+            seen.add(pattern.key)
+            yield v, force, pattern
+
+    def _guesses(self, q: Floats, bound: Floats, pattern: Pattern) -> Iterator[tuple[Floats, Floats, Pattern, bool]]:
+        """Yield v and force of each guess and whether every sign agrees; the next guess is the last one mended.
+
+        A touching node that pulls opens, an open one that penetrates touches; a sticking node above its bound slides
+        the way it is pushed; a sliding one of the wrong sign goes to stick, never straight to the opposite slip, which
+        would cycle.  A node whose bound is zero slides.
+        """
         t = self._t
         force_slack = SLACK * max(worst(np.abs(q)), worst(bound))
         length_slack = force_slack / self._stiffness
         smooth = bound == 0 if self._held is None else (bound == 0) & ~self._held
-        pattern = self._begin(start, smooth)
-        seen: set[bytes] = set()
-        for _ in range(LIMIT):
+        pattern = self._begin(pattern, smooth)
+        while True:
             system = self._systems.of(pattern)
             v, force = system.solve(q, bound)
             # v_N = 0 where a node touches and force_N = 0 where it is open, so that each sign speaks of the others
@@ -181,11 +202,6 @@ class ActiveSet:
                 back &= ~smooth
             if self._held is not None:
                 pushed &= ~self._held
-            if not any(map(np.count_nonzero, (pulls, enters, pushed, back))):
-                return v, force, system.pattern
-            seen.add(pattern.key)
+            yield v, force, system.pattern, not any(map(np.count_nonzero, (pulls, enters, pushed, back)))
             sliding = np.where(pushed, np.sign(force[:t]), np.where(back, 0, pattern.sliding)).astype(np.int8)
             pattern = Pattern(touching=pattern.touching & ~pulls | enters, sliding=sliding)
-            if pattern.key in seen:
-                return None
-        return None

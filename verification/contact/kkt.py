@@ -39,10 +39,9 @@ class KKT:
 
     @property
     def residual(self) -> float:
-        """The largest of them."""
-        return max(
-            self.equilibrium, self.non_penetration, self.compression, self.complementarity, self.bound, self.slip
-        )
+        """The largest of them; not a number where one is none."""
+        lengths = self.non_penetration, self.complementarity, self.slip
+        return worst(np.array([self.equilibrium, self.compression, self.bound, *lengths]))
 
 
 class Certificate:

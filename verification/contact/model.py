@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import warnings
 
+import cvxpy as cp
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cholesky
 
 from fem1d2d.mesh import Floats
-from verification.imports import statistics_later
-
-with statistics_later():
-    import cvxpy as cp
 
 #: Clarabel's defaults leave errors of 1e-4 in the energy; asking for more than this may end "almost solved" far off.
 TOLERANCE = 1e-10

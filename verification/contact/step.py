@@ -25,6 +25,10 @@ class ContactError(RuntimeError):
     """Step II has no minimiser, or no solver reached the KKT certificate."""
 
 
+class NoMinimiser(ContactError):
+    """Nothing holds the contact body in step II: its energy has no minimum."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ContactSolution(Value):
     """A solution of step II with its KKT residuals; but for :class:`ProgramStep` they are below the tolerance.
@@ -102,17 +106,18 @@ class ContactStep:
 
         Raises
         ------
-        ContactError
+        NoMinimiser, ContactError
             Without a minimiser, or a certificate.
         """
         found = None if self._solver == "cvxpy" else self._by_active_set(q, bound, self._pattern, "active-set")
         if found is None and (way := way_out(self._motions, q, bound)):
-            raise ContactError(f"step II has no minimiser: the loads move {self._body} {way}")
+            raise NoMinimiser(f"step II has no minimiser: the loads move {self._body} {way}")
         if found is None and self._solver != "active-set":
             found = self._by_program(q, bound)
         if found is None:
             n = len(self._S) - self._t
-            found = self._by_active_set(q, bound, Pattern.sticking(n, self._t), "active-set")
+            sticking = Pattern.sticking(n, self._t)
+            found = self._by_active_set(q, bound, sticking, "active-set") or self._by_a_guess(q, bound, sticking)
         if found is None:
             why = f": {self._near} is too near 1/2 for doubles" if self._near else ""
             raise ContactError(f"the contact step did not reach a KKT residual of {TOLERANCE:g}{why}")
@@ -125,7 +130,23 @@ class ContactStep:
         closed = self._active.solve(q, bound, start)
         if closed is None:
             return None
-        v, force, pattern = closed
+        return self._certified(q, bound, closed, solver)
+
+    def _by_a_guess(self, q: Floats, bound: Floats, start: Pattern) -> ContactSolution | None:
+        """The best of the guesses among which the active set goes round and round, if that is certified.
+
+        Signs are read with a slack of 1e-14 of the largest force.  Where forces, or jumps times stiffness, differ from
+        where a condition changes by little more, as with a friction bound of 1e-13, the nodes may turn each
+        other for ever, though each of the guesses meets all conditions to a share of the tolerance.
+        """
+        guesses = (self._certified(q, bound, guess, "active-set") for guess in self._active.repeated(q, bound, start))
+        certified = (found for found in guesses if found is not None)
+        return min(certified, key=lambda found: found.kkt.residual, default=None)
+
+    def _certified(
+        self, q: Floats, bound: Floats, guess: tuple[Floats, Floats, Pattern], solver: Literal["cvxpy", "active-set"]
+    ) -> ContactSolution | None:
+        v, force, pattern = guess
         kkt = self._certificate.measure(q, bound, v, force)
         if not kkt.residual <= TOLERANCE:
             return None

@@ -1,0 +1,119 @@
+"""End of a run: its outcome, and the distance of its joined state from contact, measured in its own traction.
+
+The joined state at g is made of both displacements, u2 from step I and u1 from step II, and of g itself as the traction
+between the bodies.  A residual ``|||T g - g|||`` that is small beside the first step does not bound it: with a contact
+body much stiffer than the other one the first step throws the bodies apart, and g then decays with every node open.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Literal
+
+import numpy as np
+
+from verification.algorithm.iterate import Iterate
+from verification.interface.pair import ContactPair
+from verification.problem import Settings
+
+Outcome = Literal["converged", "stalled", "limit", "diverged", "interrupted"]
+
+#: A run without a new least residual over so many steps has stalled.
+PATIENCE = 50
+
+#: A residual grown by this factor over the first one has diverged.
+RUNAWAY = 1e8
+
+#: A run has not arrived while its coupled residual is above this, or above so many times its tolerance: a tenth of the
+#: traction is more than the step ratios of a converging run leave in any one condition.
+MOST, TOLERANCES = 0.1, 10.0
+
+#: The reason for a missing coupled residual.
+NO_FORCE = "no force acts between the bodies at the end"
+
+
+def coupled_residual(pair: ContactPair, iterate: Iterate) -> float | None:
+    """Largest violation of a condition of contact by the joined state at g, relative to g, in the norm (5.21).
+
+    The conditions are those of (2.4) and (2.6) on the contact nodes, with the pattern of step II: a node that is open
+    carries no pressure, none pulls, friction stays within its bound; and the equilibrium of the contact body under g.
+    The rest hold by construction: step I balances the Neumann body with g, and step II lets nothing penetrate.  What
+    violates a condition is a nodal force, of which the norm is taken.
+
+    Parameters
+    ----------
+    pair : ContactPair
+    iterate : Iterate
+
+    Returns
+    -------
+    float or None
+        None without a force: g is 0, or within the tolerance of 0 beside the scale of the iterate.
+
+    Notes
+    -----
+    On grids that differ the traction of g on the contact grid is the reaction of step II and the difference g - T g,
+    carried there as a stress; at a fixed point it is the reaction itself.
+    """
+    neumann, grid = pair.neumann, pair.contact.grid
+    size = math.sqrt(max(float(iterate.g @ (iterate.displacement - neumann.unloaded)), 0.0))
+    if size <= pair.settings.tolerance * iterate.scale:
+        return None
+    off = iterate.g - iterate.image
+    force = iterate.contact.force + pair.interface.spread(off)
+    pressure, touching = force[grid.normal], iterate.contact.pattern.touching
+    parts = np.zeros((grid.size, 3))
+    parts[grid.normal, 0] = np.where(touching, 0.0, pressure)
+    parts[grid.normal, 1] = np.where(touching, np.minimum(pressure, 0.0), 0.0)
+    if grid.t:
+        shear = force[grid.tangential]
+        bound = pair.bound(iterate.g)
+        parts[grid.tangential, 2] = shear - np.clip(shear, -bound, bound)
+    violations = np.column_stack([pair.interface.carry_back(parts), off])
+    lengths = np.einsum("ij,ij->j", violations, neumann.flexibility(violations))
+    return math.sqrt(max(float(lengths.max()), 0.0)) / size
+
+
+def arrived(pair: ContactPair, iterate: Iterate) -> bool:
+    """True if the joined state at g meets the conditions of contact as closely as a run must end."""
+    found = coupled_residual(pair, iterate)
+    return found is None or found <= max(MOST, TOLERANCES * pair.settings.tolerance)
+
+
+class Ending:
+    """The end of a run, from its residuals one by one.
+
+    Parameters
+    ----------
+    settings : Settings
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        self._tolerance, self._most = settings.tolerance, settings.max_iterations
+        self._least, self._since, self._first = math.inf, 0, math.inf
+
+    def at(self, iteration: int, residual: float, scale: float, joined: Callable[[], bool]) -> Outcome | None:
+        """The outcome where the run ends at this iterate.
+
+        Parameters
+        ----------
+        iteration : int
+        residual, scale : float
+            Those of the iterate.
+        joined : callable
+            True if the iterate has :func:`arrived`; called where the residual meets the tolerance.
+        """
+        self._first = residual if iteration == 0 else self._first
+        self._least, self._since = (residual, 0) if residual < self._least else (self._least, self._since + 1)
+        if residual <= self._tolerance * scale < math.inf and joined():
+            return "converged"
+        return self.given_up(iteration, residual)
+
+    def given_up(self, iteration: int, residual: float) -> Outcome | None:
+        """The outcome where it would end here, converged or not."""
+        if not residual <= RUNAWAY * self._first:
+            return "diverged"
+        if self._since >= PATIENCE:
+            return "stalled"
+        return "limit" if iteration >= self._most else None

@@ -1,0 +1,197 @@
+"""The forces with which a run starts, and its iterates from there on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from scipy.linalg import solve
+
+from fem1d2d.mesh import Floats
+from verification.algorithm.fixed_point import FixedPointMap, iterates
+from verification.algorithm.iterate import Iterate
+from verification.algorithm.relaxation import Rule
+from verification.algorithm.theta import begin
+from verification.contact import NoMinimiser, Solver
+from verification.interface.build import pair_of
+from verification.interface.pair import ContactPair
+from verification.problem import Problem
+from verification.problem.tables import ProblemError
+from verification.value import Value
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Start(Value):
+    """g_0 of a run and where it comes from.
+
+    Attributes
+    ----------
+    g : array
+        Nodal forces on the Neumann grid, tangential components first.
+    source : {'zero', 'given', 'tied'}
+    why : str
+        Why the run does not start from g = 0; empty where it does.
+    scale : float
+        Least size that the residual is compared with, in the norm (5.21): 0, or from :func:`least_scale`.
+    """
+
+    g: Floats
+    source: Literal["zero", "given", "tied"] = "zero"
+    why: str = ""
+    scale: float = 0.0
+
+    @property
+    def summary(self) -> str:
+        return f"from {self.source}{': ' if self.why else ''}{self.why}"
+
+
+def iterate(
+    problem: Problem | ContactPair,
+    *,
+    theta: Any = None,
+    rule: Rule | str | None = None,
+    solver: Solver = "auto",
+    start: Any = None,
+) -> Iterator[Iterate]:
+    """Run the algorithm without end; the caller decides when to stop.
+
+    Parameters
+    ----------
+    problem : Problem, ContactPair or path
+    theta : number or 'auto', optional
+        Relaxation factor, 0 < theta < 1; the problem's by default.
+    rule : Rule or str, optional
+        The relaxation rule, or the name of one; the problem's by default.
+    solver : {'auto', 'cvxpy', 'active-set'}
+    start : array, optional
+        g_0, as :func:`verification.run` takes it.
+
+    Yields
+    ------
+    Iterate
+
+    Raises
+    ------
+    HypothesisError
+        theta outside (0, 1).
+    ContactError
+        Step II did not reach its KKT certificate.
+
+    Examples
+    --------
+    >>> from itertools import islice
+    >>> from verification.problem.examples import example
+    >>> bars = example("two-bars").changed(young=(2, 1))
+    >>> [round(float(step.g[0]), 4) for step in islice(iterate(bars, theta="1/2"), 3)]
+    [0.0, 0.1, 0.05]
+    """
+    pair = pair_of(problem)
+    _, _, step = begin(pair, theta, rule)
+    T = FixedPointMap(pair, solver)
+    begun = begin_at(T, start)
+    return iterates(T, step, begun.g, begun.scale)
+
+
+def begin_at(T: FixedPointMap, given: Any = None) -> Start:
+    """g_0 of a run: the given one, else 0; the tied solution where step II has no minimiser at g = 0.
+
+    Where only contact holds the contact body, friction has to resist tangential loads, and at g = 0 the bound
+    of friction is 0.
+
+    Parameters
+    ----------
+    T : FixedPointMap
+    given : array, shape (2 n,), optional
+        Nodal forces on the Neumann grid.
+
+    Raises
+    ------
+    ProblemError
+        A given start of another shape, or not finite.
+    ContactError
+        Step II has no minimiser at g = 0 nor at the tied solution.
+    """
+    pair = T.pair
+    zero = np.zeros(pair.neumann.grid.size)
+    if given is not None:
+        g = forces(given, pair)
+        return Start(g=g, source="given", why="given", scale=least_scale(T, g))
+    if not pair.contact.loose:
+        return Start(g=zero)
+    try:
+        T(zero)
+    except NoMinimiser as error:
+        g = tied_force(pair)
+        try:
+            T(g)
+        except NoMinimiser:
+            raise error from None
+        why = f"at g = 0 {error}; the run starts from the solution of the bodies tied together"
+        return Start(g=g, source="tied", why=why)
+    return Start(g=zero)
+
+
+def forces(given: Any, pair: ContactPair, source: str = "") -> Floats:
+    """A given g_0 as an array, shape (2 n,).
+
+    Parameters
+    ----------
+    given : array
+    pair : ContactPair
+    source : str
+        The file that an error names; the source of the pair by default.
+
+    Raises
+    ------
+    ProblemError
+        Another shape, or an entry that is not finite.
+    """
+    size = pair.neumann.grid.size
+    needed = f"needed {size} finite nodal forces on the contact nodes of the Neumann body, tangential ones first"
+    refuse = lambda received: ProblemError(source or pair.source, "start", received, needed)
+    try:
+        g: Floats = np.array(given, dtype=float)
+    except (TypeError, ValueError):
+        raise refuse(type(given).__name__) from None
+    if g.size != size:
+        raise refuse(f"an array of shape {g.shape}")
+    if not np.isfinite(g).all():
+        raise refuse(f"{g[~np.isfinite(g)][0]}")
+    return g.ravel()
+
+
+def tied_force(pair: ContactPair) -> Floats:
+    """g of the bodies tied together along Gamma_c, gap closed: ``(S2 + P' S1 P) u2 = l2 + P' (l1 - S1 gap n)``.
+
+    Linear, without contact and friction, so that it exists wherever the supports hold the two bodies as one.
+    """
+    contact, neumann, interface = pair.contact, pair.neumann, pair.interface
+    apart = interface.carry(neumann.known).copy()
+    apart[contact.grid.normal] += interface.gap
+    matrix = neumann.stiffness + interface.carry_form(contact.stiffness)
+    right = neumann.load + interface.carry_back(contact.load - contact.stiffness @ apart)
+    free = neumann.free
+    u = np.zeros(len(right))
+    u[free] = solve(matrix[np.ix_(free, free)], right[free], assume_a="pos")
+    force: Floats = np.where(free, neumann.stiffness @ u - neumann.load, 0.0)
+    return force
+
+
+def least_scale(T: FixedPointMap, g: Floats) -> float:
+    """Size of the forces that a residual is compared with at least, in the norm (5.21).
+
+    It is 0 where the loads press the bodies together: the present forces are the measure then.  Where T 0 = 0 the
+    solution has no force at all, a run from another start decays towards it, and the measure is the reaction of the
+    tied bodies, or where that is 0 too the start.
+    """
+    zero = np.zeros(len(g))
+    try:
+        image = T.pair.interface.carry_back(T(zero)[1].force)
+    except NoMinimiser:
+        return 0.0
+    if image.any():
+        return 0.0
+    norm = T.pair.neumann.dual_norm
+    return norm(tied_force(T.pair)) or norm(g)
