@@ -208,7 +208,7 @@ def compare(
         Bring the semidefinite bound to within 0.1 % of a factor that occurs, however many programs that takes.
     verified : bool
         Prove bounds of the constants for the exact data of the problem, of what follows from them, and the factor that
-        one semidefinite program gives (with python-flint).  What could not be proved keeps the level ``float``.
+        one semidefinite program gives.  What could not be proved keeps the level ``float``.
     watch : callable
         Called with every iterate.
     progress : callable

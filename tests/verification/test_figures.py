@@ -8,12 +8,16 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from matplotlib.collections import PolyCollection
+from matplotlib.colors import to_rgb
 from strategies import AT_NIGHT
 
 import verification as vf
+from verification.bounds.bound import Region
+from verification.bounds.region import Plane, Point
+from verification.bounds.table import BOUNDS
 from verification.cli.problems import examples
 from verification.figures import draw_bodies, draw_residuals, save
-from verification.figures.style import RAISED, new_figure
+from verification.figures.style import OUTCOMES, RAISED, new_figure
 
 LOWERED = {raised: plain for plain, raised in RAISED.items()}
 
@@ -100,7 +104,10 @@ def test_residuals_are_drawn_on_a_logarithmic_axis_that_says_what_it_shows(runs,
     run = runs[name]
     (axes,) = draw_residuals(run).axes
     assert axes.get_yscale() == "log"
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("evaluations of T", "|||T g - g||| / |||T g|||")
+    assert (axes.get_xlabel(), axes.get_ylabel()) == (
+        "evaluations of T",
+        "residual |||T g - g|||, relative to the forces",
+    )
     x, y = axes.lines[0].get_data()
     shown = [(i, r) for i, r in enumerate(run.history) if r > 0]
     assert list(zip(x, y, strict=True)) == shown
@@ -153,3 +160,62 @@ def test_powers_of_ten_are_written_as_text(tmp_path):
     texts = {"".join(text.itertext()) for text in ElementTree.parse(tmp_path / "powers.svg").findall(".//{*}text")}
     assert {"10⁻¹⁰", "10⁰", "2×10⁻¹", "4×10⁻¹"} <= texts
     assert all(float(text.replace("×10", "e").replace("10", "1e").translate(LOWERED)) > 0 for text in texts)
+
+
+# --- read by everyone, on paper too -----------------------------------------------------------------------------------
+
+
+def grey(colour) -> float:
+    """Lightness in grey print, 0 to 1."""
+    return float(np.dot(to_rgb(colour), (0.299, 0.587, 0.114)))
+
+
+def contrast(one, other) -> float:
+    """Ratio of relative luminances, 1 to 21, as the guidelines for accessible pages define it."""
+
+    def luminance(colour):
+        channels = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in to_rgb(colour)]
+        return float(np.dot(channels, (0.2126, 0.7152, 0.0722)))
+
+    high, low = sorted((luminance(one), luminance(other)), reverse=True)
+    return (high + 0.05) / (low + 0.05)
+
+
+@pytest.fixture(scope="module")
+def plane():
+    """A plane with a region of every bound and a run of every outcome."""
+    region = lambda k: Region(k=(k / 2, k), theta=((0.1, 0.9), (0.2, 0.8)), every=k, some=k)
+    points = [
+        Point(theta=0.1 * i, k=0.1, outcome=outcome, iterations=9, coupled_residual=None)
+        for i, outcome in enumerate(OUTCOMES, 1)
+    ]
+    regions = {name: region(10.0**-i) for i, name in enumerate(reversed(BOUNDS))}
+    return Plane(title="all", regions=regions, points=tuple(points), reason={}, units={"length": "mm", "stress": "MPa"})
+
+
+def test_regions_are_told_apart_in_grey_print_and_their_hatches_seen(plane):
+    drawn = [c for c in plane.plot().axes[0].collections if isinstance(c, PolyCollection)]
+    assert len(drawn) == len(BOUNDS)
+    fills = [each.get_facecolor()[0] for each in drawn]
+    assert all(fill[3] == 1 for fill in fills)  # else what lies below changes it
+    shades = sorted(grey(fill[:3]) for fill in fills)
+    assert min(np.diff([*shades, 1.0])) > 0.05
+    assert min(np.diff(shades)) > 0.15
+    for each, fill in zip(drawn, fills, strict=True):
+        if each.get_hatch():
+            assert contrast(each.get_edgecolor()[0][:3], fill[:3]) > 3
+
+
+def test_runs_of_each_outcome_have_a_marker_of_their_own_that_stands_out(plane):
+    lines = plane.plot().axes[0].lines
+    assert len({line.get_marker() for line in lines}) == len(OUTCOMES)
+    for line in lines:
+        assert contrast(line.get_markerfacecolor(), line.get_markeredgecolor()) > 3
+
+
+def test_lines_of_bounds_stand_out_on_white_and_have_dashes_of_their_own(comparisons):
+    assert all(contrast(bound.colour, "white") > 4.5 for bound in BOUNDS.values())
+    for comparison in comparisons.values():
+        lines = draw_residuals(comparison.run, comparison.computed).axes[0].lines
+        assert all(contrast(line.get_color(), "white") > 3 for line in lines if len(line.get_xdata()) > 2)
+    assert len({str(bound.dashes) for bound in BOUNDS.values()}) == len(BOUNDS)

@@ -13,7 +13,7 @@ import pytest
 import strategies
 from chain_problems import case, state_of, step_II, with_loads
 from dense_oracle import DensePair, symmetric, top
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from problem_list import PROBLEMS, loaded_bars
 from scipy.linalg import eigh
@@ -278,6 +278,7 @@ def test_the_chain_from_T_to_its_bound_adds_up(seed):
 
 @strategies.fewer(10, at_night=5)
 @given(seed=seeds, k=st.sampled_from(["1/100", "1/2", "1"]))
+@example(seed=110666, k="1/100")  # neighbours were found worse that are not, by rounding: the search took another way
 def test_the_chain_from_the_friction_term_to_its_bound_adds_up(seed, k):
     """To (5.30) repaired, and from there to what is printed."""
     found = case_of(seed, k)

@@ -16,6 +16,7 @@ from fem1d2d.loewner import positive_definite
 from verification.bounds.multipliers import QuadraticForms
 from verification.bounds.program import LMIError
 from verification.constants import measure
+from verification.interface import assembly
 from verification.interface.assembly import build
 
 Exact = list[list[Fraction]]
@@ -168,7 +169,7 @@ def test_the_multipliers_prove_the_factor_in_rationals(seed):
     )
 
 
-@pytest.mark.parametrize(("length", "condition"), [(10**2, 1e7), (10**3, 1e9), (10**4, 1e11), (10**5, 1e13)])
+@pytest.mark.parametrize(("length", "condition"), [(10**2, 1e7), (10**3, 1e9), (10**4, 1e11), (5 * 10**4, 1e12)])
 def test_near_singular_stiffness_makes_the_factor_larger_never_too_small(length, condition):
     """The value that is given is proved in rationals; it gives away at most a thousandth for it."""
     pair = build(slender(length))
@@ -178,8 +179,9 @@ def test_near_singular_stiffness_makes_the_factor_larger_never_too_small(length,
     assert definite(exact_form(pair, found.multipliers, 0.5, Fraction(found.value) ** 2 * (1 + Fraction(1, 10**15))))
 
 
-def test_where_rounding_hides_what_the_multipliers_leave_nothing_is_claimed():
+def test_where_rounding_hides_what_the_multipliers_leave_nothing_is_claimed(monkeypatch):
     """A tower 1e6 times as high as wide: condition 4e15."""
+    monkeypatch.setattr(assembly, "LEAST_RCOND", 0.0)  # such bodies are refused
     pair = build(slender(10**6))
     with pytest.raises(LMIError):
         QuadraticForms(pair, measure(pair)).factor(0.5)

@@ -17,6 +17,7 @@ from verification.certificate.claims import Claims, Confirmation, NoCertificate
 from verification.certificate.constants import verify
 from verification.certificate.contraction import certify
 from verification.certificate.description import describe
+from verification.certificate.exact_bodies import NotExact
 from verification.constants import measure
 from verification.interface.assembly import build
 from verification.verdicts import judge, judge_bound
@@ -177,13 +178,17 @@ def test_what_cannot_be_certified_says_why(compared, name):
     assert why in lmi.to_dict()["reason"]["certified"]
 
 
-def test_without_python_flint_the_factor_stays_one_in_doubles(whole, plain, monkeypatch):
-    monkeypatch.setattr("verification.certificate.claims.find_spec", lambda name: None)
+def not_exact(*given):
+    raise NotExact("these bodies are made up")
+
+
+def test_of_bodies_that_are_not_exact_the_factor_stays_one_in_doubles(whole, plain, monkeypatch):
+    monkeypatch.setattr("verification.certificate.claims.describe", not_exact)
     lmi, pair = plain.bounds["lmi"].detail, plain.run.pair
     found = lmi.proved(pair, plain.measured, F(7, 10))
     assert not found.certified
     assert found.lipschitz == lmi.lipschitz
-    assert "python-flint is not installed" in found.to_dict()["reason"]["certified"]
+    assert "these bodies are made up" in found.to_dict()["reason"]["certified"]
     assert set(found.to_dict()["unverified"]) == {"theta_max", "friction_threshold"}
     assert found.theta_max == lmi.theta_max
 

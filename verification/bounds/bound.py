@@ -200,8 +200,10 @@ class Bound(ABC):
         In documents and tables.
     words : str
         What it is, for a reader.
-    colour, hatch : str
-        Of its region and its line in figures.
+    colour, dashes : str or tuple
+        Colour and style of its line in figures, on white.
+    fill, hatch : str
+        Colour and pattern of its region; ``colour`` where there is no ``fill``.
     finding : bool
         Whether a step beyond it is a finding about the paper's text, not a fault: true of the printed theorem alone.
     calculated : bool
@@ -213,6 +215,8 @@ class Bound(ABC):
     name: ClassVar[str]
     words: ClassVar[str]
     colour: ClassVar[str]
+    dashes: ClassVar[str | tuple[int, tuple[int, ...]]] = "-."
+    fill: ClassVar[str] = ""
     hatch: ClassVar[str] = ""
     finding: ClassVar[bool] = False
     calculated: ClassVar[bool] = True

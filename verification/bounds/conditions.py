@@ -209,8 +209,8 @@ class Conditions:
         return left, right, cones, y, np.concatenate([np.full(len(y) - len(squares), np.inf), LARGE * squares])
 
     def by_node(self, y: Floats, pieces: Pieces) -> Weights:
-        """The multipliers of :meth:`rows` as those of the families, node by node."""
-        n = len(self.families[0][0])
+        """The multipliers of :meth:`rows` as those of the families, node by node; those below 0 become 0."""
+        y, n = np.maximum(y, 0.0), len(self.families[0][0])
         if len(self.families) == 1:
             return (y,)
         t = len(self.families[1][0])

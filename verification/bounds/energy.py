@@ -14,7 +14,7 @@ class Sharp(Bound):
     """The same proof as Section 5, with no constant larger than it must be; see ``docs/sharp.md``."""
 
     name, words = "sharp", "the theorem in energy norms"
-    colour, hatch = "#009E73", ".."
+    colour, dashes, fill, hatch = "#00724F", (0, (7, 2)), "#8FD3B6", ".."
     attained = True  # without friction
 
     def evaluate(self, subject: Subject, theta: Any = None, *, progress: Progress = silent) -> BoundResult:

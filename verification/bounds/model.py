@@ -5,14 +5,11 @@ from __future__ import annotations
 import warnings
 from typing import Any
 
+import cvxpy as cp
 import numpy as np
 
 from verification.bounds.program import LMIError, Optimum, Program
-from verification.imports import statistics_later
 from verification.threads import one_thread
-
-with statistics_later():
-    import cvxpy as cp
 
 
 def solve(program: Program, *, solver: str = cp.CLARABEL, **options: Any) -> Optimum:

@@ -21,6 +21,9 @@ from verification.dense import pinned, vanishing
 from verification.interface.body import Condensed
 from verification.interface.pair import ContactPair
 
+#: An eigenvalue is close to a level that is nearer to it than this share of the largest eigenvalue.
+NEAR = 1e-3
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Patterns:
@@ -200,7 +203,8 @@ class Neighbours:
         """Whose largest eigenvalue is above a level, or may be, shape (c,); borderline cases fall either way.
 
         On a neighbour the form is ``form + W K W'``, and it has as many eigenvalues above the level as
-        ``K^-1 - W' (level - form)^-1 W`` has negative ones beyond those of K; proof in ``docs/sharp.md``.
+        ``K^-1 - W' (level - form)^-1 W`` has negative ones beyond those of K; proof in ``docs/sharp.md``.  Modes whose
+        eigenvalue is close to the level are not eliminated: to divide by what is left would cost all digits.
 
         Parameters
         ----------
@@ -214,11 +218,17 @@ class Neighbours:
         if not level > eigenvalues[-1]:  # the form is 0 on the pattern itself
             return np.ones(len(self._node), dtype=bool)
         change, mixed, _ = self._changes(eigenvectors)
-        k, added = change.shape[1], np.concatenate([change, mixed], axis=1)
-        small = -(added / (level - eigenvalues)) @ np.swapaxes(added, 1, 2)
-        small[:, :k, k:] += np.eye(k)
-        small[:, k:, :k] += np.eye(k)
-        small[:, k:, k:] -= self._squares
+        k, added, left = change.shape[1], np.concatenate([change, mixed], axis=1), level - eigenvalues
+        near = left < NEAR * np.abs(eigenvalues).max()
+        far, close = added[..., ~near] / left[~near], added[..., near]
+        inner = -far @ np.swapaxes(added[..., ~near], 1, 2)
+        inner[:, :k, k:] += np.eye(k)
+        inner[:, k:, :k] += np.eye(k)
+        inner[:, k:, k:] -= self._squares
+        beside = np.broadcast_to(np.diag(left[near]), (len(inner), near.sum(), near.sum()))
+        small = np.concatenate(
+            [np.concatenate([inner, close], axis=2), np.concatenate([np.swapaxes(close, 1, 2), beside], axis=2)], axis=1
+        )
         for _ in range(2):  # rows of any unit
             scale = 1 / np.sqrt(np.abs(small).max(axis=2, keepdims=True) + np.finfo(float).tiny)
             small = scale * small * np.swapaxes(scale, 1, 2)

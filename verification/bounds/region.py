@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from verification.algorithm.runs import Outcome
+from verification.algorithm.ending import Outcome
 from verification.bounds.bound import NotComputed, Region, Subject
 from verification.bounds.table import BOUNDS
 from verification.constants import SLIDES, measure
@@ -36,12 +36,13 @@ MOST_STEPS = 300
 
 @dataclass(frozen=True, kw_only=True)
 class Point:
-    """What a run did."""
+    """Outcome of a run; ``coupled_residual`` as in :class:`verification.Run`."""
 
     theta: float
     k: float
     outcome: Outcome
     iterations: int
+    coupled_residual: float | None
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -169,4 +170,10 @@ def _point(row: Row) -> Point:
     """
     if row["steps"] is None:
         raise ContactError(row["reason"])
-    return Point(theta=row["theta"], k=row["friction"], outcome=row["outcome"], iterations=row["steps"])
+    return Point(
+        theta=row["theta"],
+        k=row["friction"],
+        outcome=row["outcome"],
+        iterations=row["steps"],
+        coupled_residual=row["coupled_residual"],
+    )

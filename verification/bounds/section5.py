@@ -51,7 +51,7 @@ class Printed(Section5):
     """As the paper prints it: in a unit of stress in which m >= 1."""
 
     name, words, edition = "printed", "the theorem as printed", PRINTED
-    colour, hatch = "#999999", "xx"
+    colour, dashes, fill, hatch = "#555555", ":", "#555555", "xx"
     finding = True
 
     def _unit(self, subject: Subject) -> str:
@@ -62,4 +62,4 @@ class Repaired(Section5):
     """With the lost power of m put back: the same in every unit."""
 
     name, words, edition = "repaired", "the theorem repaired", REPAIRED
-    colour, hatch = "#56B4E9", "//"
+    colour, dashes, fill, hatch = "#0B5A94", (0, (5, 1, 1, 1, 1, 1)), "#4A90C4", "//"

@@ -244,7 +244,7 @@ class SemidefiniteBound(Bound):
     """What multipliers of the conditions of step II prove, sign by sign of slip where needed; see ``docs/sharp.md``."""
 
     name, words = "lmi", "the semidefinite bound"
-    colour = "#F0E442"
+    colour, dashes, fill = "#8A5A00", "-.", "#FFF3B0"
     calculated = False
     attained = True  # without friction
 

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from verification.bounds.region import Plane
 from verification.bounds.table import BOUNDS
-from verification.figures.style import OUTCOMES, THETA, legend_beside, new_figure, plain, styled
+from verification.figures.style import OUTCOMES, THETA, ink, legend_beside, new_figure, plain, styled
 
 #: The enlarged part ends this much above the largest friction of which something is proved.
 ROOM = 1.3
@@ -49,13 +49,17 @@ def _draw(ax: Axes, plane: Plane, left: float, bottom: float) -> None:
         k = [bottom, *region.k]
         low = [max(lo, left) for lo, _ in (region.theta[0], *region.theta)]
         high = [hi for _, hi in (region.theta[0], *region.theta)]
-        unit = f" ({plane.units['stress']})" if name == "printed" else ""
-        look: dict[str, Any] = {"color": bound.colour, "alpha": 0.55, "linewidth": 0, "hatch": bound.hatch}
+        unit = f" ({plain(plane.units['stress'])})" if name == "printed" else ""
+        fill = bound.fill or bound.colour
+        look: dict[str, Any] = {"facecolor": fill, "edgecolor": ink(fill), "linewidth": 0, "hatch": bound.hatch}
         ax.fill_betweenx(k, low, high, step="pre", label=f"{name}{unit}: k < {max(region.k):.2g}", **look)
     for outcome, (colour, marker) in OUTCOMES.items():
         chosen = [point for point in plane.points if point.outcome == outcome]
         if chosen:
             x, y = [p.theta for p in chosen], [p.k for p in chosen]
             # a run that was still falling when it was stopped contradicts nothing: an empty marker
-            fill, label = ("none", "run still falling when stopped") if outcome == "limit" else (None, f"run {outcome}")
-            ax.plot(x, y, marker, color=colour, markerfacecolor=fill, markersize=4, label=label)
+            face, edge, words = colour, "white", outcome
+            if outcome == "limit":
+                face, edge, words = "white", colour, "still falling when stopped"
+            look = {"markerfacecolor": face, "markeredgecolor": edge, "markeredgewidth": 0.7, "markersize": 5}
+            ax.plot(x, y, marker, **look, label=f"run {words}")

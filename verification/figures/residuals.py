@@ -39,13 +39,14 @@ def draw_residuals(run: Run, bounds: Sequence[BoundResult] = ()) -> Figure:
         for row in bounds:
             if row.factor is not None and shown.any():
                 line = history[shown][0] * row.factor.value**steps
-                ax.semilogy(steps, line, "-.", color=BOUNDS[row.name].colour, label=f"{row.name} bound")
+                bound = BOUNDS[row.name]
+                ax.semilogy(steps, line, linestyle=bound.dashes, color=bound.colour, label=f"{row.name} bound")
         if run.last.scale > 0:
             floor = noise(run.pair, run.last) / run.last.scale
             ax.axhline(floor, color="0.7", linewidth=0.8, linestyle=":", label="rounding")
         ax.axhline(run.pair.settings.tolerance, color="0.4", linewidth=0.8, linestyle=":", label="tolerance")
         ax.set_xlabel("evaluations of T")
-        ax.set_ylabel("|||T g - g||| / |||T g|||")
+        ax.set_ylabel("residual |||T g - g|||, relative to the forces")
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
         ax.set_title(f"{plain(run.pair.title)}: theta = {float(run.theta):g}")
         legend_beside(ax)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import threading
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,8 +13,12 @@ from typing import Any
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from matplotlib.ticker import LogFormatterSciNotation
+
+from ndtheory.texts import clean, printable
 
 #: Blue, vermilion and their kin from the palette of Okabe and Ito; they differ in lightness too.
 BODY1, BODY2 = "#0072B2", "#D55E00"
@@ -22,7 +27,7 @@ STATES = {"stick": "#009E73", "slip": "#E69F00", "open": "#999999"}
 #: Colour and marker of a run by its outcome.
 OUTCOMES = {
     "converged": ("#0072B2", "o"),
-    "limit": ("#E69F00", "^"),
+    "limit": ("#B35900", "^"),
     "stalled": ("#D55E00", "s"),
     "diverged": ("#000000", "X"),
 }
@@ -45,6 +50,10 @@ _PARAMETERS: Any = {
 }
 
 
+#: matplotlib has one set of parameters for all threads: one draws at a time.
+_drawing = threading.RLock()
+
+
 def new_figure(width: float, height: float) -> Figure:
     """An empty figure of the given size in inches, free of any window system."""
     with styled():
@@ -56,11 +65,17 @@ def new_figure(width: float, height: float) -> Figure:
 @contextmanager
 def styled() -> Iterator[None]:
     """A context in which axes and artists take the house's parameters, whatever the user's configuration says."""
-    with mpl.rc_context(), warnings.catch_warnings():
+    with _drawing, mpl.rc_context(), warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # a character that no installed font has
         mpl.rcdefaults()
         mpl.rcParams.update(_PARAMETERS)
         yield
+
+
+def ink(fill: str) -> str:
+    """Dark or light grey for marks on a fill, whichever stands out more in grey print."""
+    red, green, blue = to_rgb(fill)
+    return "0.15" if 0.299 * red + 0.587 * green + 0.114 * blue > 0.5 else "0.9"
 
 
 def legend_beside(ax: Axes) -> None:
@@ -70,7 +85,7 @@ def legend_beside(ax: Axes) -> None:
 
 def plain(text: str) -> str:
     """A text from outside as it is: no mathematics between dollar signs, no control characters."""
-    return "".join(c if c.isprintable() else " " for c in text).replace("$", r"\$")
+    return printable(text).replace("$", r"\$")
 
 
 class Powers(LogFormatterSciNotation):
@@ -87,6 +102,10 @@ def save(figure: Figure, path: Path) -> None:
 
     The axes are laid out for the first file alone: that takes longer than to draw them.
     """
+    for text in figure.findobj(Text):
+        lines = text.get_text().split("\n")
+        if not all(map(clean, lines)):  # no XML, where it is an SVG
+            text.set_text("\n".join(map(printable, lines)))
     for axis in (axis for ax in figure.axes for axis in (ax.xaxis, ax.yaxis)):
         if type(axis.get_major_formatter()) is LogFormatterSciNotation:  # not for a second file
             axis.set_major_formatter(Powers())
