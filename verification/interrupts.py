@@ -1,10 +1,13 @@
-"""Ctrl-C while something runs that must not see it."""
+"""Ctrl-C while something runs that must not see it, and processes that end with the one that started them."""
 
 from __future__ import annotations
 
 import contextlib
+import os
 import signal
+import threading
 from collections.abc import Iterator
+from multiprocessing.connection import Connection
 
 #: Why something is missing that was not worked out after Ctrl-C.
 INTERRUPTED = "interrupted before it was worked out"
@@ -25,3 +28,24 @@ def undisturbed() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def begin_child(life: Connection) -> None:
+    """Begin a process that works for another one: it leaves Ctrl-C to its parent, and ends when that does.
+
+    It stands in a module that imports no arrays: the parent may end while they are still imported.
+
+    Parameters
+    ----------
+    life : Connection
+        The reading end of a pipe on which nothing is sent.  Only the parent has the other end, which whatever ends the
+        parent closes, SIGKILL too.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def end_with_parent() -> None:
+        with contextlib.suppress(EOFError, OSError):
+            life.recv_bytes()
+        os._exit(1)
+
+    threading.Thread(target=end_with_parent, daemon=True).start()

@@ -2,30 +2,69 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import threading
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from typing import Any
 
+#: Guards the two below.  The thread that holds it may take it again, as the handler of a signal does.
+_lock = threading.RLock()
+
+#: One entry for everybody who is inside :func:`one_thread`.
+_inside: set[object] = set()
+
+#: The numbers of threads that the last one to leave sets again, by library.
+_before: dict[Any, int] = {}
+
 
 @cache
-def _libraries() -> list[Any]:
+def libraries() -> tuple[list[Any], list[Any]]:
+    """The BLAS libraries with one number of threads for the process, and those with one for each thread of Python."""
     from threadpoolctl import ThreadpoolController  # the calculator starts without it
 
-    return list(ThreadpoolController().select(user_api="blas").lib_controllers)
+    found = ThreadpoolController().select(user_api="blas").lib_controllers
+    apart = [library for library in found if getattr(library, "threading_layer", "") == "openmp"]
+    return [library for library in found if library not in apart], apart
+
+
+def _set(numbers: Sequence[tuple[Any, int]]) -> None:
+    """Set numbers of threads from whichever thread this is.
+
+    Newer versions of threadpoolctl obey the first thread that sets a number, and ignore all others while it lives.
+    """
+    owned = {type(library) for library, _ in numbers if hasattr(library, "clear_controlling_thread")}
+    for kind in owned:
+        kind.clear_controlling_thread(force=True)
+    for library, threads in numbers:
+        library.set_num_threads(threads)
+    for kind in owned:
+        kind.clear_controlling_thread(force=True)
 
 
 @contextmanager
 def one_thread() -> Iterator[None]:
     """A context in which BLAS uses one thread; what was set before returns after it.
 
-    On matrices of a few hundred rows a second thread costs more than it gives, ten times more on a busy machine.
+    Most libraries have one number of threads for the whole process: it stays 1 until the last of all threads that are
+    in such a context has left.  On matrices of a few hundred rows a second BLAS thread costs more than it gives, ten
+    times more on a busy machine.
     """
-    several = [(library, threads) for library in _libraries() if (threads := library.num_threads) != 1]
+    shared, apart = libraries()
+    token = object()
+    own = [(library, threads) for library in apart if (threads := library.num_threads) != 1]
     try:
-        for library, _ in several:
-            library.set_num_threads(1)
+        _set([(library, 1) for library, _ in own])
+        with _lock:
+            _inside.add(token)
+            several = {library: threads for library in shared if (threads := library.num_threads) != 1}
+            _before.update(several)
+            _set([(library, 1) for library in several])
         yield
     finally:
-        for library, threads in several:
-            library.set_num_threads(threads)
+        with _lock:
+            _inside.discard(token)
+            if not _inside:
+                _set(list(_before.items()))
+                _before.clear()
+        _set(own)

@@ -1,11 +1,13 @@
 """`sweep`: its file, its screen, its table and what ends it."""
 
 import csv
+import importlib.util
 import re
 import signal
 from fractions import Fraction
 
 import pytest
+from complaints import assert_names
 from processes import ended
 from strategies import AT_NIGHT
 
@@ -209,19 +211,35 @@ def test_what_serves_for_no_sweep_is_one_line(call, sweep_file, tmp_path, monkey
     assert path.read_bytes() == before
 
 
-def test_without_dask_the_extra_is_named(call, sweep_file, monkeypatch):
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    assert "pip install 'ndtheory[cluster]'" in call("sweep", sweep_file(), "--dask", "tcp://host:8786").complaint
+@pytest.mark.parametrize(
+    ("options", "module", "extra"),
+    [
+        (("--dask", "tcp://host:8786"), "distributed", "cluster"),
+        (("--export", "results"), "xarray", "dataset"),
+        (("--export", "results"), "netCDF4", "dataset"),
+    ],
+)
+def test_without_its_extra_an_option_is_refused_before_anything_runs(
+    call, sweep_file, tmp_path, monkeypatch, options, module, extra
+):
+    find = importlib.util.find_spec
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == module else find(name))
+    monkeypatch.setattr(workers, "row", None)
+    monkeypatch.chdir(tmp_path)
+    path = sweep_file()
+    before = sorted(tmp_path.iterdir())
+    assert_names(call("sweep", path, *options).complaint, options[0], module, f"pip install 'ndtheory[{extra}]'")
+    assert sorted(tmp_path.iterdir()) == before
 
 
 #: The command in a process group that gets Ctrl-C so many seconds after the workers were asked for, as on a terminal.
 INTERRUPTED = """
     import os, signal, sys, threading
     os.environ["OPENBLAS_NUM_THREADS"] = "1"  # as the command sets it before numpy comes: threads would take the signal
-    import joblib
+    import joblib.executor
     from verification.cli import main
 
-    call = joblib.Parallel.__call__
+    call = joblib.executor.get_memmapping_executor
     waits = [float(sys.argv.pop(1))]
 
     def called(*args, **named):
@@ -229,7 +247,7 @@ INTERRUPTED = """
             threading.Timer(waits.pop(), os.killpg, (0, signal.SIGINT)).start()
         return call(*args, **named)
 
-    joblib.Parallel.__call__ = called
+    joblib.executor.get_memmapping_executor = called
     sys.exit(main())
 """
 
@@ -265,15 +283,6 @@ def test_plots_are_drawn_beside_the_table(call, sweep_file, tmp_path):
     assert "grid-theta-law.svg is not drawn: no row has a number for law" in answer.err
 
 
-def test_without_the_extra_a_csv_file_is_exported_and_the_extra_is_named(call, sweep_file, tmp_path, monkeypatch):
-    monkeypatch.setattr("verification.sweeps.export.importlib.util.find_spec", lambda name: None)
-    answer = call("sweep", sweep_file(), "--jobs", 1, "--export", tmp_path / "results")
-    assert answer.status == 0
-    assert "pip install 'ndtheory[dataset]'" in answer.err
-    assert [path.name for path in (tmp_path / "results").iterdir()] == ["grid.csv"]
-    assert (tmp_path / "results" / "grid.csv").read_bytes() == (tmp_path / "grid.csv").read_bytes()
-
-
 def test_a_log_has_lines_about_rows_done_failed_and_left(call, sweep_file, tmp_path):
     grid = "theta = [0.4, 0.6]\nrefine = [0, 8]"
     assert call("sweep", sweep_file(grid), "--jobs", 1, "--log", tmp_path / "log").status == 0
@@ -281,6 +290,32 @@ def test_a_log_has_lines_about_rows_done_failed_and_left(call, sweep_file, tmp_p
     when = r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d "
     assert re.fullmatch(when + "runs: 0 done, 0 failed, 4 left", first)
     assert re.fullmatch(when + "runs: 4 done, 2 failed, 0 left, about 0 s to go", last)
+
+
+@pytest.mark.parametrize("content", [b"", None])
+def test_a_new_log_an_empty_one_and_one_of_a_sweep_are_continued(call, sweep_file, tmp_path, content):
+    log = tmp_path / "log"
+    if content is not None:
+        log.write_bytes(content)
+    for _ in range(2):
+        assert call("sweep", sweep_file(), "--jobs", 1, "--log", log).status == 0
+    lines = log.read_text("utf-8").splitlines()
+    assert [line.split(" ", 2)[2] for line in lines if " 4 left" in line] == ["runs: 0 done, 0 failed, 4 left"]
+    assert lines[-1].endswith("runs: 4 done, 0 failed, 0 left")
+
+
+@pytest.mark.parametrize("name", ["problem.toml", "grid.toml", "notes", "binary", "folder", "grid.csv", "grid.sqlite"])
+def test_a_log_is_appended_to_no_other_file_and_nothing_is_changed(call, sweep_file, tmp_path, monkeypatch, name):
+    path = sweep_file()
+    (tmp_path / "notes").write_text("2026-01-01 10:00:00 mine\n", encoding="utf-8")
+    (tmp_path / "binary").write_bytes(bytes(range(256)))
+    (tmp_path / "folder").mkdir()
+    before = {file: file.is_file() and file.read_bytes() for file in tmp_path.iterdir()}
+    monkeypatch.setattr(workers, "row", None)
+    complaint = call("sweep", path, "--jobs", 1, "--log", tmp_path / name).complaint
+    assert f"{tmp_path / name}: " in complaint
+    assert "(--log)" in complaint
+    assert {file: file.is_file() and file.read_bytes() for file in tmp_path.iterdir()} == before
 
 
 def test_lines_about_progress_keep_their_distance():

@@ -145,14 +145,15 @@ def test_bodies_are_condensed_once_a_worker(cluster, tmp_path, monkeypatch):
         import os
         from verification.interface import body
 
-        made = body.Condensation
+        def counted(made):
+            def count(*args, **named):
+                with open({str(tmp_path / "made")!r}, "a") as file:
+                    file.write(f"{{os.getpid()}}\\n")
+                return made(*args, **named)
 
-        def counted(*args, **named):
-            with open({str(tmp_path / "made")!r}, "a") as file:
-                file.write(f"{{os.getpid()}}\\n")
-            return made(*args, **named)
+            return count
 
-        body.Condensation = counted
+        body.Condensation, body.Lifted = counted(body.Condensation), counted(body.Lifted)  # of many unknowns, of few
     """
     (tmp_path / "counted_bodies.py").write_text("\n".join(line[8:] for line in text.splitlines()))
     up = cluster(PYTHONPATH=str(tmp_path), DASK_DISTRIBUTED__WORKER__PRELOAD="counted_bodies")

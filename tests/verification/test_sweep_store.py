@@ -222,38 +222,57 @@ def test_rows_of_another_version_are_told_and_neither_used_nor_lost(place, made,
 #: Sweeps in processes that are killed after the milliseconds of the arguments, until one ends; says how many did not.
 KILLED = """
     import os, signal, sys, time
+    from pathlib import Path
     import verification as vf
     from verification.sweeps.workers import row  # noqa: F401  what a child would import first
 
+    folder = Path({folder!r})
     problem = vf.Problem.from_dict({problem!r})
-    killed = 0
-    for milliseconds in map(float, sys.argv[1:]):
+
+    def swept(place):
         child = os.fork()
         if not child:
-            vf.sweep(problem, **{grid!r}, store={store!r})
+            vf.sweep(problem, **{grid!r}, store=str(place))
             os._exit(0)
-        time.sleep(milliseconds / 1000)
+        return child
+
+    begun = time.monotonic()
+    os.waitpid(swept(folder / "not killed.sqlite"), 0)
+    whole = time.monotonic() - begun
+
+    stores = [folder / "0.sqlite"]
+    killed = 0
+    for share in map(float, sys.argv[1:]):
+        child = swept(stores[-1])
+        time.sleep(share * whole)
         os.kill(child, signal.SIGKILL)
-        killed += os.waitpid(child, 0)[1] == signal.SIGKILL
-    print(killed)
+        if os.waitpid(child, 0)[1] == signal.SIGKILL:
+            killed += 1
+        else:  # all rows are there: what comes after it would only read them
+            stores.append(folder / f"{{len(stores)}}.sqlite")
+    print(killed, len(stores))
 """
 
 LONG = {"theta": [f"{n}/40" for n in range(1, 40)], "friction": [0, "1/5", "2/5"]}
 
 
 @pytest.mark.parametrize("moments", [50 if AT_NIGHT else 12])
-def test_a_sweep_killed_at_random_moments_ends_with_the_table_of_one_that_was_not(place, moments):
+def test_a_sweep_killed_at_random_moments_ends_with_the_table_of_one_that_was_not(tmp_path, moments):
+    """After a tenth of the time of a whole sweep on the average; where all rows are there a new store is begun."""
     random = np.random.default_rng(moments)
-    code = KILLED.format(problem=SMALL.to_dict(), grid=LONG, store=str(place))
-    chosen = random.exponential(120, size=moments).round(1)
+    code = KILLED.format(problem=SMALL.to_dict(), grid=LONG, folder=str(tmp_path))
+    chosen = random.exponential(0.1, size=moments).round(4)
     answer = ended(code, *chosen, env=os.environ | {"OPENBLAS_NUM_THREADS": "1"})
     assert answer.returncode == 0, answer.stderr
-    assert int(answer.stdout) >= moments // 4  # the others came when all rows were there, as they soon are
-    found = vf.sweep(SMALL, **LONG, store=place)
-    assert found.stored > 0
-    assert found.to_csv().encode() == vf.sweep(SMALL, **LONG).to_csv().encode()
+    killed, stores = map(int, answer.stdout.split())
+    assert killed >= moments // 2
+    table = vf.sweep(SMALL, **LONG).to_csv().encode()
+    found = [vf.sweep(SMALL, **LONG, store=tmp_path / f"{n}.sqlite") for n in range(stores)]
+    assert [each.to_csv().encode() == table for each in found] == [True] * stores
+    assert sum(each.stored for each in found) > 0
     # a row that was written a second time would have another number
-    assert read(place, "SELECT count(*), max(rowid) FROM rows") == [(117, 117)]
+    counted = [read(tmp_path / f"{n}.sqlite", "SELECT count(*), max(rowid) FROM rows") for n in range(stores)]
+    assert counted == [[(117, 117)]] * stores
 
 
 def test_rows_that_were_kept_when_the_process_is_killed_are_there(place):
@@ -403,6 +422,20 @@ def test_a_store_damaged_anywhere_is_words_or_the_true_table(place, seed):
     place.write_bytes(content)
     found = table_or_words(place)
     assert found == true or (found.startswith(str(place)) and "\n" not in found)
+
+
+@pytest.mark.parametrize("name", [b"\xe4", b"a\nb", b"\x1b[2J"])
+def test_what_sqlite_repeats_of_a_damaged_store_is_not_shown(place, name):
+    """The name of a table that it cannot read is part of its message: bytes that are no text, or no letters."""
+    vf.sweep(SMALL, theta=["0.3"], store=place)
+    with closing(sqlite3.connect(place)) as file:
+        file.execute("PRAGMA writable_schema = ON")
+        broken = "UPDATE sqlite_master SET name = CAST(? AS TEXT), sql = 'CREATE nonsense' WHERE name = 'rows'"
+        file.execute(broken, [name])
+        file.commit()
+    with pytest.raises(store.StoreError) as refused:
+        vf.sweep(SMALL, theta=["0.3"], store=place)
+    assert str(refused.value) == f"{place}: {store.DAMAGED}"
 
 
 def test_the_store_says_what_its_rows_are_made_from(place):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from verification.cli.console import figures, heading, near_one, note, printable, say, table
+from verification.cli.console import figures, heading, near_one, note, say, table
 from verification.cli.typed import Typed
 from verification.sweeps.keeping import Plan
 from verification.sweeps.row import Row
@@ -20,7 +20,7 @@ HEADS = {"young1": "E1", "young2": "E2", "neumann_body": "Neumann", "friction": 
 
 def sweep(found: Sweep, target: Path | None = None) -> None:
     """The screen of ``sweep``."""
-    title = "matrices" if found.problem is None else printable(found.problem.title)
+    title = "matrices" if found.problem is None else found.problem.title
     say(f"{title} | {len(found.rows)} of {found.asked} runs" if found.interrupted else f"{title} | {found.asked} runs")
     curves = [name for name in found.axes if name != "theta"]
     groups = found.values(curves)
@@ -49,7 +49,7 @@ def sweep(found: Sweep, target: Path | None = None) -> None:
 
 def plan(found: Plan) -> None:
     """The screen of ``sweep --dry-run``."""
-    title = "matrices" if found.problem is None else printable(found.problem.title)
+    title = "matrices" if found.problem is None else found.problem.title
     say(f"{title} | {found.asked} runs")
     say(f"  {found.stored} are in the store, {found.left} are left; nothing was run")
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+from ndtheory.texts import printable
 from verification.cli.console import Interrupted, complain, deliver, stages
 from verification.cli.problems import FILE, FOLDER, JSON
 
@@ -21,6 +23,10 @@ if TYPE_CHECKING:
 
 #: Seconds between two lines about progress: in a file of their own, and on a stderr that is no terminal.
 IN_LOG, ON_STDERR = 10, 60
+
+#: How a log of a sweep begins, and how large it may become.
+LOG = re.compile(rb"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d runs: \d+ done, ")
+MOST_LOG_BYTES = 1_000_000_000
 
 JOBS = click.option(
     "--jobs", type=click.IntRange(1), metavar="N", help="How many processes run at once; one for each core by default."
@@ -96,6 +102,7 @@ def sweep(
       ndtheory sweep grid.toml --plot theta,iterations,friction --export results
     """
     from verification.cli import sweep_screen
+    from verification.extras import require
     from verification.output.folder import check_ours
     from verification.sweeps.keeping import plan
     from verification.sweeps.sweep import sweep_grid
@@ -104,6 +111,8 @@ def sweep(
 
     if dask is not None and jobs is not None:
         raise click.UsageError("needed either --jobs, for this machine, or --dask, for a cluster")
+    for option in (name for name, given in (("--export", export), ("--dask", dask)) if given is not None):
+        require(option)
     problem, grid = read_sweep(file)
     room = file.parent if folder is None else folder
     target, kept = room / f"{file.stem}.csv", store or room / f"{file.stem}.sqlite"
@@ -113,6 +122,7 @@ def sweep(
         _tell(planned.notes)
         return
     targets = _targets(file.stem, target, plots, export)
+    _check_log(log, [kept, *targets])
     for one in targets:
         _check_folder(one.parent, "--export" if one.parent == export else "-o")
         check_ours(one)
@@ -151,18 +161,13 @@ def _targets(
 
 
 def _write(found: Sweep, targets: dict[Path, Callable[[Sweep, Path], None]]) -> None:
-    """Write each file; what cannot be drawn or has no library is said, and costs no other file."""
+    """Write each file; what cannot be drawn is said, and costs no other file."""
     from verification.output.folder import staged
-    from verification.problem.tables import ProblemError
 
     for path, write in targets.items():
         with staged(path.parent, shown=path) as place:
             try:
                 write(found, place / path.name)
-            except ProblemError as error:
-                if path.suffix != ".nc":
-                    raise
-                complain(f"{path} is not written: {error}")
             except ValueError as error:
                 if path.suffix != ".svg":
                     raise
@@ -178,6 +183,28 @@ def _check_folder(room: Path, option: str) -> None:
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or error
         raise ProblemError(str(room), "", None, f"needed a folder to write to ({option}): {why}") from None
+
+
+def _check_log(log: Path | None, others: Sequence[Path]) -> None:
+    """Refuse to append to what is neither new, nor empty, nor a log of this command."""
+    from verification.problem.tables import ProblemError, unreadable
+
+    if log is None:
+        return
+    refuse = lambda needed: ProblemError(str(log), "", None, f"{needed} (--log)")
+    if log.absolute() in [other.absolute() for other in others]:
+        raise refuse("needed a separate file for the log")
+    if not log.exists():
+        return
+    if why := unreadable(log, MOST_LOG_BYTES):
+        raise refuse(why)
+    try:
+        with log.open("rb") as there:
+            first = there.readline(200)
+    except OSError as error:
+        raise refuse(f"cannot be read: {error.strerror}") from None
+    if first and not LOG.match(first):
+        raise refuse("needed a new file, an empty one or a log of a sweep; this file is left as it is")
 
 
 def _tell(notes: tuple[str, ...]) -> None:
@@ -202,7 +229,7 @@ def _progress(log: Path | None) -> Iterator[Progress]:
 
             def write(line: str) -> None:
                 with contextlib.suppress(OSError):  # a full disk: the rows matter more
-                    stream.write(line + "\n")
+                    stream.write(printable(line) + "\n")
                     stream.flush()
 
             lines = every(IN_LOG, write, at_once=True)

@@ -4,25 +4,22 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import importlib.util
 import threading
 from collections import deque
 from collections.abc import Generator, Sequence
 from itertools import islice
 from typing import Any
 
+from verification.extras import require
 from verification.interface.pair import ContactPair
 from verification.interrupts import undisturbed
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
 from verification.sweeps.row import Row, lost
-from verification.sweeps.workers import Origin, Pieces, Placed, Stopped, Work, some
+from verification.sweeps.workers import AHEAD, Origin, Pieces, Placed, Stopped, Work, some
 
 #: Seconds to wait for a scheduler.
 PATIENCE = 10
-
-#: Pieces that a thread of a worker has before it, so that it need not wait.
-AHEAD = 2
 
 
 def on_cluster(address: str) -> Work:
@@ -37,9 +34,7 @@ def on_cluster(address: str) -> Work:
     ProblemError
         No dask here, or no scheduler there.
     """
-    if not importlib.util.find_spec("distributed"):
-        needed = "needed the extra `cluster`: pip install 'ndtheory[cluster]'"
-        raise ProblemError("--dask", "address", address, needed)
+    require("--dask")
 
     def work(start: Problem | ContactPair, wanted: Sequence[tuple[int, Row]]) -> Generator[Placed, None, None]:
         from distributed import Client

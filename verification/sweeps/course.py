@@ -6,18 +6,19 @@ import math
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import takewhile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fem1d2d.mesh import Floats
+from verification.algorithm.ending import NO_FORCE, PATIENCE, RUNAWAY, Ending, Outcome, arrived, coupled_residual
 from verification.algorithm.fixed_point import iterate_at, iterates
 from verification.algorithm.iterate import Iterate
 from verification.algorithm.linearisation import NotLinear, linearised_rate
 from verification.algorithm.rates import noises, rate_of
 from verification.algorithm.relaxation import Constant, Relaxation, Rule, Step
-from verification.algorithm.runs import PATIENCE, RUNAWAY, Ending, Outcome
 from verification.algorithm.theta import Choice
 from verification.contact import ContactError
 from verification.interface.pair import ContactPair
@@ -45,7 +46,7 @@ class Course:
     paper : int or None
         n at which the test of Section 6.3 is met.
     outcome : {'converged', 'stalled', 'limit', 'diverged'}
-    observed_rate, linearised_rate : float or None
+    observed_rate, linearised_rate, coupled_residual : float or None
         As a run has them.
     reason : mapping
         Why a value is None, or why the outcome is not ``converged``.
@@ -56,6 +57,7 @@ class Course:
     outcome: Outcome
     observed_rate: float | None
     linearised_rate: float | None
+    coupled_residual: float | None
     reason: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -69,7 +71,7 @@ def meets_paper_test(g: Floats, before: Floats) -> NDArray[np.bool_]:
 
 
 def course(pair: ContactPair, rule: Rule, choice: Choice, step: Step, pieces: KnownPieces) -> Course:
-    """Run from g = 0 until both tests are met, or the run stalls, runs away or reaches its limit.
+    """Run from its start until both tests are met, or the run stalls, runs away or reaches its limit.
 
     Raises
     ------
@@ -83,11 +85,20 @@ def course(pair: ContactPair, rule: Rule, choice: Choice, step: Step, pieces: Kn
     observed = None if went.outcome == "diverged" else rate_of(went.residuals, went.floors, went.kinds)
     if observed is None:
         reason["observed_rate"] = _no_rate(went.outcome)
-    linear = None
+    end: Iterate | None = None
+    coupled, linear = None, None
+    try:
+        end = went.end()
+        coupled = coupled_residual(pair, end)
+    except ContactError as error:
+        reason["coupled_residual"] = str(error)
+    else:
+        if coupled is None:
+            reason["coupled_residual"] = NO_FORCE
     try:
         if not isinstance(rule, Constant):
             raise NotLinear(f"the {rule.name} relaxation is no constant theta")
-        here, first = went.arrived() if went.outcome == "converged" else (pieces.solution(), None)
+        here, first = (end, went.entry()) if end and went.outcome == "converged" else (pieces.solution(), None)
         linear = linearised_rate(pieces.piece(here.g, here.contact.pattern), here, float(choice.theta), first)
     except (NotLinear, SolveError, ContactError) as error:
         reason["linearised_rate"] = str(error)
@@ -97,6 +108,7 @@ def course(pair: ContactPair, rule: Rule, choice: Choice, step: Step, pieces: Kn
         outcome=went.outcome,
         observed_rate=None if observed is None else observed.value,
         linearised_rate=linear,
+        coupled_residual=coupled,
         reason=reason,
     )
 
@@ -116,8 +128,10 @@ class _Went:
         n at which the test of Section 6.3 is met.
     why : str
         What ended it before that test was met, other than its outcome.
-    arrived : callable
-        T at its last g, and the g with which it came onto that piece for good.
+    end : callable
+        T at its last g.
+    entry : callable
+        The g with which it came onto the piece of the last g for good.
     """
 
     outcome: Outcome
@@ -126,18 +140,20 @@ class _Went:
     kinds: Sequence[object]
     paper: int | None
     why: str
-    arrived: Callable[[], tuple[Iterate, Floats]]
+    end: Callable[[], Iterate]
+    entry: Callable[[], Floats]
 
 
 def _lean(pieces: KnownPieces, theta: float) -> _Went | None:
     """With constant relaxation: steps on one affine piece are taken together; None where rounding decides the count."""
-    settings, T = pieces.pair.settings, pieces.map()
+    pair, settings, T = pieces.pair, pieces.pair.settings, pieces.map()
     ending, bound = Ending(settings), settings.tolerance
+    joined = lambda g: arrived(pair, iterate_at(T, g))
     residuals: list[float] = []
     walked: list[tuple[Floats, Floats]] = []
     kinds: list[object] = []
     outcome: Outcome | None = None
-    paper, why, scale, n, least, since = None, "", 0.0, -1, math.inf, 0
+    paper, why, n, least, since = None, "", -1, math.inf, 0
     before = last = first = np.zeros(0)
     piece: tuple[bytes, ...] = ()
     try:
@@ -148,15 +164,15 @@ def _lean(pieces: KnownPieces, theta: float) -> _Went | None:
                 walked.append((taken.g, taken.u))
                 if taken.piece != piece:
                     piece, first = taken.piece, taken.g[:, 0]
-            for i, (residual, size) in enumerate(zip(taken.residual.tolist(), taken.size.tolist(), strict=True)):
-                n, scale = n + 1, max(scale, size)
-                ended = ending.at(n, residual, scale)
+            for i, (residual, scale) in enumerate(zip(taken.residual.tolist(), taken.scale.tolist(), strict=True)):
+                n, g = n + 1, taken.g[:, i]
+                ended = ending.at(n, residual, scale, partial(joined, g))
                 if outcome is None:
                     if abs(residual - bound * scale) <= TIE * bound * scale:
                         return None
                     residuals.append(residual)
                     kinds.append(taken.pattern)
-                    outcome, last = ended, taken.g[:, i]
+                    outcome, last = ended, g
                     least, since = (residual, 0) if residual < least else (least, since + 1)
                     if since > WANDERS:
                         return None
@@ -172,15 +188,16 @@ def _lean(pieces: KnownPieces, theta: float) -> _Went | None:
             raise
         why = str(error)
     assert outcome is not None  # the iterates have no end of their own
-    g, u = (np.hstack(parts)[:, : len(residuals)] for parts in zip(*walked, strict=True))
+    gs, us = (np.hstack(parts)[:, : len(residuals)] for parts in zip(*walked, strict=True))
     return _Went(
         outcome=outcome,
         residuals=residuals,
-        floors=pieces.norm.rounding(g, u).tolist(),
+        floors=pieces.norm.rounding(gs, us).tolist(),
         kinds=kinds,
         paper=paper,
         why=why,
-        arrived=lambda: (iterate_at(T, last), first),
+        end=lambda: iterate_at(T, last),
+        entry=lambda: first,
     )
 
 
@@ -199,12 +216,12 @@ def _stepwise(pieces: KnownPieces, step: Step) -> _Went:
     outcome: Outcome | None = None
     before: Floats | None = None
     try:
-        for found in iterates(pieces.map(), step):
+        for found in iterates(pieces.map(), step, pieces.start.g):
             if paper is None and before is not None and meets_paper_test(found.g[:, None], before[:, None])[0]:
                 paper = found.iteration
             if outcome is None:
                 seen.append(found)
-            ended = ending.at(found.iteration, found.residual, found.scale)
+            ended = ending.at(found.iteration, found.residual, found.scale, partial(arrived, pair, found))
             outcome = outcome or ended
             if outcome is not None and (paper is not None or ending.given_up(found.iteration, found.residual)):
                 break
@@ -215,10 +232,10 @@ def _stepwise(pieces: KnownPieces, step: Step) -> _Went:
         why = str(error)
     assert outcome is not None  # the iterates have no end of their own
 
-    def arrived() -> tuple[Iterate, Floats]:
+    def entry() -> Floats:
         last = key_of(pieces.piece(seen[-1].g, seen[-1].contact.pattern))
         same = takewhile(lambda each: key_of(pieces.piece(each.g, each.contact.pattern)) == last, reversed(seen))
-        return seen[-1], deque(same, maxlen=1)[0].g
+        return deque(same, maxlen=1)[0].g
 
     return _Went(
         outcome=outcome,
@@ -227,7 +244,8 @@ def _stepwise(pieces: KnownPieces, step: Step) -> _Went:
         kinds=[each.contact.pattern for each in seen],
         paper=paper,
         why=why,
-        arrived=arrived,
+        end=lambda: seen[-1],
+        entry=entry,
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +10,7 @@ import numpy as np
 
 from ndtheory import __version__
 from verification.algorithm.relaxation import Rule
-from verification.problem.tables import ProblemError
+from verification.extras import require
 from verification.sweeps.row import RESULTS
 from verification.sweeps.sweep import Sweep
 
@@ -38,14 +37,12 @@ NAMES = {
     "outcome": "how the run ended",
     "observed_rate": "rate at the end of the run",
     "linearised_rate": "rate of the linearisation",
+    "coupled_residual": "violation of contact by the joined state at the end",
     "sharp_factor": "q(theta) of the theorem in energy norms",
     "proved_rate": "proved rate",
     "rho": "rho",
     "reason": "why results are missing",
 }
-
-#: What is said where a library is missing.
-NEEDED = "needed the extra `dataset`: pip install 'ndtheory[dataset]'"
 
 #: The outcome of a row that was not made.
 MISSING = "missing"
@@ -61,10 +58,9 @@ def dataset(sweep: Sweep) -> xarray.Dataset:
     Raises
     ------
     ProblemError
-        xarray is not there.
+        xarray or netCDF4 is not installed.
     """
-    if not importlib.util.find_spec("xarray"):
-        raise ProblemError("--export", "", None, NEEDED)
+    require("--export")
     import xarray
 
     axes = sweep.grid.axes
@@ -112,10 +108,8 @@ def write_dataset(sweep: Sweep, path: Path) -> None:
     Raises
     ------
     ProblemError
-        xarray or netCDF4 is not there.
+        As :func:`dataset`.
     """
-    if not importlib.util.find_spec("netCDF4"):
-        raise ProblemError("--export", "", None, NEEDED)
     dataset(sweep).to_netcdf(path, engine="netcdf4")
 
 

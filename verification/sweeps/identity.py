@@ -23,6 +23,9 @@ from verification.sweeps.grid import SweepGrid
 #: How step II is solved in a row: by the active set, and by the model where that does not settle.
 SOLVER = "auto"
 
+#: Raised where a digit of a row may change: 2 since a residual is compared with the present forces.
+NUMERICS = 2
+
 #: Bytes of a key: at a million rows two of them agree by chance once in 1e26 stores.
 LENGTH = 16
 
@@ -69,7 +72,8 @@ class Identity:
         return digest
 
     def _hash(self) -> Any:
-        return hashlib.sha256(json.dumps({"version": self.version, "solver": SOLVER, "of": self.of}).encode("ascii"))
+        of = {"version": self.version, "numerics": NUMERICS, "solver": SOLVER, "of": self.of}
+        return hashlib.sha256(json.dumps(of).encode("ascii"))
 
     def keys(self, grid: SweepGrid) -> list[bytes]:
         """The key of each row of a grid, in the order of its rows.

@@ -18,6 +18,7 @@ from verification.algorithm.fixed_point import FixedPointMap, iterate_at
 from verification.algorithm.iterate import Iterate
 from verification.algorithm.linearisation import NotLinear
 from verification.algorithm.rates import Noise
+from verification.algorithm.start import Start, begin_at
 from verification.contact.active_set import SLACK, Pattern, Systems
 from verification.interface.pair import ContactPair
 from verification.monolithic import SolveError, solution_force
@@ -37,8 +38,8 @@ class Steps:
     ----------
     g, u, image : array, shape (2 n, steps)
         g, its displacement and T g.
-    residual, size : array, shape (steps,)
-        ``|||T g - g|||`` and ``|||T g|||`` in the norm (5.21).
+    residual, scale : array, shape (steps,)
+        ``|||T g - g|||`` and the larger of ``|||g|||`` and ``|||T g|||`` in the norm (5.21).
     pattern, piece : object
         Equal for steps of one contact pattern, and of one affine piece.
     """
@@ -47,7 +48,7 @@ class Steps:
     u: Floats
     image: Floats
     residual: Floats
-    size: Floats
+    scale: Floats
     pattern: bytes
     piece: tuple[bytes, ...]
 
@@ -112,7 +113,13 @@ class Affine:
         kept &= (np.abs(force[:t]) <= bound + slack).all(axis=0)
         kept &= ((self._sliding * v[:t] >= -slack / self._stiffness) | (bound == 0)).all(axis=0)
         steps = Steps(
-            g=g, u=u, image=image, residual=norm.of(image - g), size=norm.of(image), pattern=self.key[0], piece=self.key
+            g=g,
+            u=u,
+            image=image,
+            residual=norm.of(image - g),
+            scale=np.maximum(norm.of(g), norm.of(image)),
+            pattern=self.key[0],
+            piece=self.key,
         )
         return steps, len(kept) if kept.all() else int(np.argmin(kept))
 
@@ -200,8 +207,18 @@ class KnownPieces:
             raise self._solution
         return self._solution
 
+    @cached_property
+    def start(self) -> Start:
+        """Start of the runs.
+
+        Raises
+        ------
+        ContactError
+        """
+        return begin_at(self.map())
+
     def steps(self, T: FixedPointMap, theta: float) -> Iterator[Steps]:
-        """The run with constant relaxation from g = 0, without end.
+        """The run with constant relaxation from its start, without end.
 
         Parameters
         ----------
@@ -213,7 +230,7 @@ class KnownPieces:
         ------
         ContactError
         """
-        g = np.zeros(self.pair.neumann.grid.size)
+        g = self.start.g
         while True:
             found = iterate_at(T, g)
             piece = self.piece(g, found.contact.pattern)
@@ -232,10 +249,10 @@ class KnownPieces:
 
     def _single(self, found: Iterate, piece: Piece) -> Steps:
         g = found.g[:, None]
-        residual, size = np.array([found.residual]), np.array([found.size])
+        residual, scale = np.array([found.residual]), np.array([found.scale])
         key = key_of(piece)
         u = found.displacement[:, None]
-        return Steps(g=g, u=u, image=found.image[:, None], residual=residual, size=size, pattern=key[0], piece=key)
+        return Steps(g=g, u=u, image=found.image[:, None], residual=residual, scale=scale, pattern=key[0], piece=key)
 
 
 def _walk(matrix: Floats, offset: Floats, g: Floats, count: int) -> Floats:
@@ -253,7 +270,7 @@ def _first(steps: Steps, count: int) -> Steps:
         u=steps.u[:, :count],
         image=steps.image[:, :count],
         residual=steps.residual[:count],
-        size=steps.size[:count],
+        scale=steps.scale[:count],
         pattern=steps.pattern,
         piece=steps.piece,
     )

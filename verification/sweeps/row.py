@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Mapping
 from typing import Any
 
 from ndtheory import HypothesisError
 from ndtheory.sharp import one_minus_square
+from ndtheory.texts import clean, printable
 from verification.algorithm.relaxation import Constant, Rule, rule_of
 from verification.algorithm.theta import Choice, begin
 from verification.contact import ContactError
@@ -30,9 +32,28 @@ FAILED = (REFUSED, ERROR)
 
 #: The columns of a row after the values of the grid.
 RESULTS = (
-    *("iterations", "iterations_paper", "steps", "outcome", "observed_rate", "linearised_rate", "sharp_factor"),
-    *("proved_rate", "rho", "reason"),
+    *("iterations", "iterations_paper", "steps", "outcome", "observed_rate", "linearised_rate"),
+    *("coupled_residual", "sharp_factor", "proved_rate", "rho", "reason"),
 )
+
+#: The columns of whole numbers and of texts; the others are numbers.
+WHOLE = ("neumann_body", "refine", "iterations", "iterations_paper", "steps")
+TEXTS = ("law", "rule", "outcome", "reason")
+
+
+def is_row(found: Any) -> bool:
+    """True if a value that was read from JSON has the columns of a row, each of its type and printable."""
+    if not isinstance(found, dict) or found.keys() != {*GIVEN, *RESULTS} or not found["outcome"]:
+        return False
+    return all(value is None or _fits(name, value) for name, value in found.items())
+
+
+def _fits(name: str, value: Any) -> bool:
+    if name in TEXTS:
+        return isinstance(value, str) and clean(value)
+    if isinstance(value, bool) or not isinstance(value, int if name in WHOLE else (int, float)):
+        return False
+    return abs(value) <= sys.float_info.max  # not NaN
 
 
 def row(problem: Problem | ContactPair, values: Mapping[str, Any], bodies: Bodies | None = None) -> Row:
@@ -83,7 +104,9 @@ def lost(problem: Problem | ContactPair, values: Mapping[str, Any], words: str) 
 def _closed(found: Row, why: Mapping[str, str]) -> Row:
     found["reason"] = "; ".join(f"{name}: {' '.join(words.split())}" for name, words in why.items()) or None
     # in a CSV file a "#" begins a comment, in quotes too
-    return {name: value.replace("#", "%23") if isinstance(value, str) else value for name, value in found.items()}
+    return {
+        name: printable(value).replace("#", "%23") if isinstance(value, str) else value for name, value in found.items()
+    }
 
 
 def _given(bodies: Bodies, values: Mapping[str, Any]) -> Row:
@@ -138,6 +161,7 @@ def _run(found: Row, setting: Setting, values: Mapping[str, Any]) -> dict[str, s
         "outcome": went.outcome,
         "observed_rate": went.observed_rate,
         "linearised_rate": went.linearised_rate,
+        "coupled_residual": went.coupled_residual,
     }
     return why | dict(went.reason)
 

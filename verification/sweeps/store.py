@@ -20,7 +20,7 @@ from verification.interrupts import undisturbed
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
 from verification.sweeps.identity import Identity
-from verification.sweeps.row import ERROR, FAILED, Row
+from verification.sweeps.row import ERROR, FAILED, Row, is_row
 
 #: Tells a store from other files of SQLite: "ndth".
 APPLICATION = 0x6E647468
@@ -36,6 +36,12 @@ CREATE TABLE rows (key BLOB PRIMARY KEY, study INTEGER NOT NULL, outcome TEXT, r
 #: Seconds to wait for a process that is about to let go of a store.
 PATIENCE = 2.0
 
+#: A file that SQLite reads, and whose content is not what was written.
+DAMAGED = "the file is damaged; it is left as it is: needed another name (--store), or move the file away"
+
+#: How SQLite begins where it repeats text of a damaged file, which may be anything.
+REPEATS = ("malformed database schema", "Could not decode to UTF-8")
+
 #: What SQLite says, in the words of a user; what stands here for no error of it is repeated as it stands.
 WORDS = {
     "database is locked": "another sweep is at work on it: needed another store (--store), or wait until that one ends",
@@ -44,8 +50,7 @@ WORDS = {
     "attempt to write a readonly database": "it may only be read: needed another place (--store)",
     "unable to open database file": "needed a folder that exists and can be written to (--store)",
     "file is not a database": "not a store of this program: needed another name (--store)",
-    "database disk image is malformed": "the file is damaged; it is left as it is: needed another name (--store), or"
-    " move the file away",
+    "database disk image is malformed": DAMAGED,
 }
 
 
@@ -65,7 +70,7 @@ class Known:
     errors : int
         How many of those ended in an error.
     damaged : int
-        How many rows are there that do not agree with their checksum; they count as missing.
+        Number of rows whose checksum or columns are wrong; they count as missing.
     """
 
     rows: dict[int, bytes]
@@ -110,6 +115,8 @@ class Store:
         new = number == 0 and run("SELECT count(*) FROM sqlite_master").fetchone()[0] == 0
         if not new and number != APPLICATION:
             raise sqlite3.DatabaseError("file is not a database")
+        if not new and form == FORMAT and self._schema() != sorted(_tables()):
+            raise sqlite3.DatabaseError("file is not a database")
         if not new and form != FORMAT:
             needed = f"a store of format {form}, made by another version: this one reads format {FORMAT} (--store)"
             raise StoreError(str(self.path), "", None, needed)
@@ -120,9 +127,13 @@ class Store:
             if new:
                 run(f"PRAGMA application_id = {APPLICATION}")
                 run(f"PRAGMA user_version = {FORMAT}")
-                for table in filter(str.strip, TABLES.split(";")):
+                for table in _tables():
                     run(table)
         run("CREATE TEMP TABLE wanted (number INTEGER PRIMARY KEY, key BLOB NOT NULL)")
+
+    def _schema(self) -> list[str]:
+        """Statements that make the tables, views and triggers of the file; an index changes no answer."""
+        return sorted(row[0] for row in self._file.execute("SELECT sql FROM sqlite_master WHERE type != 'index'"))
 
     def __enter__(self) -> Store:
         return self
@@ -157,7 +168,7 @@ class Store:
                 "SELECT number, rows.key, outcome, CAST(row AS BLOB), crc"
                 " FROM temp.wanted JOIN rows ON rows.key = wanted.key"
             ):
-                if crc != _crc(key, text):
+                if not _is_ours(key, outcome, text, crc):
                     damaged += 1
                 elif not again(outcome):
                     found[number] = text
@@ -247,8 +258,10 @@ class Store:
         """Say in words what SQLite complains of."""
         try:
             yield
-        except sqlite3.Error as error:
-            words = WORDS.get(str(error), str(error))
+        except (sqlite3.Error, UnicodeDecodeError) as error:  # what SQLite says of a damaged file may be no text
+            said = str(error)
+            damaged = isinstance(error, UnicodeDecodeError) or said.startswith(REPEATS)
+            words = DAMAGED if damaged else WORDS.get(said, said)
             if self.kept:
                 words += (
                     f"; the {self.kept} rows that it took before are in it, and the same command goes on from there"
@@ -256,9 +269,25 @@ class Store:
             raise StoreError(str(self.path), "", None, words) from None
 
 
+def _tables() -> list[str]:
+    """The statements that make the tables, as SQLite keeps them."""
+    return [table.strip() for table in TABLES.split(";") if table.strip()]
+
+
 def written(row: Row) -> bytes:
     """A row as text; it reads back to the last digit."""
     return json.dumps(row, separators=(",", ":")).encode("ascii")
+
+
+def _is_ours(key: object, outcome: object, text: object, crc: object) -> bool:
+    """True if what a store has of a key is a row that this program has written."""
+    if not (isinstance(key, bytes) and isinstance(text, bytes) and crc == _crc(key, text)):
+        return False
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError):
+        return False
+    return is_row(found) and found["outcome"] == outcome
 
 
 def _crc(key: bytes, text: bytes) -> int:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import csv
-import io
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,6 +16,7 @@ from verification.interface.pair import UNITS, ContactPair
 from verification.problem.reading import load
 from verification.problem.specification import Problem
 from verification.progress import Progress, silent
+from verification.spreadsheet import as_csv
 from verification.sweeps.grid import SweepGrid
 from verification.sweeps.keeping import Kept
 from verification.sweeps.row import FAILED, Row
@@ -111,17 +110,11 @@ class Sweep(Document):
 
         ``pandas.read_csv(name, comment="#")`` reads it; what is None is empty.
         """
-        written = io.StringIO()
         units = ", ".join(f"{name} in {unit}" for name, unit in self.units.items())
         head = [f"ndtheory {__version__}: sweep, {units}"]
         head += [f"interrupted after {len(self.rows)} of {self.asked} rows"] * self.interrupted
         head += [] if self.problem is None else self.problem.to_toml().splitlines()
-        for line in head:
-            written.write(f"# {''.join(c if c.isprintable() else ' ' for c in line)}".rstrip() + "\n")
-        table = csv.DictWriter(written, self.columns, lineterminator="\n")
-        table.writeheader()
-        table.writerows(self.rows)
-        return written.getvalue()
+        return as_csv(head, self.columns, ([each[name] for name in self.columns] for each in self.rows))
 
     def content(self) -> dict[str, Any]:
         return {
@@ -199,7 +192,7 @@ def sweep(
     >>> bars = example("two-bars").changed(young=(2, 1))
     >>> found = sweep(bars, theta=["1/3", 0.5])
     >>> [(round(row["theta"], 3), row["iterations"], round(row["rho"], 12)) for row in found.rows]
-    [(0.333, 1, 2.0), (0.5, 30, 2.0)]
+    [(0.333, 1, 2.0), (0.5, 32, 2.0)]
     """
     start: Problem | ContactPair
     if isinstance(problem, (Problem, ContactPair)):

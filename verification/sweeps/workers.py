@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import os
-import signal
 import threading
 import time
 import uuid
 from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, wait
 from dataclasses import dataclass, field
 from functools import lru_cache
+from itertools import islice
+from multiprocessing import Pipe
 from typing import Any
 
 from ndtheory import __version__
 from verification.interface.pair import ContactPair
-from verification.interrupts import undisturbed
+from verification.interrupts import begin_child, undisturbed
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
 from verification.sweeps.bodies import Bodies
@@ -29,6 +30,15 @@ Work = Callable[[Problem | ContactPair, Sequence[tuple[int, Row]]], Generator[Pl
 #: Rows that a worker takes at once, at most, and the seconds they should take: a process that is killed loses no more
 #: than what its workers have not handed over.
 MOST_AT_ONCE, SECONDS = 32, 0.25
+
+#: Processes for each core of this machine, at most: more of them fill the memory and make no row sooner.
+MOST_FOR_A_CORE = 4
+
+#: Pieces that a process or a thread of a worker has before it, so that it need not wait.
+AHEAD = 2
+
+#: The environment in which the libraries that multiply matrices use one thread in each process.
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
 class Stopped(ProblemError):
@@ -129,62 +139,77 @@ def some(origin: Origin, piece: Sequence[tuple[int, Row]]) -> Handed:
         return Handed(rows=rows, seconds=time.monotonic() - begun)
 
 
-def _begun() -> int:
-    """The first task of a process, which tells its number; it lasts until another process can take the next one."""
-    time.sleep(0.01)
-    return os.getpid()
+@lru_cache(maxsize=1)
+def _life() -> tuple[Any, Any]:
+    """Both ends of a pipe on which nothing is sent: the reading end meets its end when this process does."""
+    return Pipe(duplex=False)
 
 
-def _quietly(origin: Origin, piece: Sequence[tuple[int, Row]]) -> Handed:
-    """Rows in a process of this machine, which leaves Ctrl-C to its parent."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    return some(origin, piece)
+def processes(jobs: int, rows: int) -> int:
+    """Number of processes that start for some rows: no more than the rows, nor than 4 for each core.
+
+    Parameters
+    ----------
+    jobs : int
+        As asked for; 0 or less counts back from all cores.
+    rows : int
+        Rows that are still to be made.
+    """
+    from joblib import cpu_count, effective_n_jobs
+
+    return min(int(effective_n_jobs(jobs)), rows, MOST_FOR_A_CORE * int(cpu_count()))
 
 
 def together(jobs: int) -> Work:
-    """In processes of this machine, by joblib; 0 or less counts back from all cores."""
+    """In processes of this machine, by the executor of joblib; 0 or less counts back from all cores."""
 
     def work(start: Problem | ContactPair, wanted: Sequence[tuple[int, Row]]) -> Generator[Placed, None, None]:
-        from multiprocessing import resource_tracker as of_python
-
-        from joblib import Parallel, delayed, effective_n_jobs, parallel_config
-        from joblib.externals.loky.backend import resource_tracker as of_joblib
+        from joblib.executor import get_memmapping_executor
         from joblib.externals.loky.process_executor import BrokenProcessPool
 
         if not wanted:
             return
-        origin, pieces = Origin.of(start), Pieces(wanted, effective_n_jobs(jobs))
-        for tracker in (of_joblib, of_python):  # where one starts, it lets signals through that are held back
-            tracker.ensure_running()
-        with parallel_config(backend="loky", inner_max_num_threads=1):
-            with undisturbed():
-                # Ctrl-C on a terminal reaches all processes: those that start here do not see it, and are all up
-                # before one may be ended, for one that starts when its parent ends says so at length
-                count, up = effective_n_jobs(jobs), set[int]()
-                while len(up) < count:
-                    up.update(Parallel(n_jobs=jobs, batch_size=1)(delayed(_begun)() for _ in range(count)))
-            try:
-                found = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1)(
-                    delayed(_quietly)(origin, piece) for piece in pieces
+        count = processes(jobs, len(wanted))
+        origin, pieces = Origin.of(start), Pieces(wanted, count)
+        source, ahead = iter(pieces), AHEAD * count
+        executor = None
+        try:
+            _start_trackers()
+            with undisturbed():  # it ends once they are started: what starts meanwhile inherits that Ctrl-C waits
+                executor = get_memmapping_executor(
+                    count, initializer=begin_child, initargs=(_life()[0],), env=ONE_THREAD
                 )
-                for handed in found:
-                    yield pieces.taken(handed)
-            except BrokenProcessPool:
-                _stop()
-                raise Stopped("--jobs", "a process was killed, perhaps as memory ran out: needed fewer jobs") from None
-            except BaseException:
-                _stop()
-                raise
+                waiting = {executor.submit(some, origin, piece) for piece in islice(source, ahead)}
+            while waiting:
+                done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+                for future in done:
+                    yield pieces.taken(future.result())
+                waiting |= {executor.submit(some, origin, piece) for piece in islice(source, ahead - len(waiting))}
+        except BrokenProcessPool:
+            _stop(executor)
+            raise Stopped("--jobs", "a process was killed, perhaps as memory ran out: needed fewer jobs") from None
+        except BaseException:
+            _stop(executor)
+            raise
 
     return work
 
 
-def _stop() -> None:
-    """End the workers at once: what they compute is not wanted any more."""
-    from joblib.externals.loky import get_reusable_executor
+def _start_trackers() -> None:
+    """Start the processes that clean up behind the others: one that starts lets signals through that are held back."""
+    from multiprocessing import resource_tracker as of_python
 
-    with undisturbed():
-        get_reusable_executor().shutdown(wait=True, kill_workers=True)
+    from joblib.externals.loky.backend import resource_tracker as of_joblib
+
+    for tracker in (of_joblib, of_python):
+        tracker.ensure_running()
+
+
+def _stop(executor: Any) -> None:
+    """End the processes at once: what they compute is not wanted any more."""
+    if executor is not None:
+        with undisturbed():
+            executor.terminate(kill_workers=True)
 
 
 class Pieces:

@@ -1,0 +1,196 @@
+"""Threads that measure, run and show at the same time find what one thread finds, to the last digit."""
+
+import random
+import sys
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+
+import pytest
+from problem_list import plates
+from strategies import AT_NIGHT
+from threadpoolctl import threadpool_info, threadpool_limits
+
+import verification as vf
+from verification import threads
+from verification.bounds.bound import Region
+from verification.bounds.region import Plane, Point
+from verification.certificate.continuum import certify_continuum
+from verification.cli import notebook
+from verification.threads import one_thread
+
+THREADS = 8
+
+
+def problem(cells: int) -> vf.Problem:
+    """Section 6 with so many cells along the lower body."""
+    keys = {f"body{i}.cells": f"[{cells * share // 5}, {cells // 5}]" for i, share in ((1, 5), (2, 3))}
+    return vf.Problem.from_dict(plates()).with_keys(keys)
+
+
+def a_plane(shown: vf.Problem) -> Plane:
+    region = Region(k=(0.1, 0.2), theta=((0.0, 0.5), (0.0, 0.4)), every=0.3, some=0.4)
+    points = (Point(theta=0.4, k=0.1, outcome="converged", iterations=12, coupled_residual=1e-9),)
+    return Plane(title="a plane", regions={"sharp": region}, points=points, reason={}, units=shown.units, problem=shown)
+
+
+#: Each kind of result, as a function of the problem.
+KINDS: dict[str, Callable[[vf.Problem], object]] = {
+    "Measured": vf.measure,
+    "Run": lambda given: vf.run(given).linearise(),
+    "Run by another rule": lambda given: vf.run(given, rule="anderson"),
+    "Solution": vf.solve,
+    "Comparison": vf.compare,
+    "Advice": vf.advise,
+    "Certificate": vf.certify,
+    "Checked": lambda given: vf.check_again(vf.certify(given).to_dict()),
+    "ContinuumCertificate": certify_continuum,
+    "Plane": a_plane,
+    "Sweep": lambda given: vf.sweep(given, theta=["0.3", "0.5"], friction=[0.1]),
+}
+#: Those that take long on a mesh on which a second BLAS thread has work.
+LONG = ("Comparison", "Certificate", "Checked")
+
+
+@pytest.fixture
+def in_threads():
+    """``in_threads(function, names)``: what a function gives for each name, in threads that change often."""
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-4)
+
+    def run(function, names):
+        with ThreadPoolExecutor(THREADS) as pool:
+            return list(pool.map(function, names))
+
+    yield run
+    sys.setswitchinterval(before)
+
+
+@pytest.fixture(scope="module")
+def results() -> dict[str, object]:
+    return {name: make(problem(10)) for name, make in KINDS.items()}
+
+
+def test_every_result_that_has_a_screen_is_among_the_kinds(results):
+    assert set(notebook.SCREENS) <= {type(result) for result in results.values()}
+
+
+def test_views_made_in_threads_are_those_of_one_thread(results, in_threads):
+    alone = {name: result._repr_html_() for name, result in results.items()}
+    names = [*results] * (100 if AT_NIGHT else 10)
+    random.Random(0).shuffle(names)
+    views = in_threads(lambda name: results[name]._repr_html_(), names)
+    assert [name for name, view in zip(names, views, strict=True) if view != alone[name]] == []
+
+
+def test_parts_of_a_report_made_in_threads_are_those_of_one_thread(results, in_threads):
+    comparison = results["Comparison"]
+    alone, times = notebook.report(comparison), 200 if AT_NIGHT else 24
+    assert in_threads(lambda _: notebook.report(comparison), range(times)) == [alone] * times
+
+
+def test_numbers_found_in_threads_are_those_of_one_thread(in_threads):
+    """The main thread has set a number of BLAS threads: threadpoolctl would ignore what another thread sets."""
+    names = [name for name in KINDS if AT_NIGHT or name not in LONG]
+    given = problem(60)
+    find = lambda name: KINDS[name](given).to_json()
+    with threadpool_limits(4, user_api="blas"):
+        alone = {name: find(name) for name in names}
+        asked = names * (8 if AT_NIGHT else 1)
+        random.Random(0).shuffle(asked)
+        found = in_threads(find, asked)
+    assert [name for name, document in zip(asked, found, strict=True) if document != alone[name]] == []
+
+
+def numbers() -> set[int]:
+    """The numbers of threads of those BLAS libraries that can have more than one."""
+    several = [library for library in threadpool_info() if library.get("threading_layer") != "disabled"]
+    return {library["num_threads"] for library in several if library["user_api"] == "blas"}
+
+
+def in_thread(function):
+    with ThreadPoolExecutor(1) as pool:
+        return pool.submit(function).result()
+
+
+def test_blas_has_one_thread_until_the_last_thread_has_left():
+    entered, leave = threading.Event(), threading.Event()
+
+    def other():
+        with one_thread():
+            entered.set()
+            assert leave.wait(10)
+
+    with threadpool_limits(3, user_api="blas"), ThreadPoolExecutor(1) as pool:
+        with one_thread():
+            waiting = pool.submit(other)
+            assert entered.wait(10)
+        assert numbers() == {1}
+        leave.set()
+        waiting.result()
+        assert numbers() == {3}
+
+
+def test_blas_has_one_thread_in_a_thread_whose_main_thread_set_several():
+    def inside():
+        with one_thread(), one_thread():
+            return numbers()
+
+    with threadpool_limits(3, user_api="blas"):
+        assert in_thread(inside) == {1}
+        assert numbers() == {3}
+
+
+def test_an_exception_in_one_thread_leaves_blas_to_the_other():
+    def fail():
+        with one_thread():
+            raise KeyError
+
+    with threadpool_limits(3, user_api="blas"):
+        with one_thread():
+            with pytest.raises(KeyError):
+                in_thread(fail)
+            assert numbers() == {1}
+        assert numbers() == {3}
+
+
+def test_a_thread_may_set_a_number_after_ours_has_left():
+    with one_thread():
+        pass
+
+    def set_three():
+        with threadpool_limits(3, user_api="blas"):
+            return numbers()
+
+    assert in_thread(set_three) == {3}
+
+
+@dataclass(eq=False)
+class OfEachThread:
+    """A BLAS library on OpenMP: each thread of Python has its own number."""
+
+    threading_layer = "openmp"
+    own: threading.local = field(default_factory=threading.local)
+
+    @property
+    def num_threads(self):
+        return getattr(self.own, "number", 4)
+
+    def set_num_threads(self, number):
+        self.own.number = number
+
+
+def test_a_library_with_a_number_for_each_thread_gets_it_back_in_each_thread(monkeypatch):
+    library = OfEachThread()
+    monkeypatch.setattr(threads, "libraries", lambda: ([], [library]))
+
+    def inside():
+        with one_thread():
+            within = library.num_threads
+        return within, library.num_threads
+
+    with one_thread():
+        assert in_thread(inside) == (1, 4)
+        assert library.num_threads == 1
+    assert library.num_threads == 4
