@@ -178,8 +178,8 @@ def test_one_run_that_alternates_tells_rho(call, write, name, theta, rho, within
 def test_a_run_that_diverges_in_every_step_tells_rho_too(call, write):
     """1 - theta - theta rho = -1.4 for the first steps, until the bars part."""
     file = write(text=examples()["two-bars"])
-    history = call("run", file, "--theta", "0.6", "--json").document["history"]
-    ratios = [b / a for a, b in itertools.pairwise(history)]
+    residuals = [iterate.residual for iterate in vf.run(file, theta=0.6).iterates]
+    ratios = [b / a for a, b in itertools.pairwise(residuals)]
     found = call("advise", "--theta", "0.6", "--ratio", f"{ratios[3]:.9f}", "--json").document
     assert ratios[3] == pytest.approx(1.4)
     assert {reading["kind"]: reading["rho"]["value"] for reading in found["readings"]} == {

@@ -101,3 +101,63 @@ def test_a_column_name_cannot_steer_the_terminal(call, tmp_path):
     path = tmp_path / "a.log"
     path.write_text("it res\x1b[2J\n" + "".join(f"{n} {0.8**n:.8e}\n" for n in range(40)), "utf-8")
     assert "\x1b[2J" not in call("advise", "--log", path, "--theta", "0.45").out
+
+
+# --- friction --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("words", [["--log", "LOG", "--theta", "0.45"], ["--theta", "0.45", "--ratio", "0.8"]], ids=str)
+def test_the_first_line_says_what_is_assumed_and_friction_takes_the_theta_away(call, log, words):
+    words = [str(log(0.45)[1]) if word == "LOG" else word for word in words]
+    plain, document = call("advise", *words), call("advise", *words, "--json").document
+    assert plain.out.splitlines()[:2] == [
+        "Assumed: no friction, or a tied interface.",
+        "With friction what follows may be false: add --friction.",
+    ]
+    assert pasted(plain.out)
+    assert document["assumes"] == "no friction, or a tied interface"
+    assert document["friction_bounds"] is None
+    for bare in (["--friction"], ["--friction", "0.2"]):
+        found = call("advise", *bare, *words, "--json").document
+        assert found == call("advise", *words, *bare, "--json").document
+        assert (found["roles"], found["theta"], found["quote"]) == ([], None, None)
+        assert found["friction_bounds"]["image"] > 0
+        assert all(one["rho"]["lo"] is one["rho"]["value"] is None for one in found["readings"])
+        answer = call("advise", *bare, *words)
+        assert answer.out.startswith("Assumed: there is friction")
+        assert "TO PASTE" not in answer.out
+        assert "WHAT IS PROVED WITH FRICTION?" in answer.out
+        assert max(map(len, answer.out.splitlines())) <= 80
+        assert len(answer.out.splitlines()) <= 46
+    assert call("advise", *words, "--friction", "0", "--json").document == document  # k = 0
+    assert call("advise", *words, "--tied").out.startswith("Assumed: nothing opens or slips.\n\n")
+
+
+@pytest.mark.parametrize(
+    ("words", "fragment"),
+    [
+        ("--theta 0.1 --ratio 1.4 --friction -1", "--friction = -1: needed no number, or k >= 0"),
+        ("--theta 0.1 --ratio 1.4 --friction much", "--friction = much: needed no number, or k >= 0"),
+        ("--theta 0.1 --ratio 1.4 --friction nan", "--friction = nan: needed no number, or k >= 0"),
+        ("--theta 0.1 --ratio 1.4 --friction --tied", "--tied with --friction"),
+        ("--S1 a.npz --S2 b.npz --friction", "matrices need one, as --friction 0.2"),
+        ("--S1 a.npz --friction --S2 b.npz", "matrices need one, as --friction 0.2"),
+        ("--young 7,2 --poisson 0.3,0.3 --friction", "needed one of"),
+    ],
+)
+def test_friction_that_does_not_fit_is_refused(call, words, fragment):
+    assert fragment in call("advise", *words.split()).complaint
+
+
+def test_a_snippet_for_runs_with_friction_is_refused_with_the_run_to_make(call):
+    answer = call("advise", "--theta", "0.45", "--ratio", "0.8", "--friction", "--snippets", "preCICE")
+    assert "with friction no run decides theta" in answer.err
+    assert "WHICH RUN NEXT?" in answer.out
+
+
+def test_a_run_to_keep_is_no_run_to_make(call, tmp_path):
+    path = tmp_path / "a.log"
+    path.write_text("it res\n1 1.0\n2 1e-9\n", "utf-8")
+    answer = call("advise", "--log", path, "--theta", "0.3")
+    assert "theta = 0.3: keep it: the run converges within 1 step" in answer.out
+    assert answer.out.endswith("Next: no run; keep theta = 0.3\n")

@@ -23,6 +23,12 @@ DEAR = 1.4
 #: Steps are those to 1e-9, and seven at least: a few more or less of so few are not worth another run.
 TO, FEWEST = math.log(1e-9), 7.0
 
+#: No faster theta is looked for where the residual falls by this a step or faster: about 0.12.
+SWIFT = math.exp(TO / (DEAR * FEWEST))
+
+#: Couplings with fewer modes than this may take fewer steps than their spectrum predicts: one mode needs a single step.
+FEWEST_MODES = 5
+
 #: Unless logs say otherwise, a is taken to be at most this share of b: a body of several elements has softer modes.
 SOFT = 0.5
 

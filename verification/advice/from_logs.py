@@ -13,27 +13,41 @@ from ndtheory.constants import take
 from ndtheory.energy import SMALLEST
 from ndtheory.number import below
 from ndtheory.sharp import predicted_rate, predicted_theta
-from verification.advice.ends import DEAR, SETTLED, Box, cheapest, common, of_ratio, of_stiffest, telling
+from verification.advice.columns import seen_column
+from verification.advice.ends import (
+    DEAR,
+    FEWEST_MODES,
+    SETTLED,
+    SWIFT,
+    Box,
+    cheapest,
+    common,
+    of_ratio,
+    of_stiffest,
+    telling,
+)
 from verification.advice.from_runs import role_of_run
-from verification.advice.log import Column, Log
+from verification.advice.log import Log
 from verification.advice.logs import read_log
-from verification.advice.pace import CONVERGED, MOST_WINDOWS, Pace, pace, together
+from verification.advice.next_run import anew, kept, pasted_or_not
+from verification.advice.pace import CONVERGED
 from verification.advice.readings import (
-    FEWEST_STEPS,
     LARGEST_TO_PASTE,
     OF_OPEN_NODES,
     SHORTEST_STEP,
     NextRun,
     Observed,
     RunReading,
+    assumed,
+    check_assumed,
     level,
     read_observed,
     read_plateau,
     rounded_down,
-    spread,
     steps_needed,
 )
 from verification.advice.roles import Advice
+from verification.advice.runs_with_friction import by_kind, friction_bounds, readings_with_friction, with_friction
 from verification.advice.seen import Interval, LogBound, SeenColumn, SeenLog, bounds
 from verification.interface.pair import UNITS
 from verification.problem.tables import ProblemError
@@ -48,8 +62,8 @@ NARROW = Fraction(5, 4)
 SMALLEST_THETA = Fraction(1, 10**6)
 
 
-def advise_logs(logs: Iterable[tuple[Path | str, Any]], *, tied: bool = False) -> Advice:
-    """What the convergence logs of runs of any code, each with a constant theta, say of rho together.
+def advise_logs(logs: Iterable[tuple[Path | str, Any]], *, tied: bool = False, friction: bool = False) -> Advice:
+    """Advice from the convergence logs of runs of any code, each with a constant theta.
 
     A log whose residual changes by a steady ratio r a step is read as
     :func:`verification.advice.from_runs.advise_run` reads r.  A residual that stays at a level belongs to a run that
@@ -58,11 +72,15 @@ def advise_logs(logs: Iterable[tuple[Path | str, Any]], *, tied: bool = False) -
 
     Without friction, or tied, ``rho >= (1 + r)/theta - 1`` wherever ``r > 1 - theta``, and ``rho >= 2/theta - 1`` of a
     run that does not converge.  If near the solution all of Gamma_c is closed and nothing slides, a run that converges
-    has ``rho <= (1 + r)/theta - 1`` besides.  Logs whose bounds exclude each other are told as contradictory.
+    has ``rho <= (1 + r)/theta - 1`` besides.  Logs whose bounds exclude each other are reported as contradictory.
+    With friction no theta is pasted, and what is proved is in :mod:`verification.advice.runs_with_friction`.
 
     A theta is pasted that is predicted to take at most 1.4 times the fewest steps wherever the smallest and the largest
     eigenvalue may lie by the logs (:mod:`verification.advice.ends`); in contact none above that of a run that
     converged.  Where one log alone decides rho, the smallest eigenvalue is taken to be at most half of the largest.
+    The prediction is for couplings of about five modes and more: one or two modes may need fewer steps.
+
+    The run to make next has a theta that no log has, unless its reason begins with "keep it" or "the same again".
 
     Parameters
     ----------
@@ -72,6 +90,8 @@ def advise_logs(logs: Iterable[tuple[Path | str, Any]], *, tied: bool = False) -
         Whether the interface is tied, so that nothing opens or slips.  A run is linear then, and its steady ratio is
         that of the softest or of the stiffest mode: two logs mostly tell both, and with them the best theta,
         ``2/(2 + lambda_min + rho)``.
+    friction : bool
+        Whether there is friction.  Without it the advice assumes that there is none, or that the interface is tied.
 
     Returns
     -------
@@ -84,6 +104,8 @@ def advise_logs(logs: Iterable[tuple[Path | str, Any]], *, tied: bool = False) -
         A log that cannot be read, or whose relaxation was not constant.
     HypothesisError
         A theta outside its range.
+    ValueError
+        No log, or friction of a tied interface.
 
     Examples
     --------
@@ -100,12 +122,17 @@ def advise_logs(logs: Iterable[tuple[Path | str, Any]], *, tied: bool = False) -
     given = [(Path(path), take("theta", theta, needed, allowed)) for path, theta in logs]
     if not given:
         raise ValueError("needed one log or more")
-    seen = tuple(_seen(read_log(path), theta) for path, theta in given)
-    lower, upper = bounds(seen)
-    interval = _interval(lower, upper)
-    readings, following, rho = _together(seen, interval, tied)
+    check_assumed(tied, friction)
+    seen = tuple(seen_log(read_log(path), theta, friction) for path, theta in given)
+    interval = interval_of(*(([], []) if friction else bounds(seen)))
+    readings, following, rho = with_friction(seen) if friction else decide(seen, interval, tied)
     if tied:  # nothing opens or slips
         readings = tuple(reading for reading in readings if reading.kind not in OF_OPEN_NODES)
+    made = [log.made for log in seen]
+    if rho is not None and (paste := pasted_or_not(following, made)) is not None:
+        following = paste
+    else:
+        following, rho = anew(following, made), None
     return Advice(
         neumann_body=None,
         roles=() if rho is None else (role_of_run(rho),),
@@ -115,15 +142,17 @@ def advise_logs(logs: Iterable[tuple[Path | str, Any]], *, tied: bool = False) -
         logs=seen,
         interval=interval,
         tied=tied,
+        assumes=assumed(tied, friction),
+        friction_bounds=friction_bounds(*by_kind(seen)) if friction else None,
     )
 
 
-def _seen(log: Log, theta: Fraction) -> SeenLog:
-    """What one log shows, and what that can mean."""
+def seen_log(log: Log, theta: Fraction, friction: bool = False) -> SeenLog:
+    """One log as it was seen, and its readings."""
     if log.theta is not None and abs(log.theta - float(theta)) > 1e-3 * float(theta):
         named = f"the log names a relaxation factor of {log.theta:g}: needed the same theta, received {float(theta):g}"
         raise ProblemError(str(log.path), "", None, named)
-    columns = tuple(_column(column, theta) for column in log.columns)
+    columns = tuple(seen_column(column, theta) for column in log.columns)
     steps = steps_needed(theta)
     bare = SeenLog(
         file=str(log.path),
@@ -132,7 +161,7 @@ def _seen(log: Log, theta: Fraction) -> SeenLog:
         steps=steps,
         columns=columns,
         readings=(),
-        next=_longer(columns, theta, steps),
+        next=longer(columns, theta, steps),
         rho=None,
         notes=log.notes,
     )
@@ -140,7 +169,7 @@ def _seen(log: Log, theta: Fraction) -> SeenLog:
     grows = ratio is not None and ratio.least > 1
     if ratio is not None and grows:
         readings, following, _ = read_observed(theta, ratio)
-        if plateau is not None and _one_mode(theta, ratio, plateau):
+        if plateau is not None and one_mode(theta, ratio, plateau):
             also = [reading for reading in read_plateau(theta, plateau)[0] if reading.kind == "plateau"]
             readings = (*readings[:1], *also, *readings[1:])
     elif plateau is not None:
@@ -154,57 +183,34 @@ def _seen(log: Log, theta: Fraction) -> SeenLog:
         if not bare.converges and all(reading.kind != "level" for reading in readings):
             readings, rho = (*readings, level(theta, bounds=False)), None
     else:
-        return bare
+        return bare if bare.pooled is None else replace(bare, next=of_pooled(theta, bare.pooled))
+    if friction:
+        readings, rho = readings_with_friction(readings), None
     return replace(bare, readings=readings, next=following, rho=rho)
 
 
-def _one_mode(theta: Fraction, ratio: Observed, plateau: Observed) -> bool:
-    """Whether the growth and the plateau of a run are those of one mode, as in a tied run."""
+def of_pooled(theta: Fraction, ratio: Observed) -> NextRun:
+    """The run to make where the windows of a transient are too short one by one."""
+    pace = f"{float(ratio.value):.4g} ({float(ratio.least):.4g} to {float(ratio.most):.4g})"
+    why = f"windows are too short one by one; their second halves have a ratio of {pace} together, which bounds nothing"
+    if ratio.most <= SWIFT:
+        return kept(theta, f"{why}, and none much faster is to be found")
+    following = read_observed(theta, ratio)[1]
+    return replace(following, why=f"{why}: {following.why}")
+
+
+def one_mode(theta: Fraction, ratio: Observed, plateau: Observed) -> bool:
+    """True if the growth and the plateau of a run belong to one mode, as in a tied run."""
     low, high = 1 / (plateau.most - 1), 1 / (plateau.least - 1)
     return (1 + ratio.least) / theta <= AGREE * (1 + high) and 1 + low <= AGREE * (1 + ratio.most) / theta
 
 
-def _column(column: Column, theta: Fraction) -> SeenColumn:
-    """The windows of one field, read one by one and put together."""
-    steps = steps_needed(theta)
-    long = [window for window in column.windows if len(window) > FEWEST_STEPS] or list(column.windows)
-    paces = [
-        pace(
-            window,
-            relative=column.residual == "relative",
-            steps=steps,
-            theta=float(theta),
-            spread=float(spread(theta)),
-            digits=column.digits,
-            decimals=column.decimals,
-        )
-        for window in long[-MOST_WINDOWS:]
-    ]
-    return SeenColumn(
-        name=column.name,
-        residual=column.residual,
-        paces=tuple(paces),
-        windows=len(column.windows),
-        ratio=_put_together([one for one in paces if one.kind != "plateau" and one.value is not None]),
-        plateau=_put_together([one for one in paces if one.kind == "plateau"]),
-    )
-
-
-def _put_together(paces: list[Pace]) -> Observed | None:
-    """The ratio or plateau of several windows; a run that grows in some does so."""
-    grows = [one for one in paces if one.kind != "plateau" and one.least is not None and one.least > 1]
-    if not paces:
-        return None
-    value, least, most = (Fraction(number) for number in together(grows or paces))
-    return Observed(value=value, least=least, most=most)
-
-
-def _longer(columns: tuple[SeenColumn, ...], theta: Fraction, steps: int) -> NextRun:
+def longer(columns: tuple[SeenColumn, ...], theta: Fraction, steps: int) -> NextRun:
     """The run to make where a log shows nothing steady."""
     paces = [one for column in columns for one in column.paces]
     if all(one.height < CONVERGED for one in paces):
         most = max(one.steps for one in paces)
-        return NextRun(theta=float(theta), why=f"keep it: the run converges within {most} steps, and shows no ratio")
+        return kept(theta, f"the run converges within {most} step{'s' * (most > 1)}, and shows no ratio")
     if any(one.lost for one in paces):
         why = "half of it, as the log ends in inf or nan before a ratio shows"
         return NextRun(theta=rounded_down(theta / 2), why=why)
@@ -213,10 +219,10 @@ def _longer(columns: tuple[SeenColumn, ...], theta: Fraction, steps: int) -> Nex
         why = f"{again}: smaller limits of convergence and a larger number of iterations"
     else:
         why = f"{again}, until the residual falls or grows steadily; a relative one must fall below 0.1 first"
-    return NextRun(theta=float(theta), why=why)
+    return NextRun(theta=float(theta), why=why, again=True)
 
 
-def _interval(lower: list[LogBound], upper: list[LogBound]) -> Interval:
+def interval_of(lower: list[LogBound], upper: list[LogBound]) -> Interval:
     """The largest bound from below beside the smallest from above."""
     lo = max(lower, key=lambda bound: bound.value, default=None)
     hi = min(upper, key=lambda bound: bound.value, default=None)
@@ -224,14 +230,14 @@ def _interval(lower: list[LogBound], upper: list[LogBound]) -> Interval:
     if lo is not None and hi is not None and 1 + lo.value > AGREE * (1 + hi.value):
         one, other = (f"{bound.log.file} with theta = {float(bound.log.theta):.4g}" for bound in (hi, lo))
         contradiction = (
-            f"by {one} rho is at most {float(hi.value):.4g}, by {other} at least {float(lo.value):.4g}: contact or "
-            "sliding changes between the runs, a theta was not constant, or they are not runs of one problem in the "
-            "same roles"
+            f"by {one} rho is at most {float(hi.value):.4g}, by {other} at least {float(lo.value):.4g}: there is "
+            "friction, contact changes between the runs, a theta was not constant, or they are not runs of one problem "
+            "in the same roles"
         )
     return Interval(lo=lo, hi=hi, contradiction=contradiction)
 
 
-def _together(
+def decide(
     logs: tuple[SeenLog, ...], interval: Interval, tied: bool
 ) -> tuple[tuple[RunReading, ...], NextRun, Fraction | None]:
     """The readings that are left, the run to make next, and rho where the logs decide."""
@@ -244,18 +250,17 @@ def _together(
     else:
         base = next((log for log in logs if log.readings), logs[0])
     if interval.contradiction is not None:
-        theta = float(min(log.theta for log in logs))
-        why = f"the logs contradict each other: {theta:.4g} once more, in one time window, with ResAbs in the log"
-        return base.readings, NextRun(theta=theta, why=why), None
+        why = "half of the smallest theta, in one time window, with ResAbs in the log: the logs contradict each other"
+        return base.readings, NextRun(theta=_half(logs), why=why), None
     lo, hi = interval.lo, interval.hi
     if (swift := next((log for log in logs if log.swift), None)) is not None and base.rho is None:
         most = max(pace.steps for column in swift.columns for pace in column.paces)
-        why = f"keep it: the run converges within {most} steps, and none much faster is to be found"
-        return swift.readings, NextRun(theta=rounded_down(swift.theta), why=why), None
-    if tied and (found := _by_ends(logs, base, None if lo is None else lo.value, tied)) is not None:
+        why = f"the run converges within {most} step{'s' * (most > 1)}, and none much faster is to be found"
+        return swift.readings, kept(swift.theta, why), None
+    if tied and (found := by_ends(logs, base, None if lo is None else lo.value, tied)) is not None:
         return found
     if base.rho is not None:
-        return base.readings, _fastest(falling, base.rho) or _robust(logs, base.next), base.rho
+        return base.readings, fastest(falling, base.rho) or robust(logs, base.next), base.rho
     if lo is not None and hi is not None and hi.value <= NARROW * lo.value:
         rho = max(lo.value, hi.value)  # they may overlap a little
         best = min(predicted_theta(rho), LARGEST_TO_PASTE)
@@ -268,16 +273,16 @@ def _together(
         says = f"the logs leave rho {left} if all of Gamma_c stays closed"
         only = RunReading(kind="mode-high", value=float(rho), lo=below(lo.value), says=says)
         following = NextRun(theta=rounded_down(min(best, base.theta)), why=why)
-        return (only,), _fastest(falling, rho) or _robust(logs, following), rho
-    if falling and (found := _by_ends(logs, base, None if lo is None else lo.value, tied)) is not None:
+        return (only,), fastest(falling, rho) or robust(logs, following), rho
+    if (found := by_ends(logs, base, None if lo is None else lo.value, tied)) is not None:
         return found
     if not falling and len(rising) > 1:
         why = "a quarter of the smallest theta so far, as none converges; come back with the log of that run, too"
         return base.readings, NextRun(theta=rounded_down(base.theta / 4), why=why), None
-    return base.readings, _between(base, rising), None
+    return base.readings, between(base, rising), None
 
 
-def _boxes(log: SeenLog, tied: bool) -> list[Box]:
+def boxes_of(log: SeenLog, tied: bool) -> list[Box]:
     """Where the ends of the spectrum may lie by a log; in contact of the modes that are left near the solution."""
     ratio, plateau, theta = log.slowest, log.plateau, float(log.theta)
     left: list[Sequence[Box]] = []
@@ -291,33 +296,33 @@ def _boxes(log: SeenLog, tied: bool) -> list[Box]:
     return common(left)
 
 
-def _by_ends(
+def by_ends(
     logs: tuple[SeenLog, ...], base: SeenLog, lo: Fraction | None, tied: bool
 ) -> tuple[tuple[RunReading, ...], NextRun, Fraction | None] | None:
     """The same by what all logs leave of the ends of the spectrum; None where that is no limit of rho."""
-    boxes = common([_boxes(log, tied) for log in logs])
+    boxes = common([boxes_of(log, tied) for log in logs])
     known, most = [float(log.theta) for log in logs], float(LARGEST_TO_PASTE)
     if not boxes:
         if not tied:
             return None
-        why = "no tied interface has all of these logs: this one once more, in one time window, or leave out tied"
-        return base.readings, NextRun(theta=float(base.theta), why=why), None
+        why = "half of the smallest theta, or leave out tied: no tied interface has all of these logs"
+        return base.readings, NextRun(theta=_half(logs), why=why), None
     if math.isinf(stiffest := max(box.b[1] for box in boxes)):
         return None
     theta, dear = cheapest(boxes, most if tied else float(base.theta))
     if dear <= DEAR:
-        says = f"the logs together leave one reading: {_ends(boxes)}; rho is taken at its upper end"
+        says = f"the logs together leave one reading: {ends_in_words(boxes)}; rho is taken at its upper end"
         only = RunReading(kind="mode-high", value=stiffest - 1, lo=None if lo is None else below(lo), says=says)
-        following = NextRun(theta=rounded_down(Fraction(theta)), why=_left(boxes, dear))
+        following = NextRun(theta=rounded_down(Fraction(theta)), why=cost_in_words(boxes, dear))
         return (only,), following, Fraction(stiffest) - 1
     rising = [float(log.theta) for log in logs if log.diverges]
     theta = rounded_down(Fraction(telling(boxes, known, most if tied else min([most, *rising]))))
-    why = f"it tells more: if {_ends(boxes)}, no theta is sure to be within {DEAR:g} times the fewest steps"
+    why = f"it tells more: if {ends_in_words(boxes)}, no theta is sure to be within {DEAR:g} times the fewest steps"
     return base.readings, NextRun(theta=theta, why=why), None
 
 
-def _ends(boxes: Sequence[Box]) -> str:
-    """What is left of the smallest and the largest eigenvalue, in words."""
+def ends_in_words(boxes: Sequence[Box]) -> str:
+    """The limits of the smallest and the largest eigenvalue, in words."""
     within = []
     for which, limits in (("smallest", [box.a for box in boxes]), ("largest", [box.b for box in boxes])):
         low, high = (f"{max(z - 1, 0):.3g}" for z in (min(z for z, _ in limits), max(z for _, z in limits)))
@@ -325,25 +330,31 @@ def _ends(boxes: Sequence[Box]) -> str:
     return " and ".join(within)
 
 
-def _left(boxes: Sequence[Box], dear: float) -> str:
-    """Why a theta is advised, in words."""
+def cost_in_words(boxes: Sequence[Box], dear: float) -> str:
+    """The reason for a theta, in words."""
     times = (
         "the fewest steps" if dear < 1.05 else f"at most {math.ceil(10 * dear - 1e-9) / 10:g} times the fewest steps"
     )
-    return f"{times} if {_ends(boxes)}, as the logs leave them where contact does not change"
+    where = f"as the logs leave them where contact does not change, with {FEWEST_MODES} modes or more"
+    return f"{times} if {ends_in_words(boxes)}, {where}"
 
 
-def _robust(logs: tuple[SeenLog, ...], best: NextRun) -> NextRun:
+def _half(logs: Sequence[SeenLog]) -> float:
+    """Half of the smallest theta."""
+    return rounded_down(min(log.theta for log in logs) / 2)
+
+
+def robust(logs: tuple[SeenLog, ...], best: NextRun) -> NextRun:
     """The theta where rho is known and the softest mode is not: at most ``2/(2 + rho)``, best where nodes are open."""
-    boxes = [box.softened() for box in common([_boxes(log, False) for log in logs])]
+    boxes = [box.softened() for box in common([boxes_of(log, False) for log in logs])]
     if not boxes:
         return best
     theta, dear = cheapest(boxes, best.theta)
     smaller = rounded_down(Fraction(theta))
-    return best if smaller >= best.theta else NextRun(theta=smaller, why=_left(boxes, dear))
+    return best if smaller >= best.theta else NextRun(theta=smaller, why=cost_in_words(boxes, dear))
 
 
-def _fastest(falling: list[SeenLog], rho: Fraction) -> NextRun | None:
+def fastest(falling: list[SeenLog], rho: Fraction) -> NextRun | None:
     """The theta of a log that falls faster than is predicted of the best one for rho; None where there is none.
 
     The prediction is for the slowest mode that there may be: a softest mode well above 0 leaves a smaller theta faster.
@@ -353,16 +364,16 @@ def _fastest(falling: list[SeenLog], rho: Fraction) -> NextRun | None:
     if ratio >= predicted_rate(rho):
         return None
     predicted = f"{float(predicted_rate(rho)):.4g} is predicted of 2/(2 + rho) with rho = {float(rho):.4g}"
-    return NextRun(theta=float(theta), why=f"its log falls by {float(ratio):.4g} a step or faster, where {predicted}")
+    return kept(theta, f"its log falls by {float(ratio):.4g} a step or faster, where {predicted}")
 
 
-def _between(base: SeenLog, rising: list[SeenLog]) -> NextRun:
+def between(base: SeenLog, rising: list[SeenLog]) -> NextRun:
     """The next run of the log that decides most, below the thetas that do not converge."""
     least = min((log.theta for log in rising), default=None)
     if not base.converges or least is None or Fraction(base.next.theta) * SHORTEST_STEP <= least:
         return base.next
     low, high = float(base.theta), float(least)
     if high <= low * float(SHORTEST_STEP):
-        return NextRun(theta=low, why=f"it converges and {high:.4g} does not: no larger one is worth a run")
+        return kept(base.theta, f"it converges and {high:.4g} does not: no larger one is worth a run")
     theta = rounded_down(Fraction((low * high) ** 0.5))
     return NextRun(theta=theta, why=f"between {low:.4g}, which converges, and {high:.4g}, which does not")

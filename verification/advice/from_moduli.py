@@ -210,11 +210,11 @@ def advise_moduli(
 ) -> Advice:
     """What the moduli of two bodies say of rho before there is a mesh.
 
-    For each role the advice has the bounds of rho from below that every geometry has in the continuum, and on meshes
-    that are fine enough: ``(G_c/G_n) kappa_n`` where a piece of Gamma_c may stick, ``E*_c/E*_n`` without friction, with
-    c for the contact body and n for the Neumann body; besides what corners of 90 degrees at the ends of Gamma_c add.
-    No theta from ``2/(1 + bound)`` on contracts.  The role with the smaller bound is worth trying first: two lower
-    bounds prove no order.
+    For each role the advice has the bounds of rho from below that every geometry has in the continuum:
+    ``(G_c/G_n) kappa_n`` where a piece of Gamma_c may stick, ``E*_c/E*_n`` without friction, with c for the contact
+    body and n for the Neumann body; besides what corners of 90 degrees at the ends of Gamma_c add.  In the continuum no
+    theta from ``2/(1 + bound)`` on contracts, and no larger one on matching meshes that are fine enough.  The role with
+    the smaller bound is worth trying first: two lower bounds prove no order.
 
     A bound from below gives no theta.  One to start with is there only where Gamma_c is flat, the mirror image of the
     contact body lies in the Neumann body, and wherever the contact body is held its image is held too.  Then

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from fem1d2d.mesh import Floats
+from verification.advice.ends import SWIFT
 from verification.advice.readings import FEWEST_STEPS
 
 #: Logarithms of ratios that scatter and drift by less, or by a fifth of theta, are steady.
@@ -45,6 +46,10 @@ TRIES = 12
 MOST_WINDOWS = 300
 
 
+#: Windows that are too short one by one are pooled where there are so many.
+FEWEST_WINDOWS = 5
+
+
 @dataclass(frozen=True, kw_only=True)
 class Pace:
     """How one series of residuals goes on.
@@ -59,9 +64,11 @@ class Pace:
     steps : int
         How many steps the series has that can be read.
     height : float
-        The last residual as a share of the largest one.
+        The last residual as a share of the largest one; where it is lost in rounding or zero, the share of rounding.
     lost : bool
         Whether the series ends in inf or nan.
+    arrived : bool
+        True if it ends in rounding or in zero, a step after those that can be read.
     """
 
     kind: Literal["steady", "level", "floor", "plateau", "unsteady", "short"]
@@ -71,6 +78,12 @@ class Pace:
     steps: int
     height: float = 1.0
     lost: bool = False
+    arrived: bool = False
+
+    @property
+    def swift(self) -> bool:
+        """True if the series falls by SWIFT a step or faster in the mean."""
+        return not self.lost and math.log(self.height) <= (self.steps + self.arrived) * math.log(SWIFT)
 
 
 def pace(
@@ -99,19 +112,26 @@ def pace(
     lost = end < len(residuals) and not math.isfinite(float(residuals[end]))
     gaps = np.flatnonzero(np.diff(usable) > 1)  # a relative residual is inf where T x vanishes: the bodies part
     values = residuals[int(usable[gaps[-1] + 1]) if gaps.size else int(usable[0]) if usable.size else 0 : end]
+    arrived = bool(values.size) and end < len(residuals) and residuals[end] == 0
+    share = ROUNDING
     if values.size:
         peak = int(np.argmax(values))
-        below = ROUNDING if relative else max(ROUNDING * values[peak], 100 * decimals)
-        under = np.flatnonzero(values[peak:] < below)
+        share = max(ROUNDING, 100 * decimals / float(values[peak]))
+        under = np.flatnonzero(values[peak:] < (ROUNDING if relative else share * values[peak]))
+        arrived = arrived or bool(under.size)
         values = values[: peak + int(under[0])] if under.size else values
     taken = max(len(values) - 1, 0)
     height = float(values[-1] / values.max()) if taken else 1.0
+    if arrived:  # at rounding or zero
+        height = min(height, share)
     if height < CONVERGED:  # no level: fewer steps show the ratio
         steps = min(steps, max(FEWEST_STEPS, taken // 2))
     if taken < steps:
-        return Pace(kind="short", steps=taken, height=height, lost=lost)
+        return Pace(kind="short", steps=max(taken, int(arrived)), height=height, lost=lost, arrived=arrived)
     logs = np.log(values)
     limit = min(STEADY, theta / 5)
+
+    known: dict[str, Any] = {"steps": taken, "height": height, "arrived": arrived}
 
     def ratio(end: int) -> Pace | None:
         """The steady ratio of the steps before ``end``; None where there is none."""
@@ -136,12 +156,7 @@ def pace(
         if relative:
             sure += math.log((1 + largest) / (1 - largest)) / steps
         return Pace(
-            kind="steady",
-            value=math.exp(median),
-            least=math.exp(median - sure),
-            most=math.exp(median + sure),
-            steps=taken,
-            height=height,
+            kind="steady", value=math.exp(median), least=math.exp(median - sure), most=math.exp(median + sure), **known
         )
 
     last = ratio(len(values))
@@ -150,9 +165,10 @@ def pace(
     if last is not None and not flat:
         return last
     if relative and (plateau := _plateau(tail, digits)) is not None:
-        return Pace(kind="plateau", value=plateau[1], least=plateau[0], most=plateau[2], steps=taken, height=height)
+        return Pace(kind="plateau", value=plateau[1], least=plateau[0], most=plateau[2], **known)
     ends = range(len(values), steps, -max(1, steps // 2))[1 : TRIES + 1]
-    before = next((found for end in ends if (found := ratio(end)) is not None), None)
+    earlier = (found for end in ends if (found := ratio(end)) is not None)
+    before = next((found for found in earlier if _falls(found) or _grows(found)), None)  # no part of the level itself
     lengths = [n for n in (steps, 2 * steps, 4 * steps) if n <= taken]  # a rough level shows over a longer stretch
     if flat or any(_level(logs[-n - 1 :], spread, limit) for n in lengths):
         kind: Literal["level", "floor"] = "floor" if height < FLOOR else "level"
@@ -160,13 +176,13 @@ def pace(
             return before
         if before is not None and (kind == "floor" or _grows(before)):
             return replace(before, kind=kind)
-        return Pace(kind=kind, steps=taken, height=height)
+        return Pace(kind=kind, **known)
     if before is not None and _grows(before):
         return before
     if height < CONVERGED and (settles := _settling(tail, relative, limit, steps)) is not None:
         least, value, most = settles
-        return Pace(kind="steady", value=value, least=least, most=most, steps=taken, height=height)
-    return Pace(kind="unsteady", steps=taken, height=height, lost=lost)
+        return Pace(kind="steady", value=value, least=least, most=most, **known)
+    return Pace(kind="unsteady", lost=lost, **known)
 
 
 def _settling(tail: Floats, relative: bool, limit: float, steps: int) -> tuple[float, float, float] | None:
@@ -225,6 +241,34 @@ def _level(logs: Floats, spread: float, limit: float) -> bool:
     turns = min(np.count_nonzero(ratios > 0), np.count_nonzero(ratios < 0)) >= len(ratios) // 5
     still = float(np.abs(_slopes(logs, 2)).max()) <= limit
     return trend <= (limit if still else spread) and bool(turns or still)
+
+
+def pooled(windows: Sequence[Floats], *, relative: bool, steps: int) -> tuple[float, float, float] | None:
+    """Median, least and largest ratio of many time windows that are too short to be read one by one.
+
+    Of each window the second half of its steps counts, where the slowest mode leads.  A mode
+    that is slower than a window is long does not show, so that this is a pace and no bound.
+
+    Parameters
+    ----------
+    windows : sequence of array
+    relative : bool
+        Whether residuals are ``|T x - x|/|T x|``; they count below SMALL then.
+    steps : int
+        So many steps must count in all.
+    """
+    ratios, count = [], 0
+    for window in windows:
+        values = window[np.isfinite(window) & (window > 0)]
+        half = (len(values) - 1) // 2
+        if len(values) < len(window) or half < 1 or (relative and values[-half - 1] > SMALL):
+            continue
+        ratios.append(float(np.log(values[-1] / values[-half - 1])) / half)
+        count += half
+    if len(ratios) < FEWEST_WINDOWS or count < steps:
+        return None
+    least, middle, most = np.exp(np.quantile(ratios, [0.1, 0.5, 0.9]))
+    return float(middle), float(least), float(most)
 
 
 def together(paces: Sequence[Pace]) -> tuple[float, float, float]:

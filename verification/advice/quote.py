@@ -21,7 +21,8 @@ def reason(found: Advice) -> str:
     best, other = found.best, found.other
     tied = found.tied and best.ends is not None
     theta, rate = found.chosen(best)
-    first = f"rho (stiffness of contact body over Neumann body on the interface, at worst) is {_rho(best, tied)}"
+    first = "" if found.assumes is None else f"Assumed: {found.assumes}. "
+    first += f"rho (stiffness of contact body over Neumann body on the interface, at worst) is {_rho(best, tied)}"
     if found.neumann_body is not None:
         first += f" with body {found.neumann_body} as Neumann body"
     if other is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from decimal import ROUND_DOWN, ROUND_UP, Context, Decimal
+from decimal import ROUND_DOWN, ROUND_FLOOR, ROUND_UP, Context, Decimal
 from fractions import Fraction
 from typing import Any, Literal
 
@@ -30,6 +30,9 @@ SHORTEST_STEP = Fraction(9, 8)
 
 #: The readings that need nodes that open: none of a tied interface.
 OF_OPEN_NODES = ("open", "level")
+
+#: A run shows nothing new if its theta and another one differ by less than this share, also of 1 - theta.
+ANEW = Fraction(1, 100)
 
 #: Ratios this close to 1 - theta, as a share of theta and of 1 - theta, are those of open nodes.
 SAME = Fraction(1, 20)
@@ -76,10 +79,22 @@ class RunReading:
 
 @dataclass(frozen=True, kw_only=True)
 class NextRun:
-    """The run to make next: its theta, and what it will show."""
+    """The run to make next: its theta, and what it will show.
+
+    Attributes
+    ----------
+    theta : float
+    why : str
+    kept : bool
+        True if a run with this theta was made and is to be kept.
+    again : bool
+        True if that run is to be made again because its log was too short or not steady.
+    """
 
     theta: float
     why: str
+    kept: bool = False
+    again: bool = False
 
     def to_dict(self) -> dict[str, Any]:
         """The object ``next``."""
@@ -197,13 +212,33 @@ def read_plateau(theta: Fraction, plateau: Observed) -> tuple[tuple[RunReading, 
     return tuple(found), NextRun(theta=rounded_down(following), why=why)
 
 
+def check_assumed(tied: bool, friction: bool) -> None:
+    """Raise ValueError where an interface is both tied and with friction."""
+    if tied and friction:
+        raise ValueError("tied with friction: needed one of them, as nothing slips on a tied interface")
+
+
+def assumed(tied: bool, friction: bool) -> str:
+    """The assumption under which runs are read."""
+    if friction:
+        return "there is friction, with which no ratio of residuals bounds rho"
+    return "nothing opens or slips" if tied else "no friction, or a tied interface"
+
+
+def same_run(theta: Fraction | float, other: Fraction) -> bool:
+    """True if a run with this theta shows nothing that one with the other does not."""
+    near = abs(Fraction(theta) - other) < ANEW * min(other, 1 - other)
+    return near or f"{float(theta):g}" == f"{float(other):g}"
+
+
 def level(theta: Fraction, bounds: bool = True) -> RunReading:
     """A residual that stays at a level, or grows for a while only; whether that tells of rho."""
     least = 2 / theta - 1
     says = "contact opens and closes in turn, and the residual stays at a level or grows for a while only"
     if bounds:
         says += (
-            f": without friction rho is at least {_few(least)}, nothing more; with friction this says nothing of rho"
+            f": without friction rho is at least {_at_least(least)}, nothing more; "
+            "with friction this does not bound rho"
         )
     else:
         says += ", or the solvers of both sides are no more accurate: this says nothing of rho"
@@ -214,7 +249,8 @@ def _readings(theta: Fraction, ratio: Observed, value: Fraction) -> tuple[RunRea
     """What a ratio can mean; ``value`` is the lambda of a mode that changes its sign."""
     r, high, low = ratio.value, (1 + ratio.least) / theta - 1, (1 - ratio.most) / theta - 1
     fastest = f"the stiffest mode in this run has lambda = {_few((1 + ratio.most) / theta - 1)} at most"
-    proved = f"without friction, or tied, rho is at least {_few(high)}, and about that if all of Gamma_c stays closed"
+    about = "and about that if all of Gamma_c stays closed"
+    proved = f"without friction, or tied, rho is at least {_at_least(high)}, {about}"
     found = []
     if ratio.least > 1:
         says = f"the residual grows by this ratio in every step: {proved}"
@@ -225,7 +261,7 @@ def _readings(theta: Fraction, ratio: Observed, value: Fraction) -> tuple[RunRea
     found.append(RunReading(kind="mode-high", value=float(value), lo=below(high), says=says))
     if ratio.least <= 1 - theta:
         low = max(low, Fraction(0))
-        bound = f"without friction, or tied, rho is at least {_few(low)}"
+        bound = f"without friction, or tied, rho is at least {_at_least(low)}"
         says = f"the softest mode keeps its sign and is the slowest: {bound}; {fastest}"
         found.append(RunReading(kind="mode-low", lo=below(low), says=says))
     sure = max(ratio.most - r, r - ratio.least)
@@ -245,6 +281,12 @@ def spread(theta: Fraction) -> Fraction:
 
 def _few(value: Fraction) -> str:
     return f"{float(value):.4g}"
+
+
+def _at_least(value: Fraction) -> str:
+    """A bound from below in four figures, not above it."""
+    down = Context(prec=4, rounding=ROUND_FLOOR).divide(Decimal(value.numerator), Decimal(value.denominator))
+    return f"{float(down):.4g}"
 
 
 def rounded_down(theta: Fraction) -> float:

@@ -28,6 +28,7 @@ from verification.progress import Progress, silent
 
 if TYPE_CHECKING:
     from verification.advice.from_moduli import SeenModuli
+    from verification.advice.runs_with_friction import FrictionBounds
     from verification.figures import Figure
 
 
@@ -61,6 +62,10 @@ class Advice(Document):
         What was seen of the matrices that were given; None where none were.
     tied : bool
         Whether the advice is for an interface of which nothing opens or slips.
+    assumes : str or None
+        The assumption under which runs were read; None where none were given.
+    friction_bounds : FrictionBounds or None
+        What runs prove with friction; None unless friction was given.
     """
 
     schema: ClassVar[str] = "ndtheory.advice/1"
@@ -79,15 +84,18 @@ class Advice(Document):
     problem: Problem | None = None
     moduli: SeenModuli | None = None
     tied: bool = False
+    assumes: str | None = None
+    friction_bounds: FrictionBounds | None = None
 
     @property
     def summary(self) -> str:
         if self.moduli is not None:
             return self.moduli.summary
         if not self.roles:
-            return f"{len(self.readings)} readings of {'logs' if self.logs else 'a run'}"
+            return f"assumed: {self.assumes}; {len(self.readings)} readings of {'logs' if self.logs else 'a run'}"
         theta, rate = self.chosen(self.best)
         who = "" if self.neumann_body is None else f"Neumann problem to body {self.neumann_body}, "
+        who = who if self.assumes is None else f"assumed: {self.assumes}; "
         return f"{who}theta = {theta:.4g} {'if tied' if self.tied else 'predicted'}, rate {rate:.4g}"
 
     def chosen(self, role: Role) -> tuple[float, float]:
@@ -110,6 +118,8 @@ class Advice(Document):
             return ""
         if self.moduli is not None:
             return "moduli bound rho from below: a theta to start with stands in moduli.roles.start, where there is one"
+        if self.friction_bounds is not None:
+            return "with friction no run decides theta: make the run that `next` names"
         return "several readings are left: make the run that `next` names"
 
     @property
@@ -182,6 +192,10 @@ class Advice(Document):
             reason["moduli"] = "no moduli were given"
         elif not self.neumann_body:
             reason["neumann_body"] = "both roles have the same bounds"
+        if self.assumes is None:
+            reason["assumes"] = "no run was given"
+        if self.friction_bounds is None:
+            reason["friction_bounds"] = "no run with friction was given"
         if self.matrices is None:
             reason["matrices"] = "no matrices were given"
         if self.theta is None:
@@ -190,6 +204,7 @@ class Advice(Document):
             "neumann_body": self.neumann_body,
             "theta": self.theta,
             "tied": self.tied,
+            "assumes": self.assumes,
             "quote": self.quote,
             "roles": [role.to_dict() for role in self.roles],
             "run": None if self.run is None else self.run.to_dict(),
@@ -197,6 +212,7 @@ class Advice(Document):
             "next": None if self.next is None else self.next.to_dict(),
             "logs": [log.to_dict() for log in self.logs],
             "interval": None if self.interval is None else self.interval.to_dict(),
+            "friction_bounds": None if self.friction_bounds is None else self.friction_bounds.to_dict(),
             "moduli": None if self.moduli is None else self.moduli.to_dict(),
             "matrices": None if self.matrices is None else self.matrices.to_dict(),
             "outside_theorem": list(self.outside),
@@ -216,7 +232,7 @@ def advise(problem: Problem | ContactPair | Path | str, *, tied: bool = False, p
     tied : bool
         Whether to advise by what holds where nothing opens or slips.
     progress : callable
-        Told the steps that rho takes where there are too many contact nodes for matrices.
+        Called with the steps that rho takes where there are too many contact nodes for matrices.
 
     Returns
     -------

@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from verification.advice.ends import DEAR, FEWEST, TO
-from verification.advice.pace import CONVERGED, Pace
+from ndtheory.number import above, below
+from verification.advice.next_run import Made
+from verification.advice.pace import Pace
 from verification.advice.readings import NextRun, Observed, RunReading
+
+#: A residual below this share of its largest value has fallen, although the log is too short for a ratio.
+FALLEN = 0.1
 
 #: What a ratio assumes to bound rho from below, and what from above.
 FROM_BELOW = "no friction, or a tied interface"
 TIED = "a tied interface"
 FROM_ABOVE = "a tied interface, or near the solution all of Gamma_c closed and nothing sliding"
+
+
+_WHY_NOT = {
+    "ratio": "no window shows one",
+    "plateau": "no window shows one",
+    "pooled": "windows are read one by one, or are too few or too short to be pooled",
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,6 +43,8 @@ class SeenColumn:
         How many time windows the log has; too short ones are not read where there are others, of many the last ones.
     ratio, plateau : Observed or None
         Of the windows put together.
+    pooled : Observed or None
+        The pace of windows that are all too short, which bounds nothing.
     """
 
     name: str
@@ -41,6 +53,7 @@ class SeenColumn:
     windows: int
     ratio: Observed | None
     plateau: Observed | None
+    pooled: Observed | None = None
 
     def count(self, *kinds: str) -> int:
         """How many of the windows that were read are of these kinds."""
@@ -65,6 +78,8 @@ class SeenColumn:
             found += f"; plateau {_within(self.plateau)}"
         if self.count("short") == len(self.paces):
             found += f", {max(pace.steps for pace in self.paces)} steps at most"
+        if self.pooled is not None:
+            found += f"; pooled, the second half of each: ratio {_within(self.pooled)}"
         return found
 
     def to_dict(self) -> dict[str, Any]:
@@ -76,8 +91,9 @@ class SeenColumn:
             "read": {kind: self.count(kind) for kind in ("steady", "level", "floor", "plateau", "unsteady", "short")},
             "ratio": _three(self.ratio),
             "plateau": _three(self.plateau),
+            "pooled": _three(self.pooled),
             "says": self.says,
-            "reason": {name: "no window shows one" for name in ("ratio", "plateau") if getattr(self, name) is None},
+            "reason": {name: why for name, why in _WHY_NOT.items() if getattr(self, name) is None},
         }
 
 
@@ -144,9 +160,28 @@ class SeenLog:
 
     @property
     def swift(self) -> bool:
-        """Whether the run has fallen to CONVERGED so fast, in the mean, that no faster one is looked for."""
-        paces = [pace for column in self.columns for pace in column.paces]
-        return all(p.height < CONVERGED and math.log(p.height) / p.steps <= TO / (DEAR * FEWEST) for p in paces)
+        """True if the residual falls so fast, in the mean of every window, that no faster run is looked for."""
+        paces = [pace for column in self.columns for pace in column.paces if pace.steps]
+        return bool(paces) and all(pace.swift for pace in paces)
+
+    @property
+    def pooled(self) -> Observed | None:
+        """The pace of the slowest field of which all windows are too short."""
+        found = [column.pooled for column in self.columns if column.pooled is not None]
+        return max(found, key=lambda ratio: ratio.value, default=None)
+
+    @property
+    def falls(self) -> bool:
+        """True if the run converges, or is too short to be read and ends below a tenth of its largest residual."""
+        paces = [pace for column in self.columns for pace in column.paces if pace.steps]
+        unread = self.slowest is None and not self.stays and bool(paces)
+        return self.converges or (unread and all(not p.lost and p.height < FALLEN for p in paces))
+
+    @property
+    def made(self) -> Made:
+        """Input of the choice of the next run."""
+        most = None if self.slowest is None else self.slowest.most
+        return Made(theta=self.theta, falls=self.falls, rises=self.diverges, ratio=most)
 
     def to_dict(self) -> dict[str, Any]:
         """A member of ``logs``."""
@@ -178,10 +213,10 @@ class LogBound:
     says: str
     assumes: str
 
-    def to_dict(self) -> dict[str, Any]:
-        """The object ``interval.lo`` or ``interval.hi``."""
+    def to_dict(self, *, up: bool) -> dict[str, Any]:
+        """The object ``interval.lo`` or ``interval.hi``, whose value is rounded outwards."""
         return {
-            "value": float(self.value),
+            "value": above(self.value) if up else below(self.value),
             "file": self.log.file,
             "theta": float(self.log.theta),
             "says": self.says,
@@ -214,8 +249,8 @@ class Interval:
         if self.contradiction is None:
             reason["contradiction"] = "the logs agree" if self.lo and self.hi else "one bound alone contradicts nothing"
         return {
-            "lo": None if self.lo is None else self.lo.to_dict(),
-            "hi": None if self.hi is None else self.hi.to_dict(),
+            "lo": None if self.lo is None else self.lo.to_dict(up=False),
+            "hi": None if self.hi is None else self.hi.to_dict(up=True),
             "contradiction": self.contradiction,
             "reason": reason,
         }

@@ -5,9 +5,11 @@ from __future__ import annotations
 from verification.advice.readings import LARGEST_TO_PASTE, NextRun, RunReading, SeenRun
 from verification.advice.role import Role, in_steps
 from verification.advice.roles import Advice
+from verification.advice.runs_with_friction import FrictionBounds
 from verification.advice.seen import Interval, LogBound, SeenLog
 from verification.advice.snippets import SNIPPETS
-from verification.cli.console import figures, heading, near_one, note, printable, say, table
+from verification.cli.console import figures, heading, near_one, note, say, table
+from verification.cli.levels import rounded
 from verification.cli.matrices import matrices
 from verification.cli.moduli_screen import moduli
 from verification.cli.screens import steps
@@ -20,12 +22,14 @@ def advice(found: Advice, typed: Typed | None = None) -> None:
     if found.moduli is not None:
         moduli(found, found.moduli)
         return
+    if found.assumes is not None:
+        _assumed(found)
     if found.matrices is not None:
         matrices(found.matrices)
     if found.run is not None and found.next is not None:
-        _seen(found.run, found.readings, found.next)
+        _seen(found.run, found.readings, found.next, found.friction_bounds)
     if found.interval is not None and found.next is not None:
-        _logs(found.logs, found.interval, found.readings, found.next)
+        _logs(found.logs, found.interval, found.readings, found.next, found.friction_bounds)
         if found.roles:
             _paste(found)
             note("Predicted for the roles that the bodies have; logs tell nothing of the other assignment.", "  ")
@@ -40,11 +44,13 @@ def advice(found: Advice, typed: Typed | None = None) -> None:
         note(f"Outside the theorem: {reason}.")
     if found.next is not None:
         say("Not claimed: a bound of rho with friction, or that a reading is the right one.")
-        if found.logs:
+        assumed = "--tied " * found.tied + "--friction " * (found.friction_bounds is not None)
+        if found.next.kept and not found.roles:
+            say(f"Next: no run; keep theta = {found.next.theta:g}")
+        elif found.logs:
             say(f"Next: the same with --log LOG --theta {found.next.theta:g} (LOG: the log of that run)")
-            return
-        tied = "--tied " * found.tied
-        say(f"Next: ndtheory advise {tied}--theta {found.next.theta:g} --ratio R (R: the ratio of that run)")
+        else:
+            say(f"Next: ndtheory advise {assumed}--theta {found.next.theta:g} --ratio R (R: its ratio)")
         return
     what = "that nothing opens or slips" if found.tied else "that the predicted theta is the best one for your loads"
     say(f"Not claimed: {what}.")
@@ -60,7 +66,33 @@ def advice(found: Advice, typed: Typed | None = None) -> None:
         say("Next: ndtheory advise --help")
 
 
-def _seen(run: SeenRun, readings: tuple[RunReading, ...], following: NextRun) -> None:
+def _assumed(found: Advice) -> None:
+    """The assumption under which runs are read, before all else."""
+    say(f"Assumed: {found.assumes}.")
+    if not found.tied and found.friction_bounds is None:
+        say("With friction what follows may be false: add --friction.")
+
+
+def _with_friction(bounds: FrictionBounds | None) -> None:
+    """Bounds that hold with friction; nothing without friction."""
+    if bounds is None:
+        return
+    heading("WHAT IS PROVED WITH FRICTION?")
+    if bounds.image is not None:
+        image = rounded(bounds.image, 3, up=False)
+        theorem = "sqrt(rho) R, with 2 R = s + sqrt(s^2 + 4 kappa_2) and s = sqrt(rho) + kappa_1"
+        note(f"The Lipschitz constant of T in the norm (5.21) is at least {image}; it is at most {theorem}.", "  ")
+    if bounds.eigenvalue is not None and bounds.theta is not None and bounds.rate is not None:
+        least, most = (rounded(end, 3, up=up) for end, up in zip(bounds.eigenvalue, (False, True), strict=True))
+        gain = rounded(1 - bounds.rate, 3, up=False)
+        near = f"Near the solution of the run at theta = {bounds.theta:.4g}, if contact does not change there, its"
+        words = f"slowest mode has |1 + lambda| from {least} to {most}, and a smaller theta' takes at most"
+        note(f"{near} {words} 1 - {gain} theta'/{bounds.theta:.4g} a step.", "  ")
+    if bounds.image is None and bounds.eigenvalue is None:
+        say("  Nothing.")
+
+
+def _seen(run: SeenRun, readings: tuple[RunReading, ...], following: NextRun, rubs: FrictionBounds | None) -> None:
     """What a run says of rho, and which one is to be made next."""
     heading("WHAT DOES THE RUN SAY OF RHO?")
     given = f"theta = {float(run.theta):.4g}; the residual |Tg - g| changes by {float(run.ratio):.4g} a step"
@@ -68,6 +100,7 @@ def _seen(run: SeenRun, readings: tuple[RunReading, ...], following: NextRun) ->
     note("A residual that rises and falls has no steady ratio: give 1.", "  ")
     note("The relative residual |Tg - g|/|Tg| of coupling libraries tells other things.", "  ")
     _readings(readings)
+    _with_friction(rubs)
     heading("WHICH RUN NEXT?")
     note(f"theta = {following.theta:g}: {following.why}", "  ")
 
@@ -75,7 +108,7 @@ def _seen(run: SeenRun, readings: tuple[RunReading, ...], following: NextRun) ->
 def _readings(readings: tuple[RunReading, ...]) -> None:
     rows = [["reading", "rho", "if it is the right one"]]
     for reading in readings:
-        rho = "-" if reading.lo is None else f">= {figures(reading.lo)}"
+        rho = "-" if reading.lo is None else f">= {rounded(reading.lo, 3, up=False)}"
         rows.append([reading.kind, rho, reading.says])
     table(rows)
 
@@ -84,17 +117,23 @@ def _readings(readings: tuple[RunReading, ...]) -> None:
 MOST_COLUMNS = 8
 
 
-def _logs(logs: tuple[SeenLog, ...], interval: Interval, readings: tuple[RunReading, ...], following: NextRun) -> None:
+def _logs(
+    logs: tuple[SeenLog, ...],
+    interval: Interval,
+    readings: tuple[RunReading, ...],
+    following: NextRun,
+    rubs: FrictionBounds | None,
+) -> None:
     """What logs say of rho, alone and together, and which run is to be made next."""
     heading("WHAT DO THE LOGS SHOW?")
     room = MOST_COLUMNS
     for log in logs:
-        note(f"theta = {float(log.theta):.4g}, {log.form}, {printable(log.file)}", "  ")
+        note(f"theta = {float(log.theta):.4g}, {log.form}, {log.file}", "  ")
         for column in log.columns[:room]:
             residual = {"assumed": "taken as absolute", "drop": "over the first one"}.get(
                 column.residual, column.residual
             )
-            note(f"{printable(column.name)}, {residual}: {column.says}", "    ")
+            note(f"{column.name}, {residual}: {column.says}", "    ")
         room -= len(log.columns[:room])
         for words in log.notes:
             note(words, "    ")
@@ -112,6 +151,7 @@ def _logs(logs: tuple[SeenLog, ...], interval: Interval, readings: tuple[RunRead
     else:
         _bound("least", interval.lo, logs)
         _bound("most", interval.hi, logs)
+    _with_friction(rubs)
     heading("WHICH RUN NEXT?")
     note(f"theta = {following.theta:g}: {following.why}", "  ")
 
@@ -123,7 +163,8 @@ def _steps(logs: tuple[SeenLog, ...]) -> str:
 def _bound(which: str, bound: LogBound | None, logs: tuple[SeenLog, ...]) -> None:
     if bound is not None:
         source = f"theta = {float(bound.log.theta):.4g}: {bound.says}" if len(logs) > 1 else bound.says
-        note(f"rho is at {which} {figures(float(bound.value))} given {bound.assumes} ({source})", "  ")
+        value = rounded(float(bound.value), 3, up=which == "most")
+        note(f"rho is at {which} {value} given {bound.assumes} ({source})", "  ")
 
 
 NAMES = {1: "body 1", 2: "body 2", None: "as in that run"}
@@ -261,4 +302,4 @@ def snippets(found: Advice, library: str) -> None:
     for name in names:
         if library == "all":
             heading(name)
-        say(found.snippet(name))
+        say(found.snippet(name), lines=True)
