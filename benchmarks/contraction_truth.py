@@ -184,6 +184,17 @@ class Truth:
             except ZeroDivisionError:  # in balls
                 return self.exact.bounds(signs, factor)
 
+    def allows(self, factor: fmpq) -> bool:
+        """Whether the piece that has the largest ``|J|`` in doubles is below a factor.
+
+        No factor is right where contact alone holds the contact body: the systems of some pieces have no solution, by
+        their rationals, though in doubles they may look regular.
+        """
+        try:
+            return self.bounds(self.patterns[int(self.sizes.argmax())], factor)
+        except ZeroDivisionError:
+            return False
+
     def holds(self, factor: str) -> bool:
         """Whether T_theta has a Lipschitz constant below a factor; the pieces of largest ``|J|`` are decided first."""
         return all(self.bounds(self.patterns[i], number(factor)) for i in np.argsort(-self.sizes))

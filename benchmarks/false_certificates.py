@@ -231,8 +231,7 @@ class Record:
                 self.undecided.append((key, str(min(factors))))
         for key, truth in self.truths.items():
             below = [x for x in self.refused.get(key, []) if x < truth.largest * (1 - 1e-14)]
-            worst = truth.patterns[int(truth.sizes.argmax())]
-            if below and not truth.bounds(worst, number(str(max(below)))):
+            if below and not truth.allows(number(str(max(below)))):
                 self.counts["false and refused"] += len(below)
 
     def attack(self, problem: vf.Problem) -> None:

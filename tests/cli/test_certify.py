@@ -6,6 +6,7 @@ import pytest
 from complaints import assert_names
 from problem_list import SMALL, edited
 
+import verification as vf
 from ndtheory import __version__
 
 
@@ -57,7 +58,14 @@ def test_where_contraction_is_not_proved_a_line_says_so_and_nothing_is_written(c
     file.write_text(edited(SMALL, {"contact.friction": "5"}), encoding="utf-8")
     answer = call("certify", file, "-o", target)
     assert (answer.status, answer.out) == (1, "")
-    assert_names(answer.err.splitlines()[-1], "no certificate", "k = 5")
+    assert_names(answer.err.splitlines()[-1], str(file), "no certificate", "k = 5")
+    assert not target.exists()
+    same = call("certify", file, "-o", target, "--json")
+    document = same.document
+    assert (same.status, same.err) == (1, answer.err)
+    assert (document["schema"], document["command"], document["file"]) == ("ndtheory.failure/1", "certify", str(file))
+    assert (document["outcome"], document["problem"]) == ("not proved", vf.load(file).to_dict())
+    assert "k = 5" in document["error"]
     assert not target.exists()
 
 
@@ -92,8 +100,3 @@ def test_bad_input_ends_in_one_line(arguments, said, call, tmp_path, monkeypatch
     (tmp_path / "empty.json").write_text('{"schema": "ndtheory.certificate/1"}', encoding="utf-8")
     (tmp_path / "bars.toml").write_text(call("example", "two-bars").out, encoding="utf-8")
     assert_names(call("certify", *arguments).complaint, *said)
-
-
-def test_without_its_extra_the_command_says_what_to_install(call, tmp_path, monkeypatch):
-    monkeypatch.setattr("verification.cli.certifying.find_spec", lambda name: None)
-    assert_names(call("certify", tmp_path / "any.toml").complaint, "python-flint", "ndtheory[certify]")

@@ -2,6 +2,9 @@
 
 import pytest
 
+import verification as vf
+from ndtheory import evaluate_sharp
+
 pytestmark = pytest.mark.usefixtures("known_continuum")
 
 
@@ -11,7 +14,7 @@ def test_the_screen_says_that_section_6_contracts_at_its_own_friction(call, writ
     assert answer.status == 0
     assert "Every small theta contracts for k < 0.2357" in said
     assert "theta = 0.4: factor <= 0.9469, guaranteed." in said
-    assert "Not claimed: the local Coulomb law" in said
+    assert "Not claimed: contraction on a mesh, which may need a smaller theta for good" in said
     assert max(map(len, answer.out.splitlines()[:-1])) <= 80
 
 
@@ -47,12 +50,90 @@ def test_where_gamma_c_reaches_an_end_small_theta_are_proved_and_none_in_numbers
     assert "rho >= 19.26 wedges at the ends of Gamma_c" in said
 
 
-def test_the_mesh_plays_no_part(call, write):
+def test_the_mesh_enters_no_bound(call, write):
     coarse, fine = (
         call("certify", "--continuum", write({"body1.cells": cells}), "--theta", "0.4", "--json").document
         for cells in ("[10, 2]", "[80, 12]")
     )
     assert coarse["factor"] == fine["factor"]
+    assert coarse["mesh"] != fine["mesh"]
+
+
+#: Section 6 with the moduli exchanged and no friction; the upper cells are twice as high as wide, the lower are square.
+EXCHANGED = {
+    "body1.young": "2e4",
+    "body2.young": "7e4",
+    "contact.friction": "0",
+    "body1.cells": "[40, 6]",
+    "body2.cells": "[24, 3]",
+}
+
+
+def test_a_theta_that_contracts_in_the_continuum_and_not_on_the_mesh_is_shown_with_both_numbers(call, write):
+    """rho_normal is 3.5 in the continuum and 4.5 on 25 nodes: theta = 0.43 lies between 2/5.5 and 2/4.5."""
+    path = write(EXCHANGED)
+    answer = call("certify", "--continuum", path, "--theta", "0.43")
+    said = " ".join(answer.out.split())
+    assert answer.status == 0
+    assert "rho_normal: 4.5001 on 25 contact nodes (float); in the continuum <= 3.5, guaranteed." in said
+    assert "On this mesh no theta from 0.3636 on contracts (float)." in said
+    assert "theta = 0.43 contracts in the continuum (guaranteed), and NOT on this mesh (float)." in said
+    assert said.index("NOT on this mesh") > said.index("guaranteed. DOES IT CONTRACT ON THE MESH")
+    assert max(map(len, answer.out.splitlines()[:-1])) <= 80
+    document = call("certify", "--continuum", path, "--theta", "0.43", "--json").document
+    assert (document["verdict"], document["mesh"]["contracts"]) == ("contraction", False)
+    assert document["mesh"]["rho_normal"]["level"] == "float"
+    assert document["constants"]["rho_normal"]["level"] == "guaranteed"
+    assert "a mesh, which may need a smaller theta for good" in document["not_claimed"]
+    stalled = call("run", path, "--theta", "0.43", "--json")
+    assert stalled.document["outcome"] == "stalled"
+    assert call("run", path, "--theta", "0.33", "--json").document["outcome"] == "converged"
+
+
+def test_the_best_theta_of_the_continuum_is_judged_where_the_file_has_none(call, write):
+    """2/(2 + 3.5) = 0.36363.. lies a little above 2/(1 + 4.5001)."""
+    mesh = call("certify", "--continuum", write({**EXCHANGED, "iteration.theta": '"auto"'}), "--json").document["mesh"]
+    assert mesh["theta"] == pytest.approx(2 / 5.5)
+    assert mesh["theta"] > mesh["theta_limit"]
+    assert mesh["contracts"] is False
+
+
+def test_rho_of_the_mesh_is_that_of_constants_and_the_mesh_is_judged_by_its_own_bound(call, write):
+    path = write({"contact.radius": "0.2"})
+    mesh = call("certify", "--continuum", path, "--theta", "0.3", "--json").document["mesh"]
+    measured = call("constants", path, "--json").document
+    assert mesh["rho"]["value"] == pytest.approx(measured["rho_max"]["value"], rel=1e-12)
+    assert mesh["rho_normal"]["value"] == pytest.approx(measured["rho_normal"]["value"], rel=1e-12)
+    assert mesh["theta_limit"] == pytest.approx(2 / (1 + measured["rho_max"]["value"]))
+    assert mesh["interface_nodes"] == measured["interface_nodes"]
+    energy = vf.measure(path).energy_constants()
+    seen = set()
+    for theta in ("0.3", "0.99"):
+        judged = call("certify", "--continuum", path, "--theta", theta, "--json").document["mesh"]["contracts"]
+        assert judged is (True if evaluate_sharp(energy, theta).verdict == "contraction" else None)
+        seen.add(judged)
+    assert seen == {True, None}
+    stiff = write({"contact.radius": "0.2", "body1.young": "2e4", "body2.young": "7e4"})
+    assert call("certify", "--continuum", stiff, "--theta", "0.5", "--json").document["mesh"]["contracts"] is False
+
+
+@pytest.mark.parametrize(
+    ("edits", "why"),
+    [
+        ({"body1.cells": "[400, 2]"}, "up to 320 cells along a side and 30000 in all"),
+        ({"contact.interval": "[0.45, 1.55]", "body2.cells": "[6, 2]"}, "the meshes are refused: "),
+    ],
+)
+def test_where_rho_of_the_mesh_is_not_known_the_bounds_of_the_continuum_are_given_with_a_warning(
+    call, write, edits, why
+):
+    answer = call("certify", "--continuum", write({"contact.radius": "0.1", **edits}), "--theta", "0.4")
+    said = " ".join(answer.out.split())
+    assert answer.status == 0
+    assert "The mesh may need a smaller theta than the continuum" in said
+    mesh = call("certify", "--continuum", write({**edits}), "--theta", "0.3", "--json").document["mesh"]
+    assert mesh["rho"] is mesh["contracts"] is mesh["theta_limit"] is None
+    assert why in mesh["reason"]["rho"]
 
 
 def test_without_friction_the_mirror_image_proves_the_classical_rate(call, write):

@@ -1,5 +1,6 @@
 """The bounds for the continuum: each formula derived again, each bound held against grids, meshes and fields."""
 
+from dataclasses import replace
 from decimal import Decimal, localcontext
 from fractions import Fraction as F
 from itertools import pairwise
@@ -312,6 +313,18 @@ def test_section_6_contracts_in_the_continuum_at_the_friction_of_the_paper(secti
     assert says.theta_max_proved.lo > 0.472
     assert statement(section6, friction="0.1").theta_max_proved.lo > 0.602
     assert statement(section6, friction="0.25").interval is None
+
+
+@pytest.mark.parametrize(("radius", "threshold", "proved"), [("0.1", 0.2357, True), ("0.02", 0.1055, False)])
+def test_what_is_proved_at_the_friction_of_the_paper_depends_on_a_radius_that_it_does_not_give(
+    section6, radius, threshold, proved
+):
+    """At its theta, 0.6, nothing is proved with either radius."""
+    found = largest_smoothed(model().neumann.strip, F(radius))  # the only constant with r in it
+    constants = replace(section6, C_s_square=F(found.hi))
+    assert friction_threshold(constants).lo == pytest.approx(threshold, abs=1e-4)
+    says = statement(constants, friction="0.2", theta="0.6")
+    assert (says.verdict, says.interval is not None) == ("no conclusion", proved)
 
 
 def test_the_bounds_of_section_6_lie_above_what_is_known_of_its_constants(section6):

@@ -197,7 +197,7 @@ def test_a_statement_is_decided_and_each_mutant_of_it_refuted(index):
 @pytest.mark.parametrize("id", [id for id, s in statements().items() if s.fault == "false as printed"])
 def test_what_is_called_false_has_an_exact_counterexample_or_a_problem_that_breaks_it(id):
     exact = [c for c in CHECKS if c.id == id and "printed" in c.forms and c.decide(c.forms["printed"]).holds is False]
-    assert exact or id in ("5.13", "sec-7")  # broken by a thin body, and by runs
+    assert exact or id == "5.13"  # broken by a thin body
 
 
 @pytest.mark.usefixtures("decided_once")
@@ -224,15 +224,6 @@ def test_one_open_sliding_node_breaks_what_is_printed_near_C_0(id, theta, shown)
         assert str(number) in statements()[id].wrong
     exact = [c for c in CHECKS if c.id == id and "one open node" in c.text.lower()]
     assert [c.decide(c.forms["printed"]).holds for c in exact] == [False]
-
-
-def test_the_map_that_shows_that_S_must_be_lipschitz_jumps_between_two_arguments():
-    (check,) = (c for c in CHECKS if c.id == "2.5")
-    at = check.decide(check.forms["step"]).counterexample
-    C, d = sp.Rational(at["C"]), sp.Rational(at["d"])
-    S = lambda tau: tau if tau >= 1 else 0
-    assert 0 < d < 1
-    assert abs(S(1) - S(1 - d)) > C * d
 
 
 @pytest.mark.parametrize("id", ["x-gradient-descent", "x-best-theta", "x-sharp", "x-printed-literal"])
@@ -311,6 +302,8 @@ ALL = [
     "x-gradient-descent",
     "x-threshold-uniqueness",
     "x-sharp",
+    "x-no-theta-for-all-moduli",
+    "x-increment-test",
 ] + [f"5.{i}" for i in range(1, 48)]
 
 
@@ -332,7 +325,7 @@ def test_no_proof_runs_in_a_circle():
 def test_a_fault_is_told_with_its_repair(statement):
     assert statement.claims
     told = [bool(text) for text in (statement.wrong, statement.repair, statement.proof)]
-    assert told == [bool(statement.fault)] * 3 or (statement.id, told) == ("sec-7", [True, False, False])
+    assert told == [bool(statement.fault)] * 3
     assert not statement.same_as or statements()[statement.same_as].fault
     for text in (statement.claims, statement.wrong, statement.repair, statement.proof, statement.note):
         assert text.count("$") % 2 == 0

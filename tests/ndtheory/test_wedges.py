@@ -138,13 +138,45 @@ def test_at_large_exponents_both_wedges_are_half_planes(contact, neumann):
     assert float(found.lo) == pytest.approx(float(half_planes(contact.body, neumann.body).free), rel=1e-6)
 
 
+def first_order(wedge):
+    r"""The relative size of what S has beside its limit ``xi^2 S_0``, per unit of xi.
+
+    The formula of the symbol gives ``S = xi^2 (S_0 + xi s diag(1, -1) + O(xi^2))``,
+
+        S_0 = 2 G/(kappa + 1) [[omega, sin(omega) e^(i omega)], [sin(omega) e^(-i omega), omega]],
+        s = -2 G ((kappa - 1) omega^2 + 2 sin^2(omega))/(kappa + 1)^2,
+
+    and the eigenvalues of ``s S_0^-1 diag(1, -1)`` are plus and minus ``|s|/det(S_0)^(1/2)``.
+    """
+    omega, kappa = math.radians(wedge.degrees), float(wedge.body.kappa)
+    sine = math.sin(omega)
+    return ((kappa - 1) * omega**2 + 2 * sine**2) / ((kappa + 1) * math.sqrt(omega**2 - sine**2))
+
+
+#: Of second order in an exponent of 1e-6, with the squares of angles up to 2 pi, and of rounding.
+NEGLIGIBLE = 1e-10
+
+
 @given(free_wedges, free_wedges)
 def test_at_small_exponents_free_wedges_answer_like_michell_s_to_a_force_at_the_apex(contact, neumann):
-    angles = math.radians(contact.degrees), math.radians(neumann.degrees)
+    """Each S lies between ``1 -+ xi first_order`` times its limit, so the largest eigenvalue of two of them does too.
+
+    Where the limits have two equal eigenvalues, as those of half-planes, the first order counts; without tangential
+    forces there is none, as the ratio is even in xi.
+    """
+    xi, angles = 1e-6, (math.radians(contact.degrees), math.radians(neumann.degrees))
     found = float(ratio(contact, neumann, F(1, 10**6)).lo)
-    assert found == pytest.approx(end(contact.body, neumann.body, angles)[1], rel=1e-6)
+    within = xi * (first_order(contact) + first_order(neumann)) + NEGLIGIBLE
+    assert found == pytest.approx(end(contact.body, neumann.body, angles)[1], rel=within)
     found = float(ratio(contact, neumann, F(1, 10**6), normal=True).lo)
-    assert found == pytest.approx(free_end(contact.body, neumann.body, angles), rel=1e-6)
+    assert found == pytest.approx(free_end(contact.body, neumann.body, angles), rel=NEGLIGIBLE)
+
+
+@given(bodies, bodies)
+def test_two_half_planes_differ_from_their_limit_by_all_of_the_first_order(contact, neumann):
+    pair = Wedge(body=contact, degrees=180), Wedge(body=neumann, degrees=180)
+    found, (_, limit) = float(ratio(*pair, F(1, 10**6)).lo), end(contact, neumann, (math.pi, math.pi))
+    assert found / limit - 1 == pytest.approx(1e-6 * sum(map(first_order, pair)), abs=NEGLIGIBLE)
 
 
 @given(wedges, wedges, numbers)

@@ -62,6 +62,17 @@ def test_a_checker_that_forgets_a_condition_on_the_multipliers_accepts_false_cer
     assert record.false
 
 
+def test_no_factor_is_right_where_contact_alone_holds_the_contact_body(benchmark):
+    """Open nodes have no jump then, in rationals; doubles may name such a piece as the largest."""
+    made = vf.certify(vf.Problem.from_dict(TINY))
+    contact = f"body{3 - made.discrete['neumann_body']}"
+    loose = {**made.discrete, contact: {**made.discrete[contact], "held": []}}
+    for discrete, allowed in ((made.discrete, True), (loose, False)):
+        truth = benchmark.Truth(discrete, made.claim["theta"])
+        truth.sizes = np.array([None not in pattern for pattern in truth.patterns], dtype=float)  # all open and sliding
+        assert truth.allows(benchmark.number("1000000")) == allowed
+
+
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_the_largest_piece_in_rationals_is_that_of_the_jacobians_in_doubles(benchmark, name):
     problem = vf.Problem.from_dict(PROBLEMS[name])

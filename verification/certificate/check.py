@@ -200,15 +200,20 @@ def examine(document):
     check(document["discrete"], document["claim"])
 
 
+def show(text):
+    """Print a text that may come from the certificate on one line, without what steers a terminal."""
+    print("".join(c if c.isprintable() else ascii(c)[1:-1] for c in text))
+
+
 def main(path):
     try:
         with open(path, encoding="utf-8") as file:
             document = json.load(file)
-        print(words(document))
+        show(words(document))
         print("sha256 of the bodies and what joins them:", digest(document["discrete"]))
         examine(document)
     except UNREADABLE as error:
-        print(f"REFUSED: {type(error).__name__}: {error}")
+        show(f"REFUSED: {type(error).__name__}: {error}")
         return 1
     print(
         "ACCEPTED:", "T_theta contracts" if rational(document["claim"]["factor"]) < 1 else "no contraction is claimed"

@@ -11,7 +11,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from decimal import ROUND_DOWN, ROUND_UP, Context, Decimal
 from fractions import Fraction
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -107,8 +106,6 @@ class Confirmation:
     """
 
     def __init__(self, pair: ContactPair, *, progress: Progress = silent) -> None:
-        if find_spec("flint") is None:
-            raise NoCertificate("python-flint is not installed: needed the extra `certify`")
         if pair.problem is None:
             raise NoCertificate(FROM_MATRICES)
         if pair.problem.dimension != 2:

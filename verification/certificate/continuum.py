@@ -1,7 +1,7 @@
 """What the theorem in energy norms says of the bodies of a problem file themselves, not of a mesh.
 
-The mesh of the file plays no part.  What is needed of the file is checked here and told in one line; what the theory
-cannot prove for it is null, with its reason.
+The mesh of the file enters no bound; its rho is shown beside the continuum's.  What is needed of the file is checked
+here and told in one line; what the theory cannot prove for it is null, with its reason.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from ndtheory.continuum import (
 )
 from ndtheory.intervals import Interval
 from ndtheory.moduli import Moduli, half_planes
+from verification.certificate.file_mesh import FileMesh, file_mesh
 from verification.document import Document
 from verification.problem import Problem, ProblemError
 from verification.progress import Progress, silent
@@ -34,8 +35,9 @@ ANY_RADIUS = Fraction(1)
 
 #: What no number here speaks of.
 NOT_CLAIMED = (
-    "the local Coulomb law, other kernels than the hat, unloading, rounding and discretisation errors of a run; that"
-    " the iteration diverges at a larger friction or theta"
+    "contraction on a mesh, which may need a smaller theta for good, however fine it is; the local Coulomb law, other"
+    " kernels than the hat, unloading, rounding and discretisation errors of a run; that the iteration diverges at a"
+    " larger friction or theta"
 )
 
 
@@ -49,6 +51,8 @@ class ContinuumCertificate(Document):
     constants : ContinuumConstants
     sharp : SharpBounds or None
         The theorem for the upper bounds of the constants; None where rho is not bounded.
+    mesh : FileMesh
+        rho on the mesh of the file, in doubles, which may be larger than the continuum's.
     """
 
     schema: ClassVar[str] = "ndtheory.certificate/1"
@@ -56,6 +60,7 @@ class ContinuumCertificate(Document):
     problem: Problem
     constants: ContinuumConstants
     sharp: SharpBounds | None
+    mesh: FileMesh
 
     @property
     def units(self) -> Mapping[str, str]:  # type: ignore[override]
@@ -72,6 +77,14 @@ class ContinuumCertificate(Document):
         if self.sharp is None:
             return False
         return self.sharp.verdict == "contraction" if self.sharp.theta is not None else self.sharp.interval is not None
+
+    @property
+    def theta_judged(self) -> float | None:
+        """The theta of the file; with ``auto`` the best one that is proved, None where there is none."""
+        theta = self.problem.iteration.theta
+        if theta != "auto":
+            return float(theta)
+        return None if self.sharp is None else self.sharp.theta_proved
 
     @property
     def solvable(self) -> bool:
@@ -142,6 +155,7 @@ class ContinuumCertificate(Document):
             "factor_proved": of("factor_proved", upper),
             "factor": of("factor", upper),
             "verdict": "contraction" if self.contracts else "no conclusion",
+            "mesh": self.mesh.to_dict(self.theta_judged),
             "not_claimed": NOT_CLAIMED,
             "reason": reason,
         }
@@ -211,7 +225,7 @@ def certify_continuum(problem: Problem, progress: Progress = silent) -> Continuu
     Parameters
     ----------
     problem : Problem
-        Two rectangles held at their outer sides alone, with the non-local law.  Its mesh plays no part.
+        Two rectangles held only at their outer sides, with the non-local law.  Its mesh enters no bound.
     progress : Progress
 
     Returns
@@ -230,4 +244,5 @@ def certify_continuum(problem: Problem, progress: Progress = silent) -> Continuu
     theta = problem.iteration.theta
     friction = problem.contact.friction
     sharp = statement(constants, friction=friction, theta=None if theta == "auto" else theta)
-    return ContinuumCertificate(problem=problem, constants=constants, sharp=sharp)
+    mesh = file_mesh(problem, progress)
+    return ContinuumCertificate(problem=problem, constants=constants, sharp=sharp, mesh=mesh)

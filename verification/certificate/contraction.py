@@ -11,7 +11,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from importlib.util import find_spec
 from typing import Any, ClassVar, Literal, get_args
 
 from verification.algorithm.theta import choose
@@ -155,8 +154,6 @@ def certify(
         The bound has no conclusion, or its multipliers do not prove what they should in rationals.
     ProblemError
         Not two plane bodies of which the theorem speaks.
-    ImportError
-        python-flint is not there.
 
     Examples
     --------
@@ -165,8 +162,6 @@ def certify(
     >>> found.lower < found.factor < 1
     True
     """
-    if find_spec("flint") is None:
-        raise ModuleNotFoundError("python-flint is not installed", name="flint")
     refuse = lambda key, needed: ProblemError(problem.source, key, None, needed)
     if edition not in get_args(Edition):
         raise ValueError(f"edition {edition!r}: needed one of {', '.join(get_args(Edition))}")
@@ -205,8 +200,6 @@ def check_again(document: Any, problem: Problem | None = None) -> Checked:
     ------
     ValueError
         Not a certificate of contraction.
-    ImportError
-        python-flint is not there.
 
     Examples
     --------

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from verification.cli.console import complain, deliver, heading, near_one, note, say, stages
+from verification.cli.console import deliver, heading, near_one, note, say, stages
+from verification.cli.failing import fail
 from verification.cli.problems import JSON, SET, SWAP, THETA, load_problem
 from verification.cli.typed import Typed
 
@@ -59,8 +59,7 @@ def certify(
 
     The certificate of a mesh holds the bodies in rational numbers and the multipliers that prove the factor.  Whoever
     doubts it checks it with a script of some 200 lines, verification/certificate/check.py, which imports nothing of
-    this program (python-flint alone, for balls).  Needs the extra `certify`; --continuum does not.  Exit 1 where
-    contraction is not proved.
+    this program (only python-flint, for balls).  Exit 1 where contraction is not proved.
 
     \b
     Examples:
@@ -88,9 +87,6 @@ def certify(
 
         assert file is not None
         return prove_continuum(file, keys, theta=theta, swap=swap, target=target, as_json=as_json)
-    if find_spec("flint") is None:
-        needed = "needed the extra `certify` (pip install 'ndtheory[certify]')"
-        raise click.UsageError(f"python-flint is not installed: {needed}", context)
     if given is not None:
         return _check(given, None if file is None else load_problem(file, keys, swap=swap), as_json)
     assert file is not None
@@ -102,8 +98,7 @@ def certify(
         with stages() as tell:
             found = prove(problem, edition=edition or "lmi", progress=tell)
     except NoCertificate as error:
-        complain(f"ndtheory: no certificate: {error}")
-        return 1
+        return fail(error, "not proved", "no certificate")
 
     typed = Typed(file=file, keys=keys, theta=theta, swap=swap)
     deliver(found, lambda: show(found, target, typed), as_json, writing(found, target), target)

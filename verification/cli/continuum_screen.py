@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from verification.cli.console import complain, deliver, figures, heading, note, say, stages, table
+from verification.cli.console import deliver, figures, heading, note, say, stages, table
+from verification.cli.failing import fail
 from verification.cli.problems import load_problem
 from verification.cli.typed import Typed
 
@@ -28,8 +29,7 @@ def prove(
         with stages() as tell:
             found = certify_continuum(problem, tell)
     except Unproved as error:
-        complain(f"ndtheory: nothing is proved: {error}")
-        return 1
+        return fail(error, "not proved", "nothing is proved")
     typed = Typed(file=file, keys=keys, theta=theta, swap=swap)
     deliver(found, lambda: show(found, typed), as_json, writing(found, target), target)
     return 0 if found.contracts else 1
@@ -94,7 +94,39 @@ def show(found: ContinuumCertificate, typed: Typed | None = None) -> None:
             note(f"theta = {document['theta']:g}: factor {_at_most(document['factor'])}, guaranteed.", "  ")
         elif document["theta"] is not None:
             note(f"theta = {document['theta']:g}: no conclusion.", "  ")
+    _on_the_mesh(found, document)
     say()
     note(f"Not claimed: {document['not_claimed']}.")
     if typed is not None:
         typed.suggest("compare", iteration=True)
+
+
+def _on_the_mesh(found: ContinuumCertificate, document: Mapping[str, Any]) -> None:
+    """rho of the mesh beside rho of the continuum, and whether the theta contracts on both."""
+    mesh, k = document["mesh"], document["friction"]
+    heading("DOES IT CONTRACT ON THE MESH OF THE FILE?")
+    name = "rho" if k else "rho_normal"
+    if mesh["theta_limit"] is None:
+        note(f"Not known. {mesh['reason']['rho']}.", "  ")
+        note("The mesh may need a smaller theta than the continuum, and so may every finer one.", "  ")
+        return
+    continuum = document["constants"][name] or document["constants"]["rho"]
+    bound = "no bound" if continuum is None else f"{_at_most(continuum)}, guaranteed"
+    nodes = mesh["interface_nodes"]
+    note(f"{name}: {mesh[name]['value']:.5g} on {nodes} contact nodes (float); in the continuum {bound}.", "  ")
+    limit, where = mesh["theta_limit"], " where all of Gamma_c sticks" if k else ""
+    if limit <= 1:
+        note(f"On this mesh no theta from {limit:.4g} on contracts{where} (float).", "  ")
+    judged = f"theta = {mesh['theta']:.4g}" if mesh["theta"] is not None else ""
+    if judged and mesh["contracts"]:
+        note(f"{judged} contracts on this mesh (float).", "  ")
+    elif judged and mesh["contracts"] is None:
+        note(f"{judged}: no conclusion on this mesh; `ndtheory compare` has sharper bounds.", "  ")
+    elif judged and found.contracts:
+        note(
+            f"{judged} contracts in the continuum (guaranteed), and NOT on this mesh (float). Finer meshes of such"
+            " cells may need a smaller theta for good, too.",
+            "  ",
+        )
+    elif judged:
+        note(f"{judged} does not contract on this mesh (float).", "  ")
