@@ -294,3 +294,20 @@ check(
     forms={"repaired": sharp.predicted_theta(rho)},
     mutants={"1/(1+rho_N)": 1 / (1 + rho), "2/(1+rho_N)": 2 / (1 + rho)},
 )
+
+check(
+    id="x-no-theta-for-all-moduli",
+    text="S_1 is proportional to E_1, so that E_1 c times as large makes rho_N c times as large.  With"
+    " c = (2/theta - 1)/rho_N the factor theta (1 + c rho_N) - 1 is 1, and larger c make it larger.  With"
+    " c = 2 (1/theta - 1)/rho_N the best theta 2/(2 + c rho_N) is theta, any number in (0, 1).",
+    goals=lambda form: [
+        equal(theta * (1 + form[0] * rho) - 1, 1),
+        less(1, theta * (1 + (1 + y) * form[0] * rho) - 1, {theta: any_theta}),
+        equal(sharp.predicted_theta(form[1] * rho), theta),
+    ],
+    forms={"repaired": ((2 / theta - 1) / rho, 2 * (1 / theta - 1) / rho)},
+    mutants={
+        "half of the first": ((2 / theta - 1) / (2 * rho), 2 * (1 / theta - 1) / rho),
+        "half of the second": ((2 / theta - 1) / rho, (1 / theta - 1) / rho),
+    },
+)

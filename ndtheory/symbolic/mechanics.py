@@ -80,18 +80,6 @@ check(
     mutants={"twice": -2},
 )
 
-apart = positive("d")  # how far tau moves
-
-check(
-    id="2.5",
-    text="That |S(tau)| <= |tau| does not make S Lipschitz, which (5.13) uses: S(tau) = tau for tau >= 1 and 0 below"
-    " jumps by 1 between 1 - d and 1, however small d > 0 is, while C d < 1 for every d < 1/C, whatever C.  A linear S"
-    " has the difference S(d).",
-    goals=lambda form: [at_most(C * apart, form(apart)), less(C * apart, 1, {apart: 1 / (C * (1 + y))})],
-    forms={"step": lambda d: sp.Integer(1), "repaired": lambda d: C * d / (1 + q)},
-    mutants={"twice the bound": lambda d: 2 * C * d},
-)
-
 b, slip = positive("b"), nonnegative("u_T")
 
 check(
@@ -270,6 +258,24 @@ check(
     goals=_green,
     forms={"printed": -1},
     mutants={"the sign": 1, "twice": -2},
+)
+
+old, image = sp.symbols("g Tg", real=True)
+
+check(
+    id="x-increment-test",
+    text="g_n - g_(n-1) = theta (T g - g) with g = g_(n-1).  Where T g - h = -l (g - h) for the fixed point h, an"
+    " increment of eps leaves g - h = eps/(theta (1+l)), 1/theta times what a residual of eps leaves.  In a unit of"
+    " force 1/u times as large the increment is u times as large a number, and the quotient of residual and T g is what"
+    " it was.",
+    goals=lambda form: [
+        equal(theta * image + (1 - theta) * old - old, form * (image - old)),
+        equal((theta * (-o * y) + (1 - theta) * y) - y, -form * (1 + o) * y),
+        equal(q * (theta * image + (1 - theta) * old - old), q * form * (image - old)),
+        equal(q * (image - old) / (q * image), (image - old) / image),
+    ],
+    forms={"repaired": theta},
+    mutants={"without theta": sp.Integer(1), "1 - theta": 1 - theta},
 )
 
 # --- Section 6 ------------------------------------------------------------------------------------------------------

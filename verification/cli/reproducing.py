@@ -28,9 +28,9 @@ def reproduce(figure: str, jobs: int | None, store: Path | None, folder: Path | 
     """Run the experiment behind a figure of Section 6, beside what the paper says of it.
 
     The text leaves open where the upper body sits (2 x 0.3 mm and 1.2 x 0.3 mm, E in MPa), whether its top may slide,
-    and names the roles of the bodies in two ways.  Every combination was named before any was run; each gets its
-    verdict, and the one that comes nearest is told.  -o writes the rows behind each figure as CSV, and the figures.
-    With --store runs are kept: figures 10 to 12 are then drawn again without one.
+    and names the roles of the bodies in two ways.  Half models and exchanged moduli, which depart from the text, are
+    tried too.  Every combination gets its verdict, and the one that comes nearest is named.  -o writes the rows behind
+    each figure as CSV, and the figures.  With --store runs are kept: figures 10 to 12 are then drawn again without one.
 
     \b
     Examples:
@@ -85,9 +85,14 @@ def _figure(result: Result) -> None:
 
 def _short(outcome: Outcome) -> str:
     reading = outcome.reading
-    side = "centred" if reading.position == "centred" else "left"
-    moved = "" if reading.moved == "whole top" else f", {reading.moved.removeprefix('left ')}"
-    return f"{side}, {reading.top.split()[0]}{moved}{'' if reading.neumann_body == 1 else ', roles of Section 3'}"
+    parts = [
+        reading.position.split()[0],
+        reading.top.split()[0],
+        "" if reading.moved == "whole top" else reading.moved.removeprefix("left "),
+        "" if reading.neumann_body == 1 else "roles of Section 3",
+        "" if reading.moduli == "as printed" else "moduli exchanged",
+    ]
+    return ", ".join(filter(None, parts))
 
 
 def _word(outcome: Outcome) -> str:

@@ -52,7 +52,7 @@ METHODS: Mapping[Method, tuple[str, str]] = {
 #: Why statements that were checked in floating point have no evidence of the kind *verified*, by prefixes of their ids;
 #: the last reason is that of all others.
 NOT_VERIFIED = (
-    ("fig- sec-", "it is about how many steps certain runs take, or where a stress changes its sign"),
+    ("fig- sec- x-no-theta x-incr", "it is about how many steps runs take, or where a stress changes its sign"),
     ("x-printed-false", "it is about all pairs of bodies; what it says is proved on one under (5.30) to (5.44)"),
     ("lemma-5.2 thm-", "it is about the limit of a run"),
     ("", "it is about solutions for given loads and every test function; residuals are evaluated in floating point"),

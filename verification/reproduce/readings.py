@@ -3,6 +3,9 @@
 The text gives both rectangles, their moduli, nu = 0.3, k = 0.2, the displacement -0.015 mm of the upper body, and the
 numbers of nodes of four meshes.  Its pictures are not in the text: it does not say where the upper body sits, nor
 whether its top may slide.  Section 6 gives the Neumann problem to the first body, Section 3 to the second.
+
+A half model and the exchanged moduli were added after the other readings had been run, because runs of an independent
+code pointed to them.  Each is combined with all that was open before, so that no combination is picked by its result.
 """
 
 from __future__ import annotations
@@ -15,14 +18,20 @@ from typing import Any, Literal
 from verification.problem import Problem
 from verification.problem.examples import example
 
-#: Where the upper body, 1.2 mm long, sits on the lower one, 2 mm long.
-POSITIONS: dict[str, Fraction] = {"centred": Fraction(2, 5), "left edges aligned": Fraction(0)}
+#: The left halves are left out: the left sides of both bodies lie on an axis of symmetry and do not move along x.
+HALF = "half model"
+
+#: Where the upper body, 1.2 mm long, begins on the lower one, 2 mm long.
+POSITIONS: dict[str, Fraction] = {"centred": Fraction(2, 5), "left edges aligned": Fraction(0), HALF: Fraction(0)}
 
 #: Which part of the top is moved down: the share of its length from the left.
 MOVED: dict[str, Fraction] = {"whole top": Fraction(1), "left two thirds": Fraction(2, 3), "left half": Fraction(1, 2)}
 
 #: Whether what is moved may slide.
 TOPS = ("clamped", "free to slide")
+
+#: Young's moduli of the lower and the upper body, in MPa.
+MODULI = {"as printed": (70000, 20000), "exchanged": (20000, 70000)}
 
 LENGTH, DOWN = Fraction(6, 5), Fraction(-15, 1000)
 
@@ -33,37 +42,45 @@ class ModelReading:
 
     Attributes
     ----------
-    position : {'centred', 'left edges aligned'}
+    position : {'centred', 'left edges aligned', 'half model'}
     moved : {'whole top', 'left two thirds', 'left half'}
     top : {'clamped', 'free to slide'}
     neumann_body : {1, 2}
         1, the lower body, as Section 6 has it, or 2 as Section 3.
+    moduli : {'as printed', 'exchanged'}
+        Exchanged: the upper body has the larger modulus.
     """
 
     position: str
     moved: str
     top: str
     neumann_body: Literal[1, 2]
+    moduli: str
 
     @property
     def name(self) -> str:
         """In a few words."""
         moved = self.moved if self.moved == "whole top" else f"{self.moved} of the top"
-        return f"{self.position}, {moved} {self.top}, Neumann body {'lower' if self.neumann_body == 1 else 'upper'}"
+        role = f"Neumann body {'lower' if self.neumann_body == 1 else 'upper'}"
+        exchanged = "" if self.moduli == "as printed" else ", moduli exchanged"
+        return f"{self.position}, {moved} {self.top}, {role}{exchanged}"
 
     @property
     def departs(self) -> list[str]:
         """Where it leaves the text of Section 6; empty where it only fills what the text leaves open."""
-        found = [] if self.moved == "whole top" else [f"only the {self.moved} of the top is moved"]
-        return found + ([] if self.neumann_body == 1 else ["the roles of the bodies are those of Section 3"])
+        departures = {
+            "the left sides of both bodies lie on an axis of symmetry": self.position == HALF,
+            f"only the {self.moved} of the top is moved": self.moved != "whole top",
+            "the roles of the bodies are those of Section 3": self.neumann_body == 2,
+            "the moduli are exchanged": self.moduli == "exchanged",
+        }
+        return [text for text, departs in departures.items() if departs]
 
     @property
     def assumes(self) -> list[str]:
         """What it assumes where the text is silent."""
-        return [
-            f"the upper body is {self.position}" if self.position == "centred" else self.position,
-            f"top {self.top}",
-        ]
+        positions = {"centred": ["the upper body is centred"], HALF: []}
+        return [*positions.get(self.position, [self.position]), f"top {self.top}"]
 
     def problem(self, nodes: int = 60) -> Problem:
         """The problem on a mesh of the family.
@@ -84,6 +101,11 @@ class ModelReading:
         base = example(f"section6-{nodes}").to_dict()
         base["title"] = f"Section 6, {self.name}, {nodes} nodes"
         base["body2"] = {key: value for key, value in base["body2"].items() if key != "prescribed"} | keys
+        if self.position == HALF:
+            on_axis = {"left": [0, "free"]}
+            base["body1"]["prescribed"] = on_axis
+            base["body2"]["prescribed"] = keys["prescribed"] | on_axis
+        base["body1"]["young"], base["body2"]["young"] = MODULI[self.moduli]
         base["iteration"]["neumann_body"] = self.neumann_body
         return Problem.from_dict(base)
 
@@ -94,6 +116,6 @@ class ModelReading:
 
 #: Every combination; nothing was left out after a run.
 READINGS: tuple[ModelReading, ...] = tuple(
-    ModelReading(position=position, moved=moved, top=top, neumann_body=role)  # type: ignore[arg-type]
-    for moved, role, position, top in product(MOVED, (1, 2), POSITIONS, TOPS)
+    ModelReading(position=position, moved=moved, top=top, neumann_body=role, moduli=moduli)  # type: ignore[arg-type]
+    for moduli, moved, role, position, top in product(MODULI, MOVED, (1, 2), POSITIONS, TOPS)
 )
