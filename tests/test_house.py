@@ -213,3 +213,9 @@ def test_a_special_name_is_no_private_one():
 
 def test_no_file_of_tests_is_longer_than_450_lines():
     assert [path.name for path in TESTS if path.read_text(encoding="utf-8").count("\n") > 450] == []
+
+
+def test_no_two_files_of_tests_have_one_name():
+    """pytest imports them by their names: of two, the second one would be an error of the whole session."""
+    names = [path.name for path in TESTS if path.name.startswith("test_")]
+    assert sorted(name for name in set(names) if names.count(name) > 1) == []

@@ -29,10 +29,10 @@ if TYPE_CHECKING:
     from verification.advice.from_moduli import advise_moduli
     from verification.advice.from_runs import advise_run
     from verification.advice.roles import Advice, advise
-    from verification.algorithm.fixed_point import iterate
     from verification.algorithm.iterate import Iterate
     from verification.algorithm.relaxation import Rule
     from verification.algorithm.runs import Run, run
+    from verification.algorithm.start import iterate
     from verification.certificate.contraction import certify, check_again
     from verification.comparison import Comparison, compare
     from verification.constants import Measured, measure
@@ -75,7 +75,7 @@ _HOME = {
     "check_again": "certificate.contraction",
     "compare": "comparison",
     "example": "problem.examples",
-    "iterate": "algorithm.fixed_point",
+    "iterate": "algorithm.start",
     "load": "problem.reading",
     "measure": "constants",
     "run": "algorithm.runs",

@@ -136,9 +136,19 @@ def test_a_sparse_matrix_of_every_kind_is_read(tmp_path, kind):
 
 
 def mesh_file(
-    path, x=(0.0, 2.0), y=(-0.3, 0.0), cells=(10, 2), names=("left", "right", "bottom", "top"), lift=None, twice=False
+    path,
+    x=(0.0, 2.0),
+    y=(-0.3, 0.0),
+    cells=(10, 2),
+    names=("left", "right", "bottom", "top"),
+    lift=None,
+    twice=False,
+    surfaces=(),
 ):
-    """The built-in rectangle as a Gmsh file; ``lift`` moves its upper side, ``twice`` doubles its cells."""
+    """The built-in rectangle as a Gmsh file.
+
+    ``lift`` moves its upper side, ``twice`` doubles its cells, ``surfaces`` names equal parts of them.
+    """
     mesh = rectangle(x, y, cells)
     listed = np.tile(mesh.cells, (2 if twice else 1, 1))
     points = np.column_stack([mesh.points, np.zeros(len(mesh.points))])
@@ -147,14 +157,15 @@ def mesh_file(
         points[upper, 1] += lift(points[upper, 0])
     sides = ("left", "right", "bottom", "top")
     tags = np.concatenate([np.full(len(mesh.sides[side]), i) for i, side in enumerate(sides, 1)])
-    inside = np.full(len(listed), 9)
+    inside = 9 + np.arange(len(listed)) * len(surfaces) // len(listed)
+    named = {name: np.array([i, 1]) for i, name in enumerate(names, 1)}
     meshio.write(
         path,
         meshio.Mesh(
             points,
             [("line", np.concatenate([mesh.sides[side] for side in sides])), ("triangle", listed)],
             cell_data={"gmsh:physical": [tags, inside], "gmsh:geometrical": [tags, inside]},
-            field_data={name: np.array([i, 1]) for i, name in enumerate(names, 1)},
+            field_data=named | {name: np.array([i, 2]) for i, name in enumerate(surfaces, 9)},
         ),
         file_format="gmsh22",
         binary=False,
@@ -190,13 +201,43 @@ def test_an_unreadable_mesh_is_refused_by_name(call, write, tmp_path, name, cont
 
 
 @pytest.mark.parametrize(
+    ("name", "content", "fragments"),
+    [
+        (
+            "body.dat",
+            'VARIABLES = "X" "Y"\nZONE N=3,E=1,F=FEPOINT,ET=TRIANGLE\n0 0\n1 0\n',
+            ["(.msh)", "(.inp)", "convert"],
+        ),
+        ("body.e", "CDF", ["(.msh)", "(.inp)", "meshio convert FILE out.msh"]),
+        ("body.inp", "*INCLUDE, INPUT=/dev/zero\n", ["it includes another file"]),
+        ("body.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n1000000000\n", ["promises 1000000000 nodes"]),
+        ("body.inp", "*NODE\n1,0,0\n*ELSET, ELSET=a, GENERATE\n1, 2000000000, 1\n", ["more than 1 GB of memory"]),
+    ],
+    ids=["tecplot", "exodus", "include", "nodes", "elements"],
+)
+def test_a_hostile_mesh_file_is_refused_within_its_limits(call, write, tmp_path, name, content, fragments):
+    """Files that hung, or took all memory."""
+    (tmp_path / name).write_text(content)
+    line = call("run", write(MESHED | {"body1.mesh": f'"{name}"'})).complaint
+    assert_names(line, "problem.toml", "body1.mesh", name, *fragments)
+
+
+def test_a_body_of_two_materials_is_refused_with_their_names(call, write, tmp_path):
+    mesh_file(tmp_path / "body1.msh", surfaces=("rubber", "steel"))
+    line = call("run", write(MESHED)).complaint
+    assert_names(line, "problem.toml", "body1.mesh", "body1.msh", 'split into the groups "rubber", "steel"')
+    mesh_file(tmp_path / "body1.msh", surfaces=("steel",))
+    assert call("run", write(MESHED)).status == 0
+
+
+@pytest.mark.parametrize(
     ("changes", "fragments"),
     [
         ({"names": ("left", "right", "under", "top")}, ["body1.fixed", '"bottom"', "left, right, under, top"]),
         ({"lift": lambda x: 0.1 * x}, ["contact", "top"]),
-        ({"y": (-0.4, -0.1)}, ["do not meet", "y = -0.1"]),
+        ({"y": (-0.2, 0.1)}, ["lie in each other", "y = 0.1"]),
     ],
-    ids=["unknown side", "slope", "apart"],
+    ids=["unknown side", "slope", "in each other"],
 )
 def test_a_mesh_that_does_not_fit_is_refused_by_name(call, write, tmp_path, changes, fragments):
     mesh_file(tmp_path / "body1.msh", **changes)

@@ -28,7 +28,8 @@ def test_a_mutated_input_is_refused_in_one_line_or_answered_by_a_document_that_o
         (0, '{"schema": "ndtheory.run/1", "x": NaN}', "", "not finite"),
         (0, '{"schema": "ndtheory.run/1", "kkt_residual": 1}', "", "kkt_residual"),
         (0, "{", "", "no valid document"),
-        (1, "", "ndtheory: no certified solution\n", None),
+        (1, "", "ndtheory: problem.toml: no certified solution\n", "no valid document"),
+        (1, '{"schema": "ndtheory.failure/1"}', "ndtheory: problem.toml: no certified solution\n", None),
         (2, "", "ndtheory: problem.toml: body1.young = -1: needed a number > 0\n", None),
     ],
 )

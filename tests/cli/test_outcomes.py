@@ -108,12 +108,19 @@ def test_a_solver_that_fails_is_told_in_one_line(call, write, monkeypatch, comma
         raise error
 
     monkeypatch.setattr(f"verification.{solver}.solve", fail)
-    answer = call(command, write())
+    file = write()
+    answer = call(command, file)
     assert answer.status == NOT_MET
     assert ("DOES ONE STEP CONTRACT?" in answer.out) == (command == "compare")  # which was known before
     assert "WHAT HAPPENED" not in answer.out
-    assert answer.err.endswith("no certificate\n")
-    assert answer.err.count("\n") == 1
+    assert answer.err == f"ndtheory: {file}: no certificate\n"
+    same = call(command, file, "--set", "contact.friction=0.3", "--json")
+    assert (same.status, same.err) == (NOT_MET, answer.err)
+    document = same.document
+    assert (document["schema"], document["version"]) == ("ndtheory.failure/1", verification.__version__)
+    assert (document["command"], document["outcome"], document["file"]) == (command, "error", str(file))
+    assert document["error"] == "no certificate"
+    assert document["problem"] == verification.load(file).with_keys({"contact.friction": "0.3"}).to_dict()
 
 
 @pytest.mark.parametrize("command", ["bounds", "run"])
@@ -285,3 +292,23 @@ def test_bodies_that_never_meet_have_no_contact_force_and_a_converged_run(call, 
     assert found["pattern"] == {"stick": 0, "slip": 0, "open": 7}
     assert found["converged"]
     assert found["iterations"] < 10
+
+
+def test_a_remedy_is_no_division_by_zero_where_one_grid_is_coarser(call, tmp_path):
+    file = tmp_path / "190.toml"
+    file.write_text(examples()["section6-190"], encoding="utf-8")
+    answer = call("run", file, "--swap-roles", "--theta", "0.6")
+    assert answer.status == NOT_MET
+    better = re.search(r"try --theta (0\.\d+) .*, or without --swap-roles with --theta (0\.\d+)$", answer.err)
+    assert call("run", file, "--swap-roles", "--theta", better[1]).status == DONE
+    assert call("run", file, "--theta", better[2]).status == DONE
+
+
+def test_a_remedy_names_no_roles_that_are_refused(call, write):
+    rolling = {"body2.prescribed": '{ top = ["free", -0.015] }', "iteration.neumann_body": "1", "body2.young": "1e7"}
+    file = write(rolling | {"iteration.theta": "0.9"})
+    assert call("run", file, "--swap-roles").status == BAD_INPUT
+    answer = call("run", file)
+    assert answer.status == NOT_MET
+    assert "does not contract here; try --theta 0." in answer.err
+    assert "--swap-roles" not in answer.err

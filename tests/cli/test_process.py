@@ -86,6 +86,12 @@ def test_ctrl_c_ends_the_process_with_130_and_a_document(write, command):
     assert (document if command == "run" else document["run"])["outcome"] == "interrupted"
 
 
+def unwarned(err):
+    """What stderr holds beside the warning that the strains of Section 6 exceed 5 %."""
+    strained = "warning: the largest principal strain"
+    return "".join(line for line in err.splitlines(keepends=True) if not line.startswith(strained))
+
+
 @pytest.mark.parametrize("arguments", [["--help"], BOUNDS, ["run", "FILE"], ["compare", "FILE", "--json"]])
 def test_a_reader_that_goes_away_is_neither_a_crash_nor_a_failed_run(write, arguments):
     reader, writer = os.pipe()
@@ -94,7 +100,7 @@ def test_a_reader_that_goes_away_is_neither_a_crash_nor_a_failed_run(write, argu
     code = SKETCHED if "compare" in arguments else COMMAND  # what is sketched is imported first
     found = start(*(file if a == "FILE" else a for a in arguments), code=code, stdout=writer)
     os.close(writer)
-    assert found.stderr == ""
+    assert unwarned(found.stderr) == ""
     assert found.returncode in (0, 141)  # 141: as if ended by SIGPIPE
 
 
@@ -175,7 +181,7 @@ def test_two_comparisons_at_once_in_one_folder_leave_whole_files(write, tmp_path
     command = ["compare", write("without friction"), "-o", tmp_path / "results"]
     with running(SKETCHED, *command) as one, running(SKETCHED, *command) as other:
         said = [process.communicate(timeout=PATIENCE)[1] for process in (one, other)]
-    assert said == [f"written: {tmp_path / 'results'}\n"] * 2
+    assert [unwarned(err) for err in said] == [f"written: {tmp_path / 'results'}\n"] * 2
     assert (one.returncode, other.returncode) == (0, 0)
     assert json.loads((tmp_path / "results" / "compare.json").read_text("utf-8"))["run"]["converged"]
     assert (tmp_path / "results" / "report.html").read_text("utf-8").rstrip().endswith("</html>")

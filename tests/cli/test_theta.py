@@ -108,8 +108,9 @@ def test_a_theta_beside_momentum_is_refused_in_one_line(call, write, command, th
 
 
 def test_a_theta_of_the_file_beside_momentum_is_one_line_of_warning(call, write):
+    gently = {"contact.friction": "0", "body2.prescribed": "{ top = [0, -0.01] }"}  # strains below 5 %
     answers = {
-        theta: call("run", write(MOMENTUM | {"contact.friction": "0", "iteration.theta": theta}), "--json")
+        theta: call("run", write(MOMENTUM | gently | {"iteration.theta": theta}), "--json")
         for theta in ("0.7", '"auto"', None)
     }
     warning = "iteration.theta = 0.7 is not used: momentum takes its step from rho"
@@ -146,7 +147,7 @@ def test_the_screen_of_a_run_says_which_residual_is_meant_and_what_is_sure(call)
     for said in (
         "|Tg - g| changes by 1.4 a step, absolute and unrelaxed",
         "The relative residual |Tg - g|/|Tg| of coupling libraries tells other things",
-        "without friction rho is at least 19, nothing more; with friction this says nothing of rho",
+        "without friction rho is at least 19, nothing more; with friction this does not bound rho",
         "rho is at least 23",
         "rises and falls has no steady ratio: give 1",
     ):

@@ -188,6 +188,12 @@ def falling(folder: Path) -> list[tuple[Path, str]]:
     return [(log, "0.9")]
 
 
+def transient(folder: Path) -> list[tuple[Path, str]]:
+    """A log of time windows that are too short one by one."""
+    window = {"ResAbs(M:F)": linear_run([0.5, 1], 0.9, 6)[0]}
+    return [(precice(folder / "transient.log", [window] * 12), "0.9")]
+
+
 def certified(*problems: vf.Problem) -> Iterator[Any]:
     """Certificates, and what comes of checking them again."""
     for problem in problems:
@@ -227,6 +233,8 @@ def documents(folder: Path, small: vf.Problem) -> list[dict[str, Any]]:
         vf.advise_matrices(np.diag([2.0, 3.0]), np.eye(2), transfer=np.eye(1)),
         vf.advise_matrices(lambda u: 2 * u, solve2=lambda f: f, unknowns=3),
         *(vf.advise_run(theta, ratio) for theta, ratio in (("0.1", "1.4"), ("0.6", "0.7"), ("0.2", "0.5"))),
+        vf.advise_logs(transient(folder)),
+        *(vf.advise_run("0.45", ratio, friction=True) for ratio in ("0.8", "1.4")),
         *(vf.advise_logs(logs) for logs in (diverging(folder), falling(folder), diverging(folder) + falling(folder))),
         vf.advise_moduli(young=(7, 2), poisson=("0.3", "0.3"), mirror=[2]),
         vf.advise_moduli(young=(2, 2), poisson=("0.3", "1/3"), corners="both", mirror=[1], flat=True),
@@ -270,6 +278,7 @@ def test_the_page_lists_every_key_of_every_document_and_no_other(documents, comp
         "example",
         "example section6",
         f"sweep {folder / 'grid.toml'} --dry-run",
+        f"certify {folder / 'small.toml'} --set contact.friction=5",  # no proof
         f"region {folder / 'small.toml'} -o {folder / 'plane.svg'}",
     ):
         documents = [*documents, printed(arguments)]

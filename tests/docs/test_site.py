@@ -84,6 +84,34 @@ def pictures_without_words(html_dir: Path) -> list[str]:
     return found
 
 
+#: A role that was not read, as inside backquotes that belong to something else.
+LEFTOVER = re.compile(r"\{(?:[a-z]+:)?[a-z]+\}(?:`|&#96;|</span>\s*<span[^>]*>`)|\{glue:[a-z]+\}|\{py:[a-z]+\}")
+
+
+def roles_left_over(html_dir: Path) -> list[str]:
+    """Lines ``file: text`` for each role of the page's source that the reader of the built page would see."""
+    found = []
+    for path in sorted(html_dir.rglob("*.html")):
+        text = path.read_text(encoding="utf-8")
+        text = re.sub(r"<script\b.*?</script>", "", text, flags=re.DOTALL)
+        found += [f"{path.relative_to(html_dir)}: {left.group()}" for left in LEFTOVER.finditer(text)]
+    return found
+
+
+@pytest.mark.parametrize(
+    ("text", "count"),
+    [
+        ("<p><code>{glue:text}</code>first``</p>", 1),
+        ("<p>see {doc}`../theory`</p>", 1),
+        ("<p>{verdict}`5.4`</p>", 1),
+        ("<pre>f'{name}'</pre><p>{a, b}</p><script>`${x}`</script>", 0),
+    ],
+)
+def test_a_role_that_was_not_read_is_found(tmp_path, text, count):
+    (tmp_path / "page.html").write_text(text, encoding="utf-8")
+    assert len(roles_left_over(tmp_path)) == count
+
+
 @pytest.mark.parametrize(("alt", "count"), [('alt="Two lines that cross"', 0), ('alt="../_images/a.svg"', 1), ("", 1)])
 def test_a_picture_without_words_is_found(tmp_path, alt, count):
     (tmp_path / "page.html").write_text(f'<p><img src="a.svg" {alt}></p>', encoding="utf-8")
@@ -180,8 +208,8 @@ if __name__ == "__main__":
     if len(sys.argv) != 2 or not (Path(sys.argv[1]) / "index.html").exists():
         sys.exit("usage: python tests/docs/test_site.py DIRECTORY, the directory of a built site")
     site = Path(sys.argv[1])
-    faults = [*external_requests(site), *pictures_without_words(site)]
-    print("\n".join(faults) or "the site asks no other host, and every picture has words")
+    faults = [*external_requests(site), *pictures_without_words(site), *roles_left_over(site)]
+    print("\n".join(faults) or "the site asks no other host, every picture has words, and every role was read")
     sys.exit(bool(faults))
 
 

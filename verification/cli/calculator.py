@@ -105,7 +105,7 @@ def bounds(edition: str, theta: str | None, check: bool, as_json: bool, **given:
         inputs["theta"] = None if theta is None else relaxation_factor(theta)
         absent = dict.fromkeys((key for key, value in inputs.items() if value is None), "not given")
         inputs = {key: None if value is None else float(value) for key, value in inputs.items()} | {"reason": absent}
-        say(BoundsDocument(inputs, results).to_json())
+        say(BoundsDocument(inputs, results).to_json(), lines=True)
     else:
         _screen(constants, {name: result for name, result in results.items() if not result.not_computed})
     proved = any(result.factor is not None and result.proved for result in results.values())

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +13,7 @@ from ndtheory import HypothesisError
 from verification.advice.snippets import SNIPPETS
 from verification.cli.console import Interrupted, complain, deliver, stages
 from verification.cli.matrices import NAMES as OF_MATRICES
-from verification.cli.matrices import advice_from_files, matrix_options
+from verification.cli.matrices import advice_from_files, matrix_options, some_friction
 from verification.cli.moduli import NAMES as OF_MODULI
 from verification.cli.moduli import advice_from_moduli, moduli_options, of_moduli
 from verification.cli.problems import FILE, JSON, SET, load_problem
@@ -19,7 +21,19 @@ from verification.cli.sweeping import STORE
 from verification.cli.typed import Typed
 
 
-@click.command()
+class _Advise(click.Command):
+    """The command with ``--friction``, which runs and logs need no number for: it is empty then."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        given: list[str] = []
+        for word, after in zip_longest(args, args[1:], fillvalue="-"):
+            given.append(word)
+            if word == "--friction" and re.match(r"-(?![\d.])", after):
+                given.append("")
+        return super().parse_args(ctx, given)
+
+
+@click.command(cls=_Advise)
 @click.argument("file", type=click.Path(path_type=Path), required=False)
 @SET
 @matrix_options
@@ -69,8 +83,9 @@ def advise(
     same interface unknowns (force per displacement, any units), with a map between grids and with friction if there
     are such: then vectors list all tangential components from left to right, then all normal ones; or runs of any
     other code with constant theta, as logs or as the ratio of their residuals: what these can mean, and which theta to
-    run next.  Give the ratio of the absolute residual |Tg - g|, not of the relative one of coupling libraries; a log
-    may hold either.  Before there is a mesh, the moduli of both bodies alone bound rho from below.
+    run next.  Without --friction these are read as runs without friction.  Give the ratio of the absolute residual
+    |Tg - g|, not of the relative one of coupling libraries; a log may hold either.  Before there is a mesh, the moduli
+    of both bodies alone bound rho from below.
 
     In a transient the matrices are those of K + c M/dt^2 (c = 1/beta of Newmark's method): give these as --S1 and --S2,
     since the better role may change with dt.
@@ -88,6 +103,7 @@ def advise(
       ndtheory advise --theta 0.1 --ratio 1.4
       ndtheory advise --log precice-Solid-convergence.log --theta 0.5
       ndtheory advise --log a.log --theta 0.3 --log b.log --theta 0.6
+      ndtheory advise --log a.log --theta 0.3 --friction
       ndtheory advise --young 70000,20000 --poisson 0.3,0.3
     """
     context = click.get_current_context()
@@ -96,6 +112,7 @@ def advise(
         {name: options[name] for name in names.values() if options[name] not in (None, False)}
         for names in (OF_MATRICES, OF_MODULI)
     )
+    rubs = matrices.pop("friction", None) if logs or ratio is not None else None
     forms: dict[str, list[Any]] = {
         "FILE": [file],
         "--S1 and --S2": [matrices or None],
@@ -124,6 +141,9 @@ def advise(
         raise click.UsageError(
             "received --tied with --young: moduli bound both ends of the spectrum from inside", context
         )
+    friction = some_friction(rubs)
+    if tied and friction:
+        raise click.UsageError("received --tied with --friction: nothing slips on a tied interface", context)
     from verification.advice import roles as advice
     from verification.cli import advice_screen
 
@@ -144,7 +164,8 @@ def advise(
             from verification.advice.from_runs import advise_run
 
             of_logs = zip(logs, thetas, strict=True)
-            found = advise_logs(of_logs, tied=tied) if logs else advise_run(theta, ratio, tied=tied)
+            assumed = {"tied": tied, "friction": friction}
+            found = advise_logs(of_logs, **assumed) if logs else advise_run(theta, ratio, **assumed)
         except HypothesisError as error:
             raise click.UsageError(f"--{error}", context) from None
     typed = None if file is None else Typed(file=file, keys=keys)
@@ -154,7 +175,8 @@ def advise(
         show = lambda: advice_screen.advice(found, typed)
     deliver(found, show, as_json)
     if snippets is not None and found.theta is None:
-        complain("no snippet: several readings are left, make the run that is named")
+        why = "several readings are left" if found.friction_bounds is None else "with friction no run decides theta"
+        complain(f"no snippet: {why}, make the run that is named")
 
 
 def _picture(context: click.Context, parameter: click.Parameter, value: Path) -> Path:

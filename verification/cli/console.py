@@ -9,12 +9,14 @@ import os
 import sys
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
+from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, TextIO
 
 import click
 
 from ndtheory import Number
+from ndtheory.texts import printable
 from verification.interrupts import undisturbed
 from verification.progress import Progress, silent
 
@@ -62,6 +64,7 @@ class Part:
     rows: tuple[tuple[str, ...], ...] = ()
 
 
+@dataclass(kw_only=True)
 class _Voice:
     """Where results go, the live line that makes room for them, and whether one was shown."""
 
@@ -69,52 +72,68 @@ class _Voice:
     lines: list[str] | None = None
     parts: list[Part] | None = None
     live: Live | None = None
-    said = False
+    said: bool = False
 
 
-_voice = _Voice()
+_ON_STDOUT = _Voice()
+
+#: The voice of a thread.  Most write to stdout; a thread that collects a result has a separate one.
+_voice: ContextVar[_Voice] = ContextVar("voice", default=_ON_STDOUT)
+
+
+@contextlib.contextmanager
+def _collecting(voice: _Voice) -> Iterator[None]:
+    """A context in which this thread alone speaks with another voice."""
+    token = _voice.set(voice)
+    try:
+        yield
+    finally:
+        _voice.reset(token)
 
 
 @contextlib.contextmanager
 def heard() -> Iterator[list[str]]:
     """Collect the lines of a result instead of writing them to stdout; without the signs that make a text bold."""
     lines: list[str] = []
-    before, _voice.lines = _voice.lines, lines
-    try:
+    with _collecting(_Voice(lines=lines)):
         yield lines
-    finally:
-        _voice.lines = before
 
 
 @contextlib.contextmanager
 def parted() -> Iterator[list[Part]]:
     """Collect the parts of a result instead of writing them to stdout, for another layout than that of a screen."""
     parts: list[Part] = []
-    before, _voice.parts = _voice.parts, parts
-    try:
+    with _collecting(_Voice(parts=parts)):
         yield parts
-    finally:
-        _voice.parts = before
 
 
-def say(text: str = "") -> None:
-    """A line of the result.
+def say(text: str = "", *, bold: bool = False, lines: bool = False) -> None:
+    """A line of the result; characters of control are shown as escapes.
+
+    Parameters
+    ----------
+    text : str
+    bold : bool
+    lines : bool
+        True for a text of several lines: a document, a file, a block to paste.
 
     Raises
     ------
     ReaderGone
         The other end of a pipe was closed.
     """
-    if _voice.parts is not None:
+    text = "\n".join(map(printable, text.split("\n"))) if lines else printable(text)
+    voice = _voice.get()
+    if voice.parts is not None:
         if text:
-            _voice.parts.append(Part(kind="line", text=click.unstyle(text)))
+            voice.parts.append(Part(kind="line", text=text))
         return
-    if _voice.lines is not None:
-        _voice.lines.append(click.unstyle(text))
+    if voice.lines is not None:
+        voice.lines.append(text)
         return
-    _voice.said = True
+    voice.said = True
     try:
-        click.echo(text, file=_voice.stream)
+        click.echo(click.style(text, bold=True) if bold else text, file=voice.stream)
     except BrokenPipeError:
         raise ReaderGone from None
 
@@ -133,23 +152,25 @@ def part(*, needed: bool = False) -> Iterator[None]:
     ReaderGone
         Nobody reads stdout, and the rest is not needed.
     """
+    voice = _voice.get()
     with undisturbed():
-        if _voice.live is not None:
-            _voice.live.stop()
+        if voice.live is not None:
+            voice.live.stop()
         try:
             yield
         except ReaderGone:
             if not needed:
                 raise
-            _voice.lines = []
-        if _voice.live is not None:
-            _voice.live.start()
+            voice.lines = []
+        if voice.live is not None:
+            voice.live.start()
 
 
 @contextlib.contextmanager
 def alone() -> Iterator[None]:
     """Let results alone reach stdout: what else is written there, by a C library too, goes to stderr."""
-    out, _voice.said = sys.stdout, False
+    voice = _voice.get()
+    out, voice.said = sys.stdout, False
     try:
         number = None if out is None else out.fileno()
     except (OSError, ValueError):  # no file: what no C library can reach
@@ -157,13 +178,13 @@ def alone() -> Iterator[None]:
     with contextlib.ExitStack() as stack:
         if number is not None:
             out.flush()
-            _voice.stream = open(os.dup(number), "w", encoding=out.encoding, errors=out.errors)  # noqa: SIM115
-            stack.callback(_restore, _voice.stream, number)
+            voice.stream = open(os.dup(number), "w", encoding=out.encoding, errors=out.errors)  # noqa: SIM115
+            stack.callback(_restore, voice.stream, number)
             os.dup2(_elsewhere(stack), number)
         else:
-            _voice.stream = out
-        stack.callback(setattr, _voice, "stream", None)
-        stack.callback(setattr, _voice, "lines", None)
+            voice.stream = out
+        stack.callback(setattr, voice, "stream", None)
+        stack.callback(setattr, voice, "lines", None)
         stack.enter_context(contextlib.redirect_stdout(sys.stderr))
         yield
 
@@ -207,22 +228,13 @@ def interruptible(command: Callable[..., Any]) -> Callable[..., Any]:
 
 def interruption() -> str:
     """What to say of a Ctrl-C that ended the command."""
-    return SHOWN if _voice.said else NOTHING
-
-
-def printable(text: str) -> str:
-    """A text from outside on one line, without what could steer a terminal.
-
-    >>> printable("a" + chr(27) + "b" + chr(10) + "c")
-    'a b c'
-    """
-    return "".join(c if c.isprintable() else " " for c in text)
+    return SHOWN if _voice.get().said else NOTHING
 
 
 def complain(text: str) -> None:
-    """A line about the result: errors, warnings, notes."""
+    """A line about the result, as errors, warnings and notes are; characters of control are shown as escapes."""
     with contextlib.suppress(OSError):  # nowhere to complain to
-        click.echo(text, err=True)
+        click.echo(printable(text), err=True)
 
 
 def deliver(
@@ -236,7 +248,7 @@ def deliver(
     text = document.to_json() if as_json else ""
     with part(needed=write is not None):
         if as_json:
-            say(text)
+            say(text, lines=True)
         else:
             screen()
     if write is None:
@@ -254,18 +266,20 @@ def deliver(
 
 def heading(question: str) -> None:
     """The question that the lines below answer."""
-    if _voice.parts is not None:
-        _voice.parts.append(Part(kind="heading", text=question))
+    question = printable(question)
+    if (parts := _voice.get().parts) is not None:
+        parts.append(Part(kind="heading", text=question))
         return
     say()
     for line in textwrap.wrap(question, WIDTH, subsequent_indent="  "):
-        say(click.style(line, bold=True))
+        say(line, bold=True)
 
 
 def note(text: str, indent: str = "") -> None:
     """A sentence of the result, folded at the width of the screen."""
-    if _voice.parts is not None:
-        _voice.parts.append(Part(kind="note", text=click.unstyle(text)))
+    text = printable(text)
+    if (parts := _voice.get().parts) is not None:
+        parts.append(Part(kind="note", text=text))
         return
     folded = textwrap.TextWrapper(WIDTH, indent, indent + "  ", break_on_hyphens=False)
     for line in folded.wrap(text):
@@ -277,9 +291,10 @@ def table(rows: Sequence[Sequence[str]], *, right: Sequence[int] = (), heads: in
 
     The last column is folded where it does not fit on the screen.
     """
-    if _voice.parts is not None:
+    rows = [[printable(cell) for cell in row] for row in rows]
+    if (parts := _voice.get().parts) is not None:
         head = tuple(" ".join(cell for cell in column if cell) for column in zip(*rows[:heads], strict=True))
-        _voice.parts.append(Part(kind="table", head=head, rows=tuple(tuple(row) for row in rows[heads:])))
+        parts.append(Part(kind="table", head=head, rows=tuple(tuple(row) for row in rows[heads:])))
         return
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     for row in rows:
@@ -322,6 +337,7 @@ def near_one(value: float) -> str:
 @contextlib.contextmanager
 def stages() -> Iterator[Progress]:
     """A live line on a terminal's stderr: what is being done, the share of it that is done, the time it takes."""
+    voice = _voice.get()
     if sys.stderr is None or not sys.stderr.isatty():
         yield silent
         return
@@ -329,16 +345,17 @@ def stages() -> Iterator[Progress]:
     from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
     from rich.progress import Progress as Live
 
-    columns = (TextColumn("{task.description}"), BarColumn(bar_width=20), TimeElapsedColumn())
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(bar_width=20), TimeElapsedColumn())
     with contextlib.ExitStack() as stack:
         with undisturbed():  # its thread takes no signal from the main one
             live = stack.enter_context(Live(*columns, console=Console(stderr=True), transient=True))
-        _voice.live = live
-        stack.callback(setattr, _voice, "live", None)
+        voice.live = live
+        stack.callback(setattr, voice, "live", None)
         task = live.add_task("", total=None)
 
         def tell(what: str, share: float | None) -> None:
             total = None if share is None else 1.0
+            what = printable(what)
             live.update(task, description=what, total=total, completed=share or 0.0, refresh=not share)  # at a start
 
         yield tell

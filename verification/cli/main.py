@@ -17,17 +17,10 @@ import click
 import ndtheory
 import verification
 from ndtheory import HypothesisError
+from ndtheory.texts import printable
 from verification.cli import calculator, certifying, choices, ledger, problems, reproducing, sweeping
-from verification.cli.console import (
-    NOTHING,
-    SHOWN,
-    Interrupted,
-    ReaderGone,
-    complain,
-    interruptible,
-    interruption,
-    printable,
-)
+from verification.cli.console import NOTHING, SHOWN, Interrupted, ReaderGone, complain, interruptible, interruption
+from verification.cli.failing import reported
 
 #: Exit statuses of the interface.  A crash is none of them.
 DONE, NOT_MET, BAD_INPUT, INCONCLUSIVE, INTERRUPTED, CRASH = 0, 1, 2, 3, 130, 70
@@ -65,7 +58,7 @@ for command in (
     ledger.verify,
 ):
     assert command.callback is not None
-    command.callback = interruptible(command.callback)
+    command.callback = interruptible(reported(command.callback))
     cli.add_command(command)
 
 
@@ -164,7 +157,8 @@ def _run(arguments: Sequence[str] | None, seen: Sequence[int]) -> int:
         if sys.stdout is not None:
             sys.stdout.flush()
     except click.exceptions.NoArgsIsHelpError as error:
-        complain(error.ctx.get_help())
+        for line in error.ctx.get_help().splitlines():
+            complain(line)
         return BAD_INPUT
     except click.UsageError as error:
         from verification.problem.tables import short
@@ -207,12 +201,7 @@ def _explain(error: Exception) -> int:
     if isinstance(error, MemoryError):
         complain("ndtheory: the problem does not fit into memory; needed fewer cells")
         return BAD_INPUT
-    from verification.contact import ContactError  # numpy: only now
-    from verification.monolithic import SolveError
-
-    if isinstance(error, (ContactError, SolveError)):
-        complain(f"ndtheory: {error}")
-        return NOT_MET
-    traceback.print_exc()
+    for line in traceback.format_exc().splitlines():
+        complain(line)
     complain("ndtheory: this is a bug; please report it with the lines above")
     return CRASH

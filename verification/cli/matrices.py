@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,10 +25,7 @@ _FILES = {
     "--kernel": "Operator S of the law of friction: normal nodal forces of the Neumann body to stress at these nodes.",
     "--weights": "Weights of the quadrature on these nodes; those of the trapezoid rule by default.",
 }
-_NUMBERS = {
-    "--friction": ("k", "Friction k >= 0, with --x and --radius, or with --kernel and --weights or --x."),
-    "--radius": ("LENGTH", "Radius of the hat kernel, in the unit of --x."),
-}
+_NUMBERS = {"--radius": ("LENGTH", "Radius of the hat kernel, in the unit of --x.")}
 
 #: Names of the options as parameters of the command.
 NAMES = {"--S1": "S1", "--S2": "S2", "--map": "transfer", "--neumann-body": "neumann_body"} | {
@@ -45,11 +43,34 @@ def matrix_options(command: Callable[..., Any]) -> Callable[..., Any]:
         click.option(option, NAMES[option], metavar=metavar, help=words)
         for option, (metavar, words) in _NUMBERS.items()
     ]
+    rubs = (
+        "Friction k >= 0 of matrices, with --x and --radius, or with --kernel and --weights or --x; of runs and logs "
+    )
+    rubs += "there is some: no number is needed, and the advice gives bounds and the run to make next."
+    made.append(click.option("--friction", "friction", metavar="[k]", help=rubs))
     body = "From whose unknowns --map leads, where its shape fits both ways."
     made.append(click.option("--neumann-body", "neumann_body", type=click.Choice(["1", "2"]), help=body))
     for option in reversed(made):
         command = option(command)
     return command
+
+
+def some_friction(given: str | None) -> bool:
+    """True if ``--friction`` says that runs have friction: without a number, or with one above 0.
+
+    Raises
+    ------
+    click.UsageError
+        A number below 0, or none.
+    """
+    try:
+        k = exact(given) if given else None
+    except ValueError:
+        k = Fraction(-1)
+    if k is not None and not k >= 0:
+        needed = "needed no number, or k >= 0; of runs and logs it says that there is friction"
+        raise click.UsageError(f"--friction = {given}: {needed}", click.get_current_context())
+    return given is not None and k != 0
 
 
 def advice_from_files(given: Mapping[str, Any], tell: Progress, *, tied: bool) -> Advice:
@@ -74,6 +95,8 @@ def advice_from_files(given: Mapping[str, Any], tell: Progress, *, tied: bool) -
     context = click.get_current_context()
     S1, S2 = given.get("S1"), given.get("S2")
     others = [option for option, name in NAMES.items() if name in given and name not in ("S1", "S2")]
+    if given.get("friction") == "":
+        raise click.UsageError("received --friction without a number: matrices need one, as --friction 0.2", context)
     if S1 is None:
         received = " with ".join(["--S2"] * (S2 is not None) + others)
         raise click.UsageError(f"received {received} without --S1: needed both --S1 and --S2", context)

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from verification.cli.console import Interrupted, complain, deliver, progress, say, stages
+from verification.cli.failing import remember
+from verification.cli.remedies import remedy
 from verification.cli.typed import Typed
 
 if TYPE_CHECKING:
@@ -127,14 +129,14 @@ def example(name: str | None, as_json: bool) -> None:
             def content(self) -> dict[str, Any]:
                 return {"examples": titles} if name is None else {"name": name, "toml": available[name]}
 
-        say(Examples().to_json())
+        say(Examples().to_json(), lines=True)
     elif name is None:
         for key, title in titles.items():
             say(f"  {key:14}  {title}")
         say()
         say("Next: ndtheory example section6 > my.toml; ndtheory compare my.toml")
     else:
-        say(available[name].rstrip())
+        say(available[name].rstrip(), lines=True)
 
 
 def _title(text: str) -> str:
@@ -163,7 +165,7 @@ def load_problem(
             needed = f'needed no theta beside relaxation = "{rule}", which takes its step from rho'
             raise ProblemError(str(file), "--theta", theta, needed)
         problem = problem.with_theta(theta)
-    return problem.swapped() if swap else problem
+    return remember(problem.swapped() if swap else problem)
 
 
 @click.command()
@@ -197,9 +199,10 @@ def constants(file: Path, keys: dict[str, str], refine: int, verified: bool, as_
 
 @click.command()
 @of_a_run
+@click.option("--start", type=click.Path(path_type=Path), metavar="g.npy", help="Begin with the forces of this file.")
 @FOLDER
 @JSON
-def run(file: Path, solver: Any, folder: Path | None, as_json: bool, **changes: Any) -> int:
+def run(file: Path, solver: Any, start: Path | None, folder: Path | None, as_json: bool, **changes: Any) -> int:
     """Run the Neumann-Dirichlet iteration on FILE.
 
     Exit 0 where it converged, 1 where it did not, 130 after Ctrl-C (what was computed is shown and written).
@@ -208,24 +211,28 @@ def run(file: Path, solver: Any, folder: Path | None, as_json: bool, **changes: 
     Example:
       ndtheory run my.toml --theta 0.6 -o results
       ndtheory run my.toml --set contact.friction=0.4 --relaxation newton
+      ndtheory run my.toml --start g.npy
     """
+    problem = load_problem(file, **changes)  # before what loads arrays: a file may be missing
+    from verification.advice.matrix_files import read_matrix
     from verification.algorithm import runs
+    from verification.algorithm.start import forces
     from verification.cli import screens
     from verification.interface.assembly import build
     from verification.output.folder import Folder
 
-    problem = load_problem(file, **changes)
     target = None if folder is None else Folder(folder, "run")
     pair = build(problem)
+    g = None if start is None else forces(read_matrix(start), pair, str(start))
     _warn(pair.warnings)
     with stages() as tell, progress(tell, problem.iteration.tolerance) as watch:
-        finished = runs.run(pair, solver=solver, watch=watch)
+        finished = runs.run(pair, start=g, solver=solver, watch=watch)
         tell("linearising", None)
         try:
             finished = finished.linearise()
         except KeyboardInterrupt:  # costs no run
             finished = replace(finished, interrupted=True).linearise()
-    _warn(finished.choice.warnings)
+    _warn(finished.warnings[len(pair.warnings) :])
     write = None if target is None else lambda: target.write_run(finished)
     deliver(finished, lambda: screens.run(finished, Typed(file=file, **changes)), as_json, write, folder)
     return _status_of_run(finished, changes["swap"])
@@ -259,6 +266,7 @@ def solve(file: Path, keys: dict[str, str], folder: Path | None, as_json: bool) 
     with stages() as tell:
         tell("solving both bodies at once", None)
         solution = monolithic.solve(bodies)
+    _warn(list(solution.checks.warnings))
     write = None if target is None else lambda: target.write_solution(solution)
     deliver(solution, lambda: screens.solution(solution, Typed(file=file, keys=keys)), as_json, write, folder)
     return 0
@@ -330,7 +338,7 @@ def _compare(problem: Problem, typed: Typed, folder: Path | None, solver: Any, a
     parts = None if as_json else screens.Parts(pair, needed=target is not None)
     with stages() as tell, progress(tell, problem.iteration.tolerance) as watch:
         comparison = verdicts.compare(pair, solver=solver, watch=watch, progress=tell, listener=parts, **asked)
-    _warn(comparison.run.choice.warnings)
+    _warn(comparison.run.warnings[len(pair.warnings) :])
     write = None if target is None else lambda: target.write_comparison(comparison)
     deliver(comparison, lambda: screens.verdicts(comparison, typed), as_json, write, folder)
     return _status_of_comparison(comparison, typed.swap)
@@ -349,39 +357,6 @@ def _status_of_run(finished: Run, swapped: bool) -> int:
     if not finished.converged:
         complain(remedy(finished, swapped))
     return 0 if finished.converged else 1
-
-
-def remedy(finished: Run, swapped: bool) -> str:
-    """What could be done about a run that did not converge, in one sentence.
-
-    Parameters
-    ----------
-    finished : Run
-    swapped : bool
-        Whether its roles are those of --swap-roles.
-    """
-    from verification.algorithm.rates import noise
-    from verification.cli.screens import worth_trying
-    from verification.constants import measure
-
-    pair, theta, last = finished.pair, float(finished.theta), finished.last
-    if finished.outcome == "limit":
-        return "not converged: max_iterations was reached while the residual still fell; raise it, or change theta"
-    if last.residual <= 100 * noise(pair, last):
-        reached = f"{last.relative_residual:.1e}"
-        return f"{finished.outcome}: the residual fell to rounding, {reached}; the tolerance must be larger than that"
-    if theta < 1e-9:
-        return f"{finished.outcome}: a step of theta = {theta:g} is lost in rounding; try a larger theta"
-    rho = measure(pair)
-    here = f"{finished.outcome}: theta = {theta:g} does not contract here"
-    roles = "without --swap-roles" if swapped else "--swap-roles"
-    if rho.rho_max is None or rho.rho_min is None:
-        return f"{here}; try a smaller theta, or {roles}"
-    good, other = worth_trying(rho.rho_max.value), worth_trying(1 / rho.rho_min.value)
-    better = f", or {roles} with --theta {other:.2g}" if other > good else ""
-    if theta <= good:
-        return f"{here}; try --theta {theta / 2:.2g}{better}"
-    return f"{here}; try --theta {good:.2g} (2/(2 + rho), rho = {rho.rho_max.value:.3g}){better}"
 
 
 def _status_of_comparison(comparison: Comparison, swapped: bool) -> int:

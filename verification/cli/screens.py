@@ -14,7 +14,7 @@ from verification.bounds.bound import BoundResult
 from verification.bounds.losses import Losses
 from verification.bounds.region import MOST_STEPS, Plane
 from verification.cli.calculator import bounds_table
-from verification.cli.console import figures, heading, near_one, note, part, printable, say, table
+from verification.cli.console import figures, heading, near_one, note, part, say, table
 from verification.cli.levels import between
 from verification.cli.typed import Typed
 from verification.comparison import Comparison, Listener
@@ -37,7 +37,7 @@ def _setting(problem: Problem, nodes: int | None = None, interface: int | None =
     counts = "" if nodes is None else f" | {nodes} nodes, {interface} on Gamma_c"
     bodies = (problem.body1, problem.body2)
     moduli = " / ".join("rigid" if body.rigid else f"{float(body.young):g}" for body in bodies)
-    say(f"{printable(problem.title)}{counts} | E {moduli} {units['stress']}")
+    say(f"{problem.title}{counts} | E {moduli} {units['stress']}")
     body = {1: "lower", 2: "upper"}[problem.iteration.neumann_body]
     law = LAWS[contact.law].label if LAWS[contact.law].needs_radius else f"{LAWS[contact.law].label} law"
     friction = "no friction" if not contact.friction else f"k = {figures(float(contact.friction), 2)}, {law}"
@@ -300,7 +300,7 @@ def verdicts(result: Comparison, typed: Typed | None = None) -> None:
 
 def plane(found: Plane, target: Path | None = None) -> None:
     """The screen of ``region``."""
-    say(printable(found.title))
+    say(found.title)
     heading("WHERE IS ONE STEP PROVED TO CONTRACT?")
     rows = [["bound", "every small theta: k <", "some theta: k <", "theta at most"]]
     for name, region in found.regions.items():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import csv
 import os
 import tempfile
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from ndtheory import __version__
 from verification.interrupts import undisturbed
 from verification.problem.tables import ProblemError, unreadable
+from verification.spreadsheet import as_csv
 
 try:
     import fcntl
@@ -301,12 +301,8 @@ def _text(path: Path, text: str) -> None:
 
 def _csv(path: Path, says: str, table: Mapping[str, Sequence[Any]]) -> None:
     """A table with a line of words above it, which readers of CSV take for a comment."""
-    says = "".join(c if c.isprintable() else " " for c in says)
-    with path.open("w", encoding="utf-8", newline="") as file:
-        file.write(f"# ndtheory {__version__}: {says}\n")
-        rows = csv.writer(file, lineterminator="\n")
-        rows.writerow(table)
-        rows.writerows(zip(*table.values(), strict=True))
+    text = as_csv([f"ndtheory {__version__}: {says}"], list(table), zip(*table.values(), strict=True))
+    path.write_text(text, encoding="utf-8", newline="")
 
 
 def _pictures(room: Path, result: Run | Solution, comparison: Comparison | None = None) -> list[str]:

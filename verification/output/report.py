@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ndtheory import __version__
+from ndtheory.texts import printable
 from verification.comparison import Comparison
 from verification.ledger.record import on_the_printed_proof
 
@@ -157,7 +158,7 @@ def report(comparison: Comparison, figures: Mapping[str, str]) -> str:
     )
     environment.filters |= {"shown": shown, "near_one": near_one, "labelled": _labelled}
     environment.tests["wide"] = _wide
-    title = "".join(c if c.isprintable() else " " for c in comparison.run.pair.title)
+    title = printable(comparison.run.pair.title)
     first, *sections = _sections(notebook.report(comparison))
     return environment.get_template("report.html.j2").render(
         run=comparison.run,
