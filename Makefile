@@ -1,5 +1,7 @@
 # make demo   the Section 6 model, end to end          make test   the whole test suite
 # make check  what CI runs: lint, types, tests, docs   make docs   the site, into docs/_build/html
+# make lowest a sample of the tests with the lowest versions that pyproject.toml allows
+# make nightly  the tests with many more random cases, PART=cli one part of them; notes in CONTRIBUTING.md what passed
 # make bench  the times on the site's page on speed; FULL=1 adds the long sizes
 # Needs Python >= 3.11 with pip, make and git; everything else goes into .venv, pinned by requirements.lock.
 
@@ -15,7 +17,7 @@ NEEDS  := pyproject.toml $(LOCKS) ndtheory/__init__.py
 # Tests and pages start many processes: each would compile the packages anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check lint docs nightly bench lock clean
+.PHONY: demo test check lint docs nightly lowest bench lock clean
 .NOTPARALLEL:  # one pip at a time; pytest uses the processors itself
 
 demo: $(VENV)/.run
@@ -37,7 +39,21 @@ docs: $(VENV)/.docs
 	@echo "the site: docs/_build/html/index.html"
 
 nightly: $(VENV)/.test
-	HYPOTHESIS_PROFILE=nightly $(BIN)/python -m pytest -n auto --dist worksteal
+	$(BIN)/python .ci/nightly.py $(PART)
+
+# Each dependency has a test here that calls it.
+SAMPLE := fem1d2d/test_mesh_files.py ndtheory/test_gradient_descent.py ndtheory/test_symbolic.py cli/test_commands.py \
+	cli/test_documents.py cli/test_progress.py cli/test_shell.py cli/test_sweep_command.py verification/test_certificate.py \
+	verification/test_contact.py verification/test_figures.py verification/test_interior_point.py \
+	verification/test_report.py verification/test_sweep_cluster.py verification/test_sweep_dataset.py \
+	verification/test_threads.py
+LOWEST := $(VENV)/lowest
+
+lowest: $(VENV)/.venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check $(UV)
+	$(BIN)/uv venv --quiet --clear --python $(BIN)/python $(LOWEST)
+	$(BIN)/uv pip install --quiet --python $(LOWEST)/bin/python --resolution lowest-direct --editable '.[test]'
+	$(LOWEST)/bin/python -m pytest -n auto --dist worksteal -p no:cacheprovider $(addprefix tests/,$(SAMPLE))
 
 bench: $(VENV)/.test
 	for b in benchmarks/bench_*.py; do $(BIN)/python $$b --record benchmarks/records $(if $(FULL),--full) || exit 1; done

@@ -1,19 +1,25 @@
 """Which Pythons are promised, tried and run: the same in the classifiers, the workflow, the Makefile and the README."""
 
+import ast
 import re
 import runpy
 import subprocess
 import sys
 import tomllib
 from collections.abc import Iterable
+from importlib.metadata import packages_distributions
 from itertools import chain
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
+from verification.extras import EXTRAS
+
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+DISTRIBUTIONS = packages_distributions()
+PACKAGES = ("fem1d2d", "ndtheory", "verification")
 PROMISED = re.findall(r"Python :: (3\.\d+)", " ".join(PROJECT["classifiers"]))
 
 
@@ -36,6 +42,16 @@ def test_every_promised_python_runs_the_whole_suite_in_the_workflow():
         )
 
 
+def test_every_night_the_lowest_versions_and_the_python_after_the_promised_ones_are_tried():
+    workflow = read(".github/workflows/nightly.yml")
+    oldest, newest = PROMISED[0], int(PROMISED[-1].partition(".")[2])
+    tried = re.findall(r'python-version: "(3\.\d+)"\n *- run: (.*)', workflow)
+    assert tried[-2:] == [(oldest, "make lowest"), (f"3.{newest + 1}", "make test")]
+    [sample] = re.findall(r"(?m)^SAMPLE := ((?:.*\\\n)*.*)$", read("Makefile"))
+    files = sample.replace("\\", "").split()
+    assert [name for name in files if not (ROOT / "tests" / name).is_file()] == []
+
+
 def pinned(lock: str) -> dict[str, str]:
     """Name -> version of all that a lock holds, on every machine or on some."""
     return dict(line.partition(" ;")[0].split("==", 1) for line in read(lock).splitlines() if "==" in line)
@@ -54,6 +70,36 @@ def test_a_lock_holds_what_its_extras_need_in_the_versions_of_the_whole_lock(loc
     needed = named(PROJECT["dependencies"]).union(*(named(optional[extra]) for extra in extras))
     assert needed <= set(found)
     assert (named(chain.from_iterable(optional.values())) - needed) & set(found) <= {"mpmath"}  # sympy needs it too
+
+
+def needs(path: Path) -> set[str]:
+    """The distributions whose modules a file imports, wherever the statement stands."""
+    tree = ast.parse(path.read_text("utf-8"))
+    found = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
+    found |= {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module}
+    tops = {name.partition(".")[0] for name in found} - {"mpl_toolkits", *PACKAGES, *sys.stdlib_module_names}
+    return {DISTRIBUTIONS[name][0].lower() for name in tops}
+
+
+def test_a_plain_installation_has_all_that_the_packages_import_but_for_extras_and_the_test_kit():
+    kit = ROOT / "verification" / "testing"
+    paths = [path for package in PACKAGES for path in (ROOT / package).rglob("*.py") if kit not in path.parents]
+    missing = set().union(*map(needs, paths)) - named(PROJECT["dependencies"])
+    assert missing == {"distributed", "xarray"}
+    assert set().union(*map(needs, kit.rglob("*.py"))) - named(PROJECT["dependencies"]) == {"hypothesis"}
+
+
+def test_each_option_with_an_extra_names_one_that_installs_what_it_needs_and_readme_has_it():
+    for option, (extra, modules) in EXTRAS.items():
+        installed = " ".join(PROJECT["optional-dependencies"][extra])
+        assert [name for name in modules if name not in installed] == []
+        assert re.search(rf"`{extra}` .*{option}`", read("README.md"))
+
+
+def test_readme_names_every_extra_and_asks_for_no_other():
+    extras = set(PROJECT["optional-dependencies"])
+    assert {extra for extra in extras if f"`{extra}`" in read("README.md")} == extras
+    assert set(re.findall(r"pip install '?[\w.]+\[(\w+)\]", read("README.md"))) <= extras
 
 
 INSTALL = SimpleNamespace(**runpy.run_path(str(ROOT / ".ci" / "install.py")))
