@@ -233,19 +233,26 @@ def test_without_its_extra_an_option_is_refused_before_anything_runs(
 
 
 #: The command in a process group that gets Ctrl-C so many seconds after the workers were asked for, as on a terminal.
+#: The thread that feeds them comes late by so many seconds, the first argument, and pieces of work come one by one.
 INTERRUPTED = """
-    import os, signal, sys, threading
+    import os, signal, sys, threading, time
     os.environ["OPENBLAS_NUM_THREADS"] = "1"  # as the command sets it before numpy comes: threads would take the signal
     import joblib.executor
+    from joblib.externals.loky.process_executor import _ExecutorManagerThread as Manager
     from verification.cli import main
 
+    late, look = float(sys.argv.pop(1)), Manager.wait_result_broken_or_wakeup
+    Manager.wait_result_broken_or_wakeup = lambda manager: (look(manager), time.sleep(late))[0]
     call = joblib.executor.get_memmapping_executor
     waits = [float(sys.argv.pop(1))]
 
     def called(*args, **named):
         if waits:
             threading.Timer(waits.pop(), os.killpg, (0, signal.SIGINT)).start()
-        return call(*args, **named)
+        executor = call(*args, **named)
+        submit = executor.submit
+        executor.submit = lambda *piece: (submit(*piece), time.sleep(late / 10))[0]
+        return executor
 
     joblib.executor.get_memmapping_executor = called
     sys.exit(main())
@@ -253,9 +260,10 @@ INTERRUPTED = """
 
 
 @pytest.mark.parametrize("wait", [0.02, 0.6, 2.5, *[0.05, 0.1, 0.2, 0.4, 0.8, 1.0, 1.2, 1.5, 2.0, 3.0] * AT_NIGHT])
-def test_ctrl_c_on_a_terminal_is_one_line_whatever_the_workers_do(sweep_file, tmp_path, wait):
+@pytest.mark.parametrize("late", [0.0, 0.5])
+def test_ctrl_c_on_a_terminal_is_one_line_whatever_the_workers_do(sweep_file, tmp_path, late, wait):
     path = sweep_file("theta = { start = 0.01, stop = 0.99, step = 0.01 }\nfriction = [0.1, 0.2, 0.3, 0.4, 0.5]")
-    answer = ended(INTERRUPTED, wait, "sweep", path, "--jobs", 2)
+    answer = ended(INTERRUPTED, late, wait, "sweep", path, "--jobs", 2)
     assert "Traceback" not in answer.stderr
     if answer.returncode == 0:  # too late
         return

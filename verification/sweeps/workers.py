@@ -5,8 +5,8 @@ from __future__ import annotations
 import threading
 import time
 import uuid
-from collections.abc import Callable, Generator, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, wait
+from collections.abc import Callable, Collection, Generator, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import islice
@@ -36,6 +36,9 @@ MOST_FOR_A_CORE = 4
 
 #: Pieces that a process or a thread of a worker has before it, so that it need not wait.
 AHEAD = 2
+
+#: Seconds that the executor has to take the pieces that it was given, before it is ended without that.
+LATEST = 1.0
 
 #: The environment in which the libraries that multiply matrices use one thread in each process.
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
@@ -173,6 +176,7 @@ def together(jobs: int) -> Work:
         origin, pieces = Origin.of(start), Pieces(wanted, count)
         source, ahead = iter(pieces), AHEAD * count
         executor = None
+        waiting: set[Future[Handed]] = set()
         try:
             _start_trackers()
             with undisturbed():  # it ends once they are started: what starts meanwhile inherits that Ctrl-C waits
@@ -184,12 +188,13 @@ def together(jobs: int) -> Work:
                 done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
                 for future in done:
                     yield pieces.taken(future.result())
-                waiting |= {executor.submit(some, origin, piece) for piece in islice(source, ahead - len(waiting))}
+                with undisturbed():  # what is submitted is known here
+                    waiting |= {executor.submit(some, origin, piece) for piece in islice(source, ahead - len(waiting))}
         except BrokenProcessPool:
-            _stop(executor)
+            _stop(executor, waiting)
             raise Stopped("--jobs", "a process was killed, perhaps as memory ran out: needed fewer jobs") from None
         except BaseException:
-            _stop(executor)
+            _stop(executor, waiting)
             raise
 
     return work
@@ -205,11 +210,19 @@ def _start_trackers() -> None:
         tracker.ensure_running()
 
 
-def _stop(executor: Any) -> None:
-    """End the processes at once: what they compute is not wanted any more."""
-    if executor is not None:
-        with undisturbed():
-            executor.terminate(kill_workers=True)
+def _stop(executor: Any, waiting: Collection[Future[Handed]]) -> None:
+    """End the processes at once: what they compute is not wanted any more.
+
+    The executor's thread looks up every piece that it was given, also those that it forgot as it was told to end, and
+    shows a traceback then: it is told once it has put all of them into its queue, which holds `AHEAD` for each process.
+    """
+    if executor is None:
+        return
+    with undisturbed():
+        latest = time.monotonic() + LATEST
+        while not all(future.running() or future.done() for future in waiting) and time.monotonic() < latest:
+            time.sleep(0.001)
+        executor.terminate(kill_workers=True)
 
 
 class Pieces:
