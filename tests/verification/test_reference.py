@@ -1,5 +1,7 @@
 """The run by cvxpy alone: the program's own answers, no active set behind them."""
 
+import itertools
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -66,11 +68,21 @@ def test_a_long_run_is_compared_at_its_ends(run, monkeypatch):
     assert 0 < found.largest_difference < 1e-6
 
 
-def test_a_slow_program_is_compared_at_the_ends_of_the_run(run, monkeypatch):
-    monkeypatch.setattr(reference, "MOST_SECONDS", -1.0)
+def test_large_programs_are_compared_at_the_ends_of_the_run(run, monkeypatch):
+    entries = run.evaluations * run.pair.contact.grid.n**2
+    monkeypatch.setattr(reference, "MOST_ENTRIES", entries - 1)
     found = by_cvxpy_alone(run)
     assert (found.whole, found.steps) == (False, 2)
-    assert "CPU" in found.why
+    assert f"{run.pair.contact.grid.n} contact nodes" in found.why
+    monkeypatch.setattr(reference, "MOST_ENTRIES", entries)
+    assert by_cvxpy_alone(run).whole
+
+
+def test_no_clock_decides_what_is_compared(run, monkeypatch):
+    before, ticks = by_cvxpy_alone(run), itertools.count(step=1e6)
+    for clock in ("monotonic", "perf_counter", "process_time", "time"):
+        monkeypatch.setattr(time, clock, lambda: next(ticks))
+    assert by_cvxpy_alone(run) == before
 
 
 def test_a_program_without_an_answer_is_told(run, monkeypatch):
