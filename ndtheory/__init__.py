@@ -12,10 +12,10 @@ finite elements and needs the standard library alone.
 from ndtheory.bounds import EDITIONS, PRINTED, REPAIRED, Bounds, Edition, evaluate
 from ndtheory.constants import Constants, relaxation_factor
 from ndtheory.energy import EnergyConstants
+from ndtheory.energy_bounds import EnergyBounds
+from ndtheory.energy_norms import evaluate_energy
 from ndtheory.errors import HypothesisError
 from ndtheory.number import Number, exact
-from ndtheory.sharp import evaluate_sharp
-from ndtheory.sharp_bounds import SharpBounds
 
 __version__ = "0.1.0"
 
@@ -26,13 +26,13 @@ __all__ = [
     "Bounds",
     "Constants",
     "Edition",
+    "EnergyBounds",
     "EnergyConstants",
     "HypothesisError",
     "Number",
-    "SharpBounds",
     "__version__",
     "evaluate",
-    "evaluate_sharp",
+    "evaluate_energy",
     "exact",
     "relaxation_factor",
 ]

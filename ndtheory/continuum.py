@@ -20,13 +20,13 @@ from fractions import Fraction
 from typing import Any
 
 from ndtheory.energy import EnergyConstants
+from ndtheory.energy_bounds import EnergyBounds
+from ndtheory.energy_norms import evaluate_energy
 from ndtheory.errors import HypothesisError
 from ndtheory.intervals import Interval
 from ndtheory.moduli import Moduli, mirror
 from ndtheory.number import Number, above, below
 from ndtheory.segments import bound, bound_at_end, zones
-from ndtheory.sharp import evaluate_sharp
-from ndtheory.sharp_bounds import SharpBounds
 from ndtheory.strip import Strip, largest_ratio_of_strips, largest_smoothed
 from ndtheory.wedges import Wedge, end_bound
 
@@ -263,7 +263,7 @@ def friction_threshold(constants: ContinuumConstants) -> Number:
     return lower(Fraction((2 / (second + (second.square() + first.square()).sqrt())).lo))
 
 
-def statement(constants: ContinuumConstants, *, friction: Any, theta: Any = None) -> SharpBounds | None:
+def statement(constants: ContinuumConstants, *, friction: Any, theta: Any = None) -> EnergyBounds | None:
     """What the theorem in energy norms says of the continuum; None where rho is not bounded.
 
     q grows with its constants, so the values for upper bounds are bounds: ``factor`` and ``factor_proved`` from above,
@@ -286,4 +286,4 @@ def statement(constants: ContinuumConstants, *, friction: Any, theta: Any = None
         return Number(value=hi, lo=hi, hi=hi, level="guaranteed")
 
     kappa_1, kappa_2 = map(proved, constants.kappa(k))
-    return evaluate_sharp(EnergyConstants(rho=proved(rho), kappa_1=kappa_1, kappa_2=kappa_2), theta)
+    return evaluate_energy(EnergyConstants(rho=proved(rho), kappa_1=kappa_1, kappa_2=kappa_2), theta)

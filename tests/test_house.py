@@ -197,7 +197,7 @@ def test_tests_use_no_private_names():
 @pytest.mark.parametrize(
     "source",
     [
-        *("sharp._roots(1)", "from a import _b", "from a._b import c", "self._x = 1", "vars(x), x.__dict__"),
+        *("energy_norms._roots(1)", "from a import _b", "from a._b import c", "self._x = 1", "vars(x), x.__dict__"),
         *('monkeypatch.setattr(rows, "_sources", f)', 'monkeypatch.setattr("a.b._c", None)', 'getattr(x, "_y")'),
     ],
 )

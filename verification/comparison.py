@@ -142,7 +142,7 @@ class Comparison(Document):
         return any(judgement.verdict == "INCONCLUSIVE" for judgement in self.verdicts.values())
 
     def content(self) -> dict[str, Any]:
-        editions = {name: self.bounds[name].to_dict() for name in (*(e.name for e in EDITIONS), "sharp")}
+        editions = {name: self.bounds[name].to_dict() for name in (*(e.name for e in EDITIONS), "energy")}
         return {
             "title": self.run.pair.title,
             "constants": self.measured.content(),
@@ -150,7 +150,7 @@ class Comparison(Document):
                 "editions": editions,
                 "reason": {name: self.bounds[name].not_computed for name, value in editions.items() if value is None},
             },
-            "sharp": self._sharp(),
+            "energy": self._energy(),
             "lmi": self.bounds["lmi"].to_dict(),
             "losses": None if self.losses is None else self.losses.to_dict(),
             "run": self.run.content(),
@@ -163,9 +163,9 @@ class Comparison(Document):
             "reason": dict(self.reason),
         }
 
-    def _sharp(self) -> dict[str, Any] | None:
-        """The object ``sharp``: the bound's own document with both rho and both thresholds on k."""
-        measured, document = self.measured, self.bounds["sharp"].to_dict()
+    def _energy(self) -> dict[str, Any] | None:
+        """The object ``energy``: the bound's own document with both rho and both thresholds on k."""
+        measured, document = self.measured, self.bounds["energy"].to_dict()
         if document is None:
             return None
         threshold = measured.friction_threshold
@@ -233,7 +233,7 @@ def compare(
     --------
     >>> from verification.problem.examples import example
     >>> bars = example("two-bars").changed(young=(1, 3))
-    >>> compare(bars).verdicts["sharp"].verdict
+    >>> compare(bars).verdicts["energy"].verdict
     'CONSISTENT'
     """
     pair, listener = pair_of(problem), listener or Listener()
@@ -269,7 +269,7 @@ def compare(
 
     finished = replace(finished, interrupted=left.interrupted)
     missing = {"losses": no_losses, "cvxpy": no_cvxpy}
-    missing |= {name: results[name].not_computed for name in ("sharp", "lmi") if results[name].detail is None}
+    missing |= {name: results[name].not_computed for name in ("energy", "lmi") if results[name].detail is None}
     reason = {name: why for name, why in missing.items() if why}
     seen = largest_step_ratio(pair, finished.iterates)
     if seen is None:

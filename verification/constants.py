@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from ndtheory import Constants, EnergyConstants, Number, evaluate_sharp, exact
+from ndtheory import Constants, EnergyConstants, Number, evaluate_energy, exact
+from ndtheory.energy_norms import friction_multiple
 from ndtheory.number import above, below, weakest
-from ndtheory.sharp import friction_multiple
 from verification.body_constants import BodyConstants, constants_of
 from verification.document import Document
 from verification.interface.pair import ContactPair, TwoBodies
@@ -189,13 +189,13 @@ class Measured(Document):
         if weakest(value.level for value in self.of_friction) == "float":
             return Number.of_float(friction_multiple(C_s * C_t1, C_s * C_t2))
         constants = self.with_friction(1.0).energy_constants()
-        return None if constants is None else evaluate_sharp(constants).friction_multiple
+        return None if constants is None else evaluate_energy(constants).friction_multiple
 
     @property
     def friction_limit(self) -> Number | None:
         """The friction below which some theta is proved by the theorem in energy norms; None without a law."""
         constants = self.with_friction(1.0).energy_constants() if self.of_friction else None
-        return None if constants is None else evaluate_sharp(constants).friction_limit_multiple
+        return None if constants is None else evaluate_energy(constants).friction_limit_multiple
 
     def with_friction(self, k: float) -> Measured:
         """The same bodies at another friction.

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from ndtheory import sharp
+from ndtheory import energy_norms
 from verification.figures import style
 
 
@@ -38,7 +38,13 @@ def _v(ax: Any, rho: float) -> None:
     thetas = np.linspace(0.001, 1, 200)
     ax.plot(thetas, np.abs(1 - thetas), color="0.4", linestyle=":", label="apart: |1 - theta|")
     ax.plot(thetas, np.abs(1 - thetas * (1 + rho)), color=style.BODY1, label="in contact: |1 - theta (1 + rho)|")
-    ax.plot([sharp.predicted_theta(rho)], [sharp.predicted_rate(rho)], "o", color=style.BODY2, label="2/(2 + rho)")
+    ax.plot(
+        [energy_norms.predicted_theta(rho)],
+        [energy_norms.predicted_rate(rho)],
+        "o",
+        color=style.BODY2,
+        label="2/(2 + rho)",
+    )
     ax.axhline(1, color="0.7", linewidth=0.8)
     ax.set(xlabel="theta", ylabel="factor a step", ylim=(0, 2), title=f"rho = {rho:.3g}")
     ax.legend()
@@ -50,7 +56,7 @@ def plane(data: dict[str, float]) -> Figure:
     rho = data["rho"] / stiffer
     kappa = np.array([np.sqrt(stiffer) * data["CsEnergy"] * data["Ct1"], data["CsEnergy"] * data["Ct2"]])
     frictions = np.linspace(0, 0.5, 300)[1:]
-    found = [(k, sharp.contraction_interval(rho, *(k * kappa))) for k in frictions]
+    found = [(k, energy_norms.contraction_interval(rho, *(k * kappa))) for k in frictions]
     known = [(k, *interval) for k, interval in found if interval is not None]
     figure = style.new_figure(5.2, 3.2)
     with style.styled():

@@ -15,17 +15,17 @@ from scipy.linalg import eigh
 import verification as vf
 from builder import stills
 from builder.javascript import function
-from ndtheory import bounds, sharp
+from ndtheory import bounds, energy_norms
 from verification.figures import style
 
 #: The formulas that the widgets call, by their name in JavaScript.
 FORMULAS: dict[str, tuple[Callable[..., Any], tuple[str, ...]]] = {
-    "predictedFactor": (sharp.predicted_factor, ("theta", "rho")),
-    "predictedTheta": (sharp.predicted_theta, ("rho",)),
-    "sharpOneMinusSquare": (sharp.one_minus_square, ("theta", "rho", "kappa1", "kappa2")),
-    "sharpEnds": (sharp.contraction_ends, ("rho", "kappa1", "kappa2")),
-    "sharpMultiple": (sharp.friction_multiple, ("kappa1", "kappa2")),
-    "sharpLimit": (sharp.friction_limit, ("rho", "kappa1", "kappa2")),
+    "predictedFactor": (energy_norms.predicted_factor, ("theta", "rho")),
+    "predictedTheta": (energy_norms.predicted_theta, ("rho",)),
+    "energyOneMinusSquare": (energy_norms.one_minus_square, ("theta", "rho", "kappa1", "kappa2")),
+    "energyEnds": (energy_norms.contraction_ends, ("rho", "kappa1", "kappa2")),
+    "energyMultiple": (energy_norms.friction_multiple, ("kappa1", "kappa2")),
+    "energyLimit": (energy_norms.friction_limit, ("rho", "kappa1", "kappa2")),
     "readPrinted": (bounds.PRINTED.coercivity, ("m",)),
     "G": (bounds.G, ("x", "m", "M", "CR", "u")),
     "P": (bounds.P, ("x", "m", "M", "CR", "u")),

@@ -42,8 +42,8 @@ nd.onPage("plane", (figure) => {
   }
 
   function energy(c, k) {
-    const [low, high, there] = f.sharpEnds(c.rho, k * c.kappa1, k * c.kappa2);
-    return there && low < high ? [low, high, (t) => f.sharpOneMinusSquare(t, c.rho, k * c.kappa1, k * c.kappa2)] : null;
+    const [low, high, there] = f.energyEnds(c.rho, k * c.kappa1, k * c.kappa2);
+    return there && low < high ? [low, high, (t) => f.energyOneMinusSquare(t, c.rho, k * c.kappa1, k * c.kappa2)] : null;
   }
 
   // C2, the friction below which an edition proves something: halving, as the condition is monotone in k.
@@ -76,7 +76,7 @@ nd.onPage("plane", (figure) => {
     ];
     const rows = [], words = [];
     for (const [name, region, look] of kinds) {
-      const end = name === "in energy norms" ? f.sharpLimit(c.rho, c.kappa1, c.kappa2) : threshold(region), highest = Math.min(end, top), left = [], right = [];
+      const end = name === "in energy norms" ? f.energyLimit(c.rho, c.kappa1, c.kappa2) : threshold(region), highest = Math.min(end, top), left = [], right = [];
       for (let i = 0; i <= ROWS && bottom < highest; i += 1) {
         const at = close ? bottom + (highest - bottom) * i / ROWS : bottom * (highest / bottom) ** (i / ROWS);
         const found = region(at * (1 - 1e-9));
@@ -90,7 +90,7 @@ nd.onPage("plane", (figure) => {
     }
     chart.line([[t, bottom], [t, top]], { stroke: nd.COLOURS.grey, "stroke-width": 0.7 });
     if (k <= top) chart.dot(t, Math.max(k, bottom), { fill: "currentColor", class: "handle" });
-    rows.push(["in energy norms, every small theta", nd.digits(f.sharpMultiple(c.kappa1, c.kappa2)), "", ""]);
+    rows.push(["in energy norms, every small theta", nd.digits(f.energyMultiple(c.kappa1, c.kappa2)), "", ""]);
     const proof = c.m >= 1 ? "the printed proof goes through (m >= 1)" : "the printed proof does not go through here (m < 1)";
     widget.says.textContent = `theta = ${nd.short(t)}, k = ${nd.short(k)}: ${words.join("; ")}. In this unit m = ${nd.short(c.m)}: ${proof}.`;
     nd.fill(widget.table, ["theorem", "friction below", "theta at this friction", "at the point"], rows);

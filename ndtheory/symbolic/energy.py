@@ -11,7 +11,7 @@ from typing import Any
 
 import sympy as sp
 
-from ndtheory import sharp
+from ndtheory import energy_norms
 from ndtheory.symbolic.contraction import any_theta
 from ndtheory.symbolic.engine import Checks, Goal, Vector, at_most, equal, less, linear, nonnegative, positive
 from ndtheory.symbolic.intervals import C0
@@ -83,13 +83,16 @@ check(
     " f(r) = -sqrt(rho) r.",
     goals=lambda form: [
         at_most(
-            sharp.work(ratio, *ENERGY[1:]) * e**2,
+            energy_norms.work(ratio, *ENERGY[1:]) * e**2,
             -(ratio**2) * e**2 + kappa_1 * ratio * e**2 + ENERGY[2] * e**2 - q - p,
         ),
-        equal(sharp.work(ratio, *ENERGY[1:]) + root_rho * ratio, (root_rho + kappa_1) * ratio + ENERGY[2] - ratio**2),
-        equal(sharp.largest_ratio(*ENERGY), form),
+        equal(
+            energy_norms.work(ratio, *ENERGY[1:]) + root_rho * ratio,
+            (root_rho + kappa_1) * ratio + ENERGY[2] - ratio**2,
+        ),
+        equal(energy_norms.largest_ratio(*ENERGY), form),
         less((root_rho + kappa_1) * (form + y) + ENERGY[2], (form + y) ** 2),
-        equal(sharp.work(form, *ENERGY[1:]), -root_rho * form),
+        equal(energy_norms.work(form, *ENERGY[1:]), -root_rho * form),
     ],
     forms={"repaired": largest},
     mutants={"without kappa_2": root_rho + kappa_1, "half as large": largest / 2},
@@ -97,10 +100,10 @@ check(
 
 # --- the theorem ------------------------------------------------------------------------------------------------------
 
-at = lambda x, theta: sharp.square_at(x, theta, *ENERGY)
+at = lambda x, theta: energy_norms.square_at(x, theta, *ENERGY)
 
 check(
-    id="x-sharp",
+    id="x-energy",
     text="(5.24) with t^2 = rho x^2 e^2/(1+p) by x-reaction and W = (f(x) - q) e^2 by x-ratio, for any x: its square is"
     " at most phi(x) e^2, as 2 theta (1-theta) >= 0; and x is in [0, r] by x-ratio, where q(theta)^2 is the largest"
     " phi(x).",
@@ -108,15 +111,15 @@ check(
         at_most(
             form(ratio, value) * e**2,
             (1 - value) ** 2 * e**2
-            + 2 * value * (1 - value) * (sharp.work(ratio, *ENERGY[1:]) - q) * e**2
+            + 2 * value * (1 - value) * (energy_norms.work(ratio, *ENERGY[1:]) - q) * e**2
             + value**2 * ENERGY[0] * ratio**2 * e**2 / (1 + p),
         )
         for value in (any_theta, sp.Integer(1))
     ],
     forms={"repaired": at},
     mutants={
-        "half of rho": lambda x, theta: sharp.square_at(x, theta, ENERGY[0] / 2, *ENERGY[1:]),
-        "without friction": lambda x, theta: sharp.square_at(x, theta, ENERGY[0], 0, 0),
+        "half of rho": lambda x, theta: energy_norms.square_at(x, theta, ENERGY[0] / 2, *ENERGY[1:]),
+        "without friction": lambda x, theta: energy_norms.square_at(x, theta, ENERGY[0], 0, 0),
         "the factor 2 dropped": lambda x, theta: (at(x, theta) + (1 - theta) ** 2 + (theta * root_rho * x) ** 2) / 2,
     },
 )
@@ -130,7 +133,7 @@ vertex = lambda theta: (1 - theta) * kappa_1 / (2 - (2 + s_**2) * theta)
 
 def _branches(turning: Any) -> list[Goal]:
     """phi is largest at the vertex, in [0, r), before the turning theta, and at r from there on."""
-    phi = lambda x, theta: sharp.square_at(x, theta, *WHERE)
+    phi = lambda x, theta: energy_norms.square_at(x, theta, *WHERE)
     early = turning / (1 + y)
     late = turning + (1 - turning) * o / (1 + o)
     bend = lambda theta: theta * (2 - (2 + s_**2) * theta)
@@ -139,19 +142,19 @@ def _branches(turning: Any) -> list[Goal]:
         less(0, 2 - (2 + s_**2) * early),
         at_most(vertex(early), 0),
         less(vertex(early), r_),
-        equal(1 - phi(vertex(theta), theta), sharp.one_minus_inside(theta, *WHERE)),
+        equal(1 - phi(vertex(theta), theta), energy_norms.one_minus_inside(theta, *WHERE)),
         # phi(r) - phi(x) = (r - x) (2 theta (1-theta) kappa_1 - bend (r + x)), the last factor least at x = 0 or r
         equal(
             phi(r_, theta) - phi(ratio, theta),
             (r_ - ratio) * (2 * theta * (1 - theta) * kappa_1 - bend(theta) * (r_ + ratio)),
         ),
         *(at_most(2 * (1 - late) * kappa_1, (2 - (2 + s_**2) * late) * (r_ + end)) for end in (0, r_)),
-        equal(1 - phi(r_, theta), sharp.one_minus_end(theta, *WHERE)),
+        equal(1 - phi(r_, theta), energy_norms.one_minus_end(theta, *WHERE)),
     ]
 
 
 check(
-    id="x-sharp-branches",
+    id="x-energy-branches",
     text="phi is a parabola in x, concave before 2/(2+rho).  Before theta_s its vertex lies in [0, r) and gives the"
     " largest value; from theta_s on r does, as phi(r) - phi(x) is (r - x) times a factor that is linear in x and not"
     " negative at x = 0 and x = r.  The two forms of 1 - q^2 that are computed are those values.",
@@ -161,17 +164,17 @@ check(
 )
 
 check(
-    id="x-sharp-interval",
+    id="x-energy-interval",
     text="The square at x is below 1 exactly where 2 (f - 1) + theta (1 - 2 f + rho x^2) < 0: linear in theta for each"
     " x, so that the good thetas form one interval.",
     goals=lambda form: equal(
-        sharp.square_at(ratio, theta, root_rho**2, kappa_1, kappa_2) - 1, theta * form, {theta: any_theta}
+        energy_norms.square_at(ratio, theta, root_rho**2, kappa_1, kappa_2) - 1, theta * form, {theta: any_theta}
     ),
     forms={
-        "repaired": 2 * (sharp.work(ratio, kappa_1, kappa_2) - 1)
-        + theta * (1 - 2 * sharp.work(ratio, kappa_1, kappa_2) + root_rho**2 * ratio**2)
+        "repaired": 2 * (energy_norms.work(ratio, kappa_1, kappa_2) - 1)
+        + theta * (1 - 2 * energy_norms.work(ratio, kappa_1, kappa_2) + root_rho**2 * ratio**2)
     },
-    mutants={"the factor 2 dropped": sharp.work(ratio, kappa_1, kappa_2) - 1 + theta * root_rho**2 * ratio**2},
+    mutants={"the factor 2 dropped": energy_norms.work(ratio, kappa_1, kappa_2) - 1 + theta * root_rho**2 * ratio**2},
 )
 
 check(
@@ -181,7 +184,7 @@ check(
     goals=lambda form: equal(
         1 + ratio**2 - kappa_1 * ratio - kappa_2, (ratio - kappa_1 / 2) ** 2 + 1 - form(kappa_1, kappa_2)
     ),
-    forms={"repaired": sharp.friction_number},
+    forms={"repaired": energy_norms.friction_number},
     mutants={"kappa_1^2/2": lambda k1, k2: k2 + k1**2 / 2, "kappa_1/4": lambda k1, k2: k2 + k1 / 4},
 )
 
@@ -285,13 +288,13 @@ check(
     " (M C_R/m)^2, which is at least rho: with E = phi' E_2 phi, phi' S_1 phi <= M C_R^2 E and phi' S_2 phi >= m E.",
     goals=lambda form: [
         equal(1 - form, form * (1 + rho) - 1),
-        equal(1 - form, sharp.predicted_rate(rho)),
-        less(sharp.predicted_rate(rho), 1 - form / (1 + y)),
-        less(sharp.predicted_rate(rho), form * (1 + y) * (1 + rho) - 1),
+        equal(1 - form, energy_norms.predicted_rate(rho)),
+        less(energy_norms.predicted_rate(rho), 1 - form / (1 + y)),
+        less(energy_norms.predicted_rate(rho), form * (1 + y) * (1 + rho) - 1),
         equal(C0, form.subs(rho, A**2 / m**2), CONSTANTS),
         at_most(A**2 / m**2, M * C_R**2 * size / (1 + p) / (m * size * (1 + q)), CONSTANTS),
     ],
-    forms={"repaired": sharp.predicted_theta(rho)},
+    forms={"repaired": energy_norms.predicted_theta(rho)},
     mutants={"1/(1+rho_N)": 1 / (1 + rho), "2/(1+rho_N)": 2 / (1 + rho)},
 )
 
@@ -303,7 +306,7 @@ check(
     goals=lambda form: [
         equal(theta * (1 + form[0] * rho) - 1, 1),
         less(1, theta * (1 + (1 + y) * form[0] * rho) - 1, {theta: any_theta}),
-        equal(sharp.predicted_theta(form[1] * rho), theta),
+        equal(energy_norms.predicted_theta(form[1] * rho), theta),
     ],
     forms={"repaired": ((2 / theta - 1) / rho, 2 * (1 / theta - 1) / rho)},
     mutants={

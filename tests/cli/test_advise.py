@@ -8,7 +8,7 @@ import pytest
 from advice_calls import GOOD, PROVED, ROLE, by_body, pasted, saved
 
 import verification as vf
-from ndtheory import evaluate_sharp
+from ndtheory import evaluate_energy
 from verification.cli.problems import examples
 
 # --- advise, from a problem ------------------------------------------------------------------------------------------
@@ -82,17 +82,17 @@ def test_the_proved_theta_is_that_of_the_theorem_in_energy_norms(call, write, fr
     problem = vf.load(file)
     for role, roles in zip(call("advise", file, "--json").document["roles"], (problem, problem.swapped()), strict=True):
         measured = vf.measure(roles)
-        sharp = evaluate_sharp(measured.energy_constants())
+        energy = evaluate_energy(measured.energy_constants())
         assert role["friction_threshold"]["value"] == measured.friction_threshold.value
-        if sharp.interval is None:
+        if energy.interval is None:
             assert {role[name] for name in PROVED - {"friction_threshold"}} == {None}
             continue
-        assert role["theta_proved"] == sharp.theta_proved
-        assert role["factor_proved"]["value"] == sharp.factor_proved.value < 1
-        assert role["theta_max_proved"]["value"] == sharp.interval[1]
-        for theta in (0.9 * sharp.theta_proved, min(1.1 * sharp.theta_proved, 0.999)):
-            beside = evaluate_sharp(measured.energy_constants(), theta).factor
-            assert beside is None or beside.value > sharp.factor_proved.value
+        assert role["theta_proved"] == energy.theta_proved
+        assert role["factor_proved"]["value"] == energy.factor_proved.value < 1
+        assert role["theta_max_proved"]["value"] == energy.interval[1]
+        for theta in (0.9 * energy.theta_proved, min(1.1 * energy.theta_proved, 0.999)):
+            beside = evaluate_energy(measured.energy_constants(), theta).factor
+            assert beside is None or beside.value > energy.factor_proved.value
 
 
 def test_nothing_is_proved_of_the_local_law(call, write):

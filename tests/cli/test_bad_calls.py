@@ -75,7 +75,7 @@ def test_a_bad_call_is_refused_by_name(call, write, arguments, fragments):
         ("--rho 1 --theta 1", ["theta", "0 < theta < 1"]),
     ],
 )
-def test_the_sharp_edition_needs_rho_and_with_friction_both_kappas(call, options, fragments):
+def test_the_edition_in_energy_norms_needs_rho_and_with_friction_both_kappas(call, options, fragments):
     assert_names(call("bounds", *options.split()).complaint, *fragments)
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 import verification as vf
-from ndtheory import evaluate_sharp
+from ndtheory import evaluate_energy
 
 pytestmark = pytest.mark.usefixtures("known_continuum")
 
@@ -110,7 +110,7 @@ def test_rho_of_the_mesh_is_that_of_constants_and_the_mesh_is_judged_by_its_own_
     seen = set()
     for theta in ("0.3", "0.99"):
         judged = call("certify", "--continuum", path, "--theta", theta, "--json").document["mesh"]["contracts"]
-        assert judged is (True if evaluate_sharp(energy, theta).verdict == "contraction" else None)
+        assert judged is (True if evaluate_energy(energy, theta).verdict == "contraction" else None)
         seen.add(judged)
     assert seen == {True, None}
     stiff = write({"contact.radius": "0.2", "body1.young": "2e4", "body2.young": "7e4"})

@@ -426,7 +426,7 @@ def test_two_thresholds_on_friction_have_two_names_and_the_printed_one_its_unit(
         assert lines[head + 1].count(f"theta {on} <") == 2
         assert any(line.startswith("  printed: with stresses in " + unit) for line in lines)
     small = call("compare", write(), "--json").document
-    assert small["sharp"]["friction_threshold"]["value"] < small["sharp"]["friction_limit"]["value"]
+    assert small["energy"]["friction_threshold"]["value"] < small["energy"]["friction_limit"]["value"]
 
 
 def test_what_each_estimate_gives_away_is_told_from_what_is_only_the_unit(call, write):

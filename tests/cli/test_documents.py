@@ -145,13 +145,13 @@ def test_a_certified_number_says_its_level_and_encloses_its_value(document, of):
 def test_bounds_hold_the_constants_of_every_edition(document, of):
     found = document(of)
     assert {"m", "M", "C_R", "C_K", "rho", "kappa_1", "kappa_2", "theta"} <= set(found["inputs"])
-    assert set(found["editions"]) == {"printed", "repaired", "sharp"}
-    assert (found["editions"]["sharp"] is not None) == ("--rho" in CALCULATIONS[of])
+    assert set(found["editions"]) == {"printed", "repaired", "energy"}
+    assert (found["editions"]["energy"] is not None) == ("--rho" in CALCULATIONS[of])
     assert {name for name, edition in found["editions"].items() if edition is None} == set(found["reason"])
     for name, edition in found["editions"].items():
         if edition is None:
             continue
-        certified = {"factor", "one_minus_factor"} | (ENERGY if name == "sharp" else BOUNDS)
+        certified = {"factor", "one_minus_factor"} | (ENERGY if name == "energy" else BOUNDS)
         assert set(edition) >= certified | {"interval", "theta", "verdict"}
         for key in certified:
             assert edition[key] is None or set(edition[key]) == NUMBER
@@ -243,28 +243,28 @@ def test_pressure_and_shear_add_up_to_the_forces(document):
 @pytest.mark.parametrize("edits", PROBLEMS, ids=str)
 def test_a_comparison_holds_constants_bounds_run_and_verdicts(document, edits):
     found = document(("compare", edits))
-    assert set(found) >= {"constants", "bounds", "sharp", "lmi", "run", "verdicts"}
-    assert set(found["bounds"]["editions"]) == {"printed", "repaired", "sharp"}
+    assert set(found) >= {"constants", "bounds", "energy", "lmi", "run", "verdicts"}
+    assert set(found["bounds"]["editions"]) == {"printed", "repaired", "energy"}
     assert set(found["verdicts"].values()) <= VERDICTS | {None}
 
 
 def test_a_comparison_has_a_verdict_for_every_bound_and_for_the_forecast(document):
     found = document(("compare", None))
-    assert set(found["verdicts"]) == {"printed", "repaired", "sharp", "lmi", "linearised"}
+    assert set(found["verdicts"]) == {"printed", "repaired", "energy", "lmi", "linearised"}
     names = {"rho", "rho_normal", "kappa_1", "kappa_2", "factor", "theta_proved", "theta_max_proved"}
-    assert names | {"theta_predicted", "friction_threshold", "friction_limit"} <= set(found["sharp"])
+    assert names | {"theta_predicted", "friction_threshold", "friction_limit"} <= set(found["energy"])
     assert {"factor", "friction_threshold", "certified"} <= set(found["lmi"])
 
 
 def test_the_bounds_of_a_comparison_grow_sharper_from_one_to_the_next(document):
-    """|J| at most the semidefinite factor, at most the sharp one; thresholds the other way round."""
+    """|J| at most the semidefinite factor, at most the one in energy norms; thresholds the other way round."""
     found = document(("compare", None))
     assert found["run"]["linearised_norm"] <= found["lmi"]["lipschitz"]["value"]
     repaired = found["bounds"]["editions"]["repaired"]["C2"]["value"]
-    assert repaired <= found["sharp"]["friction_threshold"]["value"] <= found["lmi"]["friction_threshold"]["value"]
-    assert found["sharp"]["friction_threshold"]["value"] <= found["sharp"]["friction_limit"]["value"]
-    if found["sharp"]["factor"] is not None:
-        assert found["lmi"]["factor"]["value"] <= found["sharp"]["factor"]["value"] * (1 + 1e-9)
+    assert repaired <= found["energy"]["friction_threshold"]["value"] <= found["lmi"]["friction_threshold"]["value"]
+    assert found["energy"]["friction_threshold"]["value"] <= found["energy"]["friction_limit"]["value"]
+    if found["energy"]["factor"] is not None:
+        assert found["lmi"]["factor"]["value"] <= found["energy"]["factor"]["value"] * (1 + 1e-9)
 
 
 @pytest.mark.parametrize("edits", [None, "local law", "held tangentially"], ids=str)

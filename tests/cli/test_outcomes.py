@@ -55,11 +55,11 @@ def test_a_command_ends_with_its_status_in_words_and_as_a_document(call, write, 
         ({"printed": "HYPOTHESES_NOT_MET", "repaired": "INCONCLUSIVE"}, "wrong roles", NOT_MET),
         ({"printed": "VIOLATED", "repaired": "CONSISTENT"}, None, DONE),  # a finding
         ({"printed": "VIOLATED", "repaired": "INCONCLUSIVE"}, None, INCONCLUSIVE),
-        ({"repaired": "CONSISTENT", "sharp": "VIOLATED", "lmi": "CONSISTENT"}, None, NOT_MET),
-        ({"repaired": "CONSISTENT", "sharp": "CONSISTENT", "lmi": "VIOLATED"}, None, NOT_MET),
-        ({"sharp": "CONSISTENT", "lmi": "INCONCLUSIVE"}, None, INCONCLUSIVE),
-        ({"sharp": "INCONCLUSIVE", "lmi": "VIOLATED"}, None, NOT_MET),
-        ({"sharp": "CONSISTENT", "linearised": "VIOLATED"}, None, DONE),  # a prediction, no claim
+        ({"repaired": "CONSISTENT", "energy": "VIOLATED", "lmi": "CONSISTENT"}, None, NOT_MET),
+        ({"repaired": "CONSISTENT", "energy": "CONSISTENT", "lmi": "VIOLATED"}, None, NOT_MET),
+        ({"energy": "CONSISTENT", "lmi": "INCONCLUSIVE"}, None, INCONCLUSIVE),
+        ({"energy": "INCONCLUSIVE", "lmi": "VIOLATED"}, None, NOT_MET),
+        ({"energy": "CONSISTENT", "linearised": "VIOLATED"}, None, DONE),  # a prediction, no claim
     ],
     ids=lambda v: " ".join(v.values()) if isinstance(v, dict) else str(v),
 )

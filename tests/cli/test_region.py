@@ -10,7 +10,7 @@ from problem_list import SMALL, edited
 from strategies import AT_NIGHT
 
 import verification as vf
-from ndtheory import PRINTED, REPAIRED, evaluate, evaluate_sharp
+from ndtheory import PRINTED, REPAIRED, evaluate, evaluate_energy
 from verification.bounds import bound
 from verification.bounds import region as plane
 from verification.bounds.bound import NotComputed
@@ -49,7 +49,7 @@ def test_region_writes_a_picture_with_both_axes_every_edition_and_every_outcome(
     text = "\n".join("".join(element.itertext()).strip() for element in drawn.iter() if element.tag.endswith("}text"))
     assert "relaxation factor theta" in text
     assert "coefficient of friction k" in text
-    assert all(f"{name}: k < " in text for name in ("printed (MPa)", "repaired", "sharp", "lmi"))
+    assert all(f"{name}: k < " in text for name in ("printed (MPa)", "repaired", "energy", "lmi"))
     words = lambda outcome: "run still falling when stopped" if outcome == "limit" else f"run {outcome}"
     assert all(words(outcome) in text for outcome in {point.outcome for point in charted[2].points})
     assert region("-o", tmp_path / "plane.png").status == 0
@@ -73,7 +73,7 @@ def test_the_screen_of_region_counts_runs_and_gives_each_edition_its_line(region
     assert any(f"{outcomes.count('converged')} converged" in line for line in lines)
     assert any("still falling when stopped after" in line for line in lines)
     head = next(i for i, line in enumerate(lines) if "every small theta: k <" in line and "some theta: k <" in line)
-    assert [line.split()[0] for line in lines[head + 1 : head + 5]] == ["printed", "repaired", "sharp", "lmi"]
+    assert [line.split()[0] for line in lines[head + 1 : head + 5]] == ["printed", "repaired", "energy", "lmi"]
     assert "stresses in MPa" in lines[head + 5]
     assert lines[-1].endswith("plane.svg")
     assert [line for line in lines[:-1] if len(line) > 80] == []
@@ -83,7 +83,7 @@ def test_the_document_of_region_is_its_plane(region, quick, charted, tmp_path):
     answer = region("-o", tmp_path / "plane.svg", "--json")
     found = answer.document
     assert (answer.status, answer.err, found["schema"]) == (0, "", "ndtheory.region/1")
-    assert set(found["regions"]) | set(found["reason"]) == {"printed", "repaired", "sharp", "lmi"}
+    assert set(found["regions"]) | set(found["reason"]) == {"printed", "repaired", "energy", "lmi"}
     for drawn in found["regions"].values():
         assert drawn["k"] == sorted(set(drawn["k"]))
         assert all(0 <= low < high <= 1 for low, high in drawn["theta"])
@@ -121,25 +121,25 @@ def test_below_m_equal_to_1_the_printed_region_is_not_inside_the_repaired_one(wr
 def test_what_the_repaired_theorem_contracts_the_one_in_energy_norms_does(charted):
     _, measured, drawn, _ = charted
     for k, theta in ends(drawn.regions["repaired"], every=9):
-        assert evaluate_sharp(measured.with_friction(k).energy_constants(), theta).verdict == "contraction"
+        assert evaluate_energy(measured.with_friction(k).energy_constants(), theta).verdict == "contraction"
 
 
 def test_what_the_theorem_in_energy_norms_contracts_the_semidefinite_bound_does(charted):
     _, measured, drawn, _ = charted
-    sharp, lmi = drawn.regions["sharp"], drawn.regions["lmi"]
-    assert max(sharp.k) < max(lmi.k)
+    energy, lmi = drawn.regions["energy"], drawn.regions["lmi"]
+    assert max(energy.k) < max(lmi.k)
     for k, (low, high) in zip(lmi.k, lmi.theta, strict=True):
-        inner = evaluate_sharp(measured.with_friction(k).energy_constants()).interval
+        inner = evaluate_energy(measured.with_friction(k).energy_constants()).interval
         assert inner is None or low <= inner[0] < inner[1] <= high * (1 + 1e-9)
-    for k, (_, high) in zip(sharp.k, sharp.theta, strict=True):  # the border falls as friction grows
+    for k, (_, high) in zip(energy.k, energy.theta, strict=True):  # the border falls as friction grows
         assert high <= max((h for q, (_, h) in zip(lmi.k, lmi.theta, strict=True) if q <= k), default=1.0) * (1 + 1e-9)
 
 
 def test_the_border_of_a_region_is_where_contraction_ends(charted):
     _, measured, drawn, _ = charted
-    for k, (_, high) in list(zip(drawn.regions["sharp"].k, drawn.regions["sharp"].theta, strict=True))[::5]:
+    for k, (_, high) in list(zip(drawn.regions["energy"].k, drawn.regions["energy"].theta, strict=True))[::5]:
         energy = measured.with_friction(k).energy_constants()
-        assert high == 1 or evaluate_sharp(energy, min(high * (1 + 1e-6), 1 - 1e-12)).verdict == "no conclusion"
+        assert high == 1 or evaluate_energy(energy, min(high * (1 + 1e-6), 1 - 1e-12)).verdict == "no conclusion"
     for name, edition in (("printed", PRINTED), ("repaired", REPAIRED)):
         for k, (_, high) in list(zip(drawn.regions[name].k, drawn.regions[name].theta, strict=True))[::20]:
             constants = measured.with_friction(k).constants()
@@ -150,11 +150,11 @@ def test_no_run_inside_a_proved_region_stalls_or_runs_away(charted):
     _, measured, drawn, _ = charted
     proved = 0
     for point in drawn.points:
-        sharp = evaluate_sharp(measured.with_friction(point.k).energy_constants(), point.theta)
-        if sharp.verdict == "contraction":
+        energy = evaluate_energy(measured.with_friction(point.k).energy_constants(), point.theta)
+        if energy.verdict == "contraction":
             proved += 1
             assert point.outcome in ("converged", "limit"), point
-            steps = math.log(1e-9 * (1 - sharp.factor.value)) / math.log(sharp.factor.value)
+            steps = math.log(1e-9 * (1 - energy.factor.value)) / math.log(energy.factor.value)
             assert point.outcome == "converged" or point.iterations == plane.MOST_STEPS < 2 * steps, point
     assert proved > 0
     assert any(point.outcome in ("stalled", "diverged") for point in drawn.points)

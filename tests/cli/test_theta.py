@@ -4,7 +4,7 @@ import pytest
 from advice_calls import by_body
 
 import verification as vf
-from ndtheory import evaluate_sharp
+from ndtheory import evaluate_energy
 
 MOMENTUM = {"iteration.relaxation": '"momentum"'}
 
@@ -48,9 +48,9 @@ def test_a_given_theta_is_called_given(call, write):
 def test_an_automatic_theta_says_where_it_comes_from(call, write, edits, source):
     file = write(edits | {"iteration.theta": '"auto"'}, "auto.toml")
     found = call("run", file, "--json").document
-    sharp = evaluate_sharp(vf.measure(vf.load(file)).energy_constants())
+    energy = evaluate_energy(vf.measure(vf.load(file)).energy_constants())
     assert (found["theta_source"], found["converged"]) == (source, True)
-    assert found["theta"] == pytest.approx(sharp.theta_proved if source == "proved" else sharp.theta_predicted)
+    assert found["theta"] == pytest.approx(energy.theta_proved if source == "proved" else energy.theta_predicted)
     assert f"is the {source} one" in call("run", file).out
     over = call("run", write(edits, "given.toml"), "--theta", "auto", "--json").document
     assert over == found
@@ -72,8 +72,8 @@ def test_a_comparison_at_the_proved_theta_is_consistent(call, write):
     answer = call("compare", write({"contact.friction": "0.05"}), "--theta", "auto", "--json")
     found = answer.document
     assert (answer.status, found["run"]["theta_source"]) == (0, "proved")
-    assert found["verdicts"]["sharp"] == found["verdicts"]["lmi"] == "CONSISTENT"
-    assert found["sharp"]["factor"]["value"] == pytest.approx(found["sharp"]["factor_proved"]["value"], rel=1e-9)
+    assert found["verdicts"]["energy"] == found["verdicts"]["lmi"] == "CONSISTENT"
+    assert found["energy"]["factor"]["value"] == pytest.approx(found["energy"]["factor_proved"]["value"], rel=1e-9)
 
 
 def test_an_automatic_theta_stays_below_1_however_soft_the_contact_body(call, write):

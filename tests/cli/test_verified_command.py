@@ -59,11 +59,11 @@ def test_compare_shows_proved_ends_with_their_mark_and_its_legend(call, write):
     assert max(map(len, lines[:-1])) <= 80
     assert "v (verified): proved for the exact data" in " ".join(screen.split())
     row = lambda name: next(line for line in lines if line.startswith(f"  {name} ") and " contracts v" in line)
-    sharp, lmi = document["sharp"], document["lmi"]
-    every, some, factor = numbers_of(row("sharp"))
-    assert every <= F(sharp["friction_threshold"]["lo"])
-    assert some <= F(sharp["friction_limit"]["lo"])
-    assert factor >= F(sharp["factor"]["hi"])
+    energy, lmi = document["energy"], document["lmi"]
+    every, some, factor = numbers_of(row("energy"))
+    assert every <= F(energy["friction_threshold"]["lo"])
+    assert some <= F(energy["friction_limit"]["lo"])
+    assert factor >= F(energy["factor"]["hi"])
     allowed, bound = numbers_of(row("lmi"))
     assert allowed <= F(lmi["friction_threshold"]["lo"])
     assert allowed == pytest.approx(lmi["friction_threshold"]["lo"], rel=1e-2)

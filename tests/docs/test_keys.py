@@ -197,10 +197,10 @@ def transient(folder: Path) -> list[tuple[Path, str]]:
 def certified(*problems: vf.Problem) -> Iterator[Any]:
     """Certificates, and what comes of checking them again."""
     for problem in problems:
-        of_small, of_sharp = vf.certify(problem), vf.certify(problem.changed(friction=0), edition="sharp")
-        yield from (of_small, of_sharp)
+        of_small, of_energy = vf.certify(problem), vf.certify(problem.changed(friction=0), edition="energy")
+        yield from (of_small, of_energy)
         yield vf.check_again(of_small.to_dict())
-        yield vf.check_again(of_sharp.to_dict(), problem)
+        yield vf.check_again(of_energy.to_dict(), problem)
 
 
 @pytest.fixture(scope="module")

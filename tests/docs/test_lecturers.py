@@ -70,7 +70,7 @@ def test_the_run_of_the_lecture_converges_where_lmi_alone_speaks(tmp_path, monke
     Path(file).write_text(capsys.readouterr().out, "utf-8")
     assert main([*second.split(), "--json"]) == 0
     said = json.loads(capsys.readouterr().out)["verdicts"]
-    assert said["sharp"] == said["repaired"] == said["printed"] == "HYPOTHESES_NOT_MET"
+    assert said["energy"] == said["repaired"] == said["printed"] == "HYPOTHESES_NOT_MET"
     assert said["lmi"] == said["linearised"] == "CONSISTENT"
 
 

@@ -33,7 +33,7 @@ def test_the_levels_of_a_comparison_with_proofs_are_those_of_the_page():
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines()]
     table = [(key, level.split(":")[0]) for keys, level in rows for key in re.findall(r"`([^`]+\.[^`]+)`", keys)]
     document = vf.compare(vf.example("section6-60"), verified=True).to_dict()
-    found = dict(levels_of({name: document[name] for name in ("constants", "bounds", "sharp", "lmi")}))
+    found = dict(levels_of({name: document[name] for name in ("constants", "bounds", "energy", "lmi")}))
     assert len(found) > 50
     for path, level in found.items():
         assert [said for key, said in table if fnmatchcase(path, key)][:1] == [level], path

@@ -12,7 +12,7 @@ import pytest
 from browser import chromium, needs_browser
 
 import verification as vf
-from ndtheory import PRINTED, REPAIRED, evaluate, evaluate_sharp
+from ndtheory import PRINTED, REPAIRED, evaluate, evaluate_energy
 from verification.algorithm.fixed_point import FixedPointMap
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -245,14 +245,14 @@ def test_thresholds_and_factors_of_the_plane_are_those_of_the_library(browser, r
     moduli = (at["ratio"] * E2 / at["unit"], E2 / at["unit"])
     problem = vf.example("section6").changed(young=tuple(map(str, moduli)), friction=str(at["k"]))
     measured = vf.measure(problem)
-    energy, repaired, printed, small = rows(browser, "plane")
+    in_energy_norms, repaired, printed, small = rows(browser, "plane")
     for row, edition in ((repaired, REPAIRED), (printed, PRINTED)):
         expected = evaluate(edition, measured.constants()).C2.value
         assert float(row[1]) == pytest.approx(expected, rel=1e-3)
-    sharp = evaluate_sharp(measured.energy_constants(), str(at["theta"]))
-    assert float(energy[1]) == pytest.approx(measured.friction_limit.value, rel=1e-3)
+    energy = evaluate_energy(measured.energy_constants(), str(at["theta"]))
+    assert float(in_energy_norms[1]) == pytest.approx(measured.friction_limit.value, rel=1e-3)
     assert float(small[1]) == pytest.approx(measured.friction_threshold.value, rel=1e-3)
-    assert energy[3] == f"contraction by {sharp.factor.value:.4f} a step"
+    assert in_energy_norms[3] == f"contraction by {energy.factor.value:.4f} a step"
 
 
 @needs_browser

@@ -1,8 +1,8 @@
 """Fixtures of the tests of the theory."""
 
 import pytest
+from energy_oracle import DIGITS
 from mpmath import mp
-from sharp_oracle import DIGITS
 
 
 @pytest.fixture(scope="module")

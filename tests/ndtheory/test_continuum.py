@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fem1d2d import plane_strain, rectangle, stiffness
-from ndtheory import HypothesisError, evaluate_sharp
+from ndtheory import HypothesisError, evaluate_energy
 from ndtheory.continuum import (
     Rectangle,
     TwoRectangles,
@@ -353,7 +353,7 @@ def test_the_statement_is_that_of_the_theorem_for_the_upper_bounds(section6):
     k = F("0.2")
     first, second = section6.kappa(k)
     assert float(first) == pytest.approx(0.2 * (section6.C_s_square * section6.C_t1_square) ** 0.5)
-    there = evaluate_sharp(EnergyConstants(rho=section6.rho, kappa_1=first, kappa_2=second), theta="0.4")
+    there = evaluate_energy(EnergyConstants(rho=section6.rho, kappa_1=first, kappa_2=second), theta="0.4")
     assert statement(section6, friction=k, theta="0.4").factor.value == pytest.approx(there.factor.value)
     threshold = F(friction_threshold(section6).lo)
     a, b = section6.kappa(threshold)

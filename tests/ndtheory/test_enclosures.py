@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp
 
-from ndtheory import EDITIONS, REPAIRED, Constants, EnergyConstants, HypothesisError, Number, evaluate, evaluate_sharp
+from ndtheory import EDITIONS, REPAIRED, Constants, EnergyConstants, HypothesisError, Number, evaluate, evaluate_energy
 from ndtheory.number import LEVELS, above, below, rounded, weakest, working_precision
 
 LEVEL = st.sampled_from(LEVELS)
@@ -145,15 +145,15 @@ def test_numbers_of_level_float_give_what_the_floats_give_and_no_enclosure(editi
 @given(strategies.log_uniform(-6, 6), strategies.log_uniform(-3, 1), strategies.log_uniform(-3, 1), strategies.thetas())
 def test_energy_constants_of_level_float_give_what_the_floats_give_and_no_enclosure(rho, kappa_1, kappa_2, theta):
     floats = {"rho": float(rho), "kappa_1": float(kappa_1), "kappa_2": float(kappa_2)}
-    found = evaluate_sharp(EnergyConstants(**as_floats(floats)), theta)
-    assert found == evaluate_sharp(EnergyConstants(**floats), theta)
+    found = evaluate_energy(EnergyConstants(**as_floats(floats)), theta)
+    assert found == evaluate_energy(EnergyConstants(**floats), theta)
     assert {number.level for number in numbers(found).values()} == {"float"}
 
 
 def test_constants_written_exactly_give_results_without_enclosures_as_ever():
     found = evaluate(REPAIRED, Constants(m=1, M=2, C_R="4/3", C_K="1/1000"), "1/10")
     assert {number.level for number in numbers(found).values()} == {"float"}
-    assert {number.level for number in numbers(evaluate_sharp(EnergyConstants(rho=2))).values()} == {"float"}
+    assert {number.level for number in numbers(evaluate_energy(EnergyConstants(rho=2))).values()} == {"float"}
 
 
 # --- enclosures ----------------------------------------------------------------------------------------------------
@@ -227,7 +227,7 @@ def boxes_in_energy_norms(draw):
 @given(boxes_in_energy_norms())
 def test_every_enclosure_contains_the_results_at_all_energy_constants_enclosed(case):
     given, inside, level, theta = case
-    found, point = (evaluate_sharp(EnergyConstants(**c), theta) for c in (given, inside))
+    found, point = (evaluate_energy(EnergyConstants(**c), theta) for c in (given, inside))
     for name, number in numbers(found).items():
         assert number.level == (level if name in ("rho", "kappa_1", "kappa_2", "ratio") else number.level)
         if number.level != "float":
@@ -307,7 +307,7 @@ def test_C1_has_an_enclosure_on_both_sides_of_C2_and_beyond_it(edition):
 def test_theta_must_be_inside_the_interval_throughout_for_an_enclosure_of_the_factor():
     """rho = 2 within 1/4: q < 1 below 2/(1 + rho), that is 8/13 at the worst."""
     rho = Number(value=2.0, lo=1.75, hi=2.25, level="verified")
-    near, far = (evaluate_sharp(EnergyConstants(rho=rho), theta) for theta in ("3/5", "5/8"))
+    near, far = (evaluate_energy(EnergyConstants(rho=rho), theta) for theta in ("3/5", "5/8"))
     assert near.theta_max_proved.lo == pytest.approx(8 / 13)
     assert near.factor.level == "verified"
     assert near.factor.hi == pytest.approx(0.95)
@@ -316,7 +316,7 @@ def test_theta_must_be_inside_the_interval_throughout_for_an_enclosure_of_the_fa
 
 def test_friction_that_may_vanish_spans_the_jump_from_rho_normal_to_rho():
     friction = Number(value=0.25, lo=0.0, hi=0.5, level="guaranteed")
-    found = evaluate_sharp(EnergyConstants(rho=2, rho_normal=1, kappa_2=friction), "1/4")
+    found = evaluate_energy(EnergyConstants(rho=2, rho_normal=1, kappa_2=friction), "1/4")
     assert (found.rho.value, found.rho.level) == (2, "guaranteed")
     assert found.rho.lo == pytest.approx(1)
     assert found.rho.hi == pytest.approx(2)
@@ -326,7 +326,7 @@ def test_friction_that_may_vanish_spans_the_jump_from_rho_normal_to_rho():
 @pytest.mark.parametrize("other", [0.3, Number.of_float(0.3), Number(value=0.3, lo=0.2, level="verified")])
 def test_one_constant_without_an_enclosure_leaves_all_results_without(other):
     rho = Number(value=2.0, lo=1.75, hi=2.25, level="verified")
-    found = evaluate_sharp(EnergyConstants(rho=rho, kappa_1=other), "1/4")
+    found = evaluate_energy(EnergyConstants(rho=rho, kappa_1=other), "1/4")
     assert {number.level for number in numbers(found).values()} == {"float"}
 
 
@@ -350,7 +350,7 @@ def test_an_end_in_200_digits_is_moved_outward_by_more_than_its_rounding_and_giv
 
 def test_nothing_is_called_exact_after_a_root():
     two = Number(value=2.0, lo=2.0, hi=2.0, level="exact")
-    found = evaluate_sharp(EnergyConstants(rho=two), "1/2")
+    found = evaluate_energy(EnergyConstants(rho=two), "1/2")
     assert found.ratio.level == "verified"
     assert found.ratio.lo < math.sqrt(2) + 1e-15
     assert F(found.ratio.lo) ** 2 < 2 < F(found.ratio.hi) ** 2

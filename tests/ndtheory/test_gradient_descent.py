@@ -15,7 +15,7 @@ from cvxpy.error import SolverError
 from PEPit import PEP
 from PEPit.functions import SmoothStronglyConvexFunction
 
-from ndtheory import EnergyConstants, evaluate_sharp
+from ndtheory import EnergyConstants, evaluate_energy
 
 #: Tried in this order until one says that it has solved the program: the solver, and the tolerance it is given.  Which
 #: programs Clarabel solves to 1e-9 hangs on the last digit, and so on the kernels of the BLAS; of 380 programs, each
@@ -97,10 +97,10 @@ def gradient_step(rho, theta) -> Worst:
 @pytest.mark.parametrize("place", [0.1, 0.5, 0.9, 1.0, 1.1, 1.5, 1.9])
 def test_a_gradient_step_contracts_by_q_and_no_better(rho, place):
     """On both branches: from 0 to 2/(2 + rho) as place goes to 1, from there to the end of the interval up to 2."""
-    bounds = evaluate_sharp(EnergyConstants(rho=rho))
+    bounds = evaluate_energy(EnergyConstants(rho=rho))
     best, end = bounds.theta_predicted, bounds.interval[1]
     theta = place * best if place <= 1 else best + (place - 1) * (end - best)
-    q = evaluate_sharp(EnergyConstants(rho=rho), theta).factor.value
+    q = evaluate_energy(EnergyConstants(rho=rho), theta).factor.value
     found = gradient_step(rho, theta)
     assert found.is_near(q**2)
     for wrong in (0.99 * q, 1.01 * q, min(1 - theta, abs(1 - theta - theta * rho)) if place != 1 else 1):
@@ -109,7 +109,7 @@ def test_a_gradient_step_contracts_by_q_and_no_better(rho, place):
 
 @for_each_rho
 def test_the_best_gradient_step_contracts_by_rho_over_2_plus_rho(rho):
-    bounds = evaluate_sharp(EnergyConstants(rho=rho))
+    bounds = evaluate_energy(EnergyConstants(rho=rho))
     assert bounds.theta_proved == bounds.theta_predicted == pytest.approx(2 / (2 + rho), rel=1e-15)
     best = gradient_step(rho, bounds.theta_proved)
     assert best.is_near((rho / (2 + rho)) ** 2)
@@ -119,7 +119,7 @@ def test_the_best_gradient_step_contracts_by_rho_over_2_plus_rho(rho):
 
 @pytest.mark.parametrize("rho", [1.2, 5.7])
 def test_at_the_end_of_the_interval_a_gradient_step_need_not_contract(rho):
-    end = evaluate_sharp(EnergyConstants(rho=rho)).interval[1]
+    end = evaluate_energy(EnergyConstants(rho=rho)).interval[1]
     assert gradient_step(rho, end).is_near(1)
     assert gradient_step(rho, 1.01 * end).value > 1 + 1e-3
 
@@ -221,4 +221,4 @@ def test_with_the_parameters_of_another_p_the_worst_error_shrinks_by_less_than_p
 
 @for_each_rho
 def test_momentum_is_faster_than_every_constant_theta(rho):
-    assert momentum_rate(rho) < evaluate_sharp(EnergyConstants(rho=rho)).factor_proved.value
+    assert momentum_rate(rho) < evaluate_energy(EnergyConstants(rho=rho)).factor_proved.value

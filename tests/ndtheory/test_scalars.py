@@ -11,11 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import iv, mp, mpf
 
-from ndtheory import EDITIONS, bounds, sharp
+from ndtheory import EDITIONS, bounds, energy_norms
 from ndtheory.number import absolute, maximum, minimum, sqrt, where
 
 #: What is no formula: they read constants, or answer None where there is no interval.
-NO_FORMULAS = {"evaluate", "evaluate_sharp", "contraction_interval", "best_theta"}
+NO_FORMULAS = {"evaluate", "evaluate_energy", "contraction_interval", "best_theta"}
 
 
 def formulas(module):
@@ -27,7 +27,7 @@ def formulas(module):
 
 FORMULAS = {
     **formulas(bounds),
-    **formulas(sharp),
+    **formulas(energy_norms),
     **{f"{e.name} {key}": getattr(e, key) for e in EDITIONS for key in ("coercivity", "unit", "proved")},
     **{f.__name__: f for f in (minimum, maximum, absolute, sqrt)},
 }
@@ -52,9 +52,9 @@ def listed(result):
 
 def test_the_formulas_with_branches_are_among_those_tried():
     of_bounds = {"inverse_G", "thresholds", "lower_end", "one_minus_square", "factor_and_rest"}
-    of_sharp = {"turning_theta", "worst_ratio", "one_minus_inside", "one_minus_square", "slope_inside"}
-    of_sharp |= {"friction_limit", "predicted_factor", "contraction_ends", "best_between"}
-    assert {f"bounds.{name}" for name in of_bounds} | {f"sharp.{name}" for name in of_sharp} <= set(FORMULAS)
+    of_energy = {"turning_theta", "worst_ratio", "one_minus_inside", "one_minus_square", "slope_inside"}
+    of_energy |= {"friction_limit", "predicted_factor", "contraction_ends", "best_between"}
+    assert {f"bounds.{name}" for name in of_bounds} | {f"energy_norms.{name}" for name in of_energy} <= set(FORMULAS)
 
 
 # --- a scalar that writes JavaScript -------------------------------------------------------------------------------
@@ -152,7 +152,7 @@ def test_a_formula_written_as_javascript_gives_the_same_doubles(formula, data):
 
 def test_a_written_scalar_has_no_truth_value():
     with pytest.raises(TypeError, match="no truth value"):
-        sharp.contraction_interval(*(Written(script, name) for script in [[]] for name in ("rho", "k1", "k2")))
+        energy_norms.contraction_interval(*(Written(script, name) for script in [[]] for name in ("rho", "k1", "k2")))
 
 
 def test_both_branches_of_a_written_choice_are_there():
@@ -274,6 +274,6 @@ def test_the_interval_of_a_formula_contains_its_value_at_every_point(formula, da
 @pytest.mark.parametrize("theta", [0.25, 0.5, 0.875])
 def test_the_interval_of_q_is_narrow_also_where_the_branch_is_undecided(theta):
     """rho = 2 without friction: the branches meet at theta = 1/2, where 1 - q^2 = 3/4."""
-    found = sharp.one_minus_square(Ball(theta - 1e-9, theta), Ball.of(2), Ball.of(0), Ball.of(0))
+    found = energy_norms.one_minus_square(Ball(theta - 1e-9, theta), Ball.of(2), Ball.of(0), Ball.of(0))
     assert found.hi - found.lo < 1e-7
-    assert found.lo <= 1 - sharp.predicted_factor(theta, 2.0) ** 2 <= found.hi
+    assert found.lo <= 1 - energy_norms.predicted_factor(theta, 2.0) ** 2 <= found.hi

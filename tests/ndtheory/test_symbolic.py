@@ -226,7 +226,7 @@ def test_one_open_sliding_node_breaks_what_is_printed_near_C_0(id, theta, shown)
     assert [c.decide(c.forms["printed"]).holds for c in exact] == [False]
 
 
-@pytest.mark.parametrize("id", ["x-gradient-descent", "x-best-theta", "x-sharp", "x-printed-literal"])
+@pytest.mark.parametrize("id", ["x-gradient-descent", "x-best-theta", "x-energy", "x-printed-literal"])
 def test_a_fact_of_ours_leans_on_rows_with_checks_of_their_own(id):
     own = {ground for ground in statements()[id].leans_on if ground.startswith("x-")}
     assert own
@@ -301,7 +301,7 @@ ALL = [
     "x-homogeneity",
     "x-gradient-descent",
     "x-threshold-uniqueness",
-    "x-sharp",
+    "x-energy",
     "x-no-theta-for-all-moduli",
     "x-increment-test",
 ] + [f"5.{i}" for i in range(1, 48)]

@@ -37,7 +37,7 @@ class Mutant:
 TESTS: dict[str, tuple[str, ...]] = {
     "fem1d2d/enclosed.py": ("tests/safeguards/test_enclosed.py",),
     "fem1d2d/loewner.py": ("tests/safeguards/test_loewner.py",),
-    "ndtheory/sharp.py": ("tests/safeguards/test_sharp_safe.py",),
+    "ndtheory/energy_norms.py": ("tests/safeguards/test_energy_safe.py",),
     "verification/advice/from_logs.py": (
         "tests/verification/test_from_logs.py",
         "tests/verification/test_runs_with_friction.py",
@@ -110,7 +110,7 @@ MUTANTS: dict[str, list[tuple[str, ...]]] = {
         ("if not (np.isfinite(middle).all() and (own > 0).all()):", "if False:"),
         ("2.0 ** -np.round(np.log2(own) / 2)", "own**-0.5", SPARE),
     ],
-    "ndtheory/sharp.py": [
+    "ndtheory/energy_norms.py": [
         ("(s + sqrt(s * s + 4 * kappa_2)) / 2", "(s + sqrt(s * s + 2 * kappa_2)) / 2"),
         ("(2 * r - kappa_1) / ((2 + rho) * r - kappa_1)", "2 / (2 + rho)"),
         ("        theta >= turning_theta(rho, kappa_1, kappa_2),", "        theta > 2 / (2 + rho),"),

@@ -10,10 +10,10 @@ import pytest
 from problem_list import changed
 
 import verification as vf
-from ndtheory import EnergyConstants, evaluate_sharp
+from ndtheory import EnergyConstants, evaluate_energy
 from verification.advice.from_matrices import advise_matrices
 from verification.algorithm.relaxation import RULES, Constant
-from verification.algorithm.theta import automatic, choose, sharp_bounds
+from verification.algorithm.theta import automatic, choose, energy_bounds
 from verification.cli.problems import examples, load_problem
 from verification.interface.assembly import build
 from verification.problem import ProblemError
@@ -38,29 +38,29 @@ def softened(poisson, neumann_body=1, **iteration):
 @pytest.mark.parametrize("kappa", [0, 0.05, 0.2, 0.4, 0.5, 0.6, 0.8, 0.9])
 @pytest.mark.parametrize("rho", [0.3, 2, 15, 40])
 def test_the_proved_theta_is_taken_unless_it_needs_more_than_twice_the_steps(rho, kappa):
-    sharp = evaluate_sharp(EnergyConstants(rho=rho, kappa_1=kappa, kappa_2=kappa))
-    chosen = automatic(sharp)
-    if sharp.theta_proved is None:
-        assert (chosen.source, chosen.theta) == ("predicted", F(str(sharp.theta_predicted)))
+    energy = evaluate_energy(EnergyConstants(rho=rho, kappa_1=kappa, kappa_2=kappa))
+    chosen = automatic(energy)
+    if energy.theta_proved is None:
+        assert (chosen.source, chosen.theta) == ("predicted", F(str(energy.theta_predicted)))
         assert "no theta is proved" in chosen.why
         return
-    proved, predicted = (steps(theta, rho) for theta in (sharp.theta_proved, sharp.theta_predicted))
+    proved, predicted = (steps(theta, rho) for theta in (energy.theta_proved, energy.theta_predicted))
     slow = proved > 2 * predicted
     assert chosen.source == ("predicted" if slow else "proved")
-    assert float(chosen.theta) == (sharp.theta_predicted if slow else sharp.theta_proved)
+    assert float(chosen.theta) == (energy.theta_predicted if slow else energy.theta_proved)
     if kappa:
         assert f"{predicted if slow else proved} steps predicted" in chosen.why
         assert f" {proved if slow else predicted} at the" in chosen.why
 
 
 def test_both_sources_occur_among_those_cases():
-    of = lambda kappa: automatic(evaluate_sharp(EnergyConstants(rho=15, kappa_1=kappa, kappa_2=kappa))).source
+    of = lambda kappa: automatic(evaluate_energy(EnergyConstants(rho=15, kappa_1=kappa, kappa_2=kappa))).source
     assert [of(0.2), of(0.8)] == ["proved", "predicted"]
 
 
 @pytest.mark.parametrize("size", ["1e-70", "1e-20", "1e20", "1e70"])
 def test_no_size_of_rho_stops_the_choice(size):
-    chosen = automatic(evaluate_sharp(EnergyConstants(rho=size, kappa_1="1e-3", kappa_2="1e-3")))
+    chosen = automatic(evaluate_energy(EnergyConstants(rho=size, kappa_1="1e-3", kappa_2="1e-3")))
     assert 0 < chosen.theta < 1
 
 
@@ -70,12 +70,12 @@ def section6():
 
 
 def test_the_flagship_keeps_its_proved_theta_though_its_bound_asks_for_many_steps(section6):
-    sharp = sharp_bounds(vf.measure(section6))
+    energy = energy_bounds(vf.measure(section6))
     chosen = choose(build(section6), "auto")
     assert chosen.source == "proved"
     assert float(chosen.theta) == pytest.approx(0.7012, abs=1e-4)
-    bound = math.log(1e-9) / math.log(sharp.factor_proved.value)
-    assert bound > 2 * math.log(1e-9) / math.log(sharp.rate_predicted)
+    bound = math.log(1e-9) / math.log(energy.factor_proved.value)
+    assert bound > 2 * math.log(1e-9) / math.log(energy.rate_predicted)
     assert chosen.why.startswith("18 steps predicted, at most twice the 13 ")
     finished = vf.run(section6, theta="auto")
     assert (finished.converged, finished.iterations) == (True, 17)
@@ -84,7 +84,7 @@ def test_the_flagship_keeps_its_proved_theta_though_its_bound_asks_for_many_step
 @pytest.mark.parametrize("poisson", ["0.49", "0.495"])
 def test_a_nearly_incompressible_body_gets_the_predicted_theta_and_less_than_half_the_steps(poisson):
     problem = softened(poisson)
-    proved = sharp_bounds(vf.measure(problem)).theta_proved
+    proved = energy_bounds(vf.measure(problem)).theta_proved
     chosen, slow = vf.run(problem), vf.run(problem, theta=repr(proved))
     assert chosen.to_dict()["theta_source"] == "predicted"
     assert f"at the proved theta {proved:.4g}" in chosen.to_dict()["theta_reason"]

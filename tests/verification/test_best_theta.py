@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import verification as vf
-from ndtheory import evaluate_sharp
+from ndtheory import evaluate_energy
 from verification.advice.best_theta import Fewest, best_theta
 from verification.bounds.bound import Subject
 from verification.bounds.multipliers import QuadraticForms
@@ -38,8 +38,8 @@ def test_bars_have_every_best_theta_in_closed_form(one, other):
     found = best_theta(bars(one, other))
     assert found.rho == pytest.approx(rho, rel=1e-12)
     assert found.predicted == pytest.approx(2 / (2 + rho), rel=1e-12)
-    assert found.sharp.theta == pytest.approx(2 / (2 + rho), rel=1e-12)
-    assert found.sharp.factor == pytest.approx(rho / (2 + rho), rel=1e-9)
+    assert found.energy.theta == pytest.approx(2 / (2 + rho), rel=1e-12)
+    assert found.energy.factor == pytest.approx(rho / (2 + rho), rel=1e-9)
     # contact stays closed: one mode, 1 - theta (1 + rho)
     assert found.linearised.theta == pytest.approx(1 / (1 + rho), rel=1e-5)
     assert found.linearised.factor < 1e-4
@@ -55,10 +55,10 @@ def test_the_spectral_radius_is_least_at_the_theta_of_the_jacobian(small):
 
 def test_the_proved_factors_are_least_at_their_thetas(small):
     pair, measured = vf.build(SMALL), vf.measure(SMALL)
-    sharp = evaluate_sharp(measured.energy_constants())
-    assert (small.sharp.theta, small.sharp.factor) == (sharp.theta_proved, sharp.factor_proved.value)
+    energy = evaluate_energy(measured.energy_constants())
+    assert (small.energy.theta, small.energy.factor) == (energy.theta_proved, energy.factor_proved.value)
     at = lambda theta: BOUNDS["lmi"].evaluate(Subject.of(pair, measured), theta).factor.value
-    assert small.semidefinite.factor < small.sharp.factor
+    assert small.semidefinite.factor < small.energy.factor
     assert at(small.semidefinite.theta) <= small.semidefinite.factor * (1 + 1e-6)
     whole = QuadraticForms(pair, measured).factor(small.semidefinite.theta).value
     assert whole == pytest.approx(small.semidefinite.factor, rel=1e-6)
@@ -81,15 +81,15 @@ def test_runs_that_do_not_arrive_are_no_fewest():
 
 def test_what_has_no_best_theta_says_why():
     rubbing = best_theta(SMALL.changed(friction=5), runs=False)
-    assert (rubbing.sharp, rubbing.seen, rubbing.semidefinite) == (None, None, None)
-    assert rubbing.reason["sharp"] == "q(theta) is below 1 for no theta"
+    assert (rubbing.energy, rubbing.seen, rubbing.semidefinite) == (None, None, None)
+    assert rubbing.reason["energy"] == "q(theta) is below 1 for no theta"
     assert rubbing.reason["semidefinite"] == "no theta is proved to contract"
     assert rubbing.reason["seen"] == "no runs were asked for"
     apart = best_theta(SMALL.changed(gap="0.1", friction=0), runs=False, semidefinite=False)
     assert apart.reason["linearised"] == "the spectral radius falls up to theta = 1"  # all open: it is 1 - theta
     local = best_theta(SMALL.changed(law="local", radius=None), runs=False)
-    assert (local.sharp, local.semidefinite) == (None, None)
-    assert local.reason["sharp"] == local.reason["semidefinite"] == vf.build(SMALL.changed(law="local")).outside[0]
+    assert (local.energy, local.semidefinite) == (None, None)
+    assert local.reason["energy"] == local.reason["semidefinite"] == vf.build(SMALL.changed(law="local")).outside[0]
     short = best_theta(SMALL.changed(max_iterations=1), semidefinite=False)
     assert (short.seen, short.reason["seen"]) == (None, "no run arrived")
 

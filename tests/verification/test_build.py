@@ -12,7 +12,7 @@ from ndtheory import HypothesisError
 from verification.algorithm.affine_piece import piece_of
 from verification.algorithm.fixed_point import FixedPointMap
 from verification.algorithm.rates import largest_step_ratio
-from verification.algorithm.theta import sharp_bounds
+from verification.algorithm.theta import energy_bounds
 from verification.bounds.multipliers import QuadraticForms
 from verification.constants import measure
 from verification.interface.build import build
@@ -58,7 +58,7 @@ def test_a_pair_from_its_matrices_is_the_pair(neumann_body, friction):
     assert two.linearised.rate == pytest.approx(one.linearised.rate, rel=1e-9)
     assert two.contact.status == one.contact.status
     assert two.contact.shear == pytest.approx(one.contact.shear, rel=1e-9, abs=1e-9 * np.abs(one.contact.shear).max())
-    bounds = [sharp_bounds(measure(p), Fraction(1, 10)) for p in (pair, other)]
+    bounds = [energy_bounds(measure(p), Fraction(1, 10)) for p in (pair, other)]
     for name in ("rho", "kappa_1", "kappa_2", "factor_proved"):
         first, second = (getattr(b, name) for b in bounds)
         assert (first is None) == (second is None)
@@ -172,8 +172,8 @@ def test_across_unlike_grids_no_step_exceeds_the_bounds(seed, friction):
     case = unlike(seed, friction)
     pair, measured = case.pair, measure(case.pair)
     T, norm = FixedPointMap(pair), pair.neumann.dual_norm
-    theta = float(sharp_bounds(measured).theta_predicted) * 0.8
-    sharp = sharp_bounds(measured, theta)
+    theta = float(energy_bounds(measured).theta_predicted) * 0.8
+    energy = energy_bounds(measured, theta)
     lmi = QuadraticForms(pair, measured).factor(theta).value
     worst = 0.0
     for _ in range(60):
@@ -181,9 +181,9 @@ def test_across_unlike_grids_no_step_exceeds_the_bounds(seed, friction):
         images = [pair.interface.carry_back(T(force)[1].force) for force in (g, g + d)]
         worst = max(worst, norm(theta * (images[1] - images[0]) + (1 - theta) * d) / norm(d))
     assert worst <= lmi * (1 + 1e-9)
-    assert sharp.factor is None or lmi <= sharp.factor.value * (1 + 1e-6)
+    assert energy.factor is None or lmi <= energy.factor.value * (1 + 1e-6)
     if friction == 0:
-        assert sharp.factor is not None
+        assert energy.factor is not None
         assert worst >= 0.5 * lmi  # the bounds are those of this pair, not of any
 
 

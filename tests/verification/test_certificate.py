@@ -67,7 +67,7 @@ def test_a_claim_below_a_factor_that_occurs_is_refused(certificate):
     assert not check_again(certificate).accepted
 
 
-@pytest.mark.parametrize("edition", ["sharp", "repaired"])
+@pytest.mark.parametrize("edition", ["energy", "repaired"])
 def test_other_bounds_have_certificates_with_one_number_for_all_nodes(edition):
     problem = (
         vf.example("inside") if edition == "repaired" else vf.Problem.from_dict(small(contact={"friction": "0.1"}))

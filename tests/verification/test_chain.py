@@ -16,7 +16,7 @@ import strategies
 from chain_problems import case, energy, every_piece, run_of, state_of, step_II, with_loads
 from hypothesis import settings
 
-from ndtheory import REPAIRED, bounds, evaluate, sharp
+from ndtheory import REPAIRED, bounds, energy_norms, evaluate
 from verification.algorithm.affine_piece import Piece
 from verification.algorithm.rates import largest_step_ratio
 from verification.bounds.multipliers import QuadraticForms
@@ -37,10 +37,10 @@ RELATIVE = 1e-9
 TIGHT = 0.01
 
 
-def sharp_factor(measured: Measured, theta: float, **changes: float) -> float:
+def energy_factor(measured: Measured, theta: float, **changes: float) -> float:
     """q(theta), also where it is 1 or more; with other values of rho, kappa_1, kappa_2 where they are given."""
     values = dict(zip(("rho", "kappa_1", "kappa_2"), energy(measured), strict=True)) | changes
-    return float(np.sqrt(1 - sharp.one_minus_square(theta, *(float(v) for v in values.values()))))
+    return float(np.sqrt(1 - energy_norms.one_minus_square(theta, *(float(v) for v in values.values()))))
 
 
 def repaired_factor(measured: Measured, theta: float) -> float:
@@ -116,7 +116,7 @@ class Chain:
     search: float
     lmi: float
     evaluated: float
-    sharp: float
+    energy: float
     repaired: float
 
     @property
@@ -131,8 +131,8 @@ class Chain:
             ("attained", "lmi"),
             ("search", "lmi"),
             ("evaluated", "lmi"),
-            ("evaluated", "sharp"),
-            ("sharp", "repaired"),
+            ("evaluated", "energy"),
+            ("energy", "repaired"),
         ]
         return {f"{a} <= {b}": (getattr(self, a), getattr(self, b)) for a, b in names}
 
@@ -164,7 +164,7 @@ def chain_of(pair: ContactPair, measured: Measured, theta: float, random: np.ran
         search=found.value,
         lmi=proved.value,
         evaluated=proved.evaluated,
-        sharp=sharp_factor(measured, theta),
+        energy=energy_factor(measured, theta),
         repaired=repaired_factor(measured, theta),
     )
 
@@ -223,15 +223,15 @@ def test_where_the_repaired_edition_proves_a_factor_every_other_number_is_below_
         assert 0 < left < 1
         assert found.broken == {}
         assert found.repaired == pytest.approx(1 - left, rel=1e-12)
-        assert 1 - found.sharp >= left * (1 - RELATIVE) - 1e-15
+        assert 1 - found.energy >= left * (1 - RELATIVE) - 1e-15
 
 
 #: Bounds that would be smaller.
 MUTANTS: dict[str, Callable[[Measured, float], float]] = {
-    "without friction": lambda m, theta: sharp_factor(m, theta, kappa_1=0, kappa_2=0),
-    "without kappa_1": lambda m, theta: sharp_factor(m, theta, kappa_1=0),
-    "without kappa_2": lambda m, theta: sharp_factor(m, theta, kappa_2=0),
-    "with rho_normal": lambda m, theta: sharp_factor(m, theta, rho=m.rho_normal.value),
+    "without friction": lambda m, theta: energy_factor(m, theta, kappa_1=0, kappa_2=0),
+    "without kappa_1": lambda m, theta: energy_factor(m, theta, kappa_1=0),
+    "without kappa_2": lambda m, theta: energy_factor(m, theta, kappa_2=0),
+    "with rho_normal": lambda m, theta: energy_factor(m, theta, rho=m.rho_normal.value),
 }
 
 
@@ -241,7 +241,7 @@ def test_a_smaller_bound_is_found_out():
     for seed in range(60):
         pair, measured, theta, random = case(seed)
         found = largest_factor(pair, theta, random=random, starts=2).value
-        assert found <= sharp_factor(measured, theta) * (1 + RELATIVE)
+        assert found <= energy_factor(measured, theta) * (1 + RELATIVE)
         for mutant, bound in MUTANTS.items():
             above[mutant] += found > 1.001 * bound(measured, theta)
         if min(above.values()) > 0 and not strategies.AT_NIGHT:
@@ -273,7 +273,7 @@ def test_without_friction_q_is_attained_on_both_branches(share):
     for seed in range(12 if strategies.AT_NIGHT else 6):
         pair, measured, _, random = case(seed, friction=0)
         theta = min(share * 2 / (2 + measured.rho_normal.value), 0.97)
-        bound = sharp_factor(measured, theta)
+        bound = energy_factor(measured, theta)
         *_, closed = (closed for closed in every_piece(pair) if closed.pattern.touching.all())
         *_, apart = (piece for piece in every_piece(pair) if not piece.pattern.touching.any())
         assert apart.factor(theta) == pytest.approx(1 - theta, rel=1e-9)
@@ -298,5 +298,5 @@ def test_with_little_friction_q_jumps_to_rho_and_is_nearly_attained(k, within):
             theta = min(share * 2 / (2 + rho), 0.97)
             found = largest_factor(pair, theta, random=random, starts=2).value
             assert found >= max(1 - theta, abs(1 - theta - theta * rho)) * (1 - RELATIVE)
-            close.append(sharp_factor(measured, theta) <= 1.02 * found)
+            close.append(energy_factor(measured, theta) <= 1.02 * found)
     assert np.mean(close) >= within

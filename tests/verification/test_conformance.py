@@ -13,7 +13,7 @@ from ndtheory import Number
 from verification.algorithm.fixed_point import FixedPointMap
 from verification.algorithm.relaxation import RULES, Momentum, Rule, momentum_rate
 from verification.bounds.bound import Subject
-from verification.bounds.energy import Sharp
+from verification.bounds.energy import Energy
 from verification.bounds.pattern_search import largest_factor
 from verification.bounds.table import BOUNDS
 from verification.interface.friction import LAWS, Law, Local, Nonlocal, hat
@@ -303,7 +303,7 @@ def test_a_law_that_is_wrong_in_one_way_is_refused(law, property):
 
 
 @dataclass
-class Changed(Sharp):
+class Changed(Energy):
     """The theorem in energy norms, with another factor."""
 
     change: object
@@ -318,7 +318,7 @@ class Changed(Sharp):
         )
 
 
-class Forgetting(Sharp):
+class Forgetting(Energy):
     """It forgets friction."""
 
     def evaluate(self, subject, theta=None, **options):
@@ -326,7 +326,7 @@ class Forgetting(Sharp):
         return super().evaluate(without, theta, **options)
 
 
-class OfALength(Sharp):
+class OfALength(Energy):
     """It knows how long Gamma_c is, in its unit."""
 
     def evaluate(self, subject, theta=None, **options):

@@ -118,8 +118,8 @@ def test_only_an_edition_with_a_factor_draws_its_bound(comparisons):
         draw_residuals(comparisons[name].run, comparisons[name].computed).axes[0].get_legend_handles_labels()[1]
     )
     drawn = lambda name: [label for label in labels(name) if label.endswith("bound")]
-    assert drawn("inside") == ["repaired bound", "sharp bound", "lmi bound"]
-    assert drawn("section6") == ["sharp bound", "lmi bound"]
+    assert drawn("inside") == ["repaired bound", "energy bound", "lmi bound"]
+    assert drawn("section6") == ["energy bound", "lmi bound"]
 
 
 def test_pressure_shear_and_states_are_those_of_the_run(comparisons):

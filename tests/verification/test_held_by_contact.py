@@ -286,27 +286,27 @@ def test_m_of_a_loose_body_is_zero_and_m_of_the_other_is_not() -> None:
     assert (smooth["C_t1"], smooth["kappa_1"]["value"]) == (None, 0)
 
 
-def test_without_friction_the_sharp_bound_and_the_semidefinite_one_speak_and_are_attained() -> None:
+def test_without_friction_the_bound_in_energy_norms_and_the_semidefinite_one_speak_and_are_attained() -> None:
     found = vf.compare(vf.Problem.from_dict(small(body2=SLIDING_TOP, contact={"friction": 0})))
-    sharp, lmi = found.bounds["sharp"], found.bounds["lmi"]
-    rho, theta = found.measured.rho_normal.value, sharp.theta
-    assert sharp.factor.value == pytest.approx(max(1 - theta, abs(1 - theta - theta * rho)), rel=1e-12)
-    assert lmi.detail.lower <= lmi.factor.value <= sharp.factor.value * (1 + 1e-6)
-    assert lmi.detail.lower > 0.999 * sharp.factor.value  # so that no smaller bound is one
-    assert found.verdicts["sharp"].verdict == found.verdicts["lmi"].verdict == "CONSISTENT"
+    energy, lmi = found.bounds["energy"], found.bounds["lmi"]
+    rho, theta = found.measured.rho_normal.value, energy.theta
+    assert energy.factor.value == pytest.approx(max(1 - theta, abs(1 - theta - theta * rho)), rel=1e-12)
+    assert lmi.detail.lower <= lmi.factor.value <= energy.factor.value * (1 + 1e-6)
+    assert lmi.detail.lower > 0.999 * energy.factor.value  # so that no smaller bound is one
+    assert found.verdicts["energy"].verdict == found.verdicts["lmi"].verdict == "CONSISTENT"
     for name in ("printed", "repaired"):
         assert found.verdicts[name].verdict == "NOT_COMPUTED"
         assert "m = 0" in found.verdicts[name].reason
     assert found.losses is None
     assert "m = 0" in found.reason["losses"]
-    assert (sharp.friction.every, sharp.friction.on) == (None, "k")  # no friction is allowed, where some would be
+    assert (energy.friction.every, energy.friction.on) == (None, "k")  # no friction is allowed, where some would be
     json.dumps(found.to_dict())
 
 
 @pytest.mark.parametrize("name", ["sliding top", "pressed by traction alone"])
 def test_with_friction_no_bound_speaks_where_a_free_motion_is_tangential_and_auto_is_the_prediction(name) -> None:
     found = vf.compare(problem(name), theta="auto")
-    for bound in ("sharp", "lmi"):
+    for bound in ("energy", "lmi"):
         assert found.verdicts[bound].verdict == "NOT_COMPUTED"
         assert "C_t1 is infinite" in found.verdicts[bound].reason
     choice = found.run.choice
@@ -316,7 +316,7 @@ def test_with_friction_no_bound_speaks_where_a_free_motion_is_tangential_and_aut
     assert found.run.converged
 
 
-def test_with_friction_the_sharp_bound_speaks_where_the_free_motion_lifts_alone() -> None:
+def test_with_friction_the_bound_in_energy_norms_speaks_where_the_free_motion_lifts_alone() -> None:
     wide = small(
         body1={"x": ["0.4", "1.6"], "cells": [6, 2]},
         body2=LIFTED_ONLY,
@@ -325,24 +325,26 @@ def test_with_friction_the_sharp_bound_speaks_where_the_free_motion_lifts_alone(
     )
     found = vf.compare(vf.Problem.from_dict(wide))
     assert found.measured.C_t1.value > 0
-    assert found.verdicts["sharp"].verdict == "CONSISTENT"
-    assert found.bounds["sharp"].factor.value < 1
+    assert found.verdicts["energy"].verdict == "CONSISTENT"
+    assert found.bounds["energy"].factor.value < 1
     assert found.verdicts["lmi"].verdict == "NOT_COMPUTED"
     assert "lifted rigidly" in found.verdicts["lmi"].reason
     subject = Subject.of(found.run.pair, found.measured)
-    assert BOUNDS["sharp"].region(subject).every == found.measured.friction_threshold.value
+    assert BOUNDS["energy"].region(subject).every == found.measured.friction_threshold.value
     for name, why in (("lmi", "lifted rigidly"), ("repaired", "m = 0")):
         with pytest.raises(NotComputed, match=why):
             BOUNDS[name].region(subject)
 
 
-def test_without_friction_the_refusal_of_the_semidefinite_bound_names_the_sharp_one_which_is_attained() -> None:
+def test_without_friction_the_refusal_of_the_semidefinite_bound_names_the_one_in_energy_norms_which_is_attained() -> (
+    None
+):
     """At g = 0, p = 0, and at the mode of rho_N with all nodes closed, every product of (2.4) is 0."""
     lifted = vf.Problem.from_dict(changed(LOOSE["lifted, not slid"], contact={"friction": 0}))
     found = vf.compare(lifted)
-    pair, theta, t = found.run.pair, found.bounds["sharp"].theta, found.run.pair.contact.grid.t
+    pair, theta, t = found.run.pair, found.bounds["energy"].theta, found.run.pair.contact.grid.t
     assert pair.contact.lifts
-    for words in ("lifted rigidly", "prove the sharp bound", "none prove less"):
+    for words in ("lifted rigidly", "prove the bound in energy norms", "none prove less"):
         assert words in found.verdicts["lmi"].reason
     S1, S2, normal = pair.contact.stiffness, pair.neumann.stiffness, pair.contact.grid.normal
     S1_normal = S1[t:, t:] - S1[t:, :t] @ np.linalg.solve(S1[:t, :t], S1[:t, t:])
@@ -351,21 +353,21 @@ def test_without_friction_the_refusal_of_the_semidefinite_bound_names_the_sharp_
     p = np.r_[np.zeros(t), -S1_normal @ d[normal]]
     assert np.abs(p + values[-1] * S2 @ d).max() <= 1e-9 * np.abs(p).max()
     attained = max(1 - theta, abs(1 - theta - theta * values[-1]))
-    assert found.bounds["sharp"].factor.value == pytest.approx(attained, rel=1e-9)
+    assert found.bounds["energy"].factor.value == pytest.approx(attained, rel=1e-9)
 
 
 @pytest.mark.parametrize("name", ["sliding top, smooth", "pressed by traction alone, smooth", "lifted, not slid"])
-def test_no_step_is_longer_than_the_sharp_bound(name: str) -> None:
+def test_no_step_is_longer_than_the_bound_in_energy_norms(name: str) -> None:
     problem_ = vf.Problem.from_dict(changed(LOOSE[name], contact={"friction": "0.01"} if name[0] == "l" else {}))
     pair = vf.build(problem_)
-    sharp = vf.compare(pair).bounds["sharp"]
-    T, random, theta = FixedPointMap(pair), np.random.default_rng(1), sharp.theta
+    energy = vf.compare(pair).bounds["energy"]
+    T, random, theta = FixedPointMap(pair), np.random.default_rng(1), energy.theta
     loads = np.abs(vf.run(pair).last.g).max()
     for _ in range(40):
         one, other = (loads * random.standard_normal(pair.neumann.grid.size) for _ in range(2))
         images = [pair.interface.carry_back(T(g)[1].force) for g in (one, other)]
         step = theta * (images[0] - images[1]) + (1 - theta) * (one - other)
-        assert pair.neumann.dual_norm(step) <= sharp.factor.value * pair.neumann.dual_norm(one - other) * (1 + 1e-9)
+        assert pair.neumann.dual_norm(step) <= energy.factor.value * pair.neumann.dual_norm(one - other) * (1 + 1e-9)
 
 
 # --- roles -----------------------------------------------------------------------------------------------------------

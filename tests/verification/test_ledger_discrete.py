@@ -334,13 +334,13 @@ MUTANTS: list[tuple[str, str, str, Callable[[Any, Reading, float], Any]]] = [
     ("x-friction-energy", "printed", "no kappa_1", lambda d, r, t: r.energy[2] * d.norm**2),
     ("x-ratio", "printed", "no friction", lambda d, r, t: math.sqrt(r.energy[0]) * d.norm),
     (
-        "x-sharp",
+        "x-energy",
         "printed",
         "no friction",
         lambda d, r, t: replace(r, energy=(r.energy[0], 0.0, 0.0)).q_squared(t) * d.norm**2,
     ),
     (
-        "x-sharp",
+        "x-energy",
         "printed",
         "half of rho",
         lambda d, r, t: replace(r, energy=(r.energy[0] / 2, *r.energy[1:])).q_squared(t) * d.norm**2,

@@ -12,7 +12,7 @@ from dense_oracle import DensePair
 from scipy.linalg import block_diag, eigh
 from strategies import AT_NIGHT
 
-from ndtheory import sharp
+from ndtheory import energy_norms
 from verification.bounds.multipliers import NARROW, QuadraticForms, friction_threshold
 from verification.bounds.pattern_search import largest_factor, worst_piece
 from verification.bounds.program import LMIError
@@ -213,7 +213,7 @@ def test_below_the_largest_theta_of_the_edition_its_multipliers_prove_every_thet
     """Times theta, with q = 1; above it they do not."""
     pair, measured, _, _ = case(seed)
     found, forms = QuadraticForms(pair, measured).largest_theta(), Forms.of(pair)
-    interval = sharp.contraction_interval(*(float(v) for v in energy(measured)), 1e-12)
+    interval = energy_norms.contraction_interval(*(float(v) for v in energy(measured)), 1e-12)
     assert found is not None or interval is None
     if found is None:
         return
@@ -231,7 +231,7 @@ def test_the_friction_number_bounds_the_work_of_every_piece_and_is_at_most_that_
     work = lambda piece: (piece.relaxed(1.0) + piece.relaxed(1.0).T) / 2
     _, kappa_1, kappa_2 = (float(v) for v in energy(measured))
     assert worst_piece(pair, work, random=random).value <= c + 1e-9
-    assert c <= sharp.friction_number(kappa_1, kappa_2) + 1e-9
+    assert c <= energy_norms.friction_number(kappa_1, kappa_2) + 1e-9
 
 
 @pytest.mark.parametrize("seed", [2, 11, 23])

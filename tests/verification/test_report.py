@@ -101,7 +101,7 @@ def screen(comparison) -> str:
     """What three commands show of a comparison."""
     with heard() as lines:
         screens.comparison(comparison)
-        thetas(comparison.bounds["sharp"].detail)
+        thetas(comparison.bounds["energy"].detail)
         screens.constants(comparison.measured)
     return "\n".join(lines)
 
@@ -124,7 +124,7 @@ def test_every_table_and_figure_of_the_report_has_a_caption(written):
 def test_the_report_explains_every_verdict_and_words_that_the_glossary_has(written):
     terms, verdicts = set(read(written).terms), set(get_args(RunVerdict))
     glossary = re.findall(r"^(\S.*)\n  \S", (ROOT / "docs" / "glossary.md").read_text("utf-8"), re.MULTILINE)
-    assert verdicts | {"edition", "sharp", "lmi", "decade", "rho"} <= terms
+    assert verdicts | {"edition", "energy", "lmi", "decade", "rho"} <= terms
     assert terms - verdicts <= set(glossary)
 
 

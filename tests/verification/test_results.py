@@ -37,7 +37,7 @@ def results(problem) -> dict[str, Document]:
         "Advice": vf.advise(problem),
         "Plane": Plane(
             title="a plane",
-            regions={"sharp": region},
+            regions={"energy": region},
             points=(point,),
             reason={"lmi": "made up"},
             units=problem.units,

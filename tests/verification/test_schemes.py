@@ -12,7 +12,7 @@ from strategies import log_uniform
 
 import verification as vf
 from fem1d2d import Condensation, gram
-from ndtheory.sharp import predicted_theta
+from ndtheory.energy_norms import predicted_theta
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from problem_list import PROBLEMS
 from strategies import AT_NIGHT
 
 import verification as vf
-from ndtheory import evaluate_sharp
+from ndtheory import evaluate_energy
 from verification.algorithm.relaxation import RULES
 from verification.contact import ContactError, active_set
 from verification.interface import body
@@ -75,10 +75,10 @@ def test_rows_show_what_single_runs_show(wide):
         linear = None if run.linearised is None else pytest.approx(run.linearised.rate, rel=1e-9)
         assert found["linearised_rate"] == linear
         assert found["rho"] == pytest.approx(measured.rho_max.value, rel=1e-12)
-        proved = evaluate_sharp(measured.energy_constants(), found["theta"]).factor
-        assert (found["sharp_factor"] < 1) == (proved is not None)
+        proved = evaluate_energy(measured.energy_constants(), found["theta"]).factor
+        assert (found["energy_factor"] < 1) == (proved is not None)
         if proved is not None:
-            assert found["sharp_factor"] == pytest.approx(proved.value, rel=1e-12)
+            assert found["energy_factor"] == pytest.approx(proved.value, rel=1e-12)
     assert outcomes >= {"converged", "stalled", "limit"}
 
 
@@ -139,7 +139,7 @@ def test_rules_and_laws_vary_too():
         run = vf.run(SMALL.changed(law=each["law"], theta="1/2"), rule=each["rule"])
         assert (each["steps"], each["theta"]) == (run.iterations, float(run.theta))
         assert (each["linearised_rate"] is None) == (each["rule"] != "constant")
-        assert (each["sharp_factor"] is None) == (each["rule"] != "constant" or each["law"] == "local")
+        assert (each["energy_factor"] is None) == (each["rule"] != "constant" or each["law"] == "local")
 
 
 def test_what_is_proved_of_a_row_is_proved_of_its_rule():
@@ -149,10 +149,10 @@ def test_what_is_proved_of_a_row_is_proved_of_its_rule():
     for (rule, friction), each in seen.items():
         run = vf.run(SMALL.changed(friction=friction, theta="2/5"), rule=rule)
         if rule == "constant":
-            q = each["sharp_factor"]
+            q = each["energy_factor"]
             assert each["proved_rate"] == (q if q < 1 else None)
         else:
-            assert each["sharp_factor"] is None
+            assert each["energy_factor"] is None
             assert each["proved_rate"] == (None if run.proved_rate is None else pytest.approx(run.proved_rate.value))
     proved = {key for key, each in seen.items() if each["proved_rate"] is not None}
     assert proved == {("constant", 0.0), ("constant", 0.2), ("momentum", 0.0)}

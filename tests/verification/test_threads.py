@@ -32,7 +32,9 @@ def problem(cells: int) -> vf.Problem:
 def a_plane(shown: vf.Problem) -> Plane:
     region = Region(k=(0.1, 0.2), theta=((0.0, 0.5), (0.0, 0.4)), every=0.3, some=0.4)
     points = (Point(theta=0.4, k=0.1, outcome="converged", iterations=12, coupled_residual=1e-9),)
-    return Plane(title="a plane", regions={"sharp": region}, points=points, reason={}, units=shown.units, problem=shown)
+    return Plane(
+        title="a plane", regions={"energy": region}, points=points, reason={}, units=shown.units, problem=shown
+    )
 
 
 #: Each kind of result, as a function of the problem.

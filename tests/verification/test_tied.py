@@ -12,7 +12,7 @@ from scipy.linalg import eigh
 from strategies import contact_problems, log_uniform
 
 import verification as vf
-from ndtheory.sharp import predicted_factor, predicted_rate, predicted_theta, tied_factor, tied_rate, tied_theta
+from ndtheory.energy_norms import predicted_factor, predicted_rate, predicted_theta, tied_factor, tied_rate, tied_theta
 from verification.interface import assembly
 
 spectra = st.tuples(log_uniform(-6, 6), log_uniform(-6, 6)).map(sorted)

@@ -73,13 +73,13 @@ BARS = bars(
 )
 
 
-@pytest.mark.parametrize("name", ["sharp", "lmi"])
+@pytest.mark.parametrize("name", ["energy", "lmi"])
 def test_a_factor_scaled_by_nine_tenths_is_violated_where_the_bound_is_attained(monkeypatch, name):
     """Without friction two bars in contact multiply the error by |1 - theta - theta rho| = q."""
     problem = vf.Problem.from_dict(BARS)
     whole = compare(problem)
     assert whole.verdicts[name].verdict == "CONSISTENT"
-    assert "attained" in whole.verdicts["sharp"].reason
+    assert "attained" in whole.verdicts["energy"].reason
     kind, less = type(BOUNDS[name]), lambda number: Number.of_float(0.9 * number.value)
     evaluate = kind.evaluate
 
@@ -120,7 +120,7 @@ def test_a_solver_that_gives_up_is_told_from_a_bound_that_is_not_below_1(monkeyp
 
     monkeypatch.setattr("verification.bounds.interior_point.solve", fail)
     slight, strong = compare(square_blocks(4)), compare(square_blocks(4, friction=2))
-    assert slight.bounds["lmi"].factor.value <= slight.bounds["sharp"].factor.value
+    assert slight.bounds["lmi"].factor.value <= slight.bounds["energy"].factor.value
     assert slight.verdicts["lmi"].verdict == "CONSISTENT"
     assert strong.bounds["lmi"].factor is None
     assert strong.verdicts["lmi"].verdict == "NOT_COMPUTED"

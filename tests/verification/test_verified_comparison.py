@@ -8,7 +8,7 @@ import pytest
 from problem_list import bars, changed, small
 
 import verification as vf
-from ndtheory import PRINTED, Constants, EnergyConstants, Number, evaluate, evaluate_sharp
+from ndtheory import PRINTED, Constants, EnergyConstants, Number, evaluate, evaluate_energy
 from verification.algorithm.rates import StepRatio
 from verification.bounds.bound import BoundResult
 from verification.bounds.multipliers import QuadraticForms
@@ -42,14 +42,14 @@ def plain(shared):
 
 def numbers(whole):
     """What is told at level verified."""
-    repaired, sharp = whole.bounds["repaired"].detail, whole.bounds["sharp"]
+    repaired, energy = whole.bounds["repaired"].detail, whole.bounds["energy"]
     found = {name: getattr(repaired, name) for name in ("C_T", "C0", "C2", "C3", "C4", "C5", "C_K")}
     return found | {
-        "q": sharp.factor,
-        "1 - q": sharp.one_minus_factor,
-        "theta_max": sharp.detail.theta_max_proved,
-        "every": sharp.friction.every,
-        "some": sharp.friction.some,
+        "q": energy.factor,
+        "1 - q": energy.one_minus_factor,
+        "theta_max": energy.detail.theta_max_proved,
+        "every": energy.friction.every,
+        "some": energy.friction.some,
     }
 
 
@@ -63,10 +63,10 @@ def test_bounds_are_enclosures_of_those_in_doubles(whole, plain):
 
 
 def test_the_interval_that_is_proved_lies_inside_that_in_doubles(whole):
-    sharp = whole.bounds["sharp"]
-    assert sharp.interval == sharp.detail.interval_proved
-    assert sharp.interval_level == "verified"
-    assert sharp.interval[1] == sharp.detail.theta_max_proved.lo < sharp.detail.interval[1]
+    energy = whole.bounds["energy"]
+    assert energy.interval == energy.detail.interval_proved
+    assert energy.interval_level == "verified"
+    assert energy.interval[1] == energy.detail.theta_max_proved.lo < energy.detail.interval[1]
 
 
 def test_the_semidefinite_factor_is_that_of_a_certificate(whole, plain):
@@ -143,7 +143,7 @@ def test_the_multipliers_of_the_largest_theta_prove_every_smaller_one():
 
 
 def test_the_verdicts_hold_the_run_against_the_proved_ends(whole, plain):
-    for name in ("sharp", "lmi"):
+    for name in ("energy", "lmi"):
         assert "proved bound" in whole.verdicts[name].reason
         assert "proved" not in plain.verdicts[name].reason
         assert whole.verdicts[name].verdict == plain.verdicts[name].verdict == "CONSISTENT"
@@ -159,8 +159,8 @@ def test_the_documents_of_both_differ_in_what_is_proved_alone(whole, plain):
     assert not doubles["lmi"]["certified"]
     assert "divided" not in doubles["lmi"]
     assert "unverified" not in doubles["constants"]
-    assert proved["sharp"]["friction_threshold"]["level"] == "verified"
-    assert doubles["bounds"]["editions"]["sharp"]["interval_proved"] is None
+    assert proved["energy"]["friction_threshold"]["level"] == "verified"
+    assert doubles["bounds"]["editions"]["energy"]["interval_proved"] is None
 
 
 NOT_PROVED = {
@@ -198,9 +198,9 @@ def test_of_matrices_nothing_is_proved_and_the_comparison_says_why():
     pair = vf.build(S1=S_1, S2=S_2, x=np.array([0.0, 1.0]))
     whole = vf.compare(pair, theta="0.4", verified=True)
     assert "made from matrices" in whole.measured.unverified["rho_max"]
-    assert whole.bounds["sharp"].level == "float"
+    assert whole.bounds["energy"].level == "float"
     assert "made from matrices" in whole.bounds["lmi"].detail.not_proved
-    assert "proved" not in whole.verdicts["sharp"].reason
+    assert "proved" not in whole.verdicts["energy"].reason
 
 
 # --- proved ends ------------------------------------------------------------------------------------------------------
@@ -212,7 +212,7 @@ def enclosed(value, width=1e-3):
 
 def test_a_verdict_comes_from_the_proved_end():
     """A factor of 0.5 that is proved to be at most 0.501: 0.5005 does not violate it."""
-    result = BoundResult(name="sharp", proved=True, factor=enclosed(0.5))
+    result = BoundResult(name="energy", proved=True, factor=enclosed(0.5))
     seen = StepRatio(value=0.5005, lo=0.5004, hi=0.5006, steps=3)
     assert judge(0.5, seen, "").verdict == "VIOLATED"
     found = judge_bound(result, seen, "")
@@ -237,18 +237,18 @@ def test_the_printed_proof_holds_where_all_of_the_enclosed_m_are_1_at_least():
 
 def test_an_interval_is_proved_where_it_holds_for_every_constant_enclosed():
     constants = EnergyConstants(rho=enclosed(2.0), kappa_1=enclosed(0.3), kappa_2=enclosed(0.2))
-    found = evaluate_sharp(constants)
-    worst = evaluate_sharp(EnergyConstants(rho="2.001", kappa_1="0.301", kappa_2="0.201"))
+    found = evaluate_energy(constants)
+    worst = evaluate_energy(EnergyConstants(rho="2.001", kappa_1="0.301", kappa_2="0.201"))
     low, high = found.interval_proved
     assert low >= worst.interval[0]
     assert worst.interval[1] * (1 - 1e-12) < high <= worst.interval[1]
     assert worst.interval_proved is None
-    assert evaluate_sharp(EnergyConstants(rho=2.0, kappa_1=0.3, kappa_2=0.2)).interval_proved is None
+    assert evaluate_energy(EnergyConstants(rho=2.0, kappa_1=0.3, kappa_2=0.2)).interval_proved is None
 
 
 def test_no_interval_is_proved_where_some_of_the_constants_enclosed_have_none():
     wide = EnergyConstants(rho=enclosed(1.0), kappa_1=enclosed(0.1), kappa_2=enclosed(1.2, 1.0))
-    found = evaluate_sharp(wide)
+    found = evaluate_energy(wide)
     assert found.interval is not None
     assert found.interval_proved is None
     assert "enclosures" in found.to_dict()["reason"]["interval_proved"]

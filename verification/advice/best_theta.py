@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from ndtheory import SharpBounds
+from ndtheory import EnergyBounds
 from verification.algorithm.linearisation import NotLinear
-from verification.algorithm.theta import sharp_bounds
+from verification.algorithm.theta import energy_bounds
 from verification.bounds.multipliers import QuadraticForms
 from verification.bounds.program import LMIError
 from verification.constants import Measured, measure
@@ -122,7 +122,7 @@ class BestTheta:
         None where no run arrived, or none was made.
     linearised : Least or None
         The theta of least spectral radius of the Jacobian of T_theta at the solution.
-    sharp, semidefinite : Least or None
+    energy, semidefinite : Least or None
         The theta of least proved factor below 1: of the theorem in energy norms, and of the semidefinite bound.
     reason : mapping from attribute to text
         Why one of the four is None.
@@ -132,7 +132,7 @@ class BestTheta:
     predicted: float
     seen: Fewest | None
     linearised: Least | None
-    sharp: Least | None
+    energy: Least | None
     semidefinite: Least | None
     reason: Mapping[str, str] = field(default_factory=dict)
 
@@ -160,7 +160,7 @@ def best_theta(
     >>> from verification.problem.examples import example
     >>> bars = example("two-bars").changed(young=(2, 1))
     >>> found = best_theta(bars)
-    >>> round(found.predicted, 12), round(found.sharp.theta, 12), round(found.sharp.factor, 12)
+    >>> round(found.predicted, 12), round(found.energy.theta, 12), round(found.energy.factor, 12)
     (0.5, 0.5, 0.5)
 
     One bar in contact has one mode, which theta = 1/3 removes in one step; the proof speaks of open bars too.
@@ -170,10 +170,10 @@ def best_theta(
     """
     pair = pair_of(problem)
     measured = measure(pair)
-    sharp = sharp_bounds(measured)
-    if sharp is None:
+    energy = energy_bounds(measured)
+    if energy is None:
         raise ValueError(f"needed bodies that have rho: {measured.why_no_energy}")
-    rho, predicted = float(sharp.rho.value), sharp.theta_predicted
+    rho, predicted = float(energy.rho.value), energy.theta_predicted
     outside = pair.outside[0] if pair.outside else ""
     reason: dict[str, str] = {}
 
@@ -194,7 +194,7 @@ def best_theta(
         predicted=predicted,
         seen=found("seen", "" if runs else "no runs were asked for", lambda: _seen(pair, rho), "no run arrived"),
         linearised=found("linearised", "", lambda: _linearised(pair)),
-        sharp=found("sharp", outside, lambda: _sharp(sharp), "q(theta) is below 1 for no theta"),
+        energy=found("energy", outside, lambda: _energy(energy), "q(theta) is below 1 for no theta"),
         semidefinite=found(
             "semidefinite",
             outside or ("" if semidefinite else "it was not asked for"),
@@ -210,8 +210,8 @@ def _seen(pair: ContactPair, rho: float) -> Fewest | None:
     return Fewest.of(sweep(pair, theta=[each / (1 + each) for each in odds], rule=["constant"]).rows)
 
 
-def _sharp(sharp: SharpBounds) -> Least | None:
-    theta, factor = sharp.theta_proved, sharp.factor_proved
+def _energy(energy: EnergyBounds) -> Least | None:
+    theta, factor = energy.theta_proved, energy.factor_proved
     return None if theta is None or factor is None else Least(theta=theta, factor=factor.value)
 
 

@@ -11,8 +11,8 @@ from typing import Any
 
 from ndtheory.constants import take
 from ndtheory.energy import SMALLEST
+from ndtheory.energy_norms import predicted_rate, predicted_theta
 from ndtheory.number import below
-from ndtheory.sharp import predicted_rate, predicted_theta
 from verification.advice.columns import seen_column
 from verification.advice.ends import (
     DEAR,

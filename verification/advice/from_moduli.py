@@ -10,9 +10,9 @@ from typing import Any, Literal, get_args
 
 from ndtheory import HypothesisError, Number
 from ndtheory.constants import take
+from ndtheory.energy_norms import predicted_rate, predicted_theta
 from ndtheory.moduli import Moduli, Plane, column, end, free_end, half_planes, layer, mirror
 from ndtheory.number import above, below
-from ndtheory.sharp import predicted_rate, predicted_theta
 from verification.advice.readings import LARGEST_TO_PASTE, NextRun, rounded_down
 from verification.advice.role import Role
 from verification.advice.roles import Advice

@@ -8,7 +8,7 @@ from typing import Any
 from ndtheory import Number
 from ndtheory.constants import take
 from ndtheory.energy import LARGEST, SMALLEST
-from ndtheory.sharp import predicted_rate, predicted_theta
+from ndtheory.energy_norms import predicted_rate, predicted_theta
 from verification.advice.next_run import Made, anew, pasted_or_not
 from verification.advice.readings import (
     LARGEST_TO_PASTE,

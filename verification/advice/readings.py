@@ -8,8 +8,8 @@ from decimal import ROUND_DOWN, ROUND_FLOOR, ROUND_UP, Context, Decimal
 from fractions import Fraction
 from typing import Any, Literal
 
+from ndtheory.energy_norms import predicted_theta
 from ndtheory.number import below
-from ndtheory.sharp import predicted_theta
 
 #: The largest theta that is offered to paste.
 LARGEST_TO_PASTE = Fraction(99, 100)

@@ -9,7 +9,7 @@ from fractions import Fraction
 from typing import Any, Literal
 
 from ndtheory import EnergyConstants, Number
-from ndtheory.sharp import tied_factor, tied_rate, tied_theta
+from ndtheory.energy_norms import tied_factor, tied_rate, tied_theta
 from verification.algorithm.theta import Choice
 from verification.interface.pair import SingularRole
 from verification.problem import ProblemError

@@ -8,15 +8,15 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
-from ndtheory import EnergyConstants, Number, evaluate_sharp
-from ndtheory.sharp import predicted_rate, predicted_theta
+from ndtheory import EnergyConstants, Number, evaluate_energy
+from ndtheory.energy_norms import predicted_rate, predicted_theta
 from verification.advice.quote import reason as quoted_reason
 from verification.advice.readings import LARGEST_TO_PASTE, NextRun, RunReading, SeenRun, rounded_down
 from verification.advice.role import Role, best_of, fewer, steps, with_both_ends
 from verification.advice.seen import Interval, SeenLog
 from verification.advice.seen_matrices import SeenMatrices
 from verification.advice.snippets import Coupling, snippet
-from verification.algorithm.theta import automatic, by_prediction, sharp_bounds
+from verification.algorithm.theta import automatic, by_prediction, energy_bounds
 from verification.constants import measure
 from verification.document import Document
 from verification.interface.build import build
@@ -284,10 +284,10 @@ def _exchanged(pair: ContactPair) -> Role:
 
 def _role(pair: ContactPair) -> Role:
     measured = measure(pair)
-    sharp = sharp_bounds(measured)
+    energy = energy_bounds(measured)
     if measured.rho_max is None:
         raise ProblemError(pair.source, "contact", None, f"no advice: {measured.why_no_energy}")
-    if sharp is None:
+    if energy is None:
         return _predicted_role(pair, measured.rho_max, measured.rho_min, measured.why_no_energy)
     outside = pair.outside
     threshold = None if outside else measured.friction_threshold
@@ -295,20 +295,20 @@ def _role(pair: ContactPair) -> Role:
         proved = ("theta_proved", "factor_proved", "theta_max_proved", "friction_threshold")
         reason = dict.fromkeys(proved, f"outside the theorem: {outside[0]}")
     else:
-        reason = {name: why for name, why in sharp.reason.items() if name in Role.__dataclass_fields__}
+        reason = {name: why for name, why in energy.reason.items() if name in Role.__dataclass_fields__}
         if threshold is None:
             reason["friction_threshold"] = measured.why_no_threshold
     return Role(
         neumann_body=pair.neumann_body,
-        rho=sharp.rho,
-        theta_proved=None if outside else sharp.theta_proved,
-        factor_proved=None if outside else sharp.factor_proved,
-        theta_max_proved=None if outside else sharp.theta_max_proved,
-        theta_predicted=sharp.theta_predicted,
-        rate_predicted=sharp.rate_predicted,
+        rho=energy.rho,
+        theta_proved=None if outside else energy.theta_proved,
+        factor_proved=None if outside else energy.factor_proved,
+        theta_max_proved=None if outside else energy.theta_max_proved,
+        theta_predicted=energy.theta_predicted,
+        rate_predicted=energy.rate_predicted,
         friction_threshold=threshold,
         reason=reason,
-        theta_auto=automatic(sharp, outside, pair.settings.tolerance),
+        theta_auto=automatic(energy, outside, pair.settings.tolerance),
         energy=None if outside else measured.energy_constants(),
         rho_min=measured.rho_min,
         rho_tied=measured.rho_max,
@@ -370,7 +370,7 @@ def _roles_without_matrices(bodies: TwoBodies, tied: bool, progress: Progress) -
 
 def plain_role(neumann_body: Any, rho: Fraction) -> Role:
     """What rho alone says, without friction."""
-    bounds = evaluate_sharp(EnergyConstants(rho=rho))
+    bounds = evaluate_energy(EnergyConstants(rho=rho))
     return Role(
         neumann_body=neumann_body,
         rho=bounds.rho,

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from ndtheory import SharpBounds, evaluate_sharp, exact
-from ndtheory.sharp import predicted_factor, predicted_theta
+from ndtheory import EnergyBounds, evaluate_energy, exact
+from ndtheory.energy_norms import predicted_factor, predicted_theta
 from verification.algorithm.relaxation import Rule, Step, rule_of
 from verification.constants import Measured, measure
 from verification.interface.pair import ContactPair
@@ -23,10 +23,10 @@ CLOSEST_TO_ONE = 1 - 1e-6
 TOO_SLOW = 2
 
 
-def sharp_bounds(measured: Measured, theta: Any = None) -> SharpBounds | None:
+def energy_bounds(measured: Measured, theta: Any = None) -> EnergyBounds | None:
     """The theorem in energy norms for measured constants; None where they do not exist."""
     constants = measured.energy_constants()
-    return None if constants is None else evaluate_sharp(constants, theta)
+    return None if constants is None else evaluate_energy(constants, theta)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,13 +91,13 @@ def choose(
     if wanted != "auto" and not relaxation.needs_rho:
         return Choice(theta=wanted, source="given")
     measured = measured or measure(pair)
-    sharp = sharp_bounds(measured)
+    energy = energy_bounds(measured)
     if measured.rho_max is None:
         of_rule = relaxation.needs_rho
         key, value = ("iteration.relaxation", relaxation.name) if of_rule else ("iteration.theta", "auto")
         needed = f"needed {'another rule' if of_rule else 'a number'}: rho does not exist here"
         raise ProblemError(pair.source, key, value, needed)
-    rho = (measured.rho_max if sharp is None else sharp.rho).value
+    rho = (measured.rho_max if energy is None else energy.rho).value
     own = relaxation.own_step(rho) if relaxation.needs_rho else None
     if own is not None:
         why = f"the step of the {relaxation.words} for this rho"
@@ -110,8 +110,8 @@ def choose(
         return Choice(theta=wanted, source="given", rho=rho)
     return (
         by_prediction(rho, measured.why_no_energy)
-        if sharp is None
-        else automatic(sharp, pair.outside, pair.settings.tolerance)
+        if energy is None
+        else automatic(energy, pair.outside, pair.settings.tolerance)
     )
 
 
@@ -132,15 +132,15 @@ def begin(
     return relaxation, choice, relaxation.begin(pair, float(choice.theta), choice.rho)
 
 
-def automatic(sharp: SharpBounds, outside: Sequence[str] = (), tolerance: float = 1e-9) -> Choice:
+def automatic(energy: EnergyBounds, outside: Sequence[str] = (), tolerance: float = 1e-9) -> Choice:
     """The theta that theory chooses: the proved one, unless it is predicted to need more than twice as many steps.
 
-    Both thetas are judged by one formula, :func:`ndtheory.sharp.predicted_factor`.  The proved factor would be no fair
-    judge: with friction it is far from attained.
+    Both thetas are judged by one formula, :func:`ndtheory.energy_norms.predicted_factor`.  The proved factor would be
+    no fair judge: with friction it is far from attained.
 
     Parameters
     ----------
-    sharp : SharpBounds
+    energy : EnergyBounds
     outside : sequence of str
         Why the theorem does not speak of the problem; empty where it does.
     tolerance : float
@@ -149,22 +149,22 @@ def automatic(sharp: SharpBounds, outside: Sequence[str] = (), tolerance: float 
     Examples
     --------
     >>> from ndtheory import EnergyConstants
-    >>> chosen = automatic(evaluate_sharp(EnergyConstants(rho=2)))
+    >>> chosen = automatic(evaluate_energy(EnergyConstants(rho=2)))
     >>> chosen.source, chosen.theta
     ('proved', Fraction(1, 2))
     """
-    rho = sharp.rho.value
-    predicted = below_one(sharp.theta_predicted)
-    nothing = outside[0] if outside else "q >= 1 for every theta" if sharp.theta_proved is None else None
-    if nothing is not None or sharp.theta_proved is None:
+    rho = energy.rho.value
+    predicted = below_one(energy.theta_predicted)
+    nothing = outside[0] if outside else "q >= 1 for every theta" if energy.theta_proved is None else None
+    if nothing is not None or energy.theta_proved is None:
         return Choice(theta=predicted, source="predicted", rho=rho, why=f"no theta is proved: {nothing}")
-    proved = below_one(sharp.theta_proved)
+    proved = below_one(energy.theta_proved)
     of_proved, of_predicted = (predicted_steps(theta, rho, tolerance) for theta in (proved, predicted))
     if of_proved > TOO_SLOW * of_predicted:
         why = f"{of_predicted} steps predicted, against {of_proved} at the proved theta {float(proved):.4g}"
         return Choice(theta=predicted, source="predicted", rho=rho, why=why)
     why = f"{of_proved} steps predicted, at most twice the {of_predicted} at the predicted theta {float(predicted):.4g}"
-    if sharp.friction_multiple is None:
+    if energy.friction_multiple is None:
         why = "without friction the predicted one is proved"
     return Choice(theta=proved, source="proved", rho=rho, why=why)
 

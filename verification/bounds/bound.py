@@ -124,7 +124,7 @@ class BoundResult:
         Why there is no factor.
     not_computed : str
         Why nothing was worked out; empty where it was.
-    detail : Bounds, SharpBounds, Semidefinite or None
+    detail : Bounds, EnergyBounds, Semidefinite or None
         All that this bound knows, for its own document.
     """
 

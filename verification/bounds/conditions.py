@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag, cho_factor, cho_solve, solve_triangular
 
 from fem1d2d.mesh import Floats
-from ndtheory.sharp import turning_theta, worst_ratio
+from ndtheory.energy_norms import turning_theta, worst_ratio
 from verification.bounds.bound import LARGEST
 from verification.bounds.program import Optimum, Program, Weights
 from verification.bounds.trace_forms import TraceForms
@@ -27,11 +27,11 @@ LARGE = 1e2
 #: Why no multipliers are sought where a rigid motion lifts the contact body off: without friction, and with it.
 LIFTS_SMOOTHLY = (
     "the contact body can be lifted rigidly, which only multipliers of (2.4) that are equal at all nodes allow; without"
-    " friction these prove the sharp bound, and none prove less"
+    " friction these prove the bound in energy norms, and none prove less"
 )
 LIFTS = (
     "the contact body can be lifted rigidly, which only multipliers of (2.4) that are equal at all nodes allow, as"
-    " those of the sharp bound are; others are not sought"
+    " those of the bound in energy norms are; others are not sought"
 )
 
 #: Lengths and squares smaller than this are 0.
@@ -119,7 +119,7 @@ class Conditions:
         if pair.contact.lifts:
             raise ValueError(LIFTS if k else LIFTS_SMOOTHLY)
         self._measured = measured
-        self.sharp = float(constants.at_work), float(constants.kappa_1), float(constants.kappa_2)
+        self.energy_bounds = float(constants.at_work), float(constants.kappa_1), float(constants.kappa_2)
         contact, neumann, interface = pair.contact.grid, pair.neumann.grid, pair.interface
         carries = slice(0, contact.size) if k else contact.normal  # without friction p_T = 0
         # g = L_2 y and p = B z with L_2 L_2' = S_2 and B' S_1^-1 B = 1: |y| = |||g|||, |z| = |d_1|
@@ -258,9 +258,9 @@ class Conditions:
 
         ``2 theta (1 - theta)`` where the worst ratio lies inside, and more where it is r, so that r is stationary.
         """
-        rho, kappa_1, _ = self.sharp
-        X, weight = worst_ratio(theta, *self.sharp), 2 * theta * (1 - theta)
-        if theta >= turning_theta(*self.sharp):
+        rho, kappa_1, _ = self.energy_bounds
+        X, weight = worst_ratio(theta, *self.energy_bounds), 2 * theta * (1 - theta)
+        if theta >= turning_theta(*self.energy_bounds):
             slope = 2 * X - kappa_1
             weight += max(2 * theta**2 * rho * X - weight * slope, 0.0) / (slope - math.sqrt(rho))
         return self.uniform(weight, X)
@@ -268,7 +268,7 @@ class Conditions:
     @property
     def towards_zero(self) -> Weights:
         """Multipliers that prove the factor for theta towards 0, over theta."""
-        return self.uniform(1.0, self.sharp[1] / 2)
+        return self.uniform(1.0, self.energy_bounds[1] / 2)
 
     def uniform(self, weight: float, X: float) -> Weights:
         """``lambda = tau = weight``, and a, b with ``4 a b = tau^2`` that are best at the ratio ``X = |d_1|/|d_2|``."""

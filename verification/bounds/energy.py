@@ -4,23 +4,23 @@ from __future__ import annotations
 
 from typing import Any
 
-from ndtheory import evaluate_sharp
+from ndtheory import evaluate_energy
 from ndtheory.number import weakest
 from verification.bounds.bound import Bound, BoundResult, Subject, Thresholds, why_not
 from verification.progress import Progress, silent
 
 
-class Sharp(Bound):
-    """The same proof as Section 5, with no constant larger than it must be; see ``docs/sharp.md``."""
+class Energy(Bound):
+    """The same proof as Section 5, with no constant larger than it must be; see ``docs/energy.md``."""
 
-    name, words = "sharp", "the theorem in energy norms"
+    name, words = "energy", "the theorem in energy norms"
     colour, dashes, fill, hatch = "#00724F", (0, (7, 2)), "#8FD3B6", ".."
     attained = True  # without friction
 
     def evaluate(self, subject: Subject, theta: Any = None, *, progress: Progress = silent) -> BoundResult:
         if subject.energy is None:
             return self.absent(subject.why_energy)
-        found = evaluate_sharp(subject.energy, theta)
+        found = evaluate_energy(subject.energy, theta)
         friction = Thresholds(every=found.friction_multiple, some=found.friction_limit_multiple, on="multiple")
         why, without = "", False
         if subject.measured is not None:  # then they are known on k

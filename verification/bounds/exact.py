@@ -4,7 +4,7 @@ T is piecewise affine, so that its Lipschitz constant is the largest ``|J|`` of 
 a sign eps_j, with which step II gives ``p_T v_T = eps_j w k zeta v_T`` in place of the inequality (2.6): both sides
 are 0 where the node sticks.  So the set of pieces that the bound is largest for is divided in two, by the sign of a
 node or by what it does, until what is proved for every set is close to the largest ``|J|`` found.  Proofs in
-``docs/sharp.md``.
+``docs/energy.md``.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ Lipschitz constant of T_theta once the quadratic form::
 in (g, p) is positive semidefinite for some multipliers lambda, tau, a, b >= 0.  The solver only proposes multipliers:
 the bound is a q for which the form *with them* is positive definite, checked in doubles with a bound on their
 rounding.  One set of multipliers is known in closed form, and proves the factor of the theorem in energy norms: up to
-that rounding this bound is never weaker.  Proofs in ``docs/sharp.md``.
+that rounding this bound is never weaker.  Proofs in ``docs/energy.md``.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve, eigvalsh
 
 from fem1d2d.mesh import Floats
-from ndtheory.sharp import contraction_interval
+from ndtheory.energy_norms import contraction_interval
 from verification.bounds import interior_point
 from verification.bounds.conditions import Conditions, Pieces, inside, mixed, times
 from verification.bounds.program import USUAL, LMIError, Optimum, Program, Stop, Weights
@@ -204,9 +204,9 @@ class QuadraticForms(Conditions):
                 proposals.append((found.s, self.by_node(found.y, self.everywhere)))
         except LMIError:  # the known multipliers may still prove something
             pass
-        sharp = contraction_interval(*self.sharp, 1e-12)
-        if sharp is not None:
-            highest = sharp[1] * (1 - 1e-9)
+        energy = contraction_interval(*self.energy_bounds, 1e-12)
+        if energy is not None:
+            highest = energy[1] * (1 - 1e-9)
             proposals += [(math.nan, inside(times((1 + more) / highest, self.known(highest)))) for more in MORE]
         candidates = []
         for proposed, multipliers in proposals:

@@ -203,7 +203,7 @@ class Neighbours:
         """Whose largest eigenvalue is above a level, or may be, shape (c,); borderline cases fall either way.
 
         On a neighbour the form is ``form + W K W'``, and it has as many eigenvalues above the level as
-        ``K^-1 - W' (level - form)^-1 W`` has negative ones beyond those of K; proof in ``docs/sharp.md``.  Modes whose
+        ``K^-1 - W' (level - form)^-1 W`` has negative ones beyond those of K; proof in ``docs/energy.md``.  Modes whose
         eigenvalue is close to the level are not eliminated: to divide by what is left would cost all digits.
 
         Parameters

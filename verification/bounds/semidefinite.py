@@ -213,8 +213,8 @@ def work_out(
     progress("semidefinite bound: largest theta", None)
     forms = QuadraticForms(pair, measured)
     largest = forms.largest_theta()
-    sharp = measured.friction_threshold
-    allowed = None if sharp is None else friction_threshold(pair, measured, sharp.value, progress=progress)
+    energy = measured.friction_threshold
+    allowed = None if energy is None else friction_threshold(pair, measured, energy.value, progress=progress)
     progress("semidefinite bound: factor of one step", None)
     asked = {"gap": CLOSE, "programs": None} if exact else {"gap": GAP, "programs": budget(pair.contact.grid.n)}
     found = enclose(pair, forms, theta, **asked, progress=progress)
@@ -241,7 +241,7 @@ def _rest(factor: Number) -> Number:
 
 
 class SemidefiniteBound(Bound):
-    """What multipliers of the conditions of step II prove, sign by sign of slip where needed; see ``docs/sharp.md``."""
+    """What multipliers of the conditions of step II prove, sign by sign of slip if need be; see ``docs/energy.md``."""
 
     name, words = "lmi", "the semidefinite bound"
     colour, dashes, fill = "#8A5A00", "-.", "#FFF3B0"

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, ClassVar
 
-from ndtheory import Number, SharpBounds
+from ndtheory import EnergyBounds, Number
 from ndtheory.continuum import (
     ContinuumConstants,
     Rectangle,
@@ -49,7 +49,7 @@ class ContinuumCertificate(Document):
     ----------
     problem : Problem
     constants : ContinuumConstants
-    sharp : SharpBounds or None
+    energy : EnergyBounds or None
         The theorem for the upper bounds of the constants; None where rho is not bounded.
     mesh : FileMesh
         rho on the mesh of the file, in doubles, which may be larger than the continuum's.
@@ -59,7 +59,7 @@ class ContinuumCertificate(Document):
 
     problem: Problem
     constants: ContinuumConstants
-    sharp: SharpBounds | None
+    energy: EnergyBounds | None
     mesh: FileMesh
 
     @property
@@ -74,9 +74,11 @@ class ContinuumCertificate(Document):
     @property
     def contracts(self) -> bool:
         """Whether contraction is proved at the theta of the file; with ``auto`` at some theta."""
-        if self.sharp is None:
+        if self.energy is None:
             return False
-        return self.sharp.verdict == "contraction" if self.sharp.theta is not None else self.sharp.interval is not None
+        return (
+            self.energy.verdict == "contraction" if self.energy.theta is not None else self.energy.interval is not None
+        )
 
     @property
     def theta_judged(self) -> float | None:
@@ -84,7 +86,7 @@ class ContinuumCertificate(Document):
         theta = self.problem.iteration.theta
         if theta != "auto":
             return float(theta)
-        return None if self.sharp is None else self.sharp.theta_proved
+        return None if self.energy is None else self.energy.theta_proved
 
     @property
     def solvable(self) -> bool:
@@ -95,9 +97,9 @@ class ContinuumCertificate(Document):
 
     @property
     def _interval(self) -> list[float] | None:
-        if self.sharp is None or self.sharp.interval is None or self.sharp.theta_max_proved is None:
+        if self.energy is None or self.energy.interval is None or self.energy.theta_max_proved is None:
             return None
-        lo, hi = self.sharp.interval[0], self.sharp.theta_max_proved.lo
+        lo, hi = self.energy.interval[0], self.energy.theta_max_proved.lo
         return None if hi is None else [math.nextafter(lo, 1.0) if lo else lo, hi]
 
     @property
@@ -106,16 +108,16 @@ class ContinuumCertificate(Document):
         return f"{self.problem.title}, continuum: every small theta contracts for k < {said.lo:.4g}"
 
     def content(self) -> dict[str, Any]:
-        c, k, sharp = self.constants, self.friction, self.sharp
+        c, k, energy = self.constants, self.friction, self.energy
         kappas = c.kappa(k)
-        limit = None if sharp is None or sharp.friction_limit_multiple is None else sharp.friction_limit_multiple.lo
+        limit = None if energy is None or energy.friction_limit_multiple is None else energy.friction_limit_multiple.lo
         reason = dict(c.reason)
-        if sharp is None:
-            reason |= dict.fromkeys(SHARP, c.reason.get("rho", ""))
+        if energy is None:
+            reason |= dict.fromkeys(OF_ENERGY, c.reason.get("rho", ""))
         else:
-            none = {name: why for name, why in sharp.reason.items() if name in SHARP}
+            none = {name: why for name, why in energy.reason.items() if name in OF_ENERGY}
             reason |= none | ({"friction_limit": "no friction"} if limit is None else {})
-        proved = {} if sharp is None else {name: getattr(sharp, name) for name in SHARP if hasattr(sharp, name)}
+        proved = {} if energy is None else {name: getattr(energy, name) for name in OF_ENERGY if hasattr(energy, name)}
 
         def one(value: Fraction | None) -> dict[str, Any] | None:
             return None if value is None else upper(value).to_dict()
@@ -162,7 +164,7 @@ class ContinuumCertificate(Document):
 
 
 #: What of the theorem needs a bound of rho.
-SHARP = (
+OF_ENERGY = (
     "interval", "theta_max_proved", "theta_proved", "factor_proved", "factor", "theta", "friction_limit"
 )  # fmt: skip
 
@@ -243,6 +245,6 @@ def certify_continuum(problem: Problem, progress: Progress = silent) -> Continuu
     constants = continuum_constants(model)
     theta = problem.iteration.theta
     friction = problem.contact.friction
-    sharp = statement(constants, friction=friction, theta=None if theta == "auto" else theta)
+    energy = statement(constants, friction=friction, theta=None if theta == "auto" else theta)
     mesh = file_mesh(problem, progress)
-    return ContinuumCertificate(problem=problem, constants=constants, sharp=sharp, mesh=mesh)
+    return ContinuumCertificate(problem=problem, constants=constants, energy=energy, mesh=mesh)

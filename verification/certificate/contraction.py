@@ -26,7 +26,7 @@ from verification.interface.pair import UNITS, ContactPair
 from verification.problem import Problem, ProblemError
 from verification.progress import Progress, silent
 
-Edition = Literal["lmi", "sharp", "repaired"]
+Edition = Literal["lmi", "energy", "repaired"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -79,7 +79,7 @@ class Certificate(Document):
 
     Attributes
     ----------
-    edition : {'lmi', 'sharp', 'repaired'}
+    edition : {'lmi', 'energy', 'repaired'}
         Which bound proposed the factor: the semidefinite one, that in energy norms, or that of Section 5 repaired.
     discrete : dict
         Bodies, transfer, weights, kernel and friction in rationals, as texts.
@@ -140,7 +140,7 @@ def certify(
         Two plane bodies.
     theta : number or 'auto', optional
         The problem's by default.
-    edition : {'lmi', 'sharp', 'repaired'}
+    edition : {'lmi', 'energy', 'repaired'}
         Which bound proposes factor and multipliers.
     progress : callable
 
@@ -204,7 +204,7 @@ def check_again(document: Any, problem: Problem | None = None) -> Checked:
     Examples
     --------
     >>> from verification.problem.examples import example
-    >>> document = certify(example("section6-60"), edition="sharp").to_dict()
+    >>> document = certify(example("section6-60"), edition="energy").to_dict()
     >>> document["claim"]["factor"] = "1/2"
     >>> check_again(document).accepted
     False

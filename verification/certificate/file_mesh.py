@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ndtheory import EnergyConstants, Number, evaluate_sharp
+from ndtheory import EnergyConstants, Number, evaluate_energy
 from verification.interface.assembly import build
 from verification.pencils import of_energy
 from verification.problem import Problem, ProblemError
@@ -55,7 +55,7 @@ class FileMesh:
             return None
         if theta >= self.theta_limit:
             return False
-        return True if evaluate_sharp(self.energy, theta).verdict == "contraction" else None
+        return True if evaluate_energy(self.energy, theta).verdict == "contraction" else None
 
     def to_dict(self, theta: float | None) -> dict[str, Any]:
         """The object ``mesh`` of the document."""

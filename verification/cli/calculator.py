@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import click
 
-from ndtheory import Bounds, Constants, EnergyConstants, HypothesisError, SharpBounds, relaxation_factor
+from ndtheory import Bounds, Constants, EnergyBounds, EnergyConstants, HypothesisError, relaxation_factor
 from ndtheory.constants import take
 from ndtheory.number import Level
 from verification.bounds.bound import BoundResult, Subject, bounded
@@ -56,9 +56,9 @@ class BoundsDocument(Document):
     show_default=True,
     help="Editions of Section 5.",
 )
-@click.option("--rho", metavar="NUMBER", help="Sharp bound: stiffness ratio of the bodies on Gamma_c.")
-@click.option("--kappa1", "kappa_1", metavar="NUMBER", help="Sharp bound: k C_s C_t1; 0 without friction.")
-@click.option("--kappa2", "kappa_2", metavar="NUMBER", help="Sharp bound: k C_s C_t2; 0 without friction.")
+@click.option("--rho", metavar="NUMBER", help="Bound in energy norms: stiffness ratio of the bodies on Gamma_c.")
+@click.option("--kappa1", "kappa_1", metavar="NUMBER", help="Bound in energy norms: k C_s C_t1; 0 without friction.")
+@click.option("--kappa2", "kappa_2", metavar="NUMBER", help="Bound in energy norms: k C_s C_t2; 0 without friction.")
 @click.option("--check", is_flag=True, help="Exit 1 unless contraction at theta is proved.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout.")
 def bounds(edition: str, theta: str | None, check: bool, as_json: bool, **given: str | None) -> int:
@@ -74,10 +74,10 @@ def bounds(edition: str, theta: str | None, check: bool, as_json: bool, **given:
       ndtheory bounds --rho 0.475 --kappa1 0.986 --kappa2 0.427 --theta 0.7
     """
     of_section_5 = {key: given[key] for key in CONSTANTS}
-    energy = {key: given[key] for key in ENERGY}
+    of_norms = {key: given[key] for key in ENERGY}
     if check and theta is None:
         raise click.UsageError("--check needs --theta", click.get_current_context())
-    alone = energy["rho"] is not None and not any(
+    alone = of_norms["rho"] is not None and not any(
         of_section_5[key] is not None for key in ("m", "M", "C_R", "C_K", "C_s", "C_tr")
     )
     constants = None if alone else _constants(of_section_5)
@@ -86,8 +86,8 @@ def bounds(edition: str, theta: str | None, check: bool, as_json: bool, **given:
         if constants is None
         else constants.C_K
     )
-    sharp = _energy(energy, friction > 0)
-    subject = Subject(constants=constants, energy=sharp)
+    energy = _energy(of_norms, friction > 0)
+    subject = Subject(constants=constants, energy=energy)
     results = {}
     for name, bound in BOUNDS.items():
         if not bound.calculated:
@@ -95,13 +95,13 @@ def bounds(edition: str, theta: str | None, check: bool, as_json: bool, **given:
         of_paper = isinstance(bound, Section5)
         if of_paper and (alone or edition not in (name, "both")):
             results[name] = bound.absent("needs --m, --M, --CR and --CK" if alone else "not asked for")
-        elif not of_paper and sharp is None:
+        elif not of_paper and energy is None:
             results[name] = bound.absent("needs --rho, and --kappa1, --kappa2 with friction")
         else:
             results[name] = bound.evaluate(subject, theta)
     if as_json:
         inputs: dict[str, Any] = {key: None if constants is None else getattr(constants, key) for key in CONSTANTS}
-        inputs |= {key: None if sharp is None else getattr(sharp, key) for key in ENERGY}
+        inputs |= {key: None if energy is None else getattr(energy, key) for key in ENERGY}
         inputs["theta"] = None if theta is None else relaxation_factor(theta)
         absent = dict.fromkeys((key for key, value in inputs.items() if value is None), "not given")
         inputs = {key: None if value is None else float(value) for key, value in inputs.items()} | {"reason": absent}
@@ -121,12 +121,12 @@ def _constants(given: Mapping[str, str | None]) -> Constants:
 
 
 def _energy(given: Mapping[str, str | None], rubs: bool) -> EnergyConstants | None:
-    """The constants of the sharp bound; None where they were not given."""
+    """The constants of the bound in energy norms; None where they were not given."""
     missing = [ENERGY[key] for key in ENERGY if given[key] is None]
     if len(missing) == len(ENERGY):
         return None
     if given["rho"] is None or len(missing) == 1 or (rubs and missing):
-        needed = "the sharp bound needs --rho, and with friction --kappa1 and --kappa2"
+        needed = "the bound in energy norms needs --rho, and with friction --kappa1 and --kappa2"
         raise click.UsageError(f"{', '.join(missing)} missing: {needed}", click.get_current_context())
     try:
         return EnergyConstants(**{key: value for key, value in given.items() if value is not None})
@@ -191,9 +191,9 @@ def _screen(constants: Constants | None, results: Mapping[str, BoundResult]) -> 
         values = ", ".join(f"{key} = {figures(float(getattr(constants, key)))}" for key in ("m", "M", "C_R", "C_K"))
         say(values + ("" if constants.k is None else f" (k = {figures(float(constants.k))})"))
     details = {name: result.detail for name, result in results.items()}
-    sharp = details.get("sharp")
-    if isinstance(sharp, SharpBounds):
-        say(", ".join(f"{key} = {figures(getattr(sharp, key))}" for key in ENERGY))
+    energy = details.get("energy")
+    if isinstance(energy, EnergyBounds):
+        say(", ".join(f"{key} = {figures(getattr(energy, key))}" for key in ENERGY))
     heading("DOES ONE STEP CONTRACT?")
     bounds_table(list(results.values()), "the unit of --m")
     section_5 = {name: found for name, found in details.items() if isinstance(found, Bounds)}
@@ -206,23 +206,23 @@ def _screen(constants: Constants | None, results: Mapping[str, BoundResult]) -> 
             unit = f"on {some.threshold_on}" if name in ("C2", "C3", "C4", "C5") else "1"
             rows.append([name, *(figures(getattr(b, name), 6) for b in section_5.values()), unit])
         table(rows, right=range(1, len(section_5) + 1))
-    if isinstance(sharp, SharpBounds):
-        thetas(sharp)
+    if isinstance(energy, EnergyBounds):
+        thetas(energy)
     say()
     if not all(b.proved for b in section_5.values()):
         note(on_the_printed_proof())
     say("Next: ndtheory example section6 > my.toml; ndtheory constants my.toml")
 
 
-def thetas(sharp: SharpBounds) -> None:
+def thetas(energy: EnergyBounds) -> None:
     """Show the theta with the least proved factor, and the predicted one."""
     heading("WHICH THETA?")
     rows = [["", "theta", "factor", ""]]
-    if sharp.theta_proved is None:
+    if energy.theta_proved is None:
         rows.append(["proved", "-", "-", "q >= 1 for every theta: no conclusion"])
     else:
-        rows.append(["proved", figures(sharp.theta_proved), figures(sharp.factor_proved), "least proved factor"])
-    frictionless = sharp.friction_multiple is None
+        rows.append(["proved", figures(energy.theta_proved), figures(energy.factor_proved), "least proved factor"])
+    frictionless = energy.friction_multiple is None
     note = "proved too: there is no friction" if frictionless else "2/(2 + rho), not a bound"
-    rows.append(["predicted", figures(sharp.theta_predicted), figures(sharp.rate_predicted), note])
+    rows.append(["predicted", figures(energy.theta_predicted), figures(energy.rate_predicted), note])
     table(rows)

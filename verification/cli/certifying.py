@@ -29,7 +29,7 @@ MOST_BYTES = 100_000_000
 @SWAP
 @click.option(
     "--edition",
-    type=click.Choice(["lmi", "sharp", "repaired"]),
+    type=click.Choice(["lmi", "energy", "repaired"]),
     help="Which bound proposes the factor: semidefinite (by default), energy norms, Section 5 repaired.",
 )
 @click.option(

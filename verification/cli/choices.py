@@ -203,7 +203,7 @@ def _picture(context: click.Context, parameter: click.Parameter, value: Path) ->
 def region(file: Path, keys: dict[str, str], target: Path, store: Path | None, as_json: bool) -> None:
     """Draw the plane of theta and k: where one step is proved to contract, and what runs do there.
 
-    Both axes are logarithmic; theta and k have no unit.  The regions are those of the printed, the repaired, the sharp
+    Both axes are logarithmic; theta and k have no unit.  The regions are those of the printed, the repaired, the energy
     and the semidefinite bound for the bodies of FILE; the points are runs, coloured by outcome.
 
     \b

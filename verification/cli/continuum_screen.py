@@ -80,13 +80,13 @@ def show(found: ContinuumCertificate, typed: Typed | None = None) -> None:
     note(f"Every small theta contracts for k < {threshold}: one fixed point, and (P1) has exactly one solution.", "  ")
     if document["friction_limit"] is not None:
         note(f"Some theta contracts for k < {_outward(document['friction_limit']['lo'], -1)}.", "  ")
-    if found.sharp is None:
+    if found.energy is None:
         note(f"For no single theta is anything proved. {document['reason']['rho']}.", "  ")
     elif document["interval"] is None:
         note(f"At k = {k:g} no theta is proved to contract: no conclusion.", "  ")
     else:
         lo, hi = document["interval"][0], "1"
-        if found.sharp.interval != (0.0, 1.0):
+        if found.energy.interval != (0.0, 1.0):
             hi = _outward(document["theta_max_proved"]["lo"], -1)
         best = f"{document['theta_proved']:.3f}, factor {_at_most(document['factor_proved'])}"
         note(f"At k = {k:g}: {lo:.4g} < theta < {hi}; the best proved theta is {best}.", "  ")

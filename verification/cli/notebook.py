@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from ndtheory import SharpBounds
+from ndtheory import EnergyBounds
 from verification.advice.roles import Advice
 from verification.algorithm.runs import Run
 from verification.bounds.region import Plane
@@ -50,9 +50,9 @@ def report(result: Comparison) -> list[Part]:
     """The parts of the screen of ``compare``, and at its end those of two other commands: theta, and all constants."""
     with parted() as parts:
         screens.comparison(result)
-        sharp = result.bounds["sharp"].detail
-        if isinstance(sharp, SharpBounds):
-            thetas(sharp)
+        energy = result.bounds["energy"].detail
+        if isinstance(energy, EnergyBounds):
+            thetas(energy)
     with parted() as constants:
         screens.constants(result.measured)
     start = next(i for i, part in enumerate(constants) if part.kind == "heading")  # what is computed was said above

@@ -20,7 +20,7 @@ OF_MODULI = (("0.35", ":"), ("0.35", (0, (6, 2, 1, 2))))
 
 #: Each bound with friction: the attribute of BestTheta, its words, and how it is drawn.
 PROVED = (
-    ("sharp", "proved with friction: energy norms", BODY1, "s-"),
+    ("energy", "proved with friction: energy norms", BODY1, "s-"),
     ("semidefinite", "proved with friction: semidefinite", BODY2, "D-"),
 )
 
@@ -82,7 +82,7 @@ def _draw(ax: Axes, panel: Panel) -> None:
     for (label, thetas), (colour, style) in zip(panel.moduli.items(), OF_MODULI, strict=False):
         ax.plot(*_points(thetas), linestyle=style, color=colour, linewidth=1.2, label=plain(label))
     free, rubbing = panel.without, panel.with_friction
-    exact = {ratio: found.sharp.theta for ratio, found in free.items() if found.sharp}
+    exact = {ratio: found.energy.theta for ratio, found in free.items() if found.energy}
     ax.plot(*_points(exact), "-", color="#56B4E9", linewidth=4, zorder=1.5, label="proved without friction")
     for name, label, colour, style in PROVED:
         proved = {ratio: getattr(found, name) for ratio, found in rubbing.items()}

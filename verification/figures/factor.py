@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
-from ndtheory import EnergyConstants, evaluate_sharp
-from ndtheory.sharp import predicted_factor
+from ndtheory import EnergyConstants, evaluate_energy
+from ndtheory.energy_norms import predicted_factor
 from verification.figures.style import BODY1, BODY2, THETA, legend_beside, new_figure, styled
 
 #: How many thetas a curve has.
@@ -30,11 +30,11 @@ def draw_factor(roles: Mapping[str, EnergyConstants]) -> Figure:
             name, rho = f"{label}: " if label else "", float(energy.at_work)
             predicted = [predicted_factor(theta, rho) for theta in thetas]
             ax.plot(thetas, predicted, "--", color=colour, label=f"{name}predicted, rho = {rho:.3g}")
-            found = [evaluate_sharp(energy, float(theta)).factor for theta in thetas]
+            found = [evaluate_energy(energy, float(theta)).factor for theta in thetas]
             proved = [(theta, q.value) for theta, q in zip(thetas, found, strict=True) if q is not None]
             if proved:
                 ax.plot(*zip(*proved, strict=True), "-", color=colour, label=f"{name}proved")
-            best = evaluate_sharp(energy)
+            best = evaluate_energy(energy)
             if best.theta_proved is not None and best.factor_proved is not None:
                 ax.plot([best.theta_proved], [best.factor_proved.value], "o", color=colour, markersize=5)
         ax.axhline(1.0, color="0.4", linewidth=0.8, linestyle=":")

@@ -15,7 +15,7 @@ from scipy.linalg import eigvalsh
 
 from fem1d2d import mortar, solver
 from fem1d2d.mesh import Floats
-from ndtheory import EDITIONS, evaluate, evaluate_sharp
+from ndtheory import EDITIONS, evaluate, evaluate_energy
 from verification.algorithm.fixed_point import FixedPointMap
 from verification.algorithm.iterate import Iterate
 from verification.algorithm.theta import CLOSEST_TO_ONE
@@ -226,7 +226,7 @@ def inside(level: Level) -> list[Convergence]:
     return result
 
 
-def sharp(level: Level) -> list[Convergence]:
+def energy(level: Level) -> list[Convergence]:
     """Runs with half the friction that the theorem in energy norms allows, at its best theta."""
     result = []
     for name, problem in ((case.name, case.problem) for case in cases(level)):
@@ -238,7 +238,7 @@ def sharp(level: Level) -> list[Convergence]:
             measured = measured.with_friction(float(k))
         constants = measured.energy_constants()
         assert constants is not None
-        bounds = evaluate_sharp(constants)
+        bounds = evaluate_energy(constants)
         if bounds.theta_proved is not None and bounds.factor_proved is not None:
             theta = min(bounds.theta_proved, CLOSEST_TO_ONE)
             case = Case(name=name, problem=problem.with_theta(theta))
@@ -251,7 +251,7 @@ def forces_converge(setting: Setting) -> list[Evidence]:
         _falling(
             "printed", "inside the intervals of Proposition 5.6, printed and repaired, at theta = C_0", setting.inside
         ),
-        _falling("repaired", "inside the interval of the theorem in energy norms", setting.sharp),
+        _falling("repaired", "inside the interval of the theorem in energy norms", setting.energy),
     ]
 
 
@@ -296,7 +296,7 @@ def fields_converge(setting: Setting) -> list[Evidence]:
 
     return [
         arrive("printed", "inside the intervals of Proposition 5.6", setting.inside),
-        arrive("repaired", "inside the interval of the theorem in energy norms", setting.sharp),
+        arrive("repaired", "inside the interval of the theorem in energy norms", setting.energy),
     ]
 
 
@@ -317,9 +317,9 @@ class Setting:
         return inside(self.level)
 
     @cached_property
-    def sharp(self) -> list[Convergence]:
+    def energy(self) -> list[Convergence]:
         """Runs inside the theorem in energy norms."""
-        return sharp(self.level)
+        return energy(self.level)
 
     @property
     def count(self) -> int:

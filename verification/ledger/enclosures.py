@@ -16,7 +16,7 @@ from typing import Any, Literal
 
 from fem1d2d import plane_strain
 from ndtheory import bounds as formulas
-from ndtheory import sharp
+from ndtheory import energy_norms
 from ndtheory.intervals import Interval
 from ndtheory.number import SLACK, decimal, working_precision
 from verification.ledger.cases import NAMED, three_digits
@@ -172,7 +172,7 @@ class Constants:
         return Interval(min(h_1.lo, h_2.lo), min(h_1.hi, h_2.hi))
 
     def _energy(self, formula: Callable[..., Any]) -> Interval:
-        """A formula of rho, kappa_1 and kappa_2 that grows with each (:mod:`ndtheory.sharp`)."""
+        """A formula of rho, kappa_1 and kappa_2 that grows with each (:mod:`ndtheory.energy_norms`)."""
         constants = [self.bodies.number(name) for name in ("rho_max", "kappa_1", "kappa_2")]
         with working_precision():
             low, high = formula(*(c.lo for c in constants)), formula(*(c.hi for c in constants))
@@ -181,11 +181,11 @@ class Constants:
     @property
     def ratio(self) -> Interval:
         """r, the largest ``|w^1 - w~^1|/|w^2 - w~^2|`` in energy norms."""
-        return self._energy(sharp.largest_ratio)
+        return self._energy(energy_norms.largest_ratio)
 
     def q_squared(self, theta: Fraction) -> Interval:
         """``q(theta)^2`` of the theorem in energy norms."""
-        return self._energy(lambda *constants: 1 - sharp.one_minus_square(decimal(theta), *constants))
+        return self._energy(lambda *constants: 1 - energy_norms.one_minus_square(decimal(theta), *constants))
 
 
 ONE = Interval.of(1)
@@ -250,7 +250,7 @@ CONTRACTION: Mapping[Key, Fraction] = {
 OF_STICKING: Pairs = {
     ("5.38", "printed"): lambda d, r: (r.weight(HALF) * d.norm_T.square(), r.weight(HALF) * r.Q * d.norm.square()),
     ("x-ratio", "printed"): lambda d, r: (d.energy_1, (r.ratio * d.norm).square()),
-    ("x-sharp", "printed"): lambda d, r: (d.step(HALF), r.q_squared(HALF) * d.norm.square()),
+    ("x-energy", "printed"): lambda d, r: (d.step(HALF), r.q_squared(HALF) * d.norm.square()),
     **{key: partial(contracts, share=share) for key, share in CONTRACTION.items()},
 }
 

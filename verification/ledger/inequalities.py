@@ -16,7 +16,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ndtheory import sharp
+from ndtheory import energy_norms
 from verification.bounds.losses import top
 from verification.ledger.differences import Difference
 from verification.ledger.reading import Reading
@@ -272,9 +272,11 @@ INEQUALITIES: tuple[Inequality, ...] = (
     Inequality(
         id="x-ratio",
         left=lambda d, r, _: np.sqrt(np.maximum(d.energy_1, 0.0)),
-        right=lambda d, r, _: float(sharp.largest_ratio(*r.energy)) * d.norm,
+        right=lambda d, r, _: float(energy_norms.largest_ratio(*r.energy)) * d.norm,
     ),
-    Inequality(id="x-sharp", thetas=everywhere, left=_square_of_step, right=lambda d, r, t: r.q_squared(t) * d.norm**2),
+    Inequality(
+        id="x-energy", thetas=everywhere, left=_square_of_step, right=lambda d, r, t: r.q_squared(t) * d.norm**2
+    ),
     # --- Proposition 5.6.  (1 - K^2)/theta e^2 <= (e^2 - |||T_theta psi - T_theta psi~|||^2)/theta: nothing of 1 - K
     # is lost to rounding where theta is small
     *(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from ndtheory import PRINTED, sharp
+from ndtheory import PRINTED, energy_norms
 from ndtheory import bounds as formulas
 from verification.constants import Measured
 
@@ -153,4 +153,4 @@ class Reading:
 
     def q_squared(self, theta: float) -> float:
         """``q(theta)^2`` of the theorem in energy norms."""
-        return 1 - float(sharp.one_minus_square(theta, *self.energy))
+        return 1 - float(energy_norms.one_minus_square(theta, *self.energy))

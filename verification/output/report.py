@@ -56,7 +56,7 @@ GLOSSARY = {
     "rho": "The largest stiffness of the contact body relative to the Neumann body, over all shapes of Gamma_c.",
     "edition": "A form of the theorem with the constants of this mesh. Printed: the paper's, letter by letter. "
     "Repaired: with the factor 1/m that (5.30) lost.",
-    "sharp": "The same proof in energy norms.",
+    "energy": "The same proof in energy norms.",
     "lmi": "The bound by semidefinite programs, from the conditions of contact and friction node by node. Its "
     "quadratic form is checked in floating point.",
     "verified, v": "The level of a number: it is proved for the exact data on this mesh, with all rounding errors "

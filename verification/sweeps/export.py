@@ -38,7 +38,7 @@ NAMES = {
     "observed_rate": "rate at the end of the run",
     "linearised_rate": "rate of the linearisation",
     "coupled_residual": "violation of contact by the joined state at the end",
-    "sharp_factor": "q(theta) of the theorem in energy norms",
+    "energy_factor": "q(theta) of the theorem in energy norms",
     "proved_rate": "proved rate",
     "rho": "rho",
     "reason": "why results are missing",

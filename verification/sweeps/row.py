@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ndtheory import HypothesisError
-from ndtheory.sharp import one_minus_square
+from ndtheory.energy_norms import one_minus_square
 from ndtheory.texts import clean, printable
 from verification.algorithm.relaxation import Constant, Rule, rule_of
 from verification.algorithm.theta import Choice, begin
@@ -33,7 +33,7 @@ FAILED = (REFUSED, ERROR)
 #: The columns of a row after the values of the grid.
 RESULTS = (
     *("iterations", "iterations_paper", "steps", "outcome", "observed_rate", "linearised_rate"),
-    *("coupled_residual", "sharp_factor", "proved_rate", "rho", "reason"),
+    *("coupled_residual", "energy_factor", "proved_rate", "rho", "reason"),
 )
 
 #: The columns of whole numbers and of texts; the others are numbers.
@@ -172,17 +172,17 @@ def _proved(setting: Setting, rule: Rule, choice: Choice) -> tuple[Row, dict[str
     outside = pair.outside + ([words] if (words := rule.outside(pair.friction)) else [])
     of_factor = of_rate = outside[0] if outside else "rho or the constants of friction do not exist"
     if isinstance(rule, Constant) and not outside:
-        factor = sharp_factor(setting.energy, float(choice.theta))
+        factor = energy_factor(setting.energy, float(choice.theta))
         if factor is not None:
             rate, of_rate = (factor, "") if factor < 1 else (None, "q(theta) is not below 1")
     elif not outside:  # q is about steps with one factor, even where the rule has a proved rate of its own
         of_factor = f"{rule.words}: no constant theta"
         rate = None if choice.rho is None else rule.proved_rate(choice.rho)
-    found = {"sharp_factor": factor, "proved_rate": rate}
-    reasons = {"sharp_factor": of_factor, "proved_rate": of_rate}
+    found = {"energy_factor": factor, "proved_rate": rate}
+    reasons = {"energy_factor": of_factor, "proved_rate": of_rate}
     return found, {name: words for name, words in reasons.items() if found[name] is None}
 
 
-def sharp_factor(energy: tuple[float, float, float] | None, theta: float) -> float | None:
+def energy_factor(energy: tuple[float, float, float] | None, theta: float) -> float | None:
     """q(theta) of the theorem in energy norms, also where it is 1 or more; None where its constants do not exist."""
     return None if energy is None else math.sqrt(max(1 - one_minus_square(theta, *energy), 0.0))

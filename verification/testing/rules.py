@@ -12,11 +12,11 @@ import numpy as np
 from hypothesis import strategies as st
 
 from fem1d2d.mesh import Floats
-from ndtheory import evaluate_sharp
+from ndtheory import evaluate_energy
 from verification.algorithm.fixed_point import FixedPointMap, iterate_at, iterates
 from verification.algorithm.relaxation import Constant, Newton, Rule
 from verification.algorithm.runs import run
-from verification.algorithm.theta import below_one, choose, sharp_bounds
+from verification.algorithm.theta import below_one, choose, energy_bounds
 from verification.constants import measure
 from verification.contact import ContactError
 from verification.interface.pair import ContactPair
@@ -130,10 +130,10 @@ def proved_theta(pair: ContactPair) -> tuple[Fraction, float]:
     """The theta of least proved factor, and that factor."""
     constants = measure(pair).energy_constants()
     assert constants is not None
-    best = evaluate_sharp(constants).theta_proved
+    best = evaluate_energy(constants).theta_proved
     assert best is not None
     theta = below_one(best)
-    factor = evaluate_sharp(constants, theta).factor
+    factor = evaluate_energy(constants, theta).factor
     assert factor is not None
     return theta, factor.value
 
@@ -288,7 +288,7 @@ def _rate(subject: str, rule: Rule, examples: int) -> Finding:
 
     def test(pair: ContactPair, start: Floats) -> None:
         nonlocal refuted, tried
-        found = sharp_bounds(measure(pair))
+        found = energy_bounds(measure(pair))
         assert found is not None
         rate = rule.proved_rate(found.rho.value)
         if rate is None:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.linalg import eigh
 
 from fem1d2d.mesh import Floats
-from ndtheory import evaluate_sharp
+from ndtheory import evaluate_energy
 from verification.algorithm.fixed_point import FixedPointMap
 from verification.algorithm.theta import below_one
 from verification.bounds.multipliers import QuadraticForms
@@ -120,7 +120,7 @@ class _Check:
         if constants is None:
             raise ValueError(self.measured.why_no_energy)
         self.constants = constants
-        best = evaluate_sharp(constants)
+        best = evaluate_energy(constants)
         self.theta = below_one(best.theta_predicted if best.theta_proved is None else best.theta_proved)
         self.proved = best.theta_proved is not None
         self._factors: dict[Fraction, float] = {}
@@ -136,8 +136,10 @@ class _Check:
     def factor(self, theta: Fraction) -> float:
         """A proved Lipschitz constant of T_theta."""
         if theta not in self._factors:
-            sharp = evaluate_sharp(self.constants, theta).factor
-            found = sharp.value if sharp is not None else QuadraticForms(self.pair, self.measured).factor(float(theta))
+            energy = evaluate_energy(self.constants, theta).factor
+            found = (
+                energy.value if energy is not None else QuadraticForms(self.pair, self.measured).factor(float(theta))
+            )
             self._factors[theta] = found if isinstance(found, float) else found.value
         return self._factors[theta]
 

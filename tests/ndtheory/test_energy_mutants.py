@@ -3,9 +3,9 @@
 from fractions import Fraction as F
 
 import pytest
-from sharp_oracle import differences, formula_differences, right_side, work
+from energy_oracle import differences, formula_differences, right_side, work
 
-from ndtheory import EnergyConstants, sharp
+from ndtheory import EnergyConstants, energy_norms
 
 pytestmark = pytest.mark.usefixtures("many_digits")
 
@@ -35,7 +35,7 @@ def refuted(witness) -> bool:
 
 def scaled(name):
     """A formula made a tenth smaller."""
-    formula = getattr(sharp, name)
+    formula = getattr(energy_norms, name)
     return lambda *arguments: (1 - arguments[0] / arguments[0] / 10) * formula(*arguments)
 
 
@@ -49,11 +49,11 @@ def friction_inside(bend):
 
 
 def with_interval(change):
-    interval = sharp.contraction_interval
+    interval = energy_norms.contraction_interval
     return lambda *data: change(*found, *data[:3]) if (found := interval(*data)) else None
 
 
-root_of, ratio_of, turn_of = sharp.sqrt, sharp.largest_ratio, sharp.turning_theta
+root_of, ratio_of, turn_of = energy_norms.sqrt, energy_norms.largest_ratio, energy_norms.turning_theta
 
 #: name: (formula replaced, its replacement)
 MUTANTS = {
@@ -99,8 +99,8 @@ MUTANTS = {
         "one_minus_inside",
         lambda t, rho, k1, k2: t * (2 - t - (1 - t) * k2 - ((1 - t) * k1) ** 2 / (2 - (2 + rho) * t)),
     ),
-    "wrong branch": ("one_minus_inside", sharp.one_minus_end),
-    "the other wrong branch": ("one_minus_end", sharp.one_minus_inside),
+    "wrong branch": ("one_minus_inside", energy_norms.one_minus_end),
+    "the other wrong branch": ("one_minus_end", energy_norms.one_minus_inside),
     "slope without its bend": ("slope_inside", lambda t, rho, k1, k2: 2 - 2 * t - 2 * (1 - 2 * t) * k2),
     "slope with kappa_1": (
         "slope_inside",
@@ -150,7 +150,7 @@ def test_the_theorem_in_energy_norms_passes_on_every_witness():
 
 @pytest.mark.parametrize(("name", "formula"), MUTANTS.values(), ids=MUTANTS)
 def test_no_mutated_formula_of_the_energy_norms_survives_the_comparison(monkeypatch, name, formula):
-    monkeypatch.setattr(sharp, name, formula)
+    monkeypatch.setattr(energy_norms, name, formula)
     assert any(map(refuted, WITNESSES))
 
 

@@ -1,4 +1,4 @@
-"""What the theorem in energy norms says: the result of :func:`ndtheory.sharp.evaluate_sharp`."""
+"""What the theorem in energy norms says: the result of :func:`ndtheory.energy_norms.evaluate_energy`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ndtheory.number import Number
 
 
 @dataclass(frozen=True, kw_only=True)
-class SharpBounds:
+class EnergyBounds:
     """What the theorem in energy norms says.
 
     Attributes
@@ -83,7 +83,7 @@ class SharpBounds:
         return reasons
 
     def to_dict(self) -> dict[str, Any]:
-        """The object ``editions.sharp`` of ``ndtheory.bounds/1``; what is null has a reason beside it."""
+        """The object ``editions.energy`` of ``ndtheory.bounds/1``; what is null has a reason beside it."""
         result: dict[str, Any] = {}
         for name in self.__dataclass_fields__:
             value = getattr(self, name)

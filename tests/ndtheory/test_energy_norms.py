@@ -13,9 +13,7 @@ import numpy as np
 import oracle
 import pytest
 import strategies
-from hypothesis import given
-from hypothesis import strategies as st
-from sharp_oracle import (
+from energy_oracle import (
     RHO,
     SHARES,
     cases,
@@ -28,8 +26,10 @@ from sharp_oracle import (
     right_side,
     summit,
 )
+from hypothesis import given
+from hypothesis import strategies as st
 
-from ndtheory import EnergyConstants, evaluate_sharp, exact, sharp
+from ndtheory import EnergyConstants, energy_norms, evaluate_energy, exact
 
 pytestmark = pytest.mark.usefixtures("many_digits")
 
@@ -52,7 +52,7 @@ def test_every_formula_agrees_with_a_search_for_the_worst_case(case):
 @given(cases())
 def test_a_factor_is_reported_exactly_where_the_worst_case_shrinks(case):
     constants, theta = case
-    found = evaluate_sharp(EnergyConstants(**constants), theta)
+    found = evaluate_energy(EnergyConstants(**constants), theta)
     contracts = energy(**constants).contracts(oracle.real(theta))
     assert found.verdict == ("contraction" if contracts else "no conclusion")
     assert (found.factor is not None) == (found.one_minus_factor is not None) == contracts
@@ -62,7 +62,7 @@ def test_a_factor_is_reported_exactly_where_the_worst_case_shrinks(case):
 @given(cases())
 def test_the_interval_and_the_best_theta_do_not_depend_on_the_theta_given(case):
     constants, theta = case
-    without, with_theta = (evaluate_sharp(EnergyConstants(**constants), t) for t in (None, theta))
+    without, with_theta = (evaluate_energy(EnergyConstants(**constants), t) for t in (None, theta))
     assert without == replace(with_theta, theta=None, factor=None, one_minus_factor=None, verdict=None)
 
 
@@ -70,7 +70,7 @@ def test_the_interval_and_the_best_theta_do_not_depend_on_the_theta_given(case):
 @given(cases())
 def test_no_theta_has_a_smaller_factor_than_the_one_called_best(case):
     constants, theta = case
-    found = evaluate_sharp(EnergyConstants(**constants), theta)
+    found = evaluate_energy(EnergyConstants(**constants), theta)
     assert found.factor is None or found.factor_proved.value <= found.factor.value
     assert found.interval is None or found.interval[0] < found.theta_proved <= found.interval[1]
 
@@ -81,9 +81,9 @@ def test_no_theta_has_a_smaller_factor_than_the_one_called_best(case):
 @given(rational_ratios())
 def test_r_is_the_positive_root_and_there_the_work_is_minus_sqrt_rho_r(numbers):
     root, kappa_1, kappa_2, ratio = numbers
-    assert sharp.largest_ratio(root**2, kappa_1, kappa_2) == ratio
+    assert energy_norms.largest_ratio(root**2, kappa_1, kappa_2) == ratio
     assert ratio**2 == (root + kappa_1) * ratio + kappa_2
-    assert sharp.work(ratio, kappa_1, kappa_2) == -root * ratio
+    assert energy_norms.work(ratio, kappa_1, kappa_2) == -root * ratio
 
 
 @given(rational_ratios(), strategies.thetas())
@@ -93,17 +93,17 @@ def test_q_is_the_larger_of_both_ends_and_the_vertex_in_exact_rationals(numbers,
     quadratic = lambda x: right_side(x, theta, *data)
     worst, largest = summit(quadratic, ratio)
     assert quadratic(worst) == largest
-    assert quadratic(sharp.worst_ratio(theta, *data)) == quadratic(worst)
-    assert 0 <= sharp.worst_ratio(theta, *data) <= ratio
-    assert sharp.square_at(worst, theta, *data) == quadratic(worst)
-    assert sharp.one_minus_square(theta, *data) == 1 - quadratic(worst)
+    assert quadratic(energy_norms.worst_ratio(theta, *data)) == quadratic(worst)
+    assert 0 <= energy_norms.worst_ratio(theta, *data) <= ratio
+    assert energy_norms.square_at(worst, theta, *data) == quadratic(worst)
+    assert energy_norms.one_minus_square(theta, *data) == 1 - quadratic(worst)
 
 
 @given(rational_ratios(), strategies.thetas(), SHARES)
 def test_no_x_between_0_and_r_exceeds_q(numbers, theta, share):
     root, kappa_1, kappa_2, ratio = numbers
     data = (root**2, kappa_1, kappa_2)
-    assert right_side(share * ratio, theta, *data) <= 1 - sharp.one_minus_square(theta, *data)
+    assert right_side(share * ratio, theta, *data) <= 1 - energy_norms.one_minus_square(theta, *data)
 
 
 @given(rational_ratios(), strategies.thetas())
@@ -111,16 +111,16 @@ def test_at_x_equal_to_r_q_is_the_distance_of_theta_times_1_plus_sqrt_rho_r_from
     root, kappa_1, kappa_2, ratio = numbers
     data = (root**2, kappa_1, kappa_2)
     square = (1 - theta * (1 + root * ratio)) ** 2
-    assert sharp.square_at(ratio, theta, *data) == square == 1 - sharp.one_minus_end(theta, *data)
+    assert energy_norms.square_at(ratio, theta, *data) == square == 1 - energy_norms.one_minus_end(theta, *data)
 
 
 @given(rational_ratios())
 def test_both_branches_meet_at_the_turning_theta(numbers):
     root, kappa_1, kappa_2, ratio = numbers
     data = (root**2, kappa_1, kappa_2)
-    turn = sharp.turning_theta(*data)
+    turn = energy_norms.turning_theta(*data)
     assert 0 < turn < 1
-    assert sharp.one_minus_end(turn, *data) == sharp.one_minus_inside(turn, *data)
+    assert energy_norms.one_minus_end(turn, *data) == energy_norms.one_minus_inside(turn, *data)
     assert turn * (1 + root * ratio) > 1, "so q grows from there on"
     assert (turn == 2 / (2 + root**2)) == (kappa_1 == 0)
 
@@ -130,7 +130,7 @@ def test_both_branches_meet_at_the_turning_theta(numbers):
 def test_q_is_continuous_at_the_turning_theta(constants, digits):
     found = energy(**constants)
     turn = oracle.rational(found.turning, 75)
-    below, above = (evaluate_sharp(EnergyConstants(**constants), turn + side * turn / 10**digits) for side in (-1, 1))
+    below, above = (evaluate_energy(EnergyConstants(**constants), turn + side * turn / 10**digits) for side in (-1, 1))
     assert below.verdict == above.verdict
     assert below.factor is None or below.factor.value == pytest.approx(above.factor.value, abs=1e-15)
 
@@ -146,7 +146,7 @@ def test_rational_constants_are_kept_as_they_were_written(numerator, denominator
     )
     assert (given.rho, given.rho_normal) == (rho, rho / normal)
     assert (given.kappa_1, given.kappa_2) == (exact(kappa / 1024), F(kappa, 1000))
-    assert evaluate_sharp(given).rho.value == float(given.at_work)
+    assert evaluate_energy(given).rho.value == float(given.at_work)
 
 
 # --- without friction ----------------------------------------------------------------------------------------------
@@ -154,7 +154,7 @@ def test_rational_constants_are_kept_as_they_were_written(numerator, denominator
 
 @given(RHO, strategies.thetas())
 def test_without_friction_q_is_the_larger_of_1_minus_theta_and_1_minus_theta_minus_theta_rho(rho, theta):
-    found = evaluate_sharp(EnergyConstants(rho=rho), theta)
+    found = evaluate_energy(EnergyConstants(rho=rho), theta)
     q = max(1 - theta, abs(1 - theta - theta * rho))
     assert found.verdict == ("contraction" if q < 1 else "no conclusion")
     if q < 1:
@@ -164,7 +164,7 @@ def test_without_friction_q_is_the_larger_of_1_minus_theta_and_1_minus_theta_min
 
 @given(RHO)
 def test_without_friction_the_best_theta_is_2_over_2_plus_rho_below_the_smaller_of_1_and_2_over_1_plus_rho(rho):
-    found = evaluate_sharp(EnergyConstants(rho=rho))
+    found = evaluate_energy(EnergyConstants(rho=rho))
     assert found.interval == (0, float(min(F(1), 2 / (1 + rho))))
     assert found.theta_max_proved.value == found.interval[1]
     assert found.theta_proved == found.theta_predicted == float(2 / (2 + rho))
@@ -175,7 +175,7 @@ def test_without_friction_the_best_theta_is_2_over_2_plus_rho_below_the_smaller_
 @given(RHO, st.integers(1, 99).map(lambda n: F(n, 100)), strategies.thetas())
 def test_without_friction_the_tangential_components_do_not_count(rho, share, theta):
     normal = share * rho
-    assert evaluate_sharp(EnergyConstants(rho=rho, rho_normal=normal), theta) == evaluate_sharp(
+    assert evaluate_energy(EnergyConstants(rho=rho, rho_normal=normal), theta) == evaluate_energy(
         EnergyConstants(rho=normal), theta
     )
 
@@ -187,13 +187,13 @@ def test_with_any_friction_the_tangential_components_count(case, share):
     constants = {**constants, "kappa_1": constants["kappa_1"] or F(1, 10**9)}
     known, unknown = ({**constants, "rho_normal": normal} for normal in (share * constants["rho"], None))
     assert EnergyConstants(**known).at_work == constants["rho"]
-    assert evaluate_sharp(EnergyConstants(**known), theta) == evaluate_sharp(EnergyConstants(**unknown), theta)
+    assert evaluate_energy(EnergyConstants(**known), theta) == evaluate_energy(EnergyConstants(**unknown), theta)
 
 
 def test_the_slightest_friction_makes_the_bound_jump_from_rho_normal_to_rho():
-    slides = evaluate_sharp(EnergyConstants(rho=3, rho_normal=1), "3/5")
+    slides = evaluate_energy(EnergyConstants(rho=3, rho_normal=1), "3/5")
     for key in ("kappa_1", "kappa_2"):
-        sticks = evaluate_sharp(EnergyConstants(rho=3, rho_normal=1, **{key: "1e-30"}), "3/5")
+        sticks = evaluate_energy(EnergyConstants(rho=3, rho_normal=1, **{key: "1e-30"}), "3/5")
         assert (slides.factor.value, slides.theta_proved, slides.factor_proved.value) == (0.4, 2 / 3, 1 / 3)
         assert (sticks.factor, sticks.theta_proved, sticks.factor_proved.value) == (None, 0.4, 0.6)
         assert (slides.interval, sticks.interval) == ((0, 1), (0, 0.5))
@@ -209,7 +209,7 @@ def test_q_grows_with_rho_and_with_friction(case, key, growth):
     constants, theta = case
     constants = {**constants, "rho_normal": None}
     more = {**constants, key: constants[key] * (1 + growth) or growth}
-    less, more = (evaluate_sharp(EnergyConstants(**given), theta) for given in (constants, more))
+    less, more = (evaluate_energy(EnergyConstants(**given), theta) for given in (constants, more))
     assert less.ratio.value <= more.ratio.value
     assert more.verdict == "no conclusion" or less.factor.value <= more.factor.value
     if more.interval is not None:
@@ -222,7 +222,7 @@ def test_q_grows_with_rho_and_with_friction(case, key, growth):
 
 @given(energies())
 def test_friction_makes_the_best_theta_no_larger_and_its_factor_no_smaller_than_predicted(constants):
-    found = evaluate_sharp(EnergyConstants(**constants))
+    found = evaluate_energy(EnergyConstants(**constants))
     if found.interval is not None:
         assert found.theta_proved <= found.theta_predicted
         assert found.factor_proved.value >= found.rate_predicted
@@ -230,12 +230,12 @@ def test_friction_makes_the_best_theta_no_larger_and_its_factor_no_smaller_than_
 
 @given(RHO, st.integers(0, 999).map(lambda n: F(n, 1000)))
 def test_without_kappa_1_the_best_theta_is_the_predicted_one_whatever_kappa_2(rho, kappa_2):
-    found = evaluate_sharp(EnergyConstants(rho=rho, kappa_2=kappa_2))
+    found = evaluate_energy(EnergyConstants(rho=rho, kappa_2=kappa_2))
     assert found.theta_proved == found.theta_predicted
 
 
 def test_the_best_theta_moves_either_way_with_kappa_2():
-    best = lambda **given: evaluate_sharp(EnergyConstants(**given)).theta_proved
+    best = lambda **given: evaluate_energy(EnergyConstants(**given)).theta_proved
     assert best(rho="1/30", kappa_1="27/20", kappa_2="1/10") < best(rho="1/30", kappa_1="27/20", kappa_2="1/9")
     assert best(rho=6, kappa_1="2/5", kappa_2="7/20") > best(rho=6, kappa_1="2/5", kappa_2="8/20")
 
@@ -243,7 +243,7 @@ def test_the_best_theta_moves_either_way_with_kappa_2():
 @given(RHO, near_threshold())
 def test_every_small_theta_contracts_exactly_when_kappa_2_plus_a_quarter_of_kappa_1_squared_is_below_1(rho, friction):
     kappa_1, kappa_2 = friction
-    found = evaluate_sharp(EnergyConstants(rho=rho, kappa_1=kappa_1, kappa_2=kappa_2), F(1, 10**60))
+    found = evaluate_energy(EnergyConstants(rho=rho, kappa_1=kappa_1, kappa_2=kappa_2), F(1, 10**60))
     below = kappa_2 + kappa_1**2 / 4 < 1
     assert found.verdict == ("contraction" if below else "no conclusion")
     assert (found.interval is not None and found.interval[0] == 0) == below
@@ -253,12 +253,12 @@ def test_every_small_theta_contracts_exactly_when_kappa_2_plus_a_quarter_of_kapp
 def test_friction_beyond_the_threshold_leaves_an_interval_away_from_0():
     """rho = 1/16, kappa_1 = 51/20, kappa_2 = 0: q = 1 at 7/12 exactly, and q(3/4) = sqrt(3841)/62.5 < 1."""
     constants = {"rho": F(1, 16), "kappa_1": F(51, 20)}
-    found = evaluate_sharp(EnergyConstants(**constants), "3/4")
+    found = evaluate_energy(EnergyConstants(**constants), "3/4")
     assert found.friction_multiple.value < 1
     assert found.interval == (7 / 12, float(energy(**constants).interval[1]))
     assert found.verdict == "contraction"
-    assert evaluate_sharp(EnergyConstants(**constants), F(7, 12) - F(1, 10**50)).verdict == "no conclusion"
-    assert evaluate_sharp(EnergyConstants(**constants), F(7, 12) + F(1, 10**50)).verdict == "contraction"
+    assert evaluate_energy(EnergyConstants(**constants), F(7, 12) - F(1, 10**50)).verdict == "no conclusion"
+    assert evaluate_energy(EnergyConstants(**constants), F(7, 12) + F(1, 10**50)).verdict == "contraction"
 
 
 @given(st.integers(25, 300), st.integers(0, 99).map(lambda n: F(n, 100)), SHARES, RHO)
@@ -266,7 +266,7 @@ def test_close_to_theta_0_1_minus_q_is_theta_times_1_minus_the_friction_number(d
     """But for terms smaller by a factor theta rho/(1 - number), at most 1e-17; q itself rounds to 1."""
     theta, w = F(1, 10**digits), share * number
     constants = EnergyConstants(rho=rho, kappa_1=2 * w, kappa_2=number - w**2)
-    found = evaluate_sharp(constants, theta)
+    found = evaluate_energy(constants, theta)
     assert found.one_minus_factor.value == pytest.approx(float(theta * (1 - number)), rel=1e-15)
     assert found.factor.value == 1
 
@@ -278,7 +278,7 @@ def test_close_to_theta_0_1_minus_q_is_theta_times_1_minus_the_friction_number(d
 def test_2_over_1_plus_sqrt_rho_r_itself_is_outside_the_interval(numbers):
     """There the quadratic is 1 at x = r, exactly."""
     root, kappa_1, kappa_2, ratio = numbers
-    found = evaluate_sharp(EnergyConstants(rho=root**2, kappa_1=kappa_1, kappa_2=kappa_2), 2 / (1 + root * ratio))
+    found = evaluate_energy(EnergyConstants(rho=root**2, kappa_1=kappa_1, kappa_2=kappa_2), 2 / (1 + root * ratio))
     assert (found.verdict, found.factor) == ("no conclusion", None)
 
 
@@ -286,15 +286,15 @@ def test_2_over_1_plus_sqrt_rho_r_itself_is_outside_the_interval(numbers):
 def test_without_friction_the_interval_is_open_at_2_over_1_plus_rho(rho):
     end = 2 / (1 + rho)
     constants = EnergyConstants(rho=rho)
-    assert evaluate_sharp(constants, end).verdict == "no conclusion"
-    assert evaluate_sharp(constants, end * (1 - F(1, 10**50))).verdict == "contraction"
+    assert evaluate_energy(constants, end).verdict == "no conclusion"
+    assert evaluate_energy(constants, end * (1 - F(1, 10**50))).verdict == "contraction"
 
 
 @pytest.mark.parametrize("theta", ["2/3", "7/12", "1/3"])
 def test_the_interval_is_open_at_ends_whose_decimals_do_not_end(theta):
     """rho = 2 and rho = 5 without friction, and the lower end 7/12 of rho = 1/16, kappa_1 = 51/20."""
     given = {"2/3": {"rho": 2}, "7/12": {"rho": "1/16", "kappa_1": "51/20"}, "1/3": {"rho": 5}}[theta]
-    assert evaluate_sharp(EnergyConstants(**given), theta).verdict == "no conclusion"
+    assert evaluate_energy(EnergyConstants(**given), theta).verdict == "no conclusion"
 
 
 @strategies.fewer(8, at_night=4)
@@ -315,20 +315,20 @@ def test_at_the_threshold_itself_the_interval_is_that_of_the_search(rho, share):
     ],
 )
 def test_at_the_threshold_small_thetas_contract_for_a_soft_contact_body(rho, kappa_1, kappa_2, interval):
-    found = evaluate_sharp(EnergyConstants(rho=rho, kappa_1=kappa_1, kappa_2=kappa_2)).interval
+    found = evaluate_energy(EnergyConstants(rho=rho, kappa_1=kappa_1, kappa_2=kappa_2)).interval
     assert found == (interval if interval is None else pytest.approx(interval))
 
 
 @given(RHO, SHARES)
 def test_at_the_threshold_small_thetas_contract_exactly_when_sqrt_rho_kappa_1_is_below_2(rho, share):
     """And if none of them does, no theta does: the excess is convex, and 0 at theta = 0."""
-    found = evaluate_sharp(EnergyConstants(rho=rho, kappa_1=2 * share, kappa_2=1 - share**2)).interval
+    found = evaluate_energy(EnergyConstants(rho=rho, kappa_1=2 * share, kappa_2=1 - share**2)).interval
     assert (None if found is None else found[0]) == (0 if rho * share**2 < 1 else None)
 
 
 @pytest.mark.parametrize(("rho", "kappa_1", "kappa_2", "low"), [(1, "2/3", "8/9", 0), (3, "4/3", "5/9", None)])
 def test_at_the_threshold_it_does_not_matter_how_ninths_round(rho, kappa_1, kappa_2, low):
-    found = evaluate_sharp(EnergyConstants(rho=rho, kappa_1=kappa_1, kappa_2=kappa_2)).interval
+    found = evaluate_energy(EnergyConstants(rho=rho, kappa_1=kappa_1, kappa_2=kappa_2)).interval
     assert (None if found is None else found[0]) == low
 
 
@@ -340,7 +340,7 @@ def test_the_interval_may_end_at_the_turning_theta(root, share):
     ratio = least * (1 + share / (least**2 + 1))
     kappa_1 = 2 * ratio * (1 + root**2 - root * ratio) / (1 - root * ratio)
     constants = {"rho": root**2, "kappa_1": kappa_1, "kappa_2": ratio * (ratio - root - kappa_1)}
-    assert sharp.turning_theta(*constants.values()) == 2 / (1 + root * ratio)
+    assert energy_norms.turning_theta(*constants.values()) == 2 / (1 + root * ratio)
     assert differences(constants) == []
 
 
@@ -354,7 +354,7 @@ def test_where_q_only_touches_1_there_is_no_interval(root, share):
 
 
 def test_q_touches_1_at_3_quarters_for_rho_a_quarter_and_kappa_1_5_halves():
-    found = evaluate_sharp(EnergyConstants(rho="1/4", kappa_1="5/2"), "3/4")
+    found = evaluate_energy(EnergyConstants(rho="1/4", kappa_1="5/2"), "3/4")
     assert (found.interval, found.theta_proved, found.factor_proved, found.theta_max_proved) == (None,) * 4
     assert found.verdict == "no conclusion"
 
@@ -374,7 +374,7 @@ def least_square(rho: float, kappa_1: float, kappa_2: float) -> float:
 @pytest.mark.parametrize("rho", ["1/20", "1/2", 1, 3])
 @pytest.mark.parametrize(("kappa_1", "kappa_2"), [(1, 0), (0, 1), (1, "1/3"), ("1/4", 2)])
 def test_below_the_limit_of_friction_some_theta_is_proved_and_above_it_none(rho, kappa_1, kappa_2):
-    found = evaluate_sharp(EnergyConstants(rho=rho, kappa_1=kappa_1, kappa_2=kappa_2))
+    found = evaluate_energy(EnergyConstants(rho=rho, kappa_1=kappa_1, kappa_2=kappa_2))
     every, some = found.friction_multiple.value, found.friction_limit_multiple.value
     assert every <= some
     rho, kappa_1, kappa_2 = (float(F(v)) for v in (rho, kappa_1, kappa_2))
@@ -383,6 +383,6 @@ def test_below_the_limit_of_friction_some_theta_is_proved_and_above_it_none(rho,
 
 
 def test_without_friction_nothing_limits_it():
-    found = evaluate_sharp(EnergyConstants(rho=2))
+    found = evaluate_energy(EnergyConstants(rho=2))
     assert found.friction_limit_multiple is None
     assert found.reason["friction_limit_multiple"] == "no friction"

@@ -6,11 +6,11 @@ from fractions import Fraction as F
 
 import pytest
 import strategies
+from energy_oracle import FIELDS, energies
 from hypothesis import given
 from hypothesis import strategies as st
-from sharp_oracle import FIELDS, energies
 
-from ndtheory import EnergyConstants, HypothesisError, Number, evaluate_sharp
+from ndtheory import EnergyConstants, HypothesisError, Number, evaluate_energy
 from ndtheory.bounds import NO_PROVED_INTERVAL
 
 pytestmark = pytest.mark.usefixtures("many_digits")
@@ -47,7 +47,7 @@ def test_a_broken_hypothesis_on_an_energy_constant_is_named_with_the_value_recei
 @pytest.mark.parametrize("value", [0, 1, 0.0, 1.0, "1", "-1e-300", 1.5, "1." + 60 * "0" + "1", *NO_NUMBER])
 def test_a_theta_that_is_not_between_0_and_1_is_refused(value):
     with pytest.raises(HypothesisError, match=r"^theta = .*: needed a number with 0 < theta < 1$") as refusal:
-        evaluate_sharp(EnergyConstants(rho=1), value)
+        evaluate_energy(EnergyConstants(rho=1), value)
     assert refusal.value.key == "theta"
 
 
@@ -63,8 +63,8 @@ def test_the_hypotheses_of_the_energy_constants_are_kept_with_equality(small):
     assert EnergyConstants(rho=small, rho_normal=small, kappa_1=0, kappa_2="0").at_work == F(1, 10**75)
     assert EnergyConstants(rho=small, kappa_1=small, kappa_2="1e75").frictionless is False
     assert EnergyConstants(rho=2, rho_normal="1.9999999999999999999").at_work == F(2) - F(1, 10**19)
-    assert evaluate_sharp(EnergyConstants(rho=1), "1e-300").one_minus_factor.value == 1e-300
-    assert evaluate_sharp(EnergyConstants(rho="1/2"), "0." + 60 * "9").verdict == "contraction"
+    assert evaluate_energy(EnergyConstants(rho=1), "1e-300").one_minus_factor.value == 1e-300
+    assert evaluate_energy(EnergyConstants(rho="1/2"), "0." + 60 * "9").verdict == "contraction"
 
 
 # --- the written form ----------------------------------------------------------------------------------------------
@@ -72,7 +72,7 @@ def test_the_hypotheses_of_the_energy_constants_are_kept_with_equality(small):
 
 @given(energies(), st.one_of(st.none(), strategies.thetas()))
 def test_what_is_null_has_a_reason_and_nothing_else_has_one(constants, theta):
-    found = evaluate_sharp(EnergyConstants(**constants), theta)
+    found = evaluate_energy(EnergyConstants(**constants), theta)
     document = json.loads(json.dumps(found.to_dict()))
     proved = [*FIELDS]
     proved.insert(proved.index("interval") + 1, "interval_proved")  # of constants that have enclosures
@@ -83,7 +83,7 @@ def test_what_is_null_has_a_reason_and_nothing_else_has_one(constants, theta):
 
 @given(energies(), st.one_of(st.none(), strategies.thetas()))
 def test_the_written_form_holds_the_numbers_themselves(constants, theta):
-    found = evaluate_sharp(EnergyConstants(**constants), theta)
+    found = evaluate_energy(EnergyConstants(**constants), theta)
     document = json.loads(json.dumps(found.to_dict()))
     for name in FIELDS:
         value = getattr(found, name)
@@ -95,7 +95,7 @@ def test_the_written_form_holds_the_numbers_themselves(constants, theta):
 
 def test_each_reason_says_what_is_missing():
     def reason(theta=None, **given):
-        found = dict(evaluate_sharp(EnergyConstants(rho=1, **given), theta).reason)
+        found = dict(evaluate_energy(EnergyConstants(rho=1, **given), theta).reason)
         assert found.pop("interval_proved") == NO_PROVED_INTERVAL
         return found
 

@@ -1,13 +1,13 @@
-"""The sharp edition of `bounds` and of `check`: constants of the energy norms on the command line."""
+"""The edition in energy norms of `bounds` and of `check`: constants of the energy norms on the command line."""
 
 import json
 import re
 
 import pytest
 
-from ndtheory import EnergyConstants, evaluate_sharp
+from ndtheory import EnergyConstants, evaluate_energy
 
-# --- the sharp bound of bounds -------------------------------------------------------------------------------------
+# --- the bound in energy norms of `bounds` ---
 
 KAPPAS = ["--rho", "0.475", "--kappa1", "0.986", "--kappa2", "0.427"]
 SECTION_5 = ["--m", "3084", "--M", "153229", "--CR", "1.70", "--CK", "1e-8"]
@@ -15,35 +15,35 @@ SECTION_5 = ["--m", "3084", "--M", "153229", "--CR", "1.70", "--CK", "1e-8"]
 
 @pytest.mark.parametrize("beside", [[], SECTION_5, [*SECTION_5, "--edition", "repaired"]], ids=["alone", "all", "one"])
 @pytest.mark.parametrize("theta", [[], ["--theta", "0.7"], ["--theta", "0.95"]], ids=["", "inside", "outside"])
-def test_the_sharp_edition_of_bounds_is_the_theorem(call, beside, theta):
+def test_the_edition_in_energy_norms_of_bounds_is_the_theorem(call, beside, theta):
     found = call("bounds", *KAPPAS, *beside, *theta, "--json").document
     energy = EnergyConstants(rho="0.475", kappa_1="0.986", kappa_2="0.427")
-    expected = evaluate_sharp(energy, *theta[1:]).to_dict()
-    assert found["editions"]["sharp"] == json.loads(json.dumps(expected))
+    expected = evaluate_energy(energy, *theta[1:]).to_dict()
+    assert found["editions"]["energy"] == json.loads(json.dumps(expected))
     shown = {name for name, edition in found["editions"].items() if edition is not None}
     of_section_5 = {"repaired"} if "--edition" in beside else {"printed", "repaired"} if beside else set()
-    assert shown == {"sharp"} | of_section_5
+    assert shown == {"energy"} | of_section_5
     assert shown.isdisjoint(found["reason"])
     assert [found["inputs"][key] for key in ("rho", "kappa_1", "kappa_2")] == [0.475, 0.986, 0.427]
-    rows = re.findall(r"^  (printed|repaired|sharp) .*", call("bounds", *KAPPAS, *beside, *theta).out, flags=re.M)
+    rows = re.findall(r"^  (printed|repaired|energy) .*", call("bounds", *KAPPAS, *beside, *theta).out, flags=re.M)
     assert set(rows) == shown
 
 
-def test_the_editions_beside_the_sharp_one_are_what_they_are_alone(call):
+def test_the_editions_beside_the_one_in_energy_norms_are_what_they_are_alone(call):
     alone = call("bounds", *SECTION_5, "--theta", "1e-4", "--json").document["editions"]
     beside = call("bounds", *SECTION_5, *KAPPAS, "--theta", "1e-4", "--json").document["editions"]
-    assert alone["sharp"] is None
+    assert alone["energy"] is None
     assert {name: beside[name] for name in ("printed", "repaired")} == {n: alone[n] for n in ("printed", "repaired")}
 
 
 @pytest.mark.parametrize(("theta", "status"), [("0.7", 0), ("0.9", 1)])
-def test_check_counts_the_sharp_edition(call, theta, status):
+def test_check_counts_the_edition_in_energy_norms(call, theta, status):
     assert call("bounds", *KAPPAS, "--theta", theta, "--check").status == status
     assert call("bounds", *SECTION_5, "--theta", theta, "--check").status == 1
     assert call("bounds", *SECTION_5, *KAPPAS, "--theta", theta, "--check").status == status
 
 
-def test_the_screen_of_the_sharp_edition_tells_both_thetas(call):
+def test_the_screen_of_the_edition_in_energy_norms_tells_both_thetas(call):
     lines = call("bounds", *KAPPAS, "--theta", "0.7").out.splitlines()
     assert "WHICH THETA?" in lines
     assert any(re.search(r"^  proved +0\.70. .*least proved factor", line) for line in lines)
@@ -76,6 +76,6 @@ def test_no_size_of_an_energy_constant_crashes_the_calculator(call, option, size
         if answer.status == 2:
             assert f" = {size}: needed" in answer.complaint
             continue
-        sharp = answer.document["editions"]["sharp"]
-        assert sharp["interval"] is None or 0 <= sharp["interval"][0] < sharp["interval"][1] <= 1
-        assert sharp["factor"] is None or 0 <= sharp["factor"]["value"] <= 1
+        energy = answer.document["editions"]["energy"]
+        assert energy["interval"] is None or 0 <= energy["interval"][0] < energy["interval"][1] <= 1
+        assert energy["factor"] is None or 0 <= energy["factor"]["value"] <= 1

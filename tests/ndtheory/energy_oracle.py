@@ -10,7 +10,7 @@ import strategies
 from hypothesis import strategies as st
 from mpmath import mp, mpf
 
-from ndtheory import EnergyConstants, evaluate_sharp, sharp
+from ndtheory import EnergyConstants, energy_norms, evaluate_energy
 
 DIGITS = 160
 HALVINGS = 270  # 2^-270 = 5e-82
@@ -210,8 +210,8 @@ def wanted(constants, theta=None) -> dict:
 
 
 def differences(constants, theta=None) -> list[str]:
-    """Names of the fields in which `evaluate_sharp` departs from the oracle."""
-    found = evaluate_sharp(EnergyConstants(**constants), theta)
+    """Names of the fields in which `evaluate_energy` departs from the oracle."""
+    found = evaluate_energy(EnergyConstants(**constants), theta)
     return [name for name, want in wanted(constants, theta).items() if not close(getattr(found, name), want)]
 
 
@@ -242,7 +242,7 @@ def formula_differences(constants, theta) -> list[str]:
     return [
         name
         for name, (arguments, want) in values.items()
-        if not abs(getattr(sharp, name)(*arguments) - want) <= mpf("1e-30") * max(abs(want), ZERO)
+        if not abs(getattr(energy_norms, name)(*arguments) - want) <= mpf("1e-30") * max(abs(want), ZERO)
     ]
 
 

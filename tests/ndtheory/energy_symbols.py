@@ -2,7 +2,7 @@
 
 import sympy as sp
 
-from ndtheory import sharp
+from ndtheory import energy_norms
 
 s, d = sp.symbols("s d", positive=True)  # d: any further amount > 0
 kappa_1, e, g = sp.symbols("kappa_1 e g", nonnegative=True)
@@ -52,11 +52,11 @@ def positive(expression) -> bool:
     return all(map(above_zero, quotient(expression)))
 
 
-RATIO = plain(sharp.largest_ratio(*DATA))
-TURN = sp.cancel(plain(sharp.turning_theta(*DATA)))
+RATIO = plain(energy_norms.largest_ratio(*DATA))
+TURN = sp.cancel(plain(energy_norms.turning_theta(*DATA)))
 VERTEX = (1 - theta) * kappa_1 / (2 - (2 + rho) * theta)
 SLOPE = 1 + s * r  # of |1 - theta (1 + sqrt(rho) r)| in theta
 
 
 def right_side(at, theta=theta, rho=rho):
-    return sharp.square_at(at, theta, rho, *FRICTION)
+    return energy_norms.square_at(at, theta, rho, *FRICTION)

@@ -9,7 +9,7 @@ from itertools import product
 
 import pytest
 
-from ndtheory import EnergyConstants, Number, evaluate_sharp, sharp
+from ndtheory import EnergyConstants, Number, energy_norms, evaluate_energy
 from ndtheory.number import decimal, working_precision
 
 #: sqrt(rho), kappa_1 and r - sqrt(rho) - kappa_1.
@@ -45,20 +45,20 @@ def square(theta, *drawn):
 @pytest.mark.parametrize("drawn", DRAWN, ids=lambda drawn: "-".join(map(str, drawn)))
 def test_q_and_the_worst_x_are_those_of_both_ends_and_the_vertex(drawn):
     at = data(*drawn)
-    assert sharp.largest_ratio(*at) == sum(drawn)
-    turn = sharp.turning_theta(*at)
+    assert energy_norms.largest_ratio(*at) == sum(drawn)
+    turn = energy_norms.turning_theta(*at)
     for theta in {*THETAS, turn, turn * F(99, 100)}:
         worst, places = square(theta, *drawn), squares(theta, *drawn)
-        assert sharp.one_minus_square(theta, *at) == 1 - worst
-        assert max(places)[0] == sharp.square_at(sharp.worst_ratio(theta, *at), theta, *at)
+        assert energy_norms.one_minus_square(theta, *at) == 1 - worst
+        assert max(places)[0] == energy_norms.square_at(energy_norms.worst_ratio(theta, *at), theta, *at)
         assert (worst == places[1][0]) == (theta >= turn)
         if theta <= turn:
-            assert sharp.one_minus_inside(theta, *at) == 1 - worst
+            assert energy_norms.one_minus_inside(theta, *at) == 1 - worst
         if theta < turn and 2 - (2 + at[0]) * theta:
             step = F(1, 10**12)
             rise = (square(theta - step, *drawn) - square(theta + step, *drawn)) / (2 * step)
-            assert abs(sharp.slope_inside(theta, *at) - rise) < F(1, 10**6)
-    assert sharp.slope_inside(F(2) / (2 + at[0]), at[0], F(0), at[2]) is not None
+            assert abs(energy_norms.slope_inside(theta, *at) - rise) < F(1, 10**6)
+    assert energy_norms.slope_inside(F(2) / (2 + at[0]), at[0], F(0), at[2]) is not None
 
 
 NEAR = F(1, 10**20)
@@ -69,7 +69,7 @@ def test_the_interval_is_where_q_is_below_1_and_the_best_theta_has_the_least_q(d
     at = data(*drawn)
     with working_precision():
         decimals = [decimal(value) for value in at]
-        found = sharp.contraction_interval(*decimals, Decimal(10) ** -40)
+        found = energy_norms.contraction_interval(*decimals, Decimal(10) ** -40)
         contracts = [theta for theta in [*THETAS[:-1], F(1, 10**6)] if square(theta, *drawn) < 1]
         if found is None:
             assert contracts == []
@@ -84,7 +84,7 @@ def test_the_interval_is_where_q_is_below_1_and_the_best_theta_has_the_least_q(d
                 assert square(end * inwards, *drawn) < 1 < square(end / inwards, *drawn)
         if low == 0:
             assert square(F(1, 10**30), *drawn) < 1
-        best = F(sharp.best_theta(*decimals, Decimal(10) ** -40))
+        best = F(energy_norms.best_theta(*decimals, Decimal(10) ** -40))
     around = [square(theta, *drawn) for theta in (best * (1 - F(1, 10**9)), best * (1 + F(1, 10**9)))]
     assert square(best, *drawn) <= min(*around, *(square(theta, *drawn) for theta in THETAS)) + F(1, 10**40)
 
@@ -110,25 +110,30 @@ def least_square(rho, kappa_1, kappa_2):
 @pytest.mark.parametrize("share", [0.0, 0.2, 0.4, 0.6, 0.8, 1.0])
 def test_up_to_the_limit_of_friction_some_theta_is_proved_and_beyond_it_none(rho, share):
     kappa_1, kappa_2 = 0.1 * (1 - share), 0.1 * share
-    limit, multiple = sharp.friction_limit(rho, kappa_1, kappa_2), sharp.friction_multiple(kappa_1, kappa_2)
+    limit, multiple = (
+        energy_norms.friction_limit(rho, kappa_1, kappa_2),
+        energy_norms.friction_multiple(kappa_1, kappa_2),
+    )
     assert limit >= multiple * (1 - 1e-12)
     assert least_square(rho, kappa_1 * limit * 0.999, kappa_2 * limit * 0.999) < -1e-9
     assert least_square(rho, kappa_1 * limit * 1.001, kappa_2 * limit * 1.001) > -1e-9
     t = multiple
     assert t * kappa_2 + (t * kappa_1) ** 2 / 4 == pytest.approx(1, rel=1e-12)
-    assert sharp.friction_number(t * kappa_1, t * kappa_2) == pytest.approx(1, rel=1e-12)
+    assert energy_norms.friction_number(t * kappa_1, t * kappa_2) == pytest.approx(1, rel=1e-12)
 
 
 @pytest.mark.parametrize(("low", "high"), [(F(1, 2), F(3, 2)), (F(0), F(4)), (F(2), F(2))])
 def test_of_a_tied_interface_the_factor_is_that_of_the_mode_that_shrinks_least(low, high):
     modes = [low + (high - low) * F(n, 7) for n in range(8)]
     for theta in THETAS:
-        assert sharp.tied_factor(theta, low, high) == max(abs(1 - theta * (1 + mode)) for mode in modes)
-        assert sharp.predicted_factor(theta, high) == max(abs(1 - theta * (1 + mode)) for mode in (0, *modes, high))
-        assert sharp.tied_factor(theta, low, high) >= sharp.tied_rate(low, high)
-        assert sharp.predicted_factor(theta, high) >= sharp.predicted_rate(high)
-    assert sharp.tied_factor(sharp.tied_theta(low, high), low, high) == sharp.tied_rate(low, high)
-    assert sharp.predicted_factor(sharp.predicted_theta(high), high) == sharp.predicted_rate(high)
+        assert energy_norms.tied_factor(theta, low, high) == max(abs(1 - theta * (1 + mode)) for mode in modes)
+        assert energy_norms.predicted_factor(theta, high) == max(
+            abs(1 - theta * (1 + mode)) for mode in (0, *modes, high)
+        )
+        assert energy_norms.tied_factor(theta, low, high) >= energy_norms.tied_rate(low, high)
+        assert energy_norms.predicted_factor(theta, high) >= energy_norms.predicted_rate(high)
+    assert energy_norms.tied_factor(energy_norms.tied_theta(low, high), low, high) == energy_norms.tied_rate(low, high)
+    assert energy_norms.predicted_factor(energy_norms.predicted_theta(high), high) == energy_norms.predicted_rate(high)
 
 
 # --- what is said of constants ----------------------------------------------------------------------------------------
@@ -136,7 +141,7 @@ def test_of_a_tied_interface_the_factor_is_that_of_the_mode_that_shrinks_least(l
 
 def test_a_theta_at_an_end_or_within_its_rounding_has_no_factor():
     constants = EnergyConstants(rho=2)  # q < 1 below 2/3
-    said = lambda theta: evaluate_sharp(constants, theta).verdict
+    said = lambda theta: evaluate_energy(constants, theta).verdict
     for digits in (30, 60, 90, 120, 150, 180):
         below = 2 * 10**digits // 3
         assert said(F(below + 1, 10**digits)) == "no conclusion"
@@ -144,15 +149,15 @@ def test_a_theta_at_an_end_or_within_its_rounding_has_no_factor():
     assert said(F(2, 3)) == "no conclusion"
     # friction between the two thresholds: the interval begins above 0
     rubs = EnergyConstants(rho=F(1, 100), kappa_1=F(1), kappa_2=F(4, 5))
-    low = F(evaluate_sharp(rubs).interval[0])
+    low = F(evaluate_energy(rubs).interval[0])
     assert low > 0
-    assert evaluate_sharp(rubs, low * F(99, 100)).factor is None
-    assert evaluate_sharp(rubs, low * F(101, 100)).factor is not None
+    assert evaluate_energy(rubs, low * F(99, 100)).factor is None
+    assert evaluate_energy(rubs, low * F(101, 100)).factor is not None
 
 
 def test_an_enclosure_of_the_constants_encloses_what_follows():
     number = Number(value=2.0, lo=1.75, hi=2.25, level="guaranteed")
-    found = evaluate_sharp(EnergyConstants(rho=number), theta="1/2")
+    found = evaluate_energy(EnergyConstants(rho=number), theta="1/2")
     for name, ends in {
         "ratio": (F(7, 4) ** F(1, 2), 1.5),
         "factor": (0.5, 0.625),
@@ -170,11 +175,11 @@ def test_an_enclosure_of_the_constants_encloses_what_follows():
 
 @pytest.mark.parametrize("rho", range(2, 40))
 def test_the_exact_end_of_an_interval_is_outside_however_its_decimals_round(rho):
-    assert evaluate_sharp(EnergyConstants(rho=rho), F(2, 1 + rho)).factor is None
+    assert evaluate_energy(EnergyConstants(rho=rho), F(2, 1 + rho)).factor is None
 
 
 def test_an_interval_without_a_double_is_none():
     """``sqrt(rho) kappa_1 = 1 + rho`` is where q touches 1, at 3/4; here its root is about 1e-20 wide."""
-    found = evaluate_sharp(EnergyConstants(rho=F(1, 4), kappa_1=F(5, 2) * (1 - F(1, 10**40))))
+    found = evaluate_energy(EnergyConstants(rho=F(1, 4), kappa_1=F(5, 2) * (1 - F(1, 10**40))))
     assert (found.interval, found.theta_proved) == (None, None)
-    assert evaluate_sharp(EnergyConstants(rho=F(1, 4), kappa_1=F(5, 2) * (1 - F(1, 10**20)))).interval is not None
+    assert evaluate_energy(EnergyConstants(rho=F(1, 4), kappa_1=F(5, 2) * (1 - F(1, 10**20)))).interval is not None

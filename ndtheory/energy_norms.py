@@ -8,7 +8,7 @@ For two forces psi, psi~ let d_1, d_2 be the differences of the traces of the co
 * ``<T psi - T psi~, d_2> <= f(x) |d_2|^2``, with ``f(x) = kappa_2 + kappa_1 x - x^2``, that of (5.29) and (5.30).
 
 So by (5.24) ``q(theta)^2``, the largest ``(1-theta)^2 + 2 theta (1-theta) f(x) + theta^2 rho x^2`` over 0 <= x <= r,
-bounds the square of the Lipschitz constant of T_theta.  The proof, step by step, is in ``docs/sharp.md``.
+bounds the square of the Lipschitz constant of T_theta.  The proof, step by step, is in ``docs/energy.md``.
 
 Every formula is written over any scalar (float, Decimal, Fraction where roots are rational, sympy, mpmath, an interval,
 an object that records the operations made with it); branches go through :func:`ndtheory.number.where`.  All arguments
@@ -30,8 +30,8 @@ from typing import Any
 from ndtheory.bounds import MARGIN, Conclusion, factor_and_rest
 from ndtheory.constants import inside, relaxation_factor
 from ndtheory.energy import EnergyConstants
+from ndtheory.energy_bounds import EnergyBounds
 from ndtheory.number import SLACK, absolute, decimal, maximum, minimum, rounded, sqrt, weakest, where, working_precision
-from ndtheory.sharp_bounds import SharpBounds
 
 #: Halvings of an interval inside (0, 1) until theta is known to far below a double.
 HALVINGS = 80
@@ -294,7 +294,7 @@ def _last_where(holds: Callable[[Any], bool], low: Any, high: Any) -> Any:
     return where(holds(high), high, halved)
 
 
-def evaluate_sharp(constants: EnergyConstants, theta: Any = None) -> SharpBounds:
+def evaluate_energy(constants: EnergyConstants, theta: Any = None) -> EnergyBounds:
     """Evaluate the theorem in energy norms.
 
     Parameters
@@ -305,7 +305,7 @@ def evaluate_sharp(constants: EnergyConstants, theta: Any = None) -> SharpBounds
 
     Returns
     -------
-    SharpBounds
+    EnergyBounds
         Right to the last place of a double.  Where a constant was given as an enclosure, and the others as one or
         exactly, the numbers have enclosures too, at the weakest level (``verified`` at best).  Not those that some of
         the constants enclosed do not have: ``factor_proved``, ``theta_max_proved`` have one only if there is a
@@ -319,12 +319,12 @@ def evaluate_sharp(constants: EnergyConstants, theta: Any = None) -> SharpBounds
 
     Examples
     --------
-    >>> s = evaluate_sharp(EnergyConstants(rho=2), theta="3/5")
+    >>> s = evaluate_energy(EnergyConstants(rho=2), theta="3/5")
     >>> s.interval, s.theta_proved, s.factor_proved.value, round(s.factor.value, 12)
     ((0.0, 0.6666666666666666), 0.5, 0.5, 0.8)
     >>> from ndtheory import Number
     >>> rho = Number(value=2.0, lo=1.75, hi=2.25, level="guaranteed")
-    >>> s = evaluate_sharp(EnergyConstants(rho=rho), theta="1/2")
+    >>> s = evaluate_energy(EnergyConstants(rho=rho), theta="1/2")
     >>> s.factor.level, s.factor.value, round(s.factor.lo, 12), round(s.factor.hi, 12)
     ('guaranteed', 0.5, 0.5, 0.625)
     """
@@ -347,7 +347,7 @@ def evaluate_sharp(constants: EnergyConstants, theta: Any = None) -> SharpBounds
         verdict: Conclusion | None = None
         if chosen is not None:
             verdict = "no conclusion" if found["factor"] is None else "contraction"
-        return SharpBounds(
+        return EnergyBounds(
             **{name: number(name) for name in (*names, *proved)},
             interval=None if found["low"] is None else (float(found["low"]), float(found["theta_max_proved"])),
             interval_proved=inside(corners, level, "low", "theta_max_proved"),

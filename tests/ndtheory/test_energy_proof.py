@@ -1,13 +1,14 @@
 """The algebra of the theorem in energy norms, for all admissible constants at once.
 
-The functions of ``ndtheory.sharp`` are called with symbols.  Writing ``sqrt(rho) = s`` and ``kappa_2 = e (s + kappa_1 +
-e)`` with e >= 0 reaches every kappa_2 >= 0 once and turns r into ``s + kappa_1 + e``: all that follows is rational.  An
-equality is a difference whose numerator expands to 0; an inequality has a certificate, a quotient of polynomials in
-quantities >= 0 without one negative coefficient.  Each check refutes a formula with a sign or a factor changed.
+The functions of ``ndtheory.energy_norms`` are called with symbols.  Writing ``sqrt(rho) = s`` and ``kappa_2 = e (s +
+kappa_1 + e)`` with e >= 0 reaches every kappa_2 >= 0 once and turns r into ``s + kappa_1 + e``: all that follows is
+rational.  An equality is a difference whose numerator expands to 0; an inequality has a certificate, a quotient of
+polynomials in quantities >= 0 without one negative coefficient.  Each check refutes a formula with a sign or a factor
+changed.
 """
 
 import sympy as sp
-from sharp_symbols import (
+from energy_symbols import (
     DATA,
     FRICTION,
     RATIO,
@@ -31,7 +32,7 @@ from sharp_symbols import (
     zero,
 )
 
-from ndtheory import sharp
+from ndtheory import energy_norms
 
 # --- the checks themselves -----------------------------------------------------------------------------------------
 
@@ -57,7 +58,7 @@ def test_every_kappa_2_from_0_on_is_reached_once():
     k2 = sp.Symbol("kappa_2", nonnegative=True)
     assert kappa_2.subs(e, 0) == 0
     assert positive(sp.diff(kappa_2, e))
-    found = sharp.largest_ratio(rho, kappa_1, k2) - s - kappa_1
+    found = energy_norms.largest_ratio(rho, kappa_1, k2) - s - kappa_1
     assert zero(sp.expand(found * (found + s + kappa_1)) - k2)
     assert not zero(sp.expand(found * (found + s - kappa_1)) - k2)
 
@@ -65,7 +66,7 @@ def test_every_kappa_2_from_0_on_is_reached_once():
 def test_r_squared_is_sqrt_rho_plus_kappa_1_times_r_plus_kappa_2():
     """In symbols that hide no root: any rho, kappa_1, kappa_2."""
     any_rho, k1, k2 = sp.symbols("rho k1 k2", positive=True)
-    root = sharp.largest_ratio(any_rho, k1, k2)
+    root = energy_norms.largest_ratio(any_rho, k1, k2)
     assert zero(sp.expand(root**2 - (sp.sqrt(any_rho) + k1) * root - k2))
     assert not zero(sp.expand(root**2 - (any_rho + k1) * root - k2))
     assert not zero(sp.expand(root**2 - (sp.sqrt(any_rho) + k1) * root + k2))
@@ -85,7 +86,7 @@ def test_no_x_above_r_satisfies_the_inequality_that_bounds_x():
 def test_r_grows_with_rho_and_with_both_kappas():
     """By the equation of r: r' (2 r - s - kappa_1) = (s' + kappa_1') r + kappa_2'."""
     root, k1, k2 = sp.symbols("root k1 k2", positive=True)
-    ratio = sharp.largest_ratio(root**2, k1, k2)
+    ratio = energy_norms.largest_ratio(root**2, k1, k2)
     here = {root: s, k1: kappa_1, k2: kappa_2}
     for symbol in (root, k1):
         assert zero(sp.diff(ratio, symbol).subs(here) - r / (2 * r - s - kappa_1))
@@ -99,16 +100,16 @@ def test_r_grows_with_rho_and_with_both_kappas():
 
 
 def test_the_work_at_r_is_minus_sqrt_rho_r():
-    assert zero(sharp.work(RATIO, *FRICTION) + s * r)
-    assert not zero(sharp.work(RATIO, *FRICTION) + rho * r)
-    assert not zero(sharp.work(RATIO, *FRICTION) - s * r)
+    assert zero(energy_norms.work(RATIO, *FRICTION) + s * r)
+    assert not zero(energy_norms.work(RATIO, *FRICTION) + rho * r)
+    assert not zero(energy_norms.work(RATIO, *FRICTION) - s * r)
 
 
 def test_the_largest_work_is_kappa_2_plus_a_quarter_of_kappa_1_squared_at_half_kappa_1_below_r():
-    number = sharp.friction_number(*FRICTION)
-    assert zero(number - sharp.work(x, *FRICTION) - (x - kappa_1 / 2) ** 2)
-    assert not zero(number - sharp.work(x, *FRICTION) - (x + kappa_1 / 2) ** 2)
-    assert not zero(kappa_2 + kappa_1**2 / 2 - sharp.work(x, *FRICTION) - (x - kappa_1 / 2) ** 2)
+    number = energy_norms.friction_number(*FRICTION)
+    assert zero(number - energy_norms.work(x, *FRICTION) - (x - kappa_1 / 2) ** 2)
+    assert not zero(number - energy_norms.work(x, *FRICTION) - (x + kappa_1 / 2) ** 2)
+    assert not zero(kappa_2 + kappa_1**2 / 2 - energy_norms.work(x, *FRICTION) - (x - kappa_1 / 2) ** 2)
     assert positive(RATIO - kappa_1 / 2)
     assert not positive(RATIO - 2 * kappa_1)
 
@@ -117,23 +118,23 @@ def test_at_r_the_right_hand_side_is_a_square():
     assert zero(right_side(RATIO) - (1 - theta * (1 + s * r)) ** 2)
     assert not zero(right_side(RATIO) - (1 - theta * (1 + rho * r)) ** 2)
     assert not zero(right_side(RATIO) - (1 - theta * (1 - s * r)) ** 2)
-    assert zero(1 - right_side(RATIO) - sharp.one_minus_end(theta, *DATA))
-    assert not zero(1 + right_side(RATIO) - sharp.one_minus_end(theta, *DATA))
+    assert zero(1 - right_side(RATIO) - energy_norms.one_minus_end(theta, *DATA))
+    assert not zero(1 + right_side(RATIO) - energy_norms.one_minus_end(theta, *DATA))
 
 
 def test_the_vertex_and_its_value_are_those_of_the_branch_inside(monkeypatch):
     slope = lambda at: sp.diff(right_side(x), x).subs(x, at)
     assert zero(slope(VERTEX))
     assert not zero(slope(2 * VERTEX))
-    assert zero(1 - right_side(VERTEX) - sharp.one_minus_inside(theta, *DATA))
-    assert not zero(1 - right_side(-VERTEX) - sharp.one_minus_inside(theta, *DATA))
-    assert not zero(1 - right_side(VERTEX / 2) - sharp.one_minus_inside(theta, *DATA))
-    monkeypatch.setattr(sharp, "turning_theta", lambda *data: sp.oo)  # every theta is below it
-    assert zero(sharp.worst_ratio(theta, *DATA) - VERTEX)
-    assert zero(sharp.one_minus_square(theta, *DATA) - 1 + right_side(VERTEX))
-    monkeypatch.setattr(sharp, "turning_theta", lambda *data: sp.S.Zero)  # every theta is above it
-    assert zero(sharp.worst_ratio(theta, *DATA) - RATIO)
-    assert zero(sharp.one_minus_square(theta, *DATA) - 1 + right_side(RATIO))
+    assert zero(1 - right_side(VERTEX) - energy_norms.one_minus_inside(theta, *DATA))
+    assert not zero(1 - right_side(-VERTEX) - energy_norms.one_minus_inside(theta, *DATA))
+    assert not zero(1 - right_side(VERTEX / 2) - energy_norms.one_minus_inside(theta, *DATA))
+    monkeypatch.setattr(energy_norms, "turning_theta", lambda *data: sp.oo)  # every theta is below it
+    assert zero(energy_norms.worst_ratio(theta, *DATA) - VERTEX)
+    assert zero(energy_norms.one_minus_square(theta, *DATA) - 1 + right_side(VERTEX))
+    monkeypatch.setattr(energy_norms, "turning_theta", lambda *data: sp.S.Zero)  # every theta is above it
+    assert zero(energy_norms.worst_ratio(theta, *DATA) - RATIO)
+    assert zero(energy_norms.one_minus_square(theta, *DATA) - 1 + right_side(RATIO))
 
 
 def test_below_2_over_2_plus_rho_the_quadratic_is_concave_and_from_there_on_it_grows():
@@ -175,10 +176,12 @@ def test_the_turning_theta_is_positive_below_1_and_at_most_2_over_2_plus_rho():
 
 
 def test_at_the_turning_theta_both_branches_have_the_same_value():
-    end, inside = (f(theta, *DATA).subs(theta, TURN) for f in (sharp.one_minus_end, sharp.one_minus_inside))
+    end, inside = (
+        f(theta, *DATA).subs(theta, TURN) for f in (energy_norms.one_minus_end, energy_norms.one_minus_inside)
+    )
     assert zero(end - inside)
     assert not zero(end + inside)
-    assert not zero(end - sharp.one_minus_inside(theta, rho, kappa_1, 2 * kappa_2).subs(theta, TURN))
+    assert not zero(end - energy_norms.one_minus_inside(theta, rho, kappa_1, 2 * kappa_2).subs(theta, TURN))
 
 
 def test_at_the_turning_theta_the_quadratic_is_level_at_r():
@@ -188,11 +191,13 @@ def test_at_the_turning_theta_the_quadratic_is_level_at_r():
 
 
 def test_with_kappa_1_q_has_no_kink_at_the_turning_theta_and_without_it_has_one():
-    end = sp.diff(plain(sharp.one_minus_end(theta, *DATA)), theta)
-    inside = sharp.slope_inside(theta, *DATA)
+    end = sp.diff(plain(energy_norms.one_minus_end(theta, *DATA)), theta)
+    inside = energy_norms.slope_inside(theta, *DATA)
     assert zero((end - inside).subs(theta, TURN))
     assert not zero((end + inside).subs(theta, TURN))
-    frictionless = [sp.diff(f(theta, rho, 0, 0), theta) for f in (sharp.one_minus_end, sharp.one_minus_inside)]
+    frictionless = [
+        sp.diff(f(theta, rho, 0, 0), theta) for f in (energy_norms.one_minus_end, energy_norms.one_minus_inside)
+    ]
     assert not zero((frictionless[0] - frictionless[1]).subs(theta, 2 / (2 + rho)))
 
 
@@ -208,7 +213,7 @@ def test_q_grows_from_the_turning_theta_on():
 
 def test_with_kappa_1_the_best_theta_is_below_the_turning_theta():
     """q^2 grows there already."""
-    slope = sp.cancel(sharp.slope_inside(theta, *DATA).subs(theta, TURN))
+    slope = sp.cancel(energy_norms.slope_inside(theta, *DATA).subs(theta, TURN))
     assert positive(-slope.subs(kappa_1, kappa_1 + d))
     assert not positive(slope.subs(kappa_1, kappa_1 + d))
-    assert positive(-sp.diff(sharp.one_minus_end(theta, *DATA), theta).subs(theta, TURN))
+    assert positive(-sp.diff(energy_norms.one_minus_end(theta, *DATA), theta).subs(theta, TURN))
