@@ -8,7 +8,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from decimal import Context, Decimal, InvalidOperation, localcontext
 from fractions import Fraction
-from typing import Any, Literal, get_args
+from typing import Any, Literal, TypeAlias, get_args
+
+#: What a user may write where a number is read exactly, see :func:`exact`.
+Numeric: TypeAlias = int | float | str | Fraction | Decimal
+
+#: A number of any type on which formulas are written: float, Decimal, Fraction, a symbol, an interval.  These have no
+#: common class; see :func:`where` for branches.
+Scalar: TypeAlias = Any
 
 Level = Literal["exact", "verified", "guaranteed", "float"]
 
@@ -39,13 +46,13 @@ def weakest(levels: Iterable[Level]) -> Level:
     return max(levels, key=LEVELS.index, default="exact")
 
 
-def below(x: Any) -> float:
+def below(x: Fraction | Decimal) -> float:
     """The largest double that is at most a rational or a decimal."""
     nearest = float(x)
     return nearest if nearest <= x else math.nextafter(nearest, -math.inf)
 
 
-def above(x: Any) -> float:
+def above(x: Fraction | Decimal) -> float:
     """The smallest double that is at least a rational or a decimal."""
     nearest = float(x)
     return nearest if nearest >= x else math.nextafter(nearest, math.inf)
@@ -98,12 +105,12 @@ class Number:
             raise ValueError(f"value = {self.value}: needed lo = {self.lo} <= value <= hi = {self.hi}, all finite")
 
     @classmethod
-    def of_float(cls, value: Any) -> Number:
+    def of_float(cls, value: Scalar) -> Number:
         """Round any real scalar to a double; nothing is claimed about the error."""
         return cls(value=float(value))
 
     @classmethod
-    def enclosed(cls, value: Any, lo: Any, hi: Any, level: Level) -> Number:
+    def enclosed(cls, value: Scalar, lo: Scalar, hi: Scalar, level: Level) -> Number:
         """Round a rational or decimal to the nearest double and its ends outward.
 
         What was ``exact`` remains so where the double is the number, and is ``verified`` elsewhere.
@@ -126,7 +133,7 @@ class Number:
         return {"value": self.value, "lo": self.lo, "hi": self.hi, "level": self.level}
 
 
-def exact(value: Any) -> Fraction:
+def exact(value: Numeric) -> Fraction:
     """Read a number exactly as it was written.
 
     Parameters
@@ -201,7 +208,7 @@ def decimal(value: Fraction) -> Decimal:
     return Decimal(value.numerator) / Decimal(value.denominator)
 
 
-def sqrt(x: Any) -> Any:
+def sqrt(x: Scalar) -> Scalar:
     """The square root in the arithmetic of its argument.
 
     float, int, Decimal, a Fraction that is a square, and anything with a rational power (sympy, mpmath).
@@ -232,7 +239,7 @@ def sqrt(x: Any) -> Any:
     return x**0.5
 
 
-def where(condition: Any, a: Any, b: Any) -> Any:
+def where(condition: Scalar, a: Scalar, b: Scalar) -> Scalar:
     """``a`` where a condition holds, else ``b``: the branch of a formula, beside :func:`sqrt`.
 
     A formula takes no ``if`` on a scalar, so that it serves scalars whose comparisons are not decided at once.  Such a
@@ -257,16 +264,16 @@ def where(condition: Any, a: Any, b: Any) -> Any:
     return branch() if callable(branch) else branch
 
 
-def minimum(a: Any, b: Any) -> Any:
+def minimum(a: Scalar, b: Scalar) -> Scalar:
     """The smaller of two scalars."""
     return where(b < a, b, a)
 
 
-def maximum(a: Any, b: Any) -> Any:
+def maximum(a: Scalar, b: Scalar) -> Scalar:
     """The larger of two scalars."""
     return where(b > a, b, a)
 
 
-def absolute(x: Any) -> Any:
+def absolute(x: Scalar) -> Scalar:
     """The modulus of a scalar."""
     return where(x < 0, -x, x)
