@@ -2,7 +2,7 @@
 
 Every formula is written over any scalar (float, Decimal, Fraction where roots are rational, sympy, mpmath, an interval,
 an object that records the operations made with it) and free of the cancellation that the printed form suffers; branches
-go through :func:`ndtheory.number.where`.  Docstrings give the equation, ``tests/ndtheory`` a second derivation.  With
+go through :func:`ndtheory.scalar.where`.  Docstrings give the equation, ``tests/ndtheory`` a second derivation.  With
 u = m all m, M, u and x = C_K are stresses and G is a stress cubed; C_R, theta, C_T, P, D, Q, C_0, C_1, C_6 are numbers.
 
 The two editions are one set of formulas.  The paper's bracket ``M C_R + C_K + sqrt(C_K m) + 1`` in (5.30)
@@ -25,21 +25,8 @@ from typing import Any, Literal
 
 from ndtheory.constants import Constants, Corner, inside, relaxation_factor
 from ndtheory.errors import HypothesisError
-from ndtheory.number import (
-    DIGITS,
-    SLACK,
-    Number,
-    Numeric,
-    Scalar,
-    decimal,
-    maximum,
-    minimum,
-    rounded,
-    sqrt,
-    weakest,
-    where,
-    working_precision,
-)
+from ndtheory.number import DIGITS, SLACK, Number, Numeric, decimal, rounded, weakest, working_precision
+from ndtheory.scalar import Scalar, maximum, minimum, sqrt, where
 
 Conclusion = Literal["contraction", "no conclusion"]
 

@@ -11,7 +11,7 @@ So by (5.24) ``q(theta)^2``, the largest ``(1-theta)^2 + 2 theta (1-theta) f(x) 
 bounds the square of the Lipschitz constant of T_theta.  The proof, step by step, is in ``docs/energy.md``.
 
 Every formula is written over any scalar (float, Decimal, Fraction where roots are rational, sympy, mpmath, an interval,
-an object that records the operations made with it); branches go through :func:`ndtheory.number.where`.  All arguments
+an object that records the operations made with it); branches go through :func:`ndtheory.scalar.where`.  All arguments
 and results are numbers without unit.
 
 r grows with rho, kappa_1 and kappa_2, and at each x in [0, r] the expression above does, as 0 < theta <= 1: so does q.
@@ -31,20 +31,8 @@ from ndtheory.bounds import MARGIN, Conclusion, factor_and_rest
 from ndtheory.constants import inside, relaxation_factor
 from ndtheory.energy import EnergyConstants
 from ndtheory.energy_bounds import EnergyBounds
-from ndtheory.number import (
-    SLACK,
-    Numeric,
-    Scalar,
-    absolute,
-    decimal,
-    maximum,
-    minimum,
-    rounded,
-    sqrt,
-    weakest,
-    where,
-    working_precision,
-)
+from ndtheory.number import SLACK, Numeric, decimal, rounded, weakest, working_precision
+from ndtheory.scalar import Scalar, absolute, maximum, minimum, sqrt, where
 
 #: Halvings of an interval inside (0, 1) until theta is known to far below a double.
 HALVINGS = 80

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from ndtheory.errors import HypothesisError
-from ndtheory.number import Scalar
+from ndtheory.scalar import Scalar
 
 #: Steps in which slopes and zones are sought, in thicknesses, from coarse to fine.
 STEPS = [Fraction(1, 2**j) for j in (1, 2, 3, 4, 5, 6)]

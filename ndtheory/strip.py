@@ -21,7 +21,7 @@ from itertools import pairwise
 
 from ndtheory.intervals import Interval, sinc
 from ndtheory.moduli import Moduli
-from ndtheory.number import Scalar
+from ndtheory.scalar import Scalar
 
 #: Wave numbers from one to another, or to infinity.
 Part = tuple[Fraction, Fraction | None]
