@@ -17,7 +17,6 @@ from verification import threads
 from verification.bounds.bound import Region
 from verification.bounds.region import Plane, Point
 from verification.certificate.continuum import certify_continuum
-from verification.cli import notebook
 from verification.threads import one_thread
 
 THREADS = 8
@@ -74,10 +73,6 @@ def results() -> dict[str, object]:
     return {name: make(problem(10)) for name, make in KINDS.items()}
 
 
-def test_every_result_that_has_a_screen_is_among_the_kinds(results):
-    assert set(notebook.SCREENS) <= {type(result) for result in results.values()}
-
-
 def test_views_made_in_threads_are_those_of_one_thread(results, in_threads):
     alone = {name: result._repr_html_() for name, result in results.items()}
     names = [*results] * (100 if AT_NIGHT else 10)
@@ -86,10 +81,10 @@ def test_views_made_in_threads_are_those_of_one_thread(results, in_threads):
     assert [name for name, view in zip(names, views, strict=True) if view != alone[name]] == []
 
 
-def test_parts_of_a_report_made_in_threads_are_those_of_one_thread(results, in_threads):
+def test_sections_made_in_threads_are_those_of_one_thread(results, in_threads):
     comparison = results["Comparison"]
-    alone, times = notebook.report(comparison), 200 if AT_NIGHT else 24
-    assert in_threads(lambda _: notebook.report(comparison), range(times)) == [alone] * times
+    alone, times = comparison.sections(), 200 if AT_NIGHT else 24
+    assert in_threads(lambda _: comparison.sections(), range(times)) == [alone] * times
 
 
 def test_numbers_found_in_threads_are_those_of_one_thread(in_threads):

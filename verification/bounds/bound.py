@@ -146,6 +146,11 @@ class BoundResult:
         return "float" if self.factor is None else self.factor.level
 
     @property
+    def computed(self) -> bool:
+        """Whether there is anything to show."""
+        return self.detail is not None or not self.not_computed
+
+    @property
     def marked(self) -> bool:
         """Whether some number is more than one in doubles."""
         numbers = (self.factor, self.friction.every, self.friction.some)
@@ -252,6 +257,18 @@ class Bound(ABC):
             raise NotComputed(found.not_computed or "needed a law of friction to vary k")
         interval = lambda k: self.evaluate(subject.at(k)).interval
         return trace(interval, every=found.friction.every.value, some=found.friction.some.value)
+
+    def remarks(self, result: BoundResult | None, unit: str) -> tuple[str, ...]:
+        """What must be said beside figures of this bound.
+
+        Parameters
+        ----------
+        result : BoundResult or None
+            None beside a region.
+        unit : str
+            That of stress.
+        """
+        return ()
 
     def absent(self, why: str) -> BoundResult:
         """The result where nothing was worked out."""

@@ -1,0 +1,28 @@
+"""The matrices that advice was given for."""
+
+from __future__ import annotations
+
+from verification.advice.seen_matrices import SeenMatrices
+from verification.sections.numbers import figures
+from verification.sections.parts import Note, Section
+
+
+def given(seen: SeenMatrices) -> Section:
+    """What was seen of the matrices."""
+    of = [f"S{body}: {one.rows} unknowns" for body, one in ((1, seen.S1), (2, seen.S2))]
+    if seen.transfer is not None and seen.neumann_body is not None:
+        rows, columns = seen.transfer
+        of.append(f"P: {rows} x {columns}, from body {seen.neumann_body} to body {3 - seen.neumann_body}")
+    said = ["; ".join(of)]
+    if seen.ordering is None:
+        said.append("Ordering: any, so long as both have the same.")
+    else:
+        said.append(f"Ordering assumed: {seen.ordering}.")
+    said += [f"Note: {words}." for words in seen.notes]
+    for found in seen.lanczos:
+        ends = f"rho {figures(found.rho, 6)}, residual {found.residual:.1e}"
+        least = f"least {figures(found.rho_min)}, residual {found.residual_min:.1e}"
+        said.append(f"Lanczos, Neumann body {found.neumann_body}: {ends}; {least}; steps: {found.steps}.")
+    if seen.lanczos:
+        said.append("An eigenvalue lies within each residual; rho is at least what was found, not proved to be it.")
+    return Section(id="given", title="WHAT WAS GIVEN?", parts=tuple(map(Note, said)))
