@@ -14,12 +14,13 @@ from verification.sections import logs, moduli
 from verification.sections.advised import pasted, which_body
 from verification.sections.matrices import given
 from verification.sections.numbers import NONE, count, figures, near_one
-from verification.sections.parts import Block, Cell, Next, Note, Section, Sections, Shown, closing, following, table
+from verification.sections.parts import Block, Cell, Next, Section, Sections, closing, following, of, section, table
 from verification.sections.setting import outside_the_theorem
 
 NAMES = {1: "body 1", 2: "body 2", None: "as in that run"}
 
 
+@of.register
 def sections(found: Advice) -> Sections:
     """The sections."""
     return moduli.sections(found, found.moduli) if found.moduli is not None else tuple(_sections(found))
@@ -43,7 +44,7 @@ def _sections(found: Advice) -> Iterator[Section]:
         yield from _friction(found)
         yield _paste(found)
         if found.quote is not None:
-            yield Section(id="quote", title="TO QUOTE", parts=(Note(found.quote),))
+            yield section("quote", "TO QUOTE", found.quote)
     yield _end(found)
 
 
@@ -97,7 +98,7 @@ def _which_body(found: Advice) -> Section:
         neumann, contact = NAMES[found.neumann_body], f"{NAMES[3 - found.neumann_body]}, the contact body,"
     writes = "reads forces and writes displacements", "reads displacements and writes forces"
     said.append(f"The solver of {neumann} {writes[0]}, that of {contact} {writes[1]}.")
-    return which_body(*map(Note, said))
+    return which_body(*said)
 
 
 def _which_theta(found: Advice) -> Section:
@@ -139,7 +140,7 @@ def _which_theta(found: Advice) -> Section:
             takes = f'theta = "auto" takes {float(auto.theta):.4g}, the {auto.source} one: {auto.why}'
             said.append(f"{NAMES[role.neumann_body]}: {takes}")
     lines = table(("Neumann", "rho", "", "theta", "rate", "steps", ""), rows)
-    return Section(id="theta", title="WHICH THETA?", parts=(lines, *map(Note, said)))
+    return section("theta", "WHICH THETA?", lines, *said)
 
 
 def _at_predicted(role: Role) -> str:
@@ -163,7 +164,7 @@ def _friction(found: Advice) -> Iterator[Section]:
         if role.friction_threshold is not None:
             allowed = f"every small theta contracts for k < {figures(role.friction_threshold)}"
             said[NAMES[role.neumann_body]] = f"{allowed} (here k = {figures(found.friction, 2)})"
-    yield Section(id="friction", title="HOW MUCH FRICTION IS PROVED?", parts=tuple(map(Note, _together(said))))
+    yield section("friction", "HOW MUCH FRICTION IS PROVED?", *_together(said))
 
 
 def _together(said: Mapping[str, str]) -> list[str]:
@@ -196,7 +197,8 @@ def _paste(found: Advice, *more: str) -> Section:
 def snippets(found: Advice, library: str) -> Sections:
     """The whole blocks for a library, or for all of them, each below its name."""
     names = list(SNIPPETS) if library == "all" else [library]
-    blocks: dict[str, tuple[Shown, ...]] = {name: (Block(tuple(found.snippet(name).split("\n"))),) for name in names}
+    titles = names if library == "all" else [""]
     return tuple(
-        Section(id=name, title=name if library == "all" else "", parts=block) for name, block in blocks.items()
+        section(name, title, Block(tuple(found.snippet(name).split("\n"))))
+        for name, title in zip(names, titles, strict=True)
     )

@@ -10,13 +10,33 @@ from verification.bounds.calculated import Calculated
 from verification.bounds.table import BOUNDS
 from verification.ledger.record import on_the_printed_proof
 from verification.sections.numbers import LEGEND, NONE, at_least, factor, figures, interval, marked
-from verification.sections.parts import Cell, Facts, Note, Quantity, Section, Sections, Shown, Table, closing, table
+from verification.sections.parts import (
+    Cell,
+    Facts,
+    Note,
+    Quantity,
+    Section,
+    Sections,
+    Shown,
+    Table,
+    closing,
+    of,
+    section,
+    table,
+)
 
 #: The constants of Section 5 that follow from those that are given.
 DERIVED = ("C_T", "C0", "C1", "C2", "C3", "C4", "C5", "C6")
 
+#: What the table of bounds shows.
+CAPTION = (
+    "Each bound that follows from the constants: the friction k below which every small theta, and some theta, "
+    "contracts; the theta allowed at the friction of this problem; by which factor one step of this run multiplies the "
+    "error at most."
+)
 
-def bounds(rows: Sequence[BoundResult], unit: str) -> list[Shown]:
+
+def bounds(rows: Sequence[BoundResult], unit: str) -> list[Shown | str]:
     """The bounds that were worked out, and what is to be said of each.
 
     Parameters
@@ -42,7 +62,7 @@ def bounds(rows: Sequence[BoundResult], unit: str) -> list[Shown]:
     )
     notes = [words for row in results for words in BOUNDS[row.name].remarks(row, unit)]
     notes += [LEGEND] * any(row.marked for row in found)
-    return [Table(heads, tuple(lines)), *map(Note, notes)]
+    return [Table(heads, tuple(lines)), *notes]
 
 
 def _allowed(row: BoundResult) -> list[Cell]:
@@ -61,16 +81,11 @@ def _allowed(row: BoundResult) -> list[Cell]:
 
 def contracts(rows: Sequence[BoundResult], unit: str, why: str = "") -> Section:
     """The bounds that follow from the constants, or why there is none."""
-    return Section(
-        id="bounds",
-        title="DOES ONE STEP CONTRACT?",
-        parts=tuple(bounds(rows, unit)) or (Note(f"no bound applies: {why}"),),
-        caption="Each bound that follows from the constants: the friction k below which every small theta, and some "
-        "theta, contracts; the theta allowed at the friction of this problem; by which factor one step of this run "
-        "multiplies the error at most.",
-    )
+    parts = bounds(rows, unit) or [f"no bound applies: {why}"]
+    return section("bounds", "DOES ONE STEP CONTRACT?", *parts, caption=CAPTION)
 
 
+@of.register
 def sections(found: Calculated) -> Sections:
     """The sections of the calculator."""
     facts = []
@@ -84,7 +99,7 @@ def sections(found: Calculated) -> Sections:
     section_5 = {name: detail for name, detail in details.items() if isinstance(detail, Bounds)}
     unproved = not all(detail.proved for detail in section_5.values())
     return (
-        Section(id="setting", parts=tuple(Facts("", (fact,)) for fact in facts)),
+        section("setting", "", *map(Facts, facts)),
         contracts(list(found.results.values()), "the unit of --m"),
         *([_derived(section_5)] if section_5 else []),
         *thetas(details.values()),
@@ -103,7 +118,7 @@ def _derived(found: dict[str, Bounds]) -> Section:
         unit = f"on {on}" if name in ("C2", "C3", "C4", "C5") else "1"
         rows.append((name, *(figures(getattr(b, name), 6, unit) for b in found.values()), unit))
     lines = table(("", *found, "unit"), rows, right=range(1, len(found) + 1))
-    return Section(id="derived", title="THE CONSTANTS OF SECTION 5", parts=(lines,))
+    return section("derived", "THE CONSTANTS OF SECTION 5", lines)
 
 
 def thetas(details: Iterable[object]) -> Sections:
@@ -117,12 +132,7 @@ def thetas(details: Iterable[object]) -> Sections:
         rest = "proved too: there is no friction" if energy.friction_multiple is None else "2/(2 + rho), not a bound"
         predicted = ("predicted", figures(energy.theta_predicted), figures(energy.rate_predicted), rest)
         proved = ("proved", theta, NONE if energy.theta_proved is None else least, why)
-        found.append(
-            Section(
-                id="thetas",
-                title="WHICH THETA?",
-                parts=(table(("", "theta", "factor", ""), (proved, predicted)),),
-                caption="The theta with the least proved factor, and the one that rho alone suggests.",
-            )
-        )
+        lines = table(("", "theta", "factor", ""), (proved, predicted))
+        caption = "The theta with the least proved factor, and the one that rho alone suggests."
+        found.append(section("thetas", "WHICH THETA?", lines, caption=caption))
     return tuple(found)

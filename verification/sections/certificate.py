@@ -7,11 +7,12 @@ from pathlib import Path
 from verification.bounds.table import BOUNDS
 from verification.certificate.contraction import Certificate, Checked
 from verification.sections.numbers import near_one
-from verification.sections.parts import Facts, Note, Section, Sections, closing, following
+from verification.sections.parts import Facts, Note, Sections, closing, following, of, section
 
 CLAIMS = "anything about the continuum"
 
 
+@of.register
 def sections(found: Certificate, target: Path | None = None) -> Sections:
     """The sections; ``target`` is where the certificate is written."""
     discrete, claim = found.discrete, []
@@ -28,29 +29,30 @@ def sections(found: Certificate, target: Path | None = None) -> Sections:
         f" definite for the rational data of the problem, in balls of {found.claim['bits']} bits."
     )
     then = following("certify", "-o", "certificate.json", iteration=True)
-    about = Facts(f"{found.problem.title}: {nodes} nodes, {len(discrete['weights'])} contact nodes", ())
+    about = f"{found.problem.title}: {nodes} nodes, {len(discrete['weights'])} contact nodes"
     bodies = f"k = {float(found.problem.contact.friction):g}, Neumann body {discrete['neumann_body']}"
     return (
-        Section(id="setting", parts=(about, Facts("", (bodies,)))),
-        Section(id="proved", title="WHAT IS PROVED?", parts=tuple(map(Note, claim))),
-        Section(id="proof", title="BY WHAT?", parts=(Note(proof),)),
+        section("setting", "", Facts(about), Facts(bodies)),
+        section("proved", "WHAT IS PROVED?", *claim),
+        section("proof", "BY WHAT?", proof),
         closing(CLAIMS, then=then if target is None else f"ndtheory certify --check {target}"),
     )
 
 
+@of.register
 def checked(found: Checked) -> Sections:
     """The sections of a check."""
-    said = [Note("ACCEPTED: the claim holds for these bodies" if found.accepted else "REFUSED")]
+    said: list[Note | str] = ["ACCEPTED: the claim holds for these bodies" if found.accepted else "REFUSED"]
     if found.why:
         said.append(Note(found.why, 4))
     if found.same is not None and found.problem is not None:
-        said.append(Note(f"The bodies {'are those' if found.same else 'ARE NOT those'} of {found.problem.source}."))
+        said.append(f"The bodies {'are those' if found.same else 'ARE NOT those'} of {found.problem.source}.")
     else:
-        said.append(Note("Whose bodies these are was not compared: give the problem file, too."))
+        said.append("Whose bodies these are was not compared: give the problem file, too.")
     what = (*found.words.split("; "), f"sha256 {found.sha256}")
     then = "python check.py CERTIFICATE (verification/certificate/check.py, alone)"
     return (
-        Section(id="checked", title="WHAT WAS CHECKED?", parts=tuple(map(Note, what))),
-        Section(id="proved", title="IS IT PROVED?", parts=tuple(said)),
+        section("checked", "WHAT WAS CHECKED?", *what),
+        section("proved", "IS IT PROVED?", *said),
         closing(CLAIMS, then=then),
     )

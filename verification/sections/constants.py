@@ -7,13 +7,14 @@ from collections.abc import Mapping, Sequence
 from verification.constants import ENERGY_NAMES, NAMES, Measured
 from verification.interface import assembly
 from verification.sections.numbers import between, figures
-from verification.sections.parts import Note, Section, Sections, Shown, closing, following, table
+from verification.sections.parts import Note, Section, Sections, Shown, closing, following, of, section, table
 from verification.sections.setting import setting
 
 #: The constants that a comparison shows.
 COMPARED = ("m", "M", "C_R", "C_s", "C_tr", "C_K", "rho_max")
 
 
+@of.register
 def sections(measured: Measured) -> Sections:
     """The sections; none of constants that come from matrices alone."""
     problem = measured.problem
@@ -39,15 +40,11 @@ def sections(measured: Measured) -> Sections:
     mesh = "On a mesh m is above and M below its continuous value"
     unsafe = "for the continuous theorem both err on the unsafe side"
     then = following("advise" if measured.interface_nodes > assembly.MOST_CONTACT_NODES else "compare")
+    title = "WHAT DOES THE THEOREM NEED TO KNOW?"
+    caption = "The constants on this mesh: those of Section 5, then rho and those of the theorem in energy norms."
     return (
         setting(problem, measured.nodes, measured.interface_nodes),
-        Section(
-            id="all constants",
-            title="WHAT DOES THE THEOREM NEED TO KNOW?",
-            parts=tuple(parts),
-            caption="The constants on this mesh: those of Section 5, then rho and those of the theorem in energy "
-            "norms.",
-        ),
+        section("all constants", title, *parts, caption=caption),
         closing("", Note(ends, 0), Note(f"{mesh}: {unsafe}.", 0), then=then),
     )
 
@@ -63,12 +60,8 @@ def compared(measured: Measured) -> Section:
             Note(f"m = {m} {stress}, M = {M} {stress}, C_R = {C_R}"),
             Note(f"C_s = {C_s}, C_tr = {C_tr}, C_K = {C_K} {stress}, rho = {rho}"),
         ]
-    return Section(
-        id="constants",
-        title="HOW LARGE ARE THE CONSTANTS?",
-        parts=tuple(parts),
-        caption="The constants of the theorem on this mesh, with the bounds proved of them.",
-    )
+    caption = "The constants of the theorem on this mesh, with the bounds proved of them."
+    return section("constants", "HOW LARGE ARE THE CONSTANTS?", *parts, caption=caption)
 
 
 def _units(measured: Measured) -> Mapping[str, str]:

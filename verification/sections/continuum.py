@@ -8,7 +8,7 @@ from typing import Any
 from ndtheory.number import directed
 from verification.certificate.continuum import ContinuumCertificate
 from verification.sections.numbers import figures
-from verification.sections.parts import Cell, Facts, Note, Quantity, Section, Sections, closing, following, table
+from verification.sections.parts import Cell, Facts, Quantity, Section, Sections, closing, following, of, section, table
 
 
 def _at_most(number: Mapping[str, float] | None, unit: str = "") -> Cell:
@@ -27,24 +27,19 @@ def _few(value: float, up: bool) -> str:
     return f"{float(directed(value, 4, up=up)):.4g}"
 
 
+@of.register
 def sections(found: ContinuumCertificate) -> Sections:
     """The sections."""
     problem, document = found.problem, found.content()
     stress, length = problem.units["stress"], problem.units["length"]
     radius = [] if problem.contact.radius is None else [f"r = {float(problem.contact.radius):g} {length}"]
-    body = "lower" if problem.iteration.neumann_body == 1 else "upper"
+    body = f"Neumann body: {'lower' if problem.iteration.neumann_body == 1 else 'upper'}"
     friction = ", ".join([f"k = {float(found.friction):g}", *radius])
     return (
-        Section(
-            id="setting",
-            parts=(
-                Facts(f"{problem.title}: the continuous problem, no mesh", ()),
-                Facts("", (f"Neumann body: {body}", friction)),
-            ),
-        ),
+        section("setting", "", Facts(f"{problem.title}: the continuous problem, no mesh"), Facts(body, (friction,))),
         _used(found, document["constants"], f"sqrt({stress}/{length})", f"sqrt({length}/{stress})"),
-        Section(id="continuum", title="DOES ONE STEP CONTRACT IN THE CONTINUUM?", parts=_contracts(found, document)),
-        Section(id="mesh", title="DOES IT CONTRACT ON THE MESH OF THE FILE?", parts=_on_the_mesh(found, document)),
+        section("continuum", "DOES ONE STEP CONTRACT IN THE CONTINUUM?", *_contracts(found, document)),
+        section("mesh", "DOES IT CONTRACT ON THE MESH OF THE FILE?", *_on_the_mesh(found, document)),
         closing(document["not_claimed"], then=following("compare", iteration=True)),
     )
 
@@ -66,10 +61,10 @@ def _used(found: ContinuumCertificate, constants: Mapping[str, Any], of_stress: 
         ("kappa_2", "kappa_2", _at_most, "", "k C_s C_t2"),
     )
     rows = [(name, bound(constants[key], unit), unit, by) for name, key, bound, unit, by in used]
-    return Section(id="used", title="WHAT WAS USED?", parts=(table(("bound", "", "unit", "by"), rows),))
+    return section("used", "WHAT WAS USED?", table(("bound", "", "unit", "by"), rows))
 
 
-def _contracts(found: ContinuumCertificate, document: Mapping[str, Any]) -> tuple[Note, ...]:
+def _contracts(found: ContinuumCertificate, document: Mapping[str, Any]) -> list[str]:
     k, threshold = float(found.friction), _few(document["friction_threshold"]["lo"], False)
     said = [f"Every small theta contracts for k < {threshold}: one fixed point, and (P1) has exactly one solution."]
     if document["friction_limit"] is not None:
@@ -88,16 +83,16 @@ def _contracts(found: ContinuumCertificate, document: Mapping[str, Any]) -> tupl
             said.append(f"theta = {document['theta']:g}: factor {_at_most(document['factor'])}, guaranteed.")
         elif document["theta"] is not None:
             said.append(f"theta = {document['theta']:g}: no conclusion.")
-    return tuple(map(Note, said))
+    return said
 
 
-def _on_the_mesh(found: ContinuumCertificate, document: Mapping[str, Any]) -> tuple[Note, ...]:
+def _on_the_mesh(found: ContinuumCertificate, document: Mapping[str, Any]) -> list[str]:
     """rho of the mesh beside rho of the continuum, and whether the theta contracts on both."""
     mesh, k = document["mesh"], document["friction"]
     name, limit = "rho" if k else "rho_normal", mesh["theta_limit"]
     if limit is None:
         finer = "The mesh may need a smaller theta than the continuum, and so may every finer one."
-        return Note(f"Not known. {mesh['reason']['rho']}."), Note(finer)
+        return [f"Not known. {mesh['reason']['rho']}.", finer]
     continuum = document["constants"][name] or document["constants"]["rho"]
     bound = "no bound" if continuum is None else f"{_at_most(continuum)}, guaranteed"
     nodes, where = mesh["interface_nodes"], " where all of Gamma_c sticks" if k else ""
@@ -117,4 +112,4 @@ def _on_the_mesh(found: ContinuumCertificate, document: Mapping[str, Any]) -> tu
             )
         else:
             said.append(f"{judged} does not contract on this mesh (float).")
-    return tuple(map(Note, said))
+    return said

@@ -10,7 +10,7 @@ from verification.advice.runs_with_friction import FrictionBounds
 from verification.advice.seen import Interval, LogBound, SeenLog
 from verification.sections.advised import next_run
 from verification.sections.numbers import NONE, rounded
-from verification.sections.parts import Cell, Note, Quantity, Section, Sections, Table, table
+from verification.sections.parts import Cell, Note, Quantity, Section, Sections, Table, section, table
 
 #: So many columns of all logs together are shown; the document holds every one.
 MOST_COLUMNS = 8
@@ -24,7 +24,7 @@ def assumed(found: Advice) -> Section:
     notes = [Note(f"Assumed: {found.assumes}.", 0)]
     if not found.tied and found.friction_bounds is None:
         notes.append(Note("With friction what follows may be false: add --friction.", 0))
-    return Section(id="assumed", parts=tuple(notes))
+    return section("assumed", "", *notes)
 
 
 def of_a_run(found: Advice, run: SeenRun) -> Sections:
@@ -35,22 +35,21 @@ def of_a_run(found: Advice, run: SeenRun) -> Sections:
         "A residual that rises and falls has no steady ratio: give 1.",
         "The relative residual |Tg - g|/|Tg| of coupling libraries tells other things.",
     )
-    parts = (*map(Note, notes), _readings(found.readings))
-    said = Section(id="rho", title="WHAT DOES THE RUN SAY OF RHO?", parts=parts)
+    said = section("rho", "WHAT DOES THE RUN SAY OF RHO?", *notes, _readings(found.readings))
     return (said, *_with_friction(found.friction_bounds), *([] if found.next is None else [next_run(found.next)]))
 
 
 def of_logs(found: Advice, interval: Interval) -> Sections:
     """What logs say of rho, alone and together, and which run is to be made next."""
     read = [_readings(found.readings)] if found.readings else []
-    notes = [] if read else [Note("Nothing: no residual falls, grows or stays steadily.")]
+    notes = [] if read else ["Nothing: no residual falls, grows or stays steadily."]
     if interval.contradiction is not None:
-        notes.append(Note(f"CONTRADICTION: {interval.contradiction}."))
+        notes.append(f"CONTRADICTION: {interval.contradiction}.")
     else:
         notes += _bound("least", interval.lo, found.logs) + _bound("most", interval.hi, found.logs)
     return (
         _seen(found.logs),
-        Section(id="rho", title="WHAT DO THEY SAY OF RHO?", parts=(*read, *notes)),
+        section("rho", "WHAT DO THEY SAY OF RHO?", *read, *notes),
         *_with_friction(found.friction_bounds),
         *([] if found.next is None else [next_run(found.next)]),
     )
@@ -58,19 +57,20 @@ def of_logs(found: Advice, interval: Interval) -> Sections:
 
 def _seen(logs: Sequence[SeenLog]) -> Section:
     """What the logs show, column by column."""
-    parts, room = [], MOST_COLUMNS
+    parts: list[Note | str] = []
+    room = MOST_COLUMNS
     for log in logs:
-        parts.append(Note(f"theta = {float(log.theta):.4g}, {log.form}, {log.file}"))
+        parts.append(f"theta = {float(log.theta):.4g}, {log.form}, {log.file}")
         for column in log.columns[:room]:
             parts.append(Note(f"{column.name}, {RESIDUALS.get(column.residual, column.residual)}: {column.says}", 4))
         room -= len(log.columns[:room])
         parts += [Note(words, 4) for words in log.notes]
     left = sum(len(log.columns) for log in logs) - MOST_COLUMNS
     if left > 0:
-        parts.append(Note(f"and {left} columns more, see --json"))
+        parts.append(f"and {left} columns more, see --json")
     steps = " and ".join(f"{n}" for n in sorted({log.steps for log in logs})) + " steps"
-    parts.append(Note(f"Assumed: theta constant in each run, no Aitken or quasi-Newton.  A ratio counts over {steps}."))
-    return Section(id="logs", title="WHAT DO THE LOGS SHOW?", parts=tuple(parts))
+    parts.append(f"Assumed: theta constant in each run, no Aitken or quasi-Newton.  A ratio counts over {steps}.")
+    return section("logs", "WHAT DO THE LOGS SHOW?", *parts)
 
 
 def _readings(readings: Sequence[RunReading]) -> Table:
@@ -82,12 +82,12 @@ def _readings(readings: Sequence[RunReading]) -> Table:
     return table(("reading", "rho", "if it is the right one"), rows)
 
 
-def _bound(which: str, bound: LogBound | None, logs: Sequence[SeenLog]) -> list[Note]:
+def _bound(which: str, bound: LogBound | None, logs: Sequence[SeenLog]) -> list[str]:
     if bound is None:
         return []
     source = f"theta = {float(bound.log.theta):.4g}: {bound.says}" if len(logs) > 1 else bound.says
     value = rounded(float(bound.value), 3, up=which == "most")
-    return [Note(f"rho is at {which} {value} given {bound.assumes} ({source})")]
+    return [f"rho is at {which} {value} given {bound.assumes} ({source})"]
 
 
 def _with_friction(bounds: FrictionBounds | None) -> Sections:
@@ -105,5 +105,4 @@ def _with_friction(bounds: FrictionBounds | None) -> Sections:
         near = f"Near the solution of the run at theta = {bounds.theta:.4g}, if contact does not change there, its"
         words = f"slowest mode has |1 + lambda| from {least} to {most}, and a smaller theta' takes at most"
         said.append(f"{near} {words} 1 - {gain} theta'/{bounds.theta:.4g} a step.")
-    said = said or ["Nothing."]
-    return (Section(id="with friction", title="WHAT IS PROVED WITH FRICTION?", parts=tuple(map(Note, said))),)
+    return (section("with friction", "WHAT IS PROVED WITH FRICTION?", *(said or ["Nothing."])),)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from verification.advice.seen_matrices import SeenMatrices
 from verification.sections.numbers import figures
-from verification.sections.parts import Note, Section
+from verification.sections.parts import Section, section
 
 
 def given(seen: SeenMatrices) -> Section:
@@ -25,4 +25,4 @@ def given(seen: SeenMatrices) -> Section:
         said.append(f"Lanczos, Neumann body {found.neumann_body}: {ends}; {least}; steps: {found.steps}.")
     if seen.lanczos:
         said.append("An eigenvalue lies within each residual; rho is at least what was found, not proved to be it.")
-    return Section(id="given", title="WHAT WAS GIVEN?", parts=tuple(map(Note, said)))
+    return section("given", "WHAT WAS GIVEN?", *said)

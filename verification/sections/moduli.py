@@ -8,7 +8,7 @@ from verification.advice.from_moduli import Corners, ModuliRole, SeenModuli, exc
 from verification.advice.roles import Advice
 from verification.sections.advised import next_run, pasted, which_body
 from verification.sections.numbers import figures, near_one
-from verification.sections.parts import Cell, Facts, Note, Section, Sections, Table, closing
+from verification.sections.parts import Cell, Facts, Section, Sections, Table, closing, section
 
 PLANES = {"strain": "plane strain", "stress": "plane stress", "3d": "three-dimensional"}
 ENDS: dict[Corners, str] = {
@@ -34,7 +34,7 @@ def sections(found: Advice, seen: SeenModuli) -> Sections:
     elif found.next is not None:
         last.append(next_run(found.next))
     return (
-        Section(id="setting", parts=(Facts("", (*each, PLANES[seen.bodies[0].plane])),)),
+        section("setting", "", Facts("", (*each, PLANES[seen.bodies[0].plane]))),
         _bounds(seen),
         _excluded(seen),
         _who(found, seen),
@@ -58,8 +58,7 @@ def _bounds(seen: SeenModuli) -> Section:
         "Proved for the continuum, where both bodies are homogeneous and isotropic near one inner point of Gamma_c, "
         "or near a corner of 90 degrees at its end; fine meshes come close. rho may be larger."
     )
-    title = "HOW LARGE IS RHO AT LEAST?"
-    return Section(id="bounds", title=title, parts=(Table(heads, tuple(rows)), Note(proved)))
+    return section("bounds", "HOW LARGE IS RHO AT LEAST?", Table(heads, tuple(rows)), proved)
 
 
 def _excluded(seen: SeenModuli) -> Section:
@@ -69,8 +68,8 @@ def _excluded(seen: SeenModuli) -> Section:
         bounds = seen.bounds(role)
         kinds = ((excluded_from(bounds.stick), stuck), (excluded_from(bounds.slide), "without friction"))
         found = [f"{figures(theta)} and above {where}" for theta, where in kinds if theta is not None]
-        notes.append(Note(f"body {role.neumann_body}: {', '.join(found) or 'none up to 1 is excluded'}"))
-    return Section(id="excluded", title="WHICH THETAS CANNOT CONTRACT ON FINE MESHES?", parts=tuple(notes))
+        notes.append(f"body {role.neumann_body}: {', '.join(found) or 'none up to 1 is excluded'}")
+    return section("excluded", "WHICH THETAS CANNOT CONTRACT ON FINE MESHES?", *notes)
 
 
 def _who(found: Advice, seen: SeenModuli) -> Section:
@@ -82,7 +81,7 @@ def _who(found: Advice, seen: SeenModuli) -> Section:
         says = f"Try body {found.neumann_body}: the bound is smaller. Two lower bounds prove no order of the roles."
         if free not in (None, found.neumann_body):
             says += f" Without friction body {free} has the smaller one."
-    return which_body(Note(says))
+    return which_body(says)
 
 
 def _start(started: Sequence[ModuliRole]) -> Section:
@@ -100,4 +99,4 @@ def _start(started: Sequence[ModuliRole]) -> Section:
     if not started:
         notes.append("None: a lower bound of rho gives no theta, 2/(2 + bound) can diverge.")
         notes.append("If the mirror image of a body fits into the other one, say --mirror.")
-    return Section(id="start", title="WHICH THETA TO START WITH?", parts=tuple(map(Note, notes)))
+    return section("start", "WHICH THETA TO START WITH?", *notes)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, replace
+from functools import singledispatch
 from typing import Any, Literal
 
 from ndtheory.number import Level
@@ -11,12 +12,6 @@ from ndtheory.texts import printable
 
 #: Where a result is shown.
 Place = Literal["terminal", "notebook", "report"]
-
-
-def _clean(value: Any) -> Any:
-    if isinstance(value, tuple):
-        return tuple(map(_clean, value))
-    return printable(value) if isinstance(value, str) else value
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,16 +31,22 @@ class Shown:
             object.__setattr__(self, each.name, _clean(getattr(self, each.name)))
 
 
+def _clean(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return tuple(map(_clean, value))
+    return printable(value) if isinstance(value, str) else value
+
+
 @dataclass(frozen=True)
 class Quantity(Shown):
-    """A number in a table or a sentence.
+    """A number, or the pair of numbers of an interval, with its unit and its level.
 
     Attributes
     ----------
     value : float or pair of float
-        The number, as it was computed; a pair for an interval.
+        As it was computed.
     text : str
-        The number as it is read: rounded, with the mark of its level.
+        As it is read: rounded, with the mark of its level.
     unit : str
         Empty for a pure number.
     level : {'exact', 'verified', 'guaranteed', 'float'}
@@ -66,31 +67,15 @@ Cell = str | Quantity
 
 @dataclass(frozen=True)
 class Facts(Shown):
-    """What is shown, and facts about it, in one line.
-
-    Attributes
-    ----------
-    about : str
-        A title; empty where the facts are about what stands above.
-    facts : tuple of str
-    """
+    """One line: a title, or an empty text where the title stands above, and facts."""
 
     about: str
-    facts: tuple[str, ...]
+    facts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Note(Shown):
-    """A sentence.
-
-    Attributes
-    ----------
-    text : str
-    indent : int
-        In columns of a terminal.
-    lead : str
-        Words before it that stand out.
-    """
+    """A sentence, indented by some columns of a terminal; the words before it, ``lead``, stand out."""
 
     text: str
     indent: int = 2
@@ -107,16 +92,7 @@ class Labelled(Shown):
 
 @dataclass(frozen=True)
 class Table(Shown):
-    """A table.
-
-    Attributes
-    ----------
-    heads : tuple of tuple of str
-        The lines of the head; the texts of one column belong together.
-    rows : tuple of tuple of str or Quantity
-    right : tuple of int
-        Columns that are aligned to the right.
-    """
+    """A table: the lines of its head, its rows, and which columns are aligned to the right."""
 
     heads: tuple[tuple[str, ...], ...]
     rows: tuple[tuple[Cell, ...], ...]
@@ -135,7 +111,7 @@ def table(head: Iterable[str], rows: Iterable[Iterable[Cell]], *, right: Iterabl
 
 @dataclass(frozen=True)
 class Block(Shown):
-    """Lines that stay as they are: to paste."""
+    """Lines that stay as they are, to paste."""
 
     lines: tuple[str, ...]
     indent: int = 0
@@ -143,17 +119,7 @@ class Block(Shown):
 
 @dataclass(frozen=True)
 class Next(Shown):
-    """The command to type next.
-
-    Attributes
-    ----------
-    words : tuple of str
-        The command with its options, or a text.
-    problem : bool
-        Whether the problem that was typed belongs after the first word.
-    iteration : bool
-        Whether the theta, the relaxation and the roles that were typed do, too.
-    """
+    """A command to type next; ``problem``: on the problem that was typed, ``iteration``: with its theta and roles."""
 
     words: tuple[str, ...]
     problem: bool = False
@@ -167,14 +133,6 @@ def following(*words: str, iteration: bool = False) -> Next:
 
 
 @dataclass(frozen=True)
-class Picture(Shown):
-    """A figure of the written report, and what it shows."""
-
-    name: str
-    caption: str
-
-
-@dataclass(frozen=True, kw_only=True)
 class Section(Shown):
     """Parts below one title.
 
@@ -187,36 +145,53 @@ class Section(Shown):
     parts : tuple of Shown
     caption : str
         What its table shows.
-    pictures : tuple of Picture
-        What stands below its parts, where there are figures.
+    pictures : tuple of pairs of str
+        The names of figures that stand below it in a report, and what they show.
     """
 
     id: str
-    title: str = ""
-    parts: tuple[Shown, ...] = ()
+    title: str
+    parts: tuple[Shown, ...]
     caption: str = ""
-    pictures: tuple[Picture, ...] = ()
+    pictures: tuple[tuple[str, str], ...] = ()
 
 
 Sections = tuple[Section, ...]
 
 
-def shown(sections: Iterable[Section], place: Place) -> Sections:
-    """The sections of one place, those that continue each other put together."""
-    found: list[Section] = []
-    for section in sections:
-        parts = tuple(part for part in section.parts if part.only in (None, place))
-        if section.only not in (None, place) or not (parts or section.title):
-            continue
-        if found and found[-1].id == section.id:
-            found[-1] = replace(found[-1], parts=found[-1].parts + parts)
-        else:
-            found.append(replace(section, parts=parts))
-    return tuple(found)
+@singledispatch
+def of(result: Any) -> Sections:
+    """The sections of a result; none of a kind that has none, which is shown as its document.
+
+    ``of.register`` takes a function of the results of a class: :mod:`verification.sections.of_results` knows ours.
+    """
+    return ()
+
+
+def section(
+    id: str, title: str, *parts: Shown | str, caption: str = "", pictures: tuple[tuple[str, str], ...] = ()
+) -> Section:
+    """A section; a text among its parts is a sentence."""
+    made = tuple(Note(part) if isinstance(part, str) else part for part in parts)
+    return Section(id, title, made, caption, pictures)
 
 
 def closing(claims: str, *notes: Note, then: Next | str = "") -> Section:
     """The end of a result: what it does not say, after other notes, and what to type next."""
     last = [Note(f"Not claimed: {claims}.", 0)] if claims else []
-    following = [Next((then,)) if isinstance(then, str) else then] if then else []
-    return Section(id="limits", parts=(*notes, *last, *following))
+    command = [Next((then,)) if isinstance(then, str) else then] if then else []
+    return section("limits", "", *notes, *last, *command)
+
+
+def shown(sections: Iterable[Section], place: Place) -> Sections:
+    """The sections of one place, those that continue each other put together."""
+    found: list[Section] = []
+    for each in sections:
+        parts = tuple(part for part in each.parts if part.only in (None, place))
+        if each.only not in (None, place) or not (parts or each.title):
+            continue
+        if found and found[-1].id == each.id:
+            found[-1] = replace(found[-1], parts=found[-1].parts + parts)
+        else:
+            found.append(replace(each, parts=parts))
+    return tuple(found)

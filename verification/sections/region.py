@@ -8,9 +8,10 @@ from shlex import quote
 from verification.bounds.region import MOST_STEPS, Plane
 from verification.bounds.table import BOUNDS
 from verification.sections.numbers import figures
-from verification.sections.parts import Facts, Note, Section, Sections, closing, table
+from verification.sections.parts import Facts, Sections, closing, of, section, table
 
 
+@of.register
 def sections(found: Plane, target: Path | None = None) -> Sections:
     """The sections; ``target`` is where the figure is drawn."""
     rows = []
@@ -29,9 +30,9 @@ def sections(found: Plane, target: Path | None = None) -> Sections:
     if strongest is not None:
         runs.append(f"the largest friction with a run that converged: k = {strongest:g}")
     return (
-        Section(id="setting", parts=(Facts(found.title, ()),)),
-        Section(id="regions", title="WHERE IS ONE STEP PROVED TO CONTRACT?", parts=(lines, *map(Note, notes))),
-        Section(id="runs", title="WHAT DID RUNS DO?", parts=tuple(map(Note, runs))),
+        section("setting", "", Facts(found.title)),
+        section("regions", "WHERE IS ONE STEP PROVED TO CONTRACT?", lines, *notes),
+        section("runs", "WHAT DID RUNS DO?", *runs),
         closing(
             "non-convergence outside a region, or anything on the continuum",
             then="" if target is None else f"open {quote(str(target))}",

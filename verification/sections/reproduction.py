@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from verification.reproduce.claims import CLAIMS, zones
 from verification.reproduce.experiments import Outcome, Reproduction, Result
-from verification.sections.parts import Facts, Note, Section, Sections, closing, table
+from verification.sections.parts import Facts, Section, Sections, closing, of, section, table
 
 
+@of.register
 def sections(found: Reproduction) -> Sections:
     """The sections."""
     about = "Section 6 of the paper, run again on its meshes; non-local law, r = 0.1 mm"
@@ -14,9 +15,9 @@ def sections(found: Reproduction) -> Sections:
     if len(found.results) > 1:
         said = f"{found.closest.name}: {found.reproduced(found.closest)} of {len(found.results)} reproduced"
         title = "WHICH READING COMES NEAREST TO ALL?"
-        figures.append(Section(id="nearest", title=title, parts=(Note(said),)))
+        figures.append(section("nearest", title, said))
     return (
-        Section(id="setting", parts=(Facts(about, ()),)),
+        section("setting", "", Facts(about)),
         *figures,
         closing("that the authors ran one of these readings", then="ndtheory sweep --help"),
     )
@@ -36,16 +37,9 @@ def _figure(result: Result) -> Section:
         assumed = "; ".join(", ".join([*reading.assumes, *reading.departs]) for reading in held[:3])
         notes.append(f"under the assumption that {assumed}")
     rows = [(_short(outcome), _word(outcome), _says(outcome)) for outcome in shown]
-    return Section(
-        id=result.figure,
-        title=f"{result.figure.upper()}: {result.verdict.upper()}",
-        parts=(
-            Note(f"the paper: {claim.says}"),
-            Note(f"reproduced means: {claim.criterion}"),
-            table(("reading", "", "what it shows"), rows),
-            *map(Note, notes),
-        ),
-    )
+    title = f"{result.figure.upper()}: {result.verdict.upper()}"
+    claims = f"the paper: {claim.says}", f"reproduced means: {claim.criterion}"
+    return section(result.figure, title, *claims, table(("reading", "", "what it shows"), rows), *notes)
 
 
 def _short(outcome: Outcome) -> str:

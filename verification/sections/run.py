@@ -9,11 +9,37 @@ from verification.interface.interface import Interface
 from verification.monolithic import Solution
 from verification.problem.specification import Problem
 from verification.sections.numbers import NONE, count, figures, near_one
-from verification.sections.parts import Cell, Labelled, Note, Picture, Section, Sections, Shown, following, table
-from verification.sections.parts import Quantity as Q
+from verification.sections.parts import (
+    Cell,
+    Labelled,
+    Note,
+    Quantity,
+    Section,
+    Sections,
+    Shown,
+    following,
+    of,
+    section,
+    table,
+)
 from verification.sections.setting import limits, setting
 
+#: What the table of a run shows, and its figures.
+RATES = (
+    "The rate by which one step multiplies the error in the long run, and the steps to the tolerance: as forecast half "
+    "way, as computed at the solution, and as seen."
+)
+PICTURES = (
+    ("residuals", "The residual step by step (points), and how each bound proves that it falls (lines)."),
+    (
+        "bodies",
+        "The bodies and what happens along Gamma_c: where its nodes stick, slip or are open, and the pressure and "
+        "shear they bear.",
+    ),
+)
 
+
+@of.register
 def sections(finished: Run) -> Sections:
     """The sections; none of a run on matrices alone."""
     if finished.problem is None:
@@ -41,39 +67,24 @@ def happened(finished: Run, *, alone: bool) -> Section:
         rows.append(("linearised at the solution", near_one(linear.rate), needed, f"afterwards{steady}"))
     seen: Cell = NONE if rate is None else near_one(rate.value)
     if finished.observed_growth is not None:
-        seen = Q(finished.observed_growth, f"grows by {finished.observed_growth:.4g}")
+        seen = Quantity(finished.observed_growth, f"grows by {finished.observed_growth:.4g}")
     rows.append(("observed", seen, count(finished.iterations), f"seen: {finished.outcome}"))
-    parts: list[Shown] = [table(("", "rate", "steps", ""), rows)]
+    parts: list[Shown | str] = [table(("", "rate", "steps", ""), rows)]
     if made is None and finished.relaxation == "constant" and alone:
-        parts.append(Note(f"no forecast: {finished.why_no_forecast}"))
+        parts.append(f"no forecast: {finished.why_no_forecast}")
     if linear is None:
-        parts.append(Note(f"not linearised: {finished.why_not_linearised}"))
+        parts.append(f"not linearised: {finished.why_not_linearised}")
     if finished.relaxation != "constant":
         proved = "" if finished.proved_rate is None else f"; proved rate {near_one(finished.proved_rate.value)}"
         evaluated = f"{finished.evaluations} evaluations of T"
-        parts.append(Note(f"{evaluated}, with the {finished.relaxation} relaxation{proved}"))
+        parts.append(f"{evaluated}, with the {finished.relaxation} relaxation{proved}")
     elif finished.choice.source != "given":
         chosen = f"theta = {float(finished.theta):.4g} is the {finished.choice.source} one"
-        parts.append(Note(f"{chosen}: {finished.choice.why}"))
+        parts.append(f"{chosen}: {finished.choice.why}")
     parts += _grids(finished.pair.contact_body, finished.pair.interface)
     parts += _contact(problem, finished.contact, f"; KKT residual of step II {finished.last.contact.kkt.residual:.1e}")
-    return Section(
-        id="run",
-        title="WHAT HAPPENED",
-        parts=(*parts, Note(_at_the_end(finished), only="report")),
-        caption="The rate by which one step multiplies the error in the long run, and the steps to the tolerance: as "
-        "forecast half way, as computed at the solution, and as seen.",
-        pictures=(
-            Picture(
-                "residuals", "The residual step by step (points), and how each bound proves that it falls (lines)."
-            ),
-            Picture(
-                "bodies",
-                "The bodies and what happens along Gamma_c: where its nodes stick, slip or are open, and the pressure "
-                "and shear they bear.",
-            ),
-        ),
-    )
+    parts.append(Note(_at_the_end(finished), only="report"))
+    return section("run", "WHAT HAPPENED", *parts, caption=RATES, pictures=PICTURES)
 
 
 def _at_the_end(finished: Run) -> str:
@@ -90,22 +101,17 @@ def _at_the_end(finished: Run) -> str:
     return " ".join(said)
 
 
+@of.register
 def solution(found: Solution) -> Sections:
     """The sections of the global method."""
     bodies = found.bodies
-    problem, certified = bodies.problem, f"KKT residual {found.kkt_residual:.1e}"
+    problem = bodies.problem
     then = following("run") if len(bodies.elastic) == 2 else following("solve", "-o", "results")
+    parts = (*_grids(problem.contact_body, bodies.interface), *_contact(problem, found.contact))
+    certified = f"KKT residual {found.kkt_residual:.1e} after {found.linear_solves} linear systems on Gamma_c"
     return (
         setting(problem, sum(len(body.mesh.points) for body in bodies.elastic), bodies.interface.contact.n),
-        Section(
-            id="solution",
-            title="WHAT IS THE SOLUTION?",
-            parts=(
-                *_grids(problem.contact_body, bodies.interface),
-                *_contact(problem, found.contact),
-                Note(f"{certified} after {found.linear_solves} linear systems on Gamma_c"),
-            ),
-        ),
+        section("solution", "WHAT IS THE SOLUTION?", *parts, certified),
         limits(bodies.outside, then),
     )
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from verification.interface.friction import LAWS
 from verification.problem.specification import Problem
 from verification.sections.numbers import figures
-from verification.sections.parts import Facts, Next, Note, Section, closing
+from verification.sections.parts import Facts, Next, Note, Section, closing, section
 
 
 def setting(problem: Problem, nodes: int | None, interface: int) -> Section:
@@ -26,7 +26,7 @@ def setting(problem: Problem, nodes: int | None, interface: int) -> Section:
     else:
         facts = [f"Neumann body: {body}", friction, _how(problem)]
     first = Facts(problem.title, (*counts, f"E {moduli} {units['stress']}"))
-    return Section(id="setting", parts=(first, Facts("", tuple(facts))))
+    return section("setting", "", first, Facts("", tuple(facts)))
 
 
 def _how(problem: Problem) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 
 from verification.problem.specification import Problem
 from verification.sections.numbers import NONE, count, figures, near_one
-from verification.sections.parts import Cell, Facts, Next, Note, Quantity, Section, Sections, closing, following, table
+from verification.sections.parts import Cell, Facts, Next, Quantity, Sections, closing, following, of, section, table
 from verification.sweeps.keeping import Plan
 from verification.sweeps.row import Row
 from verification.sweeps.sweep import Sweep
@@ -19,6 +19,7 @@ MOST_LINES = 24
 HEADS = {"young1": "E1", "young2": "E2", "neumann_body": "Neumann", "friction": "k"}
 
 
+@of.register
 def sections(found: Sweep, target: Path | None = None) -> Sections:
     """The sections; ``target`` is where the rows are written."""
     curves = [name for name in found.axes if name != "theta"]
@@ -40,19 +41,20 @@ def sections(found: Sweep, target: Path | None = None) -> Sections:
         of_file = found.problem is not None and found.problem.source != "<dict>"
         then = following("compare") if of_file else "ndtheory example"
     runs = f"{len(found.rows)} of {found.asked} runs" if found.interrupted else f"{found.asked} runs"
-    parts = (table(head, lines[:MOST_LINES], right=range(len(shown) + 5)), *map(Note, notes))
+    rows = table(head, lines[:MOST_LINES], right=range(len(shown) + 5))
     return (
-        Section(id="setting", parts=(Facts(_title(found.problem), (runs,)),)),
-        Section(id=id, title=title, parts=parts),
+        section("setting", "", Facts(_title(found.problem), (runs,))),
+        section(id, title, rows, *notes),
         closing("anything about a theta between those of the grid", then=then),
     )
 
 
+@of.register
 def plan(found: Plan) -> Sections:
     """What a sweep would do."""
     title = Facts(_title(found.problem), (f"{found.asked} runs",))
-    left = Note(f"{found.stored} are in the store, {found.left} are left; nothing was run")
-    return (Section(id="setting", parts=(title, left)),)
+    left = f"{found.stored} are in the store, {found.left} are left; nothing was run"
+    return (section("setting", "", title, left),)
 
 
 def _title(problem: Problem | None) -> str:
