@@ -55,7 +55,14 @@ class Document(Value, ABC):
         return self.schema
 
     def sections(self) -> tuple[Section, ...]:
-        """What the command shows of such a result, as data; empty where it has no command."""
+        """What the command and the written report show of such a result, as data.
+
+        Returns
+        -------
+        tuple of Section
+            Titles, sentences, tables whose cells are words or numbers with unit and level.  A part that belongs to one
+            place says so in ``only``.  Empty where nothing is shown but the document, as of matrices without a problem.
+        """
         found: tuple[Section, ...] = _above("sections.of_results", "of")(self)
         return found
 

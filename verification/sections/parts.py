@@ -24,7 +24,7 @@ class Shown:
         The one place where it is needed; None where it is in all of them.
     """
 
-    only: Place | None = None
+    only: Place | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         for each in fields(self):
@@ -124,7 +124,7 @@ class Next(Shown):
     words: tuple[str, ...]
     problem: bool = False
     iteration: bool = False
-    only: Place | None = field(default="terminal", kw_only=True)
+    only: Place | None = field(default="terminal", kw_only=True, repr=False)
 
 
 def following(*words: str, iteration: bool = False) -> Next:
