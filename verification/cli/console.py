@@ -215,12 +215,9 @@ def deliver(
     ----------
     document : Document
     sections : callable
-        Gives what is shown of it.
-    as_json : bool
-        Whether the document itself is shown instead.
-    write : callable, optional
-    folder : path, optional
-        What it writes.
+        Gives what is shown of it; ``as_json`` shows the document itself.
+    write, folder : callable and path, optional
+        What writes, and where.
     typing : callable, optional
         Completes the command to type next.
 

@@ -11,8 +11,7 @@ from verification.advice.roles import Advice
 from verification.advice.snippets import SNIPPETS
 from verification.problem.reading import takes_theta
 from verification.sections import logs, moduli
-from verification.sections.advised import pasted, which_body
-from verification.sections.matrices import given
+from verification.sections.advised import given, pasted, which_body
 from verification.sections.numbers import NONE, count, figures, near_one
 from verification.sections.parts import Block, Cell, Next, Section, Sections, closing, following, of, section, table
 from verification.sections.setting import outside_the_theorem

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from ndtheory.number import directed
@@ -11,16 +12,14 @@ from verification.sections.numbers import figures
 from verification.sections.parts import Cell, Facts, Quantity, Section, Sections, closing, following, of, section, table
 
 
-def _at_most(number: Mapping[str, float] | None, unit: str = "") -> Cell:
+def _at_most(number: Mapping[str, float] | None, unit: str = "", *, up: bool = True) -> Cell:
     if number is None:
         return "no bound"
-    return Quantity(number["hi"], f"<= {_few(number['hi'], True)}", unit, "guaranteed")
+    end, sign = (number["hi"], "<=") if up else (number["lo"], ">=")
+    return Quantity(end, f"{sign} {_few(end, up)}", unit, "guaranteed")
 
 
-def _at_least(number: Mapping[str, float] | None, unit: str = "") -> Cell:
-    if number is None:
-        return "no bound"
-    return Quantity(number["lo"], f">= {_few(number['lo'], False)}", unit, "guaranteed")
+_at_least = partial(_at_most, up=False)
 
 
 def _few(value: float, up: bool) -> str:
