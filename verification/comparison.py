@@ -129,7 +129,7 @@ class Comparison(Document):
     @property
     def computed(self) -> list[BoundResult]:
         """The bounds that were worked out."""
-        return [result for result in self.bounds.values() if result.computed]
+        return [result for result in self.bounds.values() if result.worked_out]
 
     @property
     def proved_violated(self) -> bool:

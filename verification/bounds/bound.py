@@ -141,14 +141,14 @@ class BoundResult:
     detail: Any = None
 
     @property
+    def worked_out(self) -> bool:
+        """True if there is something to show of the bound, be it only why it has no conclusion."""
+        return self.detail is not None or not self.not_computed
+
+    @property
     def level(self) -> Level:
         """That of the factor; ``float`` where there is none."""
         return "float" if self.factor is None else self.factor.level
-
-    @property
-    def computed(self) -> bool:
-        """Whether there is anything to show."""
-        return self.detail is not None or not self.not_computed
 
     @property
     def marked(self) -> bool:

@@ -70,10 +70,9 @@ def _after_a_problem(found: Advice) -> Next | str:
         return "ndtheory advise --help"
     if found.best.theta_auto is None:  # too large for a run
         return following("constants")
-    options = [] if found.roles[0].neumann_body == found.neumann_body else ["--swap-roles"]
-    if found.theta is not None and takes_theta(found.problem.iteration.relaxation):
-        options += ["--theta", f"{found.theta:g}"]
-    return following("run", *options)
+    taken = found.theta is not None and takes_theta(found.problem.iteration.relaxation)
+    theta = ["--theta", f"{found.theta:g}"] if taken else []
+    return following("run", *theta, exchanged=found.roles[0].neumann_body != found.neumann_body)
 
 
 def _which_body(found: Advice) -> Section:

@@ -45,7 +45,7 @@ def bounds(rows: Sequence[BoundResult], unit: str) -> list[Shown | str]:
     unit : str
         "MPa", or what the unit of stress is that of.
     """
-    results = [row for row in rows if row.computed]
+    results = [row for row in rows if row.worked_out]
     if not results:
         return []
     found = [row if row.proved else row.in_doubles() for row in results]

@@ -85,7 +85,7 @@ class Parts(Listener):
             self.show((section("losses", "WHAT DOES EACH ESTIMATE GIVE AWAY?", *parts, pictures=WATERFALL),))
 
     def programs(self, results: Sequence[BoundResult]) -> None:
-        parts = [*bounds(results, self.unit), *(f"{r.name}: {r.not_computed}" for r in results if not r.computed)]
+        parts = [*bounds(results, self.unit), *(f"{r.name}: {r.not_computed}" for r in results if not r.worked_out)]
         title = "WHAT DO SEMIDEFINITE PROGRAMS PROVE OF ONE STEP?"
         caption = "The same for the bound that takes the matrices of the bodies."
         if parts:

@@ -119,17 +119,28 @@ class Block(Shown):
 
 @dataclass(frozen=True)
 class Next(Shown):
-    """A command to type next; ``problem``: on the problem that was typed, ``iteration``: with its theta and roles."""
+    """A command to type next.
+
+    Attributes
+    ----------
+    words : tuple of str
+        A text, or a command and its options.
+    problem : bool
+        Whether the command is about the problem that was typed.
+    iteration, exchanged : bool
+        Whether it has the theta, the relaxation and the roles that were typed, and whether it exchanges the roles.
+    """
 
     words: tuple[str, ...]
     problem: bool = False
     iteration: bool = False
+    exchanged: bool = False
     only: Place | None = field(default="terminal", kw_only=True, repr=False)
 
 
-def following(*words: str, iteration: bool = False) -> Next:
+def following(*words: str, iteration: bool = False, exchanged: bool = False) -> Next:
     """A command for the problem that was typed."""
-    return Next(words, problem=True, iteration=iteration)
+    return Next(words, problem=True, iteration=iteration, exchanged=exchanged)
 
 
 @dataclass(frozen=True)
