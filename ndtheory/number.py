@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from decimal import Context, Decimal, InvalidOperation, localcontext
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal, InvalidOperation, localcontext
 from fractions import Fraction
 from typing import Any, Literal, TypeAlias, get_args
 
@@ -54,6 +54,20 @@ def above(x: Fraction | Decimal) -> float:
     """The smallest double that is at least a rational or a decimal."""
     nearest = float(x)
     return nearest if nearest >= x else math.nextafter(nearest, math.inf)
+
+
+def directed(x: float | Decimal | Fraction, digits: int, *, up: bool) -> Decimal:
+    """A number in a few significant figures, not below it (``up``) or not above it.
+
+    Examples
+    --------
+    >>> directed(Fraction(2, 3), 3, up=True), directed(-2 / 3, 3, up=True)
+    (Decimal('0.667'), Decimal('-0.666'))
+    """
+    context = Context(prec=digits, rounding=ROUND_CEILING if up else ROUND_FLOOR)
+    if isinstance(x, Fraction):
+        return context.divide(Decimal(x.numerator), Decimal(x.denominator))
+    return context.create_decimal(Decimal(x))
 
 
 @dataclass(frozen=True, kw_only=True)

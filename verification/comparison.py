@@ -130,7 +130,7 @@ class Comparison(Document):
     @property
     def computed(self) -> list[BoundResult]:
         """The bounds that were worked out."""
-        return [result for result in self.bounds.values() if result.detail is not None]
+        return [result for result in self.bounds.values() if result.worked_out]
 
     @property
     def proved_violated(self) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import importlib
 import json
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -14,6 +15,12 @@ from verification.value import Value
 if TYPE_CHECKING:
     from verification.figures import Figure
     from verification.problem import Problem
+    from verification.sections.parts import Section
+
+
+def _above(module: str, name: str) -> Any:
+    """What stands on a floor above, by name: results are shown there, and know nothing of it."""
+    return getattr(importlib.import_module(f"verification.{module}"), name)
 
 
 class Document(Value, ABC):
@@ -47,11 +54,22 @@ class Document(Value, ABC):
     def summary(self) -> str:
         return self.schema
 
-    def _repr_html_(self) -> str:
-        """Notebook view: what the screen of the command shows, or the document where there is no screen."""
-        from verification.cli.notebook import screen
+    def sections(self) -> tuple[Section, ...]:
+        """What the command and the written report show of such a result, as data.
 
-        return f"<pre>{html.escape(screen(self) or self.to_json())}</pre>"
+        Returns
+        -------
+        tuple of Section
+            Titles, sentences, tables whose cells are words or numbers with unit and level.  A part that belongs to one
+            place says so in ``only``.  Empty where nothing is shown but the document, as of matrices without a problem.
+        """
+        found: tuple[Section, ...] = _above("sections.of_results", "of")(self)
+        return found
+
+    def _repr_html_(self) -> str:
+        """Notebook view: its sections, or the document where there are none."""
+        shown = _above("sections.layout", "text")(self.sections())
+        return f"<pre>{html.escape(shown or self.to_json())}</pre>"
 
     def plot(self) -> Figure:
         """The main figure of the result.

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from decimal import ROUND_CEILING, Context, Decimal
 from typing import Literal
 
+from ndtheory.number import directed
 from verification.algorithm.rates import StepRatio
 from verification.algorithm.runs import Run
 from verification.bounds.bound import BoundResult
@@ -55,7 +55,7 @@ def judge(bound: float | None, seen: StepRatio | None, why_none: str, *, proved:
     digits = 4 if seen.hi <= bound else 6  # six where the bound is attained or violated
     shown = f"bound {bound:.{digits}g}"
     if proved:
-        shown = f"proved bound {Context(digits, ROUND_CEILING).create_decimal(Decimal(bound)):.{digits}g}"
+        shown = f"proved bound {directed(bound, digits, up=True):.{digits}g}"
     says = f"ratios <= {seen.value:.{digits}g} in {seen.steps} steps, {shown}"
     if seen.hi <= bound:
         return Judgement(verdict="CONSISTENT", reason=says)

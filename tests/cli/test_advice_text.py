@@ -11,9 +11,8 @@ from strategies import contact_problems
 
 import verification as vf
 from verification.advice.role import steps
-from verification.cli.advice_screen import advice as show
-from verification.cli.console import heard
 from verification.cli.problems import examples
+from verification.sections.layout import text
 
 FORMS = {
     "section 6": [],
@@ -116,9 +115,7 @@ SAME, KEEPS = 'This is what theta = "auto" takes, rounded.', 'theta = "auto" kee
 
 def explained(found):
     """Whether the pasted theta is that of "auto", or the screen says why not."""
-    with heard() as lines:
-        show(found)
-    said = " ".join(" ".join(lines).split())
+    said = " ".join(text(found.sections()).split())
     auto = found.best.theta_auto
     if found.theta == 0.99 <= auto.theta:
         return f'theta = "auto" takes {float(auto.theta):.4g}; 0.99 is the largest to paste.' in said

@@ -7,8 +7,8 @@ import pytest
 
 from ndtheory import Number
 from verification.certificate.exact_bodies import NotExact
-from verification.cli.levels import between
 from verification.constants import ENERGY_NAMES, NAMES
+from verification.sections.numbers import between
 
 
 def test_the_screen_shows_ends_that_lie_outside_those_of_the_document(call, write):
@@ -36,7 +36,7 @@ def test_with_halvings_each_mesh_has_its_own_bounds(call, write):
 def test_an_end_is_rounded_away_from_the_number_in_every_digit():
     number = Number(value=-0.2, lo=-2 / 3, hi=2 / 3, level="verified")
     for digits in range(1, 18):
-        low, high = between(number, digits)
+        low, high = map(str, between(number, digits))
         assert F(low) <= F(-2 / 3)
         assert F(high) >= F(2 / 3)
         assert F(high) - F(2 / 3) < F(10) ** -digits

@@ -16,11 +16,10 @@ from strategies import AT_NIGHT
 
 import verification as vf
 from verification import figures
-from verification.cli import screens
-from verification.cli.calculator import thetas
-from verification.cli.console import heard
 from verification.ledger.record import on_the_printed_proof
 from verification.output.report import report
+from verification.sections.bounds import thetas
+from verification.sections.layout import text
 from verification.verdicts import RunVerdict
 
 ROOT = Path(__file__).parents[2]
@@ -99,11 +98,8 @@ def test_the_report_says_of_the_printed_proof_what_is_recorded(written):
 
 def screen(comparison) -> str:
     """What three commands show of a comparison."""
-    with heard() as lines:
-        screens.comparison(comparison)
-        thetas(comparison.bounds["energy"].detail)
-        screens.constants(comparison.measured)
-    return "\n".join(lines)
+    found = (*comparison.sections(), *thetas([comparison.bounds["energy"].detail]), *comparison.measured.sections())
+    return text(found)
 
 
 def test_the_report_has_the_words_and_the_digits_of_the_screen(comparison, written):
@@ -184,8 +180,8 @@ BARS = {
 )
 def test_a_problem_to_which_not_every_bound_applies_has_a_report_too(tmp_path, data):
     comparison = vf.compare(vf.Problem.from_dict(data))
-    text = page_and_figures(tmp_path, comparison)
-    assert all(judgement.verdict in text for judgement in comparison.verdicts.values())
+    page = page_and_figures(tmp_path, comparison)
+    assert all(judgement.verdict in page for judgement in comparison.verdicts.values())
 
 
 #: Units of length and of stress that could do the same, beside each title one pair.

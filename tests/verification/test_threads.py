@@ -3,54 +3,20 @@
 import random
 import sys
 import threading
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 import pytest
-from problem_list import plates
+from kinds import KINDS, problem
 from strategies import AT_NIGHT
 from threadpoolctl import threadpool_info, threadpool_limits
 
-import verification as vf
 from verification import threads
-from verification.bounds.bound import Region
-from verification.bounds.region import Plane, Point
-from verification.certificate.continuum import certify_continuum
-from verification.cli import notebook
 from verification.threads import one_thread
 
 THREADS = 8
 
 
-def problem(cells: int) -> vf.Problem:
-    """Section 6 with so many cells along the lower body."""
-    keys = {f"body{i}.cells": f"[{cells * share // 5}, {cells // 5}]" for i, share in ((1, 5), (2, 3))}
-    return vf.Problem.from_dict(plates()).with_keys(keys)
-
-
-def a_plane(shown: vf.Problem) -> Plane:
-    region = Region(k=(0.1, 0.2), theta=((0.0, 0.5), (0.0, 0.4)), every=0.3, some=0.4)
-    points = (Point(theta=0.4, k=0.1, outcome="converged", iterations=12, coupled_residual=1e-9),)
-    return Plane(
-        title="a plane", regions={"energy": region}, points=points, reason={}, units=shown.units, problem=shown
-    )
-
-
-#: Each kind of result, as a function of the problem.
-KINDS: dict[str, Callable[[vf.Problem], object]] = {
-    "Measured": vf.measure,
-    "Run": lambda given: vf.run(given).linearise(),
-    "Run by another rule": lambda given: vf.run(given, rule="anderson"),
-    "Solution": vf.solve,
-    "Comparison": vf.compare,
-    "Advice": vf.advise,
-    "Certificate": vf.certify,
-    "Checked": lambda given: vf.check_again(vf.certify(given).to_dict()),
-    "ContinuumCertificate": certify_continuum,
-    "Plane": a_plane,
-    "Sweep": lambda given: vf.sweep(given, theta=["0.3", "0.5"], friction=[0.1]),
-}
 #: Those that take long on a mesh on which a second BLAS thread has work.
 LONG = ("Comparison", "Certificate", "Checked")
 
@@ -74,10 +40,6 @@ def results() -> dict[str, object]:
     return {name: make(problem(10)) for name, make in KINDS.items()}
 
 
-def test_every_result_that_has_a_screen_is_among_the_kinds(results):
-    assert set(notebook.SCREENS) <= {type(result) for result in results.values()}
-
-
 def test_views_made_in_threads_are_those_of_one_thread(results, in_threads):
     alone = {name: result._repr_html_() for name, result in results.items()}
     names = [*results] * (100 if AT_NIGHT else 10)
@@ -86,10 +48,10 @@ def test_views_made_in_threads_are_those_of_one_thread(results, in_threads):
     assert [name for name, view in zip(names, views, strict=True) if view != alone[name]] == []
 
 
-def test_parts_of_a_report_made_in_threads_are_those_of_one_thread(results, in_threads):
+def test_sections_made_in_threads_are_those_of_one_thread(results, in_threads):
     comparison = results["Comparison"]
-    alone, times = notebook.report(comparison), 200 if AT_NIGHT else 24
-    assert in_threads(lambda _: notebook.report(comparison), range(times)) == [alone] * times
+    alone, times = comparison.sections(), 200 if AT_NIGHT else 24
+    assert in_threads(lambda _: comparison.sections(), range(times)) == [alone] * times
 
 
 def test_numbers_found_in_threads_are_those_of_one_thread(in_threads):

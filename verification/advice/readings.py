@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from decimal import ROUND_DOWN, ROUND_FLOOR, ROUND_UP, Context, Decimal
 from fractions import Fraction
 from typing import Any, Literal
 
 from ndtheory.energy_norms import predicted_theta
-from ndtheory.number import below
+from ndtheory.number import below, directed
 
 #: The largest theta that is offered to paste.
 LARGEST_TO_PASTE = Fraction(99, 100)
@@ -285,14 +284,11 @@ def _few(value: Fraction) -> str:
 
 def _at_least(value: Fraction) -> str:
     """A bound from below in four figures, not above it."""
-    down = Context(prec=4, rounding=ROUND_FLOOR).divide(Decimal(value.numerator), Decimal(value.denominator))
-    return f"{float(down):.4g}"
+    return f"{float(directed(value, 4, up=False)):.4g}"
 
 
 def rounded_down(theta: Fraction) -> float:
     """A theta in four figures, not above the one meant; next to 1 in four figures of ``1 - theta``."""
     if theta > NEXT_TO_1:
-        rest = 1 - theta
-        up = Context(prec=4, rounding=ROUND_UP).divide(Decimal(rest.numerator), Decimal(rest.denominator))
-        return float(1 - up)
-    return float(Context(prec=4, rounding=ROUND_DOWN).divide(Decimal(theta.numerator), Decimal(theta.denominator)))
+        return float(1 - directed(1 - theta, 4, up=True))
+    return float(directed(theta, 4, up=False))

@@ -141,6 +141,11 @@ class BoundResult:
     detail: Any = None
 
     @property
+    def worked_out(self) -> bool:
+        """True if there is something to show of the bound, be it only why it has no conclusion."""
+        return self.detail is not None or not self.not_computed
+
+    @property
     def level(self) -> Level:
         """That of the factor; ``float`` where there is none."""
         return "float" if self.factor is None else self.factor.level
@@ -252,6 +257,18 @@ class Bound(ABC):
             raise NotComputed(found.not_computed or "needed a law of friction to vary k")
         interval = lambda k: self.evaluate(subject.at(k)).interval
         return trace(interval, every=found.friction.every.value, some=found.friction.some.value)
+
+    def remarks(self, result: BoundResult | None, unit: str) -> tuple[str, ...]:
+        """What must be said beside figures of this bound.
+
+        Parameters
+        ----------
+        result : BoundResult or None
+            None beside a region.
+        unit : str
+            That of stress.
+        """
+        return ()
 
     def absent(self, why: str) -> BoundResult:
         """The result where nothing was worked out."""

@@ -55,6 +55,9 @@ class Printed(Section5):
     def _unit(self, subject: Subject) -> str:
         return "" if subject.measured is None else f" (in {subject.measured.units['stress']})"
 
+    def remarks(self, result: BoundResult | None, unit: str) -> tuple[str, ...]:
+        return (f"{self.name}: with stresses in {unit}; in another unit its figures are others",)
+
 
 class Repaired(Section5):
     """With the lost power of m put back: the same in every unit."""

@@ -280,6 +280,18 @@ class SemidefiniteBound(Bound):
             detail=found,
         )
 
+    def remarks(self, result: BoundResult | None, unit: str) -> tuple[str, ...]:
+        found = None if result is None else result.detail
+        if found is None:
+            return ()
+        said = [f"{self.name}: {found.lower:.3f} occurs for some loads, {found.gap:.2%} less"]
+        if found.divided is not None:
+            divided = f"dividing the pieces of T gives {found.divided.value:#.4g} in doubles"
+            said.append(f"{self.name}: proved is the factor of one program; {divided}")
+        if found.unverified is not None and not found.certified:
+            said.append(f"{self.name} is not proved: {found.not_proved}")
+        return tuple(said)
+
     def region(self, subject: Subject, *, progress: Progress = silent) -> Region:
         import numpy as np
 

@@ -2,42 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from collections.abc import Mapping
 
 import click
 
-from ndtheory import Bounds, Constants, EnergyBounds, EnergyConstants, HypothesisError, relaxation_factor
+from ndtheory import Constants, EnergyConstants, HypothesisError
 from ndtheory.constants import take
-from ndtheory.number import Level
-from verification.bounds.bound import BoundResult, Subject, bounded
+from verification.bounds.bound import Subject
+from verification.bounds.calculated import Calculated
 from verification.bounds.section5 import Section5
 from verification.bounds.table import BOUNDS
-from verification.cli.console import figures, heading, note, say, table
-from verification.cli.levels import LEGEND, at_least, factor, marked, rounded
-from verification.document import Document
-from verification.ledger.record import on_the_printed_proof
+from verification.cli.console import deliver
+from verification.sections.bounds import sections
 
 #: The constants of Section 5 by key, and the options that give them.
 CONSTANTS = {"m": "--m", "M": "--M", "C_R": "--CR", "C_s": "--Cs", "C_tr": "--Ctr", "k": "--k", "C_K": "--CK"}
 ENERGY = {"rho": "--rho", "kappa_1": "--kappa1", "kappa_2": "--kappa2"}
-
-
-class BoundsDocument(Document):
-    """``ndtheory.bounds/1``."""
-
-    schema: ClassVar[str] = "ndtheory.bounds/1"
-    units: Mapping[str, str] = {"length": "any", "stress": "that of m"}
-
-    def __init__(self, inputs: Mapping[str, Any], results: Mapping[str, BoundResult]) -> None:
-        self.inputs, self.results = inputs, results
-
-    def content(self) -> dict[str, Any]:
-        return {
-            "inputs": dict(self.inputs),
-            "editions": {name: result.to_dict() for name, result in self.results.items()},
-            "reason": {name: result.not_computed for name, result in self.results.items() if result.not_computed},
-        }
 
 
 @click.command()
@@ -99,15 +79,8 @@ def bounds(edition: str, theta: str | None, check: bool, as_json: bool, **given:
             results[name] = bound.absent("needs --rho, and --kappa1, --kappa2 with friction")
         else:
             results[name] = bound.evaluate(subject, theta)
-    if as_json:
-        inputs: dict[str, Any] = {key: None if constants is None else getattr(constants, key) for key in CONSTANTS}
-        inputs |= {key: None if energy is None else getattr(energy, key) for key in ENERGY}
-        inputs["theta"] = None if theta is None else relaxation_factor(theta)
-        absent = dict.fromkeys((key for key, value in inputs.items() if value is None), "not given")
-        inputs = {key: None if value is None else float(value) for key, value in inputs.items()} | {"reason": absent}
-        say(BoundsDocument(inputs, results).to_json(), lines=True)
-    else:
-        _screen(constants, {name: result for name, result in results.items() if not result.not_computed})
+    found = Calculated(constants=constants, energy=energy, theta=theta, results=results)
+    deliver(found, sections, as_json)
     proved = any(result.factor is not None and result.proved for result in results.values())
     return 1 if check and not proved else 0
 
@@ -132,97 +105,3 @@ def _energy(given: Mapping[str, str | None], rubs: bool) -> EnergyConstants | No
         return EnergyConstants(**{key: value for key, value in given.items() if value is not None})
     except HypothesisError as error:
         raise HypothesisError(ENERGY[error.key], error.value, error.needed) from None
-
-
-def bounds_table(rows: Sequence[BoundResult], unit: str) -> None:
-    """Print the bounds, in which unit of stress the printed one speaks, and which factor below the last occurs.
-
-    Parameters
-    ----------
-    rows : sequence of BoundResult
-    unit : str
-        "MPa", or what the unit of stress is that of.
-    """
-    rows = [row if row.proved else row.in_doubles() for row in rows]
-    friction, theta = bounded(rows), rows[0].theta
-    end = [] if theta is None else [f"theta = {theta:.4g}"]
-    lines = [
-        ["", "every small", "some", "", "", *([] if theta is None else [""])],
-        ["bound", f"theta {friction} <", f"theta {friction} <", "theta allowed", "factor", *end],
-    ]
-    for row in rows:
-        interval = "-" if row.interval is None else marked(_ends(*row.interval, row.interval_level), row.interval_level)
-        line = [row.name, *_allowed(row), interval, factor(row.factor, row.one_minus_factor)]
-        if theta is not None:
-            line.append("no conclusion" if row.factor is None else marked("contracts", row.level))
-        lines.append(line)
-    table(lines, heads=2)
-    notes = [f"printed: with stresses in {unit}" for row in rows if row.name == "printed"]
-    attained = [row.detail for row in rows if row.name == "lmi"]
-    notes += [f"lmi: {found.lower:.3f} occurs for some loads, {found.gap:.2%} less" for found in attained]
-    if notes:
-        note("; ".join(notes) if attained else f"{notes[0]}; in another unit its figures are others", "  ")
-    for found in attained:
-        if found.divided is not None:
-            doubles = figures(found.divided, 4)
-            note(f"lmi: proved is the factor of one program; dividing the pieces of T gives {doubles} in doubles", "  ")
-    if any(row.marked for row in rows):
-        note(LEGEND, "  ")
-
-
-def _allowed(row: BoundResult) -> list[str]:
-    """The two thresholds on friction."""
-    friction = row.friction
-    if friction.on == "any":
-        return ["any", "any"]
-    times = " x this" if friction.on == "multiple" else ""
-    return ["-" if value is None else at_least(value) + times for value in (friction.every, friction.some)]
-
-
-def _ends(low: float, high: float, level: Level) -> str:
-    """An interval, its ends rounded inward where each theta in it is proved to contract."""
-    if level == "float":
-        return f"({low:.3g}, {figures(high)})"
-    return f"({rounded(low, 3, up=True)}, {rounded(high, 3, up=False)})"
-
-
-def _screen(constants: Constants | None, results: Mapping[str, BoundResult]) -> None:
-    if constants is not None:
-        values = ", ".join(f"{key} = {figures(float(getattr(constants, key)))}" for key in ("m", "M", "C_R", "C_K"))
-        say(values + ("" if constants.k is None else f" (k = {figures(float(constants.k))})"))
-    details = {name: result.detail for name, result in results.items()}
-    energy = details.get("energy")
-    if isinstance(energy, EnergyBounds):
-        say(", ".join(f"{key} = {figures(getattr(energy, key))}" for key in ENERGY))
-    heading("DOES ONE STEP CONTRACT?")
-    bounds_table(list(results.values()), "the unit of --m")
-    section_5 = {name: found for name, found in details.items() if isinstance(found, Bounds)}
-    if section_5:
-        heading("THE CONSTANTS OF SECTION 5")
-        names = ["C_T", "C0", "C1", "C2", "C3", "C4", "C5", "C6"]
-        some = next(iter(section_5.values()))
-        rows = [["", *section_5, "unit"]]
-        for name in names:
-            unit = f"on {some.threshold_on}" if name in ("C2", "C3", "C4", "C5") else "1"
-            rows.append([name, *(figures(getattr(b, name), 6) for b in section_5.values()), unit])
-        table(rows, right=range(1, len(section_5) + 1))
-    if isinstance(energy, EnergyBounds):
-        thetas(energy)
-    say()
-    if not all(b.proved for b in section_5.values()):
-        note(on_the_printed_proof())
-    say("Next: ndtheory example section6 > my.toml; ndtheory constants my.toml")
-
-
-def thetas(energy: EnergyBounds) -> None:
-    """Show the theta with the least proved factor, and the predicted one."""
-    heading("WHICH THETA?")
-    rows = [["", "theta", "factor", ""]]
-    if energy.theta_proved is None:
-        rows.append(["proved", "-", "-", "q >= 1 for every theta: no conclusion"])
-    else:
-        rows.append(["proved", figures(energy.theta_proved), figures(energy.factor_proved), "least proved factor"])
-    frictionless = energy.friction_multiple is None
-    note = "proved too: there is no friction" if frictionless else "2/(2 + rho), not a bound"
-    rows.append(["predicted", figures(energy.theta_predicted), figures(energy.rate_predicted), note])
-    table(rows)

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from verification.cli.console import deliver, heading, near_one, note, say, stages
+from verification.cli.console import deliver, stages
 from verification.cli.failing import fail
 from verification.cli.problems import JSON, SET, SWAP, THETA, load_problem
 from verification.cli.typed import Typed
 
 if TYPE_CHECKING:
-    from verification.certificate.contraction import Certificate, Checked
     from verification.document import Document
 
 #: A certificate of a hundred contact nodes has a few megabytes.
@@ -83,15 +82,14 @@ def certify(
     if target is not None:
         _check_target(target, context)
     if continuum:
-        from verification.cli.continuum_screen import prove as prove_continuum
-
         assert file is not None
-        return prove_continuum(file, keys, theta=theta, swap=swap, target=target, as_json=as_json)
+        return _prove_continuum(file, keys, theta=theta, swap=swap, target=target, as_json=as_json)
     if given is not None:
         return _check(given, None if file is None else load_problem(file, keys, swap=swap), as_json)
     assert file is not None
     from verification.certificate.claims import NoCertificate
     from verification.certificate.contraction import certify as prove
+    from verification.sections.certificate import sections
 
     problem = load_problem(file, keys, theta=theta, swap=swap)
     try:
@@ -99,10 +97,29 @@ def certify(
             found = prove(problem, edition=edition or "lmi", progress=tell)
     except NoCertificate as error:
         return fail(error, "not proved", "no certificate")
-
     typed = Typed(file=file, keys=keys, theta=theta, swap=swap)
-    deliver(found, lambda: show(found, target, typed), as_json, writing(found, target), target)
+    shown = lambda found: sections(found, target)
+    deliver(found, shown, as_json, writing(found, target), target, typing=typed.command)
     return 0
+
+
+def _prove_continuum(
+    file: Path, keys: Mapping[str, str], *, theta: str | None, swap: bool, target: Path | None, as_json: bool
+) -> int:
+    """Bound the continuous problem of a file and show what follows; 1 where contraction is not proved."""
+    from ndtheory.strip import Unproved
+    from verification.certificate.continuum import certify_continuum
+    from verification.sections.continuum import sections
+
+    problem = load_problem(file, keys, theta=theta, swap=swap)
+    try:
+        with stages() as tell:
+            found = certify_continuum(problem, tell)
+    except Unproved as error:
+        return fail(error, "not proved", "nothing is proved")
+    typed = Typed(file=file, keys=keys, theta=theta, swap=swap)
+    deliver(found, sections, as_json, writing(found, target), target, typing=typed.command)
+    return 0 if found.contracts else 1
 
 
 def _check_target(target: Path, context: click.Context) -> None:
@@ -131,40 +148,10 @@ def writing(found: Document, target: Path | None) -> Callable[[], None] | None:
     return write
 
 
-def show(found: Certificate, target: Path | None = None, typed: Typed | None = None) -> None:
-    """The screen of ``certify``."""
-    from verification.bounds.table import BOUNDS
-
-    discrete = found.discrete
-    nodes = sum(len(discrete[name]["points"]) for name in ("body1", "body2"))
-    say(f"{found.problem.title}: {nodes} nodes, {len(discrete['weights'])} contact nodes")
-    say(f"k = {float(found.problem.contact.friction):g}, Neumann body {discrete['neumann_body']}")
-    heading("WHAT IS PROVED?")
-    factor, theta = near_one(float(found.factor)), float(found.theta)
-    note(
-        f"On these meshes T_theta with theta = {theta:g} has the Lipschitz constant {factor} in the norm (5.21),"
-        " whatever the loads and the gap: it contracts.  Level: verified.",
-        "  ",
-    )
-    if found.lower is not None:
-        note(f"No proof can give less than {found.lower:.6g}, a factor that two forces attain (in doubles).", "  ")
-    heading("BY WHAT?")
-    note(
-        f"Multipliers proposed by {BOUNDS[found.edition].words}; with them the quadratic form of the proof is positive"
-        f" definite for the rational data of the problem, in balls of {found.claim['bits']} bits.",
-        "  ",
-    )
-    say()
-    say("Not claimed: anything about the continuum.")
-    if target is not None:
-        say(f"Next: ndtheory certify --check {target}")
-    elif typed is not None:
-        typed.suggest("certify", "-o", "certificate.json", iteration=True)
-
-
 def _check(path: Path, problem: Any, as_json: bool) -> int:
     from verification.certificate.contraction import check_again
     from verification.problem.tables import ProblemError, unreadable
+    from verification.sections.certificate import checked
 
     if why := unreadable(path, MOST_BYTES):
         raise ProblemError(str(path), "", None, why)
@@ -177,25 +164,5 @@ def _check(path: Path, problem: Any, as_json: bool) -> int:
         if isinstance(error, ProblemError):
             raise
         raise ProblemError(str(path), "", None, f"needed a certificate: {error}") from None
-    deliver(found, lambda: show_checked(found, path), as_json)
+    deliver(found, checked, as_json)
     return 0 if found.accepted and found.same is not False else 1
-
-
-def show_checked(found: Checked, path: Path | None = None) -> None:
-    """The screen of ``certify --check``."""
-    heading("WHAT WAS CHECKED?")
-    for words in found.words.split("; "):
-        say(f"  {words}")
-    say(f"  sha256 {found.sha256}")
-    heading("IS IT PROVED?")
-    say("  ACCEPTED: the claim holds for these bodies" if found.accepted else "  REFUSED")
-    if found.why:
-        note(found.why, "    ")
-    if found.same is not None and found.problem is not None:
-        about = "are those" if found.same else "ARE NOT those"
-        note(f"The bodies {about} of {found.problem.source}.", "  ")
-    else:
-        say("  Whose bodies these are was not compared: give the problem file, too.")
-    say()
-    say("Not claimed: anything about the continuum.")
-    say("Next: python check.py CERTIFICATE (verification/certificate/check.py, alone)")

@@ -19,6 +19,7 @@ from verification.cli.moduli import advice_from_moduli, moduli_options, of_modul
 from verification.cli.problems import FILE, JSON, SET, load_problem
 from verification.cli.sweeping import STORE
 from verification.cli.typed import Typed
+from verification.sections.layout import nothing_typed
 
 
 class _Advise(click.Command):
@@ -145,7 +146,8 @@ def advise(
     if tied and friction:
         raise click.UsageError("received --tied with --friction: nothing slips on a tied interface", context)
     from verification.advice import roles as advice
-    from verification.cli import advice_screen
+    from verification.sections.advice import sections
+    from verification.sections.advice import snippets as blocks
 
     if file is not None:
         if file.suffix == ".npz" and keys:
@@ -173,12 +175,11 @@ def advise(
                 found = advise_run(theta, ratio, **assumed)
         except HypothesisError as error:
             raise click.UsageError(f"--{error}", context) from None
-    typed = None if file is None else Typed(file=file, keys=keys)
+    typing = nothing_typed if file is None else Typed(file=file, keys=keys).command
     if snippets is not None and found.theta is not None:
-        show = lambda: advice_screen.snippets(found, snippets)
+        deliver(found, lambda found: blocks(found, snippets), as_json)
     else:
-        show = lambda: advice_screen.advice(found, typed)
-    deliver(found, show, as_json)
+        deliver(found, sections, as_json, typing=typing)
     if snippets is not None and found.theta is None:
         why = "several readings are left" if found.friction_bounds is None else "with friction no run decides theta"
         complain(f"no snippet: {why}, make the run that is named")
@@ -218,9 +219,9 @@ def region(file: Path, keys: dict[str, str], target: Path, store: Path | None, a
     """
     from verification import figures
     from verification.bounds.region import chart
-    from verification.cli import screens
     from verification.output.folder import check_ours, staged
     from verification.problem.tables import ProblemError
+    from verification.sections.region import sections
 
     problem = load_problem(file, keys)
     if not target.parent.is_dir():
@@ -228,7 +229,7 @@ def region(file: Path, keys: dict[str, str], target: Path, store: Path | None, a
     check_ours(target)
     with stages() as tell:
         plane = chart(problem, store=store, progress=tell)
-    deliver(plane, lambda: screens.plane(plane, target), as_json)
+    deliver(plane, lambda found: sections(found, target), as_json)
     with stages() as tell, staged(target.parent, shown=target) as room:
         tell("drawing", None)
         figures.save(figures.draw_region(plane), room / target.name)

@@ -76,7 +76,7 @@ def fail(error: Exception, outcome: str = "error", lead: str = "") -> int:
     complain(": ".join(part for part in ("ndtheory", file, lead, str(error)) if part))
     if context.params.get("as_json"):
         found = Failure(command=context.info_name or "", outcome=outcome, file=file, error=str(error), problem=problem)
-        say(found.to_json(), lines=True)
+        say(found.to_json())
     return 1
 
 

@@ -1,4 +1,4 @@
-"""``advise`` from matrices: the options, the files behind them, and what the screen says of these."""
+"""``advise`` from matrices: the options, and the files behind them."""
 
 from __future__ import annotations
 
@@ -10,11 +10,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ndtheory import HypothesisError, exact
-from verification.cli.console import figures, heading, note
 
 if TYPE_CHECKING:
     from verification.advice.roles import Advice
-    from verification.advice.seen_matrices import SeenMatrices
     from verification.progress import Progress
 
 _FILES = {
@@ -151,25 +149,3 @@ def _radius(text: str, context: click.Context) -> float:
     if not 0 < radius < float("inf"):
         raise click.UsageError(f"--radius = {text}: needed a number > 0", context)
     return radius
-
-
-def matrices(seen: SeenMatrices) -> None:
-    """What the screen says of the matrices."""
-    heading("WHAT WAS GIVEN?")
-    of = [f"S{body}: {one.rows} unknowns" for body, one in ((1, seen.S1), (2, seen.S2))]
-    if seen.transfer is not None and seen.neumann_body is not None:
-        rows, columns = seen.transfer
-        of.append(f"P: {rows} x {columns}, from body {seen.neumann_body} to body {3 - seen.neumann_body}")
-    note("; ".join(of), "  ")
-    if seen.ordering is None:
-        note("Ordering: any, so long as both have the same.", "  ")
-    else:
-        note(f"Ordering assumed: {seen.ordering}.", "  ")
-    for words in seen.notes:
-        note(f"Note: {words}.", "  ")
-    for found in seen.lanczos:
-        ends = f"rho {figures(found.rho, 6)}, residual {found.residual:.1e}"
-        least = f"least {figures(found.rho_min)}, residual {found.residual_min:.1e}"
-        note(f"Lanczos, Neumann body {found.neumann_body}: {ends}; {least}; steps: {found.steps}.", "  ")
-    if seen.lanczos:
-        note("An eigenvalue lies within each residual; rho is at least what was found, not proved to be it.", "  ")

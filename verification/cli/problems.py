@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from verification.cli.console import Interrupted, complain, deliver, progress, say, stages
+from verification.cli.console import Interrupted, complain, deliver, one_by_one, progress, say, stages
 from verification.cli.failing import remember
 from verification.cli.remedies import remedy
 from verification.cli.typed import Typed
@@ -129,14 +129,13 @@ def example(name: str | None, as_json: bool) -> None:
             def content(self) -> dict[str, Any]:
                 return {"examples": titles} if name is None else {"name": name, "toml": available[name]}
 
-        say(Examples().to_json(), lines=True)
+        say(Examples().to_json())
     elif name is None:
         for key, title in titles.items():
             say(f"  {key:14}  {title}")
-        say()
-        say("Next: ndtheory example section6 > my.toml; ndtheory compare my.toml")
+        say("\nNext: ndtheory example section6 > my.toml; ndtheory compare my.toml")
     else:
-        say(available[name].rstrip(), lines=True)
+        say(available[name].rstrip())
 
 
 def _title(text: str) -> str:
@@ -185,13 +184,13 @@ def constants(file: Path, keys: dict[str, str], refine: int, verified: bool, as_
       ndtheory constants my.toml --verified
       ndtheory constants my.toml --set body1.young=2e4
     """
-    from verification.cli import screens
     from verification.constants import measure
+    from verification.sections.constants import sections
 
     problem = load_problem(file, keys)
     with stages() as tell:
         measured = measure(problem, refine=refine, verified=verified, progress=tell)
-    deliver(measured, lambda: screens.constants(measured, Typed(file=file, keys=keys)), as_json)
+    deliver(measured, sections, as_json, typing=Typed(file=file, keys=keys).command)
     if "levels" in measured.reason:
         complain(f"{measured.reason['levels']}: what was computed is shown")
         raise Interrupted
@@ -217,9 +216,9 @@ def run(file: Path, solver: Any, start: Path | None, folder: Path | None, as_jso
     from verification.advice.matrix_files import read_matrix
     from verification.algorithm import runs
     from verification.algorithm.start import forces
-    from verification.cli import screens
     from verification.interface.assembly import build
     from verification.output.folder import Folder
+    from verification.sections.run import sections
 
     target = None if folder is None else Folder(folder, "run")
     pair = build(problem)
@@ -234,7 +233,7 @@ def run(file: Path, solver: Any, start: Path | None, folder: Path | None, as_jso
             finished = replace(finished, interrupted=True).linearise()
     _warn(finished.warnings[len(pair.warnings) :])
     write = None if target is None else lambda: target.write_run(finished)
-    deliver(finished, lambda: screens.run(finished, Typed(file=file, **changes)), as_json, write, folder)
+    deliver(finished, sections, as_json, write, folder, typing=Typed(file=file, **changes).command)
     return _status_of_run(finished, changes["swap"])
 
 
@@ -255,9 +254,9 @@ def solve(file: Path, keys: dict[str, str], folder: Path | None, as_json: bool) 
       ndtheory solve my.toml --set 'body2.prescribed.top=[0, -0.03]'
     """
     from verification import monolithic
-    from verification.cli import screens
     from verification.interface.assembly import discretise
     from verification.output.folder import Folder
+    from verification.sections import run
 
     problem = load_problem(file, keys)
     target = None if folder is None else Folder(folder, "solve")
@@ -268,7 +267,7 @@ def solve(file: Path, keys: dict[str, str], folder: Path | None, as_json: bool) 
         solution = monolithic.solve(bodies)
     _warn(list(solution.checks.warnings))
     write = None if target is None else lambda: target.write_solution(solution)
-    deliver(solution, lambda: screens.solution(solution, Typed(file=file, keys=keys)), as_json, write, folder)
+    deliver(solution, run.solution, as_json, write, folder, typing=Typed(file=file, keys=keys).command)
     return 0
 
 
@@ -328,19 +327,20 @@ def demo(folder: Path, as_json: bool) -> int:
 
 def _compare(problem: Problem, typed: Typed, folder: Path | None, solver: Any, as_json: bool, **asked: bool) -> int:
     from verification import comparison as verdicts
-    from verification.cli import screens
     from verification.interface.assembly import build
     from verification.output.folder import Folder
+    from verification.sections.comparison import Parts
+    from verification.sections.comparison import verdicts as end
 
     target = None if folder is None else Folder(folder, "compare")
     pair = build(problem)
     _warn(pair.warnings)
-    parts = None if as_json else screens.Parts(pair, needed=target is not None)
+    parts = None if as_json else Parts(pair, one_by_one(needed=target is not None))
     with stages() as tell, progress(tell, problem.iteration.tolerance) as watch:
         comparison = verdicts.compare(pair, solver=solver, watch=watch, progress=tell, listener=parts, **asked)
     _warn(comparison.run.warnings[len(pair.warnings) :])
     write = None if target is None else lambda: target.write_comparison(comparison)
-    deliver(comparison, lambda: screens.verdicts(comparison, typed), as_json, write, folder)
+    deliver(comparison, end, as_json, write, folder, typing=typed.command)
     return _status_of_comparison(comparison, typed.swap)
 
 

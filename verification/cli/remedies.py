@@ -20,7 +20,6 @@ def remedy(finished: Run, swapped: bool) -> str:
     """
     from verification.algorithm.ending import MOST
     from verification.algorithm.rates import noise
-    from verification.cli.screens import worth_trying
     from verification.constants import measure
 
     pair, theta, last = finished.pair, float(finished.theta), finished.last
@@ -41,7 +40,7 @@ def remedy(finished: Run, swapped: bool) -> str:
     if rho.rho_max is None:
         return f"{here}; try a smaller theta" + (f", or {roles}" if exchanged else "")
     beside = None if exchanged is None else measure(exchanged).rho_max
-    good, other = worth_trying(rho.rho_max.value), 0.0 if beside is None else worth_trying(beside.value)
+    good, other = _worth_trying(rho.rho_max.value), 0.0 if beside is None else _worth_trying(beside.value)
     better = f", or {roles} with --theta {other:.2g}" if other > good else ""
     if theta <= good:
         return f"{here}; try --theta {theta / 2:.2g}{better}"
@@ -54,3 +53,8 @@ def _exchanged(pair: ContactPair) -> ContactPair | None:
         return pair.swapped()
     except ValueError:  # problem errors are such
         return None
+
+
+def _worth_trying(rho: float) -> float:
+    """2/(2 + rho), and below 1 when it is written with two figures."""
+    return min(2 / (2 + rho), 0.99)

@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
-from verification.cli.console import deliver, heading, note, say, stages, table
+from verification.cli.console import deliver, stages
 from verification.cli.problems import FOLDER, JSON
 from verification.cli.sweeping import JOBS, STORE
-
-if TYPE_CHECKING:
-    from verification.reproduce import Reproduction
-    from verification.reproduce.experiments import Outcome, Result
 
 NAMES = ("fig5", "fig10", "fig11", "fig12", "all")
 
@@ -40,75 +35,10 @@ def reproduce(figure: str, jobs: int | None, store: Path | None, folder: Path | 
     from verification.output.folder import Folder
     from verification.reproduce import FIGURES
     from verification.reproduce import reproduce as run_again
+    from verification.sections.reproduction import sections
 
     target = None if folder is None else Folder(folder, "reproduce")
     with stages() as tell:
         found = run_again(FIGURES if figure == "all" else (figure,), jobs=jobs or -1, store=store, progress=tell)
     write = None if target is None else lambda: target.write_reproduction(found)
-    deliver(found, lambda: show(found), as_json, write, folder)
-
-
-def show(found: Reproduction) -> None:
-    """The screen of ``reproduce``."""
-    say("Section 6 of the paper, run again on its meshes; non-local law, r = 0.1 mm")
-    for result in found.results:
-        _figure(result)
-    if len(found.results) > 1:
-        heading("WHICH READING COMES NEAREST TO ALL?")
-        note(f"{found.closest.name}: {found.reproduced(found.closest)} of {len(found.results)} reproduced", "  ")
-    say()
-    say("Not claimed: that the authors ran one of these readings.")
-    say("Next: ndtheory sweep --help")
-
-
-def _figure(result: Result) -> None:
-    from verification.reproduce.claims import CLAIMS
-
-    claim = CLAIMS[result.figure]
-    heading(f"{result.figure.upper()}: {result.verdict.upper()}")
-    note(f"the paper: {claim.says}", "  ")
-    note(f"reproduced means: {claim.criterion}", "  ")
-    of_text = [outcome for outcome in result.outcomes if not outcome.reading.departs]
-    shown = of_text + ([] if result.closest in of_text else [result.closest])
-    rows = [["reading", "", "what it shows"]]
-    rows += [[_short(outcome), _word(outcome), _says(outcome)] for outcome in shown]
-    table(rows)
-    held = sum(bool(outcome.holds) for outcome in result.outcomes)
-    refused = sum(outcome.holds is None for outcome in result.outcomes)
-    note(f"reproduced in {held} of {len(result.outcomes)} readings, {refused} of which are refused", "  ")
-    note(f"nearest: {result.closest.reading.name}", "  ")
-    if held:
-        names = [outcome.reading for outcome in result.outcomes if outcome.holds]
-        assumed = "; ".join(", ".join([*reading.assumes, *reading.departs]) for reading in names[:3])
-        note(f"under the assumption that {assumed}", "  ")
-
-
-def _short(outcome: Outcome) -> str:
-    reading = outcome.reading
-    parts = [
-        reading.position.split()[0],
-        reading.top.split()[0],
-        "" if reading.moved == "whole top" else reading.moved.removeprefix("left "),
-        "" if reading.neumann_body == 1 else "roles of Section 3",
-        "" if reading.moduli == "as printed" else "moduli exchanged",
-    ]
-    return ", ".join(filter(None, parts))
-
-
-def _word(outcome: Outcome) -> str:
-    return {True: "yes", False: "no", None: "refused"}[outcome.holds]
-
-
-def _says(outcome: Outcome) -> str:
-    from verification.reproduce.claims import zones
-
-    if outcome.holds is None:
-        return outcome.reason
-    if outcome.contact is not None:
-        return ", ".join(f"{state} to {high:.2f}" for state, _, high in zones(outcome.contact))
-    found = []
-    for curve in outcome.curves:
-        at = curve.steps.get(0.6)
-        best = "none arrives" if not curve.best else f"{curve.best[0]:g}: {curve.fewest}"
-        found.append(f"{best} (0.6: {'-' if at is None else at})")
-    return "best theta: steps " + "; ".join(found)
+    deliver(found, sections, as_json, write, folder)

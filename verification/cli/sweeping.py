@@ -16,6 +16,7 @@ import click
 from ndtheory.texts import printable
 from verification.cli.console import Interrupted, complain, deliver, stages
 from verification.cli.problems import FILE, FOLDER, JSON
+from verification.cli.typed import Typed
 
 if TYPE_CHECKING:
     from verification.progress import Progress
@@ -101,9 +102,9 @@ def sweep(
       ndtheory sweep grid.toml --dry-run
       ndtheory sweep grid.toml --plot theta,iterations,friction --export results
     """
-    from verification.cli import sweep_screen
     from verification.extras import require
     from verification.output.folder import check_ours
+    from verification.sections import sweep as shown
     from verification.sweeps.keeping import plan
     from verification.sweeps.sweep import sweep_grid
     from verification.sweeps.sweep_file import read_sweep
@@ -118,7 +119,7 @@ def sweep(
     target, kept = room / f"{file.stem}.csv", store or room / f"{file.stem}.sqlite"
     if dry_run:
         planned = plan(problem, grid, kept, fresh=fresh, retry=retry)
-        deliver(planned, lambda: sweep_screen.plan(planned), as_json)
+        deliver(planned, shown.plan, as_json)
         _tell(planned.notes)
         return
     targets = _targets(file.stem, target, plots, export)
@@ -132,7 +133,15 @@ def sweep(
     _tell(found.notes)
     if found.stored:
         complain(f"{kept}: {found.stored} of {found.asked} rows were there")
-    deliver(found, lambda: sweep_screen.sweep(found, target), as_json, lambda: _write(found, targets), target)
+    sections = lambda found: shown.sections(found, target)
+    deliver(
+        found,
+        sections,
+        as_json,
+        lambda: _write(found, targets),
+        target,
+        typing=Typed(file=Path(problem.source)).command,
+    )
     if found.interrupted:
         complain(f"{found.reason['rows']}: those are in {target}; the same command goes on from there")
         raise Interrupted

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from shlex import quote
 
-from verification.cli.console import say
+from verification.sections.layout import nothing_typed
+from verification.sections.parts import Next
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,23 +31,16 @@ class Typed:
     relaxation: str | None = None
     swap: bool = False
 
-    def suggest(self, command: str, *options: str, iteration: bool = False) -> None:
-        """Say which command to type next.
-
-        Parameters
-        ----------
-        command : str
-        options : str
-            Of that command, after the problem.
-        iteration : bool
-            Whether the command takes theta, relaxation and roles, and is to have the same.
-        """
-        words = ["ndtheory", command, str(self.file)]
+    def command(self, part: Next) -> str:
+        """The words of a command, with the problem where it belongs; empty where they could not be pasted."""
+        if not part.problem:
+            return nothing_typed(part)
+        first, *options = part.words
+        words = ["ndtheory", first, str(self.file)]
         words += [word for key, value in self.keys.items() for word in ("--set", f"{key}={value}")]
-        if iteration:
+        if part.iteration:
             given = {"--theta": self.theta, "--relaxation": self.relaxation}
             words += [word for name, value in given.items() if value is not None for word in (name, value)]
-            words += ["--swap-roles"] * self.swap
+        words += ["--swap-roles"] * ((self.swap and part.iteration) != part.exchanged)
         words += options
-        if all(word.isprintable() for word in words):  # else it could not be pasted from a screen
-            say("Next: " + " ".join(map(quote, words)))
+        return " ".join(map(quote, words)) if all(word.isprintable() for word in words) else ""

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
-from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from fractions import Fraction
 from functools import partial
 from typing import Any, Literal
@@ -18,7 +17,7 @@ from fem1d2d import plane_strain
 from ndtheory import bounds as formulas
 from ndtheory import energy_norms
 from ndtheory.intervals import Interval
-from ndtheory.number import SLACK, decimal, working_precision
+from ndtheory.number import SLACK, decimal, directed, working_precision
 from verification.ledger.cases import NAMED, three_digits
 from verification.ledger.enclosed_pairs import MUCH, Apart, Bodies
 from verification.ledger.evidence import Evidence, Level
@@ -356,8 +355,8 @@ def decide(bodies: Bodies, id: str, of: Literal["printed", "step", "repaired"]) 
         return None
     ratios = [left / right for left, right in sides]
     low, high = max(ratio.lo for ratio in ratios), max(ratio.hi for ratio in ratios)
-    at_least = lambda digits: float(Context(digits, ROUND_FLOOR).create_decimal(low))
-    at_most = lambda digits: float(Context(digits, ROUND_CEILING).create_decimal(high))
+    at_least = lambda digits: float(directed(low, digits, up=False))
+    at_most = lambda digits: float(directed(high, digits, up=True))
     said = f"left/right >= {at_least(4):.4g}" if fails else f"left/right <= {at_most(4):.4g}"
     squares = ", of their squares" if key in OF_BODIES else ""
     in_unit = "" if unit == OWN else f", unit {float(unit):g}"

@@ -1,0 +1,115 @@
+"""A comparison: each section when it is known, or all of them of one that has ended."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from verification.algorithm.reference import Reference
+from verification.algorithm.runs import Run
+from verification.algorithm.theta import Choice
+from verification.bounds.bound import BoundResult
+from verification.bounds.losses import Losses
+from verification.comparison import Comparison, Listener
+from verification.constants import Measured
+from verification.interface.pair import ContactPair
+from verification.sections.bounds import bounds, contracts, thetas
+from verification.sections.constants import compared
+from verification.sections.constants import sections as all_constants
+from verification.sections.numbers import near_one
+from verification.sections.parts import Labelled, Note, Section, Sections, following, of, section, table
+from verification.sections.run import happened
+from verification.sections.setting import limits, outside_the_theorem, setting
+
+#: What the table of verdicts shows, and the figure of the losses.
+RATIOS = (
+    "Each bound beside the largest ratio of successive residuals in the norm (5.21), in which forces count by the "
+    "energy that they store in the Neumann body; linearised: the forecast beside the end of the run."
+)
+WATERFALL = (
+    (
+        "waterfall",
+        "What the inequalities of the proof give away, in decades. At the top each one stands by itself, at the pair "
+        "of forces that comes closest to equality; these pairs differ, so these bars do not add up. Below it one "
+        "quantity is followed step by step to its bound in each panel, and the bars add up; what leads from the "
+        "repaired to the printed bound is only the unit of stress.",
+    ),
+)
+
+
+class Parts(Listener):
+    """Hands on the sections of a comparison, each when it is known.
+
+    Parameters
+    ----------
+    pair : ContactPair
+        What is compared, made from a problem.
+    show : callable
+        Takes a tuple of sections; those of one id may come one after the other.
+    """
+
+    def __init__(self, pair: ContactPair, show: Callable[[Sections], None]) -> None:
+        self.pair, self.show, self.unit = pair, show, pair.units["stress"]
+
+    def constants(self, measured: Measured, choice: Choice) -> None:
+        problem = self.pair.problem
+        assert problem is not None  # see `sections`
+        first = setting(problem.with_theta(choice.theta), measured.nodes, measured.interface_nodes)
+        self.show((first, compared(measured)))
+
+    def bounds(self, results: Sequence[BoundResult], measured: Measured) -> None:
+        self.show((contracts(results, self.unit, measured.why_no_energy),))
+
+    def run(self, finished: Run) -> None:
+        self.show((happened(finished, alone=False),))
+
+    def cvxpy(self, reference: Reference | None, why: str) -> None:
+        part: Labelled | str = f"cvxpy: {why}"
+        if reference is not None:
+            rate = "no rate" if reference.observed_rate is None else f"rate {near_one(reference.observed_rate)}"
+            what = f"{rate}, {reference.steps - 1} steps" if reference.whole else "first and last step"
+            part = Labelled("cvxpy alone", f"{what}; T differs by {reference.largest_difference:.0e} at most")
+        self.show((section("run", "", part),))
+
+    def losses(self, losses: Losses | None, why: str) -> None:
+        friction = () if losses is None else losses.friction
+        parts = [f"losses: {why}"] if why else []
+        if friction:
+            estimates = [loss for loss in friction if not loss.only_unit]
+            total = sum(loss.decades for loss in estimates)
+            unit = sum(loss.decades for loss in friction) - total
+            links = ", ".join(f"{loss.label} {loss.decades:.1f}" for loss in estimates)
+            parts.append(f"{total:.1f} decades from the largest friction term found to (5.30), repaired:")
+            parts.append(f"{links}; the unit adds {unit:.1f}")
+        if parts:
+            self.show((section("losses", "WHAT DOES EACH ESTIMATE GIVE AWAY?", *parts, pictures=WATERFALL),))
+
+    def programs(self, results: Sequence[BoundResult]) -> None:
+        parts = [*bounds(results, self.unit), *(f"{r.name}: {r.not_computed}" for r in results if not r.worked_out)]
+        title = "WHAT DO SEMIDEFINITE PROGRAMS PROVE OF ONE STEP?"
+        caption = "The same for the bound that takes the matrices of the bodies."
+        if parts:
+            self.show((section("programs", title, *parts, caption=caption),))
+
+
+def verdicts(result: Comparison) -> Sections:
+    """The end of a comparison."""
+    judged = table(("bound", "verdict", "why"), [(n, j.verdict, j.reason) for n, j in result.verdicts.items()])
+    title = "DOES THE RUN AGREE WITH THE BOUND?"
+    return section("verdicts", title, judged, caption=RATIOS), limits(result.run.outside, following("advise"))
+
+
+@of.register
+def sections(result: Comparison) -> Sections:
+    """The sections; a report has more at the begin and at the end: warnings, the theta, all constants."""
+    if result.problem is None:
+        return ()
+    found: list[Section] = []
+    result.tell(Parts(result.run.pair, found.extend))
+    warnings = [outside_the_theorem(reason) for reason in result.run.outside]
+    warnings += [Note(f"{warning}.", 0, "Warning:") for warning in result.run.pair.warnings]
+    first = replace(section("setting", "", *warnings), only="report")
+    details = [bound.detail for bound in result.bounds.values()]
+    _, *constants = all_constants(result.measured)
+    last = [replace(each, only="report") for each in (*thetas(details), *constants)]
+    return (found[0], first, *found[1:], *verdicts(result), *last)

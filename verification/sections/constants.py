@@ -1,0 +1,86 @@
+"""The constants of a problem on its mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from verification.constants import ENERGY_NAMES, NAMES, Measured
+from verification.interface import assembly
+from verification.sections.numbers import between, figures
+from verification.sections.parts import Note, Section, Sections, Shown, closing, following, of, section, table
+from verification.sections.setting import setting
+
+#: The constants that a comparison shows.
+COMPARED = ("m", "M", "C_R", "C_s", "C_tr", "C_K", "rho_max")
+
+
+@of.register
+def sections(measured: Measured) -> Sections:
+    """The sections; none of constants that come from matrices alone."""
+    problem = measured.problem
+    if problem is None:
+        return ()
+    levels = measured.levels or (measured,)
+    parts: list[Shown] = []
+    if measured.unverified is not None:
+        parts += [part for level in levels for part in _between_bounds(level, (*NAMES, *ENERGY_NAMES))]
+        ends = "exact, verified: proved for the exact data of the file on this mesh, all rounding errors bounded."
+    else:
+        unit = _units(measured)
+        rows = [
+            (name, *(figures(getattr(level, name), 6, unit.get(name, "")) for level in levels), unit.get(name, ""))
+            for name in (*NAMES, *ENERGY_NAMES)
+        ]
+        head = ("nodes", *(str(level.nodes) for level in levels), "unit")
+        parts.append(table(head, rows, right=range(1, len(levels) + 1)))
+        ends = "Exact for this mesh, up to rounding."
+    for reason in dict.fromkeys(measured.reason.values()):
+        names = ", ".join(name for name, why in measured.reason.items() if why == reason)
+        parts.append(Note(f"{names}: {reason}"))
+    mesh = "On a mesh m is above and M below its continuous value"
+    unsafe = "for the continuous theorem both err on the unsafe side"
+    then = following("advise" if measured.interface_nodes > assembly.MOST_CONTACT_NODES else "compare")
+    title = "WHAT DOES THE THEOREM NEED TO KNOW?"
+    caption = "The constants on this mesh: those of Section 5, then rho and those of the theorem in energy norms."
+    return (
+        setting(problem, measured.nodes, measured.interface_nodes),
+        section("all constants", title, *parts, caption=caption),
+        closing("", Note(ends, 0), Note(f"{mesh}: {unsafe}.", 0), then=then),
+    )
+
+
+def compared(measured: Measured) -> Section:
+    """Those that a comparison shows."""
+    if measured.unverified is not None:
+        parts = _between_bounds(measured, COMPARED)
+    else:
+        stress = measured.units["stress"]
+        m, M, C_R, C_s, C_tr, C_K, rho = (figures(getattr(measured, name), 4) for name in COMPARED)
+        parts = [
+            Note(f"m = {m} {stress}, M = {M} {stress}, C_R = {C_R}"),
+            Note(f"C_s = {C_s}, C_tr = {C_tr}, C_K = {C_K} {stress}, rho = {rho}"),
+        ]
+    caption = "The constants of the theorem on this mesh, with the bounds proved of them."
+    return section("constants", "HOW LARGE ARE THE CONSTANTS?", *parts, caption=caption)
+
+
+def _units(measured: Measured) -> Mapping[str, str]:
+    return dict.fromkeys(("m", "M", "C_K"), measured.units["stress"])
+
+
+def _between_bounds(measured: Measured, names: Sequence[str]) -> list[Shown]:
+    """Constants with the bounds that are proved of them, and why there are none."""
+    units, rows = _units(measured), []
+    for name in names:
+        number, unit = getattr(measured, name), units.get(name, "")
+        level = "" if number is None else number.level
+        rows.append((name, figures(number, 4, unit), *between(number, unit=unit), level, unit))
+    head = (f"{measured.nodes} nodes", "about", "at least", "at most", "level", "unit")
+    why = {name: reason for name, reason in (measured.unverified or {}).items() if name in names}
+    return [
+        table(head, rows, right=(1, 2, 3)),
+        *(
+            Note(f"not proved, {', '.join(name for name in why if why[name] == reason)}: {reason}")
+            for reason in dict.fromkeys(why.values())
+        ),
+    ]

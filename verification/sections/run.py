@@ -1,0 +1,144 @@
+"""What a run of the iteration did, and what the global method found."""
+
+from __future__ import annotations
+
+from verification.advice.role import steps
+from verification.algorithm.runs import Run
+from verification.interface.fields import ContactFields
+from verification.interface.interface import Interface
+from verification.monolithic import Solution
+from verification.problem.specification import Problem
+from verification.sections.numbers import NONE, count, figures, near_one
+from verification.sections.parts import (
+    Cell,
+    Labelled,
+    Note,
+    Quantity,
+    Section,
+    Sections,
+    Shown,
+    following,
+    of,
+    section,
+    table,
+)
+from verification.sections.setting import limits, setting
+
+#: What the table of a run shows, and its figures.
+RATES = (
+    "The rate by which one step multiplies the error in the long run, and the steps to the tolerance: as forecast half "
+    "way, as computed at the solution, and as seen."
+)
+PICTURES = (
+    ("residuals", "The residual step by step (points), and how each bound proves that it falls (lines)."),
+    (
+        "bodies",
+        "The bodies and what happens along Gamma_c: where its nodes stick, slip or are open, and the pressure and "
+        "shear they bear.",
+    ),
+)
+
+
+@of.register
+def sections(finished: Run) -> Sections:
+    """The sections; none of a run on matrices alone."""
+    if finished.problem is None:
+        return ()
+    nodes = sum(len(body.mesh.points) for body in finished.bodies.elastic)
+    return (
+        setting(finished.problem.with_theta(finished.theta), nodes, finished.pair.contact.grid.n),
+        happened(finished, alone=True),
+        limits(finished.outside, following("compare", iteration=True)),
+    )
+
+
+def happened(finished: Run, *, alone: bool) -> Section:
+    """What a run did; ``alone`` where no verdict says why there is no forecast."""
+    problem = finished.problem
+    assert problem is not None  # see `sections`
+    rate, linear, made = finished.observed_rate, finished.linearised, finished.forecast
+    rows: list[tuple[Cell, ...]] = []
+    if made is not None:
+        name = f"forecast at step {made.made_at_iteration}"
+        rows.append((name, near_one(made.rate), count(made.iterations), "prediction, not a bound"))
+    if linear is not None:
+        steady = "" if linear.predicted is None else f"; consistency of J {near_one(linear.predicted)}"
+        needed = count(steps(linear.rate, problem.iteration.tolerance))
+        rows.append(("linearised at the solution", near_one(linear.rate), needed, f"afterwards{steady}"))
+    seen: Cell = NONE if rate is None else near_one(rate.value)
+    if finished.observed_growth is not None:
+        seen = Quantity(finished.observed_growth, f"grows by {finished.observed_growth:.4g}")
+    rows.append(("observed", seen, count(finished.iterations), f"seen: {finished.outcome}"))
+    parts: list[Shown | str] = [table(("", "rate", "steps", ""), rows)]
+    if made is None and finished.relaxation == "constant" and alone:
+        parts.append(f"no forecast: {finished.why_no_forecast}")
+    if linear is None:
+        parts.append(f"not linearised: {finished.why_not_linearised}")
+    if finished.relaxation != "constant":
+        proved = "" if finished.proved_rate is None else f"; proved rate {near_one(finished.proved_rate.value)}"
+        evaluated = f"{finished.evaluations} evaluations of T"
+        parts.append(f"{evaluated}, with the {finished.relaxation} relaxation{proved}")
+    elif finished.choice.source != "given":
+        chosen = f"theta = {float(finished.theta):.4g} is the {finished.choice.source} one"
+        parts.append(f"{chosen}: {finished.choice.why}")
+    parts += _grids(finished.pair.contact_body, finished.pair.interface)
+    parts += _contact(problem, finished.contact, f"; KKT residual of step II {finished.last.contact.kkt.residual:.1e}")
+    parts.append(Note(_at_the_end(finished), only="report"))
+    return section("run", "WHAT HAPPENED", *parts, caption=RATES, pictures=PICTURES)
+
+
+def _at_the_end(finished: Run) -> str:
+    """What a report adds of the end of a run."""
+    rate, linear = finished.observed_rate, finished.linearised
+    said = [f"Relative residual without relaxation at the end: {figures(finished.last.relative_residual)}."]
+    if rate is not None:
+        said.append(f"Observed rate between {near_one(rate.lo)} and {near_one(rate.hi)}.")
+    elif finished.observed_growth is None:
+        said.append("The observed rate is not measurable.")
+    if linear is not None:
+        norm = near_one(linear.norm)
+        said.append(f"At the solution J has the spectral radius {near_one(linear.radius)} and the norm {norm}.")
+    return " ".join(said)
+
+
+@of.register
+def solution(found: Solution) -> Sections:
+    """The sections of the global method."""
+    bodies = found.bodies
+    problem = bodies.problem
+    then = following("run") if len(bodies.elastic) == 2 else following("solve", "-o", "results")
+    parts = (*_grids(problem.contact_body, bodies.interface), *_contact(problem, found.contact))
+    certified = f"KKT residual {found.kkt_residual:.1e} after {found.linear_solves} linear systems on Gamma_c"
+    return (
+        setting(problem, sum(len(body.mesh.points) for body in bodies.elastic), bodies.interface.contact.n),
+        section("solution", "WHAT IS THE SOLUTION?", *parts, certified),
+        limits(bodies.outside, then),
+    )
+
+
+def _grids(contact_body: int, interface: Interface) -> list[Shown]:
+    """Who carries the contact grid, where there are two."""
+    if interface.transfer is None:
+        return []
+    names = {1: "lower", 2: "upper"}
+    own, other = names[contact_body], names[3 - contact_body]
+    counts = f"{interface.contact.n} nodes of the {own} body, Neumann grid: {interface.neumann.n} of the {other}"
+    return [Labelled("contact grid", counts)]
+
+
+def _contact(problem: Problem, contact: ContactFields, solved: str = "") -> list[Shown]:
+    """What happens along Gamma_c, in totals, and how well it was solved."""
+    units, total = problem.units, contact.force
+    normal = f"{figures(total['normal'], 6)} normal"
+    nodes = Labelled("nodes", ", ".join(f"{number} {name}" for name, number in contact.pattern.items()))
+    if problem.dimension == 1:
+        return [nodes, Labelled("force", f"{normal}, {units['stress']}{solved}")]
+    rounding = 1e-12 * max(abs(total["normal"]), abs(total["tangential"]))
+    tangential = total["tangential"] if abs(total["tangential"]) > rounding else 0.0
+    unit = f"{units['stress']} {units['length']} (per unit thickness)"
+    pressure = figures(float(contact.pressure.max()), 4)
+    return [
+        nodes,
+        Labelled("force", f"{normal}, {figures(tangential)} tangential, {unit}"),
+        Labelled("largest pressure", f"{pressure} {units['stress']}{solved}"),
+    ]

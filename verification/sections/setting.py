@@ -1,0 +1,48 @@
+"""What is computed, in two lines, and what it does not say."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from verification.interface.friction import LAWS
+from verification.problem.specification import Problem
+from verification.sections.numbers import figures
+from verification.sections.parts import Facts, Next, Note, Section, closing, section
+
+
+def setting(problem: Problem, nodes: int | None, interface: int) -> Section:
+    """A problem, on so many nodes of both bodies and of Gamma_c."""
+    units, contact = problem.units, problem.contact
+    counts = [] if nodes is None else [f"{nodes} nodes, {interface} on Gamma_c"]
+    bodies = (problem.body1, problem.body2)
+    moduli = " / ".join("rigid" if body.rigid else f"{float(body.young):g}" for body in bodies)
+    body = {1: "lower", 2: "upper"}[problem.iteration.neumann_body]
+    law = LAWS[contact.law].label if LAWS[contact.law].needs_radius else f"{LAWS[contact.law].label} law"
+    friction = "no friction" if not contact.friction else f"k = {figures(float(contact.friction), 2)}, {law}"
+    if contact.friction and contact.radius is not None and LAWS[contact.law].needs_radius:
+        friction += f", r = {float(contact.radius):g} {units['length']}"
+    if any(one.rigid for one in bodies):
+        facts = [f"Obstacle: {'lower' if problem.body1.rigid else 'upper'} body", friction]
+    else:
+        facts = [f"Neumann body: {body}", friction, _how(problem)]
+    first = Facts(problem.title, (*counts, f"E {moduli} {units['stress']}"))
+    return section("setting", "", first, Facts("", tuple(facts)))
+
+
+def _how(problem: Problem) -> str:
+    """How the iteration is relaxed."""
+    theta, relaxation = problem.iteration.theta, problem.iteration.relaxation
+    if relaxation != "constant":
+        return relaxation
+    return f"theta = {theta if theta == 'auto' else f'{float(theta):.4g}'}"
+
+
+def outside_the_theorem(reason: str) -> Note:
+    """Why the theorem does not speak of a problem."""
+    return Note(f"{reason}.", 0, "Outside the theorem:")
+
+
+def limits(outside: Iterable[str], then: Next) -> Section:
+    """What a result for a mesh does not say, and why the theorem does not speak of it."""
+    notes = map(outside_the_theorem, outside)
+    return closing("anything about the continuum, or the local Coulomb law", *notes, then=then)
