@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from verification.advice.readings import LARGEST_TO_PASTE, NextRun, RunReading, SeenRun
 from verification.advice.role import Role, in_steps
 from verification.advice.roles import Advice
@@ -50,7 +52,7 @@ def advice(found: Advice, typed: Typed | None = None) -> None:
         elif found.logs:
             say(f"Next: the same with --log LOG --theta {found.next.theta:g} (LOG: the log of that run)")
         else:
-            say(f"Next: ndtheory advise {assumed}--theta {found.next.theta:g} --ratio R (R: its ratio)")
+            say(f"Next: ndtheory advise run {assumed}--theta {found.next.theta:g} --ratio R (R: its ratio)")
         return
     what = "that nothing opens or slips" if found.tied else "that the predicted theta is the best one for your loads"
     say(f"Not claimed: {what}.")
@@ -58,10 +60,11 @@ def advice(found: Advice, typed: Typed | None = None) -> None:
         if typed is not None and found.best.theta_auto is None:  # too large for a run
             typed.suggest("constants")
         elif typed is not None:
-            options = [] if found.roles[0].neumann_body == found.neumann_body else ["--swap-roles"]
+            exchanged = found.roles[0].neumann_body != found.neumann_body
+            options = []
             if found.theta is not None and takes_theta(found.problem.iteration.relaxation):
-                options += ["--theta", f"{found.theta:g}"]
-            typed.suggest("run", *options)
+                options = ["--theta", f"{found.theta:g}"]
+            replace(typed, swap=typed.swap != exchanged).suggest("run", *options)
     else:
         say("Next: ndtheory advise --help")
 

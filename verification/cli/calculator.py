@@ -15,6 +15,7 @@ from verification.bounds.section5 import Section5
 from verification.bounds.table import BOUNDS
 from verification.cli.console import figures, heading, note, say, table
 from verification.cli.levels import LEGEND, at_least, factor, marked, rounded
+from verification.cli.options import OneOf
 from verification.document import Document
 from verification.ledger.record import on_the_printed_proof
 
@@ -51,7 +52,7 @@ class BoundsDocument(Document):
 @click.option("--theta", "theta", metavar="NUMBER", help="Relaxation factor, 0 < theta < 1.")
 @click.option(
     "--edition",
-    type=click.Choice(["printed", "repaired", "both"]),
+    type=OneOf(["printed", "repaired", "both"]),
     default="both",
     show_default=True,
     help="Editions of Section 5.",

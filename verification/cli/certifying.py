@@ -11,7 +11,8 @@ import click
 
 from verification.cli.console import deliver, heading, near_one, note, say, stages
 from verification.cli.failing import fail
-from verification.cli.problems import JSON, SET, SWAP, THETA, load_problem
+from verification.cli.options import JSON, SET, SWAP, THETA, OneOf
+from verification.cli.problems import load_problem
 from verification.cli.typed import Typed
 
 if TYPE_CHECKING:
@@ -29,18 +30,20 @@ MOST_BYTES = 100_000_000
 @SWAP
 @click.option(
     "--edition",
-    type=click.Choice(["lmi", "energy", "repaired"]),
+    type=OneOf(["lmi", "energy", "repaired"]),
     help="Which bound proposes the factor: semidefinite (by default), energy norms, Section 5 repaired.",
 )
 @click.option(
     "--continuum", is_flag=True, help="Of FILE without its mesh: two rectangles, each held at its outer side."
 )
-@click.option("-o", "--output", "target", type=click.Path(path_type=Path), metavar="CERTIFICATE", help="A .json file.")
+@click.option(
+    "-o", "--output", "target", type=click.Path(path_type=Path), metavar="FILE.json", help="Write it to this file."
+)
 @click.option(
     "--check",
     "given",
     type=click.Path(path_type=Path),
-    metavar="CERTIFICATE",
+    metavar="FILE.json",
     help="Check this one again; with FILE also whether it is about the bodies of FILE.",
 )
 @JSON
@@ -79,7 +82,7 @@ def certify(
         if used is not None and also is not None:
             raise click.UsageError(f"received {first} with {second}: needed one of both", context)
     if file is None and given is None:
-        raise click.UsageError("received nothing: needed FILE, or --check CERTIFICATE", context)
+        raise click.UsageError("received nothing: needed FILE, or --check FILE.json", context)
     if target is not None:
         _check_target(target, context)
     if continuum:

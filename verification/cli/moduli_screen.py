@@ -16,7 +16,7 @@ ENDS: dict[Corners, str] = {
 
 
 def moduli(found: Advice, seen: SeenModuli) -> None:
-    """The screen of ``advise --young --poisson``."""
+    """The screen of ``advise moduli``."""
     say()
     each = (f"body {i}: E = {float(b.young):.5g}, nu = {float(b.poisson):.5g}" for i, b in enumerate(seen.bodies, 1))
     note(f"{' | '.join(each)} | {PLANES[seen.bodies[0].plane]}")
@@ -34,7 +34,7 @@ def moduli(found: Advice, seen: SeenModuli) -> None:
     say()
     say("Not claimed: a bound of rho from above with friction, or where no image fits.")
     if found.next is not None:
-        say(f"Next: ndtheory advise --theta {found.next.theta:g} --ratio R (R: the ratio of that run)")
+        say(f"Next: ndtheory advise run --theta {found.next.theta:g} --ratio R (R: the ratio of that run)")
 
 
 def _bounds(seen: SeenModuli) -> None:

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from verification.cli.console import deliver, heading, note, say, stages, table
-from verification.cli.problems import FOLDER, JSON
-from verification.cli.sweeping import JOBS, STORE
+from verification.cli.options import FOLDER, JOBS, JSON, STORE, OneOf
 
 if TYPE_CHECKING:
     from verification.reproduce import Reproduction
@@ -19,7 +18,7 @@ NAMES = ("fig5", "fig10", "fig11", "fig12", "all")
 
 
 @click.command()
-@click.argument("figure", type=click.Choice(NAMES))
+@click.argument("figure", type=OneOf(NAMES))
 @JOBS
 @STORE
 @FOLDER

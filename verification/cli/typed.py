@@ -39,14 +39,14 @@ class Typed:
         options : str
             Of that command, after the problem.
         iteration : bool
-            Whether the command takes theta, relaxation and roles, and is to have the same.
+            Whether the command takes theta and relaxation, and is to have the same.
         """
         words = ["ndtheory", command, str(self.file)]
         words += [word for key, value in self.keys.items() for word in ("--set", f"{key}={value}")]
         if iteration:
             given = {"--theta": self.theta, "--relaxation": self.relaxation}
             words += [word for name, value in given.items() if value is not None for word in (name, value)]
-            words += ["--swap-roles"] * self.swap
+        words += ["--swap-roles"] * self.swap
         words += options
         if all(word.isprintable() for word in words):  # else it could not be pasted from a screen
             say("Next: " + " ".join(map(quote, words)))
