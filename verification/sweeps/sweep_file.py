@@ -33,7 +33,14 @@ def read_sweep(path: Path | str) -> tuple[Problem, SweepGrid]:
         Naming file, key, value received and what is needed.
     """
     path = Path(path)
-    top = Table(read_file(path), str(path))
+    data = read_file(path)
+    if "body1" in data and "grid" not in data:
+        needed = (
+            "needed the file of a sweep, this is a problem file; write another one beside it that names it and the "
+            f'values, as problem = "{path.name}" and [grid] theta = [0.3, 0.5]'
+        )
+        raise ProblemError(str(path), "", None, needed)
+    top = Table(data, str(path))
     name = top.take("problem", text)
     grid = top.table("grid", required=True)
     top.close()
