@@ -8,7 +8,7 @@ from typing import Any
 from ndtheory import Number
 from ndtheory.constants import take
 from ndtheory.energy import LARGEST, SMALLEST
-from ndtheory.energy_norms import predicted_rate, predicted_theta
+from ndtheory.energy_norms import predicted_theta
 from verification.advice.next_run import Made, anew, pasted_or_not
 from verification.advice.readings import (
     LARGEST_TO_PASTE,
@@ -21,7 +21,7 @@ from verification.advice.readings import (
     rounded_down,
     spread,
 )
-from verification.advice.role import Role
+from verification.advice.role import Role, role_of
 from verification.advice.roles import Advice
 from verification.advice.runs_with_friction import friction_bounds, next_with_friction, readings_with_friction
 from verification.interface.pair import UNITS
@@ -121,18 +121,10 @@ def advise_run(theta: Any, ratio: Any, *, tied: bool = False, friction: bool = F
 
 def role_of_run(rho: Fraction) -> Role:
     """What is predicted of the roles that a run had, of which rho was read from its residuals."""
-    nothing = "an observed ratio proves nothing"
-    return Role(
-        neumann_body=None,
-        rho=Number.of_float(rho),
-        theta_proved=None,
-        factor_proved=None,
-        theta_max_proved=None,
-        theta_predicted=float(predicted_theta(rho)),
-        rate_predicted=float(predicted_rate(rho)),
-        friction_threshold=None,
-        reason={
-            "neumann_body": "whichever body had the Neumann problem in that run",
-            **dict.fromkeys(("theta_proved", "factor_proved", "theta_max_proved", "friction_threshold"), nothing),
-        },
+    return role_of(
+        None,
+        Number.of_float(rho),
+        ratio=rho,
+        nothing="an observed ratio proves nothing",
+        reason={"neumann_body": "whichever body had the Neumann problem in that run"},
     )
