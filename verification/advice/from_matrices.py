@@ -14,7 +14,7 @@ from scipy.sparse.linalg import LinearOperator
 from fem1d2d import extremes_by_solves, largest
 from fem1d2d.mesh import Floats
 from ndtheory import Number
-from verification.advice.role import Role, best_of, with_both_ends
+from verification.advice.role import Role, with_both_ends
 from verification.advice.roles import Advice, advise, plain_role
 from verification.advice.seen_matrices import ORDERING, SeenLanczos, SeenMatrices
 from verification.advice.sides import BODIES, Body, Side, is_operator, of_matrix, of_solver, other, rows_of
@@ -148,7 +148,7 @@ def advise_matrices(
                 roles.append(_by_eigenvalues(body, sides, P))
         if not functions and P is None and not refused:
             roles = list(with_both_ends(roles))
-        found = Advice(neumann_body=best_of(roles, tied=tied).neumann_body, roles=tuple(roles), units=UNITS, tied=tied)
+        found = Advice.between(roles, tied=tied, units=UNITS)
     else:
         found = _with_friction(sides, P, 1 if 2 in refused else 2, friction, beside, tied)
         found = replace(found, roles=tuple(refused.get(role.neumann_body or 2, role) for role in found.roles))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -85,6 +85,11 @@ class Advice(Document):
     tied: bool = False
     assumes: str | None = None
     friction_bounds: FrictionBounds | None = None
+
+    @classmethod
+    def between(cls, roles: Sequence[Role], *, tied: bool, **known: Any) -> Advice:
+        """The advice for the role that takes fewer steps; one of them at least is not refused."""
+        return cls(neumann_body=best_of(roles, tied=tied).neumann_body, roles=tuple(roles), tied=tied, **known)
 
     @property
     def summary(self) -> str:
@@ -262,9 +267,8 @@ def advise(problem: Problem | ContactPair | Path | str, *, tied: bool = False, p
         given = problem if isinstance(problem, Problem) else load(problem)
         pair = build(given.swapped())  # refused itself where contact holds that body, too
         roles = (Role.refused(given.iteration.neumann_body, error), _role(pair))
-    return Advice(
-        neumann_body=best_of(roles, tied=tied).neumann_body,
-        roles=roles,
+    return Advice.between(
+        roles,
         tied=tied,
         units=UNITS if pair.problem is None else pair.problem.units,
         problem=pair.problem,
