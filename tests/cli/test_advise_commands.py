@@ -107,7 +107,13 @@ def test_an_option_of_no_form_is_answered_with_the_nearest(call):
 
 def test_advise_without_a_file_says_what_it_takes(call):
     for words in ((), ("--tied",)):
-        assert "needed FILE or one of the commands matrices, run, moduli" in call("advise", *words).complaint
+        complaint = call("advise", *words).complaint
+        assert "received nothing: needed one FILE, or one of the commands matrices, run, moduli first" in complaint
+
+
+def test_more_than_one_file_is_refused_with_what_is_needed(call):
+    complaint = call("advise", "vectors", "X.npy", "TX.npy").complaint
+    assert_names(complaint, "received vectors X.npy TX.npy: needed one FILE, or one of the commands matrices,")
 
 
 def test_a_misspelt_command_of_advise_is_no_missing_file(call, write, tmp_path, monkeypatch):

@@ -138,7 +138,7 @@ def test_the_first_line_says_what_is_assumed_and_friction_takes_the_theta_away(c
 @pytest.mark.parametrize(
     ("words", "fragment"),
     [
-        ("run --theta 0.1 --ratio 1.4 --friction 0.2", "unexpected extra argument (0.2)"),
+        ("run --theta 0.1 --ratio 1.4 --friction 0.2", "received 0.2: needed options only"),
         ("run --theta 0.1 --ratio 1.4 --friction --tied", "--tied with --friction"),
         ("matrices --S1 a.npz --S2 b.npz --friction", "'--friction' requires an argument"),
         ("matrices --S1 a.npz --friction --S2 b.npz", "--friction = --S2: needed a number >= 0, as --friction 0.2"),

@@ -47,6 +47,18 @@ def test_a_long_word_is_compared_in_no_time_and_not_repeated(call):
     assert len(line) < 700
 
 
+@pytest.mark.parametrize(
+    ("key", "value", "meant"), [("contact.law", "nonlocel", "nonlocal"), ("iteration.relaxation", "aitkin", "aitken")]
+)
+def test_a_misspelt_value_of_a_file_is_answered_alike(call, write, key, value, meant):
+    assert f"did you mean '{meant}'?" in call("run", write(), "--set", f"{key}={value}").complaint
+
+
+def test_a_misspelt_example_in_the_file_of_a_sweep_is_answered_alike(call, tmp_path):
+    (tmp_path / "grid.toml").write_text(SWEEP.replace("section6", "sektion6"), encoding="utf-8")
+    assert "did you mean 'section6'?" in call("sweep", tmp_path / "grid.toml").complaint
+
+
 @pytest.mark.parametrize("words", [["--dry-run"], ["--json"]])
 def test_a_problem_file_given_to_sweep_is_named_as_one(call, write, tmp_path, words):
     file = write()

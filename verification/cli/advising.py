@@ -48,10 +48,9 @@ def of_file(file: Path, keys: dict[str, str], swap: bool, tied: bool, snippets: 
 
     FILE is a problem file, or the interface.npz that a run has written.  Both assignments of the roles are compared:
     theta (no unit) and the factor of a step, predicted and proved, and lines to paste into a coupling configuration.
-    --swap-roles exchanges the roles of FILE before.
 
-    The commands below give the same advice where there is no problem file.  A file that has the name of one of them is
-    given as ./run.
+    The commands below advise where there is no problem file.  A file that has the name of one of them is given as
+    ./run.
 
     \b
     Examples:

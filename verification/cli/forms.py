@@ -30,10 +30,12 @@ class Form(click.Command):
     #: The group that the command belongs to; None until it is added to one.
     group: Forms | None = None
 
+    allow_extra_args = True  # to be refused here, in words of this command
+
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Read the words of the command."""
         try:
-            return super().parse_args(ctx, args)
+            extra = super().parse_args(ctx, args)
         except click.NoSuchOption as error:
             known = {} if self.group is None else self.group.forms()
             others = [name for name, form in known.items() if form is not self and takes(form, error.option_name)]
@@ -42,6 +44,14 @@ class Form(click.Command):
             root = ctx.find_root().info_name
             of = " and ".join(f"{root} {name}" for name in others)
             raise click.UsageError(f"{error.option_name} is an option of {of}", ctx) from None
+        if extra and not ctx.resilient_parsing:
+            words = [str(ctx.params[p.name or ""]) for p in self.params if isinstance(p, click.Argument)] + extra
+            raise click.UsageError(f"received {' '.join(words)}: needed {self.needed(ctx)}", ctx)
+        return extra
+
+    def needed(self, ctx: click.Context) -> str:
+        """What the command takes, in words."""
+        return "options only"
 
 
 class Default(Form):
@@ -52,15 +62,22 @@ class Default(Form):
         try:
             return super().parse_args(ctx, args)
         except click.MissingParameter as error:
-            if not isinstance(error.param, click.Argument) or self.group is None:
+            if not isinstance(error.param, click.Argument):
                 raise
-            either = f"{error.param.make_metavar(ctx)} or one of the commands {', '.join(self.group.commands)}"
-            raise click.UsageError(f"needed {either}", ctx) from None
+            raise click.UsageError(f"received nothing: needed {self.needed(ctx)}", ctx) from None
+
+    def needed(self, ctx: click.Context) -> str:
+        """The argument and the commands, in words."""
+        named = [] if self.group is None else self.group.commands
+        return f"one {' '.join(self.arguments(ctx))}, or one of the commands {', '.join(named)} first"
+
+    def arguments(self, ctx: click.Context) -> list[str]:
+        """The arguments as the help writes them."""
+        return [p.make_metavar(ctx) for p in self.params if isinstance(p, click.Argument)]
 
     def format_usage(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """How it is called, with and without a name."""
-        arguments = [p.make_metavar(ctx) for p in self.params if isinstance(p, click.Argument)]
-        formatter.write_usage(ctx.command_path, " ".join(["[OPTIONS]", *arguments]))
+        formatter.write_usage(ctx.command_path, " ".join(["[OPTIONS]", *self.arguments(ctx)]))
         formatter.write_usage(ctx.command_path, "COMMAND [OPTIONS]", prefix="   or: ")
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 from ndtheory import exact
 from ndtheory.number import decimal
-from ndtheory.texts import CONTROL, nearest, printable
+from ndtheory.texts import CONTROL, did_you_mean, nearest, printable
 
 V = TypeVar("V")
 _MISSING: Any = object()
@@ -178,7 +178,8 @@ def choice(*allowed: Any) -> Callable[[Any], Any]:
 
     def read(value: Any) -> Any:
         if type(value) not in {type(v) for v in allowed} or value not in allowed:  # 1 is not true and not 1.0
-            raise Unfit("needed one of " + ", ".join(show(v) for v in allowed))
+            meant = did_you_mean(value, [v for v in allowed if isinstance(v, str)]) if isinstance(value, str) else ""
+            raise Unfit("needed one of " + ", ".join(show(v) for v in allowed) + meant)
         return value
 
     return read

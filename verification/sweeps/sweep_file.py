@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from ndtheory.texts import did_you_mean
 from verification.problem.examples import example, examples
 from verification.problem.reading import load, read_file
 from verification.problem.specification import Problem
@@ -63,7 +64,7 @@ def _problem(path: Path, name: str) -> Problem:
     if name in built_in:
         return example(name)
     needed = f"needed a problem file beside the sweep file, or the name of a built-in problem: {', '.join(built_in)}"
-    raise ProblemError(str(path), "problem", name, needed)
+    raise ProblemError(str(path), "problem", name, needed + did_you_mean(name, built_in))
 
 
 def _values(file: str, key: str, value: Any) -> Any:
