@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.shell_completion import CompletionItem
@@ -15,14 +15,12 @@ from verification.advice.snippets import SNIPPETS
 from verification.cli.console import complain, deliver, stages
 from verification.cli.forms import Default, Form, Forms
 from verification.cli.matrices import advice_from_files
-from verification.cli.options import JSON, SET, SWAP, OneOf
+from verification.cli.options import JSON, SET, SWAP, F, OneOf
 from verification.cli.problems import load_problem
 from verification.cli.typed import Typed
 
 if TYPE_CHECKING:
     from verification.advice.roles import Advice
-
-F = TypeVar("F", bound=Callable[..., Any])
 
 TIED = click.option("--tied", is_flag=True, help="Advise by what holds where nothing opens or slips.")
 SNIPPETS_OF = click.option(

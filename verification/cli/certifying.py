@@ -11,7 +11,7 @@ import click
 
 from verification.cli.console import deliver, heading, near_one, note, say, stages
 from verification.cli.failing import fail
-from verification.cli.options import JSON, SET, SWAP, THETA, OneOf
+from verification.cli.options import JSON, SET, SWAP, THETA, OneOf, check_place, one_file
 from verification.cli.problems import load_problem
 from verification.cli.typed import Typed
 
@@ -36,9 +36,7 @@ MOST_BYTES = 100_000_000
 @click.option(
     "--continuum", is_flag=True, help="Of FILE without its mesh: two rectangles, each held at its outer side."
 )
-@click.option(
-    "-o", "--output", "target", type=click.Path(path_type=Path), metavar="FILE.json", help="Write it to this file."
-)
+@one_file(".json", words="File of the certificate")
 @click.option(
     "--check",
     "given",
@@ -84,7 +82,7 @@ def certify(
     if file is None and given is None:
         raise click.UsageError("received nothing: needed FILE, or --check FILE.json", context)
     if target is not None:
-        _check_target(target, context)
+        check_place(target)
     if continuum:
         from verification.cli.continuum_screen import prove as prove_continuum
 
@@ -106,18 +104,6 @@ def certify(
     typed = Typed(file=file, keys=keys, theta=theta, swap=swap)
     deliver(found, lambda: show(found, target, typed), as_json, writing(found, target), target)
     return 0
-
-
-def _check_target(target: Path, context: click.Context) -> None:
-    """Refuse a name under which nothing can be written."""
-    from verification.output.folder import check_ours
-    from verification.problem.tables import ProblemError
-
-    if target.suffix != ".json":
-        raise click.UsageError(f"-o {target}: needed a name ending in .json", context)
-    if not target.parent.is_dir():
-        raise ProblemError(str(target), "", None, "needed a name in a folder that exists (-o)")
-    check_ours(target)
 
 
 def writing(found: Document, target: Path | None) -> Callable[[], None] | None:

@@ -7,30 +7,15 @@ from pathlib import Path
 import click
 
 from verification.cli.console import Interrupted, complain, deliver, stages
-from verification.cli.options import FILE, JSON, SET, STORE, SWAP
+from verification.cli.options import FILE, JSON, SET, STORE, SWAP, check_place, one_file
 from verification.cli.problems import load_problem
-
-
-def _picture(context: click.Context, parameter: click.Parameter, value: Path) -> Path:
-    if value.suffix not in (".svg", ".png"):
-        raise click.BadParameter(f"{str(value)!r}: needed a name ending in .svg or .png", context, parameter)
-    return value
 
 
 @click.command()
 @FILE
 @SET
 @SWAP
-@click.option(
-    "-o",
-    "--output",
-    "target",
-    type=click.Path(path_type=Path),
-    callback=_picture,
-    required=True,
-    metavar="FILE.svg",
-    help="Where to draw it: a name ending in .svg or .png.",
-)
+@one_file(".svg", ".png", words="File to draw", required=True)
 @STORE
 @JSON
 def region(file: Path, keys: dict[str, str], swap: bool, target: Path, store: Path | None, as_json: bool) -> None:
@@ -47,13 +32,10 @@ def region(file: Path, keys: dict[str, str], swap: bool, target: Path, store: Pa
     from verification import figures
     from verification.bounds.region import chart
     from verification.cli import screens
-    from verification.output.folder import check_ours, staged
-    from verification.problem.tables import ProblemError
+    from verification.output.folder import staged
 
     problem = load_problem(file, keys, swap=swap)
-    if not target.parent.is_dir():
-        raise ProblemError(str(target), "", None, "needed a name in a folder that exists (-o)")
-    check_ours(target)
+    check_place(target)
     with stages() as tell:
         plane = chart(problem, store=store, progress=tell)
     deliver(plane, lambda: screens.plane(plane, target), as_json)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import click
 
 from ndtheory.texts import did_you_mean
+
+F = TypeVar("F", bound=Callable[..., Any])
 
 FILE = click.argument("file", type=click.Path(path_type=Path))
 JSON = click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout.")
@@ -88,6 +90,42 @@ def folder_name(context: click.Context, parameter: click.Parameter, value: str |
     if value == "":
         raise click.BadParameter("'': needed the name of a folder", context, parameter)
     return None if value is None else Path(value)
+
+
+def one_file(*endings: str, words: str, required: bool = False) -> Callable[[F], F]:
+    """The option ``-o`` of a command that makes one file, with a name that ends in one of these."""
+    needed = f"a name ending in {' or '.join(endings)}"
+
+    def named(context: click.Context, parameter: click.Parameter, value: Path | None) -> Path | None:
+        if value is not None and value.suffix not in endings:
+            raise click.BadParameter(f"{str(value)!r}: needed {needed}", context, parameter)
+        return value
+
+    return click.option(
+        "-o",
+        "--output",
+        "target",
+        type=click.Path(path_type=Path),
+        callback=named,
+        required=required,
+        metavar=f"FILE{endings[0]}",
+        help=f"{words}, {needed}.",
+    )
+
+
+def check_place(target: Path) -> None:
+    """Refuse the name of a file that cannot be written, or that is not ours to write over.
+
+    Raises
+    ------
+    ProblemError
+    """
+    from verification.output.folder import check_ours
+    from verification.problem.tables import ProblemError
+
+    if not target.parent.is_dir():
+        raise ProblemError(str(target), "", None, "needed a name in a folder that exists (-o)")
+    check_ours(target)
 
 
 FOLDER = click.option("-o", "--output", "folder", callback=folder_name, metavar="DIR", help="Folder for the results.")
