@@ -207,7 +207,7 @@ def run(
     from verification.advice.from_runs import advise_run
 
     try:
-        if logs:
+        if ratio is None:
             found = advise_logs(zip(logs, thetas, strict=True), tied=tied, friction=friction)
         else:
             found = advise_run(thetas[0], ratio, tied=tied, friction=friction)

@@ -10,6 +10,7 @@ from fractions import Fraction
 from typing import Any, Literal
 
 from ndtheory import HypothesisError, relaxation_factor
+from ndtheory.number import Numeric
 from verification.problem.meshes import MeshFile
 from verification.problem.read_only import ReadOnly
 from verification.problem.tables import ProblemError
@@ -332,7 +333,7 @@ class Problem:
 
         return with_keys(self, values)
 
-    def with_theta(self, theta: Any) -> Problem:
+    def with_theta(self, theta: Numeric) -> Problem:
         """The same problem at another theta.
 
         Raises
