@@ -219,7 +219,9 @@ OPTIONS: dict[str, dict[str, tuple[str, ...] | None]] = {
     "compare": {"--theta": NUMBERS, "--solver": ("auto", "x"), "--swap-roles": None, "--json": None},
     "constants": {"--refine": ("0", "1", "-1", "9", "x", ""), "--json": None},
     "solve": {"--json": None, "--theta": NUMBERS},
-    "advise": {"--json": None, "--theta": NUMBERS, "--ratio": NUMBERS},
+    "advise": {"--json": None, "--tied": None, "--swap-roles": None},
+    "advise run": {"--json": None, "--theta": NUMBERS, "--ratio": NUMBERS, "--friction": None, "--tied": None},
+    "advise moduli": {"--json": None, "--young": NUMBERS, "--poisson": NUMBERS, "--flat": None},
     "bounds": {
         **dict.fromkeys(("--m", "--M", "--CR", "--Cs", "--Ctr", "--k", "--CK", "--theta", "--rho"), NUMBERS),
         **dict.fromkeys(("--kappa1", "--kappa2"), NUMBERS), "--edition": ("printed", "repaired", "both", "x"),
@@ -233,12 +235,14 @@ USUAL = {"--m": "1", "--M": "3", "--CR": "1.5", "--CK": "0", "--theta": "0.3", "
 
 def options(draw: random.Random, folder: Path) -> list[str]:
     """A call with options that may not fit."""
-    command = draw.choice(tuple(OPTIONS) + ("bounds",) * 6 + ("advise",) * 3 + ("run",) * 3)
-    words = (
-        [command, draw.choice(("5.30", "x", "C5"))] if command == "verify" else [command]
-    )  # all of them take minutes
+    command = draw.choice(tuple(OPTIONS) + ("bounds",) * 6 + ("advise run",) * 3 + ("run",) * 3)
+    words = command.split()
+    if command == "verify":  # all of them take minutes
+        words.append(draw.choice(("5.30", "x", "C5")))
     known = OPTIONS[command]
-    if command not in ("bounds", "example", "verify") and draw.random() < (0.3 if command == "advise" else 0.95):
+    if command not in ("bounds", "example", "verify") and draw.random() < (
+        0.1 if command.startswith("advise ") else 0.95
+    ):
         (folder / "problem.toml").write_text(PLANE, encoding="utf-8")
         words.append(str(folder / "problem.toml"))
     for name in draw.sample(sorted(known), draw.randint(0, min(len(known), 8))):
@@ -277,7 +281,7 @@ def matrices(draw: random.Random, folder: Path) -> list[str]:
     """Advice from two matrices, many of them none, in files that may be damaged."""
     rng = np.random.default_rng(draw.randrange(2**32))
     n = draw.randint(1, 5)
-    words = ["advise"]
+    words = ["advise", "matrices"]
     for name in ("S1", "S2"):
         root = rng.normal(size=(n, n))
         matrix = root @ root.T + np.eye(n) * draw.choice((1.0, 1e-3, 1e-12))

@@ -64,10 +64,10 @@ def test_it_says_how_many_steps_both_roles_take_and_who_reads_what(call, write, 
 def test_roles_between_which_there_is_no_difference_are_told_so(call, tmp_path):
     """rho is 4 in either role."""
     S1, S2 = (saved(tmp_path, name, np.diag(values)) for name, values in (("a", [1.0, 4.0]), ("b", [4.0, 1.0])))
-    answer = call("advise", "--S1", S1, "--S2", S2)
+    answer = call("advise", "matrices", "--S1", S1, "--S2", S2)
     assert "and no difference with the roles exchanged" in answer.out
     assert (
-        call("advise", "--S1", S1, "--S2", S2, "--json")
+        call("advise", "matrices", "--S1", S1, "--S2", S2, "--json")
         .document["quote"]
         .endswith("the same with the roles exchanged.")
     )
@@ -181,7 +181,7 @@ def test_the_answer_names_the_snippets(call, write):
 
 
 def test_there_is_no_snippet_while_readings_are_left(call):
-    answer = call("advise", "--theta", "0.1", "--ratio", "1.4", "--snippets", "all")
+    answer = call("advise", "run", "--theta", "0.1", "--ratio", "1.4", "--snippets", "all")
     assert answer.status == 0
     assert "WHICH RUN NEXT?" in answer.out
     assert answer.err == "no snippet: several readings are left, make the run that is named\n"
@@ -216,12 +216,12 @@ def test_steps_of_which_the_theorem_speaks_are_at_most_so_many(call, write):
 
 @pytest.mark.parametrize("ratio", ["1.4", "1.9"])
 def test_a_tied_run_that_grows_gets_a_theta(call, ratio):
-    answer = call("advise", "--tied", "--theta", "0.1", "--ratio", ratio)
-    document = call("advise", "--tied", "--theta", "0.1", "--ratio", ratio, "--json").document
+    answer = call("advise", "run", "--tied", "--theta", "0.1", "--ratio", ratio)
+    document = call("advise", "run", "--tied", "--theta", "0.1", "--ratio", ratio, "--json").document
     rho = (1 + float(ratio)) / 0.1 - 1
     assert document["roles"][0]["rho"]["value"] == pytest.approx(rho)
     assert pasted(answer.out) == f"{document['theta']:g}"
-    assert answer.out.splitlines()[-1].startswith("Next: ndtheory advise --tied --theta")
+    assert answer.out.splitlines()[-1].startswith("Next: ndtheory advise run --tied --theta")
 
 
 def test_a_number_of_steps_is_none_where_nothing_falls():

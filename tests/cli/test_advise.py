@@ -167,7 +167,7 @@ def tail_ratio(history):
 def test_one_run_that_alternates_tells_rho(call, write, name, theta, rho, within):
     file = write(text=examples()[name])
     ratio = tail_ratio(call("run", file, "--theta", theta, "--json").document["history"])
-    found = call("advise", "--theta", theta, "--ratio", repr(ratio), "--json").document
+    found = call("advise", "run", "--theta", theta, "--ratio", repr(ratio), "--json").document
     (role,) = found["roles"]
     assert role["rho"]["value"] == pytest.approx((1 + ratio) / float(theta) - 1, rel=1e-12)
     assert role["rho"]["value"] == pytest.approx(getattr(vf.measure(vf.load(file)), rho).value, rel=within)
@@ -180,7 +180,7 @@ def test_a_run_that_diverges_in_every_step_tells_rho_too(call, write):
     file = write(text=examples()["two-bars"])
     residuals = [iterate.residual for iterate in vf.run(file, theta=0.6).iterates]
     ratios = [b / a for a, b in itertools.pairwise(residuals)]
-    found = call("advise", "--theta", "0.6", "--ratio", f"{ratios[3]:.9f}", "--json").document
+    found = call("advise", "run", "--theta", "0.6", "--ratio", f"{ratios[3]:.9f}", "--json").document
     assert ratios[3] == pytest.approx(1.4)
     assert {reading["kind"]: reading["rho"]["value"] for reading in found["readings"]} == {
         "mode-high": pytest.approx(3),
@@ -191,14 +191,14 @@ def test_a_run_that_diverges_in_every_step_tells_rho_too(call, write):
 
 
 def test_one_run_tells_nothing_of_the_other_role_and_proves_nothing(call):
-    found = call("advise", "--theta", "0.45", "--ratio", "0.8", "--json").document
+    found = call("advise", "run", "--theta", "0.45", "--ratio", "0.8", "--json").document
     (role,) = found["roles"]
     assert set(role) >= ROLE
     assert found["neumann_body"] is role["neumann_body"] is None
     assert "neumann_body" in found["reason"]
     assert {role[name] for name in PROVED} == {None}
     assert set(role["reason"]) >= PROVED | {"neumann_body"}
-    answer = call("advise", "--theta", "0.45", "--ratio", "0.8")
+    answer = call("advise", "run", "--theta", "0.45", "--ratio", "0.8")
     assert pasted(answer.out) == "0.4"
     assert "neumann_body" not in answer.out
     assert max(map(len, answer.out.splitlines())) <= 80
@@ -208,55 +208,34 @@ def test_one_run_tells_nothing_of_the_other_role_and_proves_nothing(call):
     ("theta", "ratio", "rho"), [("1/3", "4/3", 6), ("1", "1/2", 0.5), ("1", "1e-60", 1e-60), ("1e-8", "1e-8", 1e8)]
 )
 def test_theta_and_ratio_are_read_exactly(call, theta, ratio, rho):
-    found = call("advise", "--theta", theta, "--ratio", ratio, "--json").document
+    found = call("advise", "run", "--theta", theta, "--ratio", ratio, "--json").document
     assert found["readings"][0]["rho"]["value"] == pytest.approx(rho, rel=1e-7, abs=0)
 
 
 @pytest.mark.parametrize("size", ["1e-300", "1e-8", "1e8", "1e300"])
 @pytest.mark.parametrize("theta", ["1e-300", "1e-8", "1"])
 def test_no_size_of_a_ratio_crashes_the_advice(call, theta, size):
-    answer = call("advise", "--theta", theta, "--ratio", size, "--json")
+    answer = call("advise", "run", "--theta", theta, "--ratio", size, "--json")
     assert "Traceback" not in answer.err
     if answer.status == 2:
         assert "--" in answer.complaint
     else:
         assert 0 < answer.document["next"]["theta"] < 1
-        assert call("advise", "--theta", theta, "--ratio", size).status == 0
+        assert call("advise", "run", "--theta", theta, "--ratio", size).status == 0
 
 
 @pytest.mark.parametrize("value", ["0", "-1", "nan", "inf", "-inf", "abc", "", "1e400", "1e-400", "1/0", "auto"])
 @pytest.mark.parametrize("name", ["ratio", "theta"])
 def test_a_ratio_or_theta_outside_its_meaning_is_refused(call, name, value):
     given = {"theta": "0.1", "ratio": "1.4"} | {name: value}
-    complaint = call("advise", "--theta", given["theta"], "--ratio", given["ratio"]).complaint
+    complaint = call("advise", "run", "--theta", given["theta"], "--ratio", given["ratio"]).complaint
     assert f"--{name} = {value}" in complaint
     assert {"ratio": "a number > 0", "theta": "0 < theta <= 1"}[name] in complaint
 
 
 @pytest.mark.parametrize("theta", ["1.5", "1.0000000000000000000001"])
 def test_a_theta_above_1_is_refused(call, theta):
-    assert f"--theta = {theta}: needed" in call("advise", "--theta", theta, "--ratio", "1.4").complaint
-
-
-FORMS = [{"FILE"}, {"--S1", "--S2"}, {"--theta", "--ratio"}]
-
-
-@pytest.mark.parametrize(
-    "given",
-    [
-        set(some)
-        for n in range(6)
-        for some in itertools.combinations(("FILE", "--S1", "--S2", "--theta", "--ratio"), n)
-        if set(some) not in FORMS
-    ],
-    ids=lambda given: " ".join(sorted(given)) or "nothing",
-)
-def test_advise_needs_exactly_one_of_its_forms_and_that_whole(call, write, tmp_path, given):
-    values = {"--theta": "0.1", "--ratio": "1.4"} | dict.fromkeys(("--S1", "--S2"), saved(tmp_path, "a", GOOD))
-    options = [word for name in sorted(given - {"FILE"}) for word in (name, values[name])]
-    complaint = call("advise", *(["FILE"] if "FILE" in given else []), *options).complaint
-    assert "needed" in complaint
-    assert all(name in complaint for name in given)
+    assert f"--theta = {theta}: needed" in call("advise", "run", "--theta", theta, "--ratio", "1.4").complaint
 
 
 @pytest.mark.parametrize(

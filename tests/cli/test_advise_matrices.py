@@ -37,7 +37,7 @@ HOW = {
 @pytest.mark.parametrize("how", HOW)
 def test_matrices_give_the_rho_of_the_problem(call, write, tmp_path, matrices, how):
     S1, S2 = (saved(tmp_path, name, matrix, HOW[how]) for name, matrix in zip("ab", matrices, strict=True))
-    found = call("advise", "--S1", S1, "--S2", S2, "--json").document
+    found = call("advise", "matrices", "--S1", S1, "--S2", S2, "--json").document
     expected = call("advise", write("wrong roles"), "--json").document
     assert found["schema"] == "ndtheory.advice/1"
     assert found["neumann_body"] == expected["neumann_body"] == 1
@@ -51,8 +51,8 @@ def test_matrices_give_the_rho_of_the_problem(call, write, tmp_path, matrices, h
 
 def test_exchanged_matrices_exchange_the_advice(call, tmp_path, matrices):
     S1, S2 = (saved(tmp_path, name, matrix) for name, matrix in zip("ab", matrices, strict=True))
-    found = call("advise", "--S1", S1, "--S2", S2, "--json").document
-    swapped = call("advise", "--S1", S2, "--S2", S1, "--json").document
+    found = call("advise", "matrices", "--S1", S1, "--S2", S2, "--json").document
+    swapped = call("advise", "matrices", "--S1", S2, "--S2", S1, "--json").document
     assert {found["neumann_body"], swapped["neumann_body"]} == {1, 2}
     turned = {3 - body: role | {"neumann_body": 3 - body} for body, role in by_body(swapped).items()}
     assert turned == by_body(found)
@@ -63,7 +63,7 @@ def test_the_unit_of_stiffness_does_not_change_the_advice(call, tmp_path, matric
     largest = np.abs(matrices).max()
     given = [saved(tmp_path, name, matrix) for name, matrix in zip("ab", matrices, strict=True)]
     other = [saved(tmp_path, name, matrix / largest * unit) for name, matrix in zip("cd", matrices, strict=True)]
-    one, two = (call("advise", "--S1", a, "--S2", b, "--json") for a, b in (given, other))
+    one, two = (call("advise", "matrices", "--S1", a, "--S2", b, "--json") for a, b in (given, other))
     assert two.err == ""
     assert one.document["neumann_body"] == two.document["neumann_body"]
     for a, b in zip(one.document["roles"], two.document["roles"], strict=True):
@@ -73,7 +73,7 @@ def test_the_unit_of_stiffness_does_not_change_the_advice(call, tmp_path, matric
 @pytest.mark.parametrize("times", [1e6, 1e60, 1e300])
 def test_a_body_far_stiffer_than_the_other_gets_the_neumann_problem_or_is_refused(call, tmp_path, times):
     a, b = saved(tmp_path, "a", GOOD), saved(tmp_path, "b", GOOD * times)
-    answer = call("advise", "--S1", a, "--S2", b, "--json")
+    answer = call("advise", "matrices", "--S1", a, "--S2", b, "--json")
     if answer.status == 2:
         assert times > 1e75
         assert "b.npz" in answer.complaint
@@ -85,7 +85,7 @@ def test_a_body_far_stiffer_than_the_other_gets_the_neumann_problem_or_is_refuse
 
 def test_matrices_of_whole_numbers_are_read(call, tmp_path):
     a, b = saved(tmp_path, "a", np.diag([1, 2, 3])), saved(tmp_path, "b", np.eye(3, dtype=np.int8))
-    found = by_body(call("advise", "--S1", a, "--S2", b, "--json").document)
+    found = by_body(call("advise", "matrices", "--S1", a, "--S2", b, "--json").document)
     assert found[2]["rho"]["value"] == pytest.approx(3)
     assert found[1]["rho"]["value"] == pytest.approx(1)
 
@@ -118,7 +118,12 @@ BAD = {
 def test_what_is_no_stiffness_matrix_is_refused_by_name(call, tmp_path, kind):
     matrix, fragments = BAD[kind]
     complaint = call(
-        "advise", "--S1", saved(tmp_path, "a", GOOD), "--S2", saved(tmp_path, "b", matrix, np.savez_compressed)
+        "advise",
+        "matrices",
+        "--S1",
+        saved(tmp_path, "a", GOOD),
+        "--S2",
+        saved(tmp_path, "b", matrix, np.savez_compressed),
     ).complaint
     assert [fragment for fragment in ["b.npz", *fragments] if fragment not in complaint] == []
 
@@ -126,19 +131,21 @@ def test_what_is_no_stiffness_matrix_is_refused_by_name(call, tmp_path, kind):
 @pytest.mark.parametrize("matrix", [np.diag([1.0, 0.0, 1.0]), np.ones((3, 3)) + 1e-17 * GOOD])
 def test_a_body_that_can_move_rigidly_is_refused_as_neumann_body_alone(call, tmp_path, matrix):
     a, b = saved(tmp_path, "a", GOOD), saved(tmp_path, "b", matrix)
-    roles = by_body(call("advise", "--S1", a, "--S2", b, "--json").document)
+    roles = by_body(call("advise", "matrices", "--S1", a, "--S2", b, "--json").document)
     assert roles[1]["rho"]["value"] == pytest.approx(np.linalg.eigvals(np.linalg.solve(GOOD, matrix)).real.max())
     assert (roles[1]["singular"], roles[2]["singular"], roles[2]["rho"]) == (False, True, None)
     assert "S2 is singular" in roles[2]["reason"]["rho"]
-    assert "S2 is singular" in call("advise", "--S1", a, "--S2", b).out
-    both = call("advise", "--S1", b, "--S2", b).complaint
+    assert "S2 is singular" in call("advise", "matrices", "--S1", a, "--S2", b).out
+    both = call("advise", "matrices", "--S1", b, "--S2", b).complaint
     assert all(words in both for words in ("b.npz", "S1 is singular", "S2 is singular", "supports"))
 
 
 @pytest.mark.parametrize("kind", ["indefinite", "not symmetric", "not a number", "a vector"])
 def test_the_first_matrix_is_held_to_the_same(call, tmp_path, kind):
     matrix, fragments = BAD[kind]
-    complaint = call("advise", "--S1", saved(tmp_path, "a", matrix), "--S2", saved(tmp_path, "b", GOOD)).complaint
+    complaint = call(
+        "advise", "matrices", "--S1", saved(tmp_path, "a", matrix), "--S2", saved(tmp_path, "b", GOOD)
+    ).complaint
     assert [fragment for fragment in ["a.npz", "S1", *fragments] if fragment not in complaint] == []
 
 
@@ -175,7 +182,7 @@ def test_files_that_hold_no_matrix_are_refused_by_name(call, tmp_path, kind):
     write, fragments = NO_MATRIX[kind]
     bad = tmp_path / "b.npz"
     write(bad)
-    complaint = call("advise", "--S1", saved(tmp_path, "a", GOOD), "--S2", bad).complaint
+    complaint = call("advise", "matrices", "--S1", saved(tmp_path, "a", GOOD), "--S2", bad).complaint
     assert [fragment for fragment in [str(bad), *fragments] if fragment not in complaint] == []
     assert "unsafe" not in complaint  # nobody is told to load pickles
     assert complaint.isprintable()

@@ -126,7 +126,7 @@ def test_a_file_of_another_kind_that_holds_no_matrix_is_refused_in_one_line(call
     bad = tmp_path / name
     write(bad)
     words = ("--S1", bad, "--S2", bad) if other else ("--S1", saved(tmp_path, "good", GOOD), "--S2", bad)
-    complaint = call("advise", *words).complaint
+    complaint = call("advise", "matrices", *words).complaint
     fragments = [] if other else fragments  # of one file for both its names may be asked for first
     assert [fragment for fragment in [name, *fragments] if fragment not in complaint] == []
     assert complaint.isprintable()
@@ -139,9 +139,9 @@ def test_one_file_may_hold_both_matrices(call, tmp_path, matrices, ending):
     named = dict(zip(("S1", "S2"), matrices, strict=True))
     np.savez(both, **named) if ending == "npz" else scipy.io.savemat(both, named)
     a, b = (saved(tmp_path, name, matrix) for name, matrix in zip("ab", matrices, strict=True))
-    expected = call("advise", "--S1", a, "--S2", b, "--json").document
+    expected = call("advise", "matrices", "--S1", a, "--S2", b, "--json").document
     for words in (("--S1", both), ("--S1", both, "--S2", both), ("--S1", both, "--S2", b)):
-        assert call("advise", *words, "--json").document == expected
+        assert call("advise", "matrices", *words, "--json").document == expected
 
 
 # --- what is not a Schur complement -----------------------------------------------------------------------------------
@@ -152,7 +152,7 @@ def test_an_asymmetry_is_rounded_told_or_refused(call, tmp_path, skew):
     given = FULL.copy()
     given[0, 1] += skew * 4
     a, b = saved(tmp_path, "a", given), saved(tmp_path, "b", GOOD)
-    words = ("advise", "--S1", a, "--S2", b)
+    words = ("advise", "matrices", "--S1", a, "--S2", b)
     if skew > 1e-3:
         assert all(part in call(*words).complaint for part in ("a.npz", "S1 is not symmetric", "0.0011", "0.001"))
         return
@@ -162,7 +162,7 @@ def test_an_asymmetry_is_rounded_told_or_refused(call, tmp_path, skew):
     assert len(told) == (skew > 1e-8)
     assert ("asymmetric by" in call(*words).out) == (skew > 1e-8)
     c = saved(tmp_path, "c", (given + given.T) / 2)
-    symmetric = call("advise", "--S1", c, "--S2", b, "--json").document
+    symmetric = call("advise", "matrices", "--S1", c, "--S2", b, "--json").document
     assert document["roles"][0]["rho"]["value"] == pytest.approx(symmetric["roles"][0]["rho"]["value"], rel=1e-14)
 
 
@@ -171,18 +171,20 @@ def test_an_assembled_matrix_is_told_from_a_condensed_one(call, tmp_path):
     body = build(vf.example("section6")).body1.mesh_body
     S = build(vf.example("section6")).body1.stiffness
     sp.save_npz(tmp_path / "K.npz", body.stiffness)
-    whole = call("advise", "--S1", tmp_path / "K.npz", "--S2", tmp_path / "K.npz")
+    whole = call("advise", "matrices", "--S1", tmp_path / "K.npz", "--S2", tmp_path / "K.npz")
     assert whole.status == 0
     assert "assembled" in whole.out
     assert max(map(len, whole.out.splitlines())) <= 80
-    condensed = call("advise", "--S1", saved(tmp_path, "S", S), "--S2", saved(tmp_path, "T", 2 * S))
+    condensed = call("advise", "matrices", "--S1", saved(tmp_path, "S", S), "--S2", saved(tmp_path, "T", 2 * S))
     assert "assembled" not in condensed.out
 
 
 def test_decoupled_components_are_not_taken_for_an_assembled_matrix(call, tmp_path):
     """Three components that do not act on each other leave two thirds of zeros."""
     block = np.kron(np.eye(3), np.ones((9, 9)) + np.eye(9))
-    found = call("advise", "--S1", saved(tmp_path, "a", block), "--S2", saved(tmp_path, "b", block), "--json").document
+    found = call(
+        "advise", "matrices", "--S1", saved(tmp_path, "a", block), "--S2", saved(tmp_path, "b", block), "--json"
+    ).document
     assert found["matrices"]["notes"] == []
     assert found["matrices"]["S1"]["zeros"] == pytest.approx(2 / 3, abs=0.03)
 
@@ -212,9 +214,9 @@ def test_an_interface_file_is_read_whole_wherever_it_is_given(call, run_folder):
     file, results = run_folder
     expected = call("advise", file, "--json").document
     name = results / "interface.npz"
-    for words in ((name,), ("--S1", name), ("--S1", name, "--S2", name)):
+    for words in ((name,), ("matrices", "--S1", name), ("matrices", "--S1", name, "--S2", name)):
         same_advice(call("advise", *words, "--json").document, expected)
-    assert "an interface file has all of it" in call("advise", "--S1", name, "--friction", "0.2").complaint
+    assert "an interface file has all of it" in call("advise", "matrices", "--S1", name, "--friction", "0.2").complaint
 
 
 def test_matrices_with_friction_give_the_advice_of_the_problem(call, run_folder, tmp_path):
@@ -235,7 +237,7 @@ def test_matrices_with_friction_give_the_advice_of_the_problem(call, run_folder,
         ("--kernel", place("kernel"), "--weights", place("weights")),
         ("--kernel", place("kernel"), "--x", place("x")),
     ):
-        found = call("advise", *both, *words).document
+        found = call("advise", "matrices", *both, *words).document
         same_advice(found, expected)
         assert "tangential" in found["matrices"]["ordering"]
     assert pair.neumann_body in (1, 2)
@@ -278,21 +280,22 @@ def test_a_combination_that_lacks_or_mixes_something_is_one_clear_line(call, tmp
         "P": np.ones((3, 4)),
     }.items():
         np.save(f"{name}.npy", array)
-    assert fragment in call("advise", "--S1", "S.npy", "--S2", "S.npy", *words.split()).complaint
+    assert fragment in call("advise", "matrices", "--S1", "S.npy", "--S2", "S.npy", *words.split()).complaint
 
 
 @pytest.mark.parametrize("option", ["--S2", "--map", "--x", "--kernel", "--weights", "--friction", "--radius"])
 def test_what_belongs_to_matrices_needs_matrices(call, tmp_path, option):
     complaint = call("advise", option, saved(tmp_path, "a", GOOD)).complaint
-    assert option in complaint
-    assert "needed both --S1 and --S2" in complaint
+    assert f"{option} is an option of ndtheory advise matrices" in complaint
+    value = {"--friction": "0.1", "--radius": "0.1"}.get(option, saved(tmp_path, "a", GOOD))
+    assert "Missing option '--S1'" in call("advise", "matrices", option, value).complaint
 
 
 def test_friction_of_an_odd_number_of_unknowns_is_refused(call, tmp_path):
     a = saved(tmp_path, "a", GOOD)
     np.save(tmp_path / "x.npy", np.arange(3.0))
     words = ("--friction", "0.1", "--x", tmp_path / "x.npy", "--radius", "1")
-    assert "two components at each node" in call("advise", "--S1", a, "--S2", a, *words).complaint
+    assert "two components at each node" in call("advise", "matrices", "--S1", a, "--S2", a, *words).complaint
 
 
 @pytest.fixture
@@ -312,7 +315,7 @@ def test_the_map_of_a_run_gives_the_role_it_leads_to_and_refuses_the_other(call,
         both = tmp_path / "both.npz"
         np.savez(both, S1=arrays["S1"], S2=arrays["S2"])
         np.save(tmp_path / "kernel.npy", arrays["kernel"])
-    words = ("advise", "--S1", both, "--map", results / "P.npz")
+    words = ("advise", "matrices", "--S1", both, "--map", results / "P.npz")
     found = by_body(call(*words, "--json").document)
     assert found[neumann]["rho"]["value"] == pytest.approx(expected["rho"]["value"], rel=1e-9)
     assert found[3 - neumann]["rho"] is None
@@ -334,7 +337,7 @@ def test_the_screen_says_which_ordering_is_assumed_and_fits(call, tmp_path, matr
     S1, S2 = (saved(tmp_path, name, matrix) for name, matrix in zip("ab", matrices, strict=True))
     np.save(tmp_path / "x.npy", np.linspace(0, 1, len(matrices[0]) // 2))
     rest = ("--x", tmp_path / "x.npy", "--radius", "0.3") if words else ()
-    out = call("advise", "--S1", S1, "--S2", S2, *words, *rest).out
+    out = call("advise", "matrices", "--S1", S1, "--S2", S2, *words, *rest).out
     folded = " ".join(out.split())
     assert ("Ordering: any" in folded) == (not words)
     assert ("tangential, from left to right" in folded) == bool(words)

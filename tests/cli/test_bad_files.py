@@ -48,7 +48,7 @@ def test_a_mesh_file_without_an_end_is_refused_unread(call, write, tmp_path, kin
 def test_a_matrix_without_an_end_is_refused_unread(call, tmp_path, kind, says):
     bad = endless(tmp_path / "bad.npz", kind)
     np.save(tmp_path / "good.npy", np.eye(2))
-    assert_names(call("advise", "--S1", bad, "--S2", tmp_path / "good.npy").complaint, "bad.npz", says)
+    assert_names(call("advise", "matrices", "--S1", bad, "--S2", tmp_path / "good.npy").complaint, "bad.npz", says)
 
 
 @pytest.mark.parametrize("kind", ["pipe", "device"])
@@ -84,7 +84,7 @@ def packed(path, **headers):
 def test_a_matrix_that_would_fill_the_memory_is_refused_by_its_header(call, tmp_path, headers, says):
     bomb = packed(tmp_path / "bomb.npz", **headers)
     assert bomb.stat().st_size < 100_000
-    assert_names(call("advise", "--S1", bomb, "--S2", bomb).complaint, "bomb.npz", says)
+    assert_names(call("advise", "matrices", "--S1", bomb, "--S2", bomb).complaint, "bomb.npz", says)
 
 
 @pytest.mark.parametrize("blocks", [((0, 0), (0, 0, 0)), ((2, 2), (1, 0, 0)), ((2, 2), (1, 0, 2))])
@@ -94,7 +94,7 @@ def test_a_matrix_of_empty_blocks_is_refused(call, tmp_path, blocks):
         tmp_path / "S.npz", format=np.array(b"bsr"), shape=np.array(shape), data=np.zeros(data),
         indices=np.zeros(len(np.zeros(data)), dtype=int), indptr=np.array([0, len(np.zeros(data))]),
     )  # fmt: skip
-    answer = call("advise", "--S1", tmp_path / "S.npz", "--S2", tmp_path / "S.npz")
+    answer = call("advise", "matrices", "--S1", tmp_path / "S.npz", "--S2", tmp_path / "S.npz")
     assert_names(answer.complaint, "S.npz", "not a matrix")
 
 
@@ -102,16 +102,16 @@ def test_a_matrix_of_empty_blocks_is_refused(call, tmp_path, blocks):
 def test_a_matrix_at_the_ends_of_the_doubles_is_judged_without_a_warning_of_numpy(call, tmp_path, entry):
     np.save(tmp_path / "S.npy", float(entry) * np.eye(3))
     np.save(tmp_path / "bad.npy", float(entry) * (np.eye(3) - 1))
-    answer = call("advise", "--S1", tmp_path / "S.npy", "--S2", tmp_path / "S.npy")
+    answer = call("advise", "matrices", "--S1", tmp_path / "S.npy", "--S2", tmp_path / "S.npy")
     assert (answer.status, answer.err) == (0, "")
-    line = call("advise", "--S1", tmp_path / "S.npy", "--S2", tmp_path / "bad.npy").complaint
+    line = call("advise", "matrices", "--S1", tmp_path / "S.npy", "--S2", tmp_path / "bad.npy").complaint
     assert_names(line, "S2 is indefinite", "needed a positive definite matrix")
 
 
 @pytest.mark.parametrize("entry", ["1.7e308", "1e300", "1e-300"])
 def test_a_matrix_whose_sums_would_overflow_is_read_in_any_unit(call, tmp_path, entry):
     np.save(tmp_path / "S.npy", float(entry) * (np.eye(3) / 2 + np.ones((3, 3)) / 9))
-    answer = call("advise", "--S1", tmp_path / "S.npy", "--S2", tmp_path / "S.npy", "--json")
+    answer = call("advise", "matrices", "--S1", tmp_path / "S.npy", "--S2", tmp_path / "S.npy", "--json")
     assert (answer.status, answer.err) == (0, "")
     assert answer.document["roles"][0]["rho"]["value"] == pytest.approx(1, rel=1e-9)
 
@@ -121,7 +121,9 @@ def test_a_matrix_whose_header_is_damaged_is_refused(call, tmp_path):
     whole = (tmp_path / "S.npy").read_bytes()
     (tmp_path / "S.npy").write_bytes(whole.replace(b"}", b"{", 1))
     assert_names(
-        call("advise", "--S1", tmp_path / "S.npy", "--S2", tmp_path / "S.npy").complaint, "S.npy", "not a matrix"
+        call("advise", "matrices", "--S1", tmp_path / "S.npy", "--S2", tmp_path / "S.npy").complaint,
+        "S.npy",
+        "not a matrix",
     )
 
 

@@ -24,6 +24,7 @@ COMMANDS = [
     "reproduce",
     "verify",
 ]
+ADVISE = ["advise matrices", "advise run", "advise moduli"]
 CONSTANTS = ["--m", "3084", "--M", "153229", "--CR", "1.70", "--CK", "1e-8"]
 LATER = ["explore"]
 
@@ -75,18 +76,18 @@ def test_the_command_alone_shows_its_help_and_asks_for_a_command(call):
     assert all(f"\n  {name} " in answer.err for name in COMMANDS)
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", [*COMMANDS, *ADVISE])
 def test_every_help_has_an_example_and_fits_the_screen(call, command):
-    answer = call(command, "--help")
+    answer = call(*command.split(), "--help")
     assert (answer.status, answer.err) == (0, "")
     assert f"  ndtheory {command} " in answer.out.partition("Example")[2]
     assert max(map(len, answer.out.splitlines())) <= 80
-    assert call(command, "-h") == answer
+    assert call(*command.split(), "-h") == answer
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", [*COMMANDS, *ADVISE])
 def test_every_option_is_explained(call, command):
-    options = call(command, "--help").out.partition("Options:\n")[2]
+    options = call(*command.split(), "--help").out.partition("Options:\n")[2]
     entries = re.split(r"^  (?=-)", options, flags=re.M)[1:]
     assert entries
     assert [entry for entry in entries if not re.search(r"(?m)(^ {20,}|  )[A-Z]\w* .*\w", entry)] == []
@@ -361,7 +362,7 @@ def test_a_radius_of_one_cell_is_not_below_the_mesh_width(call, write, radius, c
         ["solve", "FILE", "--json"],
         ["compare", "FILE", "--json"],
         ["advise", "FILE", "--json"],
-        ["advise", "--theta", "0.1", "--ratio", "1.4", "--json"],
+        ["advise", "run", "--theta", "0.1", "--ratio", "1.4", "--json"],
         ["bounds", "--rho", "3", "--json"],
         ["demo", "-o", "FOLDER", "--json"],
     ],

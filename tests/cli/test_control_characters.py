@@ -136,14 +136,18 @@ def test_no_character_of_control_leaves_a_command_wherever_it_comes_in(place, tm
             *(["solve", problem, "--set", f"{text}=1"], ["solve", problem, "--set", f"title={text}"]),
             *(["run", problem, "--theta", text], ["run", problem, "--relaxation", text]),
             *(["sweep", grid, "--plot", text], ["sweep", grid, "--dask", safe], ["region", problem, "-o", name]),
-            *(["advise", "--log", name, "--theta", "0.5"], ["advise", "--S1", name, "--S2", name]),
-            *(["advise", "--theta", text, "--ratio", text], ["bounds", "--m", text], ["advise", "--young", text]),
+            *(["advise", "run", "--log", name, "--theta", "0.5"], ["advise", "matrices", "--S1", name, "--S2", name]),
+            *(
+                ["advise", "run", "--theta", text, "--ratio", text],
+                ["bounds", "--m", text],
+                ["advise", "moduli", "--young", text, "--poisson", text],
+            ),
         ):
             assert called(*words) in (0, 2)
         Path(name).write_text(SMALL, encoding="utf-8")
         Path(f"{name}.log").write_text(f"{text} {text}\n1 0.5\n2 0.25\n3 0.125\n", encoding="utf-8")
         Path(f"{name}.json").write_text(json.dumps({text: [text], "discrete": text}), encoding="utf-8")
-        called("advise", "--log", f"{name}.log", "--theta", "0.5")
+        called("advise", "run", "--log", f"{name}.log", "--theta", "0.5")
         assert called("certify", "--check", f"{name}.json") == 2
         with np.load(place / "small.npz") as found:
             np.savez(f"{name}.npz", **dict(found) | {"law": f"{text}."})  # numpy drops zeros at the end

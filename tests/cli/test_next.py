@@ -36,6 +36,23 @@ def test_a_comparison_is_suggested_with_the_theta_the_rule_and_the_roles_of_the_
     assert call(*words, "--json").document["problem"] == run
 
 
+@pytest.mark.parametrize("command", ["constants", "compare"])
+def test_exchanged_roles_stay_exchanged_in_the_command_that_is_suggested(call, write, command):
+    file = write(SMALL)
+    words = suggested(call(command, file, "--swap-roles"))
+    assert words == [{"constants": "compare", "compare": "advise"}[command], str(file), "--swap-roles"]
+
+
+def test_constants_are_those_of_the_roles(call, write):
+    file, other = write(SMALL), write(SMALL | {"iteration.neumann_body": "2"}, "other.toml")
+    swapped, asked = (
+        call("constants", file, "--swap-roles", "--json").document,
+        call("constants", other, "--json").document,
+    )
+    assert swapped["rho_max"] == asked["rho_max"]
+    assert swapped["rho_max"] != call("constants", file, "--json").document["rho_max"]
+
+
 def test_the_advice_suggests_no_theta_to_a_rule_that_takes_its_own_step(call, write):
     file = write(SMALL | {"contact.friction": "0", "iteration.relaxation": '"momentum"', "iteration.theta": None})
     words = suggested(call("advise", file))

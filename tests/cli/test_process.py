@@ -159,7 +159,7 @@ def test_a_sparse_matrix_that_points_outside_itself_is_refused_and_not_followed(
         import sys
         from verification.cli import main
         good, *bad = sys.argv[1:]
-        sys.exit({main(["advise", "--S1", good, "--S2", file]) for file in bad} != {2})
+        sys.exit({main(["advise", "matrices", "--S1", good, "--S2", file]) for file in bad} != {2})
     """
     found = start(tmp_path / "good.npz", *bad, code=each)
     assert (found.returncode, found.stdout) == (0, "")

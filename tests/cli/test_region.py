@@ -57,6 +57,14 @@ def test_region_writes_a_picture_with_both_axes_every_edition_and_every_outcome(
     assert b"Software\x00ndtheory" in (tmp_path / "plane.png").read_bytes()
 
 
+def test_region_is_about_the_exchanged_roles_where_they_were_asked_for(call, charted, quick, monkeypatch, tmp_path):
+    asked = []
+    monkeypatch.setattr(plane, "chart", lambda problem, store, progress: asked.append(problem) or charted[2])
+    for words in ((), ("--swap-roles",)):
+        assert call("region", charted[0], "-o", tmp_path / "plane.svg", *words).status == 0
+    assert [problem.iteration.neumann_body for problem in asked] == [2, 1]
+
+
 @pytest.mark.parametrize("ending", ["svg", *["png"] * AT_NIGHT])
 def test_region_writes_the_same_over_its_own_picture(region, tmp_path, ending):
     first = []

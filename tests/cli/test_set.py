@@ -84,8 +84,8 @@ def test_what_cannot_be_set_is_refused_in_one_short_line(call, write, tmp_path, 
 
 
 def test_a_key_is_set_in_a_file_alone(call):
-    line = call("advise", "--theta", "0.1", "--ratio", "1.4", "--set", "contact.friction=0.4").complaint
-    assert "--set without FILE" in line
+    line = call("advise", "run", "--theta", "0.1", "--ratio", "1.4", "--set", "contact.friction=0.4").complaint
+    assert "--set is an option of ndtheory advise FILE" in line
 
 
 @pytest.mark.parametrize("command", COMMANDS)

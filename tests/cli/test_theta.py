@@ -127,8 +127,8 @@ def test_a_theta_of_the_file_beside_momentum_is_one_line_of_warning(call, write)
 
 @pytest.mark.parametrize("ratio", ["1.4", "1", "0.97", "0.5", "0.9", "4.51"])
 def test_nothing_is_pasted_while_a_ratio_has_several_readings(call, ratio):
-    answer = call("advise", "--theta", "0.1", "--ratio", ratio)
-    document = call("advise", "--theta", "0.1", "--ratio", ratio, "--json").document
+    answer = call("advise", "run", "--theta", "0.1", "--ratio", ratio)
+    document = call("advise", "run", "--theta", "0.1", "--ratio", ratio, "--json").document
     assert (answer.status, answer.err) == (0, "")
     assert max(map(len, answer.out.splitlines())) <= 80
     assert len(document["readings"]) > 1
@@ -139,11 +139,11 @@ def test_nothing_is_pasted_while_a_ratio_has_several_readings(call, ratio):
     assert shown == [reading["kind"] for reading in document["readings"]]
     flat = " ".join(answer.out.split())
     assert f"theta = {document['next']['theta']:g}: {document['next']['why']}" in flat
-    assert f"Next: ndtheory advise --theta {document['next']['theta']:g} --ratio R" in answer.out
+    assert f"Next: ndtheory advise run --theta {document['next']['theta']:g} --ratio R" in answer.out
 
 
 def test_the_screen_of_a_run_says_which_residual_is_meant_and_what_is_sure(call):
-    flat = " ".join(call("advise", "--theta", "0.1", "--ratio", "1.4").out.split())
+    flat = " ".join(call("advise", "run", "--theta", "0.1", "--ratio", "1.4").out.split())
     for said in (
         "|Tg - g| changes by 1.4 a step, absolute and unrelaxed",
         "The relative residual |Tg - g|/|Tg| of coupling libraries tells other things",
@@ -152,13 +152,13 @@ def test_the_screen_of_a_run_says_which_residual_is_meant_and_what_is_sure(call)
         "rises and falls has no steady ratio: give 1",
     ):
         assert said in flat
-    assert "absolute" in " ".join(call("advise", "--help").out.split())
+    assert "absolute" in " ".join(call("advise", "run", "--help").out.split())
 
 
 def test_what_is_pasted_from_a_run_is_the_next_run(call):
-    answer = call("advise", "--theta", "0.45", "--ratio", "0.8")
-    document = call("advise", "--theta", "0.45", "--ratio", "0.8", "--json").document
+    answer = call("advise", "run", "--theta", "0.45", "--ratio", "0.8")
+    document = call("advise", "run", "--theta", "0.45", "--ratio", "0.8", "--json").document
     assert [reading["kind"] for reading in document["readings"]] == ["mode-high"]
     assert document["next"]["theta"] == 0.4
     assert '<relaxation value="0.4" />' in answer.out
-    assert "Next: ndtheory advise --theta 0.4 --ratio R" in answer.out
+    assert "Next: ndtheory advise run --theta 0.4 --ratio R" in answer.out

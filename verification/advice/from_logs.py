@@ -26,19 +26,17 @@ from verification.advice.ends import (
     of_stiffest,
     telling,
 )
-from verification.advice.from_runs import role_of_run
+from verification.advice.from_runs import advice_of_runs
 from verification.advice.log import Log
 from verification.advice.logs import read_log
-from verification.advice.next_run import anew, kept, pasted_or_not
+from verification.advice.next_run import kept
 from verification.advice.pace import CONVERGED
 from verification.advice.readings import (
     LARGEST_TO_PASTE,
-    OF_OPEN_NODES,
     SHORTEST_STEP,
     NextRun,
     Observed,
     RunReading,
-    assumed,
     check_assumed,
     level,
     read_observed,
@@ -49,7 +47,6 @@ from verification.advice.readings import (
 from verification.advice.roles import Advice
 from verification.advice.runs_with_friction import by_kind, friction_bounds, readings_with_friction, with_friction
 from verification.advice.seen import Interval, LogBound, SeenColumn, SeenLog, bounds
-from verification.interface.pair import UNITS
 from verification.problem.tables import ProblemError
 
 #: Bounds of 1 + rho that differ by less do not contradict each other: a ratio has not wholly settled.
@@ -126,25 +123,9 @@ def advise_logs(logs: Iterable[tuple[Path | str, Any]], *, tied: bool = False, f
     seen = tuple(seen_log(read_log(path), theta, friction) for path, theta in given)
     interval = interval_of(*(([], []) if friction else bounds(seen)))
     readings, following, rho = with_friction(seen) if friction else decide(seen, interval, tied)
-    if tied:  # nothing opens or slips
-        readings = tuple(reading for reading in readings if reading.kind not in OF_OPEN_NODES)
+    proved = friction_bounds(*by_kind(seen)) if friction else None
     made = [log.made for log in seen]
-    if rho is not None and (paste := pasted_or_not(following, made)) is not None:
-        following = paste
-    else:
-        following, rho = anew(following, made), None
-    return Advice(
-        neumann_body=None,
-        roles=() if rho is None else (role_of_run(rho),),
-        units=UNITS,
-        readings=readings,
-        next=following,
-        logs=seen,
-        interval=interval,
-        tied=tied,
-        assumes=assumed(tied, friction),
-        friction_bounds=friction_bounds(*by_kind(seen)) if friction else None,
-    )
+    return advice_of_runs(made, readings, following, rho, tied=tied, bounds=proved, logs=seen, interval=interval)
 
 
 def seen_log(log: Log, theta: Fraction, friction: bool = False) -> SeenLog:

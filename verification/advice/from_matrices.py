@@ -11,31 +11,28 @@ import scipy.sparse as sp
 from scipy.linalg import eigh
 from scipy.sparse.linalg import LinearOperator
 
-from fem1d2d import largest
+from fem1d2d import extremes_by_solves, largest
 from fem1d2d.mesh import Floats
 from ndtheory import Number
-from verification.advice.from_operators import is_operator, of_operators
-from verification.advice.given_matrices import (
-    BODIES,
-    TOLD,
-    Body,
-    Transfer,
-    advice_of,
-    dense,
-    other,
-    read_transfer,
-    refused_by,
-    some_role_left,
-    with_seen,
-)
 from verification.advice.role import Role, with_both_ends
 from verification.advice.roles import Advice, advise, plain_role
-from verification.advice.seen_matrices import SeenMatrix
+from verification.advice.seen_matrices import ORDERING, SeenLanczos, SeenMatrices
+from verification.advice.sides import BODIES, Body, Side, is_operator, of_matrix, of_solver, other, rows_of
+from verification.advice.transfer import Transfer, read_transfer
 from verification.interface.build import build
 from verification.interface.friction import Nonlocal, hat
-from verification.interface.matrices import Stiffness, real_array, size, stiffness
+from verification.interface.matrices import ASYMMETRY, real_array, size
+from verification.interface.pair import UNITS
 from verification.progress import Progress, silent
 from verification.threads import one_thread
+
+#: The relative residual of rho at which Lanczos stops: theta changes by less.
+ENOUGH = 1e-4
+
+#: Why Lanczos proves no theta.
+WORD_OF_LANCZOS = "rho is a value that Lanczos found: the largest eigenvalue may be larger, so that nothing is proved"
+
+Sides = dict[Body, Side]
 
 
 def advise_matrices(
@@ -124,81 +121,131 @@ def advise_matrices(
     beside = {"x": x, "x_neumann": x_neumann, "weights": weights, "radius": radius, "kernel": kernel}
     if friction is None and (left := [name for name, value in beside.items() if value is not None]):
         raise ValueError(f"{left[0]} without friction: needed both, or neither")
-    if (
-        solve1 is not None
-        or solve2 is not None
-        or isinstance(transfer, LinearOperator)
-        or is_operator(S1)
-        or is_operator(S2)
-    ):
-        if friction is not None:
-            raise ValueError("friction with an operator: needed S1, S2 and the transfer as matrices")
-        return of_operators((S1, S2), (solve1, solve2), unknowns, transfer, neumann_body, tied, progress)
-    one, two = (stiffness(name, dense(name, S), asymmetry=TOLD) for name, S in (("S1", S1), ("S2", S2)))
-    return _of_matrices({1: one, 2: two}, transfer, neumann_body, friction, beside, tied)
-
-
-# --- matrices ---------------------------------------------------------------------------------------------------------
-
-
-def _of_matrices(
-    given: dict[Body, Stiffness],
-    transfer: Any,
-    neumann_body: Body | None,
-    friction: Any,
-    beside: dict[str, Any],
-    tied: bool,
-) -> Advice:
-    P = read_transfer(transfer, {body: len(S.matrix) for body, S in given.items()}, neumann_body)
-    refused = refused_by(P)
-    for body, S in given.items():
-        if S.motions.shape[1]:
-            free = f"{S.motions.shape[1]} free motion{'s' if S.motions.shape[1] > 1 else ''}"
-            why = f"S{body} is singular ({free}): its supports do not hold body {body} in a Neumann problem"
-            refused.setdefault(body, Role.refused(body, ValueError(why)))
-            refused[body] = replace(refused[body], singular=True)
-    some_role_left(refused)
-    if friction is None:
-        roles = tuple(refused.get(body) or _role(body, given, P) for body in BODIES)
-        found = advice_of(roles if P is not None or refused else with_both_ends(roles), tied=tied)
+    given: dict[Body, tuple[Any, Any]] = {1: (S1, solve1), 2: (S2, solve2)}
+    functions = isinstance(transfer, LinearOperator) or any(
+        is_operator(S) or solve is not None for S, solve in given.values()
+    )
+    if functions and friction is not None:
+        raise ValueError("friction with an operator: needed S1, S2 and the transfer as matrices")
+    if functions:
+        rows = rows_of(given, unknowns, transfer)
+        sides = {body: of_solver(body, S, solve, rows[body]) for body, (S, solve) in given.items()}
     else:
-        found = _with_friction(given, P, 1 if 2 in refused else 2, friction, beside, tied)
+        sides = {body: of_matrix(body, S) for body, (S, _) in given.items()}
+    P = read_transfer(transfer, {body: side.seen.rows for body, side in sides.items()}, neumann_body)
+    refused = _refused(sides, P, functions)
+    lanczos: list[SeenLanczos] = []
+    if friction is None:
+        roles = []
+        for body in BODIES:
+            if body in refused:
+                roles.append(refused[body])
+            elif functions:
+                role, seen = _by_lanczos(body, sides, P, progress)
+                roles.append(role)
+                lanczos.append(seen)
+            else:
+                roles.append(_by_eigenvalues(body, sides, P))
+        if not functions and P is None and not refused:
+            roles = list(with_both_ends(roles))
+        found = Advice.between(roles, tied=tied, units=UNITS)
+    else:
+        found = _with_friction(sides, P, 1 if 2 in refused else 2, friction, beside, tied)
         found = replace(found, roles=tuple(refused.get(role.neumann_body or 2, role) for role in found.roles))
-    seen = {
-        body: SeenMatrix(
-            rows=len(S.matrix), form="matrix", asymmetry=S.asymmetry, zeros=S.zeros, free_motions=S.motions.shape[1]
-        )
-        for body, S in given.items()
-    }
-    return with_seen(found, seen, P, ordered=friction is not None)
+    notes = [note for body in (1, 2) for note in sides[body].seen.notes(f"S{body}", ASYMMETRY)]
+    ordered = friction is not None or (P is not None and P.components > 1)
+    matrices = SeenMatrices(
+        S1=sides[1].seen,
+        S2=sides[2].seen,
+        transfer=None if P is None else (int(P.P.shape[0]), int(P.P.shape[1])),
+        neumann_body=None if P is None else P.neumann_body,
+        ordering=ORDERING if ordered else None,
+        lanczos=tuple(lanczos),
+        notes=(*notes, *([] if P is None else P.notes)),
+    )
+    return replace(found, matrices=matrices)
 
 
-def _role(body: Body, given: dict[Body, Stiffness], P: Transfer | None) -> Role:
+def _refused(sides: Sides, P: Transfer | None, functions: bool) -> dict[Body, Role]:
+    """The role to which P does not belong, and those in which a body can move or a product or solve is missing.
+
+    Raises
+    ------
+    ValueError
+        No role is left.
+    """
+    refused: dict[Body, Role] = {}
+    if P is not None:
+        n, c = other(P.neumann_body), P.neumann_body
+        why = f"needed a transfer of its own, from the unknowns of body {n} to those of body {c};"
+        refused[n] = Role.refused(n, ValueError(f"{why} P' carries forces back, and no displacements"))
+    for n, side in sides.items():
+        c = other(n)
+        if functions and (sides[c].apply is None or side.solve is None):
+            why = f"needed products with S{c} and solves with S{n} (solve{n})"
+            refused.setdefault(n, Role.refused(n, ValueError(why)))
+        elif not functions and side.singular:
+            why = f"S{n} is {side.singular}: its supports do not hold body {n} in a Neumann problem"
+            refused[n] = replace(refused.get(n) or Role.refused(n, ValueError(why)), singular=True)
+    if len(refused) == 2:
+        raise ValueError("; ".join(f"body {body}: {refused[body].reason['rho']}" for body in sorted(refused)))
+    return refused
+
+
+def _by_eigenvalues(body: Body, sides: Sides, P: Transfer | None) -> Role:
     """The role in which a body has the Neumann problem, by the spectrum of (P' S_c P, S_n)."""
-    units = [float(np.abs(S.matrix).max()) for S in (given[other(body)], given[body])]
-    S_c, S_n = (S.matrix / unit for S, unit in zip((given[other(body)], given[body]), units, strict=True))
+    contact, neumann = sides[other(body)].matrix, sides[body].matrix
+    assert contact is not None
+    assert neumann is not None
+    units = [float(np.abs(S.matrix).max()) for S in (contact, neumann)]
+    S_c, S_n = contact.matrix / units[0], neumann.matrix / units[1]
     if P is not None:
         S_c = P.carry_back(P.carry_back(S_c).T)
         S_c = (S_c + S_c.T) / 2
     unit = Fraction(units[0]) / Fraction(units[1])
     with one_thread():
         role = plain_role(body, Fraction(largest(S_c, S_n).value) * unit)
-        if P is None and not given[other(body)].motions.size:
+        if P is None and not contact.motions.size:
             return role  # the eigenvalues of both roles are reciprocal
         least = max(float(eigh(S_c, S_n, eigvals_only=True, subset_by_index=[0, 0])[0]), 0.0)
     return replace(role, rho_min=Number.of_float(Fraction(least) * unit), rho_tied=role.rho)
 
 
+def _by_lanczos(body: Body, sides: Sides, P: Transfer | None, progress: Progress) -> tuple[Role, SeenLanczos]:
+    """The same by products with one body and solves with the other."""
+    apply, solve = sides[other(body)].apply, sides[body].solve
+    assert apply is not None  # else the role is refused
+    assert solve is not None
+    felt = apply if P is None else lambda u: P.carry_back(apply(P.carry(u)))
+
+    def tell(steps: int, value: float, residual: float) -> None:
+        progress(f"rho, Neumann body {body}: {value:.6g} up to {residual:.1e}, step {steps} of Lanczos", None)
+
+    with one_thread():
+        ends = extremes_by_solves(felt, solve, sides[body].seen.rows, tolerance=ENOUGH, progress=tell)
+    rho = Fraction(ends.largest.value)
+    if not rho > 0:
+        raise ValueError(f"S{other(body)} is not positive (rho = {float(rho):.3g}): needed a stiffness")
+    role = plain_role(body, rho, nothing=WORD_OF_LANCZOS)
+    role = replace(role, rho_min=Number.of_float(max(Fraction(ends.least.value), Fraction(0))), rho_tied=role.rho)
+    return role, SeenLanczos(
+        neumann_body=body,
+        rho=ends.largest.value,
+        residual=ends.largest.residual,
+        rho_min=ends.least.value,
+        residual_min=ends.least.residual,
+        steps=ends.steps,
+    )
+
+
 def _with_friction(
-    given: dict[Body, Stiffness],
-    P: Transfer | None,
-    neumann_body: Body,
-    friction: Any,
-    beside: dict[str, Any],
-    tied: bool,
+    sides: Sides, P: Transfer | None, neumann_body: Body, friction: Any, beside: dict[str, Any], tied: bool
 ) -> Advice:
     x, x_neumann, weights, radius, kernel = beside.values()
-    for body, S in given.items():
+    one, two = (side.matrix for side in (sides[1], sides[2]))
+    assert one is not None
+    assert two is not None
+    for body, S in ((1, one), (2, two)):
         if len(S.matrix) % 2:
             raise ValueError(f"S{body} is {size(S.matrix)}: needed two components at each node, as there is friction")
     if (radius is None) == (kernel is None):
@@ -207,7 +254,7 @@ def _with_friction(
         raise ValueError("friction with a radius: needed x, the positions of the nodes of the contact body")
     if kernel is not None and x is None and weights is None:
         raise ValueError("friction with a kernel: needed weights of its nodes, or x, their positions")
-    n = len(given[other(neumann_body)].matrix) // 2
+    n = sides[other(neumann_body)].seen.rows // 2
     positions = np.arange(float(n)) if x is None else x  # beside weights and a kernel they mean nothing
     matrix = None if P is None else _of_nodes(P, n)
     law = None
@@ -220,8 +267,8 @@ def _with_friction(
         x_n = real_array("x_neumann", x_neumann, (matrix.shape[1],))
         kernel = hat(real_array("x", x, (n,))[:, None] - x_n[None, :], radius)
     pair = build(
-        S1=given[1].matrix,
-        S2=given[2].matrix,
+        S1=one.matrix,
+        S2=two.matrix,
         x=positions,
         weights=weights,
         law=law,

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
+from typing import Any
 
 from ndtheory import Number
 from ndtheory.constants import take
 from ndtheory.energy import LARGEST, SMALLEST
-from ndtheory.energy_norms import predicted_rate, predicted_theta
+from ndtheory.energy_norms import predicted_theta
 from ndtheory.number import Numeric
 from verification.advice.next_run import Made, anew, pasted_or_not
 from verification.advice.readings import (
@@ -15,15 +17,21 @@ from verification.advice.readings import (
     OF_OPEN_NODES,
     NextRun,
     Observed,
+    RunReading,
     assumed,
     check_assumed,
     read_ratio,
     rounded_down,
     spread,
 )
-from verification.advice.role import Role
+from verification.advice.role import role_of
 from verification.advice.roles import Advice
-from verification.advice.runs_with_friction import friction_bounds, next_with_friction, readings_with_friction
+from verification.advice.runs_with_friction import (
+    FrictionBounds,
+    friction_bounds,
+    next_with_friction,
+    readings_with_friction,
+)
 from verification.interface.pair import UNITS
 
 
@@ -94,45 +102,59 @@ def advise_run(theta: Numeric, ratio: Numeric, *, tied: bool = False, friction: 
         falling, rising = ([(t, observed)], []) if falls else ([], [(t, observed)])
         readings, rho, bounds = readings_with_friction(readings), None, friction_bounds(falling, rising)
         following = next_with_friction(falling, [at for at, _ in rising])
-    elif tied:
-        readings = tuple(reading for reading in readings if reading.kind not in OF_OPEN_NODES)
-        if rho is None and r > 1 + spread(t):
-            rho = (1 + r) / t - 1
-            best = rounded_down(min(predicted_theta(rho), LARGEST_TO_PASTE))
-            why = f"2/(2 + rho) with rho = {float(rho):.4g}, the pace at which a tied run grows"
-            following = NextRun(theta=best, why=why)
+    elif tied and rho is None and r > 1 + spread(t):
+        rho = (1 + r) / t - 1
+        best = rounded_down(min(predicted_theta(rho), LARGEST_TO_PASTE))
+        why = f"2/(2 + rho) with rho = {float(rho):.4g}, the pace at which a tied run grows"
+        following = NextRun(theta=best, why=why)
     made = [Made(theta=t, falls=r < 1, rises=r >= 1, ratio=r)]
+    return advice_of_runs(made, readings, following, rho, tied=tied, bounds=bounds, run=run)
+
+
+def advice_of_runs(
+    made: Sequence[Made],
+    readings: Sequence[RunReading],
+    following: NextRun,
+    rho: Fraction | None,
+    *,
+    tied: bool,
+    bounds: FrictionBounds | None,
+    **seen: Any,
+) -> Advice:
+    """The advice from what runs show: a theta to paste where they decide rho, else a run that was not made yet.
+
+    Parameters
+    ----------
+    made : sequence of Made
+    readings : sequence of RunReading
+        What they can mean; of these a tied interface has none that needs nodes that open.
+    following : NextRun
+        The theta to paste, or the run that is proposed.
+    rho : Fraction or None
+        None while several readings are left.
+    tied : bool
+    bounds : FrictionBounds or None
+        What is proved with friction; None without friction.
+    **seen
+        Attributes of the advice: what was given.
+    """
     if rho is not None and (paste := pasted_or_not(following, made)) is not None:
         following = paste
     else:
         following, rho = anew(following, made), None
+    roles = []
+    if rho is not None:
+        nothing = "an observed ratio proves nothing"
+        who = {"neumann_body": "whichever body had the Neumann problem in that run"}
+        roles.append(role_of(None, Number.of_float(rho), ratio=rho, nothing=nothing, reason=who))
     return Advice(
         neumann_body=None,
-        roles=() if rho is None else (role_of_run(rho),),
+        roles=tuple(roles),
         units=UNITS,
-        run=run,
-        readings=readings,
+        readings=tuple(one for one in readings if not (tied and one.kind in OF_OPEN_NODES)),
         next=following,
         tied=tied,
-        assumes=assumed(tied, friction),
+        assumes=assumed(tied, bounds is not None),
         friction_bounds=bounds,
-    )
-
-
-def role_of_run(rho: Fraction) -> Role:
-    """What is predicted of the roles that a run had, of which rho was read from its residuals."""
-    nothing = "an observed ratio proves nothing"
-    return Role(
-        neumann_body=None,
-        rho=Number.of_float(rho),
-        theta_proved=None,
-        factor_proved=None,
-        theta_max_proved=None,
-        theta_predicted=float(predicted_theta(rho)),
-        rate_predicted=float(predicted_rate(rho)),
-        friction_threshold=None,
-        reason={
-            "neumann_body": "whichever body had the Neumann problem in that run",
-            **dict.fromkeys(("theta_proved", "factor_proved", "theta_max_proved", "friction_threshold"), nothing),
-        },
+        **seen,
     )

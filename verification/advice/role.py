@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, Literal
 
-from ndtheory import EnergyConstants, Number
-from ndtheory.energy_norms import tied_factor, tied_rate, tied_theta
+from ndtheory import EnergyBounds, EnergyConstants, Number
+from ndtheory.energy_norms import predicted_rate, predicted_theta, tied_factor, tied_rate, tied_theta
 from verification.algorithm.theta import Choice
 from verification.interface.pair import SingularRole
 from verification.problem import ProblemError
@@ -19,6 +19,9 @@ NO_VALUES = ("neumann_body", "reason", "singular", "energy")
 
 #: Exchanging the roles makes no difference where it changes the number of steps by no more than this share of it.
 SAME = 0.02
+
+#: The entries of a role that rest on an upper bound of rho.
+PROVED = ("theta_proved", "factor_proved", "theta_max_proved")
 
 #: What is known of a tied interface, in this order.
 TIED = ("rho_min", "rho_tied", "theta_tied", "rate_tied")
@@ -155,6 +158,62 @@ class Role:
             reason=dict.fromkeys(values, f"these roles are refused: {why}"),
             singular=isinstance(error, SingularRole),
         )
+
+
+def role_of(
+    neumann_body: Literal[1, 2] | None,
+    rho: Number,
+    *,
+    bounds: EnergyBounds | None = None,
+    nothing: str = "",
+    threshold: Number | None = None,
+    no_threshold: str = "",
+    ratio: Fraction | None = None,
+    reason: Mapping[str, str] | None = None,
+    **known: Any,
+) -> Role:
+    """The role of which rho is known: what it predicts, and what the theorem in energy norms proves.
+
+    Parameters
+    ----------
+    neumann_body : {1, 2} or None
+    rho : Number
+    bounds : EnergyBounds, optional
+        The theorem for this rho, and for the friction there is.
+    nothing : str
+        Why nothing is proved; empty where the bounds are.
+    threshold : Number, optional
+        Friction below which every small theta is proved.
+    no_threshold : str
+        Why that is None, if it is not for want of a proof.
+    ratio : Fraction, optional
+        rho before it was rounded.
+    reason : mapping, optional
+        Why other values are None.
+    **known
+        Other attributes of :class:`Role`.
+    """
+    ratio = Fraction(rho.value) if ratio is None else ratio
+    theta, rate = float(predicted_theta(ratio)), float(predicted_rate(ratio))
+    proved: dict[str, Any] = dict.fromkeys(PROVED)
+    because = dict.fromkeys(PROVED, nothing)
+    if bounds is not None:
+        theta, rate = bounds.theta_predicted, bounds.rate_predicted
+    if bounds is not None and not nothing:
+        proved = {name: getattr(bounds, name) for name in PROVED}
+        because = {name: why for name, why in bounds.reason.items() if name in PROVED}
+    if threshold is None:
+        because["friction_threshold"] = no_threshold or nothing
+    return Role(
+        neumann_body=neumann_body,
+        rho=rho,
+        theta_predicted=theta,
+        rate_predicted=rate,
+        friction_threshold=threshold,
+        reason={**(reason or {}), **because},
+        **proved,
+        **known,
+    )
 
 
 def with_both_ends(roles: Sequence[Role]) -> tuple[Role, ...]:

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from ndtheory import EnergyConstants, Number, evaluate_energy
-from ndtheory.energy_norms import predicted_rate, predicted_theta
 from verification.advice.quote import reason as quoted_reason
 from verification.advice.readings import LARGEST_TO_PASTE, NextRun, RunReading, SeenRun, rounded_down
-from verification.advice.role import Role, best_of, fewer, steps, with_both_ends
+from verification.advice.role import Role, best_of, fewer, role_of, steps, with_both_ends
 from verification.advice.seen import Interval, SeenLog
 from verification.advice.seen_matrices import SeenMatrices
 from verification.advice.snippets import Coupling, snippet
@@ -86,6 +85,11 @@ class Advice(Document):
     tied: bool = False
     assumes: str | None = None
     friction_bounds: FrictionBounds | None = None
+
+    @classmethod
+    def between(cls, roles: Sequence[Role], *, tied: bool, **known: Any) -> Advice:
+        """The advice for the role that takes fewer steps; one of them at least is not refused."""
+        return cls(neumann_body=best_of(roles, tied=tied).neumann_body, roles=tuple(roles), tied=tied, **known)
 
     @property
     def summary(self) -> str:
@@ -263,9 +267,8 @@ def advise(problem: Problem | ContactPair | Path | str, *, tied: bool = False, p
         given = problem if isinstance(problem, Problem) else load(problem)
         pair = build(given.swapped())  # refused itself where contact holds that body, too
         roles = (Role.refused(given.iteration.neumann_body, error), _role(pair))
-    return Advice(
-        neumann_body=best_of(roles, tied=tied).neumann_body,
-        roles=roles,
+    return Advice.between(
+        roles,
         tied=tied,
         units=UNITS if pair.problem is None else pair.problem.units,
         problem=pair.problem,
@@ -288,48 +291,22 @@ def _role(pair: ContactPair) -> Role:
     if measured.rho_max is None:
         raise ProblemError(pair.source, "contact", None, f"no advice: {measured.why_no_energy}")
     if energy is None:
-        return _predicted_role(pair, measured.rho_max, measured.rho_min, measured.why_no_energy)
-    outside = pair.outside
-    threshold = None if outside else measured.friction_threshold
-    if outside:
-        proved = ("theta_proved", "factor_proved", "theta_max_proved", "friction_threshold")
-        reason = dict.fromkeys(proved, f"outside the theorem: {outside[0]}")
+        nothing = measured.why_no_energy
+        auto = by_prediction(measured.rho_max.value, nothing)
     else:
-        reason = {name: why for name, why in energy.reason.items() if name in Role.__dataclass_fields__}
-        if threshold is None:
-            reason["friction_threshold"] = measured.why_no_threshold
-    return Role(
-        neumann_body=pair.neumann_body,
-        rho=energy.rho,
-        theta_proved=None if outside else energy.theta_proved,
-        factor_proved=None if outside else energy.factor_proved,
-        theta_max_proved=None if outside else energy.theta_max_proved,
-        theta_predicted=energy.theta_predicted,
-        rate_predicted=energy.rate_predicted,
-        friction_threshold=threshold,
-        reason=reason,
-        theta_auto=automatic(energy, outside, pair.settings.tolerance),
-        energy=None if outside else measured.energy_constants(),
+        nothing = f"outside the theorem: {pair.outside[0]}" if pair.outside else ""
+        auto = automatic(energy, pair.outside, pair.settings.tolerance)
+    return role_of(
+        pair.neumann_body,
+        measured.rho_max if energy is None else energy.rho,
+        bounds=energy,
+        nothing=nothing,
+        threshold=None if nothing else measured.friction_threshold,
+        no_threshold="" if nothing else measured.why_no_threshold,
+        theta_auto=auto,
+        energy=None if nothing else measured.energy_constants(),
         rho_min=measured.rho_min,
         rho_tied=measured.rho_max,
-    )
-
-
-def _predicted_role(pair: ContactPair, rho: Number, rho_min: Number | None, why: str) -> Role:
-    """A role of which rho is known, and of which no theorem speaks."""
-    return Role(
-        neumann_body=pair.neumann_body,
-        rho=rho,
-        theta_proved=None,
-        factor_proved=None,
-        theta_max_proved=None,
-        theta_predicted=float(predicted_theta(Fraction(rho.value))),
-        rate_predicted=float(predicted_rate(Fraction(rho.value))),
-        friction_threshold=None,
-        reason=dict.fromkeys(("theta_proved", "factor_proved", "theta_max_proved", "friction_threshold"), why),
-        theta_auto=by_prediction(rho.value, why),
-        rho_min=rho_min,
-        rho_tied=rho,
     )
 
 
@@ -345,13 +322,11 @@ def _roles_without_matrices(bodies: TwoBodies, tied: bool, progress: Progress) -
     roles = []
     for neumann in (problem.iteration.neumann_body, problem.swapped().iteration.neumann_body):
         rho = pencils.largest(neumann_body=neumann, normal=not rubs).value
-        reason = {"theta_auto": needed, "friction_threshold": needed}
-        nothing = f"outside the theorem: {outside[0]}" if outside else needed if rubs else None
-        unproved: dict[str, Any] = {}
-        if nothing is not None:
-            unproved = dict.fromkeys(("theta_proved", "factor_proved", "theta_max_proved"))
-            reason |= dict.fromkeys((*unproved, "friction_threshold"), nothing)
-        roles.append(replace(plain_role(neumann, Fraction(rho)), reason=reason, **unproved))
+        nothing = f"outside the theorem: {outside[0]}" if outside else needed if rubs else ""
+        role = plain_role(
+            neumann, Fraction(rho), nothing=nothing, no_threshold=nothing or needed, reason={"theta_auto": needed}
+        )
+        roles.append(role)
     if rubs:
         return with_both_ends(roles)
     if not tied:
@@ -368,17 +343,8 @@ def _roles_without_matrices(bodies: TwoBodies, tied: bool, progress: Progress) -
     return tuple(replace(role, rho_min=end.rho_min, rho_tied=end.rho_tied) for role, end in pairs)
 
 
-def plain_role(neumann_body: Any, rho: Fraction) -> Role:
-    """What rho alone says, without friction."""
+def plain_role(neumann_body: Any, rho: Fraction, **settings: Any) -> Role:
+    """The role by rho alone, without friction; ``settings`` are those of :func:`role_of`."""
     bounds = evaluate_energy(EnergyConstants(rho=rho))
-    return Role(
-        neumann_body=neumann_body,
-        rho=bounds.rho,
-        theta_proved=bounds.theta_proved,
-        factor_proved=bounds.factor_proved,
-        theta_max_proved=bounds.theta_max_proved,
-        theta_predicted=bounds.theta_predicted,
-        rate_predicted=bounds.rate_predicted,
-        friction_threshold=None,
-        reason={"friction_threshold": "matrices alone say nothing of friction: the proved values are for k = 0"},
-    )
+    settings.setdefault("no_threshold", "matrices alone say nothing of friction: the proved values are for k = 0")
+    return role_of(neumann_body, bounds.rho, bounds=bounds, **settings)

@@ -13,6 +13,7 @@ from verification.bounds.calculated import Calculated
 from verification.bounds.section5 import Section5
 from verification.bounds.table import BOUNDS
 from verification.cli.console import deliver
+from verification.cli.options import OneOf
 from verification.sections.bounds import sections
 
 #: The constants of Section 5 by key, and the options that give them.
@@ -31,7 +32,7 @@ ENERGY = {"rho": "--rho", "kappa_1": "--kappa1", "kappa_2": "--kappa2"}
 @click.option("--theta", "theta", metavar="NUMBER", help="Relaxation factor, 0 < theta < 1.")
 @click.option(
     "--edition",
-    type=click.Choice(["printed", "repaired", "both"]),
+    type=OneOf(["printed", "repaired", "both"]),
     default="both",
     show_default=True,
     help="Editions of Section 5.",

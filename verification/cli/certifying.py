@@ -11,7 +11,8 @@ import click
 
 from verification.cli.console import deliver, stages
 from verification.cli.failing import fail
-from verification.cli.problems import JSON, SET, SWAP, THETA, load_problem
+from verification.cli.options import JSON, SET, SWAP, THETA, OneOf, check_place, one_file
+from verification.cli.problems import load_problem
 from verification.cli.typed import Typed
 
 if TYPE_CHECKING:
@@ -28,18 +29,18 @@ MOST_BYTES = 100_000_000
 @SWAP
 @click.option(
     "--edition",
-    type=click.Choice(["lmi", "energy", "repaired"]),
+    type=OneOf(["lmi", "energy", "repaired"]),
     help="Which bound proposes the factor: semidefinite (by default), energy norms, Section 5 repaired.",
 )
 @click.option(
     "--continuum", is_flag=True, help="Of FILE without its mesh: two rectangles, each held at its outer side."
 )
-@click.option("-o", "--output", "target", type=click.Path(path_type=Path), metavar="CERTIFICATE", help="A .json file.")
+@one_file(".json", words="File of the certificate")
 @click.option(
     "--check",
     "given",
     type=click.Path(path_type=Path),
-    metavar="CERTIFICATE",
+    metavar="FILE.json",
     help="Check this one again; with FILE also whether it is about the bodies of FILE.",
 )
 @JSON
@@ -78,9 +79,9 @@ def certify(
         if used is not None and also is not None:
             raise click.UsageError(f"received {first} with {second}: needed one of both", context)
     if file is None and given is None:
-        raise click.UsageError("received nothing: needed FILE, or --check CERTIFICATE", context)
+        raise click.UsageError("received nothing: needed FILE, or --check FILE.json", context)
     if target is not None:
-        _check_target(target, context)
+        check_place(target)
     if continuum:
         assert file is not None
         return _prove_continuum(file, keys, theta=theta, swap=swap, target=target, as_json=as_json)
@@ -120,18 +121,6 @@ def _prove_continuum(
     typed = Typed(file=file, keys=keys, theta=theta, swap=swap)
     deliver(found, sections, as_json, writing(found, target), target, typing=typed.command)
     return 0 if found.contracts else 1
-
-
-def _check_target(target: Path, context: click.Context) -> None:
-    """Refuse a name under which nothing can be written."""
-    from verification.output.folder import check_ours
-    from verification.problem.tables import ProblemError
-
-    if target.suffix != ".json":
-        raise click.UsageError(f"-o {target}: needed a name ending in .json", context)
-    if not target.parent.is_dir():
-        raise ProblemError(str(target), "", None, "needed a name in a folder that exists (-o)")
-    check_ours(target)
 
 
 def writing(found: Document, target: Path | None) -> Callable[[], None] | None:

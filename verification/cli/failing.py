@@ -75,7 +75,8 @@ def fail(error: Exception, outcome: str = "error", lead: str = "") -> int:
     file = None if given is None else str(given)
     complain(": ".join(part for part in ("ndtheory", file, lead, str(error)) if part))
     if context.params.get("as_json"):
-        found = Failure(command=context.info_name or "", outcome=outcome, file=file, error=str(error), problem=problem)
+        command = context.command_path.partition(" ")[2]
+        found = Failure(command=command, outcome=outcome, file=file, error=str(error), problem=problem)
         say(found.to_json())
     return 1
 

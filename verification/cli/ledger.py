@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 import click
 
 from ndtheory.statements import statements
+from ndtheory.texts import nearest
 from verification.cli.console import Interrupted, complain, deliver, stages
-from verification.cli.problems import FOLDER, JSON
+from verification.cli.options import FOLDER, JSON, OneOf
 
 
 @click.command()
 @click.argument("ids", nargs=-1, metavar="[ID]...")
 @click.option(
     "--level",
-    type=click.Choice(["quick", "full"]),
+    type=OneOf(["quick", "full"]),
     default="quick",
     show_default=True,
     help="How many problems the discrete evidence takes: within a minute, or within twenty.",
@@ -59,8 +59,7 @@ def _named(id: str) -> list[str]:
     known = statements()
     parts = [id] if id in known else [other for other in known if id and other.startswith(f"{id}.")]
     if not parts:
-        folded = {other.casefold(): other for other in known}
-        near = [folded[name] for name in get_close_matches(id.casefold(), folded, n=3)] or list(known)[:3]
+        near = nearest(id, known, most=3) or list(known)[:3]
         context = click.get_current_context()
         from verification.problem.tables import short
 

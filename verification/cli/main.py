@@ -18,15 +18,16 @@ import ndtheory
 import verification
 from ndtheory import HypothesisError
 from ndtheory.texts import printable
-from verification.cli import calculator, certifying, choices, ledger, problems, reproducing, sweeping
+from verification.cli import advising, calculator, certifying, drawing, ledger, problems, reproducing, sweeping
 from verification.cli.console import NOTHING, SHOWN, Interrupted, ReaderGone, complain, interruptible, interruption
 from verification.cli.failing import reported
+from verification.cli.forms import Commands, Forms
 
 #: Exit statuses of the interface.  A crash is none of them.
 DONE, NOT_MET, BAD_INPUT, INCONCLUSIVE, INTERRUPTED, CRASH = 0, 1, 2, 3, 130, 70
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 80})
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 80})
 @click.version_option(ndtheory.__version__, prog_name="ndtheory", message="%(prog)s %(version)s")
 def cli() -> None:
     """The convergence theorem of Bayada, Sabil and Sassi for Neumann-Dirichlet contact iterations.
@@ -50,15 +51,16 @@ for command in (
     problems.run,
     problems.solve,
     problems.compare,
-    choices.advise,
-    choices.region,
+    advising.advise,
+    drawing.region,
     sweeping.sweep,
     certifying.certify,
     reproducing.reproduce,
     ledger.verify,
 ):
-    assert command.callback is not None
-    command.callback = interruptible(reported(command.callback))
+    for form in command.forms().values() if isinstance(command, Forms) else [command]:
+        assert form.callback is not None
+        form.callback = interruptible(reported(form.callback))
     cli.add_command(command)
 
 

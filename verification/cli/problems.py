@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +11,7 @@ import click
 
 from verification.cli.console import Interrupted, complain, deliver, one_by_one, progress, say, stages
 from verification.cli.failing import remember
+from verification.cli.options import FILE, FOLDER, JSON, SET, SWAP, folder_name, of_a_run
 from verification.cli.remedies import remedy
 from verification.cli.typed import Typed
 
@@ -18,78 +19,6 @@ if TYPE_CHECKING:
     from verification.algorithm.runs import Run
     from verification.comparison import Comparison
     from verification.problem.specification import Problem
-
-FILE = click.argument("file", type=click.Path(path_type=Path))
-JSON = click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout.")
-
-
-def _pairs(context: click.Context, parameter: click.Parameter, given: Sequence[str]) -> dict[str, str]:
-    pairs: dict[str, str] = {}
-    for words in given:
-        key, equals, value = words.partition("=")
-        if not equals:
-            needed = f"{words!r}: needed KEY=VALUE, as contact.friction=0.4"
-            raise click.BadParameter(needed, context, parameter)
-        pairs.pop(key, None)  # the last one is set last
-        pairs[key] = value
-    return pairs
-
-
-SET = click.option(
-    "--set",
-    "keys",
-    multiple=True,
-    callback=_pairs,
-    metavar="KEY=VALUE",
-    help="Set a key of FILE, as contact.friction=0.4 or 'body1.x=[0, 3]'; may be repeated.",
-)
-
-
-class RuleName(click.Choice[str]):
-    """The name of a relaxation rule; the rules are imported when their names are asked for."""
-
-    def __init__(self) -> None:
-        self.case_sensitive = True
-
-    @property
-    def choices(self) -> Sequence[str]:  # type: ignore[override]
-        """The registered rules."""
-        from verification.algorithm.relaxation import RULES
-
-        return tuple(RULES)
-
-
-RELAXATION = click.option(
-    "--relaxation",
-    type=RuleName(),
-    metavar="RULE",  # a list of the names would import the rules, and arrays with them
-    help="Rule of relaxation, over the file's; all but constant are outside the theorem.  A wrong name lists them.",
-)
-THETA = click.option("--theta", metavar="NUMBER", help="Relaxation factor, 0 < theta < 1, over the file's.")
-SWAP = click.option("--swap-roles", "swap", is_flag=True, help="Give the Neumann problem to the other body.")
-SOLVER = click.option(
-    "--solver",
-    type=click.Choice(["auto", "cvxpy", "active-set"]),
-    default="auto",
-    show_default=True,
-    help="Who solves step II.",
-)
-
-
-def of_a_run(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Give a command FILE and what changes its run."""
-    for option in reversed((FILE, SET, THETA, RELAXATION, SWAP, SOLVER)):
-        command = option(command)
-    return command
-
-
-def _folder(context: click.Context, parameter: click.Parameter, value: str | None) -> Path | None:
-    if value == "":
-        raise click.BadParameter("'': needed the name of a folder", context, parameter)
-    return None if value is None else Path(value)
-
-
-FOLDER = click.option("-o", "--output", "folder", callback=_folder, metavar="DIR", help="Folder for the results.")
 
 
 def examples() -> dict[str, str]:
@@ -117,8 +46,9 @@ def example(name: str | None, as_json: bool) -> None:
 
     available = examples()
     if name is not None and name not in available:
-        context = click.get_current_context()
-        raise click.UsageError(f"no example {name!r}; there are {', '.join(available)}", context)
+        from verification.problem.examples import unknown_example
+
+        raise click.UsageError(unknown_example(name, available), click.get_current_context())
     titles = {key: _title(text) for key, text in available.items()}
     if as_json:
 
@@ -170,10 +100,11 @@ def load_problem(
 @click.command()
 @FILE
 @SET
+@SWAP
 @click.option("--refine", type=click.IntRange(0, 8), default=0, metavar="N", help="Also on meshes halved 1 to N times.")
 @click.option("--verified", is_flag=True, help="Prove bounds of each constant, for the exact data of FILE on its mesh.")
 @JSON
-def constants(file: Path, keys: dict[str, str], refine: int, verified: bool, as_json: bool) -> None:
+def constants(file: Path, keys: dict[str, str], swap: bool, refine: int, verified: bool, as_json: bool) -> None:
     """Measure m, M, C_R, C_s, C_tr, C_K and rho on the mesh of FILE.
 
     m, M and C_K come in the file's unit of stress.
@@ -187,10 +118,10 @@ def constants(file: Path, keys: dict[str, str], refine: int, verified: bool, as_
     from verification.constants import measure
     from verification.sections.constants import sections
 
-    problem = load_problem(file, keys)
+    problem = load_problem(file, keys, swap=swap)
     with stages() as tell:
         measured = measure(problem, refine=refine, verified=verified, progress=tell)
-    deliver(measured, sections, as_json, typing=Typed(file=file, keys=keys).command)
+    deliver(measured, sections, as_json, typing=Typed(file=file, keys=keys, swap=swap).command)
     if "levels" in measured.reason:
         complain(f"{measured.reason['levels']}: what was computed is shown")
         raise Interrupted
@@ -300,7 +231,7 @@ def compare(
     "-o",
     "--output",
     "folder",
-    callback=_folder,
+    callback=folder_name,
     metavar="DIR",
     default="ndtheory-demo",
     show_default=True,

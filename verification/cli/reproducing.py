@@ -7,14 +7,13 @@ from pathlib import Path
 import click
 
 from verification.cli.console import deliver, stages
-from verification.cli.problems import FOLDER, JSON
-from verification.cli.sweeping import JOBS, STORE
+from verification.cli.options import FOLDER, JOBS, JSON, STORE, OneOf
 
 NAMES = ("fig5", "fig10", "fig11", "fig12", "all")
 
 
 @click.command()
-@click.argument("figure", type=click.Choice(NAMES))
+@click.argument("figure", type=OneOf(NAMES))
 @JOBS
 @STORE
 @FOLDER

@@ -15,7 +15,7 @@ import click
 
 from ndtheory.texts import printable
 from verification.cli.console import Interrupted, complain, deliver, stages
-from verification.cli.problems import FILE, FOLDER, JSON
+from verification.cli.options import FILE, FOLDER, JOBS, JSON, STORE
 from verification.cli.typed import Typed
 
 if TYPE_CHECKING:
@@ -28,13 +28,6 @@ IN_LOG, ON_STDERR = 10, 60
 #: How a log of a sweep begins, and how large it may become.
 LOG = re.compile(rb"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d runs: \d+ done, ")
 MOST_LOG_BYTES = 1_000_000_000
-
-JOBS = click.option(
-    "--jobs", type=click.IntRange(1), metavar="N", help="How many processes run at once; one for each core by default."
-)
-STORE = click.option(
-    "--store", type=click.Path(path_type=Path), metavar="STORE", help="File that keeps the rows of runs (SQLite)."
-)
 
 
 def _axes(context: click.Context, parameter: click.Parameter, given: tuple[str, ...]) -> list[tuple[str, ...]]:

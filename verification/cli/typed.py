@@ -41,6 +41,6 @@ class Typed:
         if part.iteration:
             given = {"--theta": self.theta, "--relaxation": self.relaxation}
             words += [word for name, value in given.items() if value is not None for word in (name, value)]
-        words += ["--swap-roles"] * ((self.swap and part.iteration) != part.exchanged)
+        words += ["--swap-roles"] * (self.swap != part.exchanged)
         words += options
         return " ".join(map(quote, words)) if all(word.isprintable() for word in words) else ""

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Iterable
 from decimal import Decimal
 from importlib import resources
 
+from ndtheory.texts import did_you_mean
 from verification.problem.specification import Problem
+from verification.problem.tables import short
 
 #: The meshes of Section 6 by their number of nodes: how often that of 60 nodes is halved.
 FAMILY = {60: 0, 190: 1, 666: 2, 2482: 3}
@@ -39,6 +42,12 @@ def _member(section6: str, nodes: int) -> str:
     )
 
 
+def unknown_example(name: str, available: Iterable[str]) -> str:
+    """Message for a name that no built-in problem has: the known ones, and the one that may be meant."""
+    known = list(available)
+    return f"no example {short(name)!r}; there are {', '.join(known)}{did_you_mean(name, known)}"
+
+
 def example(name: str) -> Problem:
     """A built-in problem.
 
@@ -63,5 +72,5 @@ def example(name: str) -> Problem:
     """
     available = examples()
     if name not in available:
-        raise ValueError(f"no example {name!r}; there are {', '.join(available)}")
+        raise ValueError(unknown_example(name, available))
     return Problem.from_dict(tomllib.loads(available[name], parse_float=Decimal))

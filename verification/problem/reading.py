@@ -70,7 +70,11 @@ def load(path: Path | str) -> Problem:
         ...
     verification.problem.tables.ProblemError: nowhere.toml: no such file
     """
-    return read_problem(read_file(path), str(path))
+    data = read_file(path)
+    if "grid" in data and "body1" not in data:
+        needed = f"needed a problem file, this is the file of a sweep; type ndtheory sweep {path}"
+        raise ProblemError(str(path), "", None, needed)
+    return read_problem(data, str(path))
 
 
 def read_file(path: Path | str) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import stat
 from collections.abc import Callable, Iterable, Mapping
 from decimal import Decimal
@@ -12,7 +11,7 @@ from typing import Any, TypeVar
 
 from ndtheory import exact
 from ndtheory.number import decimal
-from ndtheory.texts import CONTROL, printable
+from ndtheory.texts import CONTROL, did_you_mean, nearest, printable
 
 V = TypeVar("V")
 _MISSING: Any = object()
@@ -179,7 +178,8 @@ def choice(*allowed: Any) -> Callable[[Any], Any]:
 
     def read(value: Any) -> Any:
         if type(value) not in {type(v) for v in allowed} or value not in allowed:  # 1 is not true and not 1.0
-            raise Unfit("needed one of " + ", ".join(show(v) for v in allowed))
+            meant = did_you_mean(value, [v for v in allowed if isinstance(v, str)]) if isinstance(value, str) else ""
+            raise Unfit("needed one of " + ", ".join(show(v) for v in allowed) + meant)
         return value
 
     return read
@@ -279,7 +279,7 @@ class Table:
         for name, value in self._data.items():
             # body3 is no misspelling of body2: names that differ in their number alone are meant as they are
             others = [known for known in self._known if known.rstrip(DIGITS) != str(name).rstrip(DIGITS)]
-            near = difflib.get_close_matches(short(str(name)), others, n=1)
+            near = nearest(str(name), others)
             known = f"did you mean {near[0]!r}?" if near else "known here: " + ", ".join(self._known)
             what = "table" if isinstance(value, Mapping) else "key"
             raise self.refuse(str(name), None, f"unknown {what}; {known}")

@@ -61,7 +61,7 @@ def _end(found: Advice) -> Section:
     elif found.logs:
         then = f"the same with --log LOG --theta {theta} (LOG: the log of that run)"
     else:
-        then = f"ndtheory advise {assumed}--theta {theta} --ratio R (R: its ratio)"
+        then = f"ndtheory advise run {assumed}--theta {theta} --ratio R (R: its ratio)"
     return closing("a bound of rho with friction, or that a reading is the right one", *outside, then=then)
 
 

@@ -27,7 +27,7 @@ def sections(found: Advice, seen: SeenModuli) -> Sections:
     then = ""
     if found.next is not None:
         theta = f"{found.next.theta:g}"
-        then = f"ndtheory advise --theta {theta} --ratio R (R: the ratio of that run)"
+        then = f"ndtheory advise run --theta {theta} --ratio R (R: the ratio of that run)"
     last = []
     if tried is not None and tried.start is not None:
         last.append(pasted(tried.neumann_body, tried.start.theta_guess))

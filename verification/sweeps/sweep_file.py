@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from ndtheory.texts import did_you_mean
 from verification.problem.examples import example, examples
 from verification.problem.reading import load, read_file
 from verification.problem.specification import Problem
@@ -33,7 +34,14 @@ def read_sweep(path: Path | str) -> tuple[Problem, SweepGrid]:
         Naming file, key, value received and what is needed.
     """
     path = Path(path)
-    top = Table(read_file(path), str(path))
+    data = read_file(path)
+    if "body1" in data and "grid" not in data:
+        needed = (
+            "needed the file of a sweep, this is a problem file; write another one beside it that names it and the "
+            f'values, as problem = "{path.name}" and [grid] theta = [0.3, 0.5]'
+        )
+        raise ProblemError(str(path), "", None, needed)
+    top = Table(data, str(path))
     name = top.take("problem", text)
     grid = top.table("grid", required=True)
     top.close()
@@ -56,7 +64,7 @@ def _problem(path: Path, name: str) -> Problem:
     if name in built_in:
         return example(name)
     needed = f"needed a problem file beside the sweep file, or the name of a built-in problem: {', '.join(built_in)}"
-    raise ProblemError(str(path), "problem", name, needed)
+    raise ProblemError(str(path), "problem", name, needed + did_you_mean(name, built_in))
 
 
 def _values(file: str, key: str, value: Any) -> Any:

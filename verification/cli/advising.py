@@ -1,0 +1,307 @@
+"""The four commands of advise: from a problem, from matrices, from runs of other codes, from moduli alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+from click.shell_completion import CompletionItem
+
+from ndtheory import HypothesisError, exact
+from ndtheory.texts import did_you_mean
+from verification.advice.snippets import SNIPPETS
+from verification.cli.console import complain, deliver, stages
+from verification.cli.forms import Default, Form, Forms
+from verification.cli.matrices import advice_from_files
+from verification.cli.options import JSON, SET, SWAP, F, OneOf
+from verification.cli.problems import load_problem
+from verification.cli.typed import Typed
+from verification.sections.layout import nothing_typed
+
+if TYPE_CHECKING:
+    from verification.advice.roles import Advice
+
+TIED = click.option("--tied", is_flag=True, help="Advise by what holds where nothing opens or slips.")
+SNIPPETS_OF = click.option(
+    "--snippets",
+    type=OneOf([*SNIPPETS, "all"], case_sensitive=False),
+    help="Print whole blocks for the configuration of a coupling library instead, serial coupling.",
+)
+
+
+def _words(context: click.Context, parameter: click.Parameter, begun: str) -> list[CompletionItem]:
+    return advise.complete(context, parameter, begun)
+
+
+@click.command("advise", cls=Default)
+@click.argument("file", type=click.Path(path_type=Path), shell_complete=_words)
+@SET
+@SWAP
+@TIED
+@SNIPPETS_OF
+@JSON
+def of_file(file: Path, keys: dict[str, str], swap: bool, tied: bool, snippets: str | None, as_json: bool) -> None:
+    """Which body gets the Neumann problem, and which theta?
+
+    FILE is a problem file, or the interface.npz that a run has written.  Both assignments of the roles are compared:
+    theta (no unit) and the factor of a step, predicted and proved, and lines to paste into a coupling configuration.
+
+    The commands below advise where there is no problem file.  A file that has the name of one of them is given as
+    ./run.
+
+    \b
+    Examples:
+      ndtheory advise my.toml
+      ndtheory advise my.toml --set contact.friction=0.4
+      ndtheory advise my.toml --tied
+      ndtheory advise my.toml --snippets preCICE
+      ndtheory advise results/interface.npz
+    """
+    context = click.get_current_context()
+    _no_document_of(snippets, as_json)
+    meant = "" if file.suffix else did_you_mean(str(file), advise.commands)
+    if meant and not file.exists():
+        raise click.UsageError(f"{file}: no such file, and no command{meant}", context)
+    changed = [option for option, given in (("--set", keys), ("--swap-roles", swap)) if given]
+    if file.suffix == ".npz" and changed:
+        raise click.UsageError(f"received {changed[0]} with {file}: it changes a problem file", context)
+    problem = file if file.suffix == ".npz" else load_problem(file, keys, swap=swap)
+    from verification.advice import roles
+
+    with stages() as tell:
+        found = roles.advise(problem, tied=tied, progress=tell)
+    _show(found, snippets, as_json, Typed(file=file, keys=keys, swap=swap))
+
+
+def _friction(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
+    try:
+        fits = value is None or exact(value) >= 0
+    except ValueError:
+        fits = False
+    if not fits:
+        raise click.UsageError(f"--friction = {value}: needed a number >= 0, as --friction 0.2", context)
+    return value
+
+
+def _radius(context: click.Context, parameter: click.Parameter, value: str | None) -> float | None:
+    try:
+        radius = None if value is None else float(exact(value))
+    except (ValueError, OverflowError):
+        radius = 0.0
+    if radius is not None and not 0 < radius < float("inf"):
+        raise click.UsageError(f"--radius = {value}: needed a number > 0", context)
+    return radius
+
+
+def _matrix(option: str, parameter: str, words: str, **settings: Any) -> Callable[[F], F]:
+    """An option that names a file with a matrix."""
+    return click.option(option, parameter, type=click.Path(path_type=Path), metavar="MATRIX", help=words, **settings)
+
+
+@click.command(cls=Form)
+@_matrix("--S1", "S1", "Interface stiffness of body 1, or one file with S1 and S2.", required=True)
+@_matrix("--S2", "S2", "Interface stiffness of body 2.")
+@_matrix("--map", "transfer", "Transfer P from the unknowns or nodes of the Neumann body to those of the contact body.")
+@click.option(
+    "--neumann-body", type=OneOf(["1", "2"]), help="From whose unknowns --map leads, where its shape fits both ways."
+)
+@TIED
+@click.option(
+    "--friction",
+    metavar="K",
+    callback=_friction,
+    help="Friction k >= 0, with --x and --radius, or with --kernel and --weights or --x.",
+)
+@_matrix("--x", "x", "Positions of the nodes of the contact body, increasing.")
+@click.option("--radius", metavar="LENGTH", callback=_radius, help="Radius of the hat kernel, in the unit of --x.")
+@_matrix("--kernel", "kernel", "Operator S of the law of friction: normal nodal forces to stress at these nodes.")
+@_matrix("--weights", "weights", "Weights of the quadrature on these nodes; by default those of the trapezoid rule.")
+@SNIPPETS_OF
+@JSON
+def matrices(tied: bool, snippets: str | None, as_json: bool, **given: Any) -> None:
+    """Advice from the interface stiffnesses of any code.
+
+    S1 and S2 are the Schur complements of both bodies on the same interface unknowns, or on two grids with a --map.
+    Force per displacement, in any one unit; MATRIX is a file .npy, .npz, .mtx, .mat, .csv or .txt;
+    P.npz of a run is a --map, with the positions and weights of both grids.  With friction or a map vectors list all
+    tangential components from left to right, then all normal ones.
+
+    In a transient the matrices are those of K + c M/dt^2 (c = 1/beta of Newmark's method): the better role may change
+    with dt.
+
+    \b
+    Examples:
+      ndtheory advise matrices --S1 a.npz --S2 b.mtx
+      ndtheory advise matrices --S1 both.mat --map P.npz
+      ndtheory advise matrices --S1 a.npz --S2 b.npz --tied
+      ndtheory advise matrices --S1 a.npz --S2 b.npz --friction 0.2 \\
+        --x x.npy --radius 0.1
+    """
+    _no_document_of(snippets, as_json)
+    with stages() as tell:
+        found = advice_from_files({name: value for name, value in given.items() if value is not None}, tell, tied=tied)
+    _show(found, snippets, as_json)
+
+
+@click.command(cls=Form)
+@click.option(
+    "--log",
+    "logs",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    multiple=True,
+    help="Convergence log, as precice-Solid-convergence.log; may be repeated with its --theta.",
+)
+@click.option(
+    "--theta",
+    "thetas",
+    metavar="NUMBER",
+    multiple=True,
+    required=True,
+    help="Relaxation factor of the run, 0 < theta <= 1; of several logs one each, in their order.",
+)
+@click.option(
+    "--ratio",
+    metavar="NUMBER",
+    help="Ratio of its residual |Tg - g|, absolute and unrelaxed, from one step to the next, steady over 10 or more; "
+    "1 where it rises and falls.",
+)
+@click.option("--friction", is_flag=True, help="There is friction: bounds, and the run to make next.")
+@TIED
+@SNIPPETS_OF
+@JSON
+def run(
+    logs: tuple[Path, ...],
+    thetas: tuple[str, ...],
+    ratio: str | None,
+    friction: bool,
+    tied: bool,
+    snippets: str | None,
+    as_json: bool,
+) -> None:
+    """What do runs of any other code say of rho?
+
+    Runs with constant theta (no unit), as logs or as the ratio of the residuals of one run: what these can mean, and
+    which theta to run next.  Without --friction they are read as runs without friction.  Give the ratio of the absolute
+    residual |Tg - g|, not of the relative one of coupling libraries; a log may hold either, in any unit.
+
+    \b
+    Examples:
+      ndtheory advise run --theta 0.1 --ratio 1.4
+      ndtheory advise run --log precice-Solid-convergence.log --theta 0.5
+      ndtheory advise run --log a.log --theta 0.3 --log b.log --theta 0.6
+      ndtheory advise run --log a.log --theta 0.3 --friction
+    """
+    context = click.get_current_context()
+    _no_document_of(snippets, as_json)
+    if bool(logs) == (ratio is not None):
+        received = "--log with --ratio: a log shows its own ratio" if logs else "--theta without --log or --ratio"
+        raise click.UsageError(f"received {received}: needed one of --log and --ratio", context)
+    if len(thetas) != max(len(logs), 1):
+        received = f"received {len(thetas)} --theta with {len(logs)} --log"
+        raise click.UsageError(f"{received}: needed one --theta for each log, or one with --ratio", context)
+    if tied and friction:
+        raise click.UsageError("received --tied with --friction: nothing slips on a tied interface", context)
+    from verification.advice.from_logs import advise_logs
+    from verification.advice.from_runs import advise_run
+
+    try:
+        if ratio is None:
+            found = advise_logs(zip(logs, thetas, strict=True), tied=tied, friction=friction)
+        else:
+            found = advise_run(thetas[0], ratio, tied=tied, friction=friction)
+    except HypothesisError as error:
+        raise click.UsageError(f"--{error}", context) from None
+    _show(found, snippets, as_json)
+
+
+@click.command(cls=Form)
+@click.option(
+    "--young", metavar="E1,E2", required=True, help="Moduli of elasticity of bodies 1 and 2, in one unit of stress."
+)
+@click.option("--poisson", metavar="NU1,NU2", required=True, help="Poisson ratios of bodies 1 and 2, no unit.")
+@click.option("--plane-stress", is_flag=True, help="Plane stress; plane strain by default.")
+@click.option("--three-dimensional", is_flag=True, help="Bodies in space.")
+@click.option(
+    "--corners",
+    type=OneOf(["none", "1", "2", "both"]),
+    help="Which body ends in corners of 90 degrees at the ends of Gamma_c.",
+)
+@click.option(
+    "--mirror",
+    type=OneOf(["1", "2", "both"]),
+    help="The body whose mirror image in a flat Gamma_c lies inside the other one, and wherever it is held, its image "
+    "is held too.",
+)
+@click.option(
+    "--flat",
+    is_flag=True,
+    help="With --mirror: the other body is at least twice as wide as high and held along its other side.",
+)
+@JSON
+def moduli(
+    young: str,
+    poisson: str,
+    plane_stress: bool,
+    three_dimensional: bool,
+    corners: Any,
+    mirror: str | None,
+    flat: bool,
+    as_json: bool,
+) -> None:
+    """What do material data alone say, before there is a mesh?
+
+    The moduli of both bodies bound rho (no unit) from below, in both roles.  E is in any one unit of stress.  A theta
+    to start with is proved only where the mirror image of one body fits into the other: say so with --mirror.
+
+    \b
+    Examples, E in MPa:
+      ndtheory advise moduli --young 7e4,2e4 --poisson 0.3,0.3
+      ndtheory advise moduli --young 7e4,2e4 --poisson 0.3,0.3 --corners 2 \\
+        --mirror 2 --flat
+    """
+    context = click.get_current_context()
+    if flat and mirror is None:
+        needed = "received --flat without --mirror: it tells of the body that such an image fits into"
+        raise click.UsageError(needed, context)
+    if plane_stress and three_dimensional:
+        raise click.UsageError("received --plane-stress with --three-dimensional: needed one of both", context)
+    from verification.advice.from_moduli import advise_moduli
+
+    try:
+        found = advise_moduli(
+            young=young.split(","),
+            poisson=poisson.split(","),
+            plane="stress" if plane_stress else "3d" if three_dimensional else "strain",
+            corners=corners,
+            mirror=[body for body in (1, 2) if mirror in (str(body), "both")],
+            flat=flat,
+        )
+    except HypothesisError as error:
+        raise click.UsageError(f"--{error}", context) from None
+    _show(found, None, as_json)
+
+
+advise = Forms(of_file, [matrices, run, moduli])
+
+
+def _no_document_of(snippets: str | None, as_json: bool) -> None:
+    if snippets is not None and as_json:
+        needed = "received --snippets with --json: a block to paste is no JSON document"
+        raise click.UsageError(needed, click.get_current_context())
+
+
+def _show(found: Advice, snippets: str | None, as_json: bool, typed: Typed | None = None) -> None:
+    """Show the advice, or the blocks to paste where they were asked for and a theta is advised."""
+    from verification.sections.advice import sections
+    from verification.sections.advice import snippets as blocks
+
+    if snippets is not None and found.theta is not None:
+        deliver(found, lambda found: blocks(found, snippets), as_json)
+    else:
+        deliver(found, sections, as_json, typing=nothing_typed if typed is None else typed.command)
+    if snippets is not None and found.theta is None:
+        why = "several readings are left" if found.friction_bounds is None else "with friction no run decides theta"
+        complain(f"no snippet: {why}, make the run that is named")

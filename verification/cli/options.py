@@ -1,0 +1,138 @@
+"""Options that several commands share, and the types of their values."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+from ndtheory.texts import did_you_mean
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+FILE = click.argument("file", type=click.Path(path_type=Path))
+JSON = click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout.")
+
+
+def _pairs(context: click.Context, parameter: click.Parameter, given: Sequence[str]) -> dict[str, str]:
+    pairs: dict[str, str] = {}
+    for words in given:
+        key, equals, value = words.partition("=")
+        if not equals:
+            needed = f"{words!r}: needed KEY=VALUE, as contact.friction=0.4"
+            raise click.BadParameter(needed, context, parameter)
+        pairs.pop(key, None)  # the last one is set last
+        pairs[key] = value
+    return pairs
+
+
+SET = click.option(
+    "--set",
+    "keys",
+    multiple=True,
+    callback=_pairs,
+    metavar="KEY=VALUE",
+    help="Set a key of FILE, as contact.friction=0.4 or 'body1.x=[0, 3]'; may be repeated.",
+)
+
+
+class OneOf(click.Choice[str]):
+    """A word of a list; one that is not on it is answered with the list and the word that may be meant."""
+
+    def get_invalid_choice_message(self, value: Any, ctx: click.Context | None) -> str:
+        """The list, and the word that resembles the value."""
+        said = super().get_invalid_choice_message(value, ctx).rstrip(".")
+        return said + did_you_mean(str(value), self.choices)
+
+
+class RuleName(OneOf):
+    """The name of a relaxation rule; the rules are imported when their names are asked for."""
+
+    def __init__(self) -> None:
+        self.case_sensitive = True
+
+    @property
+    def choices(self) -> Sequence[str]:  # type: ignore[override]
+        """The registered rules."""
+        from verification.algorithm.relaxation import RULES
+
+        return tuple(RULES)
+
+
+RELAXATION = click.option(
+    "--relaxation",
+    type=RuleName(),
+    metavar="RULE",  # a list of the names would import the rules, and arrays with them
+    help="Rule of relaxation, over the file's; all but constant are outside the theorem.  A wrong name lists them.",
+)
+THETA = click.option("--theta", metavar="NUMBER", help="Relaxation factor, 0 < theta < 1, over the file's.")
+SWAP = click.option("--swap-roles", "swap", is_flag=True, help="Give the Neumann problem to the other body.")
+SOLVER = click.option(
+    "--solver",
+    type=OneOf(["auto", "cvxpy", "active-set"]),
+    default="auto",
+    show_default=True,
+    help="Who solves step II.",
+)
+
+
+def of_a_run(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command FILE and what changes its run."""
+    for option in reversed((FILE, SET, THETA, RELAXATION, SWAP, SOLVER)):
+        command = option(command)
+    return command
+
+
+def folder_name(context: click.Context, parameter: click.Parameter, value: str | None) -> Path | None:
+    """The folder of ``-o``; an empty name is refused."""
+    if value == "":
+        raise click.BadParameter("'': needed the name of a folder", context, parameter)
+    return None if value is None else Path(value)
+
+
+def one_file(*endings: str, words: str, required: bool = False) -> Callable[[F], F]:
+    """The option ``-o`` of a command that makes one file, with a name that ends in one of these."""
+    needed = f"a name ending in {' or '.join(endings)}"
+
+    def named(context: click.Context, parameter: click.Parameter, value: Path | None) -> Path | None:
+        if value is not None and value.suffix not in endings:
+            raise click.BadParameter(f"{str(value)!r}: needed {needed}", context, parameter)
+        return value
+
+    return click.option(
+        "-o",
+        "--output",
+        "target",
+        type=click.Path(path_type=Path),
+        callback=named,
+        required=required,
+        metavar=f"FILE{endings[0]}",
+        help=f"{words}, {needed}.",
+    )
+
+
+def check_place(target: Path) -> None:
+    """Refuse the name of a file that cannot be written, or that is not ours to write over.
+
+    Raises
+    ------
+    ProblemError
+    """
+    from verification.output.folder import check_ours
+    from verification.problem.tables import ProblemError
+
+    if not target.parent.is_dir():
+        raise ProblemError(str(target), "", None, "needed a name in a folder that exists (-o)")
+    check_ours(target)
+
+
+FOLDER = click.option("-o", "--output", "folder", callback=folder_name, metavar="DIR", help="Folder for the results.")
+
+JOBS = click.option(
+    "--jobs", type=click.IntRange(1), metavar="N", help="How many processes run at once; one for each core by default."
+)
+STORE = click.option(
+    "--store", type=click.Path(path_type=Path), metavar="STORE", help="File that keeps the rows of runs (SQLite)."
+)
