@@ -14,7 +14,7 @@ ROOMS = ("fem1d2d", "ndtheory", "verification")
 #: module: the modules and packages that alone may import it
 DOORS = {
     "cvxpy": ("verification.contact.model", "verification.bounds.model"),
-    "matplotlib": ("verification.figures",),
+    "matplotlib": ("verification.figures", "verification.document"),
     "click": ("verification.cli",),
     "rich": ("verification.cli",),
     "hypothesis": ("verification.testing",),

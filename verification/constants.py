@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -21,9 +21,6 @@ from verification.pencils import of_energy, of_section_5
 from verification.problem import Problem
 from verification.progress import Progress, silent
 from verification.threads import one_thread
-
-if TYPE_CHECKING:
-    from verification.figures import Figure
 
 #: Why C_t1 is infinite, and m is 0.
 SLIDES = "infinite: the contact body can move rigidly along Gamma_c, and its energy does not bound how far"
@@ -114,15 +111,6 @@ class Measured(Document):
     def summary(self) -> str:
         shown = {"rho": self.rho_max, "m": self.m, "M": self.M, "C_R": self.C_R}
         return ", ".join(f"{name} = {value.value:.4g}" for name, value in shown.items() if value is not None)
-
-    def plot(self) -> Figure:
-        """The factor of one step over theta: predicted, and proved in energy norms."""
-        from verification.figures import draw_factor
-
-        energy = self.energy_constants()
-        if energy is None:
-            raise ValueError("the theorem in energy norms does not speak of it: " + self.why_no_energy)
-        return draw_factor({"": energy})
 
     @property
     def nodes(self) -> int | None:

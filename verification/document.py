@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import importlib
 import json
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -12,7 +13,8 @@ from ndtheory import __version__
 from verification.value import Value
 
 if TYPE_CHECKING:
-    from verification.figures import Figure
+    from matplotlib.figure import Figure as Figure
+
     from verification.problem import Problem
 
 
@@ -65,4 +67,12 @@ class Document(Value, ABC):
         ValueError
             There is nothing to draw.
         """
-        raise ValueError(f"a {type(self).__name__} has no figure")
+        return self.drawn()
+
+    def drawn(self, **options: Any) -> Figure:
+        """The main figure, with the options that the figure of this type takes.
+
+        What shows a result is imported by name, here alone: it knows the types of results, which do not know it.
+        """
+        figure: Figure = importlib.import_module("verification.figures.of_results").draw(self, **options)
+        return figure

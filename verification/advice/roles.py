@@ -29,7 +29,6 @@ from verification.progress import Progress, silent
 if TYPE_CHECKING:
     from verification.advice.from_moduli import SeenModuli
     from verification.advice.runs_with_friction import FrictionBounds
-    from verification.figures import Figure
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -150,22 +149,6 @@ class Advice(Document):
             raise ValueError(self.why_no_theta)
         count = steps(self.chosen(self.best)[1])
         return snippet(library, Coupling(neumann_body=self.neumann_body, theta=self.theta, steps=count, tied=self.tied))
-
-    def plot(self) -> Figure:
-        """The factor of one step over theta, for each assignment of the roles."""
-        from verification.figures import draw_factor
-
-        if not self.roles:
-            raise ValueError("no reading is left alone: make the run that `next` names")
-        if self.moduli is not None:
-            raise ValueError("moduli bound rho from below only: no factor of a step follows")
-        named = {f"Neumann body {role.neumann_body}" if role.neumann_body else "that run": role for role in self.roles}
-        energy = {
-            name: role.energy or EnergyConstants(rho=role.rho.value)
-            for name, role in named.items()
-            if role.rho is not None
-        }
-        return draw_factor(energy)
 
     @property
     def best(self) -> Role:

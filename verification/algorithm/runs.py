@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -34,9 +34,6 @@ from verification.monolithic import SolveError, solution_force
 from verification.problem import Problem
 from verification.problem.tables import ProblemError
 from verification.threads import one_thread
-
-if TYPE_CHECKING:
-    from verification.figures import Figure
 
 #: Linearising takes longer than a run, and is asked for.
 NOT_ASKED = "not worked out: linearise() does"
@@ -256,12 +253,6 @@ class Run(Document):
     def summary(self) -> str:
         rate = "" if self.observed_rate is None else f", observed rate {self.observed_rate.value:.4g}"
         return f"{self.pair.title}, {self.outcome} after {self.iterations} steps at theta {float(self.theta):.4g}{rate}"
-
-    def plot(self) -> Figure:
-        """The residuals, step by step, with the rate they show."""
-        from verification.figures import draw_residuals
-
-        return draw_residuals(self)
 
     def table(self) -> dict[str, list[Any]]:
         """The history as plain columns, one row for each evaluation of T: ``pandas.DataFrame(run.table())`` reads it.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -24,9 +24,6 @@ from verification.progress import Progress, silent
 from verification.sweeps.grid import SweepGrid
 from verification.sweeps.row import Row
 from verification.sweeps.sweep import sweep_grid
-
-if TYPE_CHECKING:
-    from verification.figures import Figure
 
 #: Where runs are started, and how long they may take.
 THETAS = tuple(float(f"{v:.3g}") for v in np.geomspace(0.04, 0.97, 9))
@@ -70,12 +67,6 @@ class Plane(Document):
     @property
     def summary(self) -> str:
         return f"{self.title}, regions of {', '.join(self.regions)}; {len(self.points)} runs"
-
-    def plot(self) -> Figure:
-        """The regions with the runs over them."""
-        from verification.figures import draw_region
-
-        return draw_region(self)
 
     @property
     def interrupted(self) -> bool:

@@ -24,7 +24,7 @@ from verification.sweeps.tally import Tally
 from verification.sweeps.workers import Work, work_of
 
 if TYPE_CHECKING:
-    from verification.figures import Figure
+    from verification.document import Figure
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -101,9 +101,7 @@ class Sweep(Document):
         ValueError
             A column that there is not, or without numbers.
         """
-        from verification.figures import draw_sweep
-
-        return draw_sweep(self, x, y, curves)
+        return self.drawn(x=x, y=y, curves=curves)
 
     def to_csv(self) -> str:
         """The rows as CSV, under lines that begin with ``#`` and hold version, units and the problem as TOML.
