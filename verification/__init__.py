@@ -38,12 +38,12 @@ if TYPE_CHECKING:
     from verification.constants import Measured, measure
     from verification.contact import ContactError
     from verification.interface.build import build
-    from verification.interface.friction import Law
+    from verification.interface.interface import Law
     from verification.interface.pair import ContactPair
     from verification.ledger import Ledger, verify
     from verification.monolithic import Solution, SolveError, solve
     from verification.problem.examples import example
-    from verification.problem.reading import load
+    from verification.problem.files import load
     from verification.problem.specification import Problem
     from verification.problem.tables import ProblemError
     from verification.sweeps.sweep import Sweep, sweep
@@ -54,7 +54,7 @@ _HOME = {
     "Comparison": "comparison",
     "ContactError": "contact",
     "ContactPair": "interface.pair",
-    "Law": "interface.friction",
+    "Law": "interface.interface",
     "Ledger": "ledger",
     "Measured": "constants",
     "Problem": "problem.specification",
@@ -76,7 +76,7 @@ _HOME = {
     "compare": "comparison",
     "example": "problem.examples",
     "iterate": "algorithm.start",
-    "load": "problem.reading",
+    "load": "problem.files",
     "measure": "constants",
     "run": "algorithm.runs",
     "solve": "monolithic",

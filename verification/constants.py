@@ -15,7 +15,8 @@ from ndtheory.energy_norms import friction_multiple
 from ndtheory.number import above, below, weakest
 from verification.body_constants import BodyConstants, constants_of
 from verification.document import Document
-from verification.interface.pair import ContactPair, TwoBodies
+from verification.interface.pair import ContactPair
+from verification.interface.two_bodies import TwoBodies
 from verification.operators import Pencils, needs_matrices, pair_or_bodies
 from verification.pencils import of_energy, of_section_5
 from verification.problem import Problem

@@ -30,7 +30,8 @@ from verification.interface.assembly import discretise
 from verification.interface.body import Body
 from verification.interface.checks import Checks, check_state
 from verification.interface.fields import ContactFields
-from verification.interface.pair import ContactPair, TwoBodies
+from verification.interface.pair import ContactPair
+from verification.interface.two_bodies import TwoBodies
 from verification.problem import Problem, load
 from verification.threads import one_thread
 

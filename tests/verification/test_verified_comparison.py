@@ -19,7 +19,7 @@ from verification.certificate.contraction import certify
 from verification.certificate.description import describe
 from verification.certificate.exact_bodies import NotExact
 from verification.constants import measure
-from verification.interface.assembly import build
+from verification.interface.pair import build
 from verification.verdicts import judge, judge_bound
 
 SMALL = vf.Problem.from_dict(small())

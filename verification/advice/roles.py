@@ -20,7 +20,8 @@ from verification.algorithm.theta import automatic, by_prediction, energy_bounds
 from verification.constants import measure
 from verification.document import Document
 from verification.interface.build import build
-from verification.interface.pair import UNITS, ContactPair, SingularRole, TwoBodies
+from verification.interface.pair import UNITS, ContactPair
+from verification.interface.two_bodies import SingularRole, TwoBodies
 from verification.operators import Pencils, needs_matrices, pair_or_bodies
 from verification.problem import Problem, load
 from verification.problem.tables import ProblemError

@@ -15,8 +15,8 @@ from verification.bounds.table import BOUNDS
 from verification.constants import SLIDES, measure
 from verification.contact import ContactError
 from verification.document import Document
-from verification.interface.assembly import build
 from verification.interface.friction import LAWS
+from verification.interface.pair import build
 from verification.interrupts import INTERRUPTED
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError

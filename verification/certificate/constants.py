@@ -31,7 +31,8 @@ from verification.body_constants import BodyConstants
 from verification.certificate.exact_bodies import ExactBody, ExactInterface, NotExact
 from verification.constants import ENERGY_NAMES, FROM_MATRICES, NAMES, Measured, product
 from verification.interface.body import Name
-from verification.interface.pair import ContactPair, TwoBodies
+from verification.interface.pair import ContactPair
+from verification.interface.two_bodies import TwoBodies
 from verification.operators import needs_matrices
 from verification.progress import Progress, silent
 from verification.threads import one_thread

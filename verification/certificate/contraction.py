@@ -21,8 +21,7 @@ from verification.certificate.claims import NOT_CONFIRMED, Claims, NoCertificate
 from verification.certificate.description import describe
 from verification.constants import Measured, measure
 from verification.document import Document
-from verification.interface.assembly import build
-from verification.interface.pair import UNITS, ContactPair
+from verification.interface.pair import UNITS, ContactPair, build
 from verification.problem import Problem, ProblemError
 from verification.progress import Progress, silent
 

@@ -14,7 +14,7 @@ from verification.cli.matrices import matrices
 from verification.cli.moduli_screen import moduli
 from verification.cli.screens import steps
 from verification.cli.typed import Typed
-from verification.problem.reading import takes_theta
+from verification.problem.vocabulary import vocabulary
 
 
 def advice(found: Advice, typed: Typed | None = None) -> None:
@@ -59,7 +59,7 @@ def advice(found: Advice, typed: Typed | None = None) -> None:
             typed.suggest("constants")
         elif typed is not None:
             options = [] if found.roles[0].neumann_body == found.neumann_body else ["--swap-roles"]
-            if found.theta is not None and takes_theta(found.problem.iteration.relaxation):
+            if found.theta is not None and vocabulary().takes_theta(found.problem.iteration.relaxation):
                 options += ["--theta", f"{found.theta:g}"]
             typed.suggest("run", *options)
     else:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from verification.problem.examples import example, examples
-from verification.problem.reading import load, read_file
+from verification.problem.files import load, read_file
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError, Table, Unfit, number, positive, text
 from verification.sweeps.grid import MOST_ROWS, SweepGrid
