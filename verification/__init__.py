@@ -35,7 +35,8 @@ if TYPE_CHECKING:
     from verification.algorithm.start import iterate
     from verification.certificate.contraction import certify, check_again
     from verification.comparison import Comparison, compare
-    from verification.constants import Measured, measure
+    from verification.constants.measured import Measured
+    from verification.constants.measuring import measure
     from verification.contact import ContactError
     from verification.interface.build import build
     from verification.interface.interface import Law
@@ -56,7 +57,7 @@ _HOME = {
     "ContactPair": "interface.pair",
     "Law": "interface.interface",
     "Ledger": "ledger",
-    "Measured": "constants",
+    "Measured": "constants.measured",
     "Problem": "problem.specification",
     "ProblemError": "problem.tables",
     "Rule": "algorithm.relaxation",
@@ -77,7 +78,7 @@ _HOME = {
     "example": "problem.examples",
     "iterate": "algorithm.start",
     "load": "problem.files",
-    "measure": "constants",
+    "measure": "constants.measuring",
     "run": "algorithm.runs",
     "solve": "monolithic",
     "sweep": "sweeps.sweep",

@@ -14,7 +14,7 @@ import verification as vf
 from fem1d2d.enclosed import Enclosed
 from fem1d2d.loewner import Elimination
 from ndtheory import REPAIRED, Constants, evaluate
-from verification.certificate.constants import verify
+from verification.constants.proved import verify
 from verification.interface.interface import Law
 
 NAMES = (

@@ -12,7 +12,8 @@ import numpy as np
 from verification.algorithm.ending import Outcome
 from verification.bounds.bound import NotComputed, Region, Subject
 from verification.bounds.table import BOUNDS
-from verification.constants import SLIDES, measure
+from verification.constants import measure
+from verification.constants.measured import SLIDES
 from verification.contact import ContactError
 from verification.document import Document
 from verification.interface.friction import LAWS

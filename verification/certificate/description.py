@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from verification.certificate.exact_bodies import ExactInterface, exact_points
 from verification.interface.body import Body
+from verification.interface.exact_bodies import ExactInterface, exact_points
 from verification.interface.pair import ContactPair, build
 from verification.problem import Problem
 from verification.problem.specs import BodySpec

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,10 +12,10 @@ from verification.cli.console import deliver, heading, near_one, note, say, stag
 from verification.cli.failing import fail
 from verification.cli.problems import JSON, SET, SWAP, THETA, load_problem
 from verification.cli.typed import Typed
+from verification.output.files import check_ours, writing
 
 if TYPE_CHECKING:
     from verification.certificate.contraction import Certificate, Checked
-    from verification.document import Document
 
 #: A certificate of a hundred contact nodes has a few megabytes.
 MOST_BYTES = 100_000_000
@@ -107,7 +106,6 @@ def certify(
 
 def _check_target(target: Path, context: click.Context) -> None:
     """Refuse a name under which nothing can be written."""
-    from verification.output.folder import check_ours
     from verification.problem.tables import ProblemError
 
     if target.suffix != ".json":
@@ -115,20 +113,6 @@ def _check_target(target: Path, context: click.Context) -> None:
     if not target.parent.is_dir():
         raise ProblemError(str(target), "", None, "needed a name in a folder that exists (-o)")
     check_ours(target)
-
-
-def writing(found: Document, target: Path | None) -> Callable[[], None] | None:
-    """What writes a certificate; None where no name was given."""
-    from verification.output.folder import staged
-
-    if target is None:
-        return None
-
-    def write() -> None:
-        with staged(target.parent, shown=target) as room:
-            (room / target.name).write_text(found.to_json(), encoding="utf-8")
-
-    return write
 
 
 def show(found: Certificate, target: Path | None = None, typed: Typed | None = None) -> None:

@@ -214,7 +214,7 @@ def region(file: Path, keys: dict[str, str], target: Path, store: Path | None, a
     from verification import figures
     from verification.bounds.region import chart
     from verification.cli import screens
-    from verification.output.folder import check_ours, staged
+    from verification.output.files import check_ours, staged
     from verification.problem.tables import ProblemError
 
     problem = load_problem(file, keys)

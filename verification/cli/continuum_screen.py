@@ -11,6 +11,7 @@ from verification.cli.console import deliver, figures, heading, note, say, stage
 from verification.cli.failing import fail
 from verification.cli.problems import load_problem
 from verification.cli.typed import Typed
+from verification.output.files import writing
 
 if TYPE_CHECKING:
     from verification.certificate.continuum import ContinuumCertificate
@@ -22,7 +23,6 @@ def prove(
     """Bound the continuous problem of a file and show what follows; 1 where contraction is not proved."""
     from ndtheory.strip import Unproved
     from verification.certificate.continuum import certify_continuum
-    from verification.cli.certifying import writing
 
     problem = load_problem(file, keys, theta=theta, swap=swap)
     try:

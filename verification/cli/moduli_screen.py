@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from verification.advice.from_moduli import Corners, ModuliRole, SeenModuli, Start, excluded_from
 from verification.advice.roles import Advice
+from verification.advice.seen_moduli import Corners, ModuliRole, SeenModuli, Start, excluded_from
 from verification.cli.console import figures, heading, near_one, note, say, table
 
 PLANES = {"strain": "plane strain", "stress": "plane stress", "3d": "three-dimensional"}

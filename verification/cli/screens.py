@@ -18,7 +18,8 @@ from verification.cli.console import figures, heading, near_one, note, part, say
 from verification.cli.levels import between
 from verification.cli.typed import Typed
 from verification.comparison import Comparison, Listener
-from verification.constants import ENERGY_NAMES, NAMES, Measured
+from verification.constants import Measured
+from verification.constants.measured import ENERGY_NAMES, NAMES
 from verification.interface import assembly
 from verification.interface.fields import ContactFields
 from verification.interface.friction import LAWS

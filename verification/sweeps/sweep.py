@@ -17,11 +17,12 @@ from verification.problem.files import load
 from verification.problem.specification import Problem
 from verification.progress import Progress, silent
 from verification.spreadsheet import as_csv
+from verification.sweeps.cluster import on_cluster
 from verification.sweeps.grid import SweepGrid
 from verification.sweeps.keeping import Kept
 from verification.sweeps.row import FAILED, Row
 from verification.sweeps.tally import Tally
-from verification.sweeps.workers import Work, work_of
+from verification.sweeps.workers import Work, alone, together
 
 if TYPE_CHECKING:
     from verification.document import Figure
@@ -123,6 +124,13 @@ class Sweep(Document):
         }
 
 
+def work_of(jobs: int, dask: str | None = None) -> Work:
+    """Who makes rows: the workers of a dask scheduler, this process for one job, else processes of this machine."""
+    if dask is not None:
+        return on_cluster(dask)
+    return alone if jobs == 1 else together(jobs)
+
+
 def sweep(
     problem: Problem | ContactPair | Path | str,
     *,
@@ -221,7 +229,7 @@ def sweep_grid(
     start, grid, store, fresh, retry, progress
         As :func:`sweep` has them.
     work : callable, optional
-        Who makes the rows, as :func:`verification.sweeps.workers.work_of` says; this process by default.
+        Who makes the rows, as :func:`work_of` says; this process by default.
     """
     wanted = list(grid.rows())
     done: dict[int, Row | bytes] = {}
