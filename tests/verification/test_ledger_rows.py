@@ -151,7 +151,7 @@ def test_one_case_refutes_and_proves_nothing(monkeypatch):
         mutants={},
         one_case=True,
     )
-    monkeypatch.setattr("ndtheory.symbolic.checks", lambda: [one])
+    monkeypatch.setattr("verification.ledger.sources.checks", lambda: [one])
     found = exact(["2.2"], "quick", lambda share: None)["2.2"]
     assert [(e.method, e.of, e.holds) for e in found] == [("reading", "printed", True), ("symbolic", "repaired", False)]
     assert settle(found[:1])[0] == "ASSUMED"

@@ -258,8 +258,8 @@ def build(problem: Problem, *, law: Law | None = None, like: ContactPair | None 
     Raises
     ------
     ProblemError
-        As :func:`discretise`, and where a body is rigid, the one with the Neumann problem can move rigidly, or rounding
-        leaves no digit of a stiffness on Gamma_c.
+        As :func:`verification.interface.assembly.discretise`, and where a body is rigid, the one with the Neumann
+        problem can move rigidly, or rounding leaves no digit of a stiffness on Gamma_c.
     """
     bodies, iteration = held_bodies(problem, law=law), problem.iteration
     known = (None, None) if like is None else (like.body1, like.body2)
