@@ -2,7 +2,7 @@
 
 Every formula is written over any scalar (float, Decimal, Fraction where roots are rational, sympy, mpmath, an interval,
 an object that records the operations made with it) and free of the cancellation that the printed form suffers; branches
-go through :func:`ndtheory.number.where`.  Docstrings give the equation, ``tests/ndtheory`` a second derivation.  With
+go through :func:`ndtheory.scalar.where`.  Docstrings give the equation, ``tests/ndtheory`` a second derivation.  With
 u = m all m, M, u and x = C_K are stresses and G is a stress cubed; C_R, theta, C_T, P, D, Q, C_0, C_1, C_6 are numbers.
 
 The two editions are one set of formulas.  The paper's bracket ``M C_R + C_K + sqrt(C_K m) + 1`` in (5.30)
@@ -25,19 +25,8 @@ from typing import Any, Literal
 
 from ndtheory.constants import Constants, Corner, inside, relaxation_factor
 from ndtheory.errors import HypothesisError
-from ndtheory.number import (
-    DIGITS,
-    SLACK,
-    Number,
-    decimal,
-    maximum,
-    minimum,
-    rounded,
-    sqrt,
-    weakest,
-    where,
-    working_precision,
-)
+from ndtheory.number import DIGITS, SLACK, Number, Numeric, decimal, rounded, weakest, working_precision
+from ndtheory.scalar import Scalar, maximum, minimum, sqrt, where
 
 Conclusion = Literal["contraction", "no conclusion"]
 
@@ -71,9 +60,9 @@ class Edition:
     """
 
     name: Literal["printed", "repaired"]
-    coercivity: Callable[[Any], Any]
-    unit: Callable[[Any], Any]
-    proved: Callable[[Any], bool]
+    coercivity: Callable[[Scalar], Scalar]
+    unit: Callable[[Scalar], Scalar]
+    proved: Callable[[Scalar], bool]
 
     def __reduce__(self) -> str:  # pickled by its name, as functions are
         return self.name.upper()
@@ -87,7 +76,7 @@ EDITIONS = (PRINTED, REPAIRED)
 # The formulas.  Here m is m~ in the printed edition, A = M C_R, x = C_K.
 
 
-def lipschitz(m: Any, M: Any, C_R: Any, x: Any) -> Any:
+def lipschitz(m: Scalar, M: Scalar, C_R: Scalar, x: Scalar) -> Scalar:
     """C_T (5.16); with m~ for m it is C~_T (5.35).
 
     Examples
@@ -99,17 +88,17 @@ def lipschitz(m: Any, M: Any, C_R: Any, x: Any) -> Any:
     return A / m**2 * (A + x + sqrt(x * m))
 
 
-def C0(m: Any, M: Any, C_R: Any) -> Any:
+def C0(m: Scalar, M: Scalar, C_R: Scalar) -> Scalar:
     """C_0 (5.37): from here on the coefficient of |||T psi - T psi~||| squared is non-negative."""
     return 2 * m**2 / ((M * C_R) ** 2 + 2 * m**2)
 
 
-def G(x: Any, m: Any, M: Any, C_R: Any, u: Any) -> Any:
+def G(x: Scalar, m: Scalar, M: Scalar, C_R: Scalar, u: Scalar) -> Scalar:
     """G (5.42): ``M^2 (x^2 + sqrt(m) x^(3/2) + (M C_R + u) x) / u``."""
     return M**2 / u * x * (x + sqrt(m * x) + M * C_R + u)
 
 
-def inverse_G(y: Any, m: Any, M: Any, C_R: Any, u: Any) -> Any:
+def inverse_G(y: Scalar, m: Scalar, M: Scalar, C_R: Scalar, u: Scalar) -> Scalar:
     """The x >= 0 with G(x) = y, for y > 0: a friction constant C_K (stress) from a stress cubed.
 
     In t = sqrt(x) this is ``t^4 + sqrt(m) t^3 + (M C_R + u) t^2 = Y``: increasing and convex, so Newton's method
@@ -129,7 +118,7 @@ def inverse_G(y: Any, m: Any, M: Any, C_R: Any, u: Any) -> Any:
     return t**2
 
 
-def thresholds(m: Any, M: Any, C_R: Any, u: Any) -> tuple[Any, Any, Any, Any]:
+def thresholds(m: Scalar, M: Scalar, C_R: Scalar, u: Scalar) -> tuple[Scalar, Scalar, Scalar, Scalar]:
     """C2 (5.43), C3, C4, C5 (Cases 2-1 to 2-3), each as the C_K (stress) below which a case holds."""
     c0 = C0(m, M, C_R)
     right = (m**5 / (M * C_R) ** 2 + m**3, m**3 / 2, m**3, (2 - c0) / (1 - c0) * m**3 / 2)
@@ -137,12 +126,12 @@ def thresholds(m: Any, M: Any, C_R: Any, u: Any) -> tuple[Any, Any, Any, Any]:
     return C2, C3, C4, C5
 
 
-def P(x: Any, m: Any, M: Any, C_R: Any, u: Any) -> Any:
+def P(x: Scalar, m: Scalar, M: Scalar, C_R: Scalar, u: Scalar) -> Scalar:
     """``G(C_K)/m^3``, the friction term of (5.36) with ``2 theta (1 - theta)`` taken out."""
     return G(x, m, M, C_R, u) / m**3
 
 
-def D(x: Any, m: Any, M: Any, C_R: Any, u: Any) -> Any:
+def D(x: Scalar, m: Scalar, M: Scalar, C_R: Scalar, u: Scalar) -> Scalar:
     """``C_T^2/C_R^2 - P >= 0``: what the proof of a >= 1, b <= -2 after (5.39) needs, without subtracting.
 
     With ``A = M C_R``, ``s = sqrt(m x)`` and ``r = m/u <= 1`` the term m x of the square cancels that of P.
@@ -151,42 +140,42 @@ def D(x: Any, m: Any, M: Any, C_R: Any, u: Any) -> Any:
     return M**2 / m**4 * (A**2 + 2 * A * s + (2 - r) * (A + s) * x + (1 - r) * x**2)
 
 
-def Q(x: Any, m: Any, M: Any, C_R: Any) -> Any:
+def Q(x: Scalar, m: Scalar, M: Scalar, C_R: Scalar) -> Scalar:
     """``C_T^2 M^2/m^2``: the Lipschitz constant squared of T in the norm (5.21), by (5.22), (5.16), (5.23)."""
     return (lipschitz(m, M, C_R, x) * M / m) ** 2
 
 
-def C1(D: Any, Q: Any) -> Any:
+def C1(D: Scalar, Q: Scalar) -> Scalar:
     """C_1 = -b/a (5.40) with a = 1 + 2D + Q and b = -2(1 + D)."""
     return 2 * (1 + D) / (1 + 2 * D + Q)
 
 
-def C6(P: Any) -> Any:
+def C6(P: Scalar) -> Scalar:
     """C_6 = 1 + 1/a' with a' = 1 - 2P (5.46); counts only when a' < -1, that is P > 1."""
     return 2 * (1 - P) / (1 - 2 * P)
 
 
-def one_minus_h1(theta: Any, D: Any, Q: Any) -> Any:
+def one_minus_h1(theta: Scalar, D: Scalar, Q: Scalar) -> Scalar:
     """1 - h_1(theta) = -theta (a theta + b), h_1 of (5.39)."""
     return theta * (2 * (1 + D) - theta * (1 + 2 * D + Q))
 
 
-def one_minus_h2(theta: Any, P: Any) -> Any:
+def one_minus_h2(theta: Scalar, P: Scalar) -> Scalar:
     """1 - h_2(theta) = -theta (a' theta + b'), h_2 of (5.45), a' = 1 - 2P, b' = -1 - a'."""
     return theta * ((2 - theta) - 2 * P * (1 - theta))
 
 
-def lower_end(P: Any) -> Any:
+def lower_end(P: Scalar) -> Scalar:
     """max(0, C6) with C6 counted only where a' < -1: where the thetas that contract begin, friction being below C2."""
     return where(P > 1, lambda: maximum(0 * P, C6(P)), 0 * P)
 
 
-def one_minus_square(theta: Any, P: Any, D: Any, Q: Any) -> Any:
+def one_minus_square(theta: Scalar, P: Scalar, D: Scalar, Q: Scalar) -> Scalar:
     """1 - K(theta)^2, K^2 = max(h1, h2)."""
     return minimum(one_minus_h1(theta, D, Q), one_minus_h2(theta, P))
 
 
-def factor_and_rest(gain: Any) -> tuple[Any, Any]:
+def factor_and_rest(gain: Scalar) -> tuple[Scalar, Scalar]:
     """q and 1 - q from 1 - q^2 <= 1, the latter without cancellation.
 
     Examples
@@ -285,7 +274,7 @@ class Bounds:
         }
 
 
-def evaluate(edition: Edition, constants: Constants, theta: Any = None) -> Bounds:
+def evaluate(edition: Edition, constants: Constants, theta: Numeric | None = None) -> Bounds:
     """Evaluate an edition of Proposition 5.6.
 
     The four cases are one: C5 = C2 identically, h1 = h2 at C0, and the end points C3, C4 hold too, so T_theta contracts
@@ -335,7 +324,7 @@ def evaluate(edition: Edition, constants: Constants, theta: Any = None) -> Bound
         corners = [_figures(edition, corner, t, SLACK) for corner in constants.corners or ()]
         level = weakest([constants.level, "verified"])
 
-        def number(name: str) -> Any:
+        def number(name: str) -> Scalar:
             ends = _ends_of_C1(corners) if name == "C1" else [corner[name] for corner in corners]
             return rounded(found[name], ends, level)
 
@@ -374,7 +363,7 @@ def _figures(edition: Edition, at: Corner, theta: Decimal | None, margin: Decima
     shared = (read, M, C_R)
     p, d, q = P(x, *shared, u), D(x, *shared, u), Q(x, *shared)
     c1 = C1(d, q)
-    ends: tuple[Any, ...] = thresholds(*shared, u)
+    ends: tuple[Scalar, ...] = thresholds(*shared, u)
     # C1 - C0 can be 1e-22 relative: never compare those two instead.
     low = high = factor = rest = None
     if x < ends[0] * (1 - margin):

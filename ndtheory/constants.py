@@ -9,7 +9,7 @@ from fractions import Fraction
 from typing import Any, ClassVar
 
 from ndtheory.errors import HypothesisError
-from ndtheory.number import Level, Number, exact, rounded, weakest
+from ndtheory.number import Level, Number, Numeric, exact, rounded, weakest
 
 #: m, M, C_R, C_K and C_s C_tr, the last None where C_K alone is known.
 Corner = tuple[Fraction, Fraction, Fraction, Fraction, Fraction | None]
@@ -18,7 +18,7 @@ Corner = tuple[Fraction, Fraction, Fraction, Fraction, Fraction | None]
 ORDINARY = Fraction(1, 10**30), Fraction(10**30)
 
 
-def take(key: str, value: Any, needed: str, holds: Callable[[Fraction], bool]) -> Fraction:
+def take(key: str, value: Numeric, needed: str, holds: Callable[[Fraction], bool]) -> Fraction:
     """Read a number exactly and hold it against its hypothesis.
 
     Raises
@@ -35,7 +35,7 @@ def take(key: str, value: Any, needed: str, holds: Callable[[Fraction], bool]) -
     return number
 
 
-def relaxation_factor(value: Any) -> Fraction:
+def relaxation_factor(value: Numeric) -> Fraction:
     """Read theta exactly; Section 3 needs 0 < theta < 1.
 
     Raises
@@ -68,7 +68,7 @@ class Given:
 
     numbers: tuple[tuple[str, Number], ...] = field(init=False, repr=False, default=())
 
-    def _keep(self, key: str, value: Any, needed: str, holds: Callable[[Fraction], bool]) -> Fraction:
+    def _keep(self, key: str, value: Numeric | Number, needed: str, holds: Callable[[Fraction], bool]) -> Fraction:
         given = Number.of_float(value) if isinstance(value, float) else value
         kept = take(key, plain(value), needed, holds)
         if isinstance(given, Number):
@@ -157,7 +157,7 @@ def inside(corners: Sequence[Mapping[str, Any]], level: Level, low: str, high: s
     return first.hi, last.lo
 
 
-def plain(value: Any) -> Any:
+def plain(value: Numeric | Number) -> Numeric:
     """What is read of a constant: the value of a Number, else the constant itself."""
     return value.value if isinstance(value, Number) else value
 
@@ -206,7 +206,15 @@ class Constants(Given):
     k: Fraction | None
 
     def __init__(
-        self, *, m: Any, M: Any, C_R: Any, C_K: Any = None, C_s: Any = None, C_tr: Any = None, k: Any = None
+        self,
+        *,
+        m: Numeric | Number,
+        M: Numeric | Number,
+        C_R: Numeric | Number,
+        C_K: Numeric | Number | None = None,
+        C_s: Numeric | Number | None = None,
+        C_tr: Numeric | Number | None = None,
+        k: Numeric | Number | None = None,
     ) -> None:
         keep = self._keep
         smallest = keep("m", m, "a number m > 0", lambda v: v > 0)

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 from ndtheory.energy import EnergyConstants
 from ndtheory.energy_bounds import EnergyBounds
@@ -25,7 +24,7 @@ from ndtheory.energy_norms import evaluate_energy
 from ndtheory.errors import HypothesisError
 from ndtheory.intervals import Interval
 from ndtheory.moduli import Moduli, mirror
-from ndtheory.number import Number, above, below
+from ndtheory.number import Number, Numeric, above, below
 from ndtheory.segments import bound, bound_at_end, zones
 from ndtheory.strip import Strip, largest_ratio_of_strips, largest_smoothed
 from ndtheory.wedges import Wedge, end_bound
@@ -245,13 +244,13 @@ def continuum_constants(model: TwoRectangles) -> ContinuumConstants:
     )
 
 
-def upper(value: Any) -> Number:
+def upper(value: Fraction) -> Number:
     """A number that is proved to be at most a rational."""
     hi = above(value)
     return Number(value=hi, hi=hi, level="guaranteed")
 
 
-def lower(value: Any) -> Number:
+def lower(value: Fraction) -> Number:
     """A number that is proved to be at least a rational."""
     lo = below(value)
     return Number(value=lo, lo=lo, level="guaranteed")
@@ -263,7 +262,7 @@ def friction_threshold(constants: ContinuumConstants) -> Number:
     return lower(Fraction((2 / (second + (second.square() + first.square()).sqrt())).lo))
 
 
-def statement(constants: ContinuumConstants, *, friction: Any, theta: Any = None) -> EnergyBounds | None:
+def statement(constants: ContinuumConstants, *, friction: Numeric, theta: Numeric | None = None) -> EnergyBounds | None:
     """What the theorem in energy norms says of the continuum; None where rho is not bounded.
 
     q grows with its constants, so the values for upper bounds are bounds: ``factor`` and ``factor_proved`` from above,

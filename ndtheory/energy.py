@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 from ndtheory.constants import Given, plain
+from ndtheory.number import Number, Numeric
 
 #: Sizes whose squares and quotients fit into a double.
 SMALLEST, LARGEST = Fraction(1, 10**75), Fraction(10**75)
@@ -54,7 +54,14 @@ class EnergyConstants(Given):
     kappa_2: Fraction
     rho_normal: Fraction | None
 
-    def __init__(self, *, rho: Any, kappa_1: Any = 0, kappa_2: Any = 0, rho_normal: Any = None) -> None:
+    def __init__(
+        self,
+        *,
+        rho: Numeric | Number,
+        kappa_1: Numeric | Number = 0,
+        kappa_2: Numeric | Number = 0,
+        rho_normal: Numeric | Number | None = None,
+    ) -> None:
         keep = self._keep
         largest = keep("rho", rho, "a number rho > 0 (1e-75 to 1e75)", lambda v: SMALLEST <= v <= LARGEST)
         if rho_normal is None:

@@ -11,7 +11,7 @@ So by (5.24) ``q(theta)^2``, the largest ``(1-theta)^2 + 2 theta (1-theta) f(x) 
 bounds the square of the Lipschitz constant of T_theta.  The proof, step by step, is in ``docs/energy.md``.
 
 Every formula is written over any scalar (float, Decimal, Fraction where roots are rational, sympy, mpmath, an interval,
-an object that records the operations made with it); branches go through :func:`ndtheory.number.where`.  All arguments
+an object that records the operations made with it); branches go through :func:`ndtheory.scalar.where`.  All arguments
 and results are numbers without unit.
 
 r grows with rho, kappa_1 and kappa_2, and at each x in [0, r] the expression above does, as 0 < theta <= 1: so does q.
@@ -31,7 +31,8 @@ from ndtheory.bounds import MARGIN, Conclusion, factor_and_rest
 from ndtheory.constants import inside, relaxation_factor
 from ndtheory.energy import EnergyConstants
 from ndtheory.energy_bounds import EnergyBounds
-from ndtheory.number import SLACK, absolute, decimal, maximum, minimum, rounded, sqrt, weakest, where, working_precision
+from ndtheory.number import SLACK, Numeric, decimal, rounded, weakest, working_precision
+from ndtheory.scalar import Scalar, absolute, maximum, minimum, sqrt, where
 
 #: Halvings of an interval inside (0, 1) until theta is known to far below a double.
 HALVINGS = 80
@@ -39,7 +40,7 @@ HALVINGS = 80
 # The formulas: rho > 0, kappa_1, kappa_2 >= 0, 0 < theta <= 1.
 
 
-def largest_ratio(rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
+def largest_ratio(rho: Scalar, kappa_1: Scalar, kappa_2: Scalar) -> Scalar:
     """r, the largest ``x = |d_1|/|d_2|``: the positive root of ``r^2 = (sqrt(rho) + kappa_1) r + kappa_2``.
 
     Examples
@@ -51,17 +52,17 @@ def largest_ratio(rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
     return (s + sqrt(s * s + 4 * kappa_2)) / 2
 
 
-def work(x: Any, kappa_1: Any, kappa_2: Any) -> Any:
+def work(x: Scalar, kappa_1: Scalar, kappa_2: Scalar) -> Scalar:
     """f(x): bounds ``<T psi - T psi~, d_2> / |d_2|^2``; ``f(r) = -sqrt(rho) r``."""
     return kappa_2 + kappa_1 * x - x * x
 
 
-def square_at(x: Any, theta: Any, rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
+def square_at(x: Scalar, theta: Scalar, rho: Scalar, kappa_1: Scalar, kappa_2: Scalar) -> Scalar:
     """The right-hand side of (5.24) at one x, over ``|||psi - psi~|||^2``."""
     return (1 - theta) ** 2 + 2 * theta * (1 - theta) * work(x, kappa_1, kappa_2) + theta**2 * rho * x * x
 
 
-def turning_theta(rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
+def turning_theta(rho: Scalar, kappa_1: Scalar, kappa_2: Scalar) -> Scalar:
     """theta_s: from here on the worst x is r, below it lies in [0, r).
 
     Examples
@@ -73,7 +74,7 @@ def turning_theta(rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
     return (2 * r - kappa_1) / ((2 + rho) * r - kappa_1)
 
 
-def worst_ratio(theta: Any, rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
+def worst_ratio(theta: Scalar, rho: Scalar, kappa_1: Scalar, kappa_2: Scalar) -> Scalar:
     """The x in [0, r] at which ``square_at`` is largest."""
     return where(
         theta >= turning_theta(rho, kappa_1, kappa_2),
@@ -82,38 +83,38 @@ def worst_ratio(theta: Any, rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
     )
 
 
-def one_minus_end(theta: Any, rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
+def one_minus_end(theta: Scalar, rho: Scalar, kappa_1: Scalar, kappa_2: Scalar) -> Scalar:
     """1 - q^2 where the worst x is r: there ``q = |1 - theta (1 + sqrt(rho) r)|``."""
     slope = 1 + sqrt(rho) * largest_ratio(rho, kappa_1, kappa_2)
     return theta * slope * (2 - theta * slope)
 
 
-def one_minus_inside(theta: Any, rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
+def one_minus_inside(theta: Scalar, rho: Scalar, kappa_1: Scalar, kappa_2: Scalar) -> Scalar:
     """1 - q^2 where the worst x lies inside: for theta below ``turning_theta``, at most 2/(2 + rho)."""
     bend = where(kappa_1 == 0, 0, lambda: (1 - theta) ** 2 * kappa_1**2 / (2 - (2 + rho) * theta))
     return theta * (2 - theta - 2 * (1 - theta) * kappa_2 - bend)
 
 
-def one_minus_square(theta: Any, rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
+def one_minus_square(theta: Scalar, rho: Scalar, kappa_1: Scalar, kappa_2: Scalar) -> Scalar:
     """1 - q(theta)^2; negative where q > 1."""
     at = (theta, rho, kappa_1, kappa_2)
     turned = theta >= turning_theta(rho, kappa_1, kappa_2)
     return where(turned, lambda: one_minus_end(*at), lambda: one_minus_inside(*at))
 
 
-def slope_inside(theta: Any, rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
+def slope_inside(theta: Scalar, rho: Scalar, kappa_1: Scalar, kappa_2: Scalar) -> Scalar:
     """Derivative of ``one_minus_inside`` by theta."""
     c = 2 + rho
     bend = where(kappa_1 == 0, 0, lambda: 2 * (1 - theta) * (1 - 3 * theta + c * theta**2) / (2 - c * theta) ** 2)
     return 2 - 2 * theta - 2 * (1 - 2 * theta) * kappa_2 - kappa_1**2 * bend
 
 
-def friction_number(kappa_1: Any, kappa_2: Any) -> Any:
+def friction_number(kappa_1: Scalar, kappa_2: Scalar) -> Scalar:
     """``kappa_2 + kappa_1^2/4``, the largest f: every small theta contracts where it is below 1, none where above."""
     return kappa_2 + kappa_1**2 / 4
 
 
-def friction_multiple(kappa_1: Any, kappa_2: Any) -> Any:
+def friction_multiple(kappa_1: Scalar, kappa_2: Scalar) -> Scalar:
     """The factor t by which friction may grow until ``friction_number(t kappa_1, t kappa_2) = 1``.
 
     Examples
@@ -124,7 +125,7 @@ def friction_multiple(kappa_1: Any, kappa_2: Any) -> Any:
     return 2 / (kappa_2 + sqrt(kappa_2**2 + kappa_1**2))
 
 
-def friction_limit(rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
+def friction_limit(rho: Scalar, kappa_1: Scalar, kappa_2: Scalar) -> Scalar:
     """The factor t by which friction may grow until no theta at all is proved; never below :func:`friction_multiple`.
 
     ``(1 + 1/rho) / (kappa_2 + kappa_1/sqrt(rho))`` where ``kappa_1 (sqrt(rho) - 1/sqrt(rho)) < 2 kappa_2``;
@@ -143,17 +144,17 @@ def friction_limit(rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
     )
 
 
-def predicted_theta(rho: Any) -> Any:
+def predicted_theta(rho: Scalar) -> Scalar:
     """``2/(2 + rho)``: the best theta without friction, and a prediction with it."""
     return 2 / (2 + rho)
 
 
-def predicted_rate(rho: Any) -> Any:
+def predicted_rate(rho: Scalar) -> Scalar:
     """``rho/(2 + rho)``: the factor at :func:`predicted_theta` without friction, and a prediction with it."""
     return rho / (2 + rho)
 
 
-def tied_theta(rho_min: Any, rho: Any) -> Any:
+def tied_theta(rho_min: Scalar, rho: Scalar) -> Scalar:
     """``2/(2 + rho_min + rho)``: the best theta where nothing opens or slips, so that every step is linear.
 
     Below 2/(1 + rho), and so safe without friction where something opens after all.
@@ -166,12 +167,12 @@ def tied_theta(rho_min: Any, rho: Any) -> Any:
     return 2 / (2 + rho_min + rho)
 
 
-def tied_rate(rho_min: Any, rho: Any) -> Any:
+def tied_rate(rho_min: Scalar, rho: Scalar) -> Scalar:
     """``(rho - rho_min)/(2 + rho_min + rho)``: the factor at :func:`tied_theta` where nothing opens or slips."""
     return (rho - rho_min) / (2 + rho_min + rho)
 
 
-def tied_factor(theta: Any, rho_min: Any, rho: Any) -> Any:
+def tied_factor(theta: Scalar, rho_min: Scalar, rho: Scalar) -> Scalar:
     """``max(|1 - theta (1 + rho_min)|, |1 - theta (1 + rho)|)``: the factor where nothing opens or slips.
 
     A step then multiplies each mode by ``1 - theta (1 + lambda)``, rho_min <= lambda <= rho; it is attained at an end.
@@ -184,7 +185,7 @@ def tied_factor(theta: Any, rho_min: Any, rho: Any) -> Any:
     return maximum(absolute(1 - theta * (1 + rho_min)), absolute(1 - theta * (1 + rho)))
 
 
-def predicted_factor(theta: Any, rho: Any) -> Any:
+def predicted_factor(theta: Scalar, rho: Scalar) -> Scalar:
     """``max(|1 - theta|, |1 - theta (1 + rho)|)``: q(theta) without friction, and a prediction with it.
 
     The first is the factor of a node that stays open, the second that of the stiffest mode in contact.  Without
@@ -204,7 +205,7 @@ def predicted_factor(theta: Any, rho: Any) -> Any:
     return maximum(absolute(1 - theta), absolute(1 - theta * (1 + rho)))
 
 
-def end_quadratic(rho: Any, kappa_1: Any, kappa_2: Any) -> tuple[Any, Any, Any]:
+def end_quadratic(rho: Scalar, kappa_1: Scalar, kappa_2: Scalar) -> tuple[Scalar, Scalar, Scalar]:
     """a, b and c of ``a theta^2 + b theta + c = h (2 - (2 + rho) theta)``, with h = (q^2 - 1)/theta.
 
     Below :func:`turning_theta`, where the second factor is positive, it has the sign of q - 1.
@@ -221,7 +222,9 @@ def end_quadratic(rho: Any, kappa_1: Any, kappa_2: Any) -> tuple[Any, Any, Any]:
     return a, b, c
 
 
-def contraction_ends(rho: Any, kappa_1: Any, kappa_2: Any, margin: Any = 0) -> tuple[Any, Any, Any]:
+def contraction_ends(
+    rho: Scalar, kappa_1: Scalar, kappa_2: Scalar, margin: Scalar = 0
+) -> tuple[Scalar, Scalar, Scalar]:
     """Both ends of the interval of the thetas with q < 1, and the condition that there is one.
 
     ``q < 1`` means ``2 (f - 1) + theta (1 - 2 f + rho x^2) < 0`` for every x in [0, r].  Each is linear in theta, so
@@ -243,7 +246,9 @@ def contraction_ends(rho: Any, kappa_1: Any, kappa_2: Any, margin: Any = 0) -> t
     return low, high, ends == 2
 
 
-def contraction_interval(rho: Any, kappa_1: Any, kappa_2: Any, margin: Any = 0) -> tuple[Any, Any] | None:
+def contraction_interval(
+    rho: Scalar, kappa_1: Scalar, kappa_2: Scalar, margin: Scalar = 0
+) -> tuple[Scalar, Scalar] | None:
     """The thetas with q < 1, an open interval inside (0, 1), or None where there are none.
 
     For scalars whose comparisons are decided; :func:`contraction_ends` is the formula.
@@ -252,7 +257,7 @@ def contraction_interval(rho: Any, kappa_1: Any, kappa_2: Any, margin: Any = 0) 
     return (low, high) if there else None
 
 
-def _roots(a: Any, b: Any, c: Any, margin: Any) -> tuple[tuple[Any, Any], tuple[Any, Any]]:
+def _roots(a: Scalar, b: Scalar, c: Scalar, margin: Scalar) -> tuple[tuple[Scalar, Scalar], tuple[Scalar, Scalar]]:
     """Both real roots of ``a t^2 + b t + c`` where they differ, without cancellation, each with whether it exists."""
     discriminant = b * b - 4 * a * c
     real = discriminant > margin * b * b
@@ -264,13 +269,13 @@ def _roots(a: Any, b: Any, c: Any, margin: Any) -> tuple[tuple[Any, Any], tuple[
     )
 
 
-def best_theta(rho: Any, kappa_1: Any, kappa_2: Any, margin: Any = 0) -> Any | None:
+def best_theta(rho: Scalar, kappa_1: Scalar, kappa_2: Scalar, margin: Scalar = 0) -> Scalar | None:
     """The theta of least q, or None where q >= 1 everywhere; for scalars whose comparisons are decided."""
     interval = contraction_interval(rho, kappa_1, kappa_2, margin)
     return None if interval is None else best_between(*interval, rho, kappa_1, kappa_2)
 
 
-def best_between(low: Any, high: Any, rho: Any, kappa_1: Any, kappa_2: Any) -> Any:
+def best_between(low: Scalar, high: Scalar, rho: Scalar, kappa_1: Scalar, kappa_2: Scalar) -> Scalar:
     """The theta of least q, where the interval in which q < 1 is known.
 
     q grows above :func:`turning_theta`; below it, where q < 1, it has one minimum, since ``q <= c`` holds on one
@@ -280,10 +285,10 @@ def best_between(low: Any, high: Any, rho: Any, kappa_1: Any, kappa_2: Any) -> A
     return _last_where(lambda theta: slope_inside(theta, rho, kappa_1, kappa_2) > 0, low, top)
 
 
-def _last_where(holds: Callable[[Any], bool], low: Any, high: Any) -> Any:
+def _last_where(holds: Callable[[Scalar], bool], low: Scalar, high: Scalar) -> Scalar:
     """The end of an interval (low, ..) inside (low, high) on which a condition holds, by halving."""
 
-    def halved() -> Any:
+    def halved() -> Scalar:
         yes, no = low, high
         for _ in range(HALVINGS):
             middle = (yes + no) / 2
@@ -294,7 +299,7 @@ def _last_where(holds: Callable[[Any], bool], low: Any, high: Any) -> Any:
     return where(holds(high), high, halved)
 
 
-def evaluate_energy(constants: EnergyConstants, theta: Any = None) -> EnergyBounds:
+def evaluate_energy(constants: EnergyConstants, theta: Numeric | None = None) -> EnergyBounds:
     """Evaluate the theorem in energy norms.
 
     Parameters
@@ -336,7 +341,7 @@ def evaluate_energy(constants: EnergyConstants, theta: Any = None) -> EnergyBoun
         corners = [_figures(corner, t, SLACK) for corner in constants.corners or ()]
         level = weakest([constants.level, "verified"])
 
-        def number(name: str) -> Any:
+        def number(name: str) -> Scalar:
             return rounded(found[name], [corner[name] for corner in corners], level)
 
         def nearest(name: str) -> float | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import Any
 
 from ndtheory.number import decimal
 from ndtheory.texts import printable
@@ -25,7 +24,7 @@ class HypothesisError(ValueError):
         The hypothesis, stated positively.
     """
 
-    def __init__(self, key: str, value: Any, needed: str) -> None:
+    def __init__(self, key: str, value: object, needed: str) -> None:
         shown = value
         if isinstance(value, Fraction) and max(abs(value.numerator), value.denominator) > 10**17:
             shown = decimal(value)

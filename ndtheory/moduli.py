@@ -22,10 +22,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 from ndtheory.constants import take
 from ndtheory.errors import HypothesisError
+from ndtheory.number import Numeric
 
 #: In a plane, of strain or of stress, or in space.
 Plane = Literal["strain", "stress", "3d"]
@@ -54,16 +55,17 @@ class Moduli:
     Fraction(9, 5)
     """
 
-    young: Any
-    poisson: Any
-    plane: Plane = "strain"
+    young: Fraction
+    poisson: Fraction
+    plane: Plane
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "young", take("E", self.young, "a number E > 0", lambda v: v > 0))
+    def __init__(self, *, young: Numeric, poisson: Numeric, plane: Plane = "strain") -> None:
+        object.__setattr__(self, "young", take("E", young, "a number E > 0", lambda v: v > 0))
         needed = "a number with -1 < nu <= 1/2"
-        object.__setattr__(self, "poisson", take("nu", self.poisson, needed, lambda v: -1 < v <= Fraction(1, 2)))
-        if self.plane not in get_args(Plane):
-            raise HypothesisError("plane", self.plane, f"one of {', '.join(get_args(Plane))}")
+        object.__setattr__(self, "poisson", take("nu", poisson, needed, lambda v: -1 < v <= Fraction(1, 2)))
+        object.__setattr__(self, "plane", plane)
+        if plane not in get_args(Plane):
+            raise HypothesisError("plane", plane, f"one of {', '.join(get_args(Plane))}")
 
     @property
     def shear(self) -> Fraction:

@@ -1,4 +1,4 @@
-"""Scalars: exact reading, one square root for all of them, and numbers that carry their level of proof."""
+"""Numbers: exact reading, and numbers that carry their level of proof."""
 
 from __future__ import annotations
 
@@ -8,7 +8,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from decimal import Context, Decimal, InvalidOperation, localcontext
 from fractions import Fraction
-from typing import Any, Literal, get_args
+from typing import Any, Literal, TypeAlias, get_args
+
+from ndtheory.scalar import Scalar
+
+#: What a user may write where a number is read exactly, see :func:`exact`.
+Numeric: TypeAlias = int | float | str | Fraction | Decimal
 
 Level = Literal["exact", "verified", "guaranteed", "float"]
 
@@ -39,13 +44,13 @@ def weakest(levels: Iterable[Level]) -> Level:
     return max(levels, key=LEVELS.index, default="exact")
 
 
-def below(x: Any) -> float:
+def below(x: Fraction | Decimal) -> float:
     """The largest double that is at most a rational or a decimal."""
     nearest = float(x)
     return nearest if nearest <= x else math.nextafter(nearest, -math.inf)
 
 
-def above(x: Any) -> float:
+def above(x: Fraction | Decimal) -> float:
     """The smallest double that is at least a rational or a decimal."""
     nearest = float(x)
     return nearest if nearest >= x else math.nextafter(nearest, math.inf)
@@ -98,12 +103,12 @@ class Number:
             raise ValueError(f"value = {self.value}: needed lo = {self.lo} <= value <= hi = {self.hi}, all finite")
 
     @classmethod
-    def of_float(cls, value: Any) -> Number:
+    def of_float(cls, value: Scalar) -> Number:
         """Round any real scalar to a double; nothing is claimed about the error."""
         return cls(value=float(value))
 
     @classmethod
-    def enclosed(cls, value: Any, lo: Any, hi: Any, level: Level) -> Number:
+    def enclosed(cls, value: Scalar, lo: Scalar, hi: Scalar, level: Level) -> Number:
         """Round a rational or decimal to the nearest double and its ends outward.
 
         What was ``exact`` remains so where the double is the number, and is ``verified`` elsewhere.
@@ -126,7 +131,7 @@ class Number:
         return {"value": self.value, "lo": self.lo, "hi": self.hi, "level": self.level}
 
 
-def exact(value: Any) -> Fraction:
+def exact(value: Numeric) -> Fraction:
     """Read a number exactly as it was written.
 
     Parameters
@@ -199,74 +204,3 @@ def rounded(value: Decimal | None, ends: Sequence[Decimal | None], level: Level)
 def decimal(value: Fraction) -> Decimal:
     """A rational in the current decimal precision."""
     return Decimal(value.numerator) / Decimal(value.denominator)
-
-
-def sqrt(x: Any) -> Any:
-    """The square root in the arithmetic of its argument.
-
-    float, int, Decimal, a Fraction that is a square, and anything with a rational power (sympy, mpmath).
-
-    Raises
-    ------
-    ValueError
-        A negative number, or a Fraction whose root is irrational (a float would hide that).
-
-    Examples
-    --------
-    >>> sqrt(2.25), sqrt(Fraction(9, 4)), sqrt(Decimal("2.25"))
-    (1.5, Fraction(3, 2), Decimal('1.5'))
-    """
-    if isinstance(x, (int, float, Decimal, Fraction)) and x < 0:
-        raise ValueError(f"sqrt({x}): a number >= 0 is needed")
-    if isinstance(x, Decimal):
-        return x.sqrt()
-    if isinstance(x, Fraction):
-        root = Fraction(math.isqrt(x.numerator), math.isqrt(x.denominator))
-        if root * root != x:
-            raise ValueError(f"sqrt({x}) is irrational")
-        return root
-    if isinstance(x, (int, float)):
-        return math.sqrt(x)
-    if hasattr(x, "is_Rational"):  # a sympy expression: 0.5 would turn it into a float
-        return x ** Fraction(1, 2)
-    return x**0.5
-
-
-def where(condition: Any, a: Any, b: Any) -> Any:
-    """``a`` where a condition holds, else ``b``: the branch of a formula, beside :func:`sqrt`.
-
-    A formula takes no ``if`` on a scalar, so that it serves scalars whose comparisons are not decided at once.  Such a
-    comparison returns an object with a method ``where(a, b)``: that of a scalar that records its operations records
-    the choice, that of an interval or ball the hull of both branches.  Conditions are joined by ``&``.
-
-    Parameters
-    ----------
-    condition : bool, or an object with a method ``where(a, b)``
-        Any other (numpy, sympy) is asked for its truth.
-    a, b : scalar, or a function without arguments that returns one
-        A function is called where its branch is taken: it may divide by what vanishes in the other one.
-
-    Examples
-    --------
-    >>> where(2 > 1, 5, lambda: 1 / 0)
-    5
-    """
-    if condition is not True and condition is not False and hasattr(condition, "where"):
-        return condition.where(*(branch() if callable(branch) else branch for branch in (a, b)))
-    branch = a if condition else b
-    return branch() if callable(branch) else branch
-
-
-def minimum(a: Any, b: Any) -> Any:
-    """The smaller of two scalars."""
-    return where(b < a, b, a)
-
-
-def maximum(a: Any, b: Any) -> Any:
-    """The larger of two scalars."""
-    return where(b > a, b, a)
-
-
-def absolute(x: Any) -> Any:
-    """The modulus of a scalar."""
-    return where(x < 0, -x, x)

@@ -21,9 +21,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 from ndtheory.errors import HypothesisError
+from ndtheory.scalar import Scalar
 
 #: Steps in which slopes and zones are sought, in thicknesses, from coarse to fine.
 STEPS = [Fraction(1, 2**j) for j in (1, 2, 3, 4, 5, 6)]
@@ -44,21 +44,21 @@ class Zone:
         Slopes, left < right.
     """
 
-    lo: Any
-    hi: Any
-    left: Any
-    right: Any
+    lo: Scalar
+    hi: Scalar
+    left: Scalar
+    right: Scalar
 
     def in_doubles(self) -> Zone:
         """The same in doubles, in which the search goes on."""
         return Zone(lo=float(self.lo), hi=float(self.hi), left=float(self.left), right=float(self.right))
 
-    def inside(self, length: Any) -> bool:
+    def inside(self, length: Scalar) -> bool:
         """Whether all segments lie in a body of that length."""
         return bool(self.left < self.right and self.lo + min(self.left, 0) >= 0 and self.hi + self.right <= length)
 
 
-def meeting(s: Any, t: Any, kappa: Any) -> Any:
+def meeting(s: Scalar, t: Scalar, kappa: Scalar) -> Scalar:
     """What two segments of slopes s and t have in common: ``G C^-1 (s,1)(s,1) : (t,1)(t,1)``.
 
     Examples
@@ -69,7 +69,7 @@ def meeting(s: Any, t: Any, kappa: Any) -> Any:
     return ((1 + s * t) ** 2 - (3 - kappa) * (1 + s * s) * (1 + t * t) / 4) / 2
 
 
-def bound(zones: Sequence[Zone], kappa: Any) -> Any:
+def bound(zones: Sequence[Zone], kappa: Scalar) -> Scalar:
     """An upper bound of ``G |v_T|^2 / (d a(v))``, the norm over the zones.
 
     Exact where zones and kappa are rational; the search for zones calls it with doubles.
@@ -90,10 +90,10 @@ def bound(zones: Sequence[Zone], kappa: Any) -> Any:
     return max(_largest_sum(zone, zones, kappa) for zone in zones)
 
 
-def _largest_sum(zone: Zone, zones: Sequence[Zone], kappa: Any) -> Any:
+def _largest_sum(zone: Zone, zones: Sequence[Zone], kappa: Scalar) -> Scalar:
     """The largest integral of the kernel's modulus over the second variable, the first one in a zone."""
-    alone: Any = 0
-    crossings: list[tuple[Any, Any, Zone]] = []
+    alone: Scalar = 0
+    crossings: list[tuple[Scalar, Scalar, Zone]] = []
     breaks = {zone.lo, zone.hi}
     for s in (zone.left, zone.right):
         for other in zones:
@@ -108,7 +108,7 @@ def _largest_sum(zone: Zone, zones: Sequence[Zone], kappa: Any) -> Any:
                     x for x in (other.lo - s + t, other.hi - s + t, other.lo, other.hi) if zone.lo < x < zone.hi
                 )
 
-    def integral(x: Any) -> Any:
+    def integral(x: Scalar) -> Scalar:
         total = alone
         for weight, drift, other in crossings:
             first, last = sorted(((other.lo - x) / drift, (other.hi - x) / drift))

@@ -18,10 +18,10 @@ from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
 from itertools import pairwise
-from typing import Any
 
 from ndtheory.intervals import Interval, sinc
 from ndtheory.moduli import Moduli
+from ndtheory.scalar import Scalar
 
 #: Wave numbers from one to another, or to infinity.
 Part = tuple[Fraction, Fraction | None]
@@ -40,7 +40,9 @@ class Unproved(ArithmeticError):
     """A search among intervals came to its end without an answer."""
 
 
-def symbols(kappa: Any, sinh_double: Any, square: Any, x: Any, x_square: Any) -> tuple[Any, Any, Any]:
+def symbols(
+    kappa: Scalar, sinh_double: Scalar, square: Scalar, x: Scalar, x_square: Scalar
+) -> tuple[Scalar, Scalar, Scalar]:
     """TT, NN and NT of the strip, over ``G xi``; any common factor of the last four arguments cancels.
 
     Parameters

@@ -30,6 +30,7 @@ from ndtheory.constants import take
 from ndtheory.errors import HypothesisError
 from ndtheory.intervals import DIGITS, Interval, sinc
 from ndtheory.moduli import Moduli, half_planes
+from ndtheory.number import Numeric
 
 _CUT = Decimal("3.141592653589793238462643383279502884197")
 PI = Interval(_CUT, _CUT.next_plus(Context(DIGITS)))
@@ -71,7 +72,7 @@ class Wedge:
         if not self.body.kappa > 1:
             raise HypothesisError("nu", self.body.poisson, "a compressible body, kappa > 1")
 
-    def symbol(self, xi: Any) -> tuple[Interval, Interval, Interval, Interval]:
+    def symbol(self, xi: Numeric) -> tuple[Interval, Interval, Interval, Interval]:
         """S_11, S_22 and the real and the imaginary part of S_12, enclosed; unit stress.
 
         Parameters
@@ -109,7 +110,7 @@ def _angle(degrees: Fraction) -> tuple[Interval, Interval, Interval]:
     return PI * (degrees / 180), 2 * sine * cosine, 1 - 2 * sine.square()
 
 
-def ratio(contact: Wedge, neumann: Wedge, xi: Any, *, normal: bool = False) -> Interval:
+def ratio(contact: Wedge, neumann: Wedge, xi: Numeric, *, normal: bool = False) -> Interval:
     """The largest ratio of both symbols at one xi, contact body over Neumann body, enclosed; it bounds rho from below.
 
     Parameters

@@ -26,7 +26,7 @@ FLOORS: dict[str, dict[str, str]] = {
         ),
         "ndtheory": (
             "__init__ bounds constants continuum energy energy_bounds energy_norms errors intervals moduli "
-            "number segments statements strip texts wedges"
+            "number scalar segments statements strip texts wedges"
         ),
     },
     "elastic bodies": {

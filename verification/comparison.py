@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, ClassVar, TypeVar
 
 from ndtheory import EDITIONS
+from ndtheory.number import Numeric
 from verification.algorithm.iterate import Iterate
 from verification.algorithm.rates import StepRatio, largest_step_ratio
 from verification.algorithm.reference import Reference, by_cvxpy_alone
@@ -175,7 +176,7 @@ class Comparison(Document):
 def compare(
     problem: Problem | ContactPair | Path | str,
     *,
-    theta: Any = None,
+    theta: Numeric | None = None,
     solver: Solver = "auto",
     exact: bool = False,
     verified: bool = False,

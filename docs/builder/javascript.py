@@ -66,7 +66,7 @@ class Scalar:
 
 
 class Condition(Scalar):
-    """The truth of a comparison, for :func:`ndtheory.number.where`."""
+    """The truth of a comparison, for :func:`ndtheory.scalar.where`."""
 
     def where(self, a: Any, b: Any) -> Any:
         return self._new(f"{self.text} ? {text(a)} : {text(b)}", Condition if _is_condition(a) else None)

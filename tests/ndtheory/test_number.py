@@ -15,7 +15,8 @@ from mpmath import mp, mpf
 from processes import ended
 
 from ndtheory import Number, exact
-from ndtheory.number import decimal, sqrt, working_precision
+from ndtheory.number import decimal, working_precision
+from ndtheory.scalar import sqrt
 
 ROOT = Path(__file__).parents[2]
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from mpmath import iv, mp, mpf
 
 from ndtheory import EDITIONS, bounds, energy_norms
-from ndtheory.number import absolute, maximum, minimum, sqrt, where
+from ndtheory.scalar import absolute, maximum, minimum, sqrt, where
 
 #: What is no formula: they read constants, or answer None where there is no interval.
 NO_FORMULAS = {"evaluate", "evaluate_energy", "contraction_interval", "best_theta"}

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import Any
 
 from ndtheory import Number
 from ndtheory.constants import take
 from ndtheory.energy import LARGEST, SMALLEST
 from ndtheory.energy_norms import predicted_rate, predicted_theta
+from ndtheory.number import Numeric
 from verification.advice.next_run import Made, anew, pasted_or_not
 from verification.advice.readings import (
     LARGEST_TO_PASTE,
@@ -27,7 +27,7 @@ from verification.advice.runs_with_friction import friction_bounds, next_with_fr
 from verification.interface.pair import UNITS
 
 
-def advise_run(theta: Any, ratio: Any, *, tied: bool = False, friction: bool = False) -> Advice:
+def advise_run(theta: Numeric, ratio: Numeric, *, tied: bool = False, friction: bool = False) -> Advice:
     """Advice from one run of any code with constant theta: what it says of rho, and the run to make next.
 
     While contact does not change, a mode is multiplied by ``1 - theta (1 + lambda)`` in a step, with lambda at most

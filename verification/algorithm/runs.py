@@ -10,9 +10,11 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from fem1d2d.mesh import Floats
 from ndtheory import Number
+from ndtheory.number import Numeric
 from verification.algorithm.ending import NO_FORCE, Ending, Outcome, arrived, coupled_residual
 from verification.algorithm.fixed_point import FixedPointMap, iterate_at, iterates
 from verification.algorithm.iterate import Iterate
@@ -363,9 +365,9 @@ def check_memory(pair: ContactPair) -> None:
 def run(
     problem: Problem | ContactPair | Path | str,
     *,
-    theta: Any = None,
+    theta: Numeric | None = None,
     rule: Rule | str | None = None,
-    start: Any = None,
+    start: ArrayLike | None = None,
     solver: Solver = "auto",
     watch: Callable[[Iterate], None] = lambda iterate: None,
     measured: Measured | None = None,

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.linalg import solve
 
 from fem1d2d.mesh import Floats
+from ndtheory.number import Numeric
 from verification.algorithm.fixed_point import FixedPointMap, iterates
 from verification.algorithm.iterate import Iterate
 from verification.algorithm.relaxation import Rule
@@ -50,10 +52,10 @@ class Start(Value):
 def iterate(
     problem: Problem | ContactPair,
     *,
-    theta: Any = None,
+    theta: Numeric | None = None,
     rule: Rule | str | None = None,
     solver: Solver = "auto",
-    start: Any = None,
+    start: ArrayLike | None = None,
 ) -> Iterator[Iterate]:
     """Run the algorithm without end; the caller decides when to stop.
 
@@ -94,7 +96,7 @@ def iterate(
     return iterates(T, step, begun.g, begun.scale)
 
 
-def begin_at(T: FixedPointMap, given: Any = None) -> Start:
+def begin_at(T: FixedPointMap, given: ArrayLike | None = None) -> Start:
     """g_0 of a run: the given one, else 0; the tied solution where step II has no minimiser at g = 0.
 
     Where only contact holds the contact body, friction has to resist tangential loads, and at g = 0 the bound
@@ -133,7 +135,7 @@ def begin_at(T: FixedPointMap, given: Any = None) -> Start:
     return Start(g=zero)
 
 
-def forces(given: Any, pair: ContactPair, source: str = "") -> Floats:
+def forces(given: ArrayLike, pair: ContactPair, source: str = "") -> Floats:
     """A given g_0 as an array, shape (2 n,).
 
     Parameters

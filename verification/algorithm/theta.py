@@ -10,6 +10,7 @@ from typing import Any
 
 from ndtheory import EnergyBounds, evaluate_energy, exact
 from ndtheory.energy_norms import predicted_factor, predicted_theta
+from ndtheory.number import Numeric
 from verification.algorithm.relaxation import Rule, Step, rule_of
 from verification.constants import Measured, measure
 from verification.interface.pair import ContactPair
@@ -23,7 +24,7 @@ CLOSEST_TO_ONE = 1 - 1e-6
 TOO_SLOW = 2
 
 
-def energy_bounds(measured: Measured, theta: Any = None) -> EnergyBounds | None:
+def energy_bounds(measured: Measured, theta: Numeric | None = None) -> EnergyBounds | None:
     """The theorem in energy norms for measured constants; None where they do not exist."""
     constants = measured.energy_constants()
     return None if constants is None else evaluate_energy(constants, theta)
@@ -63,7 +64,7 @@ class Choice:
 
 
 def choose(
-    pair: ContactPair, theta: Any = None, measured: Measured | None = None, *, rule: Rule | str | None = None
+    pair: ContactPair, theta: Numeric | None = None, measured: Measured | None = None, *, rule: Rule | str | None = None
 ) -> Choice:
     """The theta of a run: the given one, else the problem's; for "auto" that of :func:`automatic`.
 
@@ -116,7 +117,7 @@ def choose(
 
 
 def begin(
-    pair: ContactPair, theta: Any = None, rule: Rule | str | None = None, measured: Measured | None = None
+    pair: ContactPair, theta: Numeric | None = None, rule: Rule | str | None = None, measured: Measured | None = None
 ) -> tuple[Rule, Choice, Step]:
     """The rule and the theta of a run, as :func:`choose` has them, and what the rule does in it.
 

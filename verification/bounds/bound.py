@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ndtheory import Constants, EnergyConstants, Number
-from ndtheory.number import Level
+from ndtheory.number import Level, Numeric
 from verification.progress import Progress, silent
 
 if TYPE_CHECKING:
@@ -223,7 +223,7 @@ class Bound(ABC):
     attained: ClassVar[bool] = False
 
     @abstractmethod
-    def evaluate(self, subject: Subject, theta: Any = None, *, progress: Progress = silent) -> BoundResult:
+    def evaluate(self, subject: Subject, theta: Numeric | None = None, *, progress: Progress = silent) -> BoundResult:
         """Evaluate the bound at one theta.
 
         Parameters
@@ -258,10 +258,12 @@ class Bound(ABC):
         return BoundResult(name=self.name, proved=False, not_computed=why)
 
 
-def why_not(interval: tuple[float, float] | None, threshold: Number | None, friction: float, theta: Any) -> str:
+def why_not(
+    interval: tuple[float, float] | None, threshold: Number | None, friction: float, theta: float | None
+) -> str:
     """Why a bound draws no conclusion at a theta."""
-    if interval is not None:
-        return f"theta = {float(theta):g} is outside ({interval[0]:.2g}, {interval[1]:.2g})"
+    if interval is not None and theta is not None:
+        return f"theta = {theta:g} is outside ({interval[0]:.2g}, {interval[1]:.2g})"
     scale = threshold.value if threshold is not None else float("inf")
     return f"friction {friction:g} is not below {scale:.2g}"
 

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from ndtheory import evaluate_energy
-from ndtheory.number import weakest
+from ndtheory.number import Numeric, weakest
 from verification.bounds.bound import Bound, BoundResult, Subject, Thresholds, why_not
 from verification.progress import Progress, silent
 
@@ -17,7 +15,7 @@ class Energy(Bound):
     colour, dashes, fill, hatch = "#00724F", (0, (7, 2)), "#8FD3B6", ".."
     attained = True  # without friction
 
-    def evaluate(self, subject: Subject, theta: Any = None, *, progress: Progress = silent) -> BoundResult:
+    def evaluate(self, subject: Subject, theta: Numeric | None = None, *, progress: Progress = silent) -> BoundResult:
         if subject.energy is None:
             return self.absent(subject.why_energy)
         found = evaluate_energy(subject.energy, theta)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from ndtheory import PRINTED, REPAIRED, evaluate
 from ndtheory.bounds import Edition
-from ndtheory.number import weakest
+from ndtheory.number import Numeric, weakest
 from verification.bounds.bound import Bound, BoundResult, Subject, Thresholds, why_not
 from verification.progress import Progress, silent
 
@@ -21,7 +19,7 @@ class Section5(Bound):
 
     edition: Edition
 
-    def evaluate(self, subject: Subject, theta: Any = None, *, progress: Progress = silent) -> BoundResult:
+    def evaluate(self, subject: Subject, theta: Numeric | None = None, *, progress: Progress = silent) -> BoundResult:
         if subject.constants is None:
             return self.absent(subject.why)
         found = evaluate(self.edition, subject.constants, theta)

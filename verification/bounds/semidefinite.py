@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import Any
 
 from ndtheory import Number
 from ndtheory.constants import relaxation_factor
-from ndtheory.number import below
+from ndtheory.number import Numeric, below
 from verification.bounds.bound import LARGEST, Bound, BoundResult, NotComputed, Region, Subject, Thresholds
 from verification.progress import Progress, silent
 
@@ -31,7 +30,7 @@ class SemidefiniteBound(Bound):
     calculated = False
     attained = True  # without friction
 
-    def evaluate(self, subject: Subject, theta: Any = None, *, progress: Progress = silent) -> BoundResult:
+    def evaluate(self, subject: Subject, theta: Numeric | None = None, *, progress: Progress = silent) -> BoundResult:
         if theta is None or subject.pair is None or subject.measured is None:
             return self.absent("needed a pair of bodies and a theta")
         if subject.pair.contact.grid.n > LARGEST:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, ClassVar, Literal, get_args
 
+from ndtheory.number import Numeric
 from verification.algorithm.theta import choose
 from verification.bounds.bound import Subject
 from verification.bounds.exact import enclose
@@ -130,7 +131,7 @@ class Certificate(Document):
 
 
 def certify(
-    problem: Problem, *, theta: Any = None, edition: Edition = "lmi", progress: Progress = silent
+    problem: Problem, *, theta: Numeric | None = None, edition: Edition = "lmi", progress: Progress = silent
 ) -> Certificate:
     """Prove that one step contracts on the meshes of a problem, for its rational data.
 

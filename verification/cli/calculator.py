@@ -117,7 +117,7 @@ def _constants(given: Mapping[str, str | None]) -> Constants:
         if given[key] is None:
             needed = "needed --m, --M, --CR and --CK, or --rho"
             raise click.UsageError(f"{CONSTANTS[key]} is missing: {needed}", click.get_current_context())
-    return Constants(**given)
+    return Constants(**{key: value for key, value in given.items() if value is not None})
 
 
 def _energy(given: Mapping[str, str | None], rubs: bool) -> EnergyConstants | None:

@@ -165,7 +165,12 @@ def advise(
 
             of_logs = zip(logs, thetas, strict=True)
             assumed = {"tied": tied, "friction": friction}
-            found = advise_logs(of_logs, **assumed) if logs else advise_run(theta, ratio, **assumed)
+            if logs:
+                found = advise_logs(of_logs, **assumed)
+            else:
+                assert theta is not None
+                assert ratio is not None
+                found = advise_run(theta, ratio, **assumed)
         except HypothesisError as error:
             raise click.UsageError(f"--{error}", context) from None
     typed = None if file is None else Typed(file=file, keys=keys)

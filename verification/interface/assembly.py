@@ -46,14 +46,14 @@ def held_bodies(problem: Problem, *, law: Law | None = None, dense: bool = True)
     ----------
     problem : Problem
     law : Law, optional
-        As for :func:`build`.
+        As for :func:`verification.interface.pair.build`.
     dense : bool
         As for :func:`discretise`.
 
     Raises
     ------
     ProblemError
-        As :func:`build`.
+        As :func:`verification.interface.pair.build`.
     """
     iteration = problem.iteration
     for name in ("body1", "body2"):

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
 from fem1d2d import trapezoid
 from fem1d2d.mesh import Floats
+from ndtheory.number import Numeric
 from verification.interface import pair as pairs
 from verification.interface.body import NO_MOTIONS, Condensed
 from verification.interface.files import read_interface
@@ -33,7 +34,7 @@ def build(
     gap: Floats | float = 0.0,
     kernel: Floats | None = None,
     transfer: Floats | None = None,
-    friction: Any = 0,
+    friction: Numeric = 0,
     neumann_body: Literal[1, 2] = 2,
 ) -> ContactPair:
     """A contact pair from a problem, or from the interface matrices of any code.

@@ -11,6 +11,7 @@ import numpy as np
 
 from fem1d2d.mesh import Floats
 from ndtheory.constants import take
+from ndtheory.number import Numeric
 from verification.dense import reciprocal_condition
 from verification.interface.assembly import held_bodies
 from verification.interface.body import Body, Condensed
@@ -100,7 +101,7 @@ class ContactPair(Value):
         """Turn interface vectors of the contact grid between y and n of the contact body (its own inverse)."""
         return self.contact.orient(interface)
 
-    def at(self, *, friction: Any) -> ContactPair:
+    def at(self, *, friction: Numeric) -> ContactPair:
         """The same bodies at another friction; what is condensed is shared.
 
         Raises

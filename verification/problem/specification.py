@@ -9,6 +9,7 @@ from decimal import Decimal
 from fractions import Fraction
 from typing import Any, Literal
 
+from ndtheory.number import Numeric
 from verification.problem.changes import Key, given, typed, with_values
 from verification.problem.reading import read_problem
 from verification.problem.specs import MOST_CELLS, BodySpec, ProblemSpec, read_theta
@@ -163,7 +164,7 @@ class Problem(ProblemSpec):
     def _with(self, values: Iterable[tuple[Key, Any]]) -> Problem:
         return Problem(**vars(with_values(self, values, vocabulary())))
 
-    def with_theta(self, theta: Any) -> Problem:
+    def with_theta(self, theta: Numeric) -> Problem:
         """The same problem at another theta.
 
         Raises

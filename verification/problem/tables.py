@@ -48,7 +48,7 @@ class ProblemError(ValueError):
         What was needed, stated positively.
     """
 
-    def __init__(self, file: str, key: str, value: Any, needed: str) -> None:
+    def __init__(self, file: str, key: str, value: object, needed: str) -> None:
         received = "" if value is None else f" = {show(value)}"
         where = file if len(file) <= LONGEST_PATH else "..." + file[3 - LONGEST_PATH :]  # its end names the file
         message = ": ".join(part for part in (where, f"{short(key)}{received}", short(needed, 400)) if part)
@@ -92,7 +92,7 @@ def unreadable(path: Path, most: int) -> str | None:
     return None
 
 
-def show(value: Any) -> str:
+def show(value: object) -> str:
     """A value on one short line, as a problem file writes it."""
     if isinstance(value, bool):
         text = str(value).lower()
