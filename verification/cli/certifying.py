@@ -12,7 +12,6 @@ from verification.cli.console import deliver, heading, near_one, note, say, stag
 from verification.cli.failing import fail
 from verification.cli.problems import JSON, SET, SWAP, THETA, load_problem
 from verification.cli.typed import Typed
-from verification.output.files import check_ours, writing
 
 if TYPE_CHECKING:
     from verification.certificate.contraction import Certificate, Checked
@@ -91,6 +90,7 @@ def certify(
     assert file is not None
     from verification.certificate.claims import NoCertificate
     from verification.certificate.contraction import certify as prove
+    from verification.output.files import writing
 
     problem = load_problem(file, keys, theta=theta, swap=swap)
     try:
@@ -106,6 +106,7 @@ def certify(
 
 def _check_target(target: Path, context: click.Context) -> None:
     """Refuse a name under which nothing can be written."""
+    from verification.output.files import check_ours
     from verification.problem.tables import ProblemError
 
     if target.suffix != ".json":

@@ -11,7 +11,6 @@ from verification.cli.console import deliver, figures, heading, note, say, stage
 from verification.cli.failing import fail
 from verification.cli.problems import load_problem
 from verification.cli.typed import Typed
-from verification.output.files import writing
 
 if TYPE_CHECKING:
     from verification.certificate.continuum import ContinuumCertificate
@@ -23,6 +22,7 @@ def prove(
     """Bound the continuous problem of a file and show what follows; 1 where contraction is not proved."""
     from ndtheory.strip import Unproved
     from verification.certificate.continuum import certify_continuum
+    from verification.output.files import writing
 
     problem = load_problem(file, keys, theta=theta, swap=swap)
     try:

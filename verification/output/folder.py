@@ -5,21 +5,22 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ndtheory import __version__
-from verification import figures
 from verification.algorithm.runs import Run
-from verification.comparison import Comparison
 from verification.interface.files import write_interface, write_transfer
 from verification.interrupts import undisturbed
-from verification.ledger import Ledger, sheets
-from verification.monolithic import Solution
+from verification.ledger import sheets
 from verification.output.files import FILES, MARKS, MOST_BYTES, Kind, check_ours, check_place, staged
-from verification.output.report import report
 from verification.problem.tables import ProblemError, unreadable
-from verification.reproduce import Reproduction
 from verification.spreadsheet import as_csv
+
+if TYPE_CHECKING:
+    from verification.comparison import Comparison
+    from verification.ledger import Ledger
+    from verification.monolithic import Solution
+    from verification.reproduce import Reproduction
 
 
 class Folder:
@@ -82,6 +83,8 @@ class Folder:
 
     def write_comparison(self, comparison: Comparison) -> None:
         """Write ``compare.json``, the tables, the interface, the problem, the figures and ``report.html``."""
+        from verification.output.report import report
+
         with staged(self.path, FILES["compare"]) as room:
             _text(room / "compare.json", comparison.to_json())
             self._tables(room, comparison.run)
@@ -107,6 +110,8 @@ class Folder:
 
     def write_reproduction(self, found: Reproduction) -> None:
         """Write ``reproduce.json``, the rows behind each figure and the figures."""
+        from verification import figures
+
         with staged(self.path, FILES["reproduce"]) as room:
             _text(room / "reproduce.json", found.to_json())
             for result in found.results:
@@ -146,6 +151,8 @@ def _csv(path: Path, says: str, table: Mapping[str, Sequence[Any]]) -> None:
 
 def _pictures(room: Path, result: Run | Solution, comparison: Comparison | None = None) -> list[str]:
     """Draw all there is to draw; returns the names of the figures."""
+    from verification import figures
+
     drawn = {"bodies": figures.draw_bodies(result)}
     if isinstance(result, Run):
         drawn["residuals"] = figures.draw_residuals(result, [] if comparison is None else comparison.computed)

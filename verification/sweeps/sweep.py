@@ -17,7 +17,6 @@ from verification.problem.files import load
 from verification.problem.specification import Problem
 from verification.progress import Progress, silent
 from verification.spreadsheet import as_csv
-from verification.sweeps.cluster import on_cluster
 from verification.sweeps.grid import SweepGrid
 from verification.sweeps.keeping import Kept
 from verification.sweeps.row import FAILED, Row
@@ -127,6 +126,8 @@ class Sweep(Document):
 def work_of(jobs: int, dask: str | None = None) -> Work:
     """Who makes rows: the workers of a dask scheduler, this process for one job, else processes of this machine."""
     if dask is not None:
+        from verification.sweeps.cluster import on_cluster
+
         return on_cluster(dask)
     return alone if jobs == 1 else together(jobs)
 
