@@ -20,7 +20,7 @@ from timing import peak, timed
 import verification as vf
 from fem1d2d import Condensation
 from verification.interface import body
-from verification.interface.assembly import build
+from verification.interface.pair import build
 
 #: Cells of the benchmark problem are scaled by these: 4,860 to 99,280 unknowns, and with --full to 1,001,000.
 FACTORS, MORE = (1.0, 2.0, 3.0, 4.56), (7.0, 10.0, 14.43)

@@ -22,8 +22,7 @@ from timing import in_turn, timed
 
 import verification as vf
 from verification.algorithm.fixed_point import FixedPointMap
-from verification.interface.assembly import build
-from verification.interface.pair import ContactPair
+from verification.interface.pair import ContactPair, build
 
 #: Interface nodes; more with --full.
 SIZES, MORE = (61, 121, 241, 481), (961,)

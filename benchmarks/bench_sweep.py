@@ -29,8 +29,7 @@ from verification.sweeps.identity import LENGTH, Identity
 from verification.sweeps.keeping import Kept
 from verification.sweeps.row import row
 from verification.sweeps.store import Store
-from verification.sweeps.sweep import sweep_grid
-from verification.sweeps.workers import work_of
+from verification.sweeps.sweep import sweep_grid, work_of
 
 #: Rows of a sweep on the mesh of 190 nodes along both bodies; more with --full.
 ROWS, MORE = (1_000,), (10_000,)

@@ -12,7 +12,8 @@ from typing import Any
 
 from ndtheory.statements import statements
 from ndtheory.symbolic.engine import Check, Decision
-from verification.ledger import Evidence, rows
+from verification.ledger import Evidence
+from verification.ledger.sources import SOURCES
 
 DECIDE = Check.decide
 
@@ -60,4 +61,4 @@ def deciding_once(shared: Shared) -> Callable[[Check, Any], Decision]:
 def gathered(source: str) -> tuple[dict[str, list[Evidence]], list[float]]:
     """What a source of the ledger finds of all statements, and the shares of its work that it told."""
     told: list[float] = []
-    return dict(rows.sources()[source](list(statements()), "quick", told.append)), told
+    return dict(SOURCES[source](list(statements()), "quick", told.append)), told

@@ -35,15 +35,16 @@ if TYPE_CHECKING:
     from verification.algorithm.start import iterate
     from verification.certificate.contraction import certify, check_again
     from verification.comparison import Comparison, compare
-    from verification.constants import Measured, measure
+    from verification.constants.measured import Measured
+    from verification.constants.measuring import measure
     from verification.contact import ContactError
     from verification.interface.build import build
-    from verification.interface.friction import Law
+    from verification.interface.interface import Law
     from verification.interface.pair import ContactPair
     from verification.ledger import Ledger, verify
     from verification.monolithic import Solution, SolveError, solve
     from verification.problem.examples import example
-    from verification.problem.reading import load
+    from verification.problem.files import load
     from verification.problem.specification import Problem
     from verification.problem.tables import ProblemError
     from verification.sweeps.sweep import Sweep, sweep
@@ -54,9 +55,9 @@ _HOME = {
     "Comparison": "comparison",
     "ContactError": "contact",
     "ContactPair": "interface.pair",
-    "Law": "interface.friction",
+    "Law": "interface.interface",
     "Ledger": "ledger",
-    "Measured": "constants",
+    "Measured": "constants.measured",
     "Problem": "problem.specification",
     "ProblemError": "problem.tables",
     "Rule": "algorithm.relaxation",
@@ -76,8 +77,8 @@ _HOME = {
     "compare": "comparison",
     "example": "problem.examples",
     "iterate": "algorithm.start",
-    "load": "problem.reading",
-    "measure": "constants",
+    "load": "problem.files",
+    "measure": "constants.measuring",
     "run": "algorithm.runs",
     "solve": "monolithic",
     "sweep": "sweeps.sweep",

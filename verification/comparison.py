@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 from ndtheory import EDITIONS
 from ndtheory.number import Numeric
@@ -27,9 +27,6 @@ from verification.interrupts import INTERRUPTED
 from verification.problem import Problem
 from verification.progress import Progress, silent
 from verification.verdicts import Judgement, judge_bound, judge_forecast
-
-if TYPE_CHECKING:
-    from verification.figures import Figure
 
 #: The bounds whose violation is a bug or an error in a proof.
 NO_FINDING = tuple(bound.name for bound in BOUNDS.values() if not bound.finding)
@@ -108,12 +105,6 @@ class Comparison(Document):
     def summary(self) -> str:
         verdicts = ", ".join(f"{name} {judgement.verdict}" for name, judgement in self.verdicts.items())
         return f"{self.run.pair.title}, {self.run.outcome}; {verdicts}"
-
-    def plot(self) -> Figure:
-        """The residuals beside what each bound proves of them."""
-        from verification.figures import draw_residuals
-
-        return draw_residuals(self.run, self.computed)
 
     def tell(self, listener: Listener) -> None:
         """Tell each part, as it was told when it was worked out."""

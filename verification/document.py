@@ -1,4 +1,7 @@
-"""Results as JSON documents, as one line, as notebook views and as figures."""
+"""Results as JSON documents, as one line, as sections and as figures.
+
+What shows a result is imported by name, here alone: it knows the types of results, which do not know it.
+"""
 
 from __future__ import annotations
 
@@ -10,17 +13,14 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ndtheory import __version__
+from verification.sections.layout import text
+from verification.sections.parts import Section
 from verification.value import Value
 
 if TYPE_CHECKING:
-    from verification.figures import Figure
+    from matplotlib.figure import Figure as Figure
+
     from verification.problem import Problem
-    from verification.sections.parts import Section
-
-
-def _above(module: str, name: str) -> Any:
-    """What stands on a floor above, by name: results are shown there, and know nothing of it."""
-    return getattr(importlib.import_module(f"verification.{module}"), name)
 
 
 class Document(Value, ABC):
@@ -63,13 +63,12 @@ class Document(Value, ABC):
             Titles, sentences, tables whose cells are words or numbers with unit and level.  A part that belongs to one
             place says so in ``only``.  Empty where nothing is shown but the document, as of matrices without a problem.
         """
-        found: tuple[Section, ...] = _above("sections.of_results", "of")(self)
+        found: tuple[Section, ...] = importlib.import_module("verification.sections.of_results").of(self)
         return found
 
     def _repr_html_(self) -> str:
         """Notebook view: its sections, or the document where there are none."""
-        shown = _above("sections.layout", "text")(self.sections())
-        return f"<pre>{html.escape(shown or self.to_json())}</pre>"
+        return f"<pre>{html.escape(text(self.sections()) or self.to_json())}</pre>"
 
     def plot(self) -> Figure:
         """The main figure of the result.
@@ -83,4 +82,9 @@ class Document(Value, ABC):
         ValueError
             There is nothing to draw.
         """
-        raise ValueError(f"a {type(self).__name__} has no figure")
+        return self.drawn()
+
+    def drawn(self, **options: Any) -> Figure:
+        """The main figure, with the options that the figure of this type takes."""
+        figure: Figure = importlib.import_module("verification.figures.of_results").draw(self, **options)
+        return figure

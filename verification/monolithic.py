@@ -19,7 +19,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -30,12 +30,10 @@ from verification.interface.assembly import discretise
 from verification.interface.body import Body
 from verification.interface.checks import Checks, check_state
 from verification.interface.fields import ContactFields
-from verification.interface.pair import ContactPair, TwoBodies
+from verification.interface.pair import ContactPair
+from verification.interface.two_bodies import TwoBodies
 from verification.problem import Problem, load
 from verification.threads import one_thread
-
-if TYPE_CHECKING:
-    from verification.figures import Figure
 
 __all__ = ["ContactSystem", "Solution", "SolveError", "contact_system", "solution_force", "solve"]
 
@@ -79,12 +77,6 @@ class Solution(Document):
     @property
     def summary(self) -> str:
         return f"{self.problem.title}, {self.contact.summary}, KKT residual {self.kkt_residual:.1e}"
-
-    def plot(self) -> Figure:
-        """The deformed bodies, and what happens along Gamma_c."""
-        from verification.figures import draw_bodies
-
-        return draw_bodies(self)
 
     @cached_property
     def displacements(self) -> tuple[Floats | None, Floats | None]:

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from advice_calls import GOOD, ROLE, by_body, saved
 
 import verification as vf
-from verification.interface.assembly import build
+from verification.interface.pair import build
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from advice_calls import GOOD, by_body, saved
 
 import verification as vf
 from verification.advice.matrix_files import read_matrix
-from verification.interface.assembly import build
+from verification.interface.pair import build
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from processes import SKETCHED, ended, on_a_terminal
 
 import verification as vf
 from verification import comparison
-from verification.bounds import semidefinite
+from verification.bounds import lipschitz
 from verification.cli import main
 from verification.contact import ContactError
 
@@ -33,7 +33,7 @@ MARKED = """
 
     sys.meta_path.insert(0, Imports())
     from verification import comparison
-    from verification.bounds import semidefinite
+    from verification.bounds import lipschitz
     from verification.cli import main
 
     def marked(module, name):
@@ -45,7 +45,7 @@ MARKED = """
 
         setattr(module, name, begun)
 
-    for module, name in ((comparison, "run"), (comparison, "locate"), (semidefinite, "work_out")):
+    for module, name in ((comparison, "run"), (comparison, "locate"), (lipschitz, "work_out")):
         marked(module, name)
     sys.exit(main())
 """
@@ -86,7 +86,7 @@ def test_a_document_is_written_last_and_alone(write, capfd, monkeypatch):
 
         return begun
 
-    for module, name in ((comparison, "run"), (comparison, "locate"), (semidefinite, "work_out")):
+    for module, name in ((comparison, "run"), (comparison, "locate"), (lipschitz, "work_out")):
         monkeypatch.setattr(module, name, marked(name, getattr(module, name)))
     status = main(["compare", str(write()), "--json"])
     os.close(out)
@@ -163,7 +163,7 @@ def test_ctrl_c_after_the_first_tables_leaves_them_and_says_what_is_missing(call
 )
 @pytest.mark.parametrize(
     ("module", "name", "last"),
-    [(comparison, "run", "DOES ONE STEP CONTRACT?"), (semidefinite, "work_out", "WHAT DOES EACH ESTIMATE GIVE AWAY?")],
+    [(comparison, "run", "DOES ONE STEP CONTRACT?"), (lipschitz, "work_out", "WHAT DOES EACH ESTIMATE GIVE AWAY?")],
     ids=["run", "programs"],
 )
 def test_what_ends_a_comparison_leaves_the_tables_before_it(

@@ -285,9 +285,9 @@ def test_an_import_that_ctrl_c_breaks_is_no_bug(write, tmp_path, module):
 
 
 def test_constants_keep_the_meshes_that_were_measured(call, write, monkeypatch):
-    from verification.interface import assembly
+    from verification.interface import pair
 
-    build, built = assembly.build, []
+    build, built = pair.build, []
 
     def interrupt(problem, law=None):
         built.append(problem)
@@ -295,7 +295,7 @@ def test_constants_keep_the_meshes_that_were_measured(call, write, monkeypatch):
             signal.raise_signal(signal.SIGINT)
         return build(problem)
 
-    monkeypatch.setattr(assembly, "build", interrupt)
+    monkeypatch.setattr(pair, "build", interrupt)
     answer = call("constants", write(), "--refine", "4", "--json")
     assert answer.status == 130
     assert len(answer.document["levels"]) == 2

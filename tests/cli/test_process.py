@@ -12,7 +12,7 @@ import pytest
 from processes import COMMAND, PATIENCE, SKETCHED, ended, running
 from strategies import AT_NIGHT
 
-from verification.output.folder import FILES
+from verification.output.files import FILES
 
 PROJECT = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text("utf-8"))["project"]
 

@@ -6,8 +6,8 @@ from fractions import Fraction as F
 import pytest
 
 from ndtheory import Number
-from verification.certificate.exact_bodies import NotExact
-from verification.constants import ENERGY_NAMES, NAMES
+from verification.constants.measured import ENERGY_NAMES, NAMES
+from verification.interface.exact_bodies import NotExact
 from verification.sections.numbers import between
 
 

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from ndtheory import PRINTED, bounds
 from ndtheory.statements import statements
-from ndtheory.symbolic import checks, dimension, engine
+from ndtheory.symbolic import dimension, engine
+from ndtheory.symbolic.checks import checks
 from ndtheory.symbolic.engine import Goal, Relation, Vector, at_most, bilinear, decide, equal, functional, less, linear
 from ndtheory.symbolic.symbols import DIMENSIONS
 

@@ -17,7 +17,7 @@ from verification.algorithm.runs import Run, run
 from verification.constants import Measured, measure
 from verification.contact import ContactError, ContactSolution
 from verification.contact.active_set import Pattern
-from verification.interface.assembly import ContactPair, build
+from verification.interface.pair import ContactPair, build
 from verification.ledger.cases import problem, three_digits
 from verification.ledger.large_friction import loaded
 

@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.linalg import block_diag, eigh
 
-from verification.interface.assembly import ContactPair
+from verification.interface.pair import ContactPair
 
 
 def dense_stiffness(points: np.ndarray, cells: np.ndarray, young: float, poisson: float) -> np.ndarray:

@@ -15,7 +15,7 @@ from verification.algorithm.affine_piece import Piece, piece_of
 from verification.algorithm.fixed_point import FixedPointMap, iterate_at
 from verification.algorithm.iterate import Iterate
 from verification.contact import ContactError
-from verification.interface.assembly import ContactPair, build
+from verification.interface.pair import ContactPair, build
 
 seeds = st.integers(0, 2**32 - 1).map(np.random.default_rng)
 

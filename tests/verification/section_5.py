@@ -17,7 +17,7 @@ import verification as vf
 from ndtheory import REPAIRED, evaluate
 from verification.algorithm.fixed_point import FixedPointMap
 from verification.contact import ContactError
-from verification.interface.assembly import build
+from verification.interface.pair import build
 
 EPS = np.finfo(float).eps
 

@@ -10,7 +10,7 @@ from pieces import Evaluated
 from scipy.linalg import eigh
 
 from verification.algorithm.affine_piece import Piece, piece_of
-from verification.interface.assembly import ContactPair
+from verification.interface.pair import ContactPair
 
 
 def condensed(stiffness: np.ndarray, kept: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ from verification.advice.from_runs import advise_run
 from verification.advice.readings import same_run
 from verification.algorithm.fixed_point import FixedPointMap, iterates
 from verification.algorithm.relaxation import Constant
-from verification.interface.assembly import build
+from verification.interface.pair import build
 
 #: A residual fallen to this share of its largest has converged.
 FALLEN = 1e-6

@@ -15,7 +15,7 @@ from verification.advice.from_matrices import advise_matrices
 from verification.algorithm.relaxation import RULES, Constant
 from verification.algorithm.theta import automatic, choose, energy_bounds
 from verification.cli.problems import examples, load_problem
-from verification.interface.assembly import build
+from verification.interface.pair import build
 from verification.problem import ProblemError
 
 

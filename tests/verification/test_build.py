@@ -16,7 +16,8 @@ from verification.algorithm.theta import energy_bounds
 from verification.bounds.multipliers import QuadraticForms
 from verification.constants import measure
 from verification.interface.build import build
-from verification.interface.friction import Law, Nonlocal, hat
+from verification.interface.friction import Nonlocal, hat
+from verification.interface.interface import Law
 from verification.interface.pair import ContactPair
 
 

@@ -22,7 +22,7 @@ from verification.algorithm.rates import largest_step_ratio
 from verification.bounds.multipliers import QuadraticForms
 from verification.bounds.pattern_search import largest_factor
 from verification.constants import Measured
-from verification.interface.assembly import ContactPair
+from verification.interface.pair import ContactPair
 from verification.threads import one_thread
 
 #: Random problems, the same ones each time, and the batches that they are tried in: each costs a semidefinite program

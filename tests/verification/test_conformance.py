@@ -16,7 +16,8 @@ from verification.bounds.bound import Subject
 from verification.bounds.energy import Energy
 from verification.bounds.pattern_search import largest_factor
 from verification.bounds.table import BOUNDS
-from verification.interface.friction import LAWS, Law, Local, Nonlocal, hat
+from verification.interface.friction import LAWS, Local, Nonlocal, hat
+from verification.interface.interface import Law
 from verification.testing import (
     Refused,
     check_bound,

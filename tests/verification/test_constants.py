@@ -19,8 +19,8 @@ from scipy.linalg import eigh
 import verification as vf
 from fem1d2d import Condensation
 from ndtheory import PRINTED, REPAIRED, evaluate
-from verification.interface.assembly import build
 from verification.interface.body import Body
+from verification.interface.pair import build
 
 CONSTANTS = ("m", "M", "C_R", "C_s", "C_tr", "C_tr_half", "C_K", "rho_max", "rho_min", "rho_normal")
 

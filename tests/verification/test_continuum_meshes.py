@@ -16,7 +16,7 @@ from sticking import Sticking, condensed, fixed_point
 from strategies import AT_NIGHT
 
 import verification as vf
-from verification.interface.assembly import ContactPair, build
+from verification.interface.pair import ContactPair, build
 
 DRAWS = 300 if AT_NIGHT else 30
 

@@ -16,7 +16,7 @@ from scipy.linalg import eigh
 
 import verification as vf
 from verification.constants import Measured
-from verification.interface.assembly import build
+from verification.interface.pair import build
 
 NAMES = ("rho_max", "rho_min", "rho_normal", "C_s_energy", "C_t1", "C_t2", "kappa_1", "kappa_2")
 

@@ -21,7 +21,7 @@ from verification.algorithm.runs import Run
 from verification.algorithm.start import Start
 from verification.algorithm.theta import Choice
 from verification.contact import ContactError
-from verification.interface.assembly import build
+from verification.interface.pair import build
 
 
 def few_steps(data: Mapping[str, Any], count: int = 4) -> list[Run]:

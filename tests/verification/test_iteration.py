@@ -22,7 +22,7 @@ from verification.algorithm.ending import PATIENCE, RUNAWAY
 from verification.algorithm.fixed_point import FixedPointMap, Iterate
 from verification.algorithm.runs import MOST_BYTES, Run
 from verification.contact import TOLERANCE, ContactError
-from verification.interface.assembly import build
+from verification.interface.pair import build
 
 # --- two bars: everything in closed form ------------------------------------------------------------------------------
 

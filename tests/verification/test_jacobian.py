@@ -17,7 +17,7 @@ from problem_list import PROBLEMS, bars
 import verification as vf
 from verification.algorithm.affine_piece import Piece, piece_of
 from verification.algorithm.linearisation import NotLinear, linearise
-from verification.interface.assembly import build
+from verification.interface.pair import build
 
 
 @strategies.fewer(1)

@@ -9,7 +9,7 @@ import pytest
 from ledger_evidence import HOLDS, PRINTED, REPAIRED, STEP, holds
 
 from fem1d2d import Condensation
-from verification.interface.assembly import build
+from verification.interface.pair import build
 from verification.ledger import convergence, field_problems, moves, weak_forms
 from verification.ledger import solutions as ledger
 from verification.ledger.convergence import Setting

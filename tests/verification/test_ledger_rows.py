@@ -5,12 +5,13 @@ import itertools
 import pytest
 
 from ndtheory.statements import statements
-from ndtheory.symbolic import checks
+from ndtheory.symbolic.checks import checks
 from ndtheory.symbolic.engine import Check, equal
 from verification.ledger import Evidence
 from verification.ledger.evidence import METHODS, settle
 from verification.ledger.inequalities import INEQUALITIES
-from verification.ledger.rows import exact, recorded
+from verification.ledger.record import recorded
+from verification.ledger.sources import exact
 
 OF = ("printed", "step", "repaired")
 HOLDS = (True, False, None)
@@ -150,7 +151,7 @@ def test_one_case_refutes_and_proves_nothing(monkeypatch):
         mutants={},
         one_case=True,
     )
-    monkeypatch.setattr("ndtheory.symbolic.checks", lambda: [one])
+    monkeypatch.setattr("verification.ledger.sources.checks", lambda: [one])
     found = exact(["2.2"], "quick", lambda share: None)["2.2"]
     assert [(e.method, e.of, e.holds) for e in found] == [("reading", "printed", True), ("symbolic", "repaired", False)]
     assert settle(found[:1])[0] == "ASSUMED"

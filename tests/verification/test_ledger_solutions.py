@@ -6,7 +6,7 @@ from fractions import Fraction
 import pytest
 from ledger_evidence import HOLDS, PRINTED, REPAIRED, STEP, holds
 
-from verification.interface.assembly import build
+from verification.interface.pair import build
 from verification.ledger import experiments as section_6
 from verification.ledger import solutions as ledger
 from verification.ledger.evidence import settle

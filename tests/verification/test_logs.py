@@ -12,7 +12,7 @@ from strategies import AT_NIGHT
 
 import verification as vf
 from verification.advice.from_logs import advise_logs
-from verification.interface.assembly import build
+from verification.interface.pair import build
 
 MODES = (0.2, 0.5, 1.1, 3.0)  # tied; rho = 3
 

@@ -25,7 +25,7 @@ from verification.bounds.losses import Losses, locate
 from verification.bounds.neighbours import squared
 from verification.bounds.pattern_search import Found, worst_piece
 from verification.constants import Measured, measure
-from verification.interface.assembly import ContactPair, build
+from verification.interface.pair import ContactPair, build
 from verification.ledger.draws import uniform_piece
 
 #: Labels whose worst pair is an eigenvector; of the others it is searched.

@@ -18,7 +18,7 @@ from verification.algorithm.affine_piece import Piece, piece_of
 from verification.algorithm.iterate import Iterate
 from verification.algorithm.linearisation import NotLinear, linearise
 from verification.contact.active_set import Pattern
-from verification.interface.assembly import ContactPair, build
+from verification.interface.pair import ContactPair, build
 
 
 def nearest_change(T: Evaluated, state: Iterate, piece: Piece) -> tuple[float, np.ndarray]:

@@ -16,7 +16,7 @@ from ndtheory import energy_norms
 from verification.bounds.multipliers import NARROW, QuadraticForms, friction_threshold
 from verification.bounds.pattern_search import largest_factor, worst_piece
 from verification.bounds.program import LMIError
-from verification.interface.assembly import ContactPair
+from verification.interface.pair import ContactPair
 
 Multipliers = tuple[np.ndarray, ...]
 

@@ -10,10 +10,10 @@ from strategies import AT_NIGHT
 
 import verification as vf
 from verification.cli.main import main
-from verification.constants import ENERGY_NAMES, NAMES
+from verification.constants.measured import ENERGY_NAMES, NAMES
+from verification.constants.operators import Pencils, Traces
 from verification.interface import assembly
 from verification.interface.assembly import TooManyContactNodes, held_bodies
-from verification.operators import Pencils, Traces
 
 #: What needs no interface matrices.
 ALWAYS = ("m", "M", "rho_max", "rho_min", "rho_normal")

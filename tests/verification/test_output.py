@@ -14,7 +14,8 @@ from small_result import ONE_STEP, problem
 
 import verification as vf
 from verification import figures
-from verification.output.folder import LOCKS, Folder, staged
+from verification.output.files import LOCKS, staged
+from verification.output.folder import Folder
 
 FIGURES = {f"{figure}.{ending}" for figure in ("bodies", "residuals") for ending in ("svg", "png")}
 DRAWN = {"compare.json", "report.html", "waterfall.svg", "waterfall.png"}
@@ -161,7 +162,7 @@ def test_a_comparison_without_losses_takes_the_waterfall_of_another_away(quick, 
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from verification.output.folder import staged
+from verification.output.files import staged
 
 folder, moves = Path(sys.argv[1]), int(sys.argv[2])
 replace = Path.replace

@@ -19,7 +19,7 @@ from verification.algorithm.iterate import Iterate
 from verification.algorithm.linearisation import Linearisation, NotLinear, linearise
 from verification.algorithm.runs import Run, run
 from verification.algorithm.start import iterate
-from verification.interface.assembly import ContactPair, build
+from verification.interface.pair import ContactPair, build
 
 #: Random problems, the same ones each time, and the batches that they are tried in.
 most = settings.default.max_examples

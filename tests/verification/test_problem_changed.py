@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import verification as vf
+from verification.interface.friction import LAWS, Local
 
 PLANE = vf.example("section6")
 BARS = vf.example("two-bars")
@@ -271,3 +272,17 @@ def test_the_page_of_the_problem_file_shows_what_the_program_answers():
     found = doctest.testfile(str(page), module_relative=False)
     assert found.attempted >= 5
     assert found.failed == 0
+
+
+def test_a_law_that_is_registered_is_one_of_the_words_of_a_problem_file(monkeypatch):
+    class Even(Local):
+        name, label, needs_radius = "even", "even", True
+
+    with pytest.raises(vf.ProblemError, match=r'contact\.law = "even"'):
+        PLANE.changed(law="even")
+    monkeypatch.setitem(LAWS, "even", Even)
+    assert PLANE.changed(law="even").contact.law == "even"
+    without = PLANE.to_dict()
+    without["contact"] = {"friction": 0.2, "law": "even"}
+    with pytest.raises(vf.ProblemError, match="the even law needs the radius of its kernel"):
+        vf.Problem.from_dict(without)

@@ -20,7 +20,7 @@ import verification as vf
 from ndtheory import exact
 from verification.cli.problems import examples
 from verification.problem.read_only import ReadOnly
-from verification.problem.specification import BodySpec
+from verification.problem.specs import BodySpec
 from verification.problem.toml import document
 from verification.problem.writing import written_number
 

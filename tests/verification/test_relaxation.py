@@ -25,7 +25,7 @@ from verification.algorithm.relaxation import RULES, Momentum, momentum_rate, mo
 from verification.algorithm.runs import Run, run
 from verification.constants import Measured, measure
 from verification.contact import ContactError
-from verification.interface.assembly import ContactPair, build
+from verification.interface.pair import ContactPair, build
 
 #: Who has the Neumann problem, E1, E2, and the left end of the upper body.
 COMBINATIONS = {

@@ -15,6 +15,7 @@ from verification.algorithm.affine_piece import piece_of
 from verification.bounds.bound import Region
 from verification.bounds.region import Plane, Point
 from verification.document import Document
+from verification.figures.of_results import draw
 
 SMALL = {"body1.cells": "[10, 2]", "body2.cells": "[6, 2]"}
 
@@ -171,6 +172,29 @@ def test_every_result_has_a_figure(results, name):
 def test_what_has_nothing_to_draw_says_so(problem):
     with pytest.raises(ValueError, match="next"):
         vf.advise_run("0.1", "1.4").plot()
+
+
+class Heights(Document):
+    """A result that no figure of ours is about."""
+
+    schema = "heights/1"
+    units = {"length": "m", "stress": "Pa"}
+
+    def content(self):
+        return {}
+
+
+def test_a_type_of_result_has_the_figure_that_is_registered_for_it():
+    with pytest.raises(ValueError, match="a Heights has no figure"):
+        Heights().plot()
+
+    class Higher(Heights):
+        """Another one, so that the first stays without."""
+
+    draw.register(Higher, lambda result, **options: f"drawn of {type(result).__name__}")
+    assert Higher().plot() == "drawn of Higher"
+    with pytest.raises(ValueError, match="a Heights has no figure"):
+        Heights().plot()
 
 
 def test_tables_are_plain_columns_of_one_length(results):

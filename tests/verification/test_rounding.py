@@ -16,8 +16,7 @@ from fem1d2d.loewner import positive_definite
 from verification.bounds.multipliers import QuadraticForms
 from verification.bounds.program import LMIError
 from verification.constants import measure
-from verification.interface import assembly
-from verification.interface.assembly import build
+from verification.interface.pair import build
 
 Exact = list[list[Fraction]]
 
@@ -181,7 +180,7 @@ def test_near_singular_stiffness_makes_the_factor_larger_never_too_small(length,
 
 def test_where_rounding_hides_what_the_multipliers_leave_nothing_is_claimed(monkeypatch):
     """A tower 1e6 times as high as wide: condition 4e15."""
-    monkeypatch.setattr(assembly, "LEAST_RCOND", 0.0)  # such bodies are refused
+    monkeypatch.setattr("verification.interface.pair.LEAST_RCOND", 0.0)  # such bodies are refused
     pair = build(slender(10**6))
     with pytest.raises(LMIError):
         QuadraticForms(pair, measure(pair)).factor(0.5)

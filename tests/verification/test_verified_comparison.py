@@ -11,15 +11,15 @@ import verification as vf
 from ndtheory import PRINTED, Constants, EnergyConstants, Number, evaluate, evaluate_energy
 from verification.algorithm.rates import StepRatio
 from verification.bounds.bound import BoundResult
+from verification.bounds.lipschitz import work_out
 from verification.bounds.multipliers import QuadraticForms
-from verification.bounds.semidefinite import work_out
 from verification.certificate.claims import Claims, Confirmation, NoCertificate
-from verification.certificate.constants import verify
 from verification.certificate.contraction import certify
 from verification.certificate.description import describe
-from verification.certificate.exact_bodies import NotExact
 from verification.constants import measure
-from verification.interface.assembly import build
+from verification.constants.proved import verify
+from verification.interface.exact_bodies import NotExact
+from verification.interface.pair import build
 from verification.verdicts import judge, judge_bound
 
 SMALL = vf.Problem.from_dict(small())

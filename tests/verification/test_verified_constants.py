@@ -14,8 +14,8 @@ import verification as vf
 from fem1d2d.enclosed import Enclosed
 from fem1d2d.loewner import Elimination
 from ndtheory import REPAIRED, Constants, evaluate
-from verification.certificate.constants import verify
-from verification.interface.friction import Law
+from verification.constants.proved import verify
+from verification.interface.interface import Law
 
 NAMES = (
     "m", "M", "C_R", "C_s", "C_tr", "C_tr_half", "C_K", "rho_max", "rho_min", "rho_normal",

@@ -14,7 +14,7 @@ from fem1d2d import rectangle
 from verification.cli.problems import examples
 from verification.interface.assembly import discretise
 from verification.interface.friction import SHARE
-from verification.interface.pair import LOCKING
+from verification.interface.two_bodies import LOCKING
 from verification.monolithic import contact_system
 
 

@@ -6,29 +6,26 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 from ndtheory import EnergyConstants, Number, evaluate_energy
-from verification.advice.quote import reason as quoted_reason
 from verification.advice.readings import LARGEST_TO_PASTE, NextRun, RunReading, SeenRun, rounded_down
-from verification.advice.role import Role, best_of, fewer, role_of, steps, with_both_ends
+from verification.advice.role import Role, best_of, fewer, in_steps, role_of, steps, with_both_ends
+from verification.advice.runs_with_friction import FrictionBounds
 from verification.advice.seen import Interval, SeenLog
 from verification.advice.seen_matrices import SeenMatrices
+from verification.advice.seen_moduli import SeenModuli
 from verification.advice.snippets import Coupling, snippet
 from verification.algorithm.theta import automatic, by_prediction, energy_bounds
 from verification.constants import measure
+from verification.constants.operators import Pencils, needs_matrices, pair_or_bodies
 from verification.document import Document
 from verification.interface.build import build
-from verification.interface.pair import UNITS, ContactPair, SingularRole, TwoBodies
-from verification.operators import Pencils, needs_matrices, pair_or_bodies
+from verification.interface.pair import UNITS, ContactPair
+from verification.interface.two_bodies import SingularRole, TwoBodies
 from verification.problem import Problem, load
 from verification.problem.tables import ProblemError
 from verification.progress import Progress, silent
-
-if TYPE_CHECKING:
-    from verification.advice.from_moduli import SeenModuli
-    from verification.advice.runs_with_friction import FrictionBounds
-    from verification.figures import Figure
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -139,8 +136,32 @@ class Advice(Document):
 
     @property
     def quote(self) -> str | None:
-        """The reason for the advice, to be quoted; None where there is no theta to paste."""
-        return None if self.theta is None else quoted_reason(self)
+        """The reason for the advice in two sentences, to be quoted; None where there is no theta to paste.
+
+        They have rho in both roles, the theta that follows from it, and the steps of both.
+        """
+        if self.theta is None:
+            return None
+        best, other = self.best, self.other
+        tied = self.tied and best.ends is not None
+        theta, rate = self.chosen(best)
+        first = "" if self.assumes is None else f"Assumed: {self.assumes}. "
+        first += f"rho (stiffness of contact body over Neumann body on the interface, at worst) is {_rho(best, tied)}"
+        if self.neumann_body is not None:
+            first += f" with body {self.neumann_body} as Neumann body"
+        if other is not None:
+            first += f", {_rho(other, tied)} with the roles exchanged"
+        formula = "2/(2+rho)"
+        if tied and best.rho_min is not None:
+            formula = "2/(2+rho_min+rho)"
+            first += f"; rho_min (at best) is {best.rho_min.value:.3g}"
+        bound = "at most " * (tied or best.proved)
+        then = f"So relax by {formula} = {theta:.3g}: {bound}{in_steps(rate)} to 1e-9"
+        then += " if nothing opens or slips" if tied else " without friction" if best.proved else " are predicted"
+        if other is not None:
+            away = in_steps(self.chosen(other)[1]).removesuffix(" steps")
+            then += ", the same with the roles exchanged" if self.no_difference else f", against {away}"
+        return f"{first}. {then}."
 
     def snippet(self, library: str) -> str:
         """What to paste into the configuration of a coupling library: preCICE, Kratos or Norma.
@@ -154,22 +175,6 @@ class Advice(Document):
             raise ValueError(self.why_no_theta)
         count = steps(self.chosen(self.best)[1])
         return snippet(library, Coupling(neumann_body=self.neumann_body, theta=self.theta, steps=count, tied=self.tied))
-
-    def plot(self) -> Figure:
-        """The factor of one step over theta, for each assignment of the roles."""
-        from verification.figures import draw_factor
-
-        if not self.roles:
-            raise ValueError("no reading is left alone: make the run that `next` names")
-        if self.moduli is not None:
-            raise ValueError("moduli bound rho from below only: no factor of a step follows")
-        named = {f"Neumann body {role.neumann_body}" if role.neumann_body else "that run": role for role in self.roles}
-        energy = {
-            name: role.energy or EnergyConstants(rho=role.rho.value)
-            for name, role in named.items()
-            if role.rho is not None
-        }
-        return draw_factor(energy)
 
     @property
     def best(self) -> Role:
@@ -348,3 +353,8 @@ def plain_role(neumann_body: Any, rho: Fraction, **settings: Any) -> Role:
     bounds = evaluate_energy(EnergyConstants(rho=rho))
     settings.setdefault("no_threshold", "matrices alone say nothing of friction: the proved values are for k = 0")
     return role_of(neumann_body, bounds.rho, bounds=bounds, **settings)
+
+
+def _rho(role: Role, tied: bool) -> str:
+    rho = role.rho_tied if tied and role.rho_tied is not None else role.rho
+    return "unknown" if rho is None else f"{rho.value:.3g}"

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,13 +15,12 @@ from numpy.typing import ArrayLike
 from fem1d2d.mesh import Floats
 from ndtheory import Number
 from ndtheory.number import Numeric
-from verification.algorithm.ending import Ending, Outcome, arrived, coupled_residual
+from verification.algorithm.ending import NO_FORCE, Ending, Outcome, arrived, coupled_residual
 from verification.algorithm.fixed_point import FixedPointMap, iterate_at, iterates
 from verification.algorithm.iterate import Iterate
 from verification.algorithm.linearisation import Forecast, Linearisation, NotLinear, forecast, linearise
 from verification.algorithm.rates import ObservedRate, observed_rate
 from verification.algorithm.relaxation import Constant, Rule
-from verification.algorithm.run_document import run_document
 from verification.algorithm.start import Start, begin_at
 from verification.algorithm.theta import Choice, begin
 from verification.constants import Measured
@@ -30,15 +29,13 @@ from verification.document import Document
 from verification.interface.build import pair_of
 from verification.interface.checks import Checks, check_state
 from verification.interface.fields import ContactFields
-from verification.interface.pair import ContactPair, TwoBodies
+from verification.interface.pair import ContactPair
+from verification.interface.two_bodies import TwoBodies
 from verification.interrupts import INTERRUPTED
 from verification.monolithic import SolveError, solution_force
 from verification.problem import Problem
 from verification.problem.tables import ProblemError
 from verification.threads import one_thread
-
-if TYPE_CHECKING:
-    from verification.figures import Figure
 
 #: Linearising takes longer than a run, and is asked for.
 NOT_ASKED = "not worked out: linearise() does"
@@ -259,12 +256,6 @@ class Run(Document):
         rate = "" if self.observed_rate is None else f", observed rate {self.observed_rate.value:.4g}"
         return f"{self.pair.title}, {self.outcome} after {self.iterations} steps at theta {float(self.theta):.4g}{rate}"
 
-    def plot(self) -> Figure:
-        """The residuals, step by step, with the rate they show."""
-        from verification.figures import draw_residuals
-
-        return draw_residuals(self)
-
     def table(self) -> dict[str, list[Any]]:
         """The history as plain columns, one row for each evaluation of T: ``pandas.DataFrame(run.table())`` reads it.
 
@@ -289,7 +280,72 @@ class Run(Document):
         return self.pair.warnings + self.choice.warnings + tied + (list(self.checks.warnings) if self.converged else [])
 
     def content(self) -> dict[str, Any]:
-        return run_document(self)
+        """The values of ``ndtheory.run/1``; what is null has a reason beside it."""
+        rate = self.observed_rate
+        solvers = [iterate.contact.solver for iterate in self.iterates]
+        linear = self.linearised
+        proved = self.proved_rate
+        reason: dict[str, str] = {}
+        if proved is None:
+            reason["proved_rate"] = "momentum without friction has one; for a constant theta see the bounds"
+        if linear is None:
+            names = ("linearised_rate", "linearised_norm", "linearised_radius", "linearised_margin", "predicted_rate")
+            reason |= dict.fromkeys(names, self.why_not_linearised)
+        else:
+            if linear.predicted is None:
+                reason["predicted_rate"] = "the run did not end in a stretch of steps without a change of state"
+            if not np.isfinite(linear.margin):
+                reason["linearised_margin"] = "no change of g changes a state"
+        if self.coupled_residual is None:
+            reason["coupled_residual"] = NO_FORCE
+        if self.start.why:
+            reason["start"] = self.start.why
+        few = "fewer than two step ratios stand clear of rounding"
+        if rate is None:
+            why = "the run diverged: it shows growth, not a rate" if self.outcome == "diverged" else few
+            reason |= {"observed_rate": why, "observed_rate_interval": why}
+        if self.observed_growth is None:
+            reason["observed_growth"] = "the run did not diverge" if self.outcome != "diverged" else few
+        if self.forecast is None:
+            reason["forecast"] = self.why_no_forecast
+        return {
+            "title": self.pair.title,
+            "theta": float(self.theta),
+            "theta_source": self.choice.source,
+            "theta_reason": self.choice.why,
+            "relaxation": self.relaxation,
+            "start": self.start.source,
+            "neumann_body": self.pair.neumann_body,
+            "grids": {"contact_body": self.pair.contact_body, **self.pair.interface.counts},
+            "iterations": self.iterations,
+            "evaluations": self.evaluations,
+            "outcome": self.outcome,
+            "converged": self.converged,
+            "proved_rate": None if proved is None else proved.to_dict(),
+            "observed_rate": None if rate is None else rate.value,
+            "observed_rate_interval": None if rate is None else [rate.lo, rate.hi],
+            "observed_growth": self.observed_growth,
+            "forecast": None if self.forecast is None else vars(self.forecast),
+            "linearised_rate": None if linear is None else linear.rate,
+            "linearised_norm": None if linear is None else linear.norm,
+            "linearised_radius": None if linear is None else linear.radius,
+            "linearised_margin": None if linear is None or not np.isfinite(linear.margin) else linear.margin,
+            "predicted_rate": None if linear is None else linear.predicted,
+            "unrelaxed_residual": _finite(self.last.relative_residual),
+            "coupled_residual": None if self.coupled_residual is None else _finite(self.coupled_residual),
+            "kkt_residual": self.last.contact.kkt.residual,
+            "solves": {"cvxpy": solvers.count("cvxpy"), "active_set": solvers.count("active-set")},
+            **self.contact.to_dict(),
+            "checks": self.checks.to_dict(),
+            "history": [_finite(r) for r in self.history],
+            "outside_theorem": self.outside,
+            "warnings": self.warnings,
+            "reason": reason,
+        }
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None
 
 
 def check_memory(pair: ContactPair) -> None:

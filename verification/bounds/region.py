@@ -5,18 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from verification.algorithm.ending import Outcome
 from verification.bounds.bound import NotComputed, Region, Subject
 from verification.bounds.table import BOUNDS
-from verification.constants import SLIDES, measure
+from verification.constants import measure
+from verification.constants.measured import SLIDES
 from verification.contact import ContactError
 from verification.document import Document
-from verification.interface.assembly import build
 from verification.interface.friction import LAWS
+from verification.interface.pair import build
 from verification.interrupts import INTERRUPTED
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
@@ -24,9 +25,6 @@ from verification.progress import Progress, silent
 from verification.sweeps.grid import SweepGrid
 from verification.sweeps.row import Row
 from verification.sweeps.sweep import sweep_grid
-
-if TYPE_CHECKING:
-    from verification.figures import Figure
 
 #: Where runs are started, and how long they may take.
 THETAS = tuple(float(f"{v:.3g}") for v in np.geomspace(0.04, 0.97, 9))
@@ -70,12 +68,6 @@ class Plane(Document):
     @property
     def summary(self) -> str:
         return f"{self.title}, regions of {', '.join(self.regions)}; {len(self.points)} runs"
-
-    def plot(self) -> Figure:
-        """The regions with the runs over them."""
-        from verification.figures import draw_region
-
-        return draw_region(self)
 
     @property
     def interrupted(self) -> bool:

@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 
 from verification.bounds.program import Weights
+from verification.certificate.check import check, surface_stiffness
 from verification.certificate.description import describe
-from verification.certificate.exact_bodies import NotExact
-from verification.constants import FROM_MATRICES
+from verification.constants.measured import FROM_MATRICES
+from verification.interface.exact_bodies import NotExact
 from verification.interface.pair import ContactPair
 from verification.progress import Progress, silent
 
@@ -65,8 +66,6 @@ class Claims:
 
     def accepted(self, theta: Fraction, factor: Fraction, multipliers: dict[str, Any]) -> dict[str, Any] | None:
         """The claim of a factor with the bits in which the checker accepts it; None where it does not."""
-        from verification.certificate.check import check, surface_stiffness
-
         for bits in BITS:
             claim = {"theta": str(theta), "factor": str(factor), "bits": bits, "multipliers": multipliers}
             words = f"checking theta = {float(theta):.6g}, factor {float(factor):.10g} in balls of {bits} bits"

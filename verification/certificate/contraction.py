@@ -16,14 +16,16 @@ from typing import Any, ClassVar, Literal, get_args
 from ndtheory.number import Numeric
 from verification.algorithm.theta import choose
 from verification.bounds.bound import Subject
+from verification.bounds.exact import enclose
+from verification.bounds.multipliers import QuadraticForms
 from verification.bounds.program import LMIError
 from verification.bounds.table import BOUNDS
+from verification.certificate import check
 from verification.certificate.claims import NOT_CONFIRMED, Claims, NoCertificate, written
 from verification.certificate.description import describe
 from verification.constants import Measured, measure
 from verification.document import Document
-from verification.interface.assembly import build
-from verification.interface.pair import UNITS, ContactPair
+from verification.interface.pair import UNITS, ContactPair, build
 from verification.problem import Problem, ProblemError
 from verification.progress import Progress, silent
 
@@ -117,12 +119,10 @@ class Certificate(Document):
         return f"theta = {float(self.theta):.4g}, factor {float(self.factor):.6g} proved ({self.edition})"
 
     def content(self) -> dict[str, Any]:
-        from verification.certificate.check import digest
-
         return {
             "kind": "contraction",
             "edition": self.edition,
-            "sha256": digest(self.discrete),
+            "sha256": check.digest(self.discrete),
             "claim": self.claim,
             "lower": self.lower,
             "reason": {} if self.lower is not None else {"lower": "not computed for this edition"},
@@ -210,8 +210,6 @@ def check_again(document: Any, problem: Problem | None = None) -> Checked:
     >>> check_again(document).accepted
     False
     """
-    from verification.certificate import check
-
     if not isinstance(document, dict) or document.get("schema") != Certificate.schema:
         raise ValueError(f"needed a document of the schema {Certificate.schema}")
     try:
@@ -238,8 +236,6 @@ def _proposed(
     pair: ContactPair, measured: Measured, theta: Fraction, edition: Edition
 ) -> tuple[float, dict[str, Any], float | None]:
     """What the factor of a bound is below 1, multipliers that should prove it, and the largest factor found."""
-    from verification.bounds.exact import enclose
-    from verification.bounds.multipliers import QuadraticForms
 
     try:
         forms = QuadraticForms(pair, measured)

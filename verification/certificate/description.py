@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from verification.certificate.exact_bodies import ExactInterface, exact_points
-from verification.interface.assembly import build
 from verification.interface.body import Body
-from verification.interface.pair import ContactPair
+from verification.interface.exact_bodies import ExactInterface, exact_points
+from verification.interface.pair import ContactPair, build
 from verification.problem import Problem
-from verification.problem.specification import BodySpec
+from verification.problem.specs import BodySpec
 
 
 def describe(problem: Problem, pair: ContactPair | None = None) -> dict[str, Any]:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -14,9 +14,6 @@ from verification.cli.failing import fail
 from verification.cli.options import JSON, SET, SWAP, THETA, OneOf, check_place, one_file
 from verification.cli.problems import load_problem
 from verification.cli.typed import Typed
-
-if TYPE_CHECKING:
-    from verification.document import Document
 
 #: A certificate of a hundred contact nodes has a few megabytes.
 MOST_BYTES = 100_000_000
@@ -90,6 +87,7 @@ def certify(
     assert file is not None
     from verification.certificate.claims import NoCertificate
     from verification.certificate.contraction import certify as prove
+    from verification.output.files import writing
     from verification.sections.certificate import sections
 
     problem = load_problem(file, keys, theta=theta, swap=swap)
@@ -110,6 +108,7 @@ def _prove_continuum(
     """Bound the continuous problem of a file and show what follows; 1 where contraction is not proved."""
     from ndtheory.strip import Unproved
     from verification.certificate.continuum import certify_continuum
+    from verification.output.files import writing
     from verification.sections.continuum import sections
 
     problem = load_problem(file, keys, theta=theta, swap=swap)
@@ -121,20 +120,6 @@ def _prove_continuum(
     typed = Typed(file=file, keys=keys, theta=theta, swap=swap)
     deliver(found, sections, as_json, writing(found, target), target, typing=typed.command)
     return 0 if found.contracts else 1
-
-
-def writing(found: Document, target: Path | None) -> Callable[[], None] | None:
-    """What writes a certificate; None where no name was given."""
-    from verification.output.folder import staged
-
-    if target is None:
-        return None
-
-    def write() -> None:
-        with staged(target.parent, shown=target) as room:
-            (room / target.name).write_text(found.to_json(), encoding="utf-8")
-
-    return write
 
 
 def _check(path: Path, problem: Any, as_json: bool) -> int:

@@ -31,7 +31,7 @@ def region(file: Path, keys: dict[str, str], swap: bool, target: Path, store: Pa
     """
     from verification import figures
     from verification.bounds.region import chart
-    from verification.output.folder import staged
+    from verification.output.files import staged
     from verification.sections.region import sections
 
     problem = load_problem(file, keys, swap=swap)

@@ -120,7 +120,7 @@ def check_place(target: Path) -> None:
     ------
     ProblemError
     """
-    from verification.output.folder import check_ours
+    from verification.output.files import check_ours
     from verification.problem.tables import ProblemError
 
     if not target.parent.is_dir():

@@ -84,13 +84,13 @@ def load_problem(
     ProblemError, HypothesisError
     """
     from verification.problem import ProblemError, load
-    from verification.problem.reading import takes_theta
+    from verification.problem.vocabulary import vocabulary
 
     chosen = {} if relaxation is None else {"iteration.relaxation": relaxation}
     problem = load(file).with_keys({**keys, **chosen})
     if theta is not None:
         rule = problem.iteration.relaxation
-        if not takes_theta(rule):
+        if not vocabulary().takes_theta(rule):
             needed = f'needed no theta beside relaxation = "{rule}", which takes its step from rho'
             raise ProblemError(str(file), "--theta", theta, needed)
         problem = problem.with_theta(theta)
@@ -147,7 +147,7 @@ def run(file: Path, solver: Any, start: Path | None, folder: Path | None, as_jso
     from verification.advice.matrix_files import read_matrix
     from verification.algorithm import runs
     from verification.algorithm.start import forces
-    from verification.interface.assembly import build
+    from verification.interface.pair import build
     from verification.output.folder import Folder
     from verification.sections.run import sections
 
@@ -258,7 +258,7 @@ def demo(folder: Path, as_json: bool) -> int:
 
 def _compare(problem: Problem, typed: Typed, folder: Path | None, solver: Any, as_json: bool, **asked: bool) -> int:
     from verification import comparison as verdicts
-    from verification.interface.assembly import build
+    from verification.interface.pair import build
     from verification.output.folder import Folder
     from verification.sections.comparison import Parts
     from verification.sections.comparison import verdicts as end

@@ -96,12 +96,11 @@ def sweep(
       ndtheory sweep grid.toml --plot theta,iterations,friction --export results
     """
     from verification.extras import require
-    from verification.output.folder import check_ours
+    from verification.output.files import check_ours
     from verification.sections import sweep as shown
     from verification.sweeps.keeping import plan
-    from verification.sweeps.sweep import sweep_grid
+    from verification.sweeps.sweep import sweep_grid, work_of
     from verification.sweeps.sweep_file import read_sweep
-    from verification.sweeps.workers import work_of
 
     if dask is not None and jobs is not None:
         raise click.UsageError("needed either --jobs, for this machine, or --dask, for a cluster")
@@ -164,7 +163,7 @@ def _targets(
 
 def _write(found: Sweep, targets: dict[Path, Callable[[Sweep, Path], None]]) -> None:
     """Write each file; what cannot be drawn is said, and costs no other file."""
-    from verification.output.folder import staged
+    from verification.output.files import staged
 
     for path, write in targets.items():
         with staged(path.parent, shown=path) as place:

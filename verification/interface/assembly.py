@@ -1,4 +1,4 @@
-"""From a problem to its two bodies: meshes, supports, stiffness matrices, Gamma_c, and their condensation onto it."""
+"""From a problem to its two bodies on their meshes: supports, stiffness matrices, Gamma_c."""
 
 from __future__ import annotations
 
@@ -22,63 +22,21 @@ from fem1d2d import (
 )
 from fem1d2d.mesh import Floats, Ints
 from fem1d2d.trace import SAME, extent
-from verification.dense import STILL, reciprocal_condition
-from verification.interface.body import Body, Condensed, Name
-from verification.interface.friction import Law
-from verification.interface.grid import Grid
+from verification.dense import STILL
+from verification.interface.body import Body, Name
+from verification.interface.interface import Law
 from verification.interface.joining import join
-from verification.interface.pair import ContactPair, SingularRole, TwoBodies
-from verification.problem.specification import MOST_CELLS, BodySpec, Problem
+from verification.interface.two_bodies import SingularRole, TwoBodies
+from verification.problem.specification import Problem
+from verification.problem.specs import MOST_CELLS, BodySpec
 from verification.problem.tables import ProblemError, short
 
 #: Interface matrices are dense; more contact nodes would fill the memory.
 MOST_CONTACT_NODES = 2000
 
 
-#: Condensation loses one digit of the least stiff motion of a body for each digit of 1/rcond: at 1e-13 three are left.
-LEAST_RCOND = 1e-13
-
-
 class TooManyContactNodes(ProblemError):
     """A sound problem, too large for dense interface matrices."""
-
-
-def build(problem: Problem, *, law: Law | None = None, like: ContactPair | None = None) -> ContactPair:
-    """Two condensed bodies with roles, as the iteration and its constants need them.
-
-    Parameters
-    ----------
-    problem : Problem
-        Its ``[iteration]`` gives the roles and the pair's settings.
-    law : Law, optional
-        A law of friction in place of the problem's.
-    like : ContactPair, optional
-        What it has condensed is shared by bodies that are the same, or differ in Young's modulus and loads alone.
-
-    Raises
-    ------
-    ProblemError
-        As :func:`discretise`, and where a body is rigid, the one with the Neumann problem can move rigidly, or rounding
-        leaves no digit of a stiffness on Gamma_c.
-    """
-    bodies, iteration = held_bodies(problem, law=law), problem.iteration
-    known = (None, None) if like is None else (like.body1, like.body2)
-    upward, grids = iteration.neumann_body == 2, (bodies.interface.contact, bodies.interface.neumann)
-    lower, upper = (
-        _condensed(body, grid, upward, side)
-        for body, grid, side in zip(bodies.elastic, grids if upward else grids[::-1], known, strict=True)
-    )
-    for name, side in (("body1", lower), ("body2", upper)):
-        _check_digits(problem, name, side)
-    return ContactPair(
-        contact=lower if upward else upper,
-        neumann=upper if upward else lower,
-        interface=bodies.interface,
-        friction=bodies.friction,
-        neumann_body=iteration.neumann_body,
-        settings=iteration.settings,
-        problem=problem,
-    )
 
 
 def held_bodies(problem: Problem, *, law: Law | None = None, dense: bool = True) -> TwoBodies:
@@ -88,14 +46,14 @@ def held_bodies(problem: Problem, *, law: Law | None = None, dense: bool = True)
     ----------
     problem : Problem
     law : Law, optional
-        As for :func:`build`.
+        As for :func:`verification.interface.pair.build`.
     dense : bool
         As for :func:`discretise`.
 
     Raises
     ------
     ProblemError
-        As :func:`build`.
+        As :func:`verification.interface.pair.build`.
     """
     iteration = problem.iteration
     for name in ("body1", "body2"):
@@ -141,28 +99,6 @@ def _check_supports(bodies: TwoBodies, *, dense: bool) -> None:
         if body.motion_traces.shape[1] < k:
             needed = f"{moves} where no contact node feels it: fix or prescribe more of its sides"
             raise ProblemError(problem.source, body.name, None, needed)
-
-
-def _check_digits(problem: Problem, name: str, side: Condensed) -> None:
-    """Refuse a body so slender, or of cells so stretched, that rounding takes its stiffness in the softest motion."""
-    found = reciprocal_condition(side.stiffness, np.flatnonzero(side.free), side.motions)
-    if not found > LEAST_RCOND:
-        needed = (
-            f"its stiffness on Gamma_c is lost in rounding (1/condition {found:.1g}): needed more than {LEAST_RCOND:g},"
-            " by a body less slender or cells less stretched; `ndtheory solve` needs no such matrix"
-        )
-        raise ProblemError(problem.source, name, None, needed)
-
-
-def _condensed(body: Body, grid: Grid, upward: bool, like: Condensed | None) -> Condensed:
-    """A body condensed, its normal components along y or against it; one like it may be condensed already."""
-    if like is None or like.body is None:
-        found = Condensed.of(body, grid)
-    elif body.equals(like.body):
-        found = like if grid.equals(like.grid) else replace(like, grid=grid)
-    else:
-        found = Condensed.of(body, grid, like.body)
-    return found if found.upward == upward else found.turned()
 
 
 def discretise(problem: Problem, *, law: Law | None = None, dense: bool = True) -> TwoBodies:

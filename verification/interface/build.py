@@ -10,12 +10,12 @@ import numpy as np
 from fem1d2d import trapezoid
 from fem1d2d.mesh import Floats
 from ndtheory.number import Numeric
-from verification.interface import assembly
+from verification.interface import pair as pairs
 from verification.interface.body import NO_MOTIONS, Condensed
 from verification.interface.files import read_interface
-from verification.interface.friction import Given, Law
+from verification.interface.friction import Given
 from verification.interface.grid import Grid
-from verification.interface.interface import Interface
+from verification.interface.interface import Interface, Law
 from verification.interface.matrices import check_matrix, check_nodes, real_array, size, stiffness
 from verification.interface.pair import ContactPair
 from verification.problem import Problem, load
@@ -89,9 +89,9 @@ def build(
         if S1 is not None or S2 is not None:
             raise ValueError("received a problem and matrices: needed one of them")
         if isinstance(problem, Problem):
-            return assembly.build(problem, law=law)
+            return pairs.build(problem, law=law)
         if Path(problem).suffix != ".npz":
-            return assembly.build(load(problem), law=law)
+            return pairs.build(load(problem), law=law)
         if law is not None:
             raise ValueError("received a law and an interface file: its operator S is a matrix already")
         return read_interface(Path(problem))

@@ -13,8 +13,9 @@ from fem1d2d.mesh import Floats, Ints
 from fem1d2d.trace import SAME, extent
 from verification.interface.body import Body
 from verification.interface.joining import obstacle_level
-from verification.interface.pair import ContactPair, TwoBodies
-from verification.problem.specification import BodySpec
+from verification.interface.pair import ContactPair
+from verification.interface.two_bodies import TwoBodies
+from verification.problem.specs import BodySpec
 from verification.threads import one_thread
 from verification.value import Value
 

@@ -6,75 +6,18 @@ are those of problem files; another one derives from :class:`Law` and is handed 
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from fem1d2d.mesh import Floats
+from verification.interface.interface import Interface, Law
 from verification.value import Value
-
-if TYPE_CHECKING:
-    from verification.interface.interface import Interface
 
 #: Part of the friction that the kernel may lose or add without a warning.  The share under an even pressure agrees with
 #: that of a block that slides as a whole within 0.01: 0.93 and 0.92 at radius 0.2 on a length of 1, 0.67 and 0.67 at 1.
 SHARE = 0.1
-
-
-class Law(ABC):
-    """A law of friction: the friction bound at a contact node is ``w_j k |(S sigma_N)_j|``, with S linear.
-
-    Attributes
-    ----------
-    name : str
-    label : str
-        What it is called in front of "law".
-    outside : str
-        Why the theorem does not speak of this law; empty where it does.
-    needs_radius : bool
-        Whether a problem file with friction must give a radius.
-    of_contact : bool
-        Whether it takes the forces of the contact grid where the grids differ.  They are no function of the forces g on
-        the Neumann grid, so that the global method alone can use it there.
-    """
-
-    name: ClassVar[str]
-    label: ClassVar[str]
-    outside: str = ""
-    needs_radius: ClassVar[bool] = False
-    of_contact: ClassVar[bool] = False
-
-    @classmethod
-    def of(cls, radius: Fraction | None) -> Law | None:
-        """The law of a problem file with that radius; None where it needs one and has none, as there is no friction."""
-        return cls()
-
-    def scaled(self, length: float) -> Law:
-        """The same law in a unit of length in which lengths are ``length`` times as large numbers.
-
-        Its operator must then be ``operator / length``; a law that holds a length multiplies it.
-        """
-        return self
-
-    @property
-    @abstractmethod
-    def words(self) -> str:
-        """The law in a few words, for a screen."""
-
-    @abstractmethod
-    def operator(self, interface: Interface) -> Floats:
-        """S: normal nodal forces on the Neumann grid to normal stress at the contact nodes, shape (n_c, n_n).
-
-        With ``of_contact`` those on the contact grid, shape (n_c, n_c).
-        Forces are per unit thickness, compressive ones positive.
-        """
-
-    def warnings(self, interface: Interface) -> list[str]:
-        """What a user should know before trusting the numbers of this law on these grids."""
-        return []
 
 
 def hat(t: Floats, radius: float) -> Floats:

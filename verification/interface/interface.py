@@ -1,17 +1,72 @@
-"""What joins two bodies along Gamma_c: their grids, the transfer between them, the gap, the operator of friction."""
+"""What joins two bodies along Gamma_c: their grids, the transfer between them, the gap, and a law of friction."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fem1d2d.mesh import Floats
-from verification.interface.friction import Law
 from verification.interface.grid import Grid
 from verification.value import Value, freeze
+
+
+class Law(ABC):
+    """A law of friction: the friction bound at a contact node is ``w_j k |(S sigma_N)_j|``, with S linear.
+
+    Attributes
+    ----------
+    name : str
+    label : str
+        What it is called in front of "law".
+    outside : str
+        Why the theorem does not speak of this law; empty where it does.
+    needs_radius : bool
+        Whether a problem file with friction must give a radius.
+    of_contact : bool
+        Whether it takes the forces of the contact grid where the grids differ.  They are no function of the forces g on
+        the Neumann grid, so that the global method alone can use it there.
+    """
+
+    name: ClassVar[str]
+    label: ClassVar[str]
+    outside: str = ""
+    needs_radius: ClassVar[bool] = False
+    of_contact: ClassVar[bool] = False
+
+    @classmethod
+    def of(cls, radius: Fraction | None) -> Law | None:
+        """The law of a problem file with that radius; None where it needs one and has none, as there is no friction."""
+        return cls()
+
+    def scaled(self, length: float) -> Law:
+        """The same law in a unit of length in which lengths are ``length`` times as large numbers.
+
+        Its operator must then be ``operator / length``; a law that holds a length multiplies it.
+        """
+        return self
+
+    @property
+    @abstractmethod
+    def words(self) -> str:
+        """The law in a few words, for a screen."""
+
+    @abstractmethod
+    def operator(self, interface: Interface) -> Floats:
+        """S: normal nodal forces on the Neumann grid to normal stress at the contact nodes, shape (n_c, n_n).
+
+        With ``of_contact`` those on the contact grid, shape (n_c, n_c).
+        Forces are per unit thickness, compressive ones positive.
+        """
+
+    def warnings(self, interface: Interface) -> list[str]:
+        """What a user should know before trusting the numbers of this law on these grids."""
+        return []
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

@@ -10,10 +10,11 @@ import numpy as np
 from fem1d2d import Mesh, MeshError, facing, mortar, surface
 from fem1d2d.mesh import Floats, Ints
 from fem1d2d.trace import SAME, extent
-from verification.interface.friction import LAWS, Law
+from verification.interface.friction import LAWS
 from verification.interface.grid import Grid
-from verification.interface.interface import Interface
-from verification.problem.specification import BodySpec, Problem
+from verification.interface.interface import Interface, Law
+from verification.problem.specification import Problem
+from verification.problem.specs import BodySpec
 from verification.problem.tables import ProblemError
 
 #: The matrix of a transfer is dense; more nodes would fill the memory.

@@ -1,4 +1,4 @@
-"""Two bodies along Gamma_c: on their meshes as they were assembled, and condensed, with the roles of the algorithm."""
+"""Two bodies condensed onto Gamma_c, with the roles of the algorithm: made from a problem, changed, swapped."""
 
 from __future__ import annotations
 
@@ -12,97 +12,29 @@ import numpy as np
 from fem1d2d.mesh import Floats
 from ndtheory.constants import take
 from ndtheory.number import Numeric
+from verification.dense import reciprocal_condition
+from verification.interface.assembly import held_bodies
 from verification.interface.body import Body, Condensed
-from verification.interface.interface import Interface
+from verification.interface.grid import Grid
+from verification.interface.interface import Interface, Law
 from verification.interface.joining import check_slopes
+from verification.interface.two_bodies import (
+    SingularRole,
+    TwoBodies,
+    nearly_incompressible,
+    reasons_outside,
+    warnings_of,
+)
 from verification.problem import Problem, Settings
-from verification.problem.specification import MOST_FRICTION
+from verification.problem.specs import MOST_FRICTION
 from verification.problem.tables import ProblemError
 from verification.value import Value, freeze
 
-#: Poisson ratio from which on linear triangles err visibly.  Two models against a mesh that does not lock (rectangles
-#: split by both diagonals, 72 cells along Gamma_c): at 0.48 the nodal pressures of the built-in split are off by 5 and
-#: 6 % (0.7 and 2.3 % at 0.3) and the force by 2 %, 7 to 11 % with 12 cells; at 0.499 the pressures by 40 and 11 %.
-LOCKING = 0.48
-
-
-class SingularRole(ProblemError):
-    """The body that would get the Neumann problem can move rigidly.
-
-    Parameters
-    ----------
-    source : str
-    body : {1, 2}
-    motions : int
-        How many rigid motions its supports leave.
-    """
-
-    def __init__(self, source: str, body: int, motions: int) -> None:
-        name, other = f"body{body}", 3 - body
-        free = f"{motions} free motion{'s' if motions > 1 else ''}"
-        super().__init__(
-            source,
-            name,
-            None,
-            f"{name} can move rigidly ({free}), so that its stiffness matrix in the Neumann problem of step I is"
-            f" singular: give body {other} the Neumann problem (iteration.neumann_body = {other}), fix or prescribe"
-            f" more sides of {name}, or use `ndtheory solve`",
-        )
-
+#: Condensation loses one digit of the least stiff motion of a body for each digit of 1/rcond: at 1e-13 three are left.
+LEAST_RCOND = 1e-13
 
 #: What is unknown of matrices and runs from elsewhere.
 UNITS = {"length": "any", "stress": "any"}
-
-
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class TwoBodies(Value):
-    """Two bodies on their meshes along Gamma_c; one of them may be rigid.
-
-    Attributes
-    ----------
-    body1, body2 : Body or None
-        None where rigid.
-    interface : Interface
-        What joins them, in the roles of the problem.
-    friction : Fraction
-        k, constant along Gamma_c.
-    problem : Problem
-        What they were made from.
-    """
-
-    body1: Body | None
-    body2: Body | None
-    interface: Interface
-    friction: Fraction
-    problem: Problem
-
-    @property
-    def summary(self) -> str:
-        return f"{self.problem.title}, {self.interface.contact.n} contact nodes"
-
-    @property
-    def neumann(self) -> Body | None:
-        """The body whose traces reach the contact grid by the transfer; None where it is rigid."""
-        return self.body2 if self.problem.contact_body == 1 else self.body1
-
-    def force_on(self, body: Body, force: Floats) -> Floats:
-        """Nodal forces on the contact grid as the grid of a body receives them."""
-        return self.interface.carry_back(force) if body is self.neumann else force
-
-    @property
-    def elastic(self) -> list[Body]:
-        """The bodies that are not rigid."""
-        return [body for body in (self.body1, self.body2) if body is not None]
-
-    @property
-    def outside(self) -> list[str]:
-        """Why the theorem does not speak of this problem; empty where it does."""
-        return _outside(self.interface, self.friction, [body.unknown for body in self.elastic])
-
-    @property
-    def warnings(self) -> list[str]:
-        """What a user should know before trusting the numbers."""
-        return _warnings(self.interface, self.friction, self.elastic)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -201,8 +133,6 @@ class ContactPair(Value):
         """
         if self.problem is None:
             raise ValueError("this pair is made from matrices: needed a problem, whose values can change")
-        from verification.interface.assembly import build  # it makes pairs
-
         law = None if {"law", "radius"} & values.keys() else self.interface.law
         return build(self.problem.changed(**values), law=law, like=self)
 
@@ -223,8 +153,6 @@ class ContactPair(Value):
         if self.contact.loose:
             raise SingularRole(self.source, self.contact_body, self.contact.motions.shape[1])
         if self.interface.transfer is not None and self.problem is not None:
-            from verification.interface.assembly import build  # it makes pairs
-
             return build(self.problem.swapped(), law=self.interface.law, like=self)
         if self.problem is not None and self.contact.grid.dimension == 2:
             bodies = [side.mesh_body for side in (self.body1, self.body2)]
@@ -302,49 +230,75 @@ class ContactPair(Value):
     @property
     def outside(self) -> list[str]:
         """Why the theorem does not speak of this pair; empty where it does."""
-        return _outside(self.interface, self.friction, [self.contact.free, self.neumann.free])
+        return reasons_outside(self.interface, self.friction, [self.contact.free, self.neumann.free])
 
     @property
     def nearly_incompressible(self) -> str:
         """The keys that hold a Poisson ratio of LOCKING or more, for a message; empty where none does."""
-        return _nearly_incompressible([side.body for side in (self.body1, self.body2) if side.body is not None])
+        return nearly_incompressible([side.body for side in (self.body1, self.body2) if side.body is not None])
 
     @property
     def warnings(self) -> list[str]:
         """What a user should know before trusting the numbers."""
         bodies = [side.body for side in (self.body1, self.body2) if side.body is not None]
-        return _warnings(self.interface, self.friction, bodies)
+        return warnings_of(self.interface, self.friction, bodies)
 
 
-def _outside(interface: Interface, friction: Fraction, free: list[Any]) -> list[str]:
-    reasons = []
-    if friction and interface.law is not None and interface.law.outside:
-        reasons.append(interface.law.outside)
-    if not all(components.all() for components in free):
-        reasons.append("a contact node is held tangentially: Gamma_u and Gamma_c must not meet")
-    return reasons
+def build(problem: Problem, *, law: Law | None = None, like: ContactPair | None = None) -> ContactPair:
+    """Two condensed bodies with roles, as the iteration and its constants need them.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its ``[iteration]`` gives the roles and the pair's settings.
+    law : Law, optional
+        A law of friction in place of the problem's.
+    like : ContactPair, optional
+        What it has condensed is shared by bodies that are the same, or differ in Young's modulus and loads alone.
+
+    Raises
+    ------
+    ProblemError
+        As :func:`verification.interface.assembly.discretise`, and where a body is rigid, the one with the Neumann
+        problem can move rigidly, or rounding leaves no digit of a stiffness on Gamma_c.
+    """
+    bodies, iteration = held_bodies(problem, law=law), problem.iteration
+    known = (None, None) if like is None else (like.body1, like.body2)
+    upward, grids = iteration.neumann_body == 2, (bodies.interface.contact, bodies.interface.neumann)
+    lower, upper = (
+        _condensed(body, grid, upward, side)
+        for body, grid, side in zip(bodies.elastic, grids if upward else grids[::-1], known, strict=True)
+    )
+    for name, side in (("body1", lower), ("body2", upper)):
+        _check_digits(problem, name, side)
+    return ContactPair(
+        contact=lower if upward else upper,
+        neumann=upper if upward else lower,
+        interface=bodies.interface,
+        friction=bodies.friction,
+        neumann_body=iteration.neumann_body,
+        settings=iteration.settings,
+        problem=problem,
+    )
 
 
-def _nearly_incompressible(bodies: list[Body]) -> str:
-    ratios = {f"{body.name}.poisson": body.poisson for body in bodies}
-    return " and ".join(f"{key} = {ratio:.12g}" for key, ratio in ratios.items() if ratio >= LOCKING)
-
-
-def _warnings(interface: Interface, friction: Fraction, bodies: list[Body]) -> list[str]:
-    found = []
-    near = _nearly_incompressible(bodies)
-    if near:
-        found.append(
-            f"{near}: near 1/2 linear triangles make a body too stiff and scatter the nodal"
-            f" pressures (Section 6 at {LOCKING:g}: 5 %, at 0.499: 40 %); needed a finer mesh, or a mesh file whose"
-            " rectangles are split by both diagonals"
+def _check_digits(problem: Problem, name: str, side: Condensed) -> None:
+    """Refuse a body so slender, or of cells so stretched, that rounding takes its stiffness in the softest motion."""
+    found = reciprocal_condition(side.stiffness, np.flatnonzero(side.free), side.motions)
+    if not found > LEAST_RCOND:
+        needed = (
+            f"its stiffness on Gamma_c is lost in rounding (1/condition {found:.1g}): needed more than {LEAST_RCOND:g},"
+            " by a body less slender or cells less stretched; `ndtheory solve` needs no such matrix"
         )
-    if interface.gap.min() < 0:
-        j = int(np.argmin(interface.gap))
-        found.append(
-            f"the initial gap is {interface.gap[j]:.4g} at x = {interface.contact.x[j]:g}: the bodies overlap as they"
-            " are drawn, and press each other apart before any load acts"
-        )
-    if friction and interface.law is not None and interface.contact.dimension == 2:
-        found += interface.law.warnings(interface)
-    return found
+        raise ProblemError(problem.source, name, None, needed)
+
+
+def _condensed(body: Body, grid: Grid, upward: bool, like: Condensed | None) -> Condensed:
+    """A body condensed, its normal components along y or against it; one like it may be condensed already."""
+    if like is None or like.body is None:
+        found = Condensed.of(body, grid)
+    elif body.equals(like.body):
+        found = like if grid.equals(like.grid) else replace(like, grid=grid)
+    else:
+        found = Condensed.of(body, grid, like.body)
+    return found if found.upward == upward else found.turned()

@@ -22,7 +22,7 @@ from fem1d2d.mesh import Floats
 from fem1d2d.proved import Ends
 from ndtheory import Number
 from ndtheory.intervals import Interval
-from verification.certificate.constants import Between, Proof, entries
+from verification.constants.proved import Between, Proof, entries
 from verification.interface.body import Condensed
 from verification.ledger.cases import NAMED
 from verification.ledger.draws import directions, uniform_piece

@@ -20,9 +20,9 @@ from fem1d2d import element
 from fem1d2d.exact import Shapes
 from fem1d2d.material import plane_strain
 from verification.algorithm.fixed_point import FixedPointMap
-from verification.certificate.exact_bodies import ExactInterface, exact_points
-from verification.interface.assembly import build
 from verification.interface.body import Condensed
+from verification.interface.exact_bodies import ExactInterface, exact_points
+from verification.interface.pair import build
 from verification.ledger.evidence import Evidence, Level
 from verification.problem.specification import Problem
 from verification.threads import one_thread

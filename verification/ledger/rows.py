@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 from ndtheory.statements import Statement, statements
 from verification.document import Document
-from verification.ledger.evidence import METHODS, Evidence, Level, Method, Source, Verdict, settle
+from verification.ledger.evidence import METHODS, Evidence, Level, Method, Verdict, settle
 from verification.ledger.record import recorded
 
 #: A statement cannot be proved from one of these.
@@ -144,7 +144,9 @@ def verify(
     chosen = [s for s in known.values() if not asked or s.id in asked]
     wanted = {s.id for s in chosen}
     evidence: dict[str, list[Evidence]] = {id: [] for id in wanted}
-    for source, gather in sources().items():
+    from verification.ledger.sources import SOURCES  # sympy and scipy come with it; records are read without
+
+    for source, gather in SOURCES.items():
         found = gather(wanted, level, partial(watch, source))
         for id, entries in found.items():
             evidence.setdefault(id, []).extend(entries)
@@ -156,52 +158,6 @@ def verify(
         verdict, method = settle(entries)
         rows.append(Row(statement=s, evidence=entries, verdict=verdict, method=method, recorded=recorded().get(s.id)))
     return Ledger(rows=tuple(_grounded(rows)), level=level, units={"length": "any", "stress": "any"})
-
-
-def sources() -> dict[str, Source]:
-    """What gathers evidence, by the name that a watcher is told."""
-    from verification.ledger.enclosures import enclosed
-    from verification.ledger.experiments import experiments
-    from verification.ledger.large_friction import large_friction
-    from verification.ledger.rational_pairs import in_rationals
-    from verification.ledger.solutions import solutions
-    from verification.ledger.worst import discrete
-
-    return {
-        "exact arithmetic and units": exact,
-        "inequalities on random problems": discrete,
-        "inequalities with enclosures": enclosed,
-        "equalities in rationals": in_rationals,
-        "large friction": large_friction,
-        "solutions": solutions,
-        "experiments of Section 6": experiments,
-    }
-
-
-def exact(ids: Collection[str], level: Level, watch: Callable[[float], None]) -> dict[str, list[Evidence]]:
-    """Symbolic evidence, and that of units: a ``Source``, the same at both levels."""
-    from ndtheory.symbolic import checks
-    from ndtheory.symbolic.dimension import consistent
-    from ndtheory.symbolic.symbols import DIMENSIONS
-
-    found: dict[str, list[Evidence]] = {}
-    chosen = [check for check in checks() if check.id in ids]
-    for i, check in enumerate(chosen):
-        entries = found.setdefault(check.id, [])
-        for of, form in check.forms.items():
-            decision = check.decide(form)
-            data = {"counterexample": dict(decision.counterexample)} if decision.counterexample else {}
-            # one case refutes; where it does not, it shows no more than that case
-            shown = check.one_case and decision.holds
-            method: Method = "reading" if shown else "symbolic"
-            text = f"One case, computed exactly.  {check.text}" if shown else check.text
-            entries.append(Evidence(method=method, of=of, holds=decision.holds, text=text, data=data))
-        for of, relations in check.units.items():
-            differ = consistent(relations, DIMENSIONS)
-            text = "both sides have one unit" if differ is None else f"units differ: {differ}"
-            entries.append(Evidence(method="dimension", of=of, holds=differ is None, text=text))
-        watch((i + 1) / len(chosen))
-    return found
 
 
 def _read(statement: Statement, found: Sequence[Evidence]) -> list[Evidence]:

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from verification.ledger.evidence import Evidence, Method
 from verification.ledger.rows import Ledger, Row
 
-#: By this our files are known (:mod:`verification.output.folder`).
+#: By this our files are known (:mod:`verification.output.files`).
 MARK = "<!-- ndtheory verify -->"
 
 SECTIONS = (

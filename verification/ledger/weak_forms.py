@@ -22,9 +22,8 @@ from verification.algorithm.fixed_point import FixedPointMap, iterate_at
 from verification.algorithm.iterate import Iterate
 from verification.algorithm.runs import Run, run
 from verification.contact import ContactError
-from verification.interface.assembly import build
 from verification.interface.body import Body, Condensed
-from verification.interface.pair import ContactPair
+from verification.interface.pair import ContactPair, build
 from verification.ledger.evidence import Level
 from verification.ledger.field_problems import PROBLEMS, drawn
 from verification.monolithic import solve

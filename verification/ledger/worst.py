@@ -15,9 +15,8 @@ from scipy.linalg import eigvalsh
 from fem1d2d.mesh import Floats
 from verification.bounds.losses import top
 from verification.constants import Measured, measure
-from verification.interface.assembly import build
 from verification.interface.body import Body
-from verification.interface.pair import ContactPair
+from verification.interface.pair import ContactPair, build
 from verification.ledger.cases import NAMED, problem
 from verification.ledger.differences import Differences, Setting
 from verification.ledger.draws import draw_pairs

@@ -7,9 +7,10 @@ from collections.abc import Iterable, Mapping
 from decimal import Decimal
 from typing import Any
 
-from verification.problem.reading import read_problem, takes_theta
-from verification.problem.specification import Problem
+from verification.problem.reading import read_problem
+from verification.problem.specs import ProblemSpec
 from verification.problem.tables import QUOTED, ProblemError
+from verification.problem.vocabulary import Vocabulary
 from verification.problem.writing import tables
 
 #: A key by its tables and its name.
@@ -19,7 +20,7 @@ Key = tuple[str, ...]
 _HERE = "value"
 
 
-def with_values(problem: Problem, values: Iterable[tuple[Key, Any]]) -> Problem:
+def with_values(problem: ProblemSpec, values: Iterable[tuple[Key, Any]], words: Vocabulary) -> ProblemSpec:
     """The problem with some keys of its file set, one after the other.
 
     A rule that takes its step from rho, set without a theta, comes with ``auto``.
@@ -29,7 +30,7 @@ def with_values(problem: Problem, values: Iterable[tuple[Key, Any]]) -> Problem:
     ProblemError
     """
     data, given = tables(problem), dict(values)
-    if not takes_theta(given.get(("iteration", "relaxation"))):
+    if not words.takes_theta(given.get(("iteration", "relaxation"))):
         given = {("iteration", "theta"): "auto"} | given
     for key, value in given.items():
         *parents, name = key
@@ -40,36 +41,35 @@ def with_values(problem: Problem, values: Iterable[tuple[Key, Any]]) -> Problem:
                 needed = f"unknown key; {'.'.join(key[:depth])} is no table"
                 raise ProblemError(problem.source, ".".join(key), None, needed)
         table[name] = value
-    return read_problem(data, problem.source)
+    return read_problem(data, problem.source, words)
 
 
-def with_each(problem: Problem, pairs: Mapping[str, Any], values: Mapping[Key, Any]) -> Problem:
-    """As :func:`with_values`, also with pairs of values for a key of both bodies; None leaves a key as it is.
+def given(values: Mapping[Key, Any], pairs: Mapping[str, Any], source: str) -> list[tuple[Key, Any]]:
+    """The keys that have a value, also those of both bodies by pairs of values; None leaves a key as it is.
 
     Raises
     ------
     ProblemError
     """
-    given = {key: value for key, value in values.items() if value is not None}
+    found = {key: value for key, value in values.items() if value is not None}
     for name, pair in pairs.items():
         if pair is None:
             continue
         if not isinstance(pair, (list, tuple)) or len(pair) != 2:
             needed = "needed two values, for body 1 and body 2 (None leaves a body as it is)"
-            raise ProblemError(problem.source, name, pair, needed)
-        given |= {(f"body{i}", name): value for i, value in enumerate(pair, 1) if value is not None}
-    return with_values(problem, given.items())
+            raise ProblemError(source, name, pair, needed)
+        found |= {(f"body{i}", name): value for i, value in enumerate(pair, 1) if value is not None}
+    return list(found.items())
 
 
-def with_keys(problem: Problem, values: Mapping[str, Any]) -> Problem:
-    """As :func:`with_values`, with dotted keys and TOML values as they are typed.
+def typed(values: Mapping[str, Any], source: str) -> list[tuple[Key, Any]]:
+    """Dotted keys and TOML values as they are typed.
 
     Raises
     ------
     ProblemError
     """
-    read = [(_key(name, problem.source), _value(name, value, problem.source)) for name, value in values.items()]
-    return with_values(problem, read)
+    return [(_key(name, source), _value(name, value, source)) for name, value in values.items()]
 
 
 def _key(name: str, source: str) -> Key:

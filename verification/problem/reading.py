@@ -1,18 +1,16 @@
-"""Problems read from TOML or a dictionary, and validated."""
+"""The tables of a problem file, validated: from nested dictionaries to the data of a problem."""
 
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Iterator, Mapping
-from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, Literal
 
 from ndtheory import HypothesisError
 from verification.problem.meshes import MeshFile, sha256_text
-from verification.problem.specification import (
+from verification.problem.specs import (
     INTERVAL_SIDES,
     MOST_CELLS,
     MOST_CONTRAST,
@@ -22,7 +20,7 @@ from verification.problem.specification import (
     Components,
     ContactSpec,
     IterationSpec,
-    Problem,
+    ProblemSpec,
     SidePart,
     Theta,
     read_theta,
@@ -40,75 +38,20 @@ from verification.problem.tables import (
     positive,
     several,
     text,
-    unreadable,
 )
-
-#: Largest size of a problem file.
-MOST_BYTES = 1_000_000
+from verification.problem.vocabulary import LawEntry, Vocabulary
 
 
-def load(path: Path | str) -> Problem:
-    """Read a problem file; decimals are read exactly.
+def read_problem(data: Mapping[str, Any], source: str, words: Vocabulary) -> ProblemSpec:
+    """Validate a nested dictionary with the keys of the problem file.
 
     Parameters
     ----------
-    path : path
-
-    Returns
-    -------
-    Problem
-
-    Raises
-    ------
-    ProblemError
-        Not a file, not readable, not TOML, or a value that does not fit.
-
-    Examples
-    --------
-    >>> load("nowhere.toml")
-    Traceback (most recent call last):
-        ...
-    verification.problem.tables.ProblemError: nowhere.toml: no such file
-    """
-    data = read_file(path)
-    if "grid" in data and "body1" not in data:
-        needed = f"needed a problem file, this is the file of a sweep; type ndtheory sweep {path}"
-        raise ProblemError(str(path), "", None, needed)
-    return read_problem(data, str(path))
-
-
-def read_file(path: Path | str) -> dict[str, Any]:
-    """The tables of a TOML file; decimals are read exactly.
-
-    Raises
-    ------
-    ProblemError
-        No such file, not readable, not TOML.
-    """
-    path = Path(path)
-    name = str(path)
-    why = unreadable(path, MOST_BYTES)
-    if why:
-        raise ProblemError(name, "", None, why)
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise ProblemError(name, "", None, f"cannot be read: {error.strerror}") from None
-    if not content.strip():
-        raise ProblemError(name, "", None, "the file is empty; `ndtheory example` prints one to start from")
-    try:
-        data = tomllib.loads(content.decode("utf-8-sig"), parse_float=Decimal)
-    except UnicodeDecodeError:
-        raise ProblemError(name, "", None, "a TOML text file is needed, this is not UTF-8 text") from None
-    except (tomllib.TOMLDecodeError, RecursionError, ArithmeticError, ValueError) as error:
-        raise ProblemError(
-            name, "", None, f"not TOML: {' '.join(str(error).split()) or type(error).__name__}"
-        ) from None
-    return data
-
-
-def read_problem(data: Mapping[str, Any], source: str) -> Problem:
-    """Validate a nested dictionary with the keys of the problem file.
+    data : mapping
+    source : str
+        What errors name.
+    words : Vocabulary
+        The laws and rules that the file may name.
 
     Raises
     ------
@@ -130,13 +73,13 @@ def read_problem(data: Mapping[str, Any], source: str) -> Problem:
     if not (body1.rigid or body2.rigid or 1 / MOST_CONTRAST <= body1.young / body2.young <= MOST_CONTRAST):
         needed = f"needed a modulus within {float(MOST_CONTRAST):g} times that of body1, {float(body1.young):g}"
         raise top.refuse("body2.young", body2.young, f'{needed}; for `solve`, shape = "rigid" makes an obstacle')
-    contact = _read_contact(top.table("contact"), dimension)
-    iteration = _read_iteration(top.table("iteration"))
+    contact = _read_contact(top.table("contact"), dimension, words.laws)
+    iteration = _read_iteration(top.table("iteration"), words)
     norm = top.table("norm")
     length = norm.take("length", positive, Fraction(1))
     norm.close()
     top.close()
-    return Problem(
+    return ProblemSpec(
         title=title,
         dimension=dimension,
         units=labels,
@@ -314,11 +257,9 @@ def _read_body(table: Table, dimension: int, source: str) -> BodySpec:
     )
 
 
-def _read_contact(table: Table, dimension: int) -> ContactSpec:
-    from verification.interface.friction import LAWS  # the laws know problems, not the other way round
-
+def _read_contact(table: Table, dimension: int, laws: Mapping[str, LawEntry]) -> ContactSpec:
     friction = table.take("friction", coefficient, Fraction(0))
-    law = table.take("law", choice(*LAWS), "nonlocal")
+    law = table.take("law", choice(*laws), "nonlocal")
     radius = table.take("radius", positive, None)
     interval = table.take("interval", ends, None)
     gap = table.take("gap", non_negative, Fraction(0))
@@ -328,11 +269,11 @@ def _read_contact(table: Table, dimension: int) -> ContactSpec:
             raise table.refuse("friction", friction, "needed 0: two bars have no friction")
         if interval:
             raise table.refuse("interval", list(interval), "two bars meet at a point; leave it out in one dimension")
-    elif friction and LAWS[law].needs_radius and radius is None:
+    elif friction and laws[law].needs_radius and radius is None:
         raise table.refuse(
             "radius",
             None,
-            f'this key is missing; the {LAWS[law].label} law needs the radius of its kernel (or law = "local")',
+            f'this key is missing; the {laws[law].label} law needs the radius of its kernel (or law = "local")',
         )
     return ContactSpec(interval=interval, friction=friction, law=law, radius=radius, gap=gap)
 
@@ -350,21 +291,11 @@ tolerance = number("a number with 0 < tolerance < 1", lambda v: 0 < v < 1)
 at_least_one = integer("a whole number >= 1", 1)
 
 
-def takes_theta(relaxation: Any) -> bool:
-    """Whether a given theta is used by the rule of a name; what is no name of a rule is refused elsewhere."""
-    from verification.algorithm.relaxation import RULES  # the one list of rules; it lies above, and is only asked
-
-    rule = RULES.get(relaxation) if isinstance(relaxation, str) else None
-    return rule is None or rule.takes_theta
-
-
-def _read_iteration(table: Table) -> IterationSpec:
-    from verification.algorithm.relaxation import RULES
-
-    relaxation: str = table.take("relaxation", choice(*RULES), "constant")
+def _read_iteration(table: Table, words: Vocabulary) -> IterationSpec:
+    relaxation: str = table.take("relaxation", choice(*words.rules), "constant")
     spec = IterationSpec(
         neumann_body=table.take("neumann_body", choice(1, 2), 2),
-        theta=table.take("theta", factor, Fraction(1, 2) if takes_theta(relaxation) else "auto"),
+        theta=table.take("theta", factor, Fraction(1, 2) if words.takes_theta(relaxation) else "auto"),
         relaxation=relaxation,
         tolerance=float(table.take("tolerance", tolerance, Fraction(1, 10**9))),
         max_iterations=table.take("max_iterations", at_least_one, 500),

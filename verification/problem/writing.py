@@ -12,13 +12,13 @@ from typing import Any
 from ndtheory import exact
 from ndtheory.number import LARGEST_EXPONENT
 from verification.problem.meshes import MeshFile
-from verification.problem.specification import BodySpec, Problem
+from verification.problem.specs import BodySpec, ProblemSpec
 
 #: Integers up to this size are doubles: readers of JSON agree on them.
 LARGEST_INTEGER = 2**53
 
 
-def tables(problem: Problem) -> dict[str, Any]:
+def tables(problem: ProblemSpec) -> dict[str, Any]:
     """The keys of the problem file with the values that their readers return.
 
     A key stands there where it has a value, its default or another; where there is none (no interval, no radius, no
@@ -114,7 +114,7 @@ def written_number(value: Fraction) -> int | float | str:
     return f"{numerator}e-{shift}/{denominator}e-{shift}"
 
 
-def fingerprint(problem: Problem) -> str:
+def fingerprint(problem: ProblemSpec) -> str:
     """SHA-256 of what changes a number: all but title, labels of units, source and the places of mesh files."""
     data = {key: value for key, value in tables(problem).items() if key not in ("title", "units")}
     for name in ("body1", "body2"):

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from verification.document import Document
 from verification.interface.fields import ContactFields
@@ -27,9 +27,6 @@ from verification.reproduce.claims import (
 from verification.reproduce.readings import READINGS, ModelReading
 from verification.sweeps.row import FAILED as FAILED  # the ledger takes it from here
 from verification.sweeps.sweep import sweep
-
-if TYPE_CHECKING:
-    from verification.figures import Figure
 
 FIGURES = tuple(CLAIMS)
 
@@ -163,12 +160,6 @@ class Reproduction(Document):
 
     def _of(self, reading: ModelReading) -> list[Outcome]:
         return [o for result in self.results for o in result.outcomes if o.reading == reading]
-
-    def plot(self) -> Figure:
-        """The figures, in the readings that come nearest."""
-        from verification.figures import draw_reproduction
-
-        return draw_reproduction(self)
 
     def content(self) -> dict[str, Any]:
         return {

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from verification.constants import ENERGY_NAMES, NAMES, Measured
+from verification.constants import Measured
+from verification.constants.measured import ENERGY_NAMES, NAMES
 from verification.interface import assembly
 from verification.sections.numbers import between, figures
 from verification.sections.parts import Note, Section, Sections, Shown, closing, following, of, section, table

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from verification.advice.from_moduli import Corners, ModuliRole, SeenModuli, excluded_from
 from verification.advice.roles import Advice
+from verification.advice.seen_moduli import Corners, ModuliRole, SeenModuli, excluded_from
 from verification.sections.advised import next_run, pasted, which_body
 from verification.sections.numbers import figures, near_one
 from verification.sections.parts import Cell, Facts, Section, Sections, Table, closing, section

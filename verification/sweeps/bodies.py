@@ -9,9 +9,8 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 from verification.constants import Measured, measure
-from verification.interface.assembly import build
-from verification.interface.friction import Law
-from verification.interface.pair import ContactPair
+from verification.interface.interface import Law
+from verification.interface.pair import ContactPair, build
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
 from verification.sweeps.lean import KnownPieces

@@ -12,7 +12,7 @@ from typing import Any
 from ndtheory import HypothesisError
 from verification.algorithm.relaxation import RULES, Rule
 from verification.interface.friction import LAWS
-from verification.problem.specification import MOST_FRICTION, read_theta
+from verification.problem.specs import MOST_FRICTION, read_theta
 from verification.problem.tables import ProblemError, Unfit, choice, integer, number, positive, several, show
 
 #: Most rows of a sweep: a typing error should not fill the memory.

@@ -14,7 +14,8 @@ import numpy as np
 
 from ndtheory import __version__
 from verification.algorithm.relaxation import RULES, Rule, rule_of
-from verification.interface.friction import LAWS, Given, Law
+from verification.interface.friction import LAWS, Given
+from verification.interface.interface import Law
 from verification.interface.pair import ContactPair
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError

@@ -13,7 +13,7 @@ from ndtheory import __version__
 from verification.document import Document
 from verification.interface.files import read_interface
 from verification.interface.pair import UNITS, ContactPair
-from verification.problem.reading import load
+from verification.problem.files import load
 from verification.problem.specification import Problem
 from verification.progress import Progress, silent
 from verification.spreadsheet import as_csv
@@ -21,10 +21,10 @@ from verification.sweeps.grid import SweepGrid
 from verification.sweeps.keeping import Kept
 from verification.sweeps.row import FAILED, Row
 from verification.sweeps.tally import Tally
-from verification.sweeps.workers import Work, work_of
+from verification.sweeps.workers import Work, alone, together
 
 if TYPE_CHECKING:
-    from verification.figures import Figure
+    from verification.document import Figure
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -101,9 +101,7 @@ class Sweep(Document):
         ValueError
             A column that there is not, or without numbers.
         """
-        from verification.figures import draw_sweep
-
-        return draw_sweep(self, x, y, curves)
+        return self.drawn(x=x, y=y, curves=curves)
 
     def to_csv(self) -> str:
         """The rows as CSV, under lines that begin with ``#`` and hold version, units and the problem as TOML.
@@ -123,6 +121,15 @@ class Sweep(Document):
             "rows": [dict(each) for each in self.rows],
             "reason": self.reason,
         }
+
+
+def work_of(jobs: int, dask: str | None = None) -> Work:
+    """Who makes rows: the workers of a dask scheduler, this process for one job, else processes of this machine."""
+    if dask is not None:
+        from verification.sweeps.cluster import on_cluster
+
+        return on_cluster(dask)
+    return alone if jobs == 1 else together(jobs)
 
 
 def sweep(
@@ -223,7 +230,7 @@ def sweep_grid(
     start, grid, store, fresh, retry, progress
         As :func:`sweep` has them.
     work : callable, optional
-        Who makes the rows, as :func:`verification.sweeps.workers.work_of` says; this process by default.
+        Who makes the rows, as :func:`work_of` says; this process by default.
     """
     wanted = list(grid.rows())
     done: dict[int, Row | bytes] = {}

@@ -10,7 +10,7 @@ from typing import Any
 
 from ndtheory.texts import did_you_mean
 from verification.problem.examples import example, examples
-from verification.problem.reading import load, read_file
+from verification.problem.files import load, read_file
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError, Table, Unfit, number, positive, text
 from verification.sweeps.grid import MOST_ROWS, SweepGrid

@@ -58,15 +58,6 @@ class Stopped(ProblemError):
         super().__init__(where, "", None, f"{why}; with a store the same command goes on from the rows that were done")
 
 
-def work_of(jobs: int, dask: str | None = None) -> Work:
-    """Who makes rows: the workers of a dask scheduler, this process for one job, else processes of this machine."""
-    if dask is not None:
-        from verification.sweeps.cluster import on_cluster  # it sends what stands here
-
-        return on_cluster(dask)
-    return alone if jobs == 1 else together(jobs)
-
-
 def alone(start: Problem | ContactPair, wanted: Sequence[tuple[int, Row]]) -> Generator[Placed, None, None]:
     """In this process, one after the other."""
     if why := unusable(start):

@@ -19,7 +19,7 @@ from verification.interface.grid import Grid
 from verification.interface.interface import Interface
 from verification.interface.pair import ContactPair
 from verification.problem import Problem
-from verification.problem.specification import BodySpec
+from verification.problem.specs import BodySpec
 
 
 def _on(grid: Grid, side: Condensed, **arrays: Floats) -> Condensed:

@@ -7,7 +7,7 @@ import pytest
 from ledger_calls import Whole
 
 from verification import ledger
-from verification.ledger import rows
+from verification.ledger import sources
 
 
 @pytest.fixture(scope="session")
@@ -24,9 +24,9 @@ def whole(evidence):
 
         return again
 
-    told, sources = [], {name: source(name) for name in rows.sources()}
+    told, gathered = [], {name: source(name) for name in sources.SOURCES}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(rows, "sources", lambda: sources)
+        patch.setattr(sources, "SOURCES", gathered)
         return Whole(ledger.verify(watch=lambda what, share: told.append((what, share))), told)
 
 

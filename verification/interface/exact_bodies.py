@@ -22,7 +22,8 @@ from verification.interface.friction import LAWS, Nonlocal
 from verification.interface.grid import Grid
 from verification.interface.interface import Interface
 from verification.interface.pair import ContactPair
-from verification.problem.specification import BodySpec, Problem
+from verification.problem.specification import Problem
+from verification.problem.specs import BodySpec
 
 
 class NotExact(ValueError):

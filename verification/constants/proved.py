@@ -27,12 +27,13 @@ from fem1d2d.loewner import Elimination, positive_definite
 from fem1d2d.mesh import Floats
 from fem1d2d.proved import Ends, enclose_largest, inverse, root
 from ndtheory import Number
-from verification.body_constants import BodyConstants
-from verification.certificate.exact_bodies import ExactBody, ExactInterface, NotExact
-from verification.constants import ENERGY_NAMES, FROM_MATRICES, NAMES, Measured, product
+from verification.constants.measured import ENERGY_NAMES, FROM_MATRICES, NAMES, Measured, product
+from verification.constants.of_body import BodyConstants
+from verification.constants.operators import needs_matrices
 from verification.interface.body import Name
-from verification.interface.pair import ContactPair, TwoBodies
-from verification.operators import needs_matrices
+from verification.interface.exact_bodies import ExactBody, ExactInterface, NotExact
+from verification.interface.pair import ContactPair
+from verification.interface.two_bodies import TwoBodies
 from verification.progress import Progress, silent
 from verification.threads import one_thread
 

@@ -31,7 +31,8 @@ from verification.interface import assembly
 from verification.interface.assembly import TooManyContactNodes, held_bodies
 from verification.interface.body import Body
 from verification.interface.build import pair_of
-from verification.interface.pair import ContactPair, TwoBodies
+from verification.interface.pair import ContactPair
+from verification.interface.two_bodies import TwoBodies
 from verification.problem import Problem, ProblemError, load
 from verification.progress import Progress, silent
 from verification.threads import one_thread

@@ -1,0 +1,67 @@
+"""Every import of a source: what it names, on which line, and whether it stands in a function or is for types alone."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from typing import Literal, NamedTuple
+
+COMPUTED = "a name computed at run time"
+
+Kind = Literal["module", "function", "types", "name"]
+
+
+class Import(NamedTuple):
+    """An import.
+
+    Attributes
+    ----------
+    line : int
+    name : str
+        Absolute; ``from a import b`` counts as a.b.
+    kind : {'module', 'function', 'types', 'name'}
+        Where it stands: in the module, in a function, under TYPE_CHECKING; or a call of ``import_module``.
+    """
+
+    line: int
+    name: str
+    kind: Kind
+
+
+def within(module: str, *owners: str) -> bool:
+    """True if a module is one of the owners, or in one of them."""
+    return any(module == owner or module.startswith(owner + ".") for owner in owners)
+
+
+def called(call: ast.Call) -> str:
+    """The last part of the name of what is called."""
+    return getattr(call.func, "attr", getattr(call.func, "id", ""))
+
+
+def written_name(call: ast.Call) -> str:
+    """The module a call of `import_module` names; of an f-string the packages before its first brace."""
+    name = call.args[0] if call.args else None
+    if isinstance(name, ast.JoinedStr) and "." in (text := getattr(name.values[0], "value", "")):
+        return text
+    return name.value if isinstance(name, ast.Constant) else COMPUTED
+
+
+def imports(module: str, tree: ast.AST, is_package: bool = False) -> Iterator[Import]:
+    """All that a source imports, wherever it is indented."""
+    waiting: list[tuple[ast.AST, Kind]] = [(tree, "module")]
+    while waiting:
+        node, kind = waiting.pop()
+        if isinstance(node, ast.Import):
+            yield from (Import(node.lineno, alias.name, kind) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            parents = module.split(".")[: None if is_package else -1]
+            start = parents[: len(parents) - node.level + 1] if node.level else []
+            base = [*start, *([node.module] if node.module else [])]
+            yield from (Import(node.lineno, ".".join([*base, alias.name]), kind) for alias in node.names)
+        elif isinstance(node, ast.Call) and called(node) in ("import_module", "__import__"):
+            yield Import(node.lineno, written_name(node), "name")
+        elif isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)):
+            kind = "function"
+        elif kind == "module" and isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
+            kind = "types"
+        waiting.extend((child, kind) for child in reversed(list(ast.iter_child_nodes(node))))

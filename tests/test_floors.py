@@ -1,0 +1,399 @@
+"""The floors of the house: what each module may import, how long a package may be, the table of docs/architecture.md.
+
+``python tests/test_floors.py`` writes the table into the page.
+"""
+
+import ast
+import graphlib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+from import_graph import Kind, imports, within
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("fem1d2d", "ndtheory", "verification")
+PAGE = ROOT / "docs" / "architecture.md"
+BEGIN, END = "<!-- floors: python tests/test_floors.py -->", "<!-- end of floors -->"
+
+#: From the ground upwards: floor -> package -> its modules.  A module imports from its own floor and from those below.
+FLOORS: dict[str, dict[str, str]] = {
+    "theory": {
+        "ndtheory.symbolic": (
+            "__init__ checks contraction dimension energy engine estimates further intervals mechanics "
+            "one_node one_step printed quotient symbols weak_form"
+        ),
+        "ndtheory": (
+            "__init__ bounds constants continuum energy energy_bounds energy_norms errors intervals moduli "
+            "number scalar segments statements strip texts wedges"
+        ),
+    },
+    "elastic bodies": {
+        "fem1d2d": (
+            "__init__ assembly condense element enclosed exact lifted loewner material mesh mesh_files "
+            "mesh_reader outline overlap pencil proved strain supports trace transfer"
+        )
+    },
+    "for all of verification": {
+        "verification": "dense interrupts progress spreadsheet threads value",
+        "verification.sections": "__init__ layout numbers parts",
+    },
+    "input": {
+        "verification.problem": (
+            "__init__ changes examples files meshes read_only reading specification specs tables toml "
+            "vocabulary writing"
+        )
+    },
+    "results, extras": {"verification": "document extras"},
+    "bodies": {
+        "verification.interface": (
+            "__init__ array_headers assembly body build checks exact_bodies fields files friction grid "
+            "interface joining matrices pair two_bodies"
+        ),
+        "verification.contact": "__init__ active_set existence kkt model step system",
+    },
+    "constants": {"verification.constants": "__init__ measured measuring of_body operators pencils proved"},
+    "iteration": {
+        "verification": "monolithic",
+        "verification.algorithm": (
+            "__init__ affine_piece ending fixed_point iterate linearisation rates reference relaxation runs start theta"
+        ),
+    },
+    "runs over grids": {
+        "verification.sweeps": (
+            "__init__ bodies cluster course export grid identity keeping lean row store sweep sweep_file tally workers"
+        )
+    },
+    "bounds, proofs": {
+        "verification.bounds": (
+            "__init__ bound calculated conditions energy exact interior_point lipschitz losses mirror model "
+            "multipliers neighbours pattern_search program region section5 semidefinite table trace_forms"
+        ),
+        "verification.certificate": "__init__ check claims continuum contraction description file_mesh",
+    },
+    "answers": {
+        "verification": "comparison verdicts",
+        "verification.advice": (
+            "__init__ best_theta columns ends from_logs from_matrices from_moduli from_runs "
+            "kratos_log log log_table logs matrix_files next_run pace readings role roles "
+            "runs_with_friction seen seen_matrices seen_moduli sides snippets transfer"
+        ),
+        "verification.reproduce": "__init__ claims experiments readings refutation",
+        "verification.ledger": (
+            "__init__ cases convergence differences draws enclosed_pairs enclosures evidence experiments "
+            "field_problems found inequalities large_friction moves rational_pairs reading record rows sheets "
+            "solutions sources weak_forms worst"
+        ),
+    },
+    "parts of results": {
+        "verification.sections": (
+            "advice advised bounds certificate comparison constants continuum ledger logs moduli of_results region "
+            "reproduction run setting sweep tex"
+        )
+    },
+    "figures": {
+        "verification.figures": (
+            "__init__ best_theta bodies factor of_results region reproduction residuals rules style sweep waterfall"
+        )
+    },
+    "files": {"verification.output": "__init__ files folder report"},
+    "names for users": {"verification": "__init__"},
+    "commands, test kit": {
+        "verification.cli": (
+            "__init__ advising calculator certifying console drawing failing forms ledger main matrices options "
+            "problems remedies reproducing shell sweeping typed"
+        ),
+        "verification.testing": "__init__ bounds laws properties rules steps strategies transforms",
+    },
+}
+
+#: Lines of each package at most, those of packages inside it apart: whoever needs more says here how many.
+BUDGET = {
+    "fem1d2d": 3300,
+    "ndtheory": 6100,
+    "verification": 1300,
+    "verification.advice": 4900,
+    "verification.algorithm": 2300,
+    "verification.bounds": 3400,
+    "verification.certificate": 1200,
+    "verification.cli": 2500,
+    "verification.constants": 1200,
+    "verification.contact": 1000,
+    "verification.figures": 900,
+    "verification.interface": 2900,
+    "verification.ledger": 4800,
+    "verification.output": 500,
+    "verification.problem": 1700,
+    "verification.reproduce": 800,
+    "verification.sections": 2000,
+    "verification.sweeps": 2600,
+    "verification.testing": 1700,
+}
+
+#: Imports by name that go upwards, and why.
+BY_NAME = {
+    ("verification.document", "verification.figures.of_results"): "a figure knows the types of results",
+    ("verification.document", "verification.sections.of_results"): "so does what is shown of them",
+    ("verification.problem.vocabulary", "verification.interface.friction"): "laws act on what is made from problems",
+    ("verification.problem.vocabulary", "verification.algorithm.relaxation"): "rules act on what is made from problems",
+}
+
+#: Imports inside functions: who, what, and why not at the top of the module.
+INSIDE = (
+    ("verification.cli", "verification", "the command starts without arrays"),
+    ("verification.cli", "ndtheory", "the command starts with what the calculator needs"),
+    ("verification.cli", "tomllib", "one command in ten reads a file"),
+    ("verification.cli.console", "rich", "only progress needs it"),
+    ("verification.cli.console", "ctypes", "Windows alone has what it calls"),
+    ("verification.bounds.bound", "numpy", "the calculator has bounds and no arrays"),
+    ("verification.bounds.semidefinite", "verification.bounds.lipschitz", "the calculator has bounds and no arrays"),
+    ("verification.ledger.rows", "verification.ledger.sources", "records are read without sympy, which takes a second"),
+    ("verification.output.folder", "verification.figures", "matplotlib is loaded once there is something to draw"),
+    ("verification.output.folder", "verification.output.report", "jinja2 is loaded once there is a comparison"),
+    ("verification.contact.step", "verification.contact.model", "cvxpy takes a second, and few steps need it"),
+    ("verification.contact.existence", "scipy.optimize", "heavy; only bodies that contact alone holds need it"),
+    ("verification.threads", "threadpoolctl", "ledger records are read without it"),
+    ("verification.sweeps.workers", "joblib", "heavy; only processes of one's own need it"),
+    ("verification.sweeps.workers", "multiprocessing", "heavy; only processes of one's own need it"),
+    ("verification.sweeps.sweep", "verification.sweeps.cluster", "asyncio comes with it, and few have a cluster"),
+    ("verification.sweeps.cluster", "distributed", "an extra"),
+    ("verification.sweeps.export", "xarray", "an extra"),
+    ("fem1d2d.mesh_reader", "meshio", "heavy; the format of the file decides"),
+    ("fem1d2d.mesh_reader", "resource", "Windows has none"),
+    ("fem1d2d.outline", "scipy.spatial", "heavy; only bodies drawn by files need it"),
+)
+
+
+class Edge(NamedTuple):
+    """An import of one module of ours by another, or of a foreign one."""
+
+    module: str
+    line: int
+    imported: str
+    kind: Kind
+
+
+def module_name(path: Path) -> str:
+    """The module in a file below the root."""
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+FILES = {module_name(path): path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))}
+
+
+def edges(sources: Mapping[str, str], packages: frozenset[str] = frozenset()) -> list[Edge]:
+    """Every import of some sources; of a name in a module of ours the module.
+
+    Parameters
+    ----------
+    sources : mapping from module to text
+    packages : frozenset of str
+        Which of them are packages, as relative imports need it.
+    """
+
+    def ours(name: str) -> str:
+        """The longest beginning of a name that is a module."""
+        while name not in sources and "." in name:
+            name = name.rpartition(".")[0]
+        return name
+
+    found = []
+    for module, text in sources.items():
+        for each in imports(module, ast.parse(text), module in packages):
+            target = ours(each.name) if each.name.split(".")[0] in PACKAGES else each.name
+            if target != module:
+                found.append(Edge(module, each.line, target, each.kind))
+    return found
+
+
+def levels(floors: Mapping[str, Mapping[str, str]]) -> dict[str, int]:
+    """The floor of each module by number, 0 for the ground.
+
+    Raises
+    ------
+    ValueError
+        A module that is listed twice.
+    """
+    found: dict[str, int] = {}
+    for number, packages in enumerate(floors.values()):
+        for package, names in packages.items():
+            for name in names.split():
+                module = package if name == "__init__" else f"{package}.{name}"
+                if module in found:
+                    raise ValueError(f"{module} stands on two floors")
+                found[module] = number
+    return found
+
+
+def upward(found: list[Edge], level: Mapping[str, int]) -> list[str]:
+    """The imports that go up; those by name are another list."""
+    return [
+        f"{edge.module}:{edge.line}: imports {edge.imported}, which stands above it"
+        for edge in found
+        if edge.kind != "name" and edge.imported in level and level[edge.imported] > level[edge.module]
+    ]
+
+
+def circle(found: list[Edge]) -> list[str]:
+    """Modules that import each other in a circle, however; empty where there is none."""
+    graph: dict[str, set[str]] = {}
+    for edge in found:
+        if edge.kind != "name":
+            graph.setdefault(edge.module, set()).add(edge.imported)
+    try:
+        graphlib.TopologicalSorter(graph).prepare()
+    except graphlib.CycleError as error:
+        return list(error.args[1])
+    return []
+
+
+def unlisted(found: list[Edge]) -> Iterator[str]:
+    """The imports inside functions that no line of INSIDE is about."""
+    for edge in found:
+        listed = any(within(edge.module, who) and within(edge.imported, what) for who, what, _ in INSIDE)
+        if edge.kind == "function" and not listed:
+            yield f"{edge.module}:{edge.line}: imports {edge.imported} inside a function"
+
+
+def table() -> str:
+    """The floors as the page shows them, the highest first."""
+    rows = ["| floor | packages and modules |", "|---|---|"]
+    for floor, packages in reversed(FLOORS.items()):
+        shown = []
+        for package, names in packages.items():
+            inside = ", ".join(f"`{name}`" for name in names.split() if name != "__init__")
+            shown.append(f"**{package}**: {inside}" if inside else f"**{package}**")
+        rows.append(f"| {floor} | {'<br>'.join(shown)} |")
+    return "\n".join(rows)
+
+
+def with_table(page: str) -> str:
+    """The page with the table of today."""
+    before, _, rest = page.partition(BEGIN)
+    _, _, after = rest.partition(END)
+    return f"{before}{BEGIN}\n{table()}\n{END}{after}"
+
+
+@pytest.fixture(scope="module")
+def ours() -> list[Edge]:
+    """The imports of the house."""
+    texts = {module: path.read_text("utf-8") for module, path in FILES.items()}
+    return edges(texts, frozenset(module for module, path in FILES.items() if path.name == "__init__.py"))
+
+
+def test_every_module_stands_on_exactly_one_floor():
+    assert set(levels(FLOORS)) == set(FILES)
+
+
+def test_no_import_goes_up(ours):
+    assert upward(ours, levels(FLOORS)) == []
+
+
+def test_no_import_closes_a_circle(ours):
+    assert circle(ours) == []
+
+
+def test_what_is_imported_by_name_is_listed_and_above(ours):
+    level = levels(FLOORS)
+    named = {(edge.module, edge.imported) for edge in ours if edge.kind == "name"}
+    assert named == set(BY_NAME)
+    assert [pair for pair in BY_NAME if level[pair[1]] <= level[pair[0]]] == []
+
+
+def test_imports_inside_functions_are_those_of_the_list(ours):
+    assert list(unlisted(ours)) == []
+
+
+def test_no_line_of_the_list_is_idle(ours):
+    inside = [edge for edge in ours if edge.kind == "function"]
+    idle = [who for who in INSIDE if not any(within(e.module, who[0]) and within(e.imported, who[1]) for e in inside)]
+    assert idle == []
+
+
+def test_no_package_is_longer_than_its_budget():
+    lines = dict.fromkeys(BUDGET, 0)
+    for module, path in FILES.items():
+        package = module if path.name == "__init__.py" else module.rpartition(".")[0]
+        owner = package if package.startswith("verification") else package.partition(".")[0]
+        lines[owner] = lines.get(owner, 0) + len(path.read_text("utf-8").splitlines())
+    assert set(lines) == set(BUDGET)
+    assert {package: count for package, count in lines.items() if count > BUDGET[package]} == {}
+
+
+def test_the_page_has_the_table_of_today():
+    page, written = PAGE.read_text("utf-8"), table()
+    assert all(f"`{module.rpartition('.')[2]}`" in written or f"**{module}**" in written for module in FILES)
+    assert page == with_table(page), "docs/architecture.md is behind: python tests/test_floors.py"
+
+
+# --- these tests find what they are for ---
+
+LOW, MIDDLE, HIGH = "verification.value", "verification.problem.specs", "verification.cli.main"
+PLANTED = {"ground": {"verification": "value", "verification.problem": "specs"}, "roof": {"verification.cli": "main"}}
+
+
+def planted(**texts: str) -> list[Edge]:
+    """The imports of three modules: nothing, unless a text is given for one of them."""
+    return edges({LOW: texts.get("low", ""), MIDDLE: texts.get("middle", ""), HIGH: texts.get("high", "")})
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "import verification.cli.main",
+        "from verification.cli.main import cli",
+        "from verification.cli import main",
+        "def f():\n    if True:\n        from verification.cli.main import cli",
+        "class A:\n    async def f(self):\n        import verification.cli.main as m",
+        "if TYPE_CHECKING:\n    from verification.cli.main import cli",
+        "from .cli import main",
+        "try:\n    from verification.cli import main\nexcept ImportError:\n    pass",
+    ],
+)
+def test_an_import_that_goes_up_is_found(text):
+    assert len(upward(planted(low=text), levels(PLANTED))) == 1
+    assert upward(planted(high=text.replace("cli.main", "value").replace("cli", "value")), levels(PLANTED)) == []
+
+
+@pytest.mark.parametrize(
+    "text", ["from {} import x", "def f():\n    from {} import x", "if TYPE_CHECKING:\n    import {}"]
+)
+def test_a_circle_on_one_floor_is_found_also_through_a_function_or_for_types(text):
+    one = planted(low=f"import {MIDDLE}")
+    assert circle(one) == upward(one, levels(PLANTED)) == []
+    both = planted(low=f"import {MIDDLE}", middle=text.format(LOW))
+    assert upward(both, levels(PLANTED)) == []
+    assert set(circle(both)) == {LOW, MIDDLE}
+
+
+def test_a_module_on_no_floor_and_one_on_two_are_found():
+    assert set(levels(PLANTED)) == {LOW, MIDDLE, HIGH}
+    assert set(levels({"roof": PLANTED["roof"]})) != {LOW, MIDDLE, HIGH}
+    with pytest.raises(ValueError, match=r"verification\.cli\.main stands on two floors"):
+        levels(PLANTED | {"attic": {"verification.cli": "main"}})
+
+
+def test_an_import_inside_a_function_needs_a_line_on_the_list():
+    assert list(unlisted(planted(low="def f():\n    import numpy")))
+    assert list(unlisted(planted(middle="def f():\n    from verification.value import Value")))
+    assert list(unlisted(planted(high="def f():\n    from verification.value import Value"))) == []
+    assert list(unlisted(planted(low="import numpy"))) == []
+
+
+def test_an_import_by_name_is_no_way_past_the_lists():
+    (edge,) = planted(low='def f():\n    return importlib.import_module("verification.cli.main").cli')
+    assert edge == Edge(LOW, 2, HIGH, "name")
+
+
+def test_a_page_that_is_behind_is_found():
+    page = f"before\n{BEGIN}\n| floor |\n{END}\nafter\n"
+    assert with_table(page) != page
+    assert with_table(with_table(page)) == with_table(page)
+    assert with_table(page).startswith("before\n")
+    assert with_table(page).endswith("\nafter\n")
+
+
+if __name__ == "__main__":
+    PAGE.write_text(with_table(PAGE.read_text("utf-8")), "utf-8")

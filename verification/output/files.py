@@ -1,0 +1,178 @@
+"""Writing files: only over our own, all of one result or none."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import tempfile
+from collections.abc import Callable, Collection, Iterator
+from pathlib import Path
+from typing import Literal
+
+from verification.document import Document
+from verification.interrupts import undisturbed
+from verification.problem.tables import ProblemError, unreadable
+
+try:
+    import fcntl
+
+    LOCKS = True
+except ImportError:  # Windows: what a killed process leaves stays there
+    LOCKS = False
+
+Kind = Literal["run", "solve", "compare", "verify", "reproduce"]
+
+_PICTURES = ("bodies.svg", "bodies.png", "residuals.svg", "residuals.png")
+
+_TABLES = ("contact.csv", "history.csv")
+
+#: The rows behind each figure of Section 6.
+_ROWS = ("fig5.csv", "fig10.csv", "fig11.csv", "fig12.csv")
+
+_MATRICES = ("interface.npz", "P.npz")
+
+#: What each command writes, beside the problem.
+FILES: dict[Kind, tuple[str, ...]] = {
+    "run": ("run.json", *_TABLES, *_MATRICES, *_PICTURES),
+    "solve": ("solve.json", *_TABLES[:1], *_MATRICES[1:], *_PICTURES[:2]),
+    "compare": ("compare.json", *_TABLES, *_MATRICES, *_PICTURES, "waterfall.svg", "waterfall.png", "report.html"),
+    "reproduce": ("reproduce.json", "reproduce.svg", "reproduce.png", *_ROWS),
+    "verify": ("ledger.json", "ledger.md", "errata.md", "verdicts.json"),
+}
+
+#: How a file of ours is told from somebody else's.
+MARKS = {
+    ".json": b'"schema": "ndtheory.',
+    ".svg": b"<dc:title>ndtheory</dc:title>",
+    ".png": b"Software\x00ndtheory",
+    ".html": b'name="generator" content="ndtheory ',
+    ".md": b"<!-- ndtheory verify -->",
+    ".csv": b"# ndtheory ",
+    ".nc": b"ndtheory sweep, version ",
+    ".npz": b"ndtheory.npy",
+    ".toml": b"# ndtheory: the problem as it was computed",
+}
+
+
+#: No file of ours is larger: reading another one to tell whose it is must end.
+MOST_BYTES = 500_000_000
+
+
+def check_ours(target: Path) -> None:
+    """Refuse to overwrite what is not ours.
+
+    Raises
+    ------
+    ProblemError
+    """
+    check_place(target)
+    if target.exists() and (unreadable(target, MOST_BYTES) or MARKS[target.suffix] not in target.read_bytes()):
+        raise ProblemError(str(target), "", None, "not written by this program; needed another folder or name (-o)")
+
+
+def check_place(target: Path) -> None:
+    """Refuse a name that a folder has."""
+    if target.is_dir():
+        raise ProblemError(str(target), "", None, "this is a folder: needed another folder or name (-o)")
+
+
+#: Files are written into a folder of such a name before they take their places.
+ROOM = ".ndtheory-writing-"
+
+
+@contextlib.contextmanager
+def staged(folder: Path, stale: Collection[str] = (), *, shown: Path | None = None) -> Iterator[Path]:
+    """A folder to write into, whose files take their places together at the end; after an error none does.
+
+    What is to be replaced goes before anything comes: a process that is killed in between leaves files of one run, some
+    of which are missing, never files of two.  Ctrl-C keeps the documents where there is nothing to replace.
+
+    Parameters
+    ----------
+    folder : Path
+        Where the files belong.
+    stale : collection of str
+        Names of the files of an earlier run, which go when the others come.
+    shown : Path, optional
+        What an error names; the folder by default.
+
+    Raises
+    ------
+    ProblemError
+    """
+    try:
+        with contextlib.ExitStack() as stack:
+            with _held(folder):
+                _sweep(folder)
+                room = Path(tempfile.mkdtemp(prefix=ROOM, dir=folder))
+                stack.callback(_remove, room)
+                stack.enter_context(_held(room))
+            try:
+                yield room
+            except KeyboardInterrupt:
+                if not any((folder / name).exists() for name in stale):
+                    _place(room, folder, "*.json")
+                raise
+            _place(room, folder, "*", stale)
+    except OSError as error:
+        raise ProblemError(str(shown or folder), "", None, f"cannot be written: {error.strerror}") from None
+
+
+def _place(room: Path, folder: Path, pattern: str, stale: Collection[str] = ()) -> None:
+    """Move files where they belong."""
+    names = sorted(path.name for path in room.glob(pattern))
+    with _held(folder), undisturbed():
+        for name in {*stale, *names}:
+            (folder / name).unlink(missing_ok=True)
+        for name in names:
+            (room / name).replace(folder / name)
+
+
+@contextlib.contextmanager
+def _held(folder: Path) -> Iterator[None]:
+    """Hold a folder against other processes of this program; when a process ends the system lets go of it."""
+    if not LOCKS:
+        yield
+        return
+    number = os.open(folder, os.O_RDONLY)
+    try:
+        with contextlib.suppress(OSError):  # some file systems have no locks
+            fcntl.flock(number, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(number)
+
+
+def _sweep(folder: Path) -> None:
+    """Remove what a killed process left: folders of ours that nobody holds, with nothing else in them."""
+    if not LOCKS:
+        return
+    for room in folder.glob(ROOM + "*"):
+        with contextlib.suppress(OSError):  # held, or no folder
+            number = os.open(room, os.O_RDONLY | os.O_DIRECTORY)
+            try:
+                fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                if all(path.is_file() and path.suffix in MARKS for path in room.iterdir()):
+                    _remove(room)
+            finally:
+                os.close(number)
+
+
+def _remove(room: Path) -> None:
+    """Remove a folder with the files in it."""
+    with contextlib.suppress(OSError):
+        for path in room.iterdir():
+            path.unlink()
+        room.rmdir()
+
+
+def writing(found: Document, target: Path | None) -> Callable[[], None] | None:
+    """What writes a document into a file; None where no name was given."""
+    if target is None:
+        return None
+
+    def write() -> None:
+        with staged(target.parent, shown=target) as room:
+            (room / target.name).write_text(found.to_json(), encoding="utf-8")
+
+    return write

@@ -1,0 +1,200 @@
+"""What a problem consists of: two bodies, their contact, the iteration and the norm, as plain data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from fractions import Fraction
+from typing import Any, Literal
+
+from ndtheory import HypothesisError, relaxation_factor
+from verification.problem.meshes import MeshFile
+from verification.problem.read_only import ReadOnly
+
+#: A displacement or a force by component; None leaves a displacement component free.
+Components = tuple[Fraction | None, ...]
+
+#: A relaxation factor, or the one that theory chooses.
+Theta = Fraction | Literal["auto"]
+
+RECTANGLE_SIDES = ("left", "right", "bottom", "top")
+INTERVAL_SIDES = ("left", "right")
+
+#: Largest number of cells of a body; a typing error should not fill the memory.
+MOST_CELLS = 250_000
+
+#: Largest ratio of the two moduli: at 1e60 the bounds of Section 5, with high powers of M C_R / m, overflow a double.
+MOST_CONTRAST = Fraction(10**30)
+
+#: Largest coefficient of friction; larger ones differ from it by nothing but overflow, as all contact sticks.
+MOST_FRICTION = Fraction(10**9)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SidePart:
+    """A part of a side of a body, between two positions along an axis.
+
+    Attributes
+    ----------
+    side : str
+    axis : {'x', 'y'}
+    ends : pair of Fraction
+        Unit of length; the part has the edges of the side that lie between them.
+    """
+
+    side: str
+    axis: Literal["x", "y"]
+    ends: tuple[Fraction, Fraction]
+
+
+@dataclass(frozen=True, kw_only=True)
+class BodySpec:
+    """A body as the problem file describes it; lengths and stresses in the file's units.
+
+    Attributes
+    ----------
+    shape : {'rectangle', 'interval', 'mesh', 'rigid'}
+        A rigid body is an obstacle: of the rest it has x and y at most.
+    x, y : pair of Fraction or None
+    cells : tuple of int or None
+    mesh : MeshFile or None
+    young, poisson : Fraction
+        E in stress; Poisson's ratio is 0 for a bar.  Both 0 where rigid.
+    parts : read-only mapping from name to SidePart
+        Parts of sides that are named like sides.
+    fixed : tuple of str
+    prescribed, traction : read-only mapping from side to components
+        Displacement (length; None: free) and force per area (stress).
+    body_force : tuple of Fraction
+        Force per volume.
+    """
+
+    shape: Literal["rectangle", "interval", "mesh", "rigid"]
+    x: tuple[Fraction, Fraction] | None = None
+    y: tuple[Fraction, Fraction] | None = None
+    cells: tuple[int, ...] | None = None
+    mesh: MeshFile | None = None
+    young: Fraction = Fraction(0)
+    poisson: Fraction = Fraction(0)
+    parts: Mapping[str, SidePart] = field(default_factory=ReadOnly)
+    fixed: tuple[str, ...] = ()
+    prescribed: Mapping[str, Components] = field(default_factory=ReadOnly)
+    traction: Mapping[str, tuple[Fraction, ...]] = field(default_factory=ReadOnly)
+    body_force: tuple[Fraction, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("parts", "prescribed", "traction"):
+            object.__setattr__(self, name, ReadOnly(getattr(self, name)))
+
+    @property
+    def rigid(self) -> bool:
+        """Whether the body is an obstacle."""
+        return self.shape == "rigid"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactSpec:
+    """Gamma_c, the friction law and the initial distance.
+
+    Attributes
+    ----------
+    interval : pair of Fraction or None
+        Ends of Gamma_c along x; None: the overlap of the two surfaces.
+    friction : Fraction
+        k, constant along Gamma_c.
+    law : str
+        One of :data:`verification.interface.friction.LAWS`.
+    radius : Fraction or None
+        Radius r of the hat kernel (length); None with a law that has none or without friction.
+    gap : Fraction
+        Initial distance (length).
+    """
+
+    interval: tuple[Fraction, Fraction] | None
+    friction: Fraction
+    law: str
+    radius: Fraction | None
+    gap: Fraction
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """How a run goes: its relaxation and when it ends.
+
+    Attributes
+    ----------
+    theta : Fraction or 'auto'
+        ``auto``: the proved theta; the predicted one where nothing is proved or the proved one is more than twice as
+        slow.  Momentum takes its step from rho: ``auto`` unless the file has a theta, which is then not used.
+    relaxation : str
+        One of :data:`verification.algorithm.relaxation.RULES`; beside ``constant`` outside the theorem.
+    tolerance : float
+        The run ends when ``|||T g - g||| <= tolerance |||T g|||`` in the norm (5.21), with the largest T g so far.
+    max_iterations : int
+    """
+
+    theta: Theta = Fraction(1, 2)
+    relaxation: str = "constant"
+    tolerance: float = 1e-9
+    max_iterations: int = 500
+
+
+@dataclass(frozen=True, kw_only=True)
+class IterationSpec(Settings):
+    """The table ``[iteration]``.
+
+    Attributes
+    ----------
+    neumann_body : {1, 2}
+        Who gets the linear problem of step I: 2 as in Section 3, 1 as in Section 6.
+    """
+
+    neumann_body: Literal[1, 2] = 2
+
+    @property
+    def settings(self) -> Settings:
+        """The table without the roles."""
+        return Settings(**{field.name: getattr(self, field.name) for field in fields(Settings)})
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class ProblemSpec:
+    """The tables of a problem file, each key with its value.
+
+    Attributes
+    ----------
+    source : str
+        The file it came from, or ``<dict>``; errors name it.
+    units : read-only mapping
+        Labels ``length`` and ``stress``.
+    length : Fraction
+        L of the norm ``|v|^2/L^2 + |grad v|^2``.
+    """
+
+    title: str
+    dimension: Literal[1, 2]
+    units: Mapping[str, str]
+    body1: BodySpec
+    body2: BodySpec
+    contact: ContactSpec
+    iteration: IterationSpec
+    length: Fraction
+    source: str = field(default="<dict>", compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "units", ReadOnly(self.units))
+
+
+def read_theta(value: Any) -> Theta:
+    """A relaxation factor, or "auto".
+
+    Raises
+    ------
+    HypothesisError
+    """
+    if value == "auto":
+        return "auto"
+    try:
+        return relaxation_factor(value)
+    except HypothesisError as error:
+        raise HypothesisError(error.key, error.value, f'{error.needed}, or "auto"') from None
