@@ -7,7 +7,7 @@ Every bound, from the printed theorem to the semidefinite program, derives from 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -24,6 +24,9 @@ LARGEST = 100
 
 #: How many friction values trace the border of a region.
 TRACED = 60
+
+#: Why a bound that was left out has no result.
+NOT_ASKED = "not asked for"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,8 +127,8 @@ class BoundResult:
         Why there is no factor.
     not_computed : str
         Why nothing was worked out; empty where it was.
-    detail : Bounds, EnergyBounds, Semidefinite or None
-        All that this bound knows, for its own document.
+    detail : object, optional
+        All that this bound knows beyond these attributes; its ``to_dict`` is the document then.
     """
 
     name: str
@@ -139,6 +142,16 @@ class BoundResult:
     why: str = ""
     not_computed: str = ""
     detail: Any = None
+
+    @property
+    def asked(self) -> bool:
+        """True if the bound was not left out."""
+        return self.not_computed != NOT_ASKED
+
+    @property
+    def worked_out(self) -> bool:
+        """True if there is something to show of the bound, be it only why it has no conclusion."""
+        return self.detail is not None or not self.not_computed
 
     @property
     def level(self) -> Level:
@@ -161,8 +174,27 @@ class BoundResult:
 
     def to_dict(self) -> dict[str, Any] | None:
         """The bound's own document; None where nothing was worked out."""
-        document: dict[str, Any] | None = None if self.detail is None else self.detail.to_dict()
-        return document
+        if not self.worked_out:
+            return None
+        if self.detail is not None:
+            document: dict[str, Any] = self.detail.to_dict()
+            return document
+        number = lambda value: None if value is None else value.to_dict()
+        concludes = "contraction" if self.factor is not None else "no conclusion"
+        found = {
+            "theta": self.theta,
+            "verdict": None if self.theta is None else concludes,
+            "factor": number(self.factor),
+            "one_minus_factor": number(self.one_minus_factor),
+            "interval": None if self.interval is None else list(self.interval),
+            "every_small_theta": number(self.friction.every),
+            "some_theta": number(self.friction.some),
+            "threshold_on": self.friction.on,
+        }
+        why = dict.fromkeys(found, "not worked out")
+        why |= dict.fromkeys(("factor", "one_minus_factor"), self.why or "no theta was given")
+        why |= dict.fromkeys(("theta", "verdict"), self.why or "no theta was given")
+        return found | {"reason": {name: why[name] for name, value in found.items() if value is None}}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -210,6 +242,10 @@ class Bound(ABC):
         Whether it follows from a few constants, without the matrices of a pair.
     attained : bool
         Whether there are pairs with a step as long as it says: :mod:`verification.testing` then looks for one.
+    of_unit : bool
+        Whether its numbers depend on the unit of stress, which is then shown beside them.
+    apart : bool
+        Whether the document of a comparison has it under its own name alone, not among ``bounds.editions``.
     """
 
     name: ClassVar[str]
@@ -221,6 +257,8 @@ class Bound(ABC):
     finding: ClassVar[bool] = False
     calculated: ClassVar[bool] = True
     attained: ClassVar[bool] = False
+    of_unit: ClassVar[bool] = False
+    apart: ClassVar[bool] = False
 
     @abstractmethod
     def evaluate(self, subject: Subject, theta: Any = None, *, progress: Progress = silent) -> BoundResult:
@@ -253,6 +291,13 @@ class Bound(ABC):
         interval = lambda k: self.evaluate(subject.at(k)).interval
         return trace(interval, every=found.friction.every.value, some=found.friction.some.value)
 
+    def objects(self, result: BoundResult, measured: Measured) -> dict[str, dict[str, Any] | None]:
+        """The objects that the document of a comparison has of this bound beside ``bounds``, by their keys.
+
+        An object is None where the bound was not worked out; the document then says why.
+        """
+        return {self.name: result.to_dict()} if self.apart else {}
+
     def absent(self, why: str) -> BoundResult:
         """The result where nothing was worked out."""
         return BoundResult(name=self.name, proved=False, not_computed=why)
@@ -282,6 +327,6 @@ def trace(interval: Callable[[float], tuple[float, float] | None], *, every: flo
     return Region(k=tuple(k for k, _ in kept), theta=tuple(ends for _, ends in kept), every=every, some=some)
 
 
-def by_name(bounds: Iterable[Bound]) -> Mapping[str, Bound]:
+def by_name(bounds: Iterable[Bound]) -> dict[str, Bound]:
     """Bounds by name, in their order."""
     return {bound.name: bound for bound in bounds}

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ndtheory import evaluate_energy
 from ndtheory.number import weakest
 from verification.bounds.bound import Bound, BoundResult, Subject, Thresholds, why_not
 from verification.progress import Progress, silent
+
+if TYPE_CHECKING:
+    from verification.constants import Measured
 
 
 class Energy(Bound):
@@ -41,3 +44,21 @@ class Energy(Bound):
             why=why,
             detail=found,
         )
+
+    def objects(self, result: BoundResult, measured: Measured) -> dict[str, dict[str, Any] | None]:
+        """Its document with both rho and both thresholds on k."""
+        document = result.to_dict()
+        if document is None:
+            return {self.name: None}
+        threshold = measured.friction_threshold
+        if threshold is None:
+            document["reason"] |= dict.fromkeys(("friction_threshold", "friction_limit"), measured.why_no_threshold)
+        number = lambda value: None if value is None else value.to_dict()
+        document |= {
+            "rho": number(measured.rho_max),
+            "rho_normal": number(measured.rho_normal),
+            "rho_at_work": document["rho"],
+            "friction_threshold": number(threshold),
+            "friction_limit": number(measured.friction_limit),
+        }
+        return {self.name: document}

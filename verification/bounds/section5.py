@@ -52,7 +52,7 @@ class Printed(Section5):
 
     name, words, edition = "printed", "the theorem as printed", PRINTED
     colour, dashes, fill, hatch = "#555555", ":", "#555555", "xx"
-    finding = True
+    finding = of_unit = True
 
     def _unit(self, subject: Subject) -> str:
         return "" if subject.measured is None else f" (in {subject.measured.units['stress']})"
