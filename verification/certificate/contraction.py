@@ -18,7 +18,7 @@ from verification.bounds.bound import Subject
 from verification.bounds.program import LMIError
 from verification.bounds.table import BOUNDS
 from verification.certificate.claims import NOT_CONFIRMED, Claims, NoCertificate, written
-from verification.certificate.description import describe
+from verification.certificate.description import describe, same
 from verification.constants import Measured, measure
 from verification.document import Document
 from verification.interface.assembly import build
@@ -229,7 +229,7 @@ def check_again(document: Any, problem: Problem | None = None) -> Checked:
         why=why,
         words=words,
         sha256=found,
-        same=None if problem is None else describe(problem) == document["discrete"],
+        same=None if problem is None else same(describe(problem), document["discrete"]),
     )
 
 

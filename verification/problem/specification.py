@@ -258,9 +258,9 @@ class Problem:
         """SHA-256, in hexadecimal digits, of what changes a number.
 
         Left out are title, labels of units, source, the places of mesh files (their content counts) and the order of
-        sides.
+        sides.  It outlives releases: a key that the problem file gets later counts only where it has no default.
         """
-        from verification.problem.writing import fingerprint
+        from verification.problem.digest import fingerprint
 
         return fingerprint(self)
 

@@ -1,9 +1,7 @@
-"""A problem as the dictionary of its file, exactly; and what tells two problems apart."""
+"""A problem as the dictionary of its file, exactly."""
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Mapping
 from decimal import Decimal
 from fractions import Fraction
@@ -112,16 +110,3 @@ def written_number(value: Fraction) -> int | float | str:
     if max(numerator.adjusted(), denominator.adjusted()) <= LARGEST_EXPONENT:  # what is read back as it stands
         return f"{numerator}/{denominator}"
     return f"{numerator}e-{shift}/{denominator}e-{shift}"
-
-
-def fingerprint(problem: Problem) -> str:
-    """SHA-256 of what changes a number: all but title, labels of units, source and the places of mesh files."""
-    data = {key: value for key, value in tables(problem).items() if key not in ("title", "units")}
-    for name in ("body1", "body2"):
-        body = data[name]
-        if "mesh" in body:
-            body["mesh"] = body["mesh"].sha256
-        if "fixed" in body:
-            body["fixed"] = tuple(sorted(body["fixed"]))
-    text = json.dumps(plain(data), sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(text.encode("ascii")).hexdigest()
