@@ -16,6 +16,8 @@ from ndtheory.number import Level
 from verification.progress import Progress, silent
 
 if TYPE_CHECKING:
+    from verification.bounds.exact import Enclosure
+    from verification.bounds.multipliers import QuadraticForms
     from verification.constants import Measured
     from verification.interface.pair import ContactPair
 
@@ -246,6 +248,9 @@ class Bound(ABC):
         Whether its numbers depend on the unit of stress, which is then shown beside them.
     apart : bool
         Whether the document of a comparison has it under its own name alone, not among ``bounds.editions``.
+    certifies : bool
+        Whether :func:`verification.certify` takes its factor: it is proved by multipliers that :meth:`enclose` returns,
+        or by those of the theorem in energy norms.
     """
 
     name: ClassVar[str]
@@ -259,6 +264,7 @@ class Bound(ABC):
     attained: ClassVar[bool] = False
     of_unit: ClassVar[bool] = False
     apart: ClassVar[bool] = False
+    certifies: ClassVar[bool] = False
 
     @abstractmethod
     def evaluate(self, subject: Subject, theta: Any = None, *, progress: Progress = silent) -> BoundResult:
@@ -290,6 +296,15 @@ class Bound(ABC):
             raise NotComputed(found.not_computed or "needed a law of friction to vary k")
         interval = lambda k: self.evaluate(subject.at(k)).interval
         return trace(interval, every=found.friction.every.value, some=found.friction.some.value)
+
+    def enclose(self, pair: ContactPair, forms: QuadraticForms, theta: float) -> Enclosure | None:
+        """Enclose the factor by multipliers of this bound's own, for a certificate; None where it has none.
+
+        Raises
+        ------
+        LMIError, ValueError
+        """
+        return None
 
     def objects(self, result: BoundResult, measured: Measured) -> dict[str, dict[str, Any] | None]:
         """The objects that the document of a comparison has of this bound beside ``bounds``, by their keys.

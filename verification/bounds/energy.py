@@ -19,6 +19,7 @@ class Energy(Bound):
     name, words = "energy", "the theorem in energy norms"
     colour, dashes, fill, hatch = "#00724F", (0, (7, 2)), "#8FD3B6", ".."
     attained = True  # without friction
+    certifies = True
 
     def evaluate(self, subject: Subject, theta: Any = None, *, progress: Progress = silent) -> BoundResult:
         if subject.energy is None:

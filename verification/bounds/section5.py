@@ -63,3 +63,4 @@ class Repaired(Section5):
 
     name, words, edition = "repaired", "the theorem repaired", REPAIRED
     colour, dashes, fill, hatch = "#0B5A94", (0, (5, 1, 1, 1, 1, 1)), "#4A90C4", "//"
+    certifies = True

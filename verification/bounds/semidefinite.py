@@ -15,7 +15,8 @@ from verification.progress import Progress, silent
 from verification.value import freeze
 
 if TYPE_CHECKING:
-    from verification.bounds.multipliers import Certified
+    from verification.bounds.exact import Enclosure
+    from verification.bounds.multipliers import Certified, QuadraticForms
     from verification.bounds.program import Weights
     from verification.constants import Measured
     from verification.interface.pair import ContactPair
@@ -247,7 +248,7 @@ class SemidefiniteBound(Bound):
     colour, dashes, fill = "#8A5A00", "-.", "#FFF3B0"
     calculated = False
     attained = True  # without friction
-    apart = True
+    apart = certifies = True
 
     def evaluate(self, subject: Subject, theta: Any = None, *, progress: Progress = silent) -> BoundResult:
         if theta is None or subject.pair is None or subject.measured is None:
@@ -280,6 +281,11 @@ class SemidefiniteBound(Bound):
             not_computed=found.gave_up if factor is None else "",
             detail=found,
         )
+
+    def enclose(self, pair: ContactPair, forms: QuadraticForms, theta: float) -> Enclosure:
+        from verification.bounds.exact import enclose
+
+        return enclose(pair, forms, theta, gap=float("inf"), programs=1)
 
     def region(self, subject: Subject, *, progress: Progress = silent) -> Region:
         import numpy as np

@@ -14,6 +14,11 @@ from verification.bounds.semidefinite import SemidefiniteBound
 BOUNDS = by_name((Printed(), Repaired(), Energy(), SemidefiniteBound()))
 
 
+def certifying() -> tuple[str, ...]:
+    """The names of the bounds that can propose a certificate, the strongest last."""
+    return tuple(name for name, bound in BOUNDS.items() if bound.certifies)
+
+
 def chosen(names: Sequence[str] | str | None) -> tuple[str, ...]:
     """The names of some bounds, in the order of :data:`BOUNDS`.
 

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import click
 
-from ndtheory import Bounds, Constants, EnergyBounds, EnergyConstants, HypothesisError, relaxation_factor
+from ndtheory import EDITIONS, Bounds, Constants, EnergyBounds, EnergyConstants, HypothesisError, relaxation_factor
 from ndtheory.constants import take
 from ndtheory.number import Level
 from verification.bounds.bound import BoundResult, Subject, bounded
@@ -51,7 +51,7 @@ class BoundsDocument(Document):
 @click.option("--theta", "theta", metavar="NUMBER", help="Relaxation factor, 0 < theta < 1.")
 @click.option(
     "--edition",
-    type=click.Choice(["printed", "repaired", "both"]),
+    type=click.Choice([*(edition.name for edition in EDITIONS), "both"]),
     default="both",
     show_default=True,
     help="Editions of Section 5.",
