@@ -10,7 +10,7 @@ import pytest
 
 import verification as vf
 from verification.certificate import contraction, description
-from verification.problem import changes, digest, reading, writing
+from verification.problem import changes, digest, reading
 from verification.problem.specification import ContactSpec, Problem, Settings
 from verification.problem.tables import non_negative
 from verification.sweeps.grid import SweepGrid
@@ -36,7 +36,7 @@ class LaterProblem(Problem):
 
 def later_contact(monkeypatch):
     """Put `contact.adhesion` into the problem file, 0 by default."""
-    read, tables = reading.read_problem, writing.tables
+    read = reading.read_problem
 
     def read_later(data, *given):
         contact = dict(data.get("contact", {}))
@@ -44,14 +44,8 @@ def later_contact(monkeypatch):
         found = read({**data, "contact": contact}, *given)
         return replace(found, contact=LaterContact(**vars(found.contact), adhesion=adhesion))
 
-    def later_tables(problem):
-        data = tables(problem)
-        return data | {"contact": data["contact"] | {"adhesion": problem.contact.adhesion}}
-
     for module in (reading, changes, digest):
         monkeypatch.setattr(module, "read_problem", read_later)
-    for module in (writing, changes, digest):
-        monkeypatch.setattr(module, "tables", later_tables)
 
 
 def later_table(monkeypatch):

@@ -22,29 +22,14 @@ def tables(problem: Problem) -> dict[str, Any]:
     A key stands there where it has a value, its default or another; where there is none (no interval, no radius, no
     sides) it is left out.  Keys come in the order of the built-in files.
     """
-    contact, iteration = problem.contact, problem.iteration
     return {
         "title": problem.title,
         "dimension": problem.dimension,
         "units": dict(problem.units),
         "body1": _body(problem.body1),
         "body2": _body(problem.body2),
-        "contact": _present(
-            {
-                "interval": contact.interval,
-                "friction": contact.friction,
-                "law": contact.law,
-                "radius": contact.radius,
-                "gap": contact.gap,
-            }
-        ),
-        "iteration": {
-            "neumann_body": iteration.neumann_body,
-            "theta": iteration.theta,
-            "relaxation": iteration.relaxation,
-            "tolerance": iteration.tolerance,
-            "max_iterations": iteration.max_iterations,
-        },
+        "contact": _present(vars(problem.contact)),
+        "iteration": {"neumann_body": problem.iteration.neumann_body} | vars(problem.iteration),
         "norm": {"length": problem.length},
     }
 
