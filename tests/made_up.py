@@ -71,7 +71,7 @@ class Cautious(vf.Rule):
 class Exponential(vf.Law):
     """``(S f)_j = sum_i f_i exp(-|x_j - x_i|/r) / (2 r)``."""
 
-    name, label, needs_radius = "exponential", "exponential", True
+    name, label, needs_radius = "made-up", "exponential", True
     radius: float
 
     @classmethod

@@ -211,6 +211,9 @@ def registered(problem: vf.Problem) -> Iterator[dict[str, Any]]:
         patch.setitem(BOUNDS, Halfway.name, Halfway())
         for some in (problem, problem.changed(friction=5)):
             yield vf.compare(some, bounds=[Halfway.name]).to_dict()
+        with contextlib.redirect_stdout(io.StringIO()) as out:
+            main(["bounds", "--rho", "2", "--kappa1", "0.1", "--kappa2", "0.1", "--theta", "0.3", "--json"])
+        yield json.loads(out.getvalue())
 
 
 @pytest.fixture(scope="module")
