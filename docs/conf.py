@@ -11,12 +11,14 @@ from sphinx.errors import ExtensionError
 from sphinx.util.docutils import SphinxRole
 
 from ndtheory import __version__
+from verification.cli.main import cli
 from verification.ledger import quote, sheets, verify
 
 BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
 sys.path += [str(BENCHMARKS), str(Path(__file__).resolve().parent)]  # folders of scripts, not packages
 
 import speed_page  # noqa: E402
+from builder import commands  # noqa: E402
 
 project = "ndtheory"
 author = "The ndtheory maintainers"
@@ -95,6 +97,22 @@ def write_ledger(app: Sphinx) -> None:
         (folder / f"{name}.md").write_text(text, encoding="utf-8")
 
 
+def write_commands(app: Sphinx) -> None:
+    """The page of commands, from the commands themselves.
+
+    Raises
+    ------
+    ExtensionError
+        A command without an example, the help of an option, or a schema.
+    """
+    source = Path(app.srcdir)
+    lacking = commands.undocumented(cli, "ndtheory", (source / "json.md").read_text("utf-8"))
+    if lacking:
+        raise ExtensionError("; ".join(lacking))
+    (source / "generated").mkdir(exist_ok=True)
+    (source / "generated" / "commands.md").write_text(commands.page(cli, "ndtheory"), encoding="utf-8")
+
+
 def prepare_kernels(app: Sphinx, env: BuildEnvironment, pages: list[str]) -> None:
     """Before the first page is read, so that all processes that read have what the kernels need."""
     if pages:
@@ -134,6 +152,7 @@ class FromLedger(SphinxRole):
 
 def setup(app: Sphinx) -> None:
     app.connect("builder-inited", write_ledger)
+    app.connect("builder-inited", write_commands)
     app.connect("builder-inited", write_speed)
     app.connect("env-before-read-docs", prepare_kernels)
     for name in ("verdict", "ledger"):

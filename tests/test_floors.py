@@ -41,7 +41,7 @@ FLOORS: dict[str, dict[str, str]] = {
     },
     "input": {
         "verification.problem": (
-            "__init__ changes examples files meshes read_only reading specification specs tables toml "
+            "__init__ changes digest examples files meshes read_only reading specification specs tables toml "
             "vocabulary writing"
         )
     },
@@ -115,7 +115,7 @@ BUDGET = {
     "verification": 1300,
     "verification.advice": 4900,
     "verification.algorithm": 2300,
-    "verification.bounds": 3400,
+    "verification.bounds": 3500,
     "verification.certificate": 1200,
     "verification.cli": 2500,
     "verification.constants": 1200,
@@ -127,7 +127,7 @@ BUDGET = {
     "verification.problem": 1700,
     "verification.reproduce": 800,
     "verification.sections": 2000,
-    "verification.sweeps": 2600,
+    "verification.sweeps": 2700,
     "verification.testing": 1700,
 }
 
@@ -147,7 +147,7 @@ INSIDE = (
     ("verification.cli.console", "rich", "only progress needs it"),
     ("verification.cli.console", "ctypes", "Windows alone has what it calls"),
     ("verification.bounds.bound", "numpy", "the calculator has bounds and no arrays"),
-    ("verification.bounds.semidefinite", "verification.bounds.lipschitz", "the calculator has bounds and no arrays"),
+    ("verification.bounds.semidefinite", "verification.bounds", "the calculator has bounds and no arrays"),
     ("verification.ledger.rows", "verification.ledger.sources", "records are read without sympy, which takes a second"),
     ("verification.output.folder", "verification.figures", "matplotlib is loaded once there is something to draw"),
     ("verification.output.folder", "verification.output.report", "jinja2 is loaded once there is a comparison"),

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar
 
-from ndtheory import EDITIONS
 from ndtheory.number import Numeric
 from verification.algorithm.iterate import Iterate
 from verification.algorithm.rates import StepRatio, largest_step_ratio
@@ -15,9 +14,10 @@ from verification.algorithm.reference import Reference, by_cvxpy_alone
 from verification.algorithm.relaxation import Constant
 from verification.algorithm.runs import Run, check_memory, run
 from verification.algorithm.theta import Choice, begin
-from verification.bounds.bound import LARGEST, BoundResult, Subject
+from verification.bounds import LARGEST
+from verification.bounds.bound import NOT_ASKED, BoundResult, Subject
 from verification.bounds.losses import Losses, locate
-from verification.bounds.table import BOUNDS
+from verification.bounds.table import BOUNDS, chosen
 from verification.constants import Measured, measure
 from verification.contact import ContactError, Solver
 from verification.document import Document
@@ -28,16 +28,14 @@ from verification.problem import Problem
 from verification.progress import Progress, silent
 from verification.verdicts import Judgement, judge_bound, judge_forecast
 
-#: The bounds whose violation is a bug or an error in a proof.
-NO_FINDING = tuple(bound.name for bound in BOUNDS.values() if not bound.finding)
-
 T = TypeVar("T")
 
 
 class Listener:
     """Hears each part of a comparison as soon as it is known, in the order of these methods.
 
-    Here nothing is done with them; a screen shows them.  Ctrl-C in a method leaves out what is still to come.
+    Here nothing is done with them; a screen shows them.  A part that was not asked for is not told.  Ctrl-C in a method
+    leaves out what is still to come.
     """
 
     def constants(self, measured: Measured, choice: Choice) -> None:
@@ -78,7 +76,7 @@ class Comparison(Document):
     verdicts : mapping from the name of a bound to Judgement
         And of ``linearised``, the forecast made half way.
     reason : mapping
-        Why a bound, losses, step_ratio or cvxpy is missing.
+        Why a bound, losses, step_ratio or cvxpy is missing; losses and cvxpy come with bounds that take the matrices.
     """
 
     schema: ClassVar[str] = "ndtheory.compare/1"
@@ -109,14 +107,18 @@ class Comparison(Document):
     def tell(self, listener: Listener) -> None:
         """Tell each part, as it was told when it was worked out."""
         listener.constants(self.measured, self.run.choice)
-        listener.bounds(self._bounds(calculated=True), self.measured)
+        if calculated := self._asked(calculated=True):
+            listener.bounds(calculated, self.measured)
         listener.run(self.run)
-        listener.cvxpy(self.cvxpy, self.reason.get("cvxpy", ""))
-        listener.losses(self.losses, self.reason.get("losses", ""))
-        listener.programs(self._bounds(calculated=False))
+        if programs := self._asked(calculated=False):
+            listener.cvxpy(self.cvxpy, self.reason.get("cvxpy", ""))
+            listener.losses(self.losses, self.reason.get("losses", ""))
+            listener.programs(programs)
 
-    def _bounds(self, *, calculated: bool) -> list[BoundResult]:
-        return [result for name, result in self.bounds.items() if BOUNDS[name].calculated == calculated]
+    def _asked(self, *, calculated: bool) -> list[BoundResult]:
+        return [
+            result for name, result in self.bounds.items() if BOUNDS[name].calculated == calculated and result.asked
+        ]
 
     @property
     def computed(self) -> list[BoundResult]:
@@ -126,7 +128,7 @@ class Comparison(Document):
     @property
     def proved_violated(self) -> bool:
         """Whether a proved claim was violated: a bug, or an error in a proof.  A printed one violated is a finding."""
-        return any(judgement.verdict == "VIOLATED" for name, judgement in self.verdicts.items() if name in NO_FINDING)
+        return any(self.verdicts[name].verdict == "VIOLATED" and not BOUNDS[name].finding for name in self.bounds)
 
     @property
     def inconclusive(self) -> bool:
@@ -134,7 +136,7 @@ class Comparison(Document):
         return any(judgement.verdict == "INCONCLUSIVE" for judgement in self.verdicts.values())
 
     def content(self) -> dict[str, Any]:
-        editions = {name: self.bounds[name].to_dict() for name in (*(e.name for e in EDITIONS), "energy")}
+        editions = {name: result.to_dict() for name, result in self.bounds.items() if not BOUNDS[name].apart}
         return {
             "title": self.run.pair.title,
             "constants": self.measured.content(),
@@ -142,8 +144,7 @@ class Comparison(Document):
                 "editions": editions,
                 "reason": {name: self.bounds[name].not_computed for name, value in editions.items() if value is None},
             },
-            "energy": self._energy(),
-            "lmi": self.bounds["lmi"].to_dict(),
+            **self._objects(),
             "losses": None if self.losses is None else self.losses.to_dict(),
             "run": self.run.content(),
             "step_ratio": None
@@ -155,22 +156,10 @@ class Comparison(Document):
             "reason": dict(self.reason),
         }
 
-    def _energy(self) -> dict[str, Any] | None:
-        """The object ``energy``: the bound's own document with both rho and both thresholds on k."""
-        measured, document = self.measured, self.bounds["energy"].to_dict()
-        if document is None:
-            return None
-        threshold = measured.friction_threshold
-        if threshold is None:
-            document["reason"] |= dict.fromkeys(("friction_threshold", "friction_limit"), measured.why_no_threshold)
-        number = lambda value: None if value is None else value.to_dict()
-        return document | {
-            "rho": number(measured.rho_max),
-            "rho_normal": number(measured.rho_normal),
-            "rho_at_work": document["rho"],
-            "friction_threshold": number(threshold),
-            "friction_limit": number(measured.friction_limit),
-        }
+    def _objects(self) -> dict[str, Any]:
+        """What bounds have of their own beside ``bounds``."""
+        own = [BOUNDS[name].objects(result, self.measured) for name, result in self.bounds.items()]
+        return {key: value for objects in own for key, value in objects.items()}
 
 
 def compare(
@@ -180,6 +169,7 @@ def compare(
     solver: Solver = "auto",
     exact: bool = False,
     verified: bool = False,
+    bounds: Sequence[str] | str | None = None,
     watch: Callable[[Iterate], None] = lambda state: None,
     progress: Progress = silent,
     listener: Listener | None = None,
@@ -201,6 +191,10 @@ def compare(
     verified : bool
         Prove bounds of the constants for the exact data of the problem, of what follows from them, and the factor that
         one semidefinite program gives.  What could not be proved keeps the level ``float``.
+    bounds : sequence of str, optional
+        Names of :data:`verification.bounds.table.BOUNDS`; all by default.  The others are ``NOT_COMPUTED``.  Unless one
+        of the names takes the matrices of the bodies, as the semidefinite bound does, a comparison costs little more
+        than its run: what else takes long, ``losses`` and ``cvxpy``, is left out, too.
     watch : callable
         Called with every iterate.
     progress : callable
@@ -220,24 +214,29 @@ def compare(
         theta outside (0, 1).
     ContactError
         Step II did not reach its KKT certificate at the first iterate.
+    ValueError
+        An unknown bound, or none.
 
     Examples
     --------
     >>> from verification.problem.examples import example
     >>> bars = example("two-bars").changed(young=(1, 3))
-    >>> compare(bars).verdicts["energy"].verdict
-    'CONSISTENT'
+    >>> found = compare(bars, bounds=["repaired", "energy"])
+    >>> found.verdicts["energy"].verdict, found.verdicts["lmi"].reason
+    ('CONSISTENT', 'not asked for')
     """
-    pair, listener = pair_of(problem), listener or Listener()
+    asked, listener = chosen(bounds), listener or Listener()
+    pair = pair_of(problem)
     check_memory(pair)  # nothing is told of a run that would be refused
     measured = measure(pair, verified=verified, progress=progress)
     choice, subject = begin(pair, theta, None, measured)[1], Subject.of(pair, measured, exact=exact)
-    results = {
-        name: bound.evaluate(subject, choice.theta) if bound.calculated else bound.absent(INTERRUPTED)
-        for name, bound in BOUNDS.items()
-    }
+    calculated = [name for name in asked if BOUNDS[name].calculated]
+    programs = [name for name in asked if not BOUNDS[name].calculated]
+    results = {name: bound.absent(INTERRUPTED if name in asked else NOT_ASKED) for name, bound in BOUNDS.items()}
+    results |= {name: BOUNDS[name].evaluate(subject, choice.theta) for name in calculated}
     listener.constants(measured, choice)
-    listener.bounds([result for name, result in results.items() if BOUNDS[name].calculated], measured)
+    if calculated:
+        listener.bounds([results[name] for name in calculated], measured)
     progress("iterating", None)
     finished = run(pair, theta=theta, solver=solver, watch=watch, measured=measured)
     left = _UntilCtrlC(finished.interrupted)
@@ -246,22 +245,23 @@ def compare(
     linearised = left.work(finished.linearise, None)
     finished = linearised or replace(finished, interrupted=True).linearise()  # which says why there is nothing
     left.tell(listener.run, finished)
-    progress("repeating the run by cvxpy alone", None)
-    no_reference: tuple[Reference | None, str] = (None, INTERRUPTED)
-    cvxpy, no_cvxpy = left.work(lambda: _reference(finished), no_reference)
-    left.tell(listener.cvxpy, cvxpy, no_cvxpy)
-    none_lost: tuple[Losses | None, str] = (None, INTERRUPTED)
-    losses, no_losses = left.work(lambda: _losses(pair, measured, progress), none_lost)
-    left.tell(listener.losses, losses, no_losses)
-    programs = [name for name, bound in BOUNDS.items() if not bound.calculated]
-    for name in programs:
-        evaluate = BOUNDS[name].evaluate
-        results[name] = left.work(lambda: evaluate(subject, choice.theta, progress=progress), results[name])  # noqa: B023
-    left.tell(listener.programs, [results[name] for name in programs])
+    none: tuple[None, str] = (None, INTERRUPTED if programs else _comes_with_programs())
+    reference: tuple[Reference | None, str] = none
+    lost: tuple[Losses | None, str] = none
+    if programs:
+        progress("repeating the run by cvxpy alone", None)
+        reference = left.work(lambda: _reference(finished), reference)
+        left.tell(listener.cvxpy, *reference)
+        lost = left.work(lambda: _losses(pair, measured, progress), lost)
+        left.tell(listener.losses, *lost)
+        for name in programs:
+            evaluate = BOUNDS[name].evaluate
+            results[name] = left.work(lambda: evaluate(subject, choice.theta, progress=progress), results[name])  # noqa: B023
+        left.tell(listener.programs, [results[name] for name in programs])
 
     finished = replace(finished, interrupted=left.interrupted)
-    missing = {"losses": no_losses, "cvxpy": no_cvxpy}
-    missing |= {name: results[name].not_computed for name in ("energy", "lmi") if results[name].detail is None}
+    missing = {"losses": lost[1], "cvxpy": reference[1]}
+    missing |= {name: result.not_computed for name, result in results.items() if not result.worked_out}
     reason = {name: why for name, why in missing.items() if why}
     seen = largest_step_ratio(pair, finished.iterates)
     if seen is None:
@@ -275,10 +275,10 @@ def compare(
     return Comparison(
         measured=measured,
         bounds=results,
-        losses=losses,
+        losses=lost[0],
         run=finished,
         step_ratio=seen,
-        cvxpy=cvxpy,
+        cvxpy=reference[0],
         verdicts=verdicts,
         reason=reason,
     )
@@ -311,6 +311,11 @@ class _UntilCtrlC:
             method(*parts)
         except KeyboardInterrupt:
             self.interrupted = True
+
+
+def _comes_with_programs() -> str:
+    """Why a part is missing that takes longer than the run and explains or checks no bound that was asked for."""
+    return f"{NOT_ASKED}: it comes with {' or '.join(name for name, bound in BOUNDS.items() if not bound.calculated)}"
 
 
 def _reference(finished: Run) -> tuple[Reference | None, str]:

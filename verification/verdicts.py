@@ -8,7 +8,7 @@ from typing import Literal
 from ndtheory.number import directed
 from verification.algorithm.rates import StepRatio
 from verification.algorithm.runs import Run
-from verification.bounds.bound import BoundResult
+from verification.bounds.bound import NOT_ASKED, BoundResult
 
 #: A bound may be attained: a ratio above it by less than this share of 1 - bound is equal to it.
 TIGHT = 1e-6
@@ -86,6 +86,8 @@ def judge_forecast(run: Run) -> Judgement:
 
 def judge_bound(result: BoundResult, seen: StepRatio | None, outside: str) -> Judgement:
     """What the run says of one bound."""
+    if not result.asked:
+        return Judgement(verdict="NOT_COMPUTED", reason=NOT_ASKED)
     if outside:
         return Judgement(verdict="HYPOTHESES_NOT_MET", reason=outside)
     if result.not_computed:

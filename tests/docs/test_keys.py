@@ -15,10 +15,12 @@ import meshio
 import numpy as np
 import pytest
 from coupling_logs import linear_run, precice
+from made_up import Halfway
 
 import verification as vf
 from verification import figures
 from verification.bounds import region as plane
+from verification.bounds.table import BOUNDS
 from verification.certificate.continuum import certify_continuum
 from verification.cli import main
 from verification.reproduce import READINGS, reproduce
@@ -203,6 +205,17 @@ def certified(*problems: vf.Problem) -> Iterator[Any]:
         yield vf.check_again(of_energy.to_dict(), problem)
 
 
+def registered(problem: vf.Problem) -> Iterator[dict[str, Any]]:
+    """Comparisons with a bound that is registered for a moment, where it has a conclusion and where not."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(BOUNDS, Halfway.name, Halfway())
+        for some in (problem, problem.changed(friction=5)):
+            yield vf.compare(some, bounds=[Halfway.name]).to_dict()
+        with contextlib.redirect_stdout(io.StringIO()) as out:
+            main(["bounds", "--rho", "2", "--kappa1", "0.1", "--kappa2", "0.1", "--theta", "0.3", "--json"])
+        yield json.loads(out.getvalue())
+
+
 @pytest.fixture(scope="module")
 def documents(folder: Path, small: vf.Problem) -> list[dict[str, Any]]:
     """Documents of every schema: with and without friction, in one dimension, from matrices, of mesh files, of runs."""
@@ -249,7 +262,7 @@ def documents(folder: Path, small: vf.Problem) -> list[dict[str, Any]]:
         ),
         *(certify_continuum(problem) for problem in (small, small.swapped(), small.changed(theta="auto", friction=0))),
     ]
-    return [result.to_dict() for result in results]
+    return [*(result.to_dict() for result in results), *registered(small)]
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ from strategies import AT_NIGHT
 import verification as vf
 from verification.algorithm.relaxation import Constant
 from verification.interface.friction import Local
-from verification.sweeps import identity, keeping, store, workers
+from verification.sweeps import identity, store, workers
 from verification.sweeps import row as row_module
 from verification.sweeps.grid import SweepGrid
 from verification.sweeps.identity import Identity
@@ -201,20 +201,6 @@ def test_a_rule_or_a_law_of_ones_own_is_refused_in_words(place):
         vf.sweep(vf.build(SMALL, law=MyLaw()), theta=["0.3"], store=place)
     assert not place.exists()
     assert vf.sweep(SMALL, theta=["0.3"], rule=[MyRule()]).rows[0]["rule"] == "mine"
-
-
-def test_rows_of_another_version_are_told_and_neither_used_nor_lost(place, made, monkeypatch):
-    old = replace(Identity.read(SMALL), version="0.0.1")
-    with monkeypatch.context() as patch:
-        patch.setattr(keeping.Identity, "read", lambda start: old)
-        vf.sweep(SMALL, theta=["0.3", "0.7"], store=place)
-    before = read(place, "SELECT * FROM rows ORDER BY key")
-    del made[:]
-    found = vf.sweep(SMALL, theta=["0.7", "0.8"], store=place)
-    assert len(made) == 2
-    assert found.notes == (f"{place}: 1 of these rows are there from version 0.0.1; they are not used, and stay",)
-    assert set(before) < set(read(place, "SELECT * FROM rows"))
-    assert plan(SMALL, SweepGrid.of({"theta": ["0.7"]}), place).others == {"0.0.1": 1}
 
 
 # --- killed ---
@@ -441,6 +427,6 @@ def test_what_sqlite_repeats_of_a_damaged_store_is_not_shown(place, name):
 def test_the_store_says_what_its_rows_are_made_from(place):
     vf.sweep(SMALL, theta=["0.3"], store=place)
     [(version, problem)] = read(place, "SELECT version, problem FROM studies JOIN rows ON rows.study = studies.id")
-    assert version == identity.__version__
+    assert version == store.__version__
     assert vf.Problem.from_dict(json.loads(problem)) == SMALL
     assert sorted(path.name for path in place.parent.iterdir()) == ["rows.sqlite"]

@@ -13,7 +13,7 @@ import verification as vf
 from ndtheory import Number
 from verification.algorithm.linearisation import NotLinear, forecast
 from verification.algorithm.rates import StepRatio
-from verification.bounds.bound import LARGEST
+from verification.bounds import LARGEST
 from verification.bounds.multipliers import QuadraticForms
 from verification.bounds.program import LMIError
 from verification.bounds.table import BOUNDS

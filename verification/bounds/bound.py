@@ -7,7 +7,7 @@ Every bound, from the printed theorem to the semidefinite program, derives from 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -16,14 +16,16 @@ from ndtheory.number import Level, Numeric
 from verification.progress import Progress, silent
 
 if TYPE_CHECKING:
+    from verification.bounds.exact import Enclosure
+    from verification.bounds.multipliers import QuadraticForms
     from verification.constants import Measured
     from verification.interface.pair import ContactPair
 
-#: The semidefinite bound and the losses are worked out up to this many contact nodes: some seconds.
-LARGEST = 100
-
 #: How many friction values trace the border of a region.
 TRACED = 60
+
+#: Why a bound that was left out has no result.
+NOT_ASKED = "not asked for"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,8 +126,8 @@ class BoundResult:
         Why there is no factor.
     not_computed : str
         Why nothing was worked out; empty where it was.
-    detail : Bounds, EnergyBounds, Semidefinite or None
-        All that this bound knows, for its own document.
+    detail : object, optional
+        All that this bound knows beyond these attributes; its ``to_dict`` is the document then.
     """
 
     name: str
@@ -139,6 +141,11 @@ class BoundResult:
     why: str = ""
     not_computed: str = ""
     detail: Any = None
+
+    @property
+    def asked(self) -> bool:
+        """True if the bound was not left out."""
+        return self.not_computed != NOT_ASKED
 
     @property
     def worked_out(self) -> bool:
@@ -166,8 +173,27 @@ class BoundResult:
 
     def to_dict(self) -> dict[str, Any] | None:
         """The bound's own document; None where nothing was worked out."""
-        document: dict[str, Any] | None = None if self.detail is None else self.detail.to_dict()
-        return document
+        if not self.worked_out:
+            return None
+        if self.detail is not None:
+            document: dict[str, Any] = self.detail.to_dict()
+            return document
+        number = lambda value: None if value is None else value.to_dict()
+        concludes = "contraction" if self.factor is not None else "no conclusion"
+        found = {
+            "theta": self.theta,
+            "verdict": None if self.theta is None else concludes,
+            "factor": number(self.factor),
+            "one_minus_factor": number(self.one_minus_factor),
+            "interval": None if self.interval is None else list(self.interval),
+            "every_small_theta": number(self.friction.every),
+            "some_theta": number(self.friction.some),
+            "threshold_on": self.friction.on,
+        }
+        why = dict.fromkeys(found, "not worked out")
+        why |= dict.fromkeys(("factor", "one_minus_factor"), self.why or "no theta was given")
+        why |= dict.fromkeys(("theta", "verdict"), self.why or "no theta was given")
+        return found | {"reason": {name: why[name] for name, value in found.items() if value is None}}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -215,6 +241,13 @@ class Bound(ABC):
         Whether it follows from a few constants, without the matrices of a pair.
     attained : bool
         Whether there are pairs with a step as long as it says: :mod:`verification.testing` then looks for one.
+    of_unit : bool
+        Whether its numbers depend on the unit of stress, which is then shown beside them.
+    apart : bool
+        Whether the document of a comparison has it under its own name alone, not among ``bounds.editions``.
+    certifies : bool
+        Whether :func:`verification.certify` takes its factor: it is proved by multipliers that :meth:`enclose` returns,
+        or by those of the theorem in energy norms.
     """
 
     name: ClassVar[str]
@@ -226,6 +259,9 @@ class Bound(ABC):
     finding: ClassVar[bool] = False
     calculated: ClassVar[bool] = True
     attained: ClassVar[bool] = False
+    of_unit: ClassVar[bool] = False
+    apart: ClassVar[bool] = False
+    certifies: ClassVar[bool] = False
 
     @abstractmethod
     def evaluate(self, subject: Subject, theta: Numeric | None = None, *, progress: Progress = silent) -> BoundResult:
@@ -270,6 +306,22 @@ class Bound(ABC):
         """
         return ()
 
+    def enclose(self, pair: ContactPair, forms: QuadraticForms, theta: float) -> Enclosure | None:
+        """Enclose the factor by multipliers of this bound's own, for a certificate; None where it has none.
+
+        Raises
+        ------
+        LMIError, ValueError
+        """
+        return None
+
+    def objects(self, result: BoundResult, measured: Measured) -> dict[str, dict[str, Any] | None]:
+        """The objects that the document of a comparison has of this bound beside ``bounds``, by their keys.
+
+        An object is None where the bound was not worked out; the document then says why.
+        """
+        return {self.name: result.to_dict()} if self.apart else {}
+
     def absent(self, why: str) -> BoundResult:
         """The result where nothing was worked out."""
         return BoundResult(name=self.name, proved=False, not_computed=why)
@@ -301,6 +353,6 @@ def trace(interval: Callable[[float], tuple[float, float] | None], *, every: flo
     return Region(k=tuple(k for k, _ in kept), theta=tuple(ends for _, ends in kept), every=every, some=some)
 
 
-def by_name(bounds: Iterable[Bound]) -> Mapping[str, Bound]:
+def by_name(bounds: Iterable[Bound]) -> dict[str, Bound]:
     """Bounds by name, in their order."""
     return {bound.name: bound for bound in bounds}

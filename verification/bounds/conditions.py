@@ -11,7 +11,7 @@ from scipy.linalg import block_diag, cho_factor, cho_solve, solve_triangular
 
 from fem1d2d.mesh import Floats
 from ndtheory.energy_norms import turning_theta, worst_ratio
-from verification.bounds.bound import LARGEST
+from verification.bounds import LARGEST
 from verification.bounds.program import Optimum, Program, Weights
 from verification.bounds.trace_forms import TraceForms
 from verification.constants import Measured
@@ -103,7 +103,7 @@ class Conditions:
     ------
     ValueError
         A contact node is held, the contact body can be lifted rigidly, or there are more nodes than
-        :data:`verification.bounds.bound.LARGEST`.
+        :data:`verification.bounds.LARGEST`.
     """
 
     def __init__(self, pair: ContactPair, measured: Measured, *, friction: float | None = None) -> None:

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 from ndtheory import evaluate_energy
 from ndtheory.number import Numeric, weakest
 from verification.bounds.bound import Bound, BoundResult, Subject, Thresholds, why_not
 from verification.progress import Progress, silent
+
+if TYPE_CHECKING:
+    from verification.constants import Measured
 
 
 class Energy(Bound):
@@ -14,6 +19,7 @@ class Energy(Bound):
     name, words = "energy", "the theorem in energy norms"
     colour, dashes, fill, hatch = "#00724F", (0, (7, 2)), "#8FD3B6", ".."
     attained = True  # without friction
+    certifies = True
 
     def evaluate(self, subject: Subject, theta: Numeric | None = None, *, progress: Progress = silent) -> BoundResult:
         if subject.energy is None:
@@ -39,3 +45,21 @@ class Energy(Bound):
             why=why,
             detail=found,
         )
+
+    def objects(self, result: BoundResult, measured: Measured) -> dict[str, dict[str, Any] | None]:
+        """Its document with both rho and both thresholds on k."""
+        document = result.to_dict()
+        if document is None:
+            return {self.name: None}
+        threshold = measured.friction_threshold
+        if threshold is None:
+            document["reason"] |= dict.fromkeys(("friction_threshold", "friction_limit"), measured.why_no_threshold)
+        number = lambda value: None if value is None else value.to_dict()
+        document |= {
+            "rho": number(measured.rho_max),
+            "rho_normal": number(measured.rho_normal),
+            "rho_at_work": document["rho"],
+            "friction_threshold": number(threshold),
+            "friction_limit": number(measured.friction_limit),
+        }
+        return {self.name: document}

@@ -50,7 +50,7 @@ class Printed(Section5):
 
     name, words, edition = "printed", "the theorem as printed", PRINTED
     colour, dashes, fill, hatch = "#555555", ":", "#555555", "xx"
-    finding = True
+    finding = of_unit = True
 
     def _unit(self, subject: Subject) -> str:
         return "" if subject.measured is None else f" (in {subject.measured.units['stress']})"
@@ -64,3 +64,4 @@ class Repaired(Section5):
 
     name, words, edition = "repaired", "the theorem repaired", REPAIRED
     colour, dashes, fill, hatch = "#0B5A94", (0, (5, 1, 1, 1, 1, 1)), "#4A90C4", "//"
+    certifies = True

@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
 from ndtheory import Number
 from ndtheory.constants import relaxation_factor
 from ndtheory.number import Numeric, below
-from verification.bounds.bound import LARGEST, Bound, BoundResult, NotComputed, Region, Subject, Thresholds
+from verification.bounds import LARGEST
+from verification.bounds.bound import Bound, BoundResult, NotComputed, Region, Subject, Thresholds
 from verification.progress import Progress, silent
+
+if TYPE_CHECKING:
+    from verification.bounds.exact import Enclosure
+    from verification.bounds.multipliers import QuadraticForms
+    from verification.interface.pair import ContactPair
 
 #: How many friction values trace the border of its region.
 TRACED = 12
@@ -29,6 +36,7 @@ class SemidefiniteBound(Bound):
     colour, dashes, fill = "#8A5A00", "-.", "#FFF3B0"
     calculated = False
     attained = True  # without friction
+    apart = certifies = True
 
     def evaluate(self, subject: Subject, theta: Numeric | None = None, *, progress: Progress = silent) -> BoundResult:
         if theta is None or subject.pair is None or subject.measured is None:
@@ -73,6 +81,11 @@ class SemidefiniteBound(Bound):
         if found.unverified is not None and not found.certified:
             said.append(f"{self.name} is not proved: {found.not_proved}")
         return tuple(said)
+
+    def enclose(self, pair: ContactPair, forms: QuadraticForms, theta: float) -> Enclosure:
+        from verification.bounds.exact import enclose
+
+        return enclose(pair, forms, theta, gap=float("inf"), programs=1)
 
     def region(self, subject: Subject, *, progress: Progress = silent) -> Region:
         from verification.bounds.lipschitz import LMIError, thetas

@@ -7,29 +7,25 @@ this library, then decides in balls whether these multipliers prove the factor f
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, ClassVar, Literal, get_args
+from typing import Any, ClassVar
 
 from ndtheory.number import Numeric
 from verification.algorithm.theta import choose
 from verification.bounds.bound import Subject
-from verification.bounds.exact import enclose
 from verification.bounds.multipliers import QuadraticForms
 from verification.bounds.program import LMIError
-from verification.bounds.table import BOUNDS
+from verification.bounds.table import BOUNDS, certifying
 from verification.certificate import check
 from verification.certificate.claims import NOT_CONFIRMED, Claims, NoCertificate, written
-from verification.certificate.description import describe
+from verification.certificate.description import describe, same
 from verification.constants import Measured, measure
 from verification.document import Document
 from verification.interface.pair import UNITS, ContactPair, build
 from verification.problem import Problem, ProblemError
 from verification.progress import Progress, silent
-
-Edition = Literal["lmi", "energy", "repaired"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -82,8 +78,8 @@ class Certificate(Document):
 
     Attributes
     ----------
-    edition : {'lmi', 'energy', 'repaired'}
-        Which bound proposed the factor: the semidefinite one, that in energy norms, or that of Section 5 repaired.
+    edition : str
+        Name of the bound that proposed the factor.
     discrete : dict
         Bodies, transfer, weights, kernel and friction in rationals, as texts.
     claim : dict
@@ -94,7 +90,7 @@ class Certificate(Document):
 
     schema: ClassVar[str] = "ndtheory.certificate/1"
 
-    edition: Edition
+    edition: str
     discrete: dict[str, Any]
     claim: dict[str, Any]
     problem: Problem
@@ -131,7 +127,7 @@ class Certificate(Document):
 
 
 def certify(
-    problem: Problem, *, theta: Numeric | None = None, edition: Edition = "lmi", progress: Progress = silent
+    problem: Problem, *, theta: Numeric | None = None, edition: str | None = None, progress: Progress = silent
 ) -> Certificate:
     """Prove that one step contracts on the meshes of a problem, for its rational data.
 
@@ -141,8 +137,8 @@ def certify(
         Two plane bodies.
     theta : number or 'auto', optional
         The problem's by default.
-    edition : {'lmi', 'energy', 'repaired'}
-        Which bound proposes factor and multipliers.
+    edition : str, optional
+        Name of the bound that proposes factor and multipliers: one of those that certify, by default the strongest.
     progress : callable
 
     Returns
@@ -164,8 +160,9 @@ def certify(
     True
     """
     refuse = lambda key, needed: ProblemError(problem.source, key, None, needed)
-    if edition not in get_args(Edition):
-        raise ValueError(f"edition {edition!r}: needed one of {', '.join(get_args(Edition))}")
+    edition = certifying()[-1] if edition is None else edition
+    if edition not in certifying():
+        raise ValueError(f"edition {edition!r}: needed one of {', '.join(certifying())}")
     if problem.dimension != 2:
         raise refuse("dimension", "needed a plane problem: in 1D rho is a ratio of exact numbers")
     pair = build(problem)
@@ -228,23 +225,24 @@ def check_again(document: Any, problem: Problem | None = None) -> Checked:
         why=why,
         words=words,
         sha256=found,
-        same=None if problem is None else describe(problem) == document["discrete"],
+        same=None if problem is None else same(describe(problem), document["discrete"]),
     )
 
 
 def _proposed(
-    pair: ContactPair, measured: Measured, theta: Fraction, edition: Edition
+    pair: ContactPair, measured: Measured, theta: Fraction, edition: str
 ) -> tuple[float, dict[str, Any], float | None]:
     """What the factor of a bound is below 1, multipliers that should prove it, and the largest factor found."""
 
+    bound = BOUNDS[edition]
     try:
         forms = QuadraticForms(pair, measured)
-        if edition == "lmi":
-            found = enclose(pair, forms, float(theta), gap=math.inf, programs=1)
+        found = bound.enclose(pair, forms, float(theta))
+        if found is not None:
             lower, spare, multipliers = found.lower, 1 - found.upper.value, found.upper.multipliers
             why = f"its bound of the factor is {found.upper.value:.4g}"
         else:
-            result = BOUNDS[edition].evaluate(Subject.of(pair, measured), theta)
+            result = bound.evaluate(Subject.of(pair, measured), theta)
             one_minus = result.one_minus_factor
             lower, spare, multipliers = None, 0.0 if one_minus is None else one_minus.value, forms.known(float(theta))
             why = result.why or result.not_computed
@@ -252,5 +250,5 @@ def _proposed(
         raise NoCertificate(str(error)) from None
     if not spare > 0:
         at = f"theta = {float(theta):g}, k = {float(pair.friction):g}"
-        raise NoCertificate(f"{BOUNDS[edition].words} proves no contraction at {at}: {why}")
+        raise NoCertificate(f"{bound.words} proves no contraction at {at}: {why}")
     return spare, written(multipliers), lower

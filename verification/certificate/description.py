@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from fractions import Fraction
 from typing import Any
 
@@ -36,6 +36,20 @@ def describe(problem: Problem, pair: ContactPair | None = None) -> dict[str, Any
         "kernel": rows(joined.exact_kernel if pair.friction else None),
         "transfer": rows(joined.exact_transfer),
     }
+
+
+def same(one: Any, other: Any) -> bool:
+    """True if two descriptions are about the same bodies.
+
+    What is null in one and missing in the other is the same: a key that descriptions get later is null where it has its
+    default, as the transfer is on one grid, so that a certificate that was written before is still about its bodies.
+
+    >>> same({"transfer": None, "friction": "1/5"}, {"friction": "1/5"}), same({"friction": "1/5"}, {"friction": "0"})
+    (True, False)
+    """
+    if not (isinstance(one, Mapping) and isinstance(other, Mapping)):
+        return bool(one == other)
+    return all(same(one.get(key), other.get(key)) for key in one.keys() | other.keys())
 
 
 def _described(spec: BodySpec, body: Body, points: NDArray[Any]) -> dict[str, Any]:

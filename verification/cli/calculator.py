@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import click
 
-from ndtheory import Constants, EnergyConstants, HypothesisError
+from ndtheory import EDITIONS, Constants, EnergyConstants, HypothesisError
 from ndtheory.constants import take
 from verification.bounds.bound import Subject
 from verification.bounds.calculated import Calculated
@@ -32,7 +32,7 @@ ENERGY = {"rho": "--rho", "kappa_1": "--kappa1", "kappa_2": "--kappa2"}
 @click.option("--theta", "theta", metavar="NUMBER", help="Relaxation factor, 0 < theta < 1.")
 @click.option(
     "--edition",
-    type=OneOf(["printed", "repaired", "both"]),
+    type=OneOf([*(edition.name for edition in EDITIONS), "both"]),
     default="both",
     show_default=True,
     help="Editions of Section 5.",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ import click
 
 from verification.cli.console import deliver, stages
 from verification.cli.failing import fail
-from verification.cli.options import JSON, SET, SWAP, THETA, OneOf, check_place, one_file
+from verification.cli.options import JSON, SET, SWAP, THETA, check_place, one_file
 from verification.cli.problems import load_problem
 from verification.cli.typed import Typed
 
@@ -19,16 +19,26 @@ from verification.cli.typed import Typed
 MOST_BYTES = 100_000_000
 
 
+class Certifying(click.Choice[str]):
+    """The name of a bound that can propose a certificate."""
+
+    def __init__(self) -> None:
+        self.case_sensitive = True
+
+    @property
+    def choices(self) -> Sequence[str]:  # type: ignore[override]
+        """Those of the bounds that are registered, the strongest first."""
+        from verification.bounds.table import certifying
+
+        return certifying()[::-1]
+
+
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path), required=False)
 @SET
 @THETA
 @SWAP
-@click.option(
-    "--edition",
-    type=OneOf(["lmi", "energy", "repaired"]),
-    help="Which bound proposes the factor: semidefinite (by default), energy norms, Section 5 repaired.",
-)
+@click.option("--edition", type=Certifying(), help="Bound that proposes the factor; the strongest by default.")
 @click.option(
     "--continuum", is_flag=True, help="Of FILE without its mesh: two rectangles, each held at its outer side."
 )
@@ -93,7 +103,7 @@ def certify(
     problem = load_problem(file, keys, theta=theta, swap=swap)
     try:
         with stages() as tell:
-            found = prove(problem, edition=edition or "lmi", progress=tell)
+            found = prove(problem, edition=edition, progress=tell)
     except NoCertificate as error:
         return fail(error, "not proved", "no certificate")
     typed = Typed(file=file, keys=keys, theta=theta, swap=swap)

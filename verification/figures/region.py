@@ -49,7 +49,7 @@ def _draw(ax: Axes, plane: Plane, left: float, bottom: float) -> None:
         k = [bottom, *region.k]
         low = [max(lo, left) for lo, _ in (region.theta[0], *region.theta)]
         high = [hi for _, hi in (region.theta[0], *region.theta)]
-        unit = f" ({plain(plane.units['stress'])})" if name == "printed" else ""
+        unit = f" ({plain(plane.units['stress'])})" if bound.of_unit else ""
         fill = bound.fill or bound.colour
         look: dict[str, Any] = {"facecolor": fill, "edgecolor": ink(fill), "linewidth": 0, "hatch": bound.hatch}
         ax.fill_betweenx(k, low, high, step="pre", label=f"{name}{unit}: k < {max(region.k):.2g}", **look)

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from verification.bounds.losses import Loss, Losses
-from verification.bounds.table import BOUNDS
+from verification.bounds.section5 import Printed, Repaired
 from verification.figures.style import STATES, new_figure, styled
 
 
@@ -42,9 +42,8 @@ def draw_waterfall(losses: Losses, unit: str) -> Figure:
 def _draw(ax: Axes, title: str, chain: Sequence[Loss], *, adds_up: bool) -> None:
     begin, farthest = 0.0, 0.0
     for i, loss in enumerate(chain):
-        name = "printed" if loss.only_unit else "repaired"
-        hatch = BOUNDS["printed"].hatch if loss.only_unit else None
-        ax.barh(i, loss.decades, left=begin, color=BOUNDS[name].colour, hatch=hatch, edgecolor="black", linewidth=0.5)
+        edition, hatch = (Printed, Printed.hatch) if loss.only_unit else (Repaired, None)
+        ax.barh(i, loss.decades, left=begin, color=edition.colour, hatch=hatch, edgecolor="black", linewidth=0.5)
         end = begin + loss.decades
         farthest = max(farthest, end)
         says = f" {loss.decades:.1f}" + (", only the unit" if loss.only_unit else "")

@@ -11,12 +11,13 @@ from typing import Any, Literal
 
 from ndtheory.number import Numeric
 from verification.problem.changes import Key, given, typed, with_values
+from verification.problem.digest import fingerprint
 from verification.problem.reading import read_problem
 from verification.problem.specs import MOST_CELLS, BodySpec, ProblemSpec, read_theta
 from verification.problem.tables import ProblemError
 from verification.problem.toml import document
 from verification.problem.vocabulary import vocabulary
-from verification.problem.writing import fingerprint, plain, tables
+from verification.problem.writing import plain, tables
 
 #: What is read as a number, exactly: a float means its shortest decimal, a text may be a fraction.
 Rational = int | float | str | Decimal | Fraction
@@ -96,7 +97,7 @@ class Problem(ProblemSpec):
         """SHA-256, in hexadecimal digits, of what changes a number.
 
         Left out are title, labels of units, source, the places of mesh files (their content counts) and the order of
-        sides.
+        sides.  It outlives releases: a key that the problem file gets later counts only where it has no default.
         """
         return fingerprint(self)
 

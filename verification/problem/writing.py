@@ -1,9 +1,7 @@
-"""A problem as the dictionary of its file, exactly; and what tells two problems apart."""
+"""A problem as the dictionary of its file, exactly."""
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Mapping
 from decimal import Decimal
 from fractions import Fraction
@@ -24,29 +22,14 @@ def tables(problem: ProblemSpec) -> dict[str, Any]:
     A key stands there where it has a value, its default or another; where there is none (no interval, no radius, no
     sides) it is left out.  Keys come in the order of the built-in files.
     """
-    contact, iteration = problem.contact, problem.iteration
     return {
         "title": problem.title,
         "dimension": problem.dimension,
         "units": dict(problem.units),
         "body1": _body(problem.body1),
         "body2": _body(problem.body2),
-        "contact": _present(
-            {
-                "interval": contact.interval,
-                "friction": contact.friction,
-                "law": contact.law,
-                "radius": contact.radius,
-                "gap": contact.gap,
-            }
-        ),
-        "iteration": {
-            "neumann_body": iteration.neumann_body,
-            "theta": iteration.theta,
-            "relaxation": iteration.relaxation,
-            "tolerance": iteration.tolerance,
-            "max_iterations": iteration.max_iterations,
-        },
+        "contact": _present(vars(problem.contact)),
+        "iteration": {"neumann_body": problem.iteration.neumann_body} | vars(problem.iteration),
         "norm": {"length": problem.length},
     }
 
@@ -112,16 +95,3 @@ def written_number(value: Fraction) -> int | float | str:
     if max(numerator.adjusted(), denominator.adjusted()) <= LARGEST_EXPONENT:  # what is read back as it stands
         return f"{numerator}/{denominator}"
     return f"{numerator}e-{shift}/{denominator}e-{shift}"
-
-
-def fingerprint(problem: ProblemSpec) -> str:
-    """SHA-256 of what changes a number: all but title, labels of units, source and the places of mesh files."""
-    data = {key: value for key, value in tables(problem).items() if key not in ("title", "units")}
-    for name in ("body1", "body2"):
-        body = data[name]
-        if "mesh" in body:
-            body["mesh"] = body["mesh"].sha256
-        if "fixed" in body:
-            body["fixed"] = tuple(sorted(body["fixed"]))
-    text = json.dumps(plain(data), sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(text.encode("ascii")).hexdigest()

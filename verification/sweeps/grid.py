@@ -51,7 +51,7 @@ AXES: dict[str, Callable[[Any], Any]] = {
     "refine": _halvings,
     "young": several(positive, 2, _moduli),
     "neumann_body": choice(1, 2),
-    "law": choice(*LAWS),
+    "law": lambda value: choice(*LAWS)(value),  # those that are registered at that moment
     "radius": positive,
     "friction": number(f"a number >= 0, at most {float(MOST_FRICTION):g}", lambda v: 0 <= v <= MOST_FRICTION),
     "rule": _rule,

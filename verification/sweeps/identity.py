@@ -1,4 +1,8 @@
-"""What tells one row from all others: the problem, the values, how it is solved, and the version of this library."""
+"""What tells one row from all others: the problem, the values, how it is solved, and the number of the numerics.
+
+A store outlives releases.  A row that another version of this library has made is the row that this one would make,
+unless :data:`NUMERICS` was raised in between.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +10,12 @@ import hashlib
 import itertools
 import json
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import MISSING, dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
-from ndtheory import __version__
 from verification.algorithm.relaxation import RULES, Rule, rule_of
 from verification.interface.friction import LAWS, Given
 from verification.interface.interface import Law
@@ -24,8 +27,13 @@ from verification.sweeps.grid import SweepGrid
 #: How step II is solved in a row: by the active set, and by the model where that does not settle.
 SOLVER = "auto"
 
-#: Raised where a digit of a row may change: 2 since a residual is compared with the present forces.
+#: Raised where a digit of a row may change, and only there: 2 since a residual is compared with the present forces.
 NUMERICS = 2
+
+#: What the key of a pair always has of its settings and arrays, whatever they are; a setting that comes later counts
+#: where it has no default, an array where there is one, so that keys stay.
+SETTINGS = ("theta", "relaxation", "tolerance", "max_iterations")
+ARRAYS = ("stiffness", "load", "known", "free", "motions")
 
 #: Bytes of a key: at a million rows two of them agree by chance once in 1e26 stores.
 LENGTH = 16
@@ -41,13 +49,16 @@ class Identity:
         The problem or the pair, as JSON; numbers exactly, mesh files and matrices by their content.
     source : str
         What errors name.
+    numerics : int
+        Number of the numerics.
     version : str
-        Of this library.
+        Empty, but in a store of 0.1.0: there a key holds the version of this library, too.
     """
 
     of: str
     source: str
-    version: str = __version__
+    numerics: int = field(default_factory=lambda: NUMERICS)
+    version: str = ""
 
     @classmethod
     def read(cls, start: Problem | ContactPair) -> Identity:
@@ -62,19 +73,18 @@ class Identity:
             return cls(of=json.dumps({"problem": start.digest}), source=start.source)
         return cls(of=json.dumps(_of_pair(start), sort_keys=True), source=start.source)
 
-    def at(self, version: str) -> Identity:
-        """The same in another version of this library."""
-        return replace(self, version=version)
+    def before(self, numerics: int, version: str = "") -> Identity:
+        """The same under another number of the numerics, and as a store of 0.1.0 has it where a version is given."""
+        return replace(self, numerics=numerics, version=version)
 
-    @property
-    def digest(self) -> str:
-        """SHA-256, in hexadecimal digits."""
-        digest: str = self._hash().hexdigest()
-        return digest
+    def study(self, version: str) -> str:
+        """What a version of this library makes under this identity: SHA-256, in hexadecimal digits."""
+        of = self._written() if self.version else {"made by": version} | self._written()
+        return hashlib.sha256(json.dumps(of).encode("ascii")).hexdigest()
 
-    def _hash(self) -> Any:
-        of = {"version": self.version, "numerics": NUMERICS, "solver": SOLVER, "of": self.of}
-        return hashlib.sha256(json.dumps(of).encode("ascii"))
+    def _written(self) -> dict[str, Any]:
+        of = {"numerics": self.numerics, "solver": SOLVER, "of": self.of}
+        return {"version": self.version} | of if self.version else of
 
     def keys(self, grid: SweepGrid) -> list[bytes]:
         """The key of each row of a grid, in the order of its rows.
@@ -97,7 +107,7 @@ class Identity:
         return list(self._keys(axes))
 
     def _keys(self, axes: list[list[bytes]]) -> Iterator[bytes]:
-        start = self._hash()
+        start = hashlib.sha256(json.dumps(self._written()).encode("ascii"))
         for values in itertools.product(*axes):
             one = start.copy()
             one.update(b"".join(values))
@@ -133,11 +143,15 @@ def exactly(value: Fraction) -> str:
 
 def _of_pair(pair: ContactPair) -> dict[str, Any]:
     """A pair by its matrices, bit by bit, and by what else a run of it depends on."""
-    settings = asdict(pair.settings) | {"theta": str(pair.settings.theta)}
-    interface = pair.interface
+    default, interface = type(pair.settings)(), pair.interface
+    settings = {
+        name: value
+        for name, value in vars(pair.settings).items()
+        if name in SETTINGS or value != getattr(default, name)
+    }
     arrays: dict[str, Any] = {"gap": interface.gap, "transfer": interface.transfer}
     for name, side in (("contact", pair.contact), ("neumann", pair.neumann)):
-        for part in ("stiffness", "load", "known", "free", "motions"):
+        for part in ARRAYS:
             arrays[f"{name}.{part}"] = getattr(side, part)
         arrays |= {f"{name}.x": side.grid.x, f"{name}.weights": side.grid.weights}
     return {
@@ -167,4 +181,6 @@ def _law(law: Law, source: str) -> dict[str, str]:
             type(law).__name__,
             "needed a law of this library, as nothing tells two versions of another one apart; or no store",
         )
-    return {"name": law.name} | {name: str(value) for name, value in vars(law).items()}
+    default = {name: field.default for name, field in getattr(type(law), "__dataclass_fields__", {}).items()}
+    given = {name: str(value) for name, value in vars(law).items() if value != default.get(name, MISSING)}
+    return {"name": law.name} | given

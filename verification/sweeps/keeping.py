@@ -45,16 +45,28 @@ class Kept:
         self._store = Store(path)
         try:
             again = lambda outcome: fresh or (retry and outcome == ERROR)
-            self.known: Known = self._store.known(self._keys, again)
-            #: The rows of this sweep that other versions of this library have made, by version.
+            self.known = Known()
+            for form in self._forms(identity):
+                keys = self._keys if form == identity else form.keys(grid)
+                missing = {i: key for i, key in enumerate(keys) if i not in self.known.rows}
+                self.known |= self._store.known(missing, again)
+            #: The rows of this sweep that were made under other numerics, by the version of this library.
             self.others: dict[str, int] = {}
-            for version in self._store.others():
-                if count := self._store.count(identity.at(version).keys(grid)):
-                    self.others[version] = count
+            for numerics in range(1, identity.numerics):
+                for form in self._forms(identity.before(numerics)):
+                    for version, count in self._store.count(dict(enumerate(form.keys(grid)))).items():
+                        self.others[version] = self.others.get(version, 0) + count
             self._study = self._store.begin(identity, start if isinstance(start, Problem) else start.problem)
         except BaseException:
             self._store.close()
             raise
+
+    def _forms(self, identity: Identity) -> list[Identity]:
+        """The forms of an identity under which the store has rows: the present one, and those of 0.1.0 by version."""
+        studies = self._store.studies()
+        versions = dict.fromkeys(studies.values())
+        forms = [identity, *(identity.before(identity.numerics, version) for version in versions)]
+        return [form for form in forms if any(form.study(version) in studies for version in versions)]
 
     def __enter__(self) -> Kept:
         return self
@@ -80,7 +92,7 @@ class Kept:
 def notes(path: Path, others: Mapping[str, int], damaged: int, errors: int) -> tuple[str, ...]:
     """What a store has that is not used, or may not be wanted, in words."""
     found = [
-        f"{path}: {count} of these rows are there from version {version}; they are not used, and stay"
+        f"{path}: {count} of these rows are of version {version} with other numerics; they are not used, and stay"
         for version, count in others.items()
     ]
     if damaged:
@@ -105,7 +117,7 @@ class Plan(Document):
     errors : int
         How many of the stored rows ended in an error.
     others : mapping from a version of this library to a number
-        Rows of this sweep that another version has made: they are not used.
+        Rows of this sweep that were made under other numerics: they are not used.
     store : Path or None
         Where rows are kept.
     """
@@ -162,7 +174,7 @@ def plan(
     ProblemError
         As for a sweep.
     """
-    known, others = Known(rows={}, failed=0, errors=0, damaged=0), dict[str, int]()
+    known, others = Known(), dict[str, int]()
     if store is not None and store.exists():
         with Kept(store, start, grid, fresh=fresh, retry=retry) as kept:
             known, others = kept.known, kept.others

@@ -36,6 +36,9 @@ RESULTS = (
     *("coupled_residual", "energy_factor", "proved_rate", "rho", "reason"),
 )
 
+#: Columns that once had another name: stores made before keep it.
+RENAMED = {"sharp_factor": "energy_factor"}
+
 #: The columns of whole numbers and of texts; the others are numbers.
 WHOLE = ("neumann_body", "refine", "iterations", "iterations_paper", "steps")
 TEXTS = ("law", "rule", "outcome", "reason")
@@ -46,6 +49,21 @@ def is_row(found: Any) -> bool:
     if not isinstance(found, dict) or found.keys() != {*GIVEN, *RESULTS} or not found["outcome"]:
         return False
     return all(value is None or _fits(name, value) for name, value in found.items())
+
+
+def renamed(found: Any) -> Any:
+    """A value that was read from JSON; in a row the columns have their present names, in their order.
+
+    >>> renamed({"rho": 2.0, "sharp_factor": None, "reason": "sharp_factor: outside"})
+    {'rho': 2.0, 'energy_factor': None, 'reason': 'energy_factor: outside'}
+    """
+    if not isinstance(found, dict) or not RENAMED.keys() & found.keys():
+        return found
+    row = {RENAMED.get(name, name): value for name, value in found.items()}
+    if isinstance(row.get("reason"), str):
+        for old, new in RENAMED.items():
+            row["reason"] = row["reason"].replace(f"{old}: ", f"{new}: ")
+    return row
 
 
 def _fits(name: str, value: Any) -> bool:

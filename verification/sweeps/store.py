@@ -11,8 +11,8 @@ import contextlib
 import json
 import sqlite3
 import zlib
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from ndtheory import __version__
@@ -20,7 +20,7 @@ from verification.interrupts import undisturbed
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
 from verification.sweeps.identity import Identity
-from verification.sweeps.row import ERROR, FAILED, Row, is_row
+from verification.sweeps.row import ERROR, FAILED, Row, is_row, renamed
 
 #: Tells a store from other files of SQLite: "ndth".
 APPLICATION = 0x6E647468
@@ -73,10 +73,19 @@ class Known:
         Number of rows whose checksum or columns are wrong; they count as missing.
     """
 
-    rows: dict[int, bytes]
-    failed: int
-    errors: int
-    damaged: int
+    rows: dict[int, bytes] = field(default_factory=dict)
+    failed: int = 0
+    errors: int = 0
+    damaged: int = 0
+
+    def __or__(self, other: Known) -> Known:
+        """What a store has of these and of other keys."""
+        return Known(
+            rows=self.rows | other.rows,
+            failed=self.failed + other.failed,
+            errors=self.errors + other.errors,
+            damaged=self.damaged + other.damaged,
+        )
 
 
 class Store:
@@ -148,12 +157,12 @@ class Store:
                 self._file.execute("PRAGMA journal_mode = DELETE")
             self._file.close()
 
-    def known(self, keys: Sequence[bytes], again: Callable[[str], bool] = lambda outcome: False) -> Known:
+    def known(self, keys: Mapping[int, bytes], again: Callable[[str], bool] = lambda outcome: False) -> Known:
         """The rows of some keys.
 
         Parameters
         ----------
-        keys : sequence of bytes
+        keys : mapping from the number of a row to its key
         again : callable
             From an outcome to whether rows that have it count as missing.
 
@@ -168,37 +177,39 @@ class Store:
                 "SELECT number, rows.key, outcome, CAST(row AS BLOB), crc"
                 " FROM temp.wanted JOIN rows ON rows.key = wanted.key"
             ):
-                if not _is_ours(key, outcome, text, crc):
+                row = _read(key, outcome, text, crc)
+                if row is None:
                     damaged += 1
                 elif not again(outcome):
-                    found[number] = text
+                    found[number] = row
                     failed += outcome in FAILED
                     errors += outcome == ERROR
         return Known(rows=found, failed=failed, errors=errors, damaged=damaged)
 
-    def count(self, keys: Sequence[bytes]) -> int:
-        """How many of the keys have a row.
+    def count(self, keys: Mapping[int, bytes]) -> dict[str, int]:
+        """How many of the keys have a row, by the version of this library that made it.
 
         Raises
         ------
         StoreError
         """
         with self._told(), self._wanted(keys):
-            row = self._file.execute("SELECT count(*) FROM temp.wanted JOIN rows ON rows.key = wanted.key").fetchone()
-        return int(row[0])
+            rows = self._file.execute(
+                "SELECT version, count(*) FROM temp.wanted JOIN rows ON rows.key = wanted.key"
+                " JOIN studies ON studies.id = rows.study GROUP BY version ORDER BY version"
+            )
+            return {str(version): int(count) for version, count in rows}
 
-    def others(self) -> list[str]:
-        """The other versions of this library that have made rows of this store.
+    def studies(self) -> dict[str, str]:
+        """The studies of this store, and by which version of this library each was made.
 
         Raises
         ------
         StoreError
         """
         with self._told():
-            rows = self._file.execute(
-                "SELECT DISTINCT version FROM studies WHERE version != ? ORDER BY version", [__version__]
-            )
-            return [str(row[0]) for row in rows]
+            rows = self._file.execute("SELECT identity, version FROM studies ORDER BY version").fetchall()
+        return {str(identity): str(version) for identity, version in rows}
 
     def begin(self, identity: Identity, problem: Problem | None) -> int:
         """The number of a study: what rows are made from, with the problem as its file has it.
@@ -211,9 +222,9 @@ class Store:
         with self._told(), self._transaction():
             self._file.execute(
                 "INSERT OR IGNORE INTO studies (identity, version, problem) VALUES (?, ?, ?)",
-                [identity.digest, identity.version, written],
+                [study := identity.study(__version__), __version__, written],
             )
-            row = self._file.execute("SELECT id FROM studies WHERE identity = ?", [identity.digest]).fetchone()
+            row = self._file.execute("SELECT id FROM studies WHERE identity = ?", [study]).fetchone()
         return int(row[0])
 
     def add(self, study: int, rows: Sequence[tuple[bytes, Row]]) -> None:
@@ -232,11 +243,11 @@ class Store:
         self.kept += len(rows)
 
     @contextlib.contextmanager
-    def _wanted(self, keys: Sequence[bytes]) -> Iterator[None]:
+    def _wanted(self, keys: Mapping[int, bytes]) -> Iterator[None]:
         self._file.execute("DELETE FROM temp.wanted")
         self._file.execute("BEGIN")
         try:
-            self._file.executemany("INSERT INTO temp.wanted VALUES (?, ?)", enumerate(keys))
+            self._file.executemany("INSERT INTO temp.wanted VALUES (?, ?)", keys.items())
             yield
         finally:
             self._file.execute("COMMIT")
@@ -279,15 +290,18 @@ def written(row: Row) -> bytes:
     return json.dumps(row, separators=(",", ":")).encode("ascii")
 
 
-def _is_ours(key: object, outcome: object, text: object, crc: object) -> bool:
-    """True if what a store has of a key is a row that this program has written."""
+def _read(key: object, outcome: object, text: object, crc: object) -> bytes | None:
+    """The row that a store has of a key, with its columns as they are named now; None where this program wrote none."""
     if not (isinstance(key, bytes) and isinstance(text, bytes) and crc == _crc(key, text)):
-        return False
+        return None
     try:
-        found = json.loads(text)
+        there = json.loads(text)
     except (ValueError, RecursionError):
-        return False
-    return is_row(found) and found["outcome"] == outcome
+        return None
+    found = renamed(there)
+    if not is_row(found) or found["outcome"] != outcome:
+        return None
+    return text if found is there else written(found)
 
 
 def _crc(key: bytes, text: bytes) -> int:

@@ -1,0 +1,62 @@
+"""Every command is on the page of commands, with an example and all its options, and its document has a schema."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+import pytest
+
+from verification.cli.main import cli
+
+ROOT = Path(__file__).parents[2]
+DOCUMENTS = (ROOT / "docs" / "json.md").read_text("utf-8")
+
+
+@pytest.fixture(scope="module")
+def pages():
+    sys.path.append(str(ROOT / "docs"))
+    try:
+        from builder import commands
+    finally:
+        sys.path.remove(str(ROOT / "docs"))
+    return commands
+
+
+def test_every_command_is_documented(pages):
+    assert pages.undocumented(cli, "ndtheory", DOCUMENTS) == []
+
+
+def test_the_page_has_the_help_of_every_command_as_it_is_printed(pages):
+    page = pages.page(cli, "ndtheory")
+    for name, command in cli.commands.items():
+        assert f"## `ndtheory {name}`\n" in page
+        for option in command.params:
+            assert option.opts[-1] in page or isinstance(option, click.Argument)
+    assert max(map(len, page.splitlines())) <= 120
+
+
+def test_a_command_without_a_page_or_a_schema_is_found(pages):
+    group = click.Group("ndtheory", commands={name: command for name, command in cli.commands.items() if name == "run"})
+    inner = click.Group("mine", help="Several.\n\n\b\nExample:\n  ndtheory mine forces")
+
+    @inner.command()
+    @click.option("--largest", is_flag=True)
+    def forces(largest: bool) -> None:
+        """Say what I compute."""
+
+    group.add_command(inner)
+    assert pages.undocumented(group, "ndtheory", DOCUMENTS) == [
+        "ndtheory mine: no schema on the page of documents",
+        "ndtheory mine forces: no example in its help",
+        "ndtheory mine forces: no help for --largest",
+        "ndtheory mine forces: no schema on the page of documents",
+    ]
+    forces.help = "Say it.\n\n\b\nExample:\n  ndtheory mine forces"
+    forces.params[0].help = "Only the largest."
+    assert (
+        pages.undocumented(group, "ndtheory", DOCUMENTS + "\nWritten by `ndtheory mine`, `ndtheory mine forces`.\n")
+        == []
+    )
+    assert "## `ndtheory mine forces`" in pages.page(group, "ndtheory")

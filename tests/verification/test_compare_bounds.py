@@ -1,0 +1,130 @@
+"""A comparison of some bounds: the others are left out, and all that takes longer than the run with them."""
+
+import pytest
+from made_up import Halfway, Slow
+from problem_list import small
+
+import verification as vf
+from verification import comparison
+from verification.bounds.bound import NOT_ASKED
+from verification.bounds.table import BOUNDS, chosen
+
+PROBLEM = vf.Problem.from_dict(small())
+QUICK = ("printed", "repaired", "energy")
+KNOWN = ", ".join(BOUNDS)
+
+
+@pytest.fixture
+def worked_out(monkeypatch):
+    """The names of what is worked out."""
+    seen = []
+    for kind in {type(bound) for bound in BOUNDS.values()}:
+
+        def evaluate(self, *args, before=kind.evaluate, **options):
+            seen.append(self.name)
+            return before(self, *args, **options)
+
+        monkeypatch.setattr(kind, "evaluate", evaluate)
+    for name in ("_reference", "_losses"):
+        part = getattr(comparison, name)
+        monkeypatch.setattr(comparison, name, lambda *args, n=name, part=part: seen.append(n) or part(*args))
+    return seen
+
+
+class Heard(comparison.Listener):
+    """The names of the parts that are told, with the bounds."""
+
+    def __init__(self):
+        self.told = []
+
+    def __getattribute__(self, name):
+        if name in ("constants", "bounds", "run", "cvxpy", "losses", "programs"):
+            return lambda *parts: self.told.append((name, [r.name for r in parts[0]] if name in BOUND_PARTS else []))
+        return super().__getattribute__(name)
+
+
+BOUND_PARTS = ("bounds", "programs")
+
+
+def test_a_bound_that_was_not_asked_for_is_not_computed_and_says_so(worked_out):
+    found = vf.compare(PROBLEM, bounds=QUICK)
+    assert worked_out == list(QUICK)
+    assert (found.verdicts["lmi"].verdict, found.verdicts["lmi"].reason) == ("NOT_COMPUTED", NOT_ASKED)
+    document = found.to_dict()
+    assert (document["verdicts"]["lmi"], document["reason"]["lmi"]) == ("NOT_COMPUTED", NOT_ASKED)
+    assert document["lmi"] is None
+    for name in ("losses", "cvxpy"):
+        assert document[name] is None
+        assert document["reason"][name] == "not asked for: it comes with lmi"
+    assert [row.name for row in found.computed] == list(QUICK)
+
+
+def test_what_was_asked_for_is_what_a_whole_comparison_has(worked_out):
+    whole, some = vf.compare(PROBLEM).to_dict(), vf.compare(PROBLEM, bounds="energy,repaired").to_dict()
+    assert some["energy"] == whole["energy"]
+    for name in ("repaired", "energy"):
+        assert some["bounds"]["editions"][name] == whole["bounds"]["editions"][name]
+    assert (some["bounds"]["editions"]["printed"], some["bounds"]["reason"]["printed"]) == (None, NOT_ASKED)
+    assert some["run"] == whole["run"]
+    assert {name: some["reasons"][name] for name in ("repaired", "energy", "linearised")} == {
+        name: whole["reasons"][name] for name in ("repaired", "energy", "linearised")
+    }
+
+
+def test_a_bound_that_takes_the_matrices_brings_what_takes_long(worked_out):
+    found = vf.compare(PROBLEM, bounds=["lmi"])
+    assert worked_out == ["_reference", "_losses", "lmi"]
+    assert found.losses is not None
+    assert found.cvxpy is not None
+    assert found.bounds["energy"].not_computed == NOT_ASKED
+
+
+@pytest.mark.parametrize("bounds", [None, ("lmi",), QUICK, tuple(BOUNDS)], ids=str)
+def test_parts_are_told_again_as_they_were_told_first(bounds):
+    first, again = Heard(), Heard()
+    vf.compare(PROBLEM, bounds=bounds, listener=first).tell(again)
+    assert again.told == first.told
+    names = [name for part, listed in first.told for name in listed]
+    assert names == list(bounds or BOUNDS)
+    slow = {"cvxpy", "losses", "programs"} & {part for part, _ in first.told}
+    assert len(slow) == (0 if bounds == QUICK else 3)
+
+
+def test_all_names_are_no_names(worked_out):
+    assert vf.compare(PROBLEM, bounds=tuple(BOUNDS)).to_json() == vf.compare(PROBLEM).to_json()
+
+
+def test_outside_the_theorem_too_a_bound_that_was_not_asked_for_is_not_computed():
+    found = vf.compare(PROBLEM.changed(law="local"), bounds=["energy"])
+    assert found.verdicts["energy"].verdict == "HYPOTHESES_NOT_MET"
+    assert found.verdicts["repaired"].reason == NOT_ASKED
+
+
+def test_names_are_those_of_the_moment(monkeypatch):
+    for bound in (Halfway(), Slow()):
+        monkeypatch.setitem(BOUNDS, bound.name, bound)
+    found = vf.compare(PROBLEM, bounds=["halfway"])
+    assert [name for name, row in found.bounds.items() if row.asked] == ["halfway"]
+    assert found.reason["losses"] == "not asked for: it comes with lmi or slow"
+    assert vf.compare(PROBLEM, bounds=["slow"]).cvxpy is not None
+
+
+@pytest.mark.parametrize(
+    ("bounds", "message"),
+    [
+        ("enrgy", f"no bound 'enrgy': did you mean 'energy'? there are {KNOWN}"),
+        (["lmi", "x\n"], f"no bound 'x\\n': there are {KNOWN}"),
+        ((), f"needed one bound at least of {KNOWN}"),
+        ("", f"needed one bound at least of {KNOWN}"),
+        (" , ", f"needed one bound at least of {KNOWN}"),
+    ],
+)
+def test_an_unknown_name_and_none_are_refused_with_the_names_there_are(bounds, message):
+    with pytest.raises(ValueError) as caught:
+        vf.compare(PROBLEM, bounds=bounds)
+    assert str(caught.value) == message
+
+
+def test_names_are_taken_in_the_order_of_the_table():
+    assert chosen(["lmi", "printed", "lmi"]) == ("printed", "lmi")
+    assert chosen(None) == tuple(BOUNDS)

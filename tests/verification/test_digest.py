@@ -1,0 +1,175 @@
+"""Digests, keys of rows and certificates that a key of the problem file with a default leaves as they are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from fractions import Fraction
+from typing import Any
+
+import pytest
+
+import verification as vf
+from verification.certificate import contraction, description
+from verification.problem import changes, digest, reading
+from verification.problem.specification import Problem
+from verification.problem.specs import ContactSpec, Settings
+from verification.problem.tables import non_negative
+from verification.sweeps.grid import SweepGrid
+from verification.sweeps.identity import Identity
+
+NAMES = ("section6", "two-bars", "inside", "signorini")
+GRID = SweepGrid.of({"theta": ["0.3"]})
+
+
+@dataclass(frozen=True, kw_only=True)
+class LaterContact(ContactSpec):
+    """The contact of a later release, with adhesion."""
+
+    adhesion: Fraction = Fraction(0)
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class LaterProblem(Problem):
+    """A problem of a later release, with a table of steps."""
+
+    steps: Any = ()
+
+
+def later_contact(monkeypatch):
+    """Put `contact.adhesion` into the problem file, 0 by default."""
+    read = reading.read_problem
+
+    def read_later(data, *given):
+        contact = dict(data.get("contact", {}))
+        adhesion = non_negative(contact.pop("adhesion", 0))
+        found = read({**data, "contact": contact}, *given)
+        return replace(found, contact=LaterContact(**vars(found.contact), adhesion=adhesion))
+
+    for module in (reading, changes, digest):
+        monkeypatch.setattr(module, "read_problem", read_later)
+
+
+def later_table(monkeypatch):
+    """Put a table `step` into what a digest reads and writes, empty by default."""
+    read, tables = digest.read_problem, digest.tables
+
+    def read_later(data, source):
+        found = read({key: value for key, value in data.items() if key != "step"}, source)
+        given = {field.name: getattr(found, field.name) for field in fields(found)}
+        return LaterProblem(**given, steps=data.get("step", ()))
+
+    monkeypatch.setattr(digest, "read_problem", read_later)
+    monkeypatch.setattr(digest, "tables", lambda problem: tables(problem) | {"step": getattr(problem, "steps", ())})
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_later_key_with_a_default_changes_no_digest_and_no_key_of_a_row(monkeypatch, name):
+    before, key = vf.example(name).digest, Identity.read(vf.example(name)).keys(GRID)
+    later_contact(monkeypatch)
+    problem = vf.Problem.from_dict(vf.example(name).to_dict())
+    assert problem.to_dict()["contact"]["adhesion"] == 0
+    assert (problem.digest, Identity.read(problem).keys(GRID)) == (before, key)
+
+
+def test_another_value_of_a_later_key_changes_the_digest(monkeypatch):
+    later_contact(monkeypatch)
+    problem = vf.Problem.from_dict(vf.example("section6").to_dict())
+    found = {problem.with_keys({"contact.adhesion": value}).digest for value in ("0", "1/3", "0.3", "3e-1")}
+    assert len(found) == 3
+    assert problem.digest in found
+
+
+def test_a_later_table_changes_the_digest_where_it_says_something(monkeypatch):
+    before = vf.example("two-bars")
+    digest_before = before.digest
+    later_table(monkeypatch)
+    later = LaterProblem(**{field.name: getattr(before, field.name) for field in fields(before)})
+    assert later.digest == digest_before
+    assert replace(later, steps=("press",)).digest != digest_before
+
+
+def test_a_key_that_the_file_must_have_counts(monkeypatch):
+    before = vf.example("two-bars").digest
+    later_contact(monkeypatch)
+    problem = vf.Problem.from_dict(vf.example("two-bars").to_dict())
+    read = digest.read_problem
+
+    def demanding(data, source):
+        if "adhesion" not in data["contact"]:
+            raise vf.ProblemError(source, "contact.adhesion", None, "this key is missing")
+        return read(data, source)
+
+    monkeypatch.setattr(digest, "read_problem", demanding)
+    assert problem.digest != before
+
+
+OF_0_1_0 = [
+    ("contact", "gap"),
+    ("contact", "law"),
+    ("iteration", "tolerance"),
+    ("norm", "length"),
+    ("body1", "body_force"),
+]
+
+
+@pytest.mark.parametrize(("table", "key"), OF_0_1_0)
+def test_keys_of_0_1_0_count_with_their_defaults_too(monkeypatch, table, key):
+    """A release that changes a default leaves digests as they are, and tells its problems from those before."""
+    problem, tables = vf.example("section6"), digest.tables
+    before = problem.digest
+    less = lambda data: {name: value for name, value in data.items() if name != key}
+    monkeypatch.setattr(digest, "tables", lambda p: tables(p) | {table: less(tables(p)[table])})
+    assert problem.digest != before
+
+
+@dataclass(frozen=True, kw_only=True)
+class LaterSettings(Settings):
+    """The settings of a later release."""
+
+    patience: int = 5
+
+
+def test_a_later_setting_with_a_default_changes_no_key_of_a_pair():
+    pair = vf.build(vf.example("two-bars"))
+    keys = lambda **more: Identity.read(replace(pair, settings=LaterSettings(**vars(pair.settings), **more))).keys(GRID)
+    assert keys() == Identity.read(pair).keys(GRID) != keys(patience=6)
+
+
+# --- certificates ---
+
+
+@pytest.fixture(scope="module")
+def certified():
+    problem = vf.example("section6").changed(cells=((10, 2), (8, 2)), radius="0.2")
+    return problem, vf.certify(problem, edition="energy").to_dict()
+
+
+def describing(monkeypatch, more):
+    """Let descriptions have more keys."""
+    describe = description.describe
+    monkeypatch.setattr(contraction, "describe", lambda *given: describe(*given) | more)
+
+
+@pytest.mark.parametrize("of_a_body", [False, True])
+def test_a_certificate_is_about_its_bodies_after_descriptions_got_another_key(monkeypatch, certified, of_a_body):
+    problem, document = certified
+    describing(monkeypatch, {"body1": document["discrete"]["body1"] | {"of": None}} if of_a_body else {"offset": None})
+    checked = vf.check_again(document, problem)
+    assert (checked.accepted, checked.same) == (True, True)
+
+
+def test_a_certificate_is_not_about_bodies_that_have_another_value_of_that_key(monkeypatch, certified):
+    problem, document = certified
+    describing(monkeypatch, {"offset": {"normal": "1/3"}})
+    assert vf.check_again(document, problem).same is False
+
+
+def test_a_certificate_reads_a_problem_of_a_release_without_the_key(monkeypatch, certified):
+    problem, document = certified
+    before = problem.digest
+    assert "adhesion" not in document["problem"]["contact"]
+    later_contact(monkeypatch)
+    read = vf.Problem.from_dict(document["problem"])
+    assert (read.digest, read.contact.adhesion) == (before, 0)
+    assert vf.check_again(document, read).same
+    assert vf.check_again(document, read.with_keys({"contact.friction": "1/4"})).same is False
