@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from decimal import Decimal
-from fractions import Fraction
 from typing import Any, Literal
 
 from ndtheory.number import Numeric
@@ -18,9 +16,6 @@ from verification.problem.tables import ProblemError
 from verification.problem.toml import document
 from verification.problem.vocabulary import vocabulary
 from verification.problem.writing import plain, tables
-
-#: What is read as a number, exactly: a float means its shortest decimal, a text may be a fraction.
-Rational = int | float | str | Decimal | Fraction
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -105,17 +100,17 @@ class Problem(ProblemSpec):
         self,
         *,
         title: str | None = None,
-        young: Sequence[Rational | None] | None = None,
-        poisson: Sequence[Rational | None] | None = None,
+        young: Sequence[Numeric | None] | None = None,
+        poisson: Sequence[Numeric | None] | None = None,
         cells: Sequence[int | Sequence[int] | None] | None = None,
-        friction: Rational | None = None,
+        friction: Numeric | None = None,
         law: str | None = None,
-        radius: Rational | None = None,
-        gap: Rational | None = None,
+        radius: Numeric | None = None,
+        gap: Numeric | None = None,
         neumann_body: int | None = None,
-        theta: Rational | None = None,
+        theta: Numeric | None = None,
         relaxation: str | None = None,
-        tolerance: Rational | None = None,
+        tolerance: Numeric | None = None,
         max_iterations: int | None = None,
     ) -> Problem:
         """The same problem with other values, read as those of a file are: exactly, and refused by the same words.

@@ -159,17 +159,7 @@ class IterationSpec(Settings):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class ProblemSpec:
-    """The tables of a problem file, each key with its value.
-
-    Attributes
-    ----------
-    source : str
-        The file it came from, or ``<dict>``; errors name it.
-    units : read-only mapping
-        Labels ``length`` and ``stress``.
-    length : Fraction
-        L of the norm ``|v|^2/L^2 + |grad v|^2``.
-    """
+    """The tables of a problem file, each key with its value; :class:`verification.Problem` says more."""
 
     title: str
     dimension: Literal[1, 2]
