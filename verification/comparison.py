@@ -128,7 +128,8 @@ class Comparison(Document):
     @property
     def proved_violated(self) -> bool:
         """Whether a proved claim was violated: a bug, or an error in a proof.  A printed one violated is a finding."""
-        return any(self.verdicts[name].verdict == "VIOLATED" and not BOUNDS[name].finding for name in self.bounds)
+        judged = ((BOUNDS.get(name), judgement.verdict) for name, judgement in self.verdicts.items())
+        return any(verdict == "VIOLATED" and bound is not None and not bound.finding for bound, verdict in judged)
 
     @property
     def inconclusive(self) -> bool:

@@ -31,9 +31,9 @@ def test_the_document_and_the_report_say_what_was_not_asked_for(call, write, tmp
 @pytest.mark.parametrize(
     ("names", "says"),
     [
-        ("enrgy", f"no bound 'enrgy': did you mean 'energy'? there are {KNOWN}"),
+        ("enrgy", f"no bound 'enrgy', there are {KNOWN}; did you mean 'energy'?"),
         ("", f"needed one bound at least of {KNOWN}"),
-        ("lmi,energy,x", f"no bound 'x': there are {KNOWN}"),
+        ("lmi,energy,x", f"no bound 'x', there are {KNOWN}"),
     ],
 )
 def test_what_is_no_bound_is_one_line(call, write, names, says):

@@ -10,7 +10,7 @@ import pytest
 
 import verification as vf
 from verification.certificate import contraction, description
-from verification.problem import changes, digest, reading
+from verification.problem import changes, digest, reading, specification
 from verification.problem.specification import Problem
 from verification.problem.specs import ContactSpec, Settings
 from verification.problem.tables import non_negative
@@ -45,7 +45,7 @@ def later_contact(monkeypatch):
         found = read({**data, "contact": contact}, *given)
         return replace(found, contact=LaterContact(**vars(found.contact), adhesion=adhesion))
 
-    for module in (reading, changes, digest):
+    for module in (reading, changes, digest, specification):
         monkeypatch.setattr(module, "read_problem", read_later)
 
 
@@ -53,10 +53,10 @@ def later_table(monkeypatch):
     """Put a table `step` into what a digest reads and writes, empty by default."""
     read, tables = digest.read_problem, digest.tables
 
-    def read_later(data, source):
-        found = read({key: value for key, value in data.items() if key != "step"}, source)
-        given = {field.name: getattr(found, field.name) for field in fields(found)}
-        return LaterProblem(**given, steps=data.get("step", ()))
+    def read_later(data, *given):
+        found = read({key: value for key, value in data.items() if key != "step"}, *given)
+        values = {field.name: getattr(found, field.name) for field in fields(found)}
+        return LaterProblem(**values, steps=data.get("step", ()))
 
     monkeypatch.setattr(digest, "read_problem", read_later)
     monkeypatch.setattr(digest, "tables", lambda problem: tables(problem) | {"step": getattr(problem, "steps", ())})
@@ -94,10 +94,10 @@ def test_a_key_that_the_file_must_have_counts(monkeypatch):
     problem = vf.Problem.from_dict(vf.example("two-bars").to_dict())
     read = digest.read_problem
 
-    def demanding(data, source):
+    def demanding(data, *given):
         if "adhesion" not in data["contact"]:
-            raise vf.ProblemError(source, "contact.adhesion", None, "this key is missing")
-        return read(data, source)
+            raise vf.ProblemError(given[0], "contact.adhesion", None, "this key is missing")
+        return read(data, *given)
 
     monkeypatch.setattr(digest, "read_problem", demanding)
     assert problem.digest != before

@@ -11,7 +11,7 @@ import click
 
 from verification.cli.console import deliver, stages
 from verification.cli.failing import fail
-from verification.cli.options import JSON, SET, SWAP, THETA, check_place, one_file
+from verification.cli.options import JSON, SET, SWAP, THETA, OneOf, check_place, one_file
 from verification.cli.problems import load_problem
 from verification.cli.typed import Typed
 
@@ -19,7 +19,7 @@ from verification.cli.typed import Typed
 MOST_BYTES = 100_000_000
 
 
-class Certifying(click.Choice[str]):
+class Certifying(OneOf):
     """The name of a bound that can propose a certificate."""
 
     def __init__(self) -> None:
