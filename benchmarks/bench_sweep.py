@@ -23,7 +23,7 @@ from recording import Record, Row, options, report
 from timing import clock, timed
 
 import verification as vf
-from verification.sweeps.bodies import Bodies
+from verification.sweeps.bodies import SharedBodies
 from verification.sweeps.grid import SweepGrid
 from verification.sweeps.identity import LENGTH, Identity
 from verification.sweeps.keeping import Kept
@@ -49,7 +49,7 @@ def grid(rows: int) -> SweepGrid:
 
 def alone(start: vf.Problem, asked: SweepGrid) -> list[dict[str, Any]]:
     """The rows and nothing else."""
-    bodies = Bodies(start)
+    bodies = SharedBodies(start)
     return [row(start, values, bodies) for values in asked.rows()]
 
 

@@ -41,7 +41,7 @@ ONE_FILE = "it includes another file: needed one file that holds the whole mesh"
 REFUSED = 3
 
 
-class Refused(Exception):
+class NotRead(Exception):
     """A file that is not read, with the reason."""
 
 
@@ -63,23 +63,23 @@ def contents(path: Path) -> dict[str, Any]:
     if kind == "gmsh":
         content = path.read_bytes()
         if not content.startswith(b"$MeshFormat"):
-            raise Refused("no Gmsh file: needed $MeshFormat on its first line")
+            raise NotRead("no Gmsh file: needed $MeshFormat on its first line")
         _check_counts(content)
         largest = _largest_number(content)
         if largest > LARGEST_NUMBER:
-            raise Refused(f"a node has the number {largest:g}: at most {LARGEST_NUMBER} is needed")
+            raise NotRead(f"a node has the number {largest:g}: at most {LARGEST_NUMBER} is needed")
         del content
     else:
         try:
             materials = _abaqus_materials(path)
         except UnicodeDecodeError as error:
-            raise Refused(f"needed text in UTF-8: {error.reason}") from None
+            raise NotRead(f"needed text in UTF-8: {error.reason}") from None
     read, triangles, lines, groups = _by_meshio(path, kind)
     if triangles is None or len(triangles) == 0:
-        raise Refused(f"no triangles in it, only {', '.join(read.cells_dict) or 'nothing'}")
+        raise NotRead(f"no triangles in it, only {', '.join(read.cells_dict) or 'nothing'}")
     others = sorted(set(read.cells_dict) - {"triangle", "line", "vertex"})
     if others:
-        raise Refused(f"needed only triangles, it has {', '.join(others)} too")
+        raise NotRead(f"needed only triangles, it has {', '.join(others)} too")
     if materials:
         split = sorted(materials) if len(materials) > 1 else []
     else:
@@ -89,19 +89,19 @@ def contents(path: Path) -> dict[str, Any]:
             [json.dumps(name[:40], ensure_ascii=False) for name in split[:5]] + ["..."] * (len(split) > 5)
         )
         what = "materials" if materials else "groups"
-        raise Refused(
+        raise NotRead(
             f"needed one material: its triangles are split into the {what} {named}; write a file for each, or put all"
             " triangles into one group"
         )
     if not lines:
-        raise Refused("no named lines; give the sides physical names")
+        raise NotRead("no named lines; give the sides physical names")
     if kind == "gmsh":
         try:
             least = _least_number(path.read_bytes())
         except (IndexError, KeyError, ValueError):
-            raise Refused("its elements do not fit its format") from None
+            raise NotRead("its elements do not fit its format") from None
         if least < 1:
-            raise Refused(f"an element names node {least}: nodes are numbered from 1")
+            raise NotRead(f"an element names node {least}: nodes are numbered from 1")
     points = np.asarray(read.points, dtype=float)
     return {"points": points, "triangles": np.asarray(triangles, dtype=np.int64), "lines": lines}
 
@@ -122,7 +122,7 @@ def _by_meshio(path: Path, kind: str) -> tuple[Any, Any, dict[str, Ints], dict[s
         raise
     except (Exception, SystemExit) as error:
         why = " ".join((words.getvalue() or f"{type(error).__name__}: {error}").split())
-        raise Refused(f"meshio cannot read it ({why})") from None
+        raise NotRead(f"meshio cannot read it ({why})") from None
 
 
 def _groups(read: Any, kind: str, dimension: int) -> dict[str, Ints]:
@@ -171,15 +171,15 @@ def _abaqus_materials(path: Path) -> set[str]:
             head, *options = line.split(",")
             word = "".join(head.split()).replace("*", "").upper()
             if word == "INCLUDE":  # meshio needs no star before it
-                raise Refused(ONE_FILE)
+                raise NotRead(ONE_FILE)
             if not line.startswith("*"):
                 if keyword == "ELSET" and line.strip(" \t\r\n,") and not head.strip().isnumeric():
-                    raise Refused("an *ELSET lists names of other sets: needed numbers of elements")
+                    raise NotRead("an *ELSET lists names of other sets: needed numbers of elements")
                 continue
             keyword = word
             given = {key.strip().upper(): value.strip() for key, _, value in (pair.partition("=") for pair in options)}
             if "INPUT" in given:
-                raise Refused(ONE_FILE)
+                raise NotRead(ONE_FILE)
             if keyword in SECTIONS and given.get("MATERIAL"):
                 materials.add(given["MATERIAL"].upper())
             elif keyword == "ELEMENT":
@@ -188,9 +188,9 @@ def _abaqus_materials(path: Path) -> set[str]:
                 lists.append(given.get("ELSET"))
     named = [name for name in blocks if name]
     if len(set(named)) < len(named) or None in blocks[: len(named)]:  # meshio counts the sets for the blocks
-        raise Refused("needed a different ELSET for each *ELEMENT, or for none of them")
+        raise NotRead("needed a different ELSET for each *ELEMENT, or for none of them")
     if len(set(lists)) < len(lists):  # meshio keeps the last
-        raise Refused("needed one *ELSET for each name")
+        raise NotRead("needed one *ELSET for each name")
     return materials
 
 
@@ -204,7 +204,7 @@ def _check_counts(content: bytes) -> None:
     for section in re.finditer(rb"^\$(PhysicalNames|Entities|Nodes|Elements)[ \t\r]*\n", content, re.MULTILINE):
         name, start = section[1], section.end()
         if name in seen:
-            raise Refused(f"it has two sections ${name.decode()}: one is needed")
+            raise NotRead(f"it has two sections ${name.decode()}: one is needed")
         seen.add(name)
         if name == b"PhysicalNames" or not binary or version.startswith(b"2"):
             counts = [int(word) for word in content[start : start + 200].partition(b"\n")[0].split() if word.isdigit()]
@@ -218,7 +218,7 @@ def _check_counts(content: bytes) -> None:
         left, least = len(content) - start, LEAST_BYTES[name][binary]
         if any(count * least > left for count in counts):
             what = re.sub("([A-Z])", r" \1", name.decode()).strip().lower()
-            raise Refused(f"it promises {max(counts)} {what}, but only {left} bytes follow")
+            raise NotRead(f"it promises {max(counts)} {what}, but only {left} bytes follow")
 
 
 def _largest_number(content: bytes) -> float:
@@ -321,7 +321,7 @@ def main(arguments: Sequence[str]) -> int:
         sides = {f"side{i}": facets for i, facets in enumerate(found["lines"].values())}
         np.savez(out, points=found["points"], triangles=found["triangles"], names=names, **sides)
         answer, status = out.getbuffer(), 0
-    except Refused as error:
+    except NotRead as error:
         answer, status = memoryview(str(error).encode(errors="replace")), REFUSED
     except MemoryError:
         answer, status = memoryview(f"reading it needs more than {int(memory) / 1e9:g} GB of memory".encode()), REFUSED

@@ -51,7 +51,7 @@ def relaxation_factor(value: Numeric) -> Fraction:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Given:
+class GivenConstants:
     """Constants as exact rationals, with what was given in their place.
 
     A :class:`~ndtheory.number.Number` enters the formulas as its value, read like any float; its level and its ends
@@ -163,7 +163,7 @@ def plain(value: Numeric | Number) -> Numeric:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Constants(Given):
+class Constants(GivenConstants):
     """m, M, C_R and C_K: all that Section 5 knows of the two bodies and of friction.
 
     Numbers are kept exactly as written (see :func:`ndtheory.number.exact`).  Each may be a

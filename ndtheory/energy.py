@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 
-from ndtheory.constants import Given, plain
+from ndtheory.constants import GivenConstants, plain
 from ndtheory.number import Number, Numeric
 
 #: Sizes whose squares and quotients fit into a double.
@@ -17,7 +17,7 @@ def _friction(kappa: Fraction) -> bool:
 
 
 @dataclass(frozen=True, kw_only=True)
-class EnergyConstants(Given):
+class EnergyConstants(GivenConstants):
     """rho, kappa_1 and kappa_2: all that the theorem in energy norms knows of the two bodies and of friction.
 
     Numbers are kept exactly as written (see :func:`ndtheory.number.exact`).  Each may be a

@@ -8,7 +8,7 @@ from typing import Any
 import sympy as sp
 
 from ndtheory import bounds
-from ndtheory.symbolic.engine import Checks, Goal, Relation, equal, less
+from ndtheory.symbolic.engine import CheckList, Goal, Relation, equal, less
 from ndtheory.symbolic.intervals import ADMISSIBLE, C0, P_, Q_, a_, b_, of_36, of_edition, repaired_G, tilde_G, tilde_P
 from ndtheory.symbolic.symbols import (
     C_R,
@@ -37,7 +37,7 @@ from ndtheory.symbolic.symbols import (
     y,
 )
 
-CHECKS = Checks()
+CHECKS = CheckList()
 check = CHECKS.add
 
 # --- Cases 5.7 and 5.8 ----------------------------------------------------------------------------------------------

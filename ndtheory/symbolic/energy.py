@@ -13,11 +13,11 @@ import sympy as sp
 
 from ndtheory import energy_norms
 from ndtheory.symbolic.contraction import any_theta
-from ndtheory.symbolic.engine import Checks, Goal, Vector, at_most, equal, less, linear, nonnegative, positive
+from ndtheory.symbolic.engine import CheckList, Goal, Vector, at_most, equal, less, linear, nonnegative, positive
 from ndtheory.symbolic.intervals import C0
 from ndtheory.symbolic.symbols import C_R, CONSTANTS, L1, L2, A, C_s, M, a1, a2, d1, e, k, m, o, p, psi, q, r, theta, y
 
-CHECKS = Checks()
+CHECKS = CheckList()
 check = CHECKS.add
 
 rho, size = positive("rho E")

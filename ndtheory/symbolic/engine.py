@@ -298,7 +298,7 @@ class Check:
         return decide(self.goals(form))
 
 
-class Checks(list[Check]):
+class CheckList(list[Check]):
     """The checks of one module, in the order of the paper."""
 
     def add(self, *, states: Callable[[Any], Relation | Sequence[Relation]] | None = None, **fields: Any) -> None:

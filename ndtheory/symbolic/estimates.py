@@ -12,7 +12,7 @@ from typing import Any
 import sympy as sp
 
 from ndtheory import bounds
-from ndtheory.symbolic.engine import Checks, Goal, Relation, Vector, equal, nonnegative
+from ndtheory.symbolic.engine import CheckList, Goal, Relation, Vector, equal, nonnegative
 from ndtheory.symbolic.symbols import (
     C_R,
     CONSTANTS,
@@ -54,7 +54,7 @@ from ndtheory.symbolic.symbols import (
     y,
 )
 
-CHECKS = Checks()
+CHECKS = CheckList()
 check = CHECKS.add
 
 # --- Lemma 5.3 ------------------------------------------------------------------------------------------------------

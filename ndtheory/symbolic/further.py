@@ -8,7 +8,7 @@ import sympy as sp
 
 from ndtheory import bounds
 from ndtheory.symbolic.contraction import above_C6, any_theta, inside
-from ndtheory.symbolic.engine import Checks, at_most, equal, less, nonnegative, positive
+from ndtheory.symbolic.engine import CheckList, at_most, equal, less, nonnegative, positive
 from ndtheory.symbolic.intervals import C0, P_, Q_, end_of_43
 from ndtheory.symbolic.symbols import (
     C_R,
@@ -40,7 +40,7 @@ from ndtheory.symbolic.symbols import (
     y,
 )
 
-CHECKS = Checks()
+CHECKS = CheckList()
 check = CHECKS.add
 
 check(

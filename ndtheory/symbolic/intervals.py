@@ -7,7 +7,7 @@ from typing import Any
 import sympy as sp
 
 from ndtheory import bounds
-from ndtheory.symbolic.engine import Checks, Goal, Relation, equal, less, nonnegative
+from ndtheory.symbolic.engine import CheckList, Goal, Relation, equal, less, nonnegative
 from ndtheory.symbolic.symbols import (
     C_R,
     C_T,
@@ -40,7 +40,7 @@ from ndtheory.symbolic.symbols import (
     y,
 )
 
-CHECKS = Checks()
+CHECKS = CheckList()
 check = CHECKS.add
 
 # --- second step ----------------------------------------------------------------------------------------------------

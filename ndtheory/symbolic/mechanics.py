@@ -10,7 +10,7 @@ from typing import Any
 
 import sympy as sp
 
-from ndtheory.symbolic.engine import Checks, Goal, Vector, at_most, equal, less, nonnegative, positive
+from ndtheory.symbolic.engine import CheckList, Goal, Vector, at_most, equal, less, nonnegative, positive
 from ndtheory.symbolic.symbols import (
     CONSTANTS,
     M_1,
@@ -36,7 +36,7 @@ from ndtheory.symbolic.symbols import (
     y,
 )
 
-CHECKS = Checks()
+CHECKS = CheckList()
 check = CHECKS.add
 
 # --- Section 2 ------------------------------------------------------------------------------------------------------

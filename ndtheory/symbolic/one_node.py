@@ -6,11 +6,11 @@ from typing import Any
 
 import sympy as sp
 
-from ndtheory.symbolic.engine import Check, Checks, nonnegative, positive
+from ndtheory.symbolic.engine import Check, CheckList, nonnegative, positive
 from ndtheory.symbolic.one_step import relaxed
 from ndtheory.symbolic.symbols import C_R, A, F, M, P, W, at_most, e, m, mu, printed_P, t, t_, theta, x, xi
 
-CHECKS = Checks()
+CHECKS = CheckList()
 check = CHECKS.add
 
 #: |||(T_theta psi) - (T_theta psi~)|||^2 in full, by (5.24).

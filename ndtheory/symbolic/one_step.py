@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sympy as sp
 
-from ndtheory.symbolic.engine import Checks, Relation, Vector, bilinear, equal, functional
+from ndtheory.symbolic.engine import CheckList, Relation, Vector, bilinear, equal, functional
 from ndtheory.symbolic.symbols import (
     C_R,
     CONSTANTS,
@@ -49,7 +49,7 @@ from ndtheory.symbolic.symbols import (
     x,
 )
 
-CHECKS = Checks()
+CHECKS = CheckList()
 check = CHECKS.add
 
 inner = bilinear("b")  # the inner product of (5.21)

@@ -7,7 +7,7 @@ from typing import Any
 import sympy as sp
 
 from ndtheory import bounds
-from ndtheory.symbolic.engine import Checks, Goal, at_most, equal, less, positive
+from ndtheory.symbolic.engine import CheckList, Goal, at_most, equal, less, positive
 from ndtheory.symbolic.intervals import of_36
 from ndtheory.symbolic.one_node import AT_THE_NODE, expanded, kappa, one_node
 from ndtheory.symbolic.symbols import (
@@ -46,7 +46,7 @@ from ndtheory.symbolic.symbols import (
     y,
 )
 
-CHECKS = Checks()
+CHECKS = CheckList()
 check = CHECKS.add
 
 # --- (5.39) and (5.44) at the one sliding node: there C_0 = 1/3 ------------------------------------------------------

@@ -9,10 +9,10 @@ from typing import Any
 
 import sympy as sp
 
-from ndtheory.symbolic.engine import Checks, Goal, Vector, at_most, equal, less, positive
+from ndtheory.symbolic.engine import CheckList, Goal, Vector, at_most, equal, less, positive
 from ndtheory.symbolic.symbols import C_R, CONSTANTS, L1, L2, C, M, a1, a2, lift, o, p, q, test, theta, y
 
-CHECKS = Checks()
+CHECKS = CheckList()
 check = CHECKS.add
 
 u1, u2, field = Vector("u1"), Vector("u2"), Vector("w")

@@ -7,7 +7,7 @@ from math import isnan, nan
 import numpy as np
 import pytest
 
-from verification.contact.kkt import KKT, Certificate, certify
+from verification.contact.kkt import KKT, KKTCertificate, certify
 
 #: Two nodes: tangential components first, then normal ones.
 S = np.array([[4.0, 1, 0, 0], [1, 3, 1, 0], [0, 1, 2, 1], [0, 0, 1, 2]])
@@ -69,7 +69,7 @@ def test_each_condition_that_is_broken_has_its_size(name):
     wrong = whose.copy()
     wrong[place] = value
     v, force = (wrong, FORCE) if whose is V else (V, wrong)
-    found = Certificate(S).measure(S @ v + force, BOUND, v, force)
+    found = KKTCertificate(S).measure(S @ v + force, BOUND, v, force)
     size = max(abs(S @ v + force).max(), abs(S @ v).max(), BOUND.max())
     assert broken(found) == {condition: miss / size for condition, miss in misses.items()}
     assert found.residual == max(misses.values()) / size

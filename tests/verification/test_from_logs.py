@@ -17,7 +17,7 @@ from verification.advice.ends import SWIFT, Box
 from verification.advice.log import Column, Log
 from verification.advice.pace import Pace
 from verification.advice.readings import NextRun, Observed, read_observed, read_plateau
-from verification.advice.seen import Interval, LogBound, SeenColumn, SeenLog
+from verification.advice.seen import LogBound, RhoInterval, SeenColumn, SeenLog
 from verification.problem.tables import ProblemError
 
 
@@ -194,7 +194,7 @@ def test_bounds_contradict_each_other_beyond_three_percent_of_1_plus_rho():
 def test_the_log_that_decides_most_is_the_largest_that_falls_or_the_smallest_that_does_not():
     low, high = log("0.1", "0.9", file="low"), log("0.3", "0.7", file="high")
     rises, more = log("0.5", "1.5", file="rises"), log("0.7", "2.2", file="more")
-    apart = Interval(lo=None, hi=None, contradiction="so that nothing else decides")
+    apart = RhoInterval(lo=None, hi=None, contradiction="so that nothing else decides")
     for logs in ((low, high, rises), (rises, high, low)):
         assert together(*logs, interval=apart)[0] == high.readings
     for logs in ((rises, more), (more, rises)):
@@ -206,7 +206,7 @@ def test_the_log_that_decides_most_is_the_largest_that_falls_or_the_smallest_tha
 
 def test_contradictory_logs_ask_for_half_of_the_smallest_theta():
     logs = (log("0.3", "0.7"), log("0.2", "0.9"))
-    found = together(*logs, interval=Interval(lo=None, hi=None, contradiction="they do"))
+    found = together(*logs, interval=RhoInterval(lo=None, hi=None, contradiction="they do"))
     assert (found[1].theta, found[2]) == (0.1, None)
     assert found[0] == logs[0].readings
 
@@ -228,7 +228,7 @@ def test_a_swift_log_is_kept_unless_the_largest_decides_rho():
 def test_a_rho_between_narrow_bounds_is_taken_at_its_upper_end():
     """Two logs in contact: one falls with several readings, another one stays at a level."""
     falls = lambda r: log("0.2", r)
-    interval = lambda lo, hi: Interval(lo=bound(lo), hi=bound(hi), contradiction=None)
+    interval = lambda lo, hi: RhoInterval(lo=bound(lo), hi=bound(hi), contradiction=None)
     logs = (falls("0.5"), log("0.9", "1.5"))
     for lo, hi in ((6, F("7.5")), (F("7.5"), F("7.4"))):
         readings, following, rho = together(*logs, interval=interval(lo, hi))
@@ -241,7 +241,7 @@ def test_a_rho_between_narrow_bounds_is_taken_at_its_upper_end():
 
 
 def test_the_theta_for_narrow_bounds_is_run_first_where_it_is_much_larger_than_one_that_falls():
-    interval = lambda rho: Interval(lo=bound(rho), hi=bound(rho), contradiction=None)
+    interval = lambda rho: RhoInterval(lo=bound(rho), hi=bound(rho), contradiction=None)
     of = lambda theta, rho: together(log(theta, 1 - F(theta)), interval=interval(rho))
     _, following, rho = of("0.1", 8)  # 2/(2 + rho) = 0.2
     assert (following.theta, rho) == (0.2, None)
@@ -389,7 +389,7 @@ def test_bounds_of_a_log_use_the_safe_end_of_its_ratio(tmp_path):
     assert upper.value == F("1.85") / F("0.45") - 1
     for ratio in ("0.5", observed("0.57", "0.5", "0.6")):  # below 1 - theta in part
         assert from_logs.bounds([log("0.45", ratio)])[0] == []
-    document = Interval(lo=bound(F(1, 3)), hi=bound(F(1, 3)), contradiction=None).to_dict()
+    document = RhoInterval(lo=bound(F(1, 3)), hi=bound(F(1, 3)), contradiction=None).to_dict()
     assert F(document["lo"]["value"]) <= F(1, 3) <= F(document["hi"]["value"])
     assert document["lo"]["value"] < document["hi"]["value"]
 

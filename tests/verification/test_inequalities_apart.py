@@ -16,7 +16,7 @@ from section_5 import PAIRS, assert_all_hold, draw_pair, ratios, thetas_for
 
 from verification.interface.interface import Interface
 from verification.ledger.cases import NAMED, problem
-from verification.ledger.convergence import Setting, there_and_back
+from verification.ledger.convergence import RunsOfLevel, there_and_back
 from verification.ledger.differences import Difference
 from verification.ledger.field_problems import PROBLEMS
 from verification.ledger.inequalities import ALLOWANCE, INEQUALITIES
@@ -202,7 +202,7 @@ def test_a_transfer_that_is_off_by_a_millionth_is_found_out_in_the_weak_forms(na
         P[middle, P[middle].argmax()] += change
         pair = replace(case.weak.pair, interface=replace(interface, transfer=P))
         other = type("Given", (Case,), kept | {"weak": Weak(pair=pair)})(name=name, problem=case.problem)
-        return CHECKS[statement](type("Only", (Setting,), {"cases": [other]})(level="quick"))[-1].holds
+        return CHECKS[statement](type("Only", (RunsOfLevel,), {"cases": [other]})(level="quick"))[-1].holds
 
     assert holds(0.0)
     assert not (holds(1e-6) and holds(-1e-6))

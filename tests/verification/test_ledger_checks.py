@@ -12,7 +12,7 @@ from fem1d2d import Condensation
 from verification.interface.pair import build
 from verification.ledger import convergence, field_problems, moves, weak_forms
 from verification.ledger import solutions as ledger
-from verification.ledger.convergence import Setting
+from verification.ledger.convergence import RunsOfLevel
 from verification.ledger.weak_forms import EXACT, Case, Fields, Weak
 from verification.problem.specification import Problem
 
@@ -43,7 +43,7 @@ def with_solution(case, u):
 
 
 def asked(statement, *cases):
-    class Given(Setting):
+    class Given(RunsOfLevel):
         @cached_property
         def cases(self):
             return list(cases)

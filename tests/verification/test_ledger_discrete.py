@@ -18,11 +18,11 @@ from scipy.linalg import eigh
 
 from verification.ledger import inequalities
 from verification.ledger.cases import NAMED
-from verification.ledger.differences import Difference, Differences, Setting, along, between
+from verification.ledger.differences import Difference, Differences, DrawnSetting, along, between
 from verification.ledger.draws import directions, pieces, uniform_piece
 from verification.ledger.evidence import Evidence
 from verification.ledger.inequalities import ALLOWANCE, INEQUALITIES, LEVELS, SHARES, Inequality, Reading
-from verification.ledger.worst import Tally, Trial, discrete, draw_cases, pairs_of
+from verification.ledger.worst import Trial, WorstTally, discrete, draw_cases, pairs_of
 from verification.problem.specification import Problem
 from verification.threads import one_thread
 
@@ -89,7 +89,7 @@ def pool_of(kind: str) -> dict[str, Subjects]:
 
 def worst(inequality: Inequality, pool: dict[str, Subjects]) -> float:
     """The largest ratio on the pool."""
-    tally = Tally(inequality=inequality)
+    tally = WorstTally(inequality=inequality)
     with one_thread():
         for case, subjects in pool[inequality.about]:
             tally.take(case, subjects)
@@ -230,7 +230,7 @@ def test_loads_bring_about_two_forces_that_break_what_is_printed(id, name, unit)
     g = np.concatenate([random.uniform(-1, 1, t), random.uniform(0.5, 1, n)])
     pair = with_loads(case.pair, g, *state_of(case.pair, piece.pattern, g, random))
     step = expected.force * np.linalg.norm(g) / np.linalg.norm(expected.force) / 1e4
-    seen = between(Setting(pair=pair), g + step, g - step)
+    seen = between(DrawnSetting(pair=pair), g + step, g - step)
     assert inequality.ratio(expected, reading) > 1.4
     assert inequality.ratio(seen, reading) == pytest.approx(inequality.ratio(expected, reading), rel=1e-3)
     assert ENTRY[id, "repaired"].ratio(seen, case.reading) < 1
@@ -247,7 +247,7 @@ def test_two_forces_inside_a_piece_differ_as_the_piece_says():
             y = directions(case.setting, piece, random)[1]
             expected = along(case.setting, piece, y)
             step = expected.force * np.linalg.norm(g) / np.linalg.norm(expected.force) / 1e5
-            seen = between(Setting(pair=pair), g + step, g - step)
+            seen = between(DrawnSetting(pair=pair), g + step, g - step)
             scale = 2 * step[0] / expected.force[0]
             for name in ("size_1", "size_2", "norm", "dual", "norm_T", "dual_T"):
                 assert getattr(seen, name) == pytest.approx(
@@ -379,7 +379,7 @@ def test_what_cannot_be_compared_is_not_called_true(id, side):
     case = next(iter(draw_cases(1)))[0]
     piece = uniform_piece(case.pair, touching=True, sliding=0)
     pair = along(case.setting, piece, np.ones(case.pair.contact.grid.n * 2))
-    tally = Tally(inequality=replace(entry, **unknown))
+    tally = WorstTally(inequality=replace(entry, **unknown))
     tally.take(case, case if entry.about == "bodies" else Differences([pair]))
     tally.inequality = entry  # what follows does not cover it up
     tally.take(case, case if entry.about == "bodies" else Differences([pair]))

@@ -8,7 +8,7 @@ import pytest
 from verification.ledger.cases import NAMED
 from verification.ledger.differences import along
 from verification.ledger.draws import uniform_piece
-from verification.ledger.enclosed_pairs import Bodies
+from verification.ledger.enclosed_pairs import EnclosedBodies
 from verification.ledger.enclosures import (
     CONTRACTION,
     LAYER,
@@ -18,12 +18,12 @@ from verification.ledger.enclosures import (
     OF_STICKING,
     ON_LAYER,
     PLATE,
-    Constants,
+    EnclosedConstants,
     decide,
     enclosed,
 )
 from verification.ledger.inequalities import INEQUALITIES
-from verification.ledger.worst import Tally
+from verification.ledger.worst import WorstTally
 from verification.problem.specification import Problem
 
 REFUTED = [("4.7", "printed"), ("5.13", "printed"), ("5.30", "printed"), *OF_MUCH]
@@ -50,7 +50,7 @@ def found(shared):
 
 @pytest.fixture(scope="module")
 def bodies():
-    return {name: Bodies(name) for name in (PLATE, LAYER)}
+    return {name: EnclosedBodies(name) for name in (PLATE, LAYER)}
 
 
 def of(found, key):
@@ -81,7 +81,7 @@ def test_everything_else_holds_by_proof(found, key):
 def test_the_ratio_of_two_bodies_in_doubles_lies_between_the_bounds(found, bodies, key):
     evidence = of(found, key)
     case = bodies[LAYER if key in REFUTED else PLATE].case
-    tally = Tally(inequality=ENTRY[key])
+    tally = WorstTally(inequality=ENTRY[key])
     tally.take(case, case)
     squared = 1 if key[0].startswith("x-") else 2
     low, high = evidence.data["ratio"]
@@ -133,7 +133,7 @@ def test_the_energy_of_sticking_nodes_lies_between_its_bounds(bodies):
 
 def test_a_step_is_bounded_below_C_2_alone(bodies):
     """At the friction of the bodies, which is far above, nothing is said of contraction."""
-    r = Constants(bodies=bodies[LAYER])
+    r = EnclosedConstants(bodies=bodies[LAYER])
     slight = r.contracting()
     assert float(r.P.lo) > 1 + float(r.give.hi)
     assert float(slight.P.hi) < 1 + float(slight.give.lo)
@@ -151,7 +151,7 @@ def test_where_the_enclosures_overlap_nothing_is_said(bodies, monkeypatch):
 
 
 def test_what_cannot_be_enclosed_is_not_decided(bodies, monkeypatch):
-    def fail(slides: object, reading: Constants) -> None:
+    def fail(slides: object, reading: EnclosedConstants) -> None:
         raise ArithmeticError("made up")
 
     monkeypatch.setitem(OF_PAIRS, ("5.11", "printed"), fail)

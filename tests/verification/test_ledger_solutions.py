@@ -10,7 +10,7 @@ from verification.interface.pair import build
 from verification.ledger import experiments as section_6
 from verification.ledger import solutions as ledger
 from verification.ledger.evidence import settle
-from verification.ledger.experiments import Section6, Stopped
+from verification.ledger.experiments import Section6, StoppedRuns
 from verification.ledger.solutions import solutions
 from verification.monolithic import solution_force, solve
 from verification.reproduce import READINGS
@@ -312,7 +312,7 @@ def test_a_reading_whose_run_does_not_arrive_is_not_compared():
 
 
 def ends(residual_slow, residual_fast, steps_in_tpa):
-    at = lambda steps, residual: Stopped(steps=steps, residual=residual, error=residual)
+    at = lambda steps, residual: StoppedRuns(steps=steps, residual=residual, error=residual)
     return {
         (section_6.SLOW, "MPa"): at(300, residual_slow),
         (section_6.SLOW, "TPa"): at(300, residual_slow),

@@ -23,7 +23,7 @@ from ndtheory import PRINTED, REPAIRED, bounds
 from verification.algorithm.affine_piece import Piece
 from verification.bounds.losses import Losses, locate
 from verification.bounds.neighbours import squared
-from verification.bounds.pattern_search import Found, worst_piece
+from verification.bounds.pattern_search import FoundFactor, worst_piece
 from verification.constants import Measured, measure
 from verification.interface.pair import ContactPair, build
 from verification.ledger.draws import uniform_piece
@@ -129,7 +129,7 @@ class Case:
             return square(piece.force, self.flexibility), self.flexibility
         return symmetric(-piece.bound.T @ (piece.pattern.sliding[:, None] * piece.jump[:t])), self.flexibility
 
-    def search(self, label: str, starts: int = 2) -> Found:
+    def search(self, label: str, starts: int = 2) -> FoundFactor:
         """As the losses are searched."""
         root = self.pair.neumann.root
         turned = lambda matrix: symmetric(root.T @ matrix @ root)

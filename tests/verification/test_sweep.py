@@ -17,7 +17,7 @@ from verification.algorithm.relaxation import RULES
 from verification.contact import ContactError, active_set
 from verification.interface import body
 from verification.sweeps import course, grid, workers
-from verification.sweeps.bodies import Bodies
+from verification.sweeps.bodies import SharedBodies
 from verification.sweeps.lean import KnownPieces
 from verification.sweeps.row import RESULTS, row
 
@@ -107,7 +107,7 @@ def test_what_is_null_has_a_reason_and_nothing_else_has(wide):
 
 def test_a_row_does_not_depend_on_the_rows_before_it(wide):
     values = list(grid.SweepGrid.of(WIDE).rows())
-    bodies = Bodies(SMALL)
+    bodies = SharedBodies(SMALL)
     backwards = [row(SMALL, each, bodies) for each in reversed(values)]
     assert tuple(reversed(backwards)) == wide.rows
     assert row(SMALL, values[5]) == wide.rows[5]

@@ -13,7 +13,7 @@ from strategies import AT_NIGHT
 import verification as vf
 from verification.sweeps.grid import SweepGrid
 from verification.sweeps.keeping import plan
-from verification.sweeps.workers import Stopped
+from verification.sweeps.workers import NoWorkers
 
 pytest.importorskip("distributed", reason="the extra `cluster` is not installed: there is no dask to sweep on")
 
@@ -100,7 +100,7 @@ def test_rows_are_those_of_one_process_though_a_worker_is_killed_half_way(cluste
 def test_a_scheduler_that_goes_away_leaves_what_is_done_in_the_store(cluster, tmp_path, monkeypatch):
     up = cluster()
     place = tmp_path / "rows.sqlite"
-    with pytest.raises(Stopped, match="the scheduler has gone") as stopped:
+    with pytest.raises(NoWorkers, match="the scheduler has gone") as stopped:
         vf.sweep(SMALL, **GRID, dask=up.address, store=place, progress=once(0.4, up.scheduler.kill))
     assert str(stopped.value).startswith(up.address)
     assert "the same command goes on" in str(stopped.value)

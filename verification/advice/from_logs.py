@@ -46,7 +46,7 @@ from verification.advice.readings import (
 )
 from verification.advice.roles import Advice
 from verification.advice.runs_with_friction import by_kind, friction_bounds, readings_with_friction, with_friction
-from verification.advice.seen import Interval, LogBound, SeenColumn, SeenLog, bounds
+from verification.advice.seen import LogBound, RhoInterval, SeenColumn, SeenLog, bounds
 from verification.problem.tables import ProblemError
 
 #: Bounds of 1 + rho that differ by less do not contradict each other: a ratio has not wholly settled.
@@ -203,7 +203,7 @@ def longer(columns: tuple[SeenColumn, ...], theta: Fraction, steps: int) -> Next
     return NextRun(theta=float(theta), why=why, again=True)
 
 
-def interval_of(lower: list[LogBound], upper: list[LogBound]) -> Interval:
+def interval_of(lower: list[LogBound], upper: list[LogBound]) -> RhoInterval:
     """The largest bound from below beside the smallest from above."""
     lo = max(lower, key=lambda bound: bound.value, default=None)
     hi = min(upper, key=lambda bound: bound.value, default=None)
@@ -215,11 +215,11 @@ def interval_of(lower: list[LogBound], upper: list[LogBound]) -> Interval:
             "friction, contact changes between the runs, a theta was not constant, or they are not runs of one problem "
             "in the same roles"
         )
-    return Interval(lo=lo, hi=hi, contradiction=contradiction)
+    return RhoInterval(lo=lo, hi=hi, contradiction=contradiction)
 
 
 def decide(
-    logs: tuple[SeenLog, ...], interval: Interval, tied: bool
+    logs: tuple[SeenLog, ...], interval: RhoInterval, tied: bool
 ) -> tuple[tuple[RunReading, ...], NextRun, Fraction | None]:
     """The readings that are left, the run to make next, and rho where the logs decide."""
     falling = [log for log in logs if log.converges]

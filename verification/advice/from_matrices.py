@@ -17,7 +17,7 @@ from ndtheory import Number
 from verification.advice.role import Role, with_both_ends
 from verification.advice.roles import Advice, advise, plain_role
 from verification.advice.seen_matrices import ORDERING, SeenLanczos, SeenMatrices
-from verification.advice.sides import BODIES, Body, Side, is_operator, of_matrix, of_solver, other, rows_of
+from verification.advice.sides import BODIES, BodyNumber, Side, is_operator, of_matrix, of_solver, other, rows_of
 from verification.advice.transfer import Transfer, read_transfer
 from verification.interface.build import build
 from verification.interface.friction import Nonlocal, hat
@@ -32,7 +32,7 @@ ENOUGH = 1e-4
 #: Why Lanczos proves no theta.
 WORD_OF_LANCZOS = "rho is a value that Lanczos found: the largest eigenvalue may be larger, so that nothing is proved"
 
-Sides = dict[Body, Side]
+Sides = dict[BodyNumber, Side]
 
 
 def advise_matrices(
@@ -43,7 +43,7 @@ def advise_matrices(
     solve2: Any = None,
     unknowns: int | None = None,
     transfer: Any = None,
-    neumann_body: Body | None = None,
+    neumann_body: BodyNumber | None = None,
     friction: Any = None,
     x: Any = None,
     x_neumann: Any = None,
@@ -121,7 +121,7 @@ def advise_matrices(
     beside = {"x": x, "x_neumann": x_neumann, "weights": weights, "radius": radius, "kernel": kernel}
     if friction is None and (left := [name for name, value in beside.items() if value is not None]):
         raise ValueError(f"{left[0]} without friction: needed both, or neither")
-    given: dict[Body, tuple[Any, Any]] = {1: (S1, solve1), 2: (S2, solve2)}
+    given: dict[BodyNumber, tuple[Any, Any]] = {1: (S1, solve1), 2: (S2, solve2)}
     functions = isinstance(transfer, LinearOperator) or any(
         is_operator(S) or solve is not None for S, solve in given.values()
     )
@@ -166,7 +166,7 @@ def advise_matrices(
     return replace(found, matrices=matrices)
 
 
-def _refused(sides: Sides, P: Transfer | None, functions: bool) -> dict[Body, Role]:
+def _refused(sides: Sides, P: Transfer | None, functions: bool) -> dict[BodyNumber, Role]:
     """The role to which P does not belong, and those in which a body can move or a product or solve is missing.
 
     Raises
@@ -174,7 +174,7 @@ def _refused(sides: Sides, P: Transfer | None, functions: bool) -> dict[Body, Ro
     ValueError
         No role is left.
     """
-    refused: dict[Body, Role] = {}
+    refused: dict[BodyNumber, Role] = {}
     if P is not None:
         n, c = other(P.neumann_body), P.neumann_body
         why = f"needed a transfer of its own, from the unknowns of body {n} to those of body {c};"
@@ -192,7 +192,7 @@ def _refused(sides: Sides, P: Transfer | None, functions: bool) -> dict[Body, Ro
     return refused
 
 
-def _by_eigenvalues(body: Body, sides: Sides, P: Transfer | None) -> Role:
+def _by_eigenvalues(body: BodyNumber, sides: Sides, P: Transfer | None) -> Role:
     """The role in which a body has the Neumann problem, by the spectrum of (P' S_c P, S_n)."""
     contact, neumann = sides[other(body)].matrix, sides[body].matrix
     assert contact is not None
@@ -211,7 +211,7 @@ def _by_eigenvalues(body: Body, sides: Sides, P: Transfer | None) -> Role:
     return replace(role, rho_min=Number.of_float(Fraction(least) * unit), rho_tied=role.rho)
 
 
-def _by_lanczos(body: Body, sides: Sides, P: Transfer | None, progress: Progress) -> tuple[Role, SeenLanczos]:
+def _by_lanczos(body: BodyNumber, sides: Sides, P: Transfer | None, progress: Progress) -> tuple[Role, SeenLanczos]:
     """The same by products with one body and solves with the other."""
     apply, solve = sides[other(body)].apply, sides[body].solve
     assert apply is not None  # else the role is refused
@@ -239,7 +239,7 @@ def _by_lanczos(body: Body, sides: Sides, P: Transfer | None, progress: Progress
 
 
 def _with_friction(
-    sides: Sides, P: Transfer | None, neumann_body: Body, friction: Any, beside: dict[str, Any], tied: bool
+    sides: Sides, P: Transfer | None, neumann_body: BodyNumber, friction: Any, beside: dict[str, Any], tied: bool
 ) -> Advice:
     x, x_neumann, weights, radius, kernel = beside.values()
     one, two = (side.matrix for side in (sides[1], sides[2]))

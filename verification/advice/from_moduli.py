@@ -15,7 +15,15 @@ from ndtheory.number import below
 from verification.advice.readings import NextRun, rounded_down
 from verification.advice.role import Role
 from verification.advice.roles import Advice
-from verification.advice.seen_moduli import Body, Corners, LowerBounds, ModuliRole, SeenModuli, Start, exactly
+from verification.advice.seen_moduli import (
+    BodyNumber,
+    Corners,
+    LowerBounds,
+    ModuliRole,
+    SeenModuli,
+    StartTheta,
+    exactly,
+)
 from verification.interface.pair import UNITS
 
 #: Sizes of E, and how close nu may come to -1 and to 1/2: bounds of rho then stay between 1e-75 and 1e75.
@@ -84,7 +92,7 @@ def advise_moduli(
     bodies = _bodies(young, poisson, plane)
     if corners is not None and corners not in get_args(Corners):
         raise HypothesisError("corners", corners, f"one of {', '.join(get_args(Corners))}")
-    both: tuple[Body, ...] = (1, 2)
+    both: tuple[BodyNumber, ...] = (1, 2)
     fits = tuple(body for body in both if body in mirror)
     if len(set(mirror)) != len(fits):
         raise HypothesisError("mirror", list(mirror), "bodies 1, 2 or both")
@@ -128,7 +136,7 @@ def _bodies(young: Sequence[Any], poisson: Sequence[Any], plane: Plane) -> tuple
 
 
 def _role(
-    neumann_body: Body, bodies: tuple[Moduli, Moduli], corners: Corners | None, fits: tuple[int, ...], flat: bool
+    neumann_body: BodyNumber, bodies: tuple[Moduli, Moduli], corners: Corners | None, fits: tuple[int, ...], flat: bool
 ) -> ModuliRole:
     contact_body = 3 - neumann_body
     neumann, contact = bodies[neumann_body - 1], bodies[contact_body - 1]
@@ -153,7 +161,7 @@ def _role(
     words = "a layer and its ends"
     if not flat:
         reflected, words = max(reflected, column()), "a slender column, more than any layer"
-    start = Start(s=s, guess=float(s) * reflected, guessed_from=words)
+    start = StartTheta(s=s, guess=float(s) * reflected, guessed_from=words)
     return ModuliRole(neumann_body=neumann_body, corners=bounds, start=start)
 
 
@@ -198,7 +206,7 @@ def _as_role(role: ModuliRole, bounds: LowerBounds) -> Role:
     )
 
 
-def _next(seen: SeenModuli, tried: Body | None) -> NextRun:
+def _next(seen: SeenModuli, tried: BodyNumber | None) -> NextRun:
     """The theta to start with in the role that is tried, or the run to make."""
     role = seen.roles[0 if tried is None else tried - 1]
     if role.start is not None:

@@ -12,7 +12,7 @@ from ndtheory import EnergyConstants, Number, evaluate_energy
 from verification.advice.readings import LARGEST_TO_PASTE, NextRun, RunReading, SeenRun, rounded_down
 from verification.advice.role import Role, best_of, fewer, in_steps, role_of, steps, with_both_ends
 from verification.advice.runs_with_friction import FrictionBounds
-from verification.advice.seen import Interval, SeenLog
+from verification.advice.seen import RhoInterval, SeenLog
 from verification.advice.seen_matrices import SeenMatrices
 from verification.advice.seen_moduli import SeenModuli
 from verification.advice.snippets import Coupling, snippet
@@ -75,7 +75,7 @@ class Advice(Document):
     readings: tuple[RunReading, ...] = ()
     next: NextRun | None = None
     logs: tuple[SeenLog, ...] = ()
-    interval: Interval | None = None
+    interval: RhoInterval | None = None
     matrices: SeenMatrices | None = None
     problem: Problem | None = None
     moduli: SeenModuli | None = None

@@ -225,7 +225,7 @@ class LogBound:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Interval:
+class RhoInterval:
     """What logs of one coupling say of rho together.
 
     Attributes

@@ -15,7 +15,7 @@ from ndtheory.number import above
 from verification.advice.readings import LARGEST_TO_PASTE, rounded_down
 from verification.problem.writing import written_number
 
-Body = Literal[1, 2]
+BodyNumber = Literal[1, 2]
 Corners = Literal["none", "1", "2", "both"]
 
 
@@ -53,7 +53,7 @@ def excluded_from(bound: Number) -> float | None:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Start:
+class StartTheta:
     """A theta to start with, where the mirror image of the contact body fits into the Neumann body.
 
     Attributes
@@ -112,9 +112,9 @@ class ModuliRole:
     why_no_start : str
     """
 
-    neumann_body: Body
+    neumann_body: BodyNumber
     corners: Mapping[Corners, LowerBounds]
-    start: Start | None
+    start: StartTheta | None
     why_no_start: str = ""
 
     def to_dict(self) -> dict[str, Any]:
@@ -147,7 +147,7 @@ class SeenModuli:
 
     bodies: tuple[Moduli, Moduli]
     corners: Corners | None
-    mirror: tuple[Body, ...]
+    mirror: tuple[BodyNumber, ...]
     flat: bool
     roles: tuple[ModuliRole, ModuliRole]
 
@@ -160,7 +160,7 @@ class SeenModuli:
         known = role.corners.values() if self.corners is None else [self.bounds(role)]
         return max(bounds.stick.value for bounds in known)
 
-    def smaller(self, kind: Literal["stick", "slide"]) -> Body | None:
+    def smaller(self, kind: Literal["stick", "slide"]) -> BodyNumber | None:
         """The Neumann body of the role with the smaller bound; None where both are equal."""
         one, two = (getattr(self.bounds(role), kind).value for role in self.roles)
         if math.isclose(one, two, rel_tol=1e-12):

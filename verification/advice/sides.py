@@ -22,15 +22,15 @@ TOLD = 1e-3
 #: How far a solve may be from the inverse of the product beside it.
 INVERSE = 1e-3
 
-Body = Literal[1, 2]
+BodyNumber = Literal[1, 2]
 
 #: The Neumann bodies of the roles, in their order.
-BODIES: tuple[Body, Body] = (2, 1)
+BODIES: tuple[BodyNumber, BodyNumber] = (2, 1)
 
 Apply = Callable[[Floats], Floats]
 
 
-def other(body: Body) -> Body:
+def other(body: BodyNumber) -> BodyNumber:
     """The other body."""
     return 1 if body == 2 else 2
 
@@ -82,7 +82,7 @@ class Side:
         return f"singular ({free} free motion{'s' * (free > 1)})" if free else ""
 
 
-def of_matrix(body: Body, S: Any) -> Side:
+def of_matrix(body: BodyNumber, S: Any) -> Side:
     """A body by its matrix.
 
     Raises
@@ -97,7 +97,7 @@ def of_matrix(body: Body, S: Any) -> Side:
     return Side(matrix=S, apply=S.matrix.__matmul__, seen=seen)
 
 
-def rows_of(given: dict[Body, tuple[Any, Any]], unknowns: Any, transfer: Any) -> dict[int, int]:
+def rows_of(given: dict[BodyNumber, tuple[Any, Any]], unknowns: Any, transfer: Any) -> dict[int, int]:
     """Number of unknowns of each body on the interface, by what is given of (S, solve).
 
     Raises
@@ -125,7 +125,7 @@ def rows_of(given: dict[Body, tuple[Any, Any]], unknowns: Any, transfer: Any) ->
     return rows
 
 
-def of_solver(body: Body, S: Any, solve: Any, n: int) -> Side:
+def of_solver(body: BodyNumber, S: Any, solve: Any, n: int) -> Side:
     """A body by products and solves with vectors of n numbers, tried on random ones.
 
     Raises

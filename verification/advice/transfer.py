@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator
 
 from fem1d2d.mesh import Floats
-from verification.advice.sides import BODIES, Body, dense
+from verification.advice.sides import BODIES, BodyNumber, dense
 from verification.interface.matrices import size
 
 
@@ -19,7 +19,7 @@ class Transfer:
     """P as given, of which body's unknowns, for how many components at each node."""
 
     P: Any
-    neumann_body: Body
+    neumann_body: BodyNumber
     components: int
     chosen: bool
 
@@ -41,7 +41,7 @@ class Transfer:
         return [f"P is read as leading from body {n} to body {3 - n}: its shape fits both ways"]
 
 
-def read_transfer(given: Any, rows: dict[int, int], neumann_body: Body | None) -> Transfer | None:
+def read_transfer(given: Any, rows: dict[int, int], neumann_body: BodyNumber | None) -> Transfer | None:
     """Which way P leads, by its shape; None without one.
 
     Raises
@@ -60,7 +60,7 @@ def read_transfer(given: Any, rows: dict[int, int], neumann_body: Body | None) -
     entries = None if isinstance(P, LinearOperator) else P.data if sp.issparse(P) else P
     if entries is not None and (np.asarray(entries).dtype.kind not in "fiu" or not np.isfinite(entries).all()):
         raise ValueError("the transfer has entries that are not finite numbers: needed real ones")
-    bodies: tuple[Body, ...] = BODIES if neumann_body is None else (neumann_body,)
+    bodies: tuple[BodyNumber, ...] = BODIES if neumann_body is None else (neumann_body,)
     fits = [
         (body, components)
         for body in bodies

@@ -82,7 +82,7 @@ class Losses:
         }
 
 
-class Forms:
+class LossForms:
     """The quadratic forms of Section 5 in y with ``psi - psi~ = L_2 y``, so that the length of y is the norm (5.21).
 
     "1" is the contact body and "2" the Neumann body, whatever their numbers in the file.
@@ -155,7 +155,7 @@ def locate(pair: ContactPair, measured: Measured, *, seed: int = 0, progress: Pr
     A, done = M * C_R, count()
     X = (A + x + math.sqrt(x * m)) / m  # (5.11)
     with one_thread():
-        forms = Forms(pair)
+        forms = LossForms(pair)
         N_1, N_2, dual, d_2 = forms.N_1, forms.N_2, forms.dual, forms.d_2
         S_1, size2 = pair.contact.stiffness, square(d_2, N_2)
         felt = pair.interface.carry_back(S_1)  # the contact body's reaction, as the Neumann body receives it

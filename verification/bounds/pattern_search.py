@@ -36,7 +36,7 @@ Form = Callable[[Piece], Floats]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Found:
+class FoundFactor:
     """A piece that a search came to.
 
     Attributes
@@ -95,7 +95,7 @@ class Search:
         tangential = (0, 1, -1) if pair.rubs else (1,)  # without friction every node slides
         self.states = [(touching, slide) for touching in (True, False) for slide in tangential]
         self.sign, self._still = signs(pair), np.zeros(pair.neumann.grid.n, dtype=bool)
-        self._visited: dict[tuple[bytes, bytes], Found] = {}  # ways up meet
+        self._visited: dict[tuple[bytes, bytes], FoundFactor] = {}  # ways up meet
         self._below: dict[tuple[bytes, bytes], float] = {}  # a level that the value of a piece does not exceed
         self._reached = np.ones(pair.contact.grid.n, dtype=bool)
         self._reached[: len(self.sign)] = (self.sign != 0) | (not pair.rubs)
@@ -107,13 +107,13 @@ class Search:
         what = ((True, stick), (False, self.states[-1][1]))
         return [(np.full(n, touching), np.full(t, slides, dtype=np.int8)) for touching, slides in what]
 
-    def found(self, touching: NDArray[np.bool_], sliding: NDArray[np.int8]) -> Found:
+    def found(self, touching: NDArray[np.bool_], sliding: NDArray[np.int8]) -> FoundFactor:
         """The piece of a pattern, but that a node without a friction bound slides."""
         found = self.above(-np.inf, touching, sliding)
         assert found is not None
         return found
 
-    def above(self, level: float, touching: NDArray[np.bool_], sliding: NDArray[np.int8]) -> Found | None:
+    def above(self, level: float, touching: NDArray[np.bool_], sliding: NDArray[np.int8]) -> FoundFactor | None:
         """The same; None where its value is not above a level.
 
         A Cholesky factorisation decides that in a fraction of the time that the eigenvalues take.
@@ -132,13 +132,15 @@ class Search:
                     self._below[visited] = level
                     return None
             found, vectors = eigh(form, self._against, check_finite=False)
-            self._visited[visited] = Found(value=float(found[-1]), piece=piece, eigenvalues=found, eigenvectors=vectors)
+            self._visited[visited] = FoundFactor(
+                value=float(found[-1]), piece=piece, eigenvalues=found, eigenvectors=vectors
+            )
         known = self._visited[visited]
         return known if known.value > level else None
 
-    def climb(self, best: Found) -> Found:
+    def climb(self, best: FoundFactor) -> FoundFactor:
         """The best piece on the way up: what one node does is changed, or several do, as long as that helps."""
-        better: Found | None = best
+        better: FoundFactor | None = best
         while better is not None:
             best = better
             level = best.value + 10.0**-DIGITS * best.size
@@ -146,7 +148,7 @@ class Search:
             better = next((found for found in tried if found is not None), None)
         return best
 
-    def _tried(self, best: Found, level: float) -> Iterator[tuple[NDArray[np.bool_], NDArray[np.int8]]]:
+    def _tried(self, best: FoundFactor, level: float) -> Iterator[tuple[NDArray[np.bool_], NDArray[np.int8]]]:
         """Patterns that may be better, the most promising first: by the change of force that is worst on the best."""
         patterns, node = self._neighbours(best.piece.pattern)
         if self._factors is None:
@@ -192,7 +194,7 @@ def worst_piece(
     against: Floats | None = None,
     factors: Factors | None = None,
     starts: int = 4,
-) -> Found:
+) -> FoundFactor:
     """Search the affine pieces of T for the largest value of a quadratic form.
 
     Parameters
@@ -206,7 +208,7 @@ def worst_piece(
     return _from_starts(Search(pair, form, against=against, factors=factors), random=random, starts=starts)
 
 
-def _from_starts(search: Search, *, random: np.random.Generator, starts: int) -> Found:
+def _from_starts(search: Search, *, random: np.random.Generator, starts: int) -> FoundFactor:
     n, t = search.pair.contact.grid.n, search.pair.contact.grid.t
     patterns = search.extremes()
     for _ in range(max(starts - len(patterns), 0)):
@@ -230,7 +232,7 @@ def factor_search(pair: ContactPair, theta: float) -> Search:
     return Search(pair, form, factors=factors)
 
 
-def largest_factor(pair: ContactPair, theta: float, *, random: np.random.Generator, starts: int = 4) -> Found:
+def largest_factor(pair: ContactPair, theta: float, *, random: np.random.Generator, starts: int = 4) -> FoundFactor:
     """The largest ``|J|`` of T_theta over contact patterns, in the norm (5.21): attained by two forces."""
     found = _from_starts(factor_search(pair, theta), random=random, starts=starts)
     return replace(found, value=found.piece.factor(theta))

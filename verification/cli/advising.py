@@ -13,7 +13,7 @@ from ndtheory import HypothesisError, exact
 from ndtheory.texts import did_you_mean
 from verification.advice.snippets import SNIPPETS
 from verification.cli.console import complain, deliver, stages
-from verification.cli.forms import Default, Form, Forms
+from verification.cli.forms import AdviseCommand, AdviseGroup, Default
 from verification.cli.matrices import advice_from_files
 from verification.cli.options import JSON, SET, SWAP, F, OneOf
 from verification.cli.problems import load_problem
@@ -100,7 +100,7 @@ def _matrix(option: str, parameter: str, words: str, **settings: Any) -> Callabl
     return click.option(option, parameter, type=click.Path(path_type=Path), metavar="MATRIX", help=words, **settings)
 
 
-@click.command(cls=Form)
+@click.command(cls=AdviseCommand)
 @_matrix("--S1", "S1", "Interface stiffness of body 1, or one file with S1 and S2.", required=True)
 @_matrix("--S2", "S2", "Interface stiffness of body 2.")
 @_matrix("--map", "transfer", "Transfer P from the unknowns or nodes of the Neumann body to those of the contact body.")
@@ -145,7 +145,7 @@ def matrices(tied: bool, snippets: str | None, as_json: bool, **given: Any) -> N
     _show(found, snippets, as_json)
 
 
-@click.command(cls=Form)
+@click.command(cls=AdviseCommand)
 @click.option(
     "--log",
     "logs",
@@ -217,7 +217,7 @@ def run(
     _show(found, snippets, as_json)
 
 
-@click.command(cls=Form)
+@click.command(cls=AdviseCommand)
 @click.option(
     "--young", metavar="E1,E2", required=True, help="Moduli of elasticity of bodies 1 and 2, in one unit of stress."
 )
@@ -284,7 +284,7 @@ def moduli(
     _show(found, None, as_json)
 
 
-advise = Forms(of_file, [matrices, run, moduli])
+advise = AdviseGroup(of_file, [matrices, run, moduli])
 
 
 def _no_document_of(snippets: str | None, as_json: bool) -> None:

@@ -24,11 +24,11 @@ class Commands(click.Group):
         return super().resolve_command(ctx, args)
 
 
-class Form(click.Command):
+class AdviseCommand(click.Command):
     """One of several commands on one subject: an option of another one is refused with the name of that command."""
 
     #: The group that the command belongs to; None until it is added to one.
-    group: Forms | None = None
+    group: AdviseGroup | None = None
 
     allow_extra_args = True  # to be refused here, in words of this command
 
@@ -54,7 +54,7 @@ class Form(click.Command):
         return "options only"
 
 
-class Default(Form):
+class Default(AdviseCommand):
     """The command of a group that needs no name: its help is that of the group, and lists the other commands."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
@@ -88,7 +88,7 @@ class Default(Form):
             formatter.write_dl([(name, form.get_short_help_str(60)) for name, form in named.items()])
 
 
-class Forms(Commands):
+class AdviseGroup(Commands):
     """A group whose default is a command with an argument: a first word that names no command is that argument.
 
     Parameters
@@ -99,7 +99,7 @@ class Forms(Commands):
         The commands with one.
     """
 
-    def __init__(self, default: Default, forms: Sequence[Form]) -> None:
+    def __init__(self, default: Default, forms: Sequence[AdviseCommand]) -> None:
         super().__init__(default.name, help=default.help, commands=list(forms))
         self.default = default
         for form in (default, *forms):

@@ -21,7 +21,7 @@ from ndtheory.texts import printable
 from verification.cli import advising, calculator, certifying, drawing, ledger, problems, reproducing, sweeping
 from verification.cli.console import NOTHING, SHOWN, Interrupted, ReaderGone, complain, interruptible, interruption
 from verification.cli.failing import reported
-from verification.cli.forms import Commands, Forms
+from verification.cli.forms import AdviseGroup, Commands
 
 #: Exit statuses of the interface.  A crash is none of them.
 DONE, NOT_MET, BAD_INPUT, INCONCLUSIVE, INTERRUPTED, CRASH = 0, 1, 2, 3, 130, 70
@@ -58,7 +58,7 @@ for command in (
     reproducing.reproduce,
     ledger.verify,
 ):
-    for form in command.forms().values() if isinstance(command, Forms) else [command]:
+    for form in command.forms().values() if isinstance(command, AdviseGroup) else [command]:
         assert form.callback is not None
         form.callback = interruptible(reported(form.callback))
     cli.add_command(command)

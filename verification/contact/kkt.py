@@ -44,7 +44,7 @@ class KKT:
         return worst(np.array([self.equilibrium, self.compression, self.bound, *lengths]))
 
 
-class Certificate:
+class KKTCertificate:
     """The KKT conditions of step II for one contact body.
 
     A complementarity pair is measured by the smaller of its two relative terms, the distance to the nearer branch.
@@ -91,5 +91,5 @@ class Certificate:
 def certify(
     S: Floats, q: Floats, bound: Floats, v: Floats, force: Floats, free: NDArray[np.bool_] | None = None
 ) -> KKT:
-    """Measure how far (v, force) is from solving step II; see :class:`Certificate`."""
-    return Certificate(S, free).measure(q, bound, v, force)
+    """Measure how far (v, force) is from solving step II; see :class:`KKTCertificate`."""
+    return KKTCertificate(S, free).measure(q, bound, v, force)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fem1d2d.mesh import Floats
 from verification.contact.active_set import ActiveSet, Pattern, Systems
 from verification.contact.existence import way_out
-from verification.contact.kkt import KKT, TOLERANCE, Certificate
+from verification.contact.kkt import KKT, TOLERANCE, KKTCertificate
 from verification.interrupts import undisturbed
 from verification.value import Value
 
@@ -95,7 +95,10 @@ class ContactStep:
         self._S, self._free, self._t, self._solver, self._near = S, free, tangential, solver, near
         self._body = body
         self._motions = np.zeros((len(S), 0)) if motions is None or not motions.size else motions
-        self._active, self._certificate = ActiveSet(S, free, tangential, self._motions, systems), Certificate(S, free)
+        self._active, self._certificate = (
+            ActiveSet(S, free, tangential, self._motions, systems),
+            KKTCertificate(S, free),
+        )
         self._model: ContactModel | None = None
         self._pattern = Pattern.sticking(len(S) - tangential, tangential)
 

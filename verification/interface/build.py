@@ -13,7 +13,7 @@ from ndtheory.number import Numeric
 from verification.interface import pair as pairs
 from verification.interface.body import NO_MOTIONS, Condensed
 from verification.interface.files import read_interface
-from verification.interface.friction import Given
+from verification.interface.friction import GivenOperator
 from verification.interface.grid import Grid
 from verification.interface.interface import Interface, Law
 from verification.interface.matrices import check_matrix, check_nodes, real_array, size, stiffness
@@ -122,7 +122,7 @@ def build(
     if P is not None and law is not None:
         raise ValueError("law: needed a kernel, as a transfer does not tell where the nodes of the Neumann body lie")
     other = grid if P is None else Grid(x=np.full(m, np.nan), weights=P.T @ w)
-    given = law if kernel is None else Given(matrix=real_array("kernel", kernel, (n, m)))
+    given = law if kernel is None else GivenOperator(matrix=real_array("kernel", kernel, (n, m)))
     contact, neumann = (
         _condensed(name, matrix, load, own, free, upward=neumann_body == 2)
         for name, matrix, load, own, free in (("contact", S_c, l_c, grid, motions), ("neumann", S_n, l_n, other, None))

@@ -20,14 +20,14 @@ from ndtheory import HypothesisError, __version__, exact
 from verification.dense import pinned
 from verification.interface.array_headers import headers
 from verification.interface.body import NO_MOTIONS, Condensed
-from verification.interface.friction import Given
+from verification.interface.friction import GivenOperator
 from verification.interface.grid import Grid
 from verification.interface.interface import Interface
 from verification.interface.matrices import ASYMMETRY, UNREADABLE, check_matrix, check_nodes, real_array
 from verification.interface.pair import ContactPair
 from verification.problem import ProblemError, Settings
 from verification.problem.reading import at_least_one, factor, tolerance
-from verification.problem.tables import Table, choice, label, non_negative, unreadable
+from verification.problem.tables import TomlTable, choice, label, non_negative, unreadable
 
 #: Largest size of an interface file, and of what it unpacks to: two matrices of 4000 rows, and what else there is.
 MOST_BYTES = 600_000_000
@@ -147,9 +147,9 @@ def _check_sizes(arrays: dict[str, np.ndarray]) -> None:
             raise ValueError(f"the largest entry of {name} is {largest:.2g}: {needed}")
 
 
-def _texts(arrays: dict[str, np.ndarray], source: str) -> Table:
+def _texts(arrays: dict[str, np.ndarray], source: str) -> TomlTable:
     """The texts of an interface file, to be read as the keys of a problem file are."""
-    return Table({name: _scalar(arrays[name]) for name in SCALARS if name in arrays}, source)
+    return TomlTable({name: _scalar(arrays[name]) for name in SCALARS if name in arrays}, source)
 
 
 def _scalar(array: np.ndarray) -> Any:
@@ -182,7 +182,7 @@ def _pair(arrays: dict[str, np.ndarray], source: str) -> ContactPair:
     law = None
     if "kernel" in arrays:
         kernel = real_array("kernel", arrays["kernel"], (n, other.n))
-        law = Given(
+        law = GivenOperator(
             matrix=kernel,
             words=texts.take("law", label, "operator S given as a matrix"),
             outside=texts.take("outside", label, ""),

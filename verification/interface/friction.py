@@ -129,7 +129,7 @@ class LocalOfContact(Law):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Given(Value, Law):
+class GivenOperator(Value, Law):
     """An operator S that was given as a matrix.
 
     Attributes
@@ -146,7 +146,7 @@ class Given(Value, Law):
     words: str = "operator S given as a matrix"
     outside: str = ""
 
-    def scaled(self, length: float) -> Given:
+    def scaled(self, length: float) -> GivenOperator:
         return replace(self, matrix=self.matrix / length)
 
     @property

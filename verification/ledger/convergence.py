@@ -50,7 +50,7 @@ def distances(case: Case, sign: int, steps: int) -> Floats:
     return np.array(result)
 
 
-def strong_form(setting: Setting) -> list[Evidence]:
+def strong_form(setting: RunsOfLevel) -> list[Evidence]:
     """Step III of (3.1): ``sigma^1 n^1`` is minus T g, so that the printed sign is that of minus T g."""
     loaded = [case for case in setting.cases if np.abs(case.g).any()]
     printed = {case.name: distances(case, -1, STEPS) for case in loaded}
@@ -136,7 +136,7 @@ def there_and_back(case: Case) -> float:
     return float(eigvalsh((form + form.T) / 2, stiffness)[0])
 
 
-def forces_carry_displacements(setting: Setting) -> list[Evidence]:
+def forces_carry_displacements(setting: RunsOfLevel) -> list[Evidence]:
     estimate: dict[str, float] = {}
     lemma: dict[str, float] = {}
     for case in setting.cases:
@@ -246,7 +246,7 @@ def energy(level: Level) -> list[Convergence]:
     return result
 
 
-def forces_converge(setting: Setting) -> list[Evidence]:
+def forces_converge(setting: RunsOfLevel) -> list[Evidence]:
     return [
         _falling(
             "printed", "inside the intervals of Proposition 5.6, printed and repaired, at theta = C_0", setting.inside
@@ -289,7 +289,7 @@ def end_of(case: Case) -> float:
     return neumann.dual_norm(case.run.last.g - case.g) / (neumann.dual_norm(case.g) or 1.0)
 
 
-def fields_converge(setting: Setting) -> list[Evidence]:
+def fields_converge(setting: RunsOfLevel) -> list[Evidence]:
     def arrive(of: Any, text: str, runs: Sequence[Convergence]) -> Evidence:
         ends = [Found(case=r.case, values=np.array([apart(r.case)]), limit=LIMIT) for r in runs if r.case.run.converged]
         return equations(of, f"u_i at the end of runs {text}, against the global method in V", ends)
@@ -301,7 +301,7 @@ def fields_converge(setting: Setting) -> list[Evidence]:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Setting:
+class RunsOfLevel:
     """What the checks share."""
 
     level: Level

@@ -18,7 +18,7 @@ import numpy as np
 from fem1d2d.mesh import Floats
 from verification.algorithm.affine_piece import Piece
 from verification.algorithm.fixed_point import FixedPointMap
-from verification.bounds.losses import Forms
+from verification.bounds.losses import LossForms
 from verification.contact import ContactError, ContactSolution
 from verification.interface.body import Body
 from verification.interface.pair import ContactPair
@@ -46,7 +46,7 @@ def lifted_energy(body: Body) -> Floats:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Setting:
+class DrawnSetting:
     """A problem with the matrices in which its differences are measured.
 
     Attributes
@@ -58,9 +58,9 @@ class Setting:
     pair: ContactPair
 
     @cached_property
-    def forms(self) -> Forms:
+    def forms(self) -> LossForms:
         """Gram matrices and the forms on the pieces of T."""
-        return Forms(self.pair)
+        return LossForms(self.pair)
 
     @cached_property
     def bilinear_1(self) -> Floats:
@@ -105,7 +105,7 @@ class Difference:
         The energies from which the difference was formed: what rounding is relative to.
     """
 
-    setting: Setting
+    setting: DrawnSetting
     force: Floats
     reaction: Floats
     d_1: Floats
@@ -230,7 +230,7 @@ def _norm(v: Floats, gram: Floats) -> float:
 # --- two forces pushed through steps I and II
 
 
-def between(setting: Setting, psi: Floats, other: Floats) -> Difference:
+def between(setting: DrawnSetting, psi: Floats, other: Floats) -> Difference:
     """The difference of the solutions for two forces.
 
     Raises
@@ -293,7 +293,7 @@ def _stress(pair: ContactPair, force: Floats) -> Floats:
 # --- a direction on a piece of T
 
 
-def along(setting: Setting, piece: Piece, y: Floats) -> Difference:
+def along(setting: DrawnSetting, piece: Piece, y: Floats) -> Difference:
     """The difference on one piece of T in a direction ``psi - psi~ = L_2 y``."""
     forms, pair = setting.forms, setting.pair
     root, t = forms.root, pair.contact.grid.t

@@ -11,12 +11,12 @@ from scipy.linalg import eigh
 
 from fem1d2d.mesh import Floats
 from verification.algorithm.affine_piece import Piece
-from verification.bounds.losses import Forms, square, top
+from verification.bounds.losses import LossForms, square, top
 from verification.bounds.neighbours import Factors, squared
 from verification.bounds.pattern_search import Form, signs, worst_piece
 from verification.contact.active_set import Pattern
 from verification.interface.pair import ContactPair
-from verification.ledger.differences import Difference, Setting, along, between
+from verification.ledger.differences import Difference, DrawnSetting, along, between
 
 #: Distances of two random forces, over their size.
 DISTANCES = (0.1, 0.3, 1.0, 3.0)
@@ -25,7 +25,7 @@ DISTANCES = (0.1, 0.3, 1.0, 3.0)
 RANDOM_DIRECTIONS = 2
 
 
-def random_pairs(setting: Setting, random: np.random.Generator, count: int) -> Iterator[Difference]:
+def random_pairs(setting: DrawnSetting, random: np.random.Generator, count: int) -> Iterator[Difference]:
     """Forces from a tenth to ten times those that the loads bring up, at several distances; every second one presses.
 
     Parameters
@@ -48,7 +48,7 @@ def random_pairs(setting: Setting, random: np.random.Generator, count: int) -> I
         yield between(setting, psi, other)
 
 
-def work_form(forms: Forms, piece: Piece) -> Floats:
+def work_form(forms: LossForms, piece: Piece) -> Floats:
     """The work ``<T psi - T psi~, w^2 - w~^2>`` as a quadratic form in y."""
     form = forms.d_2.T @ forms.force(piece)
     return np.asarray(form + form.T) / 2
@@ -62,7 +62,7 @@ def uniform_piece(pair: ContactPair, *, touching: bool, sliding: int) -> Piece:
     return Piece(pair=pair, pattern=pattern, sign=signs(pair), still=still)
 
 
-def pieces(setting: Setting, random: np.random.Generator, *, starts: int) -> list[Piece]:
+def pieces(setting: DrawnSetting, random: np.random.Generator, *, starts: int) -> list[Piece]:
     """Pieces of T on which an inequality comes close to equality.
 
     All nodes stick, all are open and slide one way, and the worst of a search for the largest friction term, the
@@ -92,7 +92,7 @@ def pieces(setting: Setting, random: np.random.Generator, *, starts: int) -> lis
     return found
 
 
-def directions(setting: Setting, piece: Piece, random: np.random.Generator) -> list[Floats]:
+def directions(setting: DrawnSetting, piece: Piece, random: np.random.Generator) -> list[Floats]:
     """Directions on a piece: the worst ones of the pencils of Section 5, and random ones.
 
     Parameters
@@ -124,7 +124,9 @@ def directions(setting: Setting, piece: Piece, random: np.random.Generator) -> l
     return worst + [random.standard_normal(len(F)) for _ in range(RANDOM_DIRECTIONS)]
 
 
-def draw_pairs(setting: Setting, random: np.random.Generator, *, starts: int, realised: int) -> Iterator[Difference]:
+def draw_pairs(
+    setting: DrawnSetting, random: np.random.Generator, *, starts: int, realised: int
+) -> Iterator[Difference]:
     """Pairs of one problem from both sources.
 
     Parameters

@@ -35,7 +35,7 @@ from verification.progress import silent
 MUCH = Fraction(10**8)
 
 
-class Bodies:
+class EnclosedBodies:
     """Two bodies with what is proved of them; "1" is the contact body and "2" the Neumann body.
 
     Parameters
@@ -136,7 +136,7 @@ class Apart:
     norm_T: Interval
     dual_T: Interval
 
-    def __init__(self, bodies: Bodies, u: Floats) -> None:
+    def __init__(self, bodies: EnclosedBodies, u: Floats) -> None:
         self.u, self._proof, pair = u, bodies.proof, bodies.case.pair
         sides = (pair.contact, pair.neumann)
         self._S_1, self._S_2 = (_turned(form, side) for form, side in zip(bodies.S, sides, strict=True))
@@ -175,7 +175,7 @@ class Sticks(Apart):
     bodies : Bodies
     """
 
-    def __init__(self, bodies: Bodies) -> None:
+    def __init__(self, bodies: EnclosedBodies) -> None:
         pair = bodies.case.pair
         n = len(pair.neumann.stiffness)
         u = eigh(pair.contact.stiffness, pair.neumann.stiffness, subset_by_index=[n - 1] * 2)[1][:, 0]
@@ -196,7 +196,7 @@ class Slides(Apart):
         How many times their friction.
     """
 
-    def __init__(self, bodies: Bodies, more: Fraction = Fraction(1)) -> None:
+    def __init__(self, bodies: EnclosedBodies, more: Fraction = Fraction(1)) -> None:
         pair, case = bodies.case.pair, bodies.case
         piece = uniform_piece(pair, touching=False, sliding=1)
         random = np.random.default_rng(SEED)

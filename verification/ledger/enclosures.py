@@ -19,7 +19,7 @@ from ndtheory import energy_norms
 from ndtheory.intervals import Interval
 from ndtheory.number import SLACK, decimal, directed, working_precision
 from verification.ledger.cases import NAMED, three_digits
-from verification.ledger.enclosed_pairs import MUCH, Apart, Bodies
+from verification.ledger.enclosed_pairs import MUCH, Apart, EnclosedBodies
 from verification.ledger.evidence import Evidence, Level
 from verification.threads import one_thread
 
@@ -46,7 +46,7 @@ Key = tuple[str, Literal["printed", "step", "repaired"]]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Constants:
+class EnclosedConstants:
     """The constants as Section 5 reads them, and its right sides, all enclosed.
 
     Attributes
@@ -60,7 +60,7 @@ class Constants:
         Of the friction of the bodies, at which the constants are read.
     """
 
-    bodies: Bodies
+    bodies: EnclosedBodies
     printed: bool = False
     unit: Fraction = OWN
     share: Fraction = Fraction(1)
@@ -148,7 +148,7 @@ class Constants:
         """The smallest theta that is proved not to lie below C_0."""
         return Fraction(self.C_0.hi)
 
-    def contracting(self) -> Constants:
+    def contracting(self) -> EnclosedConstants:
         """The same at a friction below C_2, as repaired."""
         slight = three_digits(float(JUST_BELOW) * self.bodies.case.reading.threshold / float(self.stress("C_K").hi))
         found = replace(self, share=slight)
@@ -191,7 +191,7 @@ ONE = Interval.of(1)
 
 
 #: Of the bodies alone; both sides are squares.
-OF_BODIES: Mapping[Key, Callable[[Bodies], Sides]] = {
+OF_BODIES: Mapping[Key, Callable[[EnclosedBodies], Sides]] = {
     ("4.7", "printed"): lambda b: [(b.top(b.E[1], b.N[0]), ONE), (b.top(b.E[0], b.N[1]), ONE)],
     ("4.7", "repaired"): lambda b: [(b.top(E, N), ONE) for E, N in zip(b.E, b.N, strict=True)],
     ("4.8", "repaired"): lambda b: [(b.top(N, E), c) for N, E, c in zip(b.N, b.E, b.contrast, strict=True)],
@@ -208,17 +208,17 @@ OF_BODIES: Mapping[Key, Callable[[Bodies], Sides]] = {
     ("x-lift-bound", "printed"): lambda b: [(b.top(N, E), c) for N, E, c in zip(b.N, b.E, b.contrast, strict=True)],
 }
 
-Pairs = Mapping[Key, Callable[[Apart, Constants], tuple[Interval, Interval]]]
+Pairs = Mapping[Key, Callable[[Apart, EnclosedConstants], tuple[Interval, Interval]]]
 
 
-def contracts(d: Apart, r: Constants, share: Fraction) -> tuple[Interval, Interval]:
+def contracts(d: Apart, r: EnclosedConstants, share: Fraction) -> tuple[Interval, Interval]:
     """``1 - K(theta)^2`` is at most what a step takes away, both over theta; share as for ``inside``."""
     slight = r.contracting()
     theta = slight.inside(share)
     return slight.gain(theta) * d.norm.square(), d.gain(theta)
 
 
-def of_step(d: Apart, r: Constants, theta: Fraction) -> tuple[Interval, Interval]:
+def of_step(d: Apart, r: EnclosedConstants, theta: Fraction) -> tuple[Interval, Interval]:
     """(5.32), with the term of ``|||T psi - T psi~|||^2`` on the side on which it is positive."""
     term, weight = d.norm_T.square(), r.weight(theta)
     left, right = d.step(theta), r.h_2(theta) * d.norm.square()
@@ -226,7 +226,7 @@ def of_step(d: Apart, r: Constants, theta: Fraction) -> tuple[Interval, Interval
 
 
 #: What follows from (5.30), close to C_0 where it says most.
-STEPS: Mapping[str, Callable[[Apart, Constants], tuple[Interval, Interval]]] = {
+STEPS: Mapping[str, Callable[[Apart, EnclosedConstants], tuple[Interval, Interval]]] = {
     "5.31": lambda d, r: (d.work + r.give * d.norm_T.square(), r.P * d.norm.square()),
     **{id: lambda d, r: of_step(d, r, r.below_C_0) for id in ("5.32", "5.33", "5.36")},
     "5.39": lambda d, r: (d.step(r.at_C_0), r.h_1(r.at_C_0) * d.norm.square()),
@@ -308,18 +308,18 @@ def enclosed(
     wanted = [key for key in (*OF_BODIES, *OF_PAIRS, *OF_MUCH, *OF_STICKING) if ids is None or key[0] in ids]
     found: dict[str, list[Evidence]] = {}
     with one_thread():
-        known: dict[str, Bodies] = {}
+        known: dict[str, EnclosedBodies] = {}
         for done, key in enumerate(wanted):
             watch(done / len(wanted))
             name = LAYER if key in ON_LAYER else PLATE
-            bodies = known[name] = known.get(name) or Bodies(name)
+            bodies = known[name] = known.get(name) or EnclosedBodies(name)
             if (evidence := decide(bodies, *key)) is not None:
                 found.setdefault(key[0], []).append(evidence)
     watch(1.0)
     return found
 
 
-def decide(bodies: Bodies, id: str, of: Literal["printed", "step", "repaired"]) -> Evidence | None:
+def decide(bodies: EnclosedBodies, id: str, of: Literal["printed", "step", "repaired"]) -> Evidence | None:
     """The evidence of an inequality on some bodies; None where the enclosures overlap.
 
     Parameters
@@ -334,7 +334,7 @@ def decide(bodies: Bodies, id: str, of: Literal["printed", "step", "repaired"]) 
     share = MUCH if key in OF_MUCH else Fraction(1)
     where = bodies.name
     try:
-        reading = Constants(bodies=bodies, printed=of == "printed", unit=unit, share=share)
+        reading = EnclosedConstants(bodies=bodies, printed=of == "printed", unit=unit, share=share)
         if key in OF_BODIES:
             sides = OF_BODIES[key](bodies)
         elif key in OF_STICKING:

@@ -252,7 +252,7 @@ UNITS = {"MPa": 1, "TPa": 10**6}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Stopped:
+class StoppedRuns:
     """A run when a test stops it.
 
     Attributes
@@ -269,13 +269,13 @@ class Stopped:
     error: float
 
 
-def stopped(pair: ContactPair, theta: Fraction, g: Floats) -> tuple[Stopped, Stopped]:
+def stopped(pair: ContactPair, theta: Fraction, g: Floats) -> tuple[StoppedRuns, StoppedRuns]:
     """A run where the printed test stops it, and where the unrelaxed residual does; g is that of the global method."""
     seen, size = finished(pair, theta, PAPER / 10).iterates, float(np.linalg.norm(g))
     by_paper = (n for n in range(1, len(seen)) if meets_paper_test(seen[n].g[:, None], seen[n - 1].g[:, None])[0])
     by_residual = (n for n, iterate in enumerate(seen) if iterate.relative_residual <= PAPER)
     found = [
-        Stopped(steps=n, residual=seen[n].relative_residual, error=float(np.linalg.norm(seen[n].g - g)) / size)
+        StoppedRuns(steps=n, residual=seen[n].relative_residual, error=float(np.linalg.norm(seen[n].g - g)) / size)
         for n in (next(by_paper), next(by_residual))
     ]
     return found[0], found[1]
@@ -285,7 +285,7 @@ def _stopping(section: Section6) -> list[Evidence]:
     """Ours: the increment test depends on theta and on the unit of force, the test of the residual on neither."""
     runs = section.runs(LITERAL)
     pairs = {name: runs.pair(young=(Fraction(HARD, unit), Fraction(SOFT, unit))) for name, unit in UNITS.items()}
-    found: dict[tuple[Fraction, str], tuple[Stopped, Stopped]] = {}
+    found: dict[tuple[Fraction, str], tuple[StoppedRuns, StoppedRuns]] = {}
     for name, pair in pairs.items():
         g = solution_force(pair)
         found |= {(theta, name): stopped(pair, theta, g) for theta in (SLOW, FAST)}
@@ -295,7 +295,7 @@ def _stopping(section: Section6) -> list[Evidence]:
     return [on_test(name, {key: both[i] for key, both in found.items()}, rho.value) for name, i in by.items()]
 
 
-def on_test(name: str, runs: Mapping[tuple[Fraction, str], Stopped], rho: float) -> Evidence:
+def on_test(name: str, runs: Mapping[tuple[Fraction, str], StoppedRuns], rho: float) -> Evidence:
     """Evidence that the increment depends on theta or on the unit of force, or that the residual depends on neither.
 
     A test depends on neither if it stops at one unrelaxed residual, for all theta and units.  At one residual r the

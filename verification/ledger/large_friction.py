@@ -17,7 +17,7 @@ from fem1d2d.mesh import Floats
 from verification.bounds.losses import square
 from verification.interface.pair import ContactPair
 from verification.ledger.cases import three_digits
-from verification.ledger.differences import Difference, Setting, along, between
+from verification.ledger.differences import Difference, DrawnSetting, along, between
 from verification.ledger.draws import uniform_piece
 from verification.ledger.evidence import Evidence, Level, figure
 from verification.ledger.inequalities import SEED
@@ -120,7 +120,7 @@ def witness(case: Trial, random: np.random.Generator) -> Witness:
     one = case.measured.with_friction(1.0)
     reading = Reading.of(one)
     steep = reading.C_K * reading.M**2 / reading.m**3  # of the printed bound in k, where the bracket is 1
-    first = Setting(pair=_with_friction(case.pair, Fraction(1)))
+    first = DrawnSetting(pair=_with_friction(case.pair, Fraction(1)))
     piece = uniform_piece(first.pair, touching=False, sliding=1)
     T, felt = first.forms.force(piece), case.pair.neumann.grid
     y = eigh(square(T, first.forms.inverse))[1][:, -1]
@@ -132,7 +132,7 @@ def witness(case: Trial, random: np.random.Generator) -> Witness:
     pair = _with_friction(case.pair, k)
     reading = Reading.of(case.measured.with_friction(float(k)))
     unit = BRACKET / (reading.A + 2 * reading.C_K + reading.m)  # sqrt(m x) <= m + x
-    setting, grid = Setting(pair=pair), pair.contact.grid
+    setting, grid = DrawnSetting(pair=pair), pair.contact.grid
     g = np.concatenate([random.uniform(-1, 1, felt.t), random.uniform(0.5, 1, felt.n)])
     length = STEP * np.abs(g[felt.normal]).min() / np.abs(setting.forms.root @ y).max()
     change = along(setting, uniform_piece(pair, touching=False, sliding=1), length * y)
@@ -141,7 +141,7 @@ def witness(case: Trial, random: np.random.Generator) -> Witness:
     far = max(far, np.abs(change.d_1 - pair.interface.carry(change.d_2)).max() / STEP)
     jump = far * np.concatenate([random.uniform(0.5, 1, grid.t), -random.uniform(0.5, 1, grid.n)])
     pair = loaded(pair, g, jump, np.concatenate([pair.bound(g), np.zeros(grid.n)]))
-    difference = between(Setting(pair=pair), g + change.force, g - change.force)
+    difference = between(DrawnSetting(pair=pair), g + change.force, g - change.force)
     return Witness(name=case.name, difference=difference, reading=reading.in_unit(unit), friction=float(k), unit=unit)
 
 

@@ -120,7 +120,7 @@ class ExactSide:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Solution:
+class RationalSolution:
     """Steps I and II for one force, in rationals.
 
     Attributes
@@ -171,7 +171,7 @@ class RationalPair:
         self.d_1, self.d_2 = one.w_1 - other.w_1, one.w_2 - other.w_2
         self.friction = -((one.bound - other.bound) @ (abs(one.slip) - abs(other.slip)))
 
-    def solve(self, g: Exact) -> Solution:
+    def solve(self, g: Exact) -> RationalSolution:
         """Steps I and II.
 
         Raises
@@ -201,7 +201,7 @@ class RationalPair:
         if not satisfied:
             raise ArithmeticError("what doubles say of the nodes leads to no exact solution of step II")
         state = f"{int(touching.sum())} of {n} nodes touch, {int((sliding != 0).sum())} slip"
-        return Solution(g=g, reaction=force, w_1=w_2 + v, w_2=w_2, slip=slip, bound=bound, state=state)
+        return RationalSolution(g=g, reaction=force, w_1=w_2 + v, w_2=w_2, slip=slip, bound=bound, state=state)
 
     @cached_property
     def lifts(self) -> tuple[Exact, Exact]:

@@ -10,7 +10,7 @@ import numpy as np
 from fem1d2d.mesh import Floats
 from verification.algorithm.iterate import Iterate
 from verification.ledger.convergence import (
-    Setting,
+    RunsOfLevel,
     fields_converge,
     forces_carry_displacements,
     forces_converge,
@@ -40,7 +40,7 @@ from verification.ledger.weak_forms import (
 )
 
 
-def _action_and_reaction(setting: Setting) -> list[Evidence]:
+def _action_and_reaction(setting: RunsOfLevel) -> list[Evidence]:
     seen = [(case, reaction(case.weak, case.solution)) for case in setting.cases]
     normal = [Found(case=c, values=np.array([s["sigma_N^1 = sigma_N^2"]]), limit=EXACT) for c, s in seen]
     opposite = [Found(case=c, values=np.array([s["sigma_T^1 = -sigma_T^2"]]), limit=EXACT) for c, s in seen]
@@ -58,7 +58,7 @@ def _action_and_reaction(setting: Setting) -> list[Evidence]:
     ]
 
 
-def _signorini(setting: Setting) -> list[Evidence]:
+def _signorini(setting: RunsOfLevel) -> list[Evidence]:
     seen = [
         Found(case=c, values=np.array(list(unilateral(c.weak, c.solution).values())), limit=EXACT)
         for c in setting.cases
@@ -82,7 +82,7 @@ def lowest_pressure(case: Case) -> float:
     return float(force.min() / (np.abs(force).max() or 1.0))
 
 
-def _friction(setting: Setting) -> list[Evidence]:
+def _friction(setting: RunsOfLevel) -> list[Evidence]:
     plane = with_friction(setting.cases)
     seen = [Found(case=c, values=np.array(list(coulomb(c.weak, c.solution).values())), limit=EXACT) for c in plane]
     slips = [np.abs(c.weak.jump(c.solution.one, c.solution.two)[c.weak.pair.contact.grid.tangential]) for c in plane]
@@ -93,7 +93,7 @@ def _friction(setting: Setting) -> list[Evidence]:
 
 
 def _gather(
-    setting: Setting,
+    setting: RunsOfLevel,
     key: str,
     items: Callable[[Case], Iterable[Any]],
     values: Callable[[Weak, Any, np.random.Generator], Floats],
@@ -108,13 +108,13 @@ def _gather(
     ]
 
 
-def _original(setting: Setting) -> list[Evidence]:
+def _original(setting: RunsOfLevel) -> list[Evidence]:
     values = lambda weak, u, rng: inequality(weak, u, moves_in_K(weak, u, rng, setting.count))
     seen = _gather(setting, "4.4", lambda case: [case.solution], values)
     return [inequalities("printed", "at the solution of the global method, for v in K", seen)]
 
 
-def _lift(setting: Setting) -> list[Evidence]:
+def _lift(setting: RunsOfLevel) -> list[Evidence]:
     rng, count, seen = generator("4.5"), setting.count, []
     for case in setting.cases:
         for body in (case.weak.one, case.weak.two):
@@ -128,7 +128,7 @@ def _lift(setting: Setting) -> list[Evidence]:
     return [equations("printed", "a(R phi, v) = 0 for v = 0 on Gamma_c, and R phi = phi there, on both bodies", seen)]
 
 
-def _step_1(setting: Setting) -> list[Evidence]:
+def _step_1(setting: RunsOfLevel) -> list[Evidence]:
     values = lambda weak, step, rng: neumann_equation(
         weak, weak.at(step[0]).two, step[0].g, directions(rng, weak.two, setting.count)
     )
@@ -136,7 +136,7 @@ def _step_1(setting: Setting) -> list[Evidence]:
     return [equations("printed", "for v in V^2, along runs", seen)]
 
 
-def _step_2(setting: Setting) -> list[Evidence]:
+def _step_2(setting: RunsOfLevel) -> list[Evidence]:
     def values(weak: Weak, step: tuple[Iterate, Iterate], rng: np.random.Generator) -> Floats:
         u = weak.at(step[0])
         return shifted_inequality(weak, u, obstacle_tests(weak, u, rng, setting.count))
@@ -180,7 +180,7 @@ def _printed_step_2(found: Sequence[Case]) -> Evidence:
     return evidence("printed", worst >= -EXACT, text, data)
 
 
-def _step_3(setting: Setting) -> list[Evidence]:
+def _step_3(setting: RunsOfLevel) -> list[Evidence]:
     def values(weak: Weak, item: tuple[float, Iterate, Iterate], rng: np.random.Generator) -> Floats:
         theta, state, following = item
         image = (following.g - (1 - theta) * state.g) / theta
@@ -200,25 +200,25 @@ def _fixed_point(found: Sequence[Case]) -> Evidence:
     return equations("printed", "T g = g for the contact forces g of the global method", seen)
 
 
-def _neumann_problem(setting: Setting) -> list[Evidence]:
+def _neumann_problem(setting: RunsOfLevel) -> list[Evidence]:
     values = lambda weak, u, rng: balance(weak, u, directions(rng, weak.two, setting.count))
     seen = _gather(setting, "5.1", lambda case: [case.solution], values)
     return [equations("printed", "at the solution of the global method, for v in V^2", seen)]
 
 
-def _shifted_problem(setting: Setting) -> list[Evidence]:
+def _shifted_problem(setting: RunsOfLevel) -> list[Evidence]:
     values = lambda weak, u, rng: shifted_inequality(weak, u, obstacle_tests(weak, u, rng, setting.count))
     seen = _gather(setting, "5.2", lambda case: [case.solution], values)
     return [inequalities("printed", "at the solution of the global method, for w in V^1_-(0)", seen)]
 
 
-def _obstacle_problem(setting: Setting) -> list[Evidence]:
+def _obstacle_problem(setting: RunsOfLevel) -> list[Evidence]:
     values = lambda weak, u, rng: contact_inequality(weak, u, moves_of_one(weak, u, rng, setting.count))
     seen = _gather(setting, "5.3", lambda case: [case.solution], values)
     return [inequalities("printed", "at the solution of the global method, for v in V^1_-(u^2_N)", seen)]
 
 
-def _definition_of_T(setting: Setting) -> list[Evidence]:
+def _definition_of_T(setting: RunsOfLevel) -> list[Evidence]:
     values = lambda weak, state, rng: transfer(
         weak, weak.at(state), state.image, directions(rng, weak.two, setting.count)
     )
@@ -226,7 +226,7 @@ def _definition_of_T(setting: Setting) -> list[Evidence]:
     return [equations("printed", "at random psi, for v in V^2", seen), _fixed_point(setting.cases)]
 
 
-def _contact_problem(setting: Setting) -> list[Evidence]:
+def _contact_problem(setting: RunsOfLevel) -> list[Evidence]:
     def values(weak: Weak, state: Iterate, rng: np.random.Generator) -> Floats:
         w = weak.at(state)
         return contact_inequality(weak, w, moves_of_one(weak, w, rng, setting.count))
@@ -235,7 +235,7 @@ def _contact_problem(setting: Setting) -> list[Evidence]:
     return [inequalities("printed", "at random psi, for v in V^1_-(w^2_N)", seen)]
 
 
-def _loaded_problem(setting: Setting) -> list[Evidence]:
+def _loaded_problem(setting: RunsOfLevel) -> list[Evidence]:
     values = lambda weak, state, rng: neumann_equation(
         weak, weak.at(state).two, state.g, directions(rng, weak.two, setting.count)
     )
@@ -243,14 +243,14 @@ def _loaded_problem(setting: Setting) -> list[Evidence]:
     return [equations("printed", "at random psi, for v in V^2", seen)]
 
 
-def _limit(setting: Setting) -> list[Evidence]:
+def _limit(setting: RunsOfLevel) -> list[Evidence]:
     values = lambda weak, u, rng: inequality(weak, u, moves_in_K(weak, u, rng, setting.count))
     items = lambda case: [case.limit] if case.run.converged else []
     seen = _gather(setting, "lemma-5.2", items, values, LIMIT)
     return [inequalities("printed", "(4.4) at the limit of runs, for v in K", seen)]
 
 
-Check = Callable[[Setting], list[Evidence]]
+Check = Callable[[RunsOfLevel], list[Evidence]]
 
 #: What answers for each statement.
 CHECKS: dict[str, Check] = {
@@ -288,4 +288,4 @@ def solutions(
     >>> [e.holds for e in solutions(["2.3"], "quick")["2.3"]]
     [False, True]
     """
-    return gather(CHECKS, Setting(level=level), ids, watch)
+    return gather(CHECKS, RunsOfLevel(level=level), ids, watch)

@@ -18,7 +18,7 @@ from verification.constants import Measured, measure
 from verification.interface.body import Body
 from verification.interface.pair import ContactPair, build
 from verification.ledger.cases import NAMED, problem
-from verification.ledger.differences import Differences, Setting
+from verification.ledger.differences import Differences, DrawnSetting
 from verification.ledger.draws import draw_pairs
 from verification.ledger.evidence import Evidence, figure
 from verification.ledger.inequalities import ALLOWANCE, INEQUALITIES, LEVELS, ONE_TRACE_SPACE, SEED, SHARES, Inequality
@@ -51,9 +51,9 @@ class Trial:
         return cls(name=name, pair=pair, measured=measure(pair))
 
     @cached_property
-    def setting(self) -> Setting:
+    def setting(self) -> DrawnSetting:
         """The matrices in which differences are measured."""
-        return Setting(pair=self.pair)
+        return DrawnSetting(pair=self.pair)
 
     @cached_property
     def reading(self) -> Reading:
@@ -131,7 +131,7 @@ class Trial:
 
 
 @dataclass(kw_only=True)
-class Tally:
+class WorstTally:
     """The worst ratio of one inequality so far.
 
     Attributes
@@ -255,7 +255,7 @@ def discrete(
     One pass over the problems serves all inequalities, and what is found of one does not depend on which others were
     asked for.
     """
-    tallies = [Tally(inequality=inequality) for inequality in INEQUALITIES if ids is None or inequality.id in ids]
+    tallies = [WorstTally(inequality=inequality) for inequality in INEQUALITIES if ids is None or inequality.id in ids]
     if not tallies:  # no problem need be built
         watch(1.0)
         return {}

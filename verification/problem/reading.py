@@ -27,7 +27,7 @@ from verification.problem.specs import (
 )
 from verification.problem.tables import (
     ProblemError,
-    Table,
+    TomlTable,
     Unfit,
     choice,
     ends,
@@ -60,7 +60,7 @@ def read_problem(data: Mapping[str, Any], source: str, words: Vocabulary) -> Pro
     """
     if not isinstance(data, Mapping):
         raise ProblemError(source, "", None, f"needed a table of keys, received {type(data).__name__}")
-    top = Table(data, source)
+    top = TomlTable(data, source)
     dimension: Literal[1, 2] = top.take("dimension", choice(1, 2), 2)
     title = top.take("title", label, "untitled")
     units = top.table("units")
@@ -92,7 +92,7 @@ def read_problem(data: Mapping[str, Any], source: str, words: Vocabulary) -> Pro
     )
 
 
-def _read_shape(table: Table, dimension: int, source: str) -> dict[str, Any]:
+def _read_shape(table: TomlTable, dimension: int, source: str) -> dict[str, Any]:
     """The geometry of a body: a mesh file, or a shape with its cells."""
     if "mesh" in table:
         if dimension == 1:
@@ -118,18 +118,18 @@ def _read_shape(table: Table, dimension: int, source: str) -> dict[str, Any]:
     return {"shape": shape, **read}
 
 
-def _read_mesh(table: Table, source: str) -> MeshFile:
+def _read_mesh(table: TomlTable, source: str) -> MeshFile:
     """A mesh file: its name, its name and the SHA-256 it must have, or one that was read before."""
 
-    def read(value: Any) -> MeshFile | Table | str:
+    def read(value: Any) -> MeshFile | TomlTable | str:
         if isinstance(value, Mapping):
-            return Table(value, source, table.key("mesh"))
+            return TomlTable(value, source, table.key("mesh"))
         return value if isinstance(value, MeshFile) else text(value)
 
     given = table.take("mesh", read)
     if isinstance(given, MeshFile):
         return given
-    if isinstance(given, Table):
+    if isinstance(given, TomlTable):
         name, sha256 = given.take("path", text), given.take("sha256", sha256_text)
         given.close()
     else:
@@ -165,7 +165,7 @@ def _components(dimension: int, *, free: bool) -> Any:
     return read
 
 
-def _by_side(table: Table, sides: tuple[str, ...] | None, read: Any) -> Mapping[str, Any]:
+def _by_side(table: TomlTable, sides: tuple[str, ...] | None, read: Any) -> Mapping[str, Any]:
     """Read a sub-table keyed by side names; the sides of a mesh file are known only later."""
     result = {}
     for name in _names(table):
@@ -175,7 +175,7 @@ def _by_side(table: Table, sides: tuple[str, ...] | None, read: Any) -> Mapping[
     return result
 
 
-def _read_parts(table: Table, sides: tuple[str, ...] | None, dimension: int) -> Mapping[str, SidePart]:
+def _read_parts(table: TomlTable, sides: tuple[str, ...] | None, dimension: int) -> Mapping[str, SidePart]:
     """Parts of sides, each under a name of its own: the side, and the ends of the part along x or y."""
     parts = {}
     for name in _names(table):
@@ -191,7 +191,7 @@ def _read_parts(table: Table, sides: tuple[str, ...] | None, dimension: int) -> 
     return parts
 
 
-def _names(table: Table) -> Iterator[str]:
+def _names(table: TomlTable) -> Iterator[str]:
     """The keys of a table, each of which must be a name that a file can hold."""
     for name in table.names():
         try:
@@ -200,7 +200,7 @@ def _names(table: Table) -> Iterator[str]:
             raise table.refuse(str(name), None, str(error)) from None
 
 
-def _read_body(table: Table, dimension: int, source: str) -> BodySpec:
+def _read_body(table: TomlTable, dimension: int, source: str) -> BodySpec:
     shape = _read_shape(table, dimension, source)
     if shape["shape"] == "rigid":
         table.close()
@@ -257,7 +257,7 @@ def _read_body(table: Table, dimension: int, source: str) -> BodySpec:
     )
 
 
-def _read_contact(table: Table, dimension: int, laws: Mapping[str, LawEntry]) -> ContactSpec:
+def _read_contact(table: TomlTable, dimension: int, laws: Mapping[str, LawEntry]) -> ContactSpec:
     friction = table.take("friction", coefficient, Fraction(0))
     law = table.take("law", choice(*laws), "nonlocal")
     radius = table.take("radius", positive, None)
@@ -291,7 +291,7 @@ tolerance = number("a number with 0 < tolerance < 1", lambda v: 0 < v < 1)
 at_least_one = integer("a whole number >= 1", 1)
 
 
-def _read_iteration(table: Table, words: Vocabulary) -> IterationSpec:
+def _read_iteration(table: TomlTable, words: Vocabulary) -> IterationSpec:
     relaxation: str = table.take("relaxation", choice(*words.rules), "constant")
     spec = IterationSpec(
         neumann_body=table.take("neumann_body", choice(1, 2), 2),

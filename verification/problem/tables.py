@@ -205,7 +205,7 @@ def ends(value: Any) -> tuple[Fraction, Fraction]:
     return a, b
 
 
-class Table:
+class TomlTable:
     """A table of which every key is taken once; what is left over is an error.
 
     Parameters
@@ -252,17 +252,17 @@ class Table:
         except Unfit as error:
             raise self.refuse(name, value, str(error)) from None
 
-    def table(self, name: str, *, required: bool = False) -> Table:
+    def table(self, name: str, *, required: bool = False) -> TomlTable:
         """Read a sub-table; a missing one is empty unless required."""
 
-        def read(value: Any) -> Table:
+        def read(value: Any) -> TomlTable:
             if not isinstance(value, Mapping):
                 raise Unfit("needed a table")
-            return Table(value, self._file, self.key(name))
+            return TomlTable(value, self._file, self.key(name))
 
         if required:
             return self.take(name, read)
-        return self.take(name, read, Table({}, self._file, self.key(name)))
+        return self.take(name, read, TomlTable({}, self._file, self.key(name)))
 
     def names(self) -> Iterable[str]:
         """Keys not taken yet."""

@@ -15,7 +15,7 @@ from verification.interface.pair import ContactPair
 from verification.reproduce.claims import NODES, PRINTED_THETA, SERVES, Claim
 from verification.reproduce.experiments import THETAS, Outcome, curve_of, outcome_of
 from verification.reproduce.readings import ModelReading
-from verification.sweeps.bodies import Bodies
+from verification.sweeps.bodies import SharedBodies
 from verification.sweeps.grid import SweepGrid
 from verification.sweeps.row import FAILED, REFUSED, Row, row
 
@@ -44,9 +44,9 @@ class Runs:
         self._rows: dict[tuple[tuple[str, Any], ...], Row] = {}
 
     @cached_property
-    def bodies(self) -> Bodies:
+    def bodies(self) -> SharedBodies:
         """What the runs share."""
-        return Bodies(self._problem)
+        return SharedBodies(self._problem)
 
     def pair(self, **values: Any) -> ContactPair:
         """The bodies on the mesh of 190 nodes, with other values of a grid.

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from verification.advice.readings import RunReading, SeenRun
 from verification.advice.roles import Advice
 from verification.advice.runs_with_friction import FrictionBounds
-from verification.advice.seen import Interval, LogBound, SeenLog
+from verification.advice.seen import LogBound, RhoInterval, SeenLog
 from verification.sections.advised import next_run
 from verification.sections.numbers import NONE, rounded
 from verification.sections.parts import Cell, Note, Quantity, Section, Sections, Table, section, table
@@ -39,7 +39,7 @@ def of_a_run(found: Advice, run: SeenRun) -> Sections:
     return (said, *_with_friction(found.friction_bounds), *([] if found.next is None else [next_run(found.next)]))
 
 
-def of_logs(found: Advice, interval: Interval) -> Sections:
+def of_logs(found: Advice, interval: RhoInterval) -> Sections:
     """What logs say of rho, alone and together, and which run is to be made next."""
     read = [_readings(found.readings)] if found.readings else []
     notes = [] if read else ["Nothing: no residual falls, grows or stays steadily."]

@@ -26,7 +26,7 @@ KEPT = 16
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Setting:
+class RowSetting:
     """What rows share that differ in theta or in the rule alone.
 
     Attributes
@@ -48,7 +48,7 @@ class Setting:
         return None if found is None else (float(found.at_work), float(found.kappa_1), float(found.kappa_2))
 
 
-class Bodies:
+class SharedBodies:
     """The pairs and the constants of a sweep, each made once while it is in use.
 
     What a row gets does not depend on the rows before it: bodies are always scaled from those of the problem on the
@@ -69,7 +69,7 @@ class Bodies:
         self._constants = lru_cache(maxsize=KEPT)(self._measure)
         self._setting = lru_cache(maxsize=KEPT)(self._set)
 
-    def setting(self, values: Mapping[str, Any]) -> Setting:
+    def setting(self, values: Mapping[str, Any]) -> RowSetting:
         """What a row has in common with the rows of the same bodies and friction.
 
         Raises
@@ -78,7 +78,7 @@ class Bodies:
         """
         return self._setting(*self._key(values), values.get("friction"))
 
-    def _set(self, refine: int, changes: Changes, friction: Fraction | None) -> Setting:
+    def _set(self, refine: int, changes: Changes, friction: Fraction | None) -> RowSetting:
         pair = self._pair(refine, changes)
         if friction is not None:
             pair = pair.at(friction=friction)
@@ -91,7 +91,7 @@ class Bodies:
         measured = self._constants(refine, tuple(named.items()))
         if measured.of_friction:  # else there is no friction, or its constants do not exist
             measured = measured.with_friction(float(pair.friction))
-        return Setting(pair=pair, measured=measured, pieces=KnownPieces(pair))
+        return RowSetting(pair=pair, measured=measured, pieces=KnownPieces(pair))
 
     @staticmethod
     def _key(values: Mapping[str, Any]) -> tuple[int, Changes]:

@@ -16,7 +16,7 @@ from verification.interrupts import undisturbed
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
 from verification.sweeps.row import Row, lost
-from verification.sweeps.workers import AHEAD, Origin, Pieces, Placed, Stopped, Work, some
+from verification.sweeps.workers import AHEAD, Batches, NoWorkers, Origin, Placed, Work, some
 
 #: Seconds to wait for a scheduler.
 PATIENCE = 10
@@ -92,7 +92,7 @@ def _rows(
     from distributed.comm.core import CommClosedError
 
     threads = max(1, sum(client.ncores().values()))
-    pieces = Pieces(wanted, threads)
+    pieces = Batches(wanted, threads)
     source = iter(pieces)
     # a future, so that a pair of large matrices goes to each worker once, and is made again where a worker dies
     origin = client.submit(_same, Origin.of(start), pure=False)
@@ -113,7 +113,7 @@ def _rows(
             piece, alone = sent.pop(future.key), future.key not in together
             together.discard(future.key)
             if future.status not in ("finished", "error"):
-                raise Stopped(address, "the scheduler has gone")
+                raise NoWorkers(address, "the scheduler has gone")
             error = future.exception()
             if isinstance(error, KilledWorker) and not (alone and len(piece) == 1):
                 suspects.extend(piece)
@@ -121,7 +121,7 @@ def _rows(
                 index, values = piece[0]
                 yield [(index, lost(start, values, "the workers that ran it were killed, perhaps as memory ran out"))]
             elif error is not None:
-                raise Stopped(address, f"a worker cannot make rows: {type(error).__name__}: {error}")
+                raise NoWorkers(address, f"a worker cannot make rows: {type(error).__name__}: {error}")
             else:
                 yield pieces.taken(future.result())
             for piece in islice(source, 1):
@@ -129,7 +129,7 @@ def _rows(
             if suspects and not sent:
                 coming.add(submit([suspects.popleft()]))
     except (CommClosedError, TimeoutError) as error:
-        raise Stopped(address, f"the scheduler has gone ({error})") from None
+        raise NoWorkers(address, f"the scheduler has gone ({error})") from None
 
 
 def _same(origin: Origin) -> Origin:

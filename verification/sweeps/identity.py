@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from verification.algorithm.relaxation import RULES, Rule, rule_of
-from verification.interface.friction import LAWS, Given
+from verification.interface.friction import LAWS, GivenOperator
 from verification.interface.interface import Law
 from verification.interface.pair import ContactPair
 from verification.problem.specification import Problem
@@ -172,7 +172,7 @@ def _content(array: Any) -> str:
 
 
 def _law(law: Law, source: str) -> dict[str, str]:
-    if isinstance(law, Given):
+    if isinstance(law, GivenOperator):
         return {"name": law.name, "words": law.words, "outside": law.outside, "matrix": _content(law.matrix)}
     if type(law) not in LAWS.values():
         raise ProblemError(

@@ -17,7 +17,7 @@ from verification.interface.pair import ContactPair
 from verification.monolithic import SolveError
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
-from verification.sweeps.bodies import Bodies, Setting
+from verification.sweeps.bodies import RowSetting, SharedBodies
 from verification.sweeps.course import Course, course
 from verification.threads import one_thread
 
@@ -74,7 +74,7 @@ def _fits(name: str, value: Any) -> bool:
     return abs(value) <= sys.float_info.max  # not NaN
 
 
-def row(problem: Problem | ContactPair, values: Mapping[str, Any], bodies: Bodies | None = None) -> Row:
+def row(problem: Problem | ContactPair, values: Mapping[str, Any], bodies: SharedBodies | None = None) -> Row:
     """Run a problem with other values, and say what happened.
 
     Parameters
@@ -91,7 +91,7 @@ def row(problem: Problem | ContactPair, values: Mapping[str, Any], bodies: Bodie
         The values, the columns :data:`RESULTS`, and None where there is nothing, with ``reason`` in words; a "#" in
         words is written ``%23``.
     """
-    shared = Bodies(problem) if bodies is None else bodies
+    shared = SharedBodies(problem) if bodies is None else bodies
     found = _given(shared, values) | dict.fromkeys(RESULTS)
     why: dict[str, str] = {}
     try:
@@ -116,7 +116,9 @@ def row(problem: Problem | ContactPair, values: Mapping[str, Any], bodies: Bodie
 
 def lost(problem: Problem | ContactPair, values: Mapping[str, Any], words: str) -> Row:
     """The row of a run that ended with the process that made it."""
-    return _closed(_given(Bodies(problem), values) | dict.fromkeys(RESULTS) | {"outcome": ERROR}, {"outcome": words})
+    return _closed(
+        _given(SharedBodies(problem), values) | dict.fromkeys(RESULTS) | {"outcome": ERROR}, {"outcome": words}
+    )
 
 
 def _closed(found: Row, why: Mapping[str, str]) -> Row:
@@ -127,7 +129,7 @@ def _closed(found: Row, why: Mapping[str, str]) -> Row:
     }
 
 
-def _given(bodies: Bodies, values: Mapping[str, Any]) -> Row:
+def _given(bodies: SharedBodies, values: Mapping[str, Any]) -> Row:
     """The columns of the grid; what does not vary is what the problem has."""
     problem = bodies.problem
     rule = values.get("rule", "constant" if problem is None else problem.iteration.relaxation)
@@ -160,7 +162,7 @@ def _of_pair(pair: ContactPair) -> Row:
     return found if law is None else found | {"law": law.name}
 
 
-def _run(found: Row, setting: Setting, values: Mapping[str, Any]) -> dict[str, str]:
+def _run(found: Row, setting: RowSetting, values: Mapping[str, Any]) -> dict[str, str]:
     """Fill the columns of a run; returns why some of them are None."""
     pair, measured = setting.pair, setting.measured
     found["rho"] = None if measured.rho_max is None else measured.rho_max.value
@@ -184,7 +186,7 @@ def _run(found: Row, setting: Setting, values: Mapping[str, Any]) -> dict[str, s
     return why | dict(went.reason)
 
 
-def _proved(setting: Setting, rule: Rule, choice: Choice) -> tuple[Row, dict[str, str]]:
+def _proved(setting: RowSetting, rule: Rule, choice: Choice) -> tuple[Row, dict[str, str]]:
     """The columns that a theorem gives, and why one is None."""
     pair, factor, rate = setting.pair, None, None
     outside = pair.outside + ([words] if (words := rule.outside(pair.friction)) else [])

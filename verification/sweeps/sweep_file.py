@@ -12,7 +12,7 @@ from ndtheory.texts import did_you_mean
 from verification.problem.examples import example, examples
 from verification.problem.files import load, read_file
 from verification.problem.specification import Problem
-from verification.problem.tables import ProblemError, Table, Unfit, number, positive, text
+from verification.problem.tables import ProblemError, TomlTable, Unfit, number, positive, text
 from verification.sweeps.grid import MOST_ROWS, SweepGrid
 
 #: The keys of a range of values.
@@ -41,7 +41,7 @@ def read_sweep(path: Path | str) -> tuple[Problem, SweepGrid]:
             f'values, as problem = "{path.name}" and [grid] theta = [0.3, 0.5]'
         )
         raise ProblemError(str(path), "", None, needed)
-    top = Table(data, str(path))
+    top = TomlTable(data, str(path))
     name = top.take("problem", text)
     grid = top.table("grid", required=True)
     top.close()
@@ -71,7 +71,7 @@ def _values(file: str, key: str, value: Any) -> Any:
     """A list as it stands, a range as the list of its values."""
     if not isinstance(value, Mapping):
         return value
-    table = Table(value, file, key)
+    table = TomlTable(value, file, key)
     reads: tuple[Callable[[Any], Fraction], ...] = (number(), number(), positive)
     start, stop, step = (table.take(name, read) for name, read in zip(RANGE, reads, strict=True))
     table.close()

@@ -18,7 +18,7 @@ from verification.interface.pair import ContactPair
 from verification.interrupts import begin_child, undisturbed
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
-from verification.sweeps.bodies import Bodies
+from verification.sweeps.bodies import SharedBodies
 from verification.sweeps.row import Row, row
 
 #: Rows by their places in the grid.
@@ -44,7 +44,7 @@ LATEST = 1.0
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
-class Stopped(ProblemError):
+class NoWorkers(ProblemError):
     """No worker is left that could make the rows.
 
     Parameters
@@ -62,7 +62,7 @@ def alone(start: Problem | ContactPair, wanted: Sequence[tuple[int, Row]]) -> Ge
     """In this process, one after the other."""
     if why := unusable(start):
         raise ProblemError(start.source, "mesh", None, why)
-    bodies = Bodies(start)
+    bodies = SharedBodies(start)
     for index, values in wanted:
         yield [(index, row(start, values, bodies))]
 
@@ -106,9 +106,9 @@ _one_at_a_time = threading.Lock()
 
 
 @lru_cache(maxsize=1)
-def _bodies(origin: Origin) -> Bodies:
+def _bodies(origin: Origin) -> SharedBodies:
     """What the rows of a worker share."""
-    return Bodies(origin.start)
+    return SharedBodies(origin.start)
 
 
 def unusable(start: Problem | ContactPair) -> str:
@@ -164,7 +164,7 @@ def together(jobs: int) -> Work:
         if not wanted:
             return
         count = processes(jobs, len(wanted))
-        origin, pieces = Origin.of(start), Pieces(wanted, count)
+        origin, pieces = Origin.of(start), Batches(wanted, count)
         source, ahead = iter(pieces), AHEAD * count
         executor = None
         waiting: set[Future[Handed]] = set()
@@ -183,7 +183,7 @@ def together(jobs: int) -> Work:
                     waiting |= {executor.submit(some, origin, piece) for piece in islice(source, ahead - len(waiting))}
         except BrokenProcessPool:
             _stop(executor, waiting)
-            raise Stopped("--jobs", "a process was killed, perhaps as memory ran out: needed fewer jobs") from None
+            raise NoWorkers("--jobs", "a process was killed, perhaps as memory ran out: needed fewer jobs") from None
         except BaseException:
             _stop(executor, waiting)
             raise
@@ -216,7 +216,7 @@ def _stop(executor: Any, waiting: Collection[Future[Handed]]) -> None:
         executor.terminate(kill_workers=True)
 
 
-class Pieces:
+class Batches:
     """Rows that stand together and have one mesh, as many at once as take a moment.
 
     Parameters
@@ -250,9 +250,9 @@ class Pieces:
             The worker has another version of this library, or cannot read a mesh file.
         """
         if handed.version != __version__:
-            raise Stopped("worker", f"it has version {handed.version} of ndtheory: needed {__version__}, as here")
+            raise NoWorkers("worker", f"it has version {handed.version} of ndtheory: needed {__version__}, as here")
         if handed.unusable:
-            raise Stopped("worker", f"it cannot read {handed.unusable}")
+            raise NoWorkers("worker", f"it cannot read {handed.unusable}")
         # the last pieces count most: another mesh takes another time
         self._rows, self._seconds = self._rows / 2 + len(handed.rows), self._seconds / 2 + handed.seconds
         self._at_once = max(1, min(self._most, int(SECONDS * self._rows / max(self._seconds, 1e-9))))

@@ -14,7 +14,7 @@ import numpy as np
 
 from fem1d2d.mesh import Floats
 from verification.interface.body import Condensed
-from verification.interface.friction import Given
+from verification.interface.friction import GivenOperator
 from verification.interface.grid import Grid
 from verification.interface.interface import Interface
 from verification.interface.pair import ContactPair
@@ -31,7 +31,11 @@ def _on(grid: Grid, side: Condensed, **arrays: Floats) -> Condensed:
 def _of_matrices(pair: ContactPair, contact: Condensed, neumann: Condensed, **changes: Any) -> ContactPair:
     interface = pair.interface
     kernel, transfer = interface.kernel, interface.transfer
-    given = {"gap": interface.gap, "law": None if kernel is None else Given(matrix=kernel), "transfer": transfer}
+    given = {
+        "gap": interface.gap,
+        "law": None if kernel is None else GivenOperator(matrix=kernel),
+        "transfer": transfer,
+    }
     joined = Interface(contact=contact.grid, neumann=neumann.grid, **(given | changes))
     return replace(pair, contact=contact, neumann=neumann, interface=joined, problem=None)
 
@@ -61,7 +65,7 @@ def in_units(pair: ContactPair, *, force: float = 1.0, stress: float = 1.0, leng
         )
 
     kernel = pair.interface.kernel
-    law = None if kernel is None else Given(matrix=kernel / length)
+    law = None if kernel is None else GivenOperator(matrix=kernel / length)
     gap = force * length * pair.interface.gap
     return _of_matrices(pair, side(pair.contact), side(pair.neumann), gap=gap, law=law)
 
@@ -103,7 +107,7 @@ def mirrored(pair: ContactPair) -> ContactPair:
         side(pair.neumann),
         gap=interface.gap[::-1],
         transfer=turn(interface.transfer),
-        law=None if kernel is None else Given(matrix=kernel),
+        law=None if kernel is None else GivenOperator(matrix=kernel),
     )
 
 
