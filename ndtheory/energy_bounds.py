@@ -1,4 +1,4 @@
-"""What the theorem in energy norms says: the result of :func:`ndtheory.energy_norms.evaluate_energy`."""
+"""The answer of the theorem in energy norms, the result of :func:`ndtheory.energy_norms.evaluate_energy`."""
 
 from __future__ import annotations
 

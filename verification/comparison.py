@@ -158,7 +158,7 @@ class Comparison(Document):
         }
 
     def _objects(self) -> dict[str, Any]:
-        """What bounds have of their own beside ``bounds``."""
+        """Objects of single bounds, beside ``bounds``."""
         own = [BOUNDS[name].objects(result, self.measured) for name, result in self.bounds.items()]
         return {key: value for objects in own for key, value in objects.items()}
 

@@ -1,6 +1,7 @@
 """Results as JSON documents, as one line, as sections and as figures.
 
-What shows a result is imported by name, here alone: it knows the types of results, which do not know it.
+The modules that show a result are imported by name, and only here: they depend on the types of results, not the
+other way round.
 """
 
 from __future__ import annotations
@@ -55,7 +56,7 @@ class Document(Value, ABC):
         return self.schema
 
     def sections(self) -> tuple[Section, ...]:
-        """What the command and the written report show of such a result, as data.
+        """The parts of the result that the command and the written report show, as data.
 
         Returns
         -------

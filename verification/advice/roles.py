@@ -349,7 +349,7 @@ def _roles_without_matrices(bodies: TwoBodies, tied: bool, progress: Progress) -
 
 
 def plain_role(neumann_body: Any, rho: Fraction, **settings: Any) -> Role:
-    """The role by rho alone, without friction; ``settings`` are those of :func:`role_of`."""
+    """The role without friction, from rho; ``settings`` are those of :func:`role_of`."""
     bounds = evaluate_energy(EnergyConstants(rho=rho))
     settings.setdefault("no_threshold", "matrices alone say nothing of friction: the proved values are for k = 0")
     return role_of(neumann_body, bounds.rho, bounds=bounds, **settings)

@@ -1,4 +1,4 @@
-"""What the moduli of two bodies say of both roles."""
+"""Bounds of rho for both roles, from the moduli of two bodies."""
 
 from __future__ import annotations
 

@@ -60,7 +60,7 @@ def by_cvxpy_alone(run: Run) -> Reference:
     """Repeat a run with every step II taken from cvxpy's own answer.
 
     A run of more than :data:`MOST_STEPS` evaluations, or one whose steps give the program more than
-    :data:`MOST_ENTRIES` entries, is compared at its first and last iterate alone.
+    :data:`MOST_ENTRIES` entries, is compared only at its first and last iterate.
 
     Raises
     ------

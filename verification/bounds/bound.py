@@ -244,7 +244,7 @@ class Bound(ABC):
     of_unit : bool
         Whether its numbers depend on the unit of stress, which is then shown beside them.
     apart : bool
-        Whether the document of a comparison has it under its own name alone, not among ``bounds.editions``.
+        Whether the document of a comparison has it under its name, not among ``bounds.editions``.
     certifies : bool
         Whether :func:`verification.certify` takes its factor: it is proved by multipliers that :meth:`enclose` returns,
         or by those of the theorem in energy norms.
@@ -295,7 +295,7 @@ class Bound(ABC):
         return trace(interval, every=found.friction.every.value, some=found.friction.some.value)
 
     def remarks(self, result: BoundResult | None, unit: str) -> tuple[str, ...]:
-        """What must be said beside figures of this bound.
+        """Remarks that belong beside figures of this bound.
 
         Parameters
         ----------

@@ -30,7 +30,7 @@ def _rest(factor: Number) -> Number:
 
 
 class SemidefiniteBound(Bound):
-    """What multipliers of the conditions of step II prove, sign by sign of slip if need be; see ``docs/energy.md``."""
+    """The factor proved by multipliers of the conditions of step II; see ``docs/energy.md``."""
 
     name, words = "lmi", "the semidefinite bound"
     colour, dashes, fill = "#8A5A00", "-.", "#FFF3B0"

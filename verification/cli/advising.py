@@ -1,4 +1,4 @@
-"""The four commands of advise: from a problem, from matrices, from runs of other codes, from moduli alone."""
+"""The four commands of advise: from a problem, from matrices, from runs of other codes, from material data."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def of_file(file: Path, keys: dict[str, str], swap: bool, tied: bool, snippets: 
     FILE is a problem file, or the interface.npz that a run has written.  Both assignments of the roles are compared:
     theta (no unit) and the factor of a step, predicted and proved, and lines to paste into a coupling configuration.
 
-    The commands below advise where there is no problem file.  A file that has the name of one of them is given as
+    The commands below need no problem file.  A file that has the name of one of them is given as
     ./run.
 
     \b

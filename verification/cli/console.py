@@ -44,7 +44,7 @@ NOTHING, SHOWN = "interrupted before anything was computed", "interrupted; what 
 
 @dataclass(kw_only=True)
 class _Stdout:
-    """Where results go, whether anybody reads them, the live line that makes room, and whether one was shown."""
+    """The stream of results, its state, and the live line that makes room for them."""
 
     stream: TextIO | None = None
     unread: bool = False

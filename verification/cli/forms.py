@@ -50,7 +50,7 @@ class AdviseCommand(click.Command):
         return extra
 
     def needed(self, ctx: click.Context) -> str:
-        """What the command takes, in words."""
+        """The arguments of the command, in words."""
         return "options only"
 
 
@@ -76,7 +76,7 @@ class Default(AdviseCommand):
         return [p.make_metavar(ctx) for p in self.params if isinstance(p, click.Argument)]
 
     def format_usage(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """How it is called, with and without a name."""
+        """Both calls, with and without a name."""
         formatter.write_usage(ctx.command_path, " ".join(["[OPTIONS]", *self.arguments(ctx)]))
         formatter.write_usage(ctx.command_path, "COMMAND [OPTIONS]", prefix="   or: ")
 
@@ -120,7 +120,7 @@ class AdviseGroup(Commands):
         return super().make_context(info_name, [args[first], *args[:first], *args[first + 1 :]], parent, **extra)
 
     def complete(self, ctx: click.Context, parameter: click.Parameter, begun: str) -> list[CompletionItem]:
-        """What may follow the name of the group: its commands, and files."""
+        """Completions of the name of the group: its commands, and files."""
         names = [CompletionItem(name) for name in self.commands if name.startswith(begun)]
         return [*names, CompletionItem(begun, type="file")]
 

@@ -1,4 +1,4 @@
-"""What joins two bodies along Gamma_c: their grids, the transfer between them, the gap, and a law of friction."""
+"""Two bodies joined along Gamma_c: their grids, the transfer between them, the gap, and a law of friction."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What gathers evidence for the ledger."""
+"""The sources of evidence for the ledger."""
 
 from __future__ import annotations
 

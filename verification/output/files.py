@@ -167,7 +167,7 @@ def _remove(room: Path) -> None:
 
 
 def writing(found: Document, target: Path | None) -> Callable[[], None] | None:
-    """What writes a document into a file; None where no name was given."""
+    """A function that writes a document into a file; None where no name was given."""
     if target is None:
         return None
 

@@ -1,4 +1,4 @@
-"""What tells two problems apart in stores, which outlive releases: a later key of the file changes no digest."""
+"""Digests of problems for stores, which outlive releases: a later key of the file changes no digest."""
 
 from __future__ import annotations
 

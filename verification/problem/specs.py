@@ -1,4 +1,4 @@
-"""What a problem consists of: two bodies, their contact, the iteration and the norm, as plain data."""
+"""The parts of a problem: two bodies, their contact, the iteration and the norm, as plain data."""
 
 from __future__ import annotations
 

@@ -9,14 +9,14 @@ from typing import Any, Protocol
 
 
 class LawEntry(Protocol):
-    """What a reader asks of a law; see :class:`verification.interface.interface.Law`."""
+    """The attributes of a law that a reader needs; see :class:`verification.interface.interface.Law`."""
 
     label: str
     needs_radius: bool
 
 
 class RuleEntry(Protocol):
-    """What a reader asks of a rule; see :class:`verification.algorithm.relaxation.Rule`."""
+    """The attributes of a rule that a reader needs; see :class:`verification.algorithm.relaxation.Rule`."""
 
     takes_theta: bool
 
@@ -29,7 +29,7 @@ class Vocabulary:
     rules: Mapping[str, RuleEntry]
 
     def takes_theta(self, relaxation: Any) -> bool:
-        """True if the rule of a name uses a given theta; what is no name of a rule is refused elsewhere."""
+        """True if the rule of a name uses a given theta; other names are refused elsewhere."""
         rule = self.rules.get(relaxation) if isinstance(relaxation, str) else None
         return rule is None or rule.takes_theta
 
@@ -37,8 +37,8 @@ class Vocabulary:
 def vocabulary() -> Vocabulary:
     """The laws and rules that are registered now.
 
-    Their modules are imported by name, here alone: a law acts on an interface and a rule on a pair of bodies, and both
-    are made from problems.
+    Their modules are imported by name, and only here: a law acts on an interface and a rule on a pair of bodies, both
+    made from problems.
     """
     laws = importlib.import_module("verification.interface.friction").LAWS
     rules = importlib.import_module("verification.algorithm.relaxation").RULES

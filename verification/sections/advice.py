@@ -48,7 +48,7 @@ def _sections(found: Advice) -> Iterator[Section]:
 
 
 def _end(found: Advice) -> Section:
-    """What is not said, and what to type next."""
+    """The limits of the advice, and the command to type next."""
     outside = map(outside_the_theorem, found.outside)
     if found.next is None:
         tied = "that nothing opens or slips"
@@ -174,7 +174,7 @@ def _together(said: Mapping[str, str]) -> list[str]:
 
 
 def _paste(found: Advice, *more: str) -> Section:
-    """What to paste, and what to know of it."""
+    """Lines to paste, and notes on them."""
     said = [f"Whole blocks: --snippets {', '.join(SNIPPETS)} or all."]
     auto = found.best.theta_auto
     if auto is not None and found.theta is not None:

@@ -1,4 +1,4 @@
-"""What advice of several origins has: matrices, roles, a run to make next, lines to paste."""
+"""Sections that advice of several origins shares: matrices, roles, a run to make next, lines to paste."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from verification.sections.parts import Block, Section, section
 
 
 def which_body(*notes: str) -> Section:
-    """Who gets the Neumann problem."""
+    """The body that gets the Neumann problem."""
     return section("body", "WHICH BODY GETS THE NEUMANN PROBLEM?", *notes)
 
 
@@ -27,7 +27,7 @@ def pasted(neumann_body: int | None, theta: float | None, *notes: str) -> Sectio
 
 
 def given(seen: SeenMatrices) -> Section:
-    """What was seen of the matrices."""
+    """The matrices that were given."""
     of = [f"S{body}: {one.rows} unknowns" for body, one in ((1, seen.S1), (2, seen.S2))]
     if seen.transfer is not None and seen.neumann_body is not None:
         rows, columns = seen.transfer

@@ -1,4 +1,4 @@
-"""What is proved of the continuous problem."""
+"""The proof for the continuous problem."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What runs of another code say of rho: as the ratio of one, or as logs."""
+"""Runs of another code, given as the ratio of one or as logs, and the values of rho that they allow."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def of_logs(found: Advice, interval: RhoInterval) -> Sections:
 
 
 def _seen(logs: Sequence[SeenLog]) -> Section:
-    """What the logs show, column by column."""
+    """The logs, column by column."""
     parts: list[Note | str] = []
     room = MOST_COLUMNS
     for log in logs:

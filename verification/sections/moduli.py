@@ -1,4 +1,4 @@
-"""Advice from the moduli of two bodies alone."""
+"""Advice from nothing but the moduli of two bodies."""
 
 from __future__ import annotations
 

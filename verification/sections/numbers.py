@@ -17,7 +17,7 @@ LEGEND = (
     " is computed in doubles"
 )
 
-#: What stands where there is no number.
+#: Shown in place of a missing number.
 NONE = "-"
 
 
@@ -49,7 +49,7 @@ def near_one(value: float) -> Quantity:
 
 
 def count(number: int | None, before: str = "") -> Cell:
-    """How many; a dash where that is not known."""
+    """A count; a dash where it is not known."""
     return NONE if number is None else Quantity(number, f"{before}{number}")
 
 

@@ -1,4 +1,4 @@
-"""What a result is shown by: sections of typed parts, without the width, the colours and the tags of a place."""
+"""The parts by which a result is shown: sections of typed parts, without the width, colours and tags of a place."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a run of the iteration did, and what the global method found."""
+"""A run of the iteration, and the solution of the global method."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def happened(finished: Run, *, alone: bool) -> Section:
 
 
 def _at_the_end(finished: Run) -> str:
-    """What a report adds of the end of a run."""
+    """The end of a run, which only a report shows."""
     rate, linear = finished.observed_rate, finished.linearised
     said = [f"Relative residual without relaxation at the end: {figures(finished.last.relative_residual)}."]
     if rate is not None:

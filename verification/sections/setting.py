@@ -1,4 +1,4 @@
-"""What is computed, in two lines, and what it does not say."""
+"""The problem in two lines, and the limits of a result."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ def _how(problem: Problem) -> str:
 
 
 def outside_the_theorem(reason: str) -> Note:
-    """Why the theorem does not speak of a problem."""
+    """A reason why a problem lies outside the theorem."""
     return Note(f"{reason}.", 0, "Outside the theorem:")
 
 
 def limits(outside: Iterable[str], then: Next) -> Section:
-    """What a result for a mesh does not say, and why the theorem does not speak of it."""
+    """The limits of a result for a mesh, and the reasons why it lies outside the theorem."""
     notes = map(outside_the_theorem, outside)
     return closing("anything about the continuum, or the local Coulomb law", *notes, then=then)

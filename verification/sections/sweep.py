@@ -51,7 +51,7 @@ def sections(found: Sweep, target: Path | None = None) -> Sections:
 
 @of.register
 def plan(found: Plan) -> Sections:
-    """What a sweep would do."""
+    """A sweep that was planned, not run."""
     title = Facts(_title(found.problem), (f"{found.asked} runs",))
     left = f"{found.stored} are in the store, {found.left} are left; nothing was run"
     return (section("setting", "", title, left),)

@@ -1,4 +1,4 @@
-"""What tells one row from all others: the problem, the values, how it is solved, and the number of the numerics.
+"""The identity of a row: the problem, the values, how it is solved, and the number of the numerics.
 
 A store outlives releases.  A row that another version of this library has made is the row that this one would make,
 unless :data:`NUMERICS` was raised in between.
@@ -78,7 +78,7 @@ class Identity:
         return replace(self, numerics=numerics, version=version)
 
     def study(self, version: str) -> str:
-        """What a version of this library makes under this identity: SHA-256, in hexadecimal digits."""
+        """The key under which a version of this library keeps it: SHA-256, in hexadecimal digits."""
         of = self._written() if self.version else {"made by": version} | self._written()
         return hashlib.sha256(json.dumps(of).encode("ascii")).hexdigest()
 

@@ -79,7 +79,7 @@ class Known:
     damaged: int = 0
 
     def __or__(self, other: Known) -> Known:
-        """What a store has of these and of other keys."""
+        """The rows of a store that have these keys, and the number of others."""
         return Known(
             rows=self.rows | other.rows,
             failed=self.failed + other.failed,
@@ -187,7 +187,7 @@ class Store:
         return Known(rows=found, failed=failed, errors=errors, damaged=damaged)
 
     def count(self, keys: Mapping[int, bytes]) -> dict[str, int]:
-        """How many of the keys have a row, by the version of this library that made it.
+        """The number of keys that have a row, by the version of this library that made it.
 
         Raises
         ------
