@@ -112,8 +112,8 @@ def test_names_are_those_of_the_moment(monkeypatch):
 @pytest.mark.parametrize(
     ("bounds", "message"),
     [
-        ("enrgy", f"no bound 'enrgy': did you mean 'energy'? there are {KNOWN}"),
-        (["lmi", "x\n"], f"no bound 'x\\n': there are {KNOWN}"),
+        ("enrgy", f"no bound 'enrgy', there are {KNOWN}; did you mean 'energy'?"),
+        (["lmi", "x\n"], f"no bound 'x\\n', there are {KNOWN}"),
         ((), f"needed one bound at least of {KNOWN}"),
         ("", f"needed one bound at least of {KNOWN}"),
         (" , ", f"needed one bound at least of {KNOWN}"),
