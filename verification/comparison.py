@@ -17,7 +17,7 @@ from verification.algorithm.theta import Choice, begin
 from verification.bounds import LARGEST
 from verification.bounds.bound import NOT_ASKED, BoundResult, Subject
 from verification.bounds.losses import Losses, locate
-from verification.bounds.table import BOUNDS, chosen
+from verification.bounds.table import BOUNDS, chosen, named
 from verification.constants import Measured, measure
 from verification.contact import ContactError, Solver
 from verification.document import Document
@@ -116,9 +116,7 @@ class Comparison(Document):
             listener.programs(programs)
 
     def _asked(self, *, calculated: bool) -> list[BoundResult]:
-        return [
-            result for name, result in self.bounds.items() if BOUNDS[name].calculated == calculated and result.asked
-        ]
+        return [result for name, result in self.bounds.items() if named(name).calculated == calculated and result.asked]
 
     @property
     def computed(self) -> list[BoundResult]:
@@ -128,8 +126,8 @@ class Comparison(Document):
     @property
     def proved_violated(self) -> bool:
         """Whether a proved claim was violated: a bug, or an error in a proof.  A printed one violated is a finding."""
-        judged = ((BOUNDS.get(name), judgement.verdict) for name, judgement in self.verdicts.items())
-        return any(verdict == "VIOLATED" and bound is not None and not bound.finding for bound, verdict in judged)
+        violated = {name for name, judgement in self.verdicts.items() if judgement.verdict == "VIOLATED"}
+        return any(not named(name).finding for name in violated & set(self.bounds))
 
     @property
     def inconclusive(self) -> bool:
@@ -137,7 +135,7 @@ class Comparison(Document):
         return any(judgement.verdict == "INCONCLUSIVE" for judgement in self.verdicts.values())
 
     def content(self) -> dict[str, Any]:
-        editions = {name: result.to_dict() for name, result in self.bounds.items() if not BOUNDS[name].apart}
+        editions = {name: result.to_dict() for name, result in self.bounds.items() if not named(name).apart}
         return {
             "title": self.run.pair.title,
             "constants": self.measured.content(),
@@ -159,7 +157,7 @@ class Comparison(Document):
 
     def _objects(self) -> dict[str, Any]:
         """Objects of single bounds, beside ``bounds``."""
-        own = [BOUNDS[name].objects(result, self.measured) for name, result in self.bounds.items()]
+        own = [named(name).objects(result, self.measured) for name, result in self.bounds.items()]
         return {key: value for objects in own for key, value in objects.items()}
 
 
@@ -286,7 +284,7 @@ def compare(
 
 
 class _UntilCtrlC:
-    """Work that is left: after Ctrl-C nothing more of it is begun, and all of it is told.
+    """Run the remaining steps.  After Ctrl-C no further step starts, but each is still reported.
 
     Parameters
     ----------
@@ -315,7 +313,7 @@ class _UntilCtrlC:
 
 
 def _comes_with_programs() -> str:
-    """Why a part is missing that takes longer than the run and explains or checks no bound that was asked for."""
+    """The reason for leaving out a slow part that belongs to bounds that were not asked for."""
     return f"{NOT_ASKED}: it comes with {' or '.join(name for name, bound in BOUNDS.items() if not bound.calculated)}"
 
 

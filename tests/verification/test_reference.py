@@ -69,12 +69,12 @@ def test_a_long_run_is_compared_at_its_ends(run, monkeypatch):
 
 
 def test_large_programs_are_compared_at_the_ends_of_the_run(run, monkeypatch):
-    entries = run.evaluations * run.pair.contact.grid.n**2
-    monkeypatch.setattr(reference, "MOST_ENTRIES", entries - 1)
+    pairs = run.evaluations * run.pair.contact.grid.n**2
+    monkeypatch.setattr(reference, "MOST_PAIRS", pairs - 1)
     found = by_cvxpy_alone(run)
     assert (found.whole, found.steps) == (False, 2)
     assert f"{run.pair.contact.grid.n} contact nodes" in found.why
-    monkeypatch.setattr(reference, "MOST_ENTRIES", entries)
+    monkeypatch.setattr(reference, "MOST_PAIRS", pairs)
     assert by_cvxpy_alone(run).whole
 
 

@@ -14,10 +14,11 @@ from scipy.sparse.linalg import LinearOperator
 from fem1d2d import extremes_by_solves, largest
 from fem1d2d.mesh import Floats
 from ndtheory import Number
+from verification.advice import BodyNumber
 from verification.advice.role import Role, with_both_ends
 from verification.advice.roles import Advice, advise, plain_role
 from verification.advice.seen_matrices import ORDERING, SeenLanczos, SeenMatrices
-from verification.advice.sides import BODIES, BodyNumber, Side, is_operator, of_matrix, of_solver, other, rows_of
+from verification.advice.sides import BODIES, Side, is_operator, of_matrix, of_solver, other, rows_of
 from verification.advice.transfer import Transfer, read_transfer
 from verification.interface.build import build
 from verification.interface.friction import Nonlocal, hat

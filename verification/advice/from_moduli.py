@@ -12,18 +12,11 @@ from ndtheory.constants import take
 from ndtheory.energy_norms import predicted_rate, predicted_theta
 from ndtheory.moduli import Moduli, Plane, column, end, free_end, half_planes, layer, mirror
 from ndtheory.number import below
+from verification.advice import BodyNumber
 from verification.advice.readings import NextRun, rounded_down
 from verification.advice.role import Role
 from verification.advice.roles import Advice
-from verification.advice.seen_moduli import (
-    BodyNumber,
-    Corners,
-    LowerBounds,
-    ModuliRole,
-    SeenModuli,
-    StartTheta,
-    exactly,
-)
+from verification.advice.seen_moduli import Corners, LowerBounds, ModuliRole, SeenModuli, StartTheta, exactly
 from verification.interface.pair import UNITS
 
 #: Sizes of E, and how close nu may come to -1 and to 1/2: bounds of rho then stay between 1e-75 and 1e75.

@@ -50,7 +50,7 @@ class Advice(Document):
         The run to make next.
     logs : tuple of SeenLog
         What was seen in the logs of other runs.
-    interval : Interval or None
+    interval : RhoInterval or None
         What these logs say of rho together.
     moduli : SeenModuli or None
         What was given of two bodies, and bounds of rho from below.

@@ -12,10 +12,10 @@ from ndtheory import Number
 from ndtheory.energy_norms import predicted_theta
 from ndtheory.moduli import Moduli
 from ndtheory.number import above
+from verification.advice import BodyNumber
 from verification.advice.readings import LARGEST_TO_PASTE, rounded_down
 from verification.problem.writing import written_number
 
-BodyNumber = Literal[1, 2]
 Corners = Literal["none", "1", "2", "both"]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -13,6 +13,7 @@ from scipy.sparse.linalg import LinearOperator
 
 from fem1d2d import solver_with_inertia
 from fem1d2d.mesh import Floats
+from verification.advice import BodyNumber
 from verification.advice.seen_matrices import SeenMatrix
 from verification.interface.matrices import MOST_ROWS, Stiffness, real_array, stiffness
 
@@ -21,8 +22,6 @@ TOLD = 1e-3
 
 #: How far a solve may be from the inverse of the product beside it.
 INVERSE = 1e-3
-
-BodyNumber = Literal[1, 2]
 
 #: The Neumann bodies of the roles, in their order.
 BODIES: tuple[BodyNumber, BodyNumber] = (2, 1)

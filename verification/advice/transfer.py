@@ -10,7 +10,8 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator
 
 from fem1d2d.mesh import Floats
-from verification.advice.sides import BODIES, BodyNumber, dense
+from verification.advice import BodyNumber
+from verification.advice.sides import BODIES, dense
 from verification.interface.matrices import size
 
 

@@ -45,7 +45,7 @@ class Thresholds:
 
     every: Number | None = None
     some: Number | None = None
-    on: str = "any"
+    on: str = "k"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -351,6 +351,24 @@ def trace(interval: Callable[[float], tuple[float, float] | None], *, every: flo
     found = [(float(k), interval(float(k))) for k in ks]
     kept = [(k, ends) for k, ends in found if ends is not None]
     return Region(k=tuple(k for k, _ in kept), theta=tuple(ends for _, ends in kept), every=every, some=some)
+
+
+class Removed(Bound):
+    """A bound that is no longer registered, of which older results may hold something.
+
+    Parameters
+    ----------
+    name : str
+    """
+
+    name = words = "removed"
+    colour = "#555555"
+
+    def __init__(self, name: str) -> None:
+        vars(self).update(name=name, words=f"the bound {name}")
+
+    def evaluate(self, subject: Subject, theta: Numeric | None = None, *, progress: Progress = silent) -> BoundResult:
+        return self.absent("it is not registered")
 
 
 def by_name(bounds: Iterable[Bound]) -> dict[str, Bound]:

@@ -41,7 +41,7 @@ class Energy(Bound):
             one_minus_factor=found.one_minus_factor,
             interval=found.interval_proved or found.interval,
             interval_level=weakest([subject.energy.level, "verified"]) if found.interval_proved else "float",
-            friction=Thresholds() if friction.every is None and not without else friction,
+            friction=Thresholds(on="any") if friction.every is None and not without else friction,
             why=why,
             detail=found,
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ndtheory.texts import did_you_mean
-from verification.bounds.bound import by_name
+from verification.bounds.bound import Bound, Removed, by_name
 from verification.bounds.energy import Energy
 from verification.bounds.section5 import Printed, Repaired
 from verification.bounds.semidefinite import SemidefiniteBound
@@ -14,9 +14,24 @@ from verification.bounds.semidefinite import SemidefiniteBound
 BOUNDS = by_name((Printed(), Repaired(), Energy(), SemidefiniteBound()))
 
 
+def named(name: str) -> Bound:
+    """The bound of a result, which may have been taken out of :data:`BOUNDS` since the result was made."""
+    return BOUNDS.get(name) or Removed(name)
+
+
 def certifying() -> tuple[str, ...]:
     """The names of the bounds that can propose a certificate, the strongest last."""
     return tuple(name for name, bound in BOUNDS.items() if bound.certifies)
+
+
+#: The bounds that this library brings along.
+OURS = tuple(BOUNDS)
+
+
+def strongest() -> str:
+    """The bound that proposes a certificate where none is named: the last of our own, whatever is registered beside."""
+    certify = certifying()
+    return ([name for name in OURS if name in certify] or certify)[-1]
 
 
 def chosen(names: Sequence[str] | str | None) -> tuple[str, ...]:

@@ -17,7 +17,7 @@ from verification.algorithm.theta import choose
 from verification.bounds.bound import Subject
 from verification.bounds.multipliers import QuadraticForms
 from verification.bounds.program import LMIError
-from verification.bounds.table import BOUNDS, certifying
+from verification.bounds.table import BOUNDS, certifying, strongest
 from verification.certificate import check
 from verification.certificate.claims import NOT_CONFIRMED, Claims, NoCertificate, written
 from verification.certificate.description import describe, same
@@ -160,7 +160,7 @@ def certify(
     True
     """
     refuse = lambda key, needed: ProblemError(problem.source, key, None, needed)
-    edition = certifying()[-1] if edition is None else edition
+    edition = strongest() if edition is None else edition
     if edition not in certifying():
         raise ValueError(f"edition {edition!r}: needed one of {', '.join(certifying())}")
     if problem.dimension != 2:

@@ -41,8 +41,8 @@ def describe(problem: Problem, pair: ContactPair | None = None) -> dict[str, Any
 def same(one: Any, other: Any) -> bool:
     """True if two descriptions are about the same bodies.
 
-    What is null in one and missing in the other is the same: a key that descriptions get later is null where it has its
-    default, as the transfer is on one grid, so that a certificate that was written before is still about its bodies.
+    A key that is null counts as equal to one that is missing.  A later key is null at its default, as the transfer is
+    on one grid, so that certificates written before are still about their bodies.
 
     >>> same({"transfer": None, "friction": "1/5"}, {"friction": "1/5"}), same({"friction": "1/5"}, {"friction": "0"})
     (True, False)

@@ -8,8 +8,9 @@ import click
 
 from ndtheory import EDITIONS, Constants, EnergyConstants, HypothesisError
 from ndtheory.constants import take
-from verification.bounds.bound import Subject
+from verification.bounds.bound import NOT_ASKED, Subject
 from verification.bounds.calculated import Calculated
+from verification.bounds.energy import Energy
 from verification.bounds.section5 import Section5
 from verification.bounds.table import BOUNDS
 from verification.cli.console import deliver
@@ -75,8 +76,8 @@ def bounds(edition: str, theta: str | None, check: bool, as_json: bool, **given:
             continue
         of_paper = isinstance(bound, Section5)
         if of_paper and (alone or edition not in (name, "both")):
-            results[name] = bound.absent("needs --m, --M, --CR and --CK" if alone else "not asked for")
-        elif not of_paper and energy is None:
+            results[name] = bound.absent("needs --m, --M, --CR and --CK" if alone else NOT_ASKED)
+        elif isinstance(bound, Energy) and energy is None:
             results[name] = bound.absent("needs --rho, and --kappa1, --kappa2 with friction")
         else:
             results[name] = bound.evaluate(subject, theta)

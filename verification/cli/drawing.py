@@ -21,8 +21,8 @@ from verification.cli.problems import load_problem
 def region(file: Path, keys: dict[str, str], swap: bool, target: Path, store: Path | None, as_json: bool) -> None:
     """Draw the plane of theta and k: where one step is proved to contract, and what runs do there.
 
-    Both axes are logarithmic; theta and k have no unit.  The regions are those of the printed, the repaired, the energy
-    and the semidefinite bound for the bodies of FILE; the points are runs, coloured by outcome.
+    Both axes are logarithmic; theta and k have no unit.  The regions are those of all bounds for the bodies of FILE;
+    the points are runs, coloured by outcome.
 
     \b
     Example:

@@ -95,7 +95,7 @@ class AdviseGroup(Commands):
     ----------
     default : Default
         The command without a name.
-    forms : sequence of Form
+    forms : sequence of AdviseCommand
         The commands with one.
     """
 

@@ -219,7 +219,7 @@ def _bounds(context: click.Context, parameter: click.Parameter, value: str | Non
     "--bounds",
     callback=_bounds,
     metavar="NAMES",
-    help="Only these bounds, as printed,repaired,energy: all but lmi, without which it takes no longer than a run.",
+    help="Only these bounds, as printed,repaired,energy: all but lmi, without which it takes little longer than a run.",
 )
 @FOLDER
 @JSON

@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 from verification.algorithm.rates import noise
 from verification.algorithm.runs import Run
 from verification.bounds.bound import BoundResult
-from verification.bounds.table import BOUNDS
+from verification.bounds.table import named
 from verification.figures.style import PRESSURE, legend_beside, new_figure, plain, styled
 
 
@@ -39,7 +39,7 @@ def draw_residuals(run: Run, bounds: Sequence[BoundResult] = ()) -> Figure:
         for row in bounds:
             if row.factor is not None and shown.any():
                 line = history[shown][0] * row.factor.value**steps
-                bound = BOUNDS[row.name]
+                bound = named(row.name)
                 ax.semilogy(steps, line, linestyle=bound.dashes, color=bound.colour, label=f"{row.name} bound")
         if run.last.scale > 0:
             floor = noise(run.pair, run.last) / run.last.scale

@@ -92,7 +92,7 @@ class Difference:
 
     Attributes
     ----------
-    setting : Setting
+    setting : DrawnSetting
     force : array
         ``psi - psi~``, nodal forces on the Neumann grid.
     reaction : array

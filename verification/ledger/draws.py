@@ -30,7 +30,7 @@ def random_pairs(setting: DrawnSetting, random: np.random.Generator, count: int)
 
     Parameters
     ----------
-    setting : Setting
+    setting : DrawnSetting
     random : Generator
     count : int
     """
@@ -70,7 +70,7 @@ def pieces(setting: DrawnSetting, random: np.random.Generator, *, starts: int) -
 
     Parameters
     ----------
-    setting : Setting
+    setting : DrawnSetting
     random : Generator
     starts : int
         Of each search; 0 leaves the searches out.
@@ -97,7 +97,7 @@ def directions(setting: DrawnSetting, piece: Piece, random: np.random.Generator)
 
     Parameters
     ----------
-    setting : Setting
+    setting : DrawnSetting
     piece : Piece
     random : Generator
     """
@@ -131,7 +131,7 @@ def draw_pairs(
 
     Parameters
     ----------
-    setting : Setting
+    setting : DrawnSetting
     random : Generator
     starts : int
         Of each search over pieces.

@@ -115,7 +115,7 @@ class Apart:
 
     Parameters
     ----------
-    bodies : Bodies
+    bodies : EnclosedBodies
     u : array
         d_2.
 
@@ -172,7 +172,7 @@ class Sticks(Apart):
 
     Parameters
     ----------
-    bodies : Bodies
+    bodies : EnclosedBodies
     """
 
     def __init__(self, bodies: EnclosedBodies) -> None:
@@ -191,7 +191,7 @@ class Slides(Apart):
 
     Parameters
     ----------
-    bodies : Bodies
+    bodies : EnclosedBodies
     more : Fraction
         How many times their friction.
     """

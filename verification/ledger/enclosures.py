@@ -51,7 +51,7 @@ class EnclosedConstants:
 
     Attributes
     ----------
-    bodies : Bodies
+    bodies : EnclosedBodies
     printed : bool
         Whether the bracket of (5.30) adds a stress to 1.
     unit : Fraction
@@ -324,7 +324,7 @@ def decide(bodies: EnclosedBodies, id: str, of: Literal["printed", "step", "repa
 
     Parameters
     ----------
-    bodies : Bodies
+    bodies : EnclosedBodies
     id : str
         Of the statement.
     of : {'printed', 'step', 'repaired'}

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from ndtheory import Bounds, EnergyBounds
 from verification.bounds.bound import BoundResult, bounded
 from verification.bounds.calculated import Calculated
-from verification.bounds.table import BOUNDS
+from verification.bounds.table import named
 from verification.ledger.record import on_the_printed_proof
 from verification.sections.numbers import LEGEND, NONE, at_least, factor, figures, interval, marked
 from verification.sections.parts import (
@@ -49,7 +49,7 @@ def bounds(rows: Sequence[BoundResult], unit: str) -> list[Shown | str]:
     if not results:
         return []
     found = [row if row.proved else row.in_doubles() for row in results]
-    friction, theta = bounded(found), found[0].theta
+    friction, theta = bounded(found), next((row.theta for row in found if row.theta is not None), None)
     at = [] if theta is None else [f"theta = {theta:.4g}"]
     lines = []
     for row in found:
@@ -60,7 +60,7 @@ def bounds(rows: Sequence[BoundResult], unit: str) -> list[Shown | str]:
         ("", "every small", "some", "", "", *("" for _ in at)),
         ("bound", f"theta {friction} <", f"theta {friction} <", "theta allowed", "factor", *at),
     )
-    notes = [words for row in results for words in BOUNDS[row.name].remarks(row, unit)]
+    notes = [words for row in results for words in named(row.name).remarks(row, unit)]
     notes += [LEGEND] * any(row.marked for row in found)
     return [Table(heads, tuple(lines)), *notes]
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 
-from verification.bounds.table import BOUNDS
+from verification.bounds.table import named
 from verification.certificate.contraction import Certificate, Checked
 from verification.sections.numbers import near_one
 from verification.sections.parts import Facts, Note, Sections, closing, following, of, section
@@ -25,7 +26,7 @@ def sections(found: Certificate, target: Path | None = None) -> Sections:
     if found.lower is not None:
         claim.append(f"No proof can give less than {found.lower:.6g}, a factor that two forces attain (in doubles).")
     proof = (
-        f"Multipliers proposed by {BOUNDS[found.edition].words}; with them the quadratic form of the proof is positive"
+        f"Multipliers proposed by {named(found.edition).words}; with them the quadratic form of the proof is positive"
         f" definite for the rational data of the problem, in balls of {found.claim['bits']} bits."
     )
     then = following("certify", "-o", "certificate.json", iteration=True)
@@ -35,7 +36,7 @@ def sections(found: Certificate, target: Path | None = None) -> Sections:
         section("setting", "", Facts(about), Facts(bodies)),
         section("proved", "WHAT IS PROVED?", *claim),
         section("proof", "BY WHAT?", proof),
-        closing(CLAIMS, then=then if target is None else f"ndtheory certify --check {target}"),
+        closing(CLAIMS, then=then if target is None else f"ndtheory certify --check {quote(str(target))}"),
     )
 
 

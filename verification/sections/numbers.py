@@ -72,7 +72,7 @@ def marked(text: str, level: Level) -> str:
 
 
 def at_least(number: Number | None, digits: int = 3) -> Cell:
-    """A number of which it matters that it is no smaller: its lower end rounded downwards, where it has one.
+    """A lower bound, rounded down: the lower end of the enclosure, if there is one.
 
     >>> print(at_least(Number(value=0.2, lo=0.19999, hi=0.20001, level="verified")), at_least(Number.of_float(0.2)))
     0.199 v 0.200

@@ -6,7 +6,7 @@ from pathlib import Path
 from shlex import quote
 
 from verification.bounds.region import MOST_STEPS, Plane
-from verification.bounds.table import BOUNDS
+from verification.bounds.table import named
 from verification.sections.numbers import figures
 from verification.sections.parts import Facts, Sections, closing, of, section, table
 
@@ -20,7 +20,7 @@ def sections(found: Plane, target: Path | None = None) -> Sections:
         if region.k:
             highest = figures(max(hi for _, hi in region.theta))
             rows.append((name, figures(region.every), figures(region.some), highest))
-            notes += BOUNDS[name].remarks(None, found.units["stress"])
+            notes += named(name).remarks(None, found.units["stress"])
     notes += [f"{name}: {reason}" for name, reason in found.reason.items()]
     lines = table(("bound", "every small theta: k <", "some theta: k <", "theta at most"), rows)
     outcomes = [point.outcome for point in found.points]

@@ -82,7 +82,7 @@ def row(problem: Problem | ContactPair, values: Mapping[str, Any], bodies: Share
     problem : Problem or ContactPair
     values : mapping
         As :meth:`verification.sweeps.grid.SweepGrid.rows` yields them: the name of an axis to its value.
-    bodies : Bodies, optional
+    bodies : SharedBodies, optional
         What is condensed already, of the same problem; no digit of the row depends on it.
 
     Returns

@@ -188,7 +188,7 @@ def sweep(
     ------
     ProblemError
         A value that fits no problem.  A run that fails is a row that says why.
-    StoreError, Stopped
+    StoreError, NoWorkers
         The store does not take a row; no worker is left.  Both are problem errors, and the store keeps what it has.
     KeyboardInterrupt
         Before the first row; later the sweep holds the rows that are done.

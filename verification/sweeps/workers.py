@@ -246,7 +246,7 @@ class Batches:
 
         Raises
         ------
-        Stopped
+        NoWorkers
             The worker has another version of this library, or cannot read a mesh file.
         """
         if handed.version != __version__:
