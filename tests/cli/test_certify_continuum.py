@@ -163,3 +163,11 @@ def test_bars_are_refused(call, tmp_path):
     call("example", "two-bars")
     (tmp_path / "bars.toml").write_text(call("example", "two-bars").out, "utf-8")
     assert "dimension = 1: needed 2" in call("certify", "--continuum", str(tmp_path / "bars.toml")).complaint
+
+
+def test_a_certificate_of_the_continuum_is_refused_by_the_check_of_those_of_meshes(call, write, tmp_path):
+    target = tmp_path / "continuum.json"
+    call("certify", "--continuum", write({"body1.cells": "[10, 2]", "body2.cells": "[6, 2]"}), "-o", target)
+    complaint = call("certify", "--check", target).complaint
+    assert "of the continuum" in complaint
+    assert "KeyError" not in complaint

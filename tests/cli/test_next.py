@@ -74,3 +74,14 @@ def test_a_folder_where_a_result_belongs_is_refused_before_anything_is_computed(
     line = call(command, write(SMALL), "-o", tmp_path / "results").complaint
     assert f"{name}: this is a folder: needed another folder or name (-o)" in line
     assert [path.name for path in (tmp_path / "results").iterdir()] == [name]
+
+
+@pytest.mark.parametrize("name", ["run", "matrices", "-x.toml"])
+def test_a_file_that_is_named_like_a_command_or_an_option_is_suggested_as_a_path(
+    call, write, tmp_path, monkeypatch, name
+):
+    (tmp_path / name).write_bytes(write().read_bytes())
+    monkeypatch.chdir(tmp_path)
+    *_, last = call("compare", "--bounds", "energy", "--", name).out.splitlines()
+    assert last == f"Next: ndtheory advise ./{name}"
+    assert call(*last.removeprefix("Next: ndtheory ").split()).status == 0

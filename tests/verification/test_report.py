@@ -1,5 +1,6 @@
 """The written report: the words and digits of the screen, on any screen, asking nobody else."""
 
+import html
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -17,6 +18,7 @@ from strategies import AT_NIGHT
 import verification as vf
 from verification import figures
 from verification.ledger.record import on_the_printed_proof
+from verification.output.folder import Folder
 from verification.output.report import report
 from verification.sections.bounds import thetas
 from verification.sections.layout import text
@@ -198,3 +200,15 @@ def test_titles_and_units_stay_text_in_every_file(comparison, tmp_path, title, u
     assert all(character.isprintable() or character == "\n" for character in page.heading)
     for unit in units:
         assert page.text.count(unit) >= 2
+
+
+def test_every_warning_of_the_run_stands_in_the_report(tmp_path):
+    problem = vf.example("two-bars")
+    compared = vf.compare(problem, bounds=["energy"])
+    assert any("strain" in warning for warning in compared.run.warnings)
+    Folder(tmp_path, "compare").write_comparison(compared)
+    page = (tmp_path / "report.html").read_text("utf-8")
+    assert all(html.escape(warning) in page for warning in compared.run.warnings)
+    quiet = vf.compare(problem.with_keys({"body2.prescribed.right": "[-0.0001]"}), bounds=["energy"])
+    assert quiet.run.warnings == []
+    assert [section.id for section in quiet.sections()].count("setting") == 1

@@ -209,6 +209,10 @@ def check_again(document: Any, problem: Problem | None = None) -> Checked:
     """
     if not isinstance(document, dict) or document.get("schema") != Certificate.schema:
         raise ValueError(f"needed a document of the schema {Certificate.schema}")
+    if "discrete" not in document:
+        raise ValueError(
+            "not a certificate of contraction on a mesh, as one of the continuum is not: it has no `discrete`"
+        )
     try:
         words, found = check.words(document), check.digest(document["discrete"])
     except check.UNREADABLE as error:

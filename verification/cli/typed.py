@@ -36,7 +36,7 @@ class Typed:
         if not part.problem:
             return nothing_typed(part)
         first, *options = part.words
-        words = ["ndtheory", first, str(self.file)]
+        words = ["ndtheory", first, self._place()]
         words += [word for key, value in self.keys.items() for word in ("--set", f"{key}={value}")]
         if part.iteration:
             given = {"--theta": self.theta, "--relaxation": self.relaxation}
@@ -44,3 +44,8 @@ class Typed:
         words += ["--swap-roles"] * (self.swap != part.exchanged)
         words += options
         return " ".join(map(quote, words)) if all(word.isprintable() for word in words) else ""
+
+    def _place(self) -> str:
+        """The file, with ./ before what could be read as an option or as the name of a command."""
+        name = str(self.file)
+        return f"./{name}" if name.startswith("-") or (self.file.name == name and not self.file.suffix) else name

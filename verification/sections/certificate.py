@@ -6,6 +6,7 @@ from pathlib import Path
 from shlex import quote
 
 from verification.bounds.table import named
+from verification.certificate import check
 from verification.certificate.contraction import Certificate, Checked
 from verification.sections.numbers import near_one
 from verification.sections.parts import Facts, Note, Sections, closing, following, of, section
@@ -51,7 +52,7 @@ def checked(found: Checked) -> Sections:
     else:
         said.append("Whose bodies these are was not compared: give the problem file, too.")
     what = (*found.words.split("; "), f"sha256 {found.sha256}")
-    then = "python check.py CERTIFICATE (verification/certificate/check.py, alone)"
+    then = f"python {quote(check.__file__)} CERTIFICATE"
     return (
         section("checked", "WHAT WAS CHECKED?", *what),
         section("proved", "IS IT PROVED?", *said),

@@ -107,9 +107,9 @@ def sections(result: Comparison) -> Sections:
     found: list[Section] = []
     result.tell(Parts(result.run.pair, found.extend))
     warnings = [outside_the_theorem(reason) for reason in result.run.outside]
-    warnings += [Note(f"{warning}.", 0, "Warning:") for warning in result.run.pair.warnings]
-    first = replace(section("setting", "", *warnings), only="report")
+    warnings += [Note(f"{warning}.", 0, "Warning:") for warning in result.run.warnings]
+    first = [replace(section("setting", "", *warnings), only="report")] if warnings else []
     details = [bound.detail for bound in result.bounds.values()]
     _, *constants = all_constants(result.measured)
     last = [replace(each, only="report") for each in (*thetas(details), *constants)]
-    return (found[0], first, *found[1:], *verdicts(result), *last)
+    return (found[0], *first, *found[1:], *verdicts(result), *last)
