@@ -15,10 +15,10 @@ class Silent(Bound):
     words, colour = "a bound that says nothing", "#333333"
 
     def __init__(self, name, answer):
-        self.name, self._answer = name, answer
+        self.name, self.answer = name, answer
 
     def evaluate(self, subject, theta=None, *, progress=None):
-        return self.absent("it suits no pair") if self._answer is None else self._answer
+        return self.absent("it suits no pair") if self.answer is None else self.answer
 
 
 @pytest.fixture
