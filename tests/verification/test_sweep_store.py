@@ -10,12 +10,13 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from processes import ended, running
+from stored import read
 from strategies import AT_NIGHT
 
 import verification as vf
 from verification.algorithm.relaxation import Constant
 from verification.interface.friction import Local
-from verification.sweeps import identity, store, workers
+from verification.sweeps import identity, store
 from verification.sweeps import row as row_module
 from verification.sweeps.grid import SweepGrid
 from verification.sweeps.identity import Identity
@@ -26,24 +27,6 @@ SMALL = vf.example("section6").changed(cells=((10, 2), (8, 2)), radius="0.2", ma
 
 #: Runs that converge, that reach their limit, and that are refused.
 GRID = {"theta": ["1/50", "0.3", "0.7", "0.95"], "friction": [0, "1/5"], "refine": [0, 8]}
-
-
-@pytest.fixture
-def place(tmp_path):
-    return tmp_path / "rows.sqlite"
-
-
-@pytest.fixture
-def made(monkeypatch):
-    """The values of the rows that are made."""
-    row, seen = workers.row, []
-    monkeypatch.setattr(workers, "row", lambda *given: seen.append(given[1]) or row(*given))
-    return seen
-
-
-def read(place, question):
-    with closing(sqlite3.connect(place)) as file:
-        return file.execute(question).fetchall()
 
 
 # --- a row is made once ---

@@ -15,11 +15,6 @@ from verification.sweeps.keeping import plan
 SMALL = vf.example("section6").changed(cells=((10, 2), (8, 2)), radius="0.2", max_iterations=200)
 
 
-@pytest.fixture
-def place(tmp_path):
-    return tmp_path / "rows.sqlite"
-
-
 def replaced(place, text, **columns):
     """Put another text into each row of a store, with a checksum that agrees, and other values into its columns."""
     with closing(sqlite3.connect(place)) as file:

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from stored import read
 
 import verification as vf
-from verification.sweeps import identity, store, workers
+from verification.sweeps import identity, store
 from verification.sweeps.grid import SweepGrid
 from verification.sweeps.identity import Identity
 from verification.sweeps.keeping import plan
@@ -25,24 +26,6 @@ OLD = Path(__file__).with_name("store_of_0_1_0.sql").read_text("utf-8")
 FACTORS = [0.8454876938196176, 0.7742401092422802, None, None]
 
 TOLD = "{}: {} of these rows are of version {} with other numerics; they are not used, and stay"
-
-
-@pytest.fixture
-def place(tmp_path):
-    return tmp_path / "rows.sqlite"
-
-
-@pytest.fixture
-def made(monkeypatch):
-    """The values of the rows that are made."""
-    row, seen = workers.row, []
-    monkeypatch.setattr(workers, "row", lambda *given: seen.append(given[1]) or row(*given))
-    return seen
-
-
-def read(place, question):
-    with closing(sqlite3.connect(place)) as file:
-        return file.execute(question).fetchall()
 
 
 @pytest.fixture(params=["sharp_factor", "energy_factor"])

@@ -20,7 +20,7 @@ def named(name: str) -> Bound:
 
 
 def certifying() -> tuple[str, ...]:
-    """The names of the bounds that can propose a certificate, the strongest last."""
+    """The names of the bounds that can propose a certificate, in the order of :data:`BOUNDS`."""
     return tuple(name for name, bound in BOUNDS.items() if bound.certifies)
 
 

@@ -11,7 +11,7 @@ import click
 
 from verification.cli.console import deliver, stages
 from verification.cli.failing import fail
-from verification.cli.options import JSON, SET, SWAP, THETA, OneOf, check_place, one_file
+from verification.cli.options import JSON, SET, SWAP, THETA, Registered, check_place, one_file
 from verification.cli.problems import load_problem
 from verification.cli.typed import Typed
 
@@ -19,18 +19,10 @@ from verification.cli.typed import Typed
 MOST_BYTES = 100_000_000
 
 
-class Certifying(OneOf):
-    """The name of a bound that can propose a certificate."""
+def _editions() -> Sequence[str]:
+    from verification.bounds.table import certifying
 
-    def __init__(self) -> None:
-        self.case_sensitive = True
-
-    @property
-    def choices(self) -> Sequence[str]:  # type: ignore[override]
-        """Those of the bounds that are registered, the strongest first."""
-        from verification.bounds.table import certifying
-
-        return certifying()[::-1]
+    return certifying()[::-1]
 
 
 @click.command()
@@ -38,7 +30,7 @@ class Certifying(OneOf):
 @SET
 @THETA
 @SWAP
-@click.option("--edition", type=Certifying(), help="Bound that proposes the factor; the strongest by default.")
+@click.option("--edition", type=Registered(_editions), help="Bound that proposes the factor; the strongest by default.")
 @click.option(
     "--continuum", is_flag=True, help="Of FILE without its mesh: two rectangles, each held at its outer side."
 )

@@ -47,23 +47,34 @@ class OneOf(click.Choice[str]):
         return said + did_you_mean(str(value), self.choices)
 
 
-class RuleName(OneOf):
-    """The name of a relaxation rule; the rules are imported when their names are asked for."""
+class Registered(OneOf):
+    """A name of what is registered: its module is imported, and read, when the names are needed.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    names : callable
+        Gives the names there are.
+    """
+
+    def __init__(self, names: Callable[[], Sequence[str]]) -> None:
         self.case_sensitive = True
+        self._names = names
 
     @property
     def choices(self) -> Sequence[str]:  # type: ignore[override]
-        """The registered rules."""
-        from verification.algorithm.relaxation import RULES
+        """The names there are now."""
+        return self._names()
 
-        return tuple(RULES)
+
+def _rules() -> Sequence[str]:
+    from verification.algorithm.relaxation import RULES
+
+    return tuple(RULES)
 
 
 RELAXATION = click.option(
     "--relaxation",
-    type=RuleName(),
+    type=Registered(_rules),
     metavar="RULE",  # a list of the names would import the rules, and arrays with them
     help="Rule of relaxation, over the file's; all but constant are outside the theorem.  A wrong name lists them.",
 )
