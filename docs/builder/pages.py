@@ -102,13 +102,15 @@ class Navigation:
     """The navigation of a page, which shows the titles of the others; kept where it would be made anew for each page.
 
     Sphinx copies all headings and all names of the API for every page, a quarter of a second, and drops them again:
-    here they are left out before.  Pages of source code stand in no table of contents, and no document in their folder:
-    those that lie equally deep share one navigation, as marks and relative links are the same.
+    here they are left out before.  Pages of modules and of their source code are in no table of contents: those in
+    equally deep folders share one navigation, as marks and relative links are the same.
     """
+
+    SHARING = ("_modules/", "generated/api/")
 
     def __init__(self) -> None:
         self.titles: dict[str, Any] = {}  # page -> its table of contents, without what lies below its titles
-        self.known: dict[tuple[Any, ...], str] = {}  # of source code: depth and options -> HTML
+        self.known: dict[tuple[Any, ...], str] = {}  # for pages that share: depth and options -> HTML
 
     def of_titles(self, tocs: dict[str, Any]) -> dict[str, Any]:
         """The tables of contents of all pages without what ``titles_only`` drops."""
@@ -136,7 +138,7 @@ class Navigation:
         make = context["toctree"]
 
         def toctree(**options: Any) -> str:
-            if not page.startswith("_modules/"):
+            if not page.startswith(self.SHARING):
                 return self.made(app, make, options)
             key = (page.count("/"), *sorted(options.items()))
             if key not in self.known:
