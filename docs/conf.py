@@ -18,7 +18,7 @@ BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
 sys.path += [str(BENCHMARKS), str(Path(__file__).resolve().parent)]  # folders of scripts, not packages
 
 import speed_page  # noqa: E402
-from builder import api, commands  # noqa: E402
+from builder import api, cheat_sheet, commands  # noqa: E402
 
 project = "ndtheory"
 author = "The ndtheory maintainers"
@@ -122,6 +122,11 @@ def write_api(app: Sphinx) -> None:
     api.write(Path(app.srcdir) / "generated")
 
 
+def write_cheat_sheet(app: Sphinx) -> None:
+    """The cheat sheet as a page and a PDF, with the numbers of Section 6 as they are computed now."""
+    cheat_sheet.write(Path(app.srcdir) / "generated")
+
+
 def prepare_kernels(app: Sphinx, env: BuildEnvironment, pages: list[str]) -> None:
     """Before the first page is read, so that all processes that read have what the kernels need."""
     if pages:
@@ -164,6 +169,7 @@ def setup(app: Sphinx) -> None:
     app.connect("builder-inited", write_commands)
     app.connect("builder-inited", write_speed)
     app.connect("builder-inited", write_api)
+    app.connect("builder-inited", write_cheat_sheet)
     app.connect("env-before-read-docs", prepare_kernels)
     for name in ("verdict", "ledger"):
         app.add_role(name, FromLedger())

@@ -48,12 +48,16 @@ class gallery(nodes.General, nodes.Element):
 
 
 class GalleryDirective(SphinxDirective):
-    """``{gallery}``: the main picture and the title of each page named in its lines, as links."""
+    """``{gallery}``: the main picture and the title of each page named in its lines, as links.
+
+    A line ``page | words`` shows these words, and no number and title.
+    """
 
     has_content = True
 
     def run(self) -> list[nodes.Node]:
-        return [gallery(pages=[line.strip() for line in self.content if line.strip()])]
+        lines = [line.partition("|") for line in self.content if line.strip()]
+        return [gallery(pages=[(page.strip(), words.strip()) for page, _, words in lines])]
 
 
 def fill_galleries(app: Sphinx, doctree: nodes.document, page: str) -> None:
@@ -66,7 +70,7 @@ def fill_galleries(app: Sphinx, doctree: nodes.document, page: str) -> None:
     """
     for place in list(doctree.findall(gallery)):
         cards = nodes.container(classes=["gallery"])
-        for number, name in enumerate(place["pages"], 1):
+        for number, (name, words) in enumerate(place["pages"], 1):
             if name not in app.env.found_docs:
                 raise ExtensionError(f"{page}: no page {name!r} for the gallery")
             shown = next(app.env.get_doctree(name).findall(nodes.figure), None)
@@ -74,7 +78,7 @@ def fill_galleries(app: Sphinx, doctree: nodes.document, page: str) -> None:
                 raise ExtensionError(f"{page}: {name} has no figure for the gallery")
             picture = next(shown.findall(nodes.image)).deepcopy()
             link = nodes.reference("", "", internal=True, refuri=app.builder.get_relative_uri(page, name))
-            link += [picture, nodes.inline("", f"{number}. {app.env.titles[name].astext()}")]
+            link += [picture, nodes.inline("", words or f"{number}. {app.env.titles[name].astext()}")]
             cards += nodes.paragraph("", "", link, classes=["card"])
         place.replace_self(cards)
 
