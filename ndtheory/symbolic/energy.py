@@ -12,9 +12,8 @@ from typing import Any
 import sympy as sp
 
 from ndtheory import energy_norms
-from ndtheory.symbolic.contraction import any_theta
 from ndtheory.symbolic.engine import CheckList, Goal, Vector, at_most, equal, less, linear, nonnegative, positive
-from ndtheory.symbolic.intervals import C0
+from ndtheory.symbolic.section5 import C0, any_theta
 from ndtheory.symbolic.symbols import C_R, CONSTANTS, L1, L2, A, C_s, M, a1, a2, d1, e, k, m, o, p, psi, q, r, theta, y
 
 CHECKS = CheckList()
@@ -221,7 +220,7 @@ def _descent(form: Any) -> list[Goal]:
         ),
         # -<p, d_2> >= D >= t^2/rho_N
         at_most(D + q, (smooth - 1) * D / ((1 + p) * rho)),
-        # step I of the new force less that of the old one
+        # step I of the new force less step I of the old one
         equal(
             solve(theta * image + (1 - theta) * psi + loads) - solve(psi + loads),
             step * solve(psi - image),

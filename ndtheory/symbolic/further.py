@@ -1,4 +1,4 @@
-"""What the paper does not state, proved: how its constants hang together, and the theorem in energy norms."""
+"""What the paper does not state, proved: where the printed (5.30) holds, and how the constants are connected."""
 
 from __future__ import annotations
 
@@ -7,41 +7,210 @@ from typing import Any
 import sympy as sp
 
 from ndtheory import bounds
-from ndtheory.symbolic.contraction import above_C6, any_theta, inside
-from ndtheory.symbolic.engine import CheckList, at_most, equal, less, nonnegative, positive
-from ndtheory.symbolic.intervals import C0, P_, Q_, end_of_43
-from ndtheory.symbolic.symbols import (
-    C_R,
-    CONSTANTS,
-    M_1,
-    A,
-    M,
+from ndtheory.symbolic.engine import CheckList, Goal, at_most, equal, less, nonnegative, positive
+from ndtheory.symbolic.section5 import (
+    AT_THE_NODE,
+    C0,
+    LARGE_M,
+    P_,
+    Q_,
+    SMALL_M,
+    WITH_THETA,
     P,
     Q,
-    exx,
-    exy,
-    eyy,
-    lame_mu,
-    m,
-    o,
+    W,
+    X,
+    above_C6,
+    any_theta,
+    end_of_43,
+    expanded,
+    inside,
+    kappa,
+    m_tilde,
+    of_31,
+    of_36,
     of_h1,
     of_h2,
-    p,
+    one_node,
     printed_P,
-    q,
-    r,
-    strain_energy,
-    theta,
-    u_1,
-    u_2,
-    v_1,
-    v_2,
-    x,
-    y,
+    s,
+    with_theta,
 )
+from ndtheory.symbolic.symbols import C_R, CONSTANTS, A, M, b, c, d1, d2, e, m, mu, o, p, q, r, theta, x, xi, y
 
 CHECKS = CheckList()
 check = CHECKS.add
+
+# --- (5.39) and (5.44) at the one sliding node: there C_0 = 1/3 ------------------------------------------------------
+
+CHECKS += [
+    one_node(
+        "5.39",
+        expanded,
+        of_h1(m, printed_P(m), Q) * e**2,
+        of_h1(m, P, Q) * e**2,
+        {**AT_THE_NODE, theta: (1 + p) / (3 + p)},
+        "  For m <= 1 C_T is C~_T.  theta from C_0 = 1/3 on: near C_0 the coefficient of t^2, and with it C_T, hardly"
+        " counts.",
+    ),
+    one_node(
+        "5.44",
+        expanded,
+        of_h2(printed_P(m)) * e**2,
+        of_h2(P) * e**2,
+        {**AT_THE_NODE, theta: 1 / (3 + y)},
+        "  theta below C_0 = 1/3.  At kappa = 400, m = 1e-6 and theta = 0.33 the left side is 17424, the right 708.",
+    ),
+]
+
+# --- where (5.30) holds as printed, and where it fails ---------------------------------------------------------------
+
+
+def _border(root: Any) -> list[Goal]:
+    """(5.30) holds for M >= root sqrt(m), and for each m and M >= 2 m below that some friction breaks it."""
+    ratio = root / (1 + y)  # M/sqrt(m)
+    below = {m: (ratio / (2 * (1 + q))) ** 2, M: ratio**2 / (2 * (1 + q))}  # M >= 2 m
+    many = (1 + y) ** 2 / (y * (2 + y)) * (1 + ratio**2 + ratio**2 * (M + 1) / m).subs(below)  # sqrt(kappa)
+    direct = x * (X + 1) * d2**2  # (5.13), (5.11)
+    return [
+        *(
+            at_most(printed_P(m) * e**2, direct.subs(d2, e / sp.sqrt(m * (1 + p))), chart)
+            for chart in (
+                {m: (root / (1 + o)) ** 2, M: root**2 / (1 + o) * (1 + b), C_R: 1 + c, x: xi**2},
+                {m: (root + o) ** 2, M: (root + o) ** 2 * (1 + b), C_R: 1 + c, x: xi**2},
+            )
+        ),
+        less((printed_P(m).subs({C_R: 1, x: xi**2 * m}) / xi**2).subs(below).subs(xi, many), many**2),
+    ]
+
+
+check(
+    id="x-printed-border",
+    text="With m d_2^2 <= e^2 directly for (5.19), (5.23), F <= C_K (X + 1) e^2/m; the printed bound exceeds that by"
+    " C_K/m^3 ((M^2 - m)(A + C_K + s) + M^2 - m^2) e^2.  For M^2 < m, M >= 2 m: the one open node that slides,"
+    " F = kappa^2 e^2, body 1 with one more unknown that is not on Gamma_c and has the stiffness M - m; it breaks"
+    " (5.30) as soon as sqrt(kappa) >= (1 + v + v (M + 1)/m)/(1 - v), v = M^2/m.",
+    goals=_border,
+    forms={"repaired": sp.Integer(1)},
+    mutants={"true from M^2 = m/4 on": sp.Rational(1, 2), "false below M^2 = 4 m": sp.Integer(2)},
+)
+
+unit, slips, stretch, pull, bound = positive("lambda alpha beta gamma delta")
+weights = positive("w_1 w_2")
+zeta, along = sp.symbols("zeta_1 zeta_2", real=True), sp.symbols("d_2T1 d_2T2", real=True)
+k = positive("k")
+
+
+def _flexibility(name: str) -> Any:
+    """``(S^-1)_TT`` at two nodes."""
+    return sp.Matrix(2, 2, lambda i, j: sp.Symbol(f"{name}_{min(i, j) + 1}{max(i, j) + 1}", real=True))
+
+
+def _all_slide(form: Any) -> list[Goal]:
+    """Two nodes, open and sliding one way, for two forces; and the printed bound in a unit of stress."""
+    factor, of_k = form
+    one, two, d_2 = _flexibility("f"), _flexibility("g"), sp.Matrix(along)
+    load = sp.Matrix([w * z for w, z in zip(weights, zeta, strict=True)])
+    p_T = k * load  # p_N = 0
+    bounds_ = k * load  # differences of the friction bounds, S sigma_N > 0
+    slide = -one * p_T - d_2  # of the slips, which have one sign
+    large = (of_k * bound + pull + y) / slips
+    in_unit = printed_P(m).subs({m: unit * m, M: unit * M, x: unit * x}, simultaneous=True)
+    return [
+        equal(-(bounds_.T * slide)[0], factor * k**2 * (load.T * one * load)[0] + k * (load.T * d_2)[0]),  # F
+        equal((p_T.T * two * p_T)[0], factor * k**2 * (load.T * two * load)[0]),  # t^2
+        equal((p_T.T * d_2)[0], k * (load.T * d_2)[0]),  # W
+        equal(in_unit, x * M**2 / m**3 * (1 + unit * (A + x + s)), {**CONSTANTS, unit: o + 1}),
+        less(large * bound * (1 + unit * stretch), slips * large**2 - pull * large, {unit: 1 / (stretch * (1 + p))}),
+    ]
+
+
+check(
+    id="x-printed-false-everywhere",
+    text="Loads make every node open and slide one way with S sigma_N > 0, for any pair of bodies and no gap.  Then"
+    " p_N = 0, p_T = k W zeta, d_1 = -S_1^-1 p and F = k^2 <W zeta, (S_1^-1)_TT W zeta> + k <W zeta, d_2T>: of"
+    " e^2, alpha k^2 - gamma k at least, alpha > 0.  In a unit of stress in which all stresses are lambda times as"
+    " large the printed bound is delta k (1 + lambda beta) e^2 with delta = C_s C_tr M^2/m^3, beta = A + C_K + s; it"
+    " is exceeded for k > (2 delta + gamma)/alpha, lambda <= 1/beta.  Likewise W + (m/A)^2 t^2 of (5.31), and so"
+    " (5.32), (5.33), (5.36), and theta t^2 + 2 (1-theta) W of (5.44), and of (5.39) at C_0, against the same term:"
+    " t^2 = k^2 <W zeta, (S_2^-1)_TT W zeta>, W = k <W zeta, d_2T>.",
+    goals=_all_slide,
+    forms={"repaired": (1, 2)},
+    mutants={
+        "half of the quadratic term": (sp.Rational(1, 2), 2),
+        "from k = delta/(2 alpha) on": (1, sp.Rational(1, 2)),
+    },
+)
+
+# --- Proposition 5.6 with the printed constants ----------------------------------------------------------------------
+
+M_sum = {M: (2 + o) * m}
+
+check(
+    id="x-printed-rescued",
+    text="Split a_11: half of it bounds t^2, as Cauchy-Schwarz in a_1 gives a_11 >= m t^2/(M^1 C_R^2), and"
+    " M^2 >= 2 m M^1 for M >= 2 m and M >= M^1; by Young -m d_1^2/2 + C_K d_1 d_2 <= C_K^2 d_2^2/(2m).  With"
+    " kappa = C_K/m and m d_2^2 <= e^2 friction adds at most (kappa + kappa^2/2) e^2, for kappa <= 6 below 4 kappa e^2"
+    " and so below the printed bound; and k < C_2 implies kappa < 4.  C_K is k C_s C_tr with C_tr into L2(Gamma_c)"
+    " throughout, in (5.13) as in C_2.",
+    goals=lambda form: [
+        at_most(x**2 * d2**2 / (2 * m), x * d1 * d2 - m * d1**2 / 2, squares=[(m * d1 - x * d2) ** 2 / (2 * m)]),
+        at_most(M**2, 2 * m * M / (1 + p), M_sum),
+        at_most(4 * kappa, kappa + kappa**2 / 2, {kappa: form[0] * q / (1 + q)}),
+        at_most(of_36(m_tilde, printed_P(m_tilde)), of_36(m, P), with_theta(LARGE_M)),
+        at_most(
+            of_36(m, 4 * kappa),
+            expanded.subs(W, of_31(kappa + kappa**2 / 2) - r),
+            {**WITH_THETA, kappa: form[0] * q / (1 + q)},
+        ),
+        at_most(printed_P(m).subs(M_sum), 4 * x / m, {**CONSTANTS, m: mu**2}),
+        *(
+            at_most(
+                bounds.G(x, m_tilde, M, C_R, sp.Integer(1)).subs(x, form[1] * m),
+                m_tilde**3 + m_tilde**5 / A**2,
+                {**chart, x: sp.Integer(0), M: chart[m] * (2 + q)},
+            )
+            for chart in (SMALL_M, LARGE_M)
+        ),
+    ],
+    forms={"repaired": (6, 4)},
+    mutants={"for C_K <= 17 m": (17, 4), "k < C_2 implies C_K < m/100": (6, sp.Rational(1, 100))},
+)
+
+more, true_kappa = positive("c kappa_2")  # C_tr(L2)/C_tr(H^1/2), and kappa with C_tr into L2
+
+
+def _literal(reach: Any) -> list[Goal]:
+    """With x = k C_s C_tr, C_tr into H^1/2, and c x the constant of friction that (5.13) needs: c <= reach (M/m)^2."""
+    at_end = lambda m_tilde, M: (1 + m_tilde**2 / M**2) * m_tilde**3 / M**2 / (1 + q)  # k < C_2 leaves x below
+    goals, cap = [], sp.Rational(5, 4) * reach
+    for chart in (SMALL_M, LARGE_M):
+        ratio = {more: reach * (chart[M] / chart[m]) ** 2 / (1 + p), m: chart[m], M: chart[M], m_tilde: chart[m_tilde]}
+        goals += [
+            at_most(printed_P(m_tilde), x * M**2 / m_tilde**3, chart),
+            at_most(1 + m_tilde**2 / M**2, 1 + m_tilde**2 / A**2, chart),
+            at_most(cap, more * x / m, {**ratio, x: at_end(chart[m_tilde], chart[M])}),  # kappa
+            at_most(M**2 / m_tilde**3, more / m * (1 + cap / 2), ratio),  # times x: friction
+            at_most(1 + true_kappa, 2 * sp.sqrt(true_kappa), {true_kappa: y**2}, squares=[(y - 1) ** 2]),
+            # t <= A/m X e with X of the true kappa; C_T M/m~ >= (A/m) (A M/m^2)
+            at_most(A * M / m**2, A / m + cap + (1 + cap) / 2, {**chart, x: sp.Integer(0)}),
+        ]
+    return goals
+
+
+check(
+    id="x-printed-literal",
+    text="x = k C_s C_tr with C_tr into H^1/2, c = C_tr(L2)/C_tr(H^1/2), kappa = c x/m: friction adds at most"
+    " (kappa + kappa^2/2) e^2 as in x-printed-rescued.  k < C_2 says that the printed term P(x) is below"
+    " 1 + m~^2/A^2, and P(x) >= x M^2/m~^3.  For c <= 2/3 (M/m)^2 that leaves kappa <= 5/6, hence"
+    " kappa + kappa^2/2 <= x M^2/m~^3 <= P(x), and t^2 <= C_T^2 M^2/m~^2 e^2 with the C_T of x, as"
+    " sqrt(kappa) <= (1 + kappa)/2.",
+    goals=_literal,
+    forms={"repaired": sp.Rational(2, 3)},
+    mutants={"c <= 3/4 (M/m)^2": sp.Rational(3, 4), "c <= (M/m)^2": sp.Integer(1)},
+)
+
+# --- how the constants hang together ----------------------------------------------------------------------------------
 
 check(
     id="x-c5-is-c2",
@@ -112,49 +281,6 @@ check(
     goals=lambda form: equal(form, P, {**CONSTANTS, m: sp.Integer(1), M: 1 + o}),
     forms={"repaired": printed_P(m)},
     mutants={"1 dropped from the bracket": printed_P(m) - x * M**2 / m**3},
-)
-
-check(
-    id="x-max-suffices",
-    text="|a(u, v)| <= M_1 u_1 v_1 + M_2 u_2 v_2 <= max(M_1, M_2) |u| |v|: (4.2) could take the maximum for M.",
-    goals=lambda form: [
-        at_most(
-            form(big, less_) ** 2 * (u_1**2 + u_2**2) * (v_1**2 + v_2**2),
-            (first * u_1 * v_1 + second * u_2 * v_2) ** 2,
-            squares=[big**2 * (u_1 * v_2 - u_2 * v_1) ** 2],
-        )
-        for first, second, big, less_ in ((M_1, M_1 + o, M_1 + o, M_1), (M_1 + o, M_1, M_1 + o, M_1))
-    ],
-    forms={"repaired": lambda large, small: large},
-    mutants={"the minimum": lambda large, small: small},
-)
-
-check(
-    id="x-lift-bound",
-    text="m |R phi|^2 <= a(R phi, R phi) <= a(v, v) <= M |v|^2 for every v with the trace phi: into the norm of its own"
-    " body the lift has a constant of at most sqrt(M/m), and no theorem of Banach is needed.",
-    goals=lambda form: at_most(form, M * y**2 / (m * (1 + p) * (1 + q) * (1 + r)), CONSTANTS),
-    forms={"repaired": M / m * y**2},
-    mutants={"m/M": m / M * y**2, "1": y**2},
-)
-
-w = sp.Symbol("omega", real=True)
-gradient = exx**2 + eyy**2 + 2 * exy**2 + 2 * w**2
-
-check(
-    id="x-continuity",
-    text="sigma : e = 2 mu |e|^2 + lambda (tr e)^2 with |grad v|^2 = |e|^2 + 2 omega^2 and (tr e)^2 <= 2 |e|^2, in"
-    " plane strain: M^a <= max(2 mu, 2 mu + 2 lambda) for the norm of the gradient, hence for that of V^a.",
-    goals=lambda form: [
-        at_most(
-            (2 * lame_mu + form * o) * gradient,
-            strain_energy(o),
-            squares=[o * (exx - eyy) ** 2, 4 * o * exy**2, (4 * lame_mu + 4 * o) * w**2],
-        ),
-        at_most(2 * lame_mu * gradient, strain_energy(-o), squares=[o * (exx + eyy) ** 2, 4 * lame_mu * w**2]),
-    ],
-    forms={"repaired": sp.Integer(2)},
-    mutants={"lambda for 2 lambda": sp.Integer(1)},
 )
 
 # --- what the interval can reach -------------------------------------------------------------------------------------

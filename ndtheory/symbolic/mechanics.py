@@ -11,37 +11,16 @@ from typing import Any
 import sympy as sp
 
 from ndtheory.symbolic.engine import CheckList, Goal, Vector, at_most, equal, less, nonnegative, positive
-from ndtheory.symbolic.symbols import (
-    CONSTANTS,
-    M_1,
-    C,
-    M,
-    a2,
-    exx,
-    exy,
-    eyy,
-    lame_mu,
-    m,
-    o,
-    p,
-    q,
-    r,
-    strain_energy,
-    test,
-    theta,
-    u_1,
-    u_2,
-    v_1,
-    v_2,
-    y,
-)
+from ndtheory.symbolic.symbols import CONSTANTS, C, M, a2, m, o, p, q, r, test, theta, y
 
 CHECKS = CheckList()
 check = CHECKS.add
 
 # --- Section 2 ------------------------------------------------------------------------------------------------------
 
-lame_lambda = positive("lame_lambda")
+lame_lambda, lame_mu = positive("lame_lambda lame_mu")
+exx, eyy, exy = sp.symbols("e_xx e_yy e_xy", real=True)
+strain_energy = lambda lam: 2 * lame_mu * (exx**2 + eyy**2 + 2 * exy**2) + lam * (exx + eyy) ** 2  # sigma : e
 
 check(
     id="2.2",
@@ -169,7 +148,8 @@ check(
     mutants={"half the larger one": lambda: at_most((p + r) / 2 + (q + o) / 2, (p + q) / (1 + y))},
 )
 
-m_1 = positive("m_1")
+m_1, M_1 = positive("m_1 M_1")
+u_1, u_2, v_1, v_2 = nonnegative("u_1 u_2 v_1 v_2")  # norms of two fields on body 1 and on body 2
 
 check(
     id="4.3",
@@ -199,6 +179,40 @@ check(
 )
 
 check(
+    id="x-max-suffices",
+    text="|a(u, v)| <= M_1 u_1 v_1 + M_2 u_2 v_2 <= max(M_1, M_2) |u| |v|: (4.2) could take the maximum for M.",
+    goals=lambda form: [
+        at_most(
+            form(big, less_) ** 2 * (u_1**2 + u_2**2) * (v_1**2 + v_2**2),
+            (first * u_1 * v_1 + second * u_2 * v_2) ** 2,
+            squares=[big**2 * (u_1 * v_2 - u_2 * v_1) ** 2],
+        )
+        for first, second, big, less_ in ((M_1, M_1 + o, M_1 + o, M_1), (M_1 + o, M_1, M_1 + o, M_1))
+    ],
+    forms={"repaired": lambda large, small: large},
+    mutants={"the minimum": lambda large, small: small},
+)
+
+w = sp.Symbol("omega", real=True)
+gradient = exx**2 + eyy**2 + 2 * exy**2 + 2 * w**2
+
+check(
+    id="x-continuity",
+    text="sigma : e = 2 mu |e|^2 + lambda (tr e)^2 with |grad v|^2 = |e|^2 + 2 omega^2 and (tr e)^2 <= 2 |e|^2, in"
+    " plane strain: M^a <= max(2 mu, 2 mu + 2 lambda) for the norm of the gradient, hence for that of V^a.",
+    goals=lambda form: [
+        at_most(
+            (2 * lame_mu + form * o) * gradient,
+            strain_energy(o),
+            squares=[o * (exx - eyy) ** 2, 4 * o * exy**2, (4 * lame_mu + 4 * o) * w**2],
+        ),
+        at_most(2 * lame_mu * gradient, strain_energy(-o), squares=[o * (exx + eyy) ** 2, 4 * lame_mu * w**2]),
+    ],
+    forms={"repaired": sp.Integer(2)},
+    mutants={"lambda for 2 lambda": sp.Integer(1)},
+)
+
+check(
     id="4.7",
     text="Two bars, |phi|^2 = coth(L_2) >= 1/L_2 in the norm of the one, |R phi|^2 = L_1/3 + 1/L_1 in the other:"
     " measured in another body the norm of a trace exceeds that of its lift.  In the same body the infimum is at most"
@@ -220,6 +234,14 @@ check(
     mutants={"1": sp.Integer(1), "m/M": sp.sqrt(m / M)},
 )
 
+check(
+    id="x-lift-bound",
+    text="m |R phi|^2 <= a(R phi, R phi) <= a(v, v) <= M |v|^2 for every v with the trace phi: into the norm of its own"
+    " body the lift has a constant of at most sqrt(M/m), and no theorem of Banach is needed.",
+    goals=lambda form: at_most(form, M * y**2 / (m * (1 + p) * (1 + q) * (1 + r)), CONSTANTS),
+    forms={"repaired": M / m * y**2},
+    mutants={"m/M": m / M * y**2, "1": y**2},
+)
 
 check(
     id="prop-4.1.2",
