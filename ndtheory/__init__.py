@@ -10,10 +10,8 @@ finite elements and needs the standard library alone.
 """
 
 from ndtheory.bounds import EDITIONS, PRINTED, REPAIRED, Bounds, Edition, evaluate
-from ndtheory.constants import Constants, relaxation_factor
-from ndtheory.energy import EnergyConstants
-from ndtheory.energy_bounds import EnergyBounds
-from ndtheory.energy_norms import evaluate_energy
+from ndtheory.constants import Constants, EnergyConstants, relaxation_factor
+from ndtheory.energy_norms import EnergyBounds, evaluate_energy
 from ndtheory.errors import HypothesisError
 from ndtheory.number import Number, exact
 

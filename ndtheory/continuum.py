@@ -18,9 +18,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 
-from ndtheory.energy import EnergyConstants
-from ndtheory.energy_bounds import EnergyBounds
-from ndtheory.energy_norms import evaluate_energy
+from ndtheory.constants import EnergyConstants
+from ndtheory.energy_norms import EnergyBounds, evaluate_energy
 from ndtheory.errors import HypothesisError
 from ndtheory.intervals import Interval
 from ndtheory.moduli import Moduli, mirror

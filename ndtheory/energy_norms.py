@@ -23,15 +23,14 @@ three (rho_normal in the place of rho where there is no friction) gives one of e
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
 from typing import Any
 
-from ndtheory.bounds import MARGIN, Conclusion, factor_and_rest
-from ndtheory.constants import inside, relaxation_factor
-from ndtheory.energy import EnergyConstants
-from ndtheory.energy_bounds import EnergyBounds
-from ndtheory.number import SLACK, Numeric, decimal, rounded, weakest, working_precision
+from ndtheory.bounds import MARGIN, Answer, factor_and_rest
+from ndtheory.constants import EnergyConstants, relaxation_factor
+from ndtheory.number import SLACK, Number, Numeric, decimal, rounded, weakest, working_precision
 from ndtheory.scalar import Scalar, absolute, maximum, minimum, sqrt, where
 
 #: Halvings of an interval inside (0, 1) until theta is known to far below a double.
@@ -299,6 +298,57 @@ def _last_where(holds: Callable[[Scalar], bool], low: Scalar, high: Scalar) -> S
     return where(holds(high), high, halved)
 
 
+@dataclass(frozen=True, kw_only=True)
+class EnergyBounds(Answer):
+    """The answer of the theorem in energy norms; ``factor`` is q(theta).
+
+    Attributes
+    ----------
+    rho : Number
+        The one at work: rho_normal without friction, where it is known.
+    kappa_1, kappa_2 : Number
+    ratio : Number
+        r, the largest ``|d_1|/|d_2|``.
+    friction_multiple : Number or None
+        The factor by which friction may grow until no small theta is proved: times k it is the threshold k_s.  None
+        without friction.
+    friction_limit_multiple : Number or None
+        The factor by which it may grow until no theta at all is proved: times k it is k_e >= k_s.  None without
+        friction.
+    theta_proved : float or None
+        The theta of least q; None where q >= 1 everywhere.
+    factor_proved : Number or None
+        q there.
+    theta_max_proved : Number or None
+        The upper end of the interval.
+    theta_predicted, rate_predicted : float
+        ``2/(2 + rho)`` and ``rho/(2 + rho)``: proved without friction, a prediction with it.
+    """
+
+    rho: Number
+    kappa_1: Number
+    kappa_2: Number
+    ratio: Number
+    friction_multiple: Number | None
+    friction_limit_multiple: Number | None
+    theta_proved: float | None
+    factor_proved: Number | None
+    theta_max_proved: Number | None
+    theta_predicted: float
+    rate_predicted: float
+
+    @property
+    def reason(self) -> dict[str, str]:
+        """Why a value is None, by its name."""
+        reasons = super().reason
+        if self.friction_multiple is None:
+            reasons |= dict.fromkeys(("friction_multiple", "friction_limit_multiple"), "no friction")
+        if self.interval is None:
+            names = ("interval", "theta_proved", "factor_proved", "theta_max_proved")
+            reasons |= dict.fromkeys(names, "q >= 1 for every theta")
+        return reasons
+
+
 def evaluate_energy(constants: EnergyConstants, theta: Numeric | None = None) -> EnergyBounds:
     """Evaluate the theorem in energy norms.
 
@@ -312,10 +362,10 @@ def evaluate_energy(constants: EnergyConstants, theta: Numeric | None = None) ->
     -------
     EnergyBounds
         Right to the last place of a double.  Where a constant was given as an enclosure, and the others as one or
-        exactly, the numbers have enclosures too, at the weakest level (``verified`` at best).  Not those that some of
-        the constants enclosed do not have: ``factor_proved``, ``theta_max_proved`` have one only if there is a
-        contraction interval throughout, ``factor`` and ``one_minus_factor`` if theta is inside it.
-        ``interval``, ``verdict`` and what is a plain number are those of the values.
+        exactly, the numbers have enclosures too, at the weakest level (``verified`` at best), if all of the constants
+        enclosed have such a number: ``factor_proved``, ``theta_max_proved`` have one only if there is a contraction
+        interval throughout, ``factor`` and ``one_minus_factor`` if theta is inside it.  ``interval``, ``verdict`` and
+        plain numbers come from the values, not from the enclosures.
 
     Raises
     ------
@@ -344,28 +394,19 @@ def evaluate_energy(constants: EnergyConstants, theta: Numeric | None = None) ->
         def number(name: str) -> Scalar:
             return rounded(found[name], [corner[name] for corner in corners], level)
 
-        def nearest(name: str) -> float | None:
-            return None if found[name] is None else float(found[name])
-
         names = ("rho", "kappa_1", "kappa_2", "ratio", "friction_multiple", "friction_limit_multiple")
         proved = ("factor_proved", "theta_max_proved", "factor", "one_minus_factor")
-        verdict: Conclusion | None = None
-        if chosen is not None:
-            verdict = "no conclusion" if found["factor"] is None else "contraction"
         return EnergyBounds(
             **{name: number(name) for name in (*names, *proved)},
-            interval=None if found["low"] is None else (float(found["low"]), float(found["theta_max_proved"])),
-            interval_proved=inside(corners, level, "low", "theta_max_proved"),
-            theta_proved=nearest("theta_proved"),
-            theta_predicted=float(predicted_theta(decimal(constants.at_work))),
-            rate_predicted=float(predicted_rate(decimal(constants.at_work))),
-            theta=None if chosen is None else float(chosen),
-            verdict=verdict,
+            **Answer.shared(found, corners, level, chosen),
+            theta_proved=None if found["theta_proved"] is None else float(found["theta_proved"]),
+            theta_predicted=float(predicted_theta(found["rho"])),
+            rate_predicted=float(predicted_rate(found["rho"])),
         )
 
 
 def _figures(at: tuple[Fraction, ...], theta: Decimal | None, margin: Decimal) -> dict[str, Any]:
-    """What the theorem says for rho, kappa_1 and kappa_2: decimals by name, None where there is none."""
+    """The values of the theorem for rho, kappa_1 and kappa_2: decimals by name, None where there is none."""
     rho, kappa_1, kappa_2 = data = decimal(at[0]), decimal(at[1]), decimal(at[2])
     rubs = any(at[1:])
     interval = contraction_interval(*data, margin)
@@ -387,6 +428,7 @@ def _figures(at: tuple[Fraction, ...], theta: Decimal | None, margin: Decimal) -
         "friction_multiple": friction_multiple(kappa_1, kappa_2) if rubs else None,
         "friction_limit_multiple": friction_limit(*data) if rubs else None,
         "low": low,
+        "high": high,
         "theta_proved": best,
         "factor_proved": None if best is None else factor_and_rest(one_minus_square(best, *data))[0],
         "theta_max_proved": high,

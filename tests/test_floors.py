@@ -22,7 +22,7 @@ FLOORS: dict[str, dict[str, str]] = {
     "theory": {
         "ndtheory.symbolic": "__init__ checks dimension energy engine further mechanics quotient section5 symbols",
         "ndtheory": (
-            "__init__ bounds constants continuum energy energy_bounds energy_norms errors intervals moduli "
+            "__init__ bounds constants continuum energy_norms errors intervals moduli "
             "number scalar segments statements strip texts wedges"
         ),
     },
