@@ -56,13 +56,7 @@ ELEMENTS: dict[tuple[int, int], Element] = {(1, 2): P1(), (2, 3): P1()}
 
 
 def element_of(mesh: Cells) -> Element:
-    """The element of the cells of a mesh.
-
-    Raises
-    ------
-    MeshError
-        There is none for so many nodes.
-    """
+    """The element of the cells of a mesh; MeshError if there is none for so many nodes."""
     nodes = mesh.cells.shape[1]
     if (mesh.dimension, nodes) not in ELEMENTS:
         known = " or ".join(str(k) for d, k in ELEMENTS if d == mesh.dimension)
@@ -114,16 +108,9 @@ def mass(mesh: Cells) -> NDArray[Any]:
 def largest_strains(mesh: Cells, displacement: Floats) -> Floats:
     """Largest absolute principal strain of each cell, shape (c,), a pure number.
 
-    In the plane the principal strains of eps = (grad u + grad u') / 2 are
-
-        (eps_xx + eps_yy)/2 +- sqrt((eps_xx - eps_yy)^2/4 + eps_xy^2);
-
-    the third one of plane strain is 0.
-
-    Parameters
-    ----------
-    displacement : array, shape (n, d)
-        At the nodes, unit of length.
+    In the plane the principal strains of ``eps = (grad u + grad u') / 2``, u the displacement of the nodes, shape
+    (n, d), unit of length, are ``(eps_xx + eps_yy)/2 +- sqrt((eps_xx - eps_yy)^2/4 + eps_xy^2)``; the third one of
+    plane strain is 0.
 
     Examples
     --------

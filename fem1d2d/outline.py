@@ -81,7 +81,7 @@ def fault(points: NDArray[Any], edges: Ints) -> str | None:
 
 
 def _convex(edges: Ints, exactly: tuple[NDArray[Any], NDArray[Any]], floats: tuple[Floats, Floats]) -> bool:
-    """True if all edges form one polygon, in turn, that turns left or goes straight on, once round."""
+    """True if the edges, one after the other, form one polygon that turns left or goes straight on, once round."""
     following, ends = {node: edge for edge, node in enumerate(edges[:, 0].tolist())}, edges[:, 1].tolist()
     order, edge = [0], following.get(ends[0])
     while edge and len(order) < len(edges):

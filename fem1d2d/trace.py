@@ -16,9 +16,7 @@ def extent(mesh: Mesh) -> float:
 
 
 def surface(mesh: Mesh, *, upper: bool, ends: tuple[float, float] | None = None) -> Ints:
-    """Nodes of the flat top (or bottom) of a mesh, from left to right.
-
-    That is the boundary at the largest (smallest) last coordinate.
+    """Nodes of the flat top (or bottom), the boundary at the largest (smallest) last coordinate, from left to right.
 
     Parameters
     ----------
@@ -31,7 +29,7 @@ def surface(mesh: Mesh, *, upper: bool, ends: tuple[float, float] | None = None)
     Raises
     ------
     MeshError
-        The extreme node stands alone: no boundary edge lies flat there (2D).
+        No boundary edge lies flat at the extreme node (2D).
     """
     points = mesh.points.astype(float)
     height = points[:, -1]
@@ -50,20 +48,12 @@ def surface(mesh: Mesh, *, upper: bool, ends: tuple[float, float] | None = None)
 def facing(mesh: Mesh, *, upper: bool, ends: tuple[float, float]) -> Ints:
     """Nodes of the boundary that faces up (or down) between two positions, from left to right (2D).
 
-    The surface may be curved, as that of a cylinder on a plane.
-
-    Parameters
-    ----------
-    upper : bool
-        True for what faces up.
-    ends : pair of float
-        A part of the x axis, in the mesh's unit of length: the nodes of the edges that reach into it, the outermost of
-        which may lie beyond.
+    The surface may be curved, like a cylinder on a plane.  ``ends`` are used as by :func:`surface`.
 
     Raises
     ------
     MeshError
-        Two points of it lie above each other.
+        Two points of the surface lie above each other.
     """
     edges = mesh.boundary
     x = mesh.points[:, 0].astype(float)
@@ -80,7 +70,7 @@ def facing(mesh: Mesh, *, upper: bool, ends: tuple[float, float]) -> Ints:
 
 
 def _between(mesh: Mesh, edges: Ints, ends: tuple[float, float]) -> Ints:
-    """Those of some edges that reach further than rounding between two positions."""
+    """The edges among these that reach further than rounding between two positions."""
     x, slack = mesh.points[edges, 0].astype(float), SAME * extent(mesh)
     return np.asarray(edges[(x.min(axis=1) < ends[1] - slack) & (x.max(axis=1) > ends[0] + slack)])
 

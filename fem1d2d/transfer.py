@@ -1,4 +1,4 @@
-"""The mortar transfer between two traces on one line: grids that share nothing but the interval they cover."""
+"""The mortar transfer between two traces on one line, whose grids need share only the interval they cover."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def mortar(contact: NDArray[Any], neumann: NDArray[Any]) -> NDArray[Any]:
     exact on the intersections of both grids.  psi_j is the dual basis of the contact grid, on every cell ``2 phi_j``
     minus the other hat function: ``int psi_j phi_k = 0`` for j != k, and ``sum_j psi_j = 1``.  So
 
-    * P leaves what is piecewise linear on the contact grid as it is, constants and rigid motions among it;
+    * P reproduces functions that are piecewise linear on the contact grid, constants and rigid motions among them;
     * ``P' w_c = w_n``, where w are integrals of hat functions over that interval: a constant pressure stays constant.
 
     psi_j is negative in places, and so are some entries of P (none below -1/3).
@@ -23,8 +23,8 @@ def mortar(contact: NDArray[Any], neumann: NDArray[Any]) -> NDArray[Any]:
     Parameters
     ----------
     contact, neumann : array, shapes (n_c,), (n_n,)
-        Increasing positions, n_c >= 2.  Of the second grid all nodes with a hat function that reaches into the interval
-        of the first; the outermost may lie outside.  Rational entries (object arrays) give rational ones.
+        Increasing positions, n_c >= 2; of the second grid all nodes whose hat functions reach into the interval of the
+        first, so that the outermost may lie outside.  Rational entries (object arrays) give rational ones.
 
     Raises
     ------
