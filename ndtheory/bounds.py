@@ -1,18 +1,18 @@
 """C_0, .., C_6, G, h_1, h_2 and the contraction interval (Section 5), printed and repaired.
 
-Every formula is written over any scalar (float, Decimal, Fraction where roots are rational, sympy, mpmath, an interval,
-an object that records the operations made with it) and free of the cancellation that the printed form suffers; branches
-go through :func:`ndtheory.scalar.where`.  Docstrings give the equation, ``tests/ndtheory`` a second derivation.  With
-u = m all m, M, u and x = C_K are stresses and G is a stress cubed; C_R, theta, C_T, P, D, Q, C_0, C_1, C_6 are numbers.
+Every formula applies to any scalar (float, Decimal, Fraction where roots are rational, sympy, mpmath, an interval, an
+object that records its operations), avoids the cancellation of the printed form, and branches by
+:func:`ndtheory.scalar.where`.  Docstrings give the equation, ``tests/ndtheory`` a second derivation.  With u = m all m,
+M, u and x = C_K are stresses and G is a stress cubed; C_R, theta, C_T, P, D, Q, C_0, C_1, C_6 are numbers.
 
 The two editions are one set of formulas.  The paper's bracket ``M C_R + C_K + sqrt(C_K m) + 1`` in (5.30)
 adds a stress to the number 1: (5.11), (5.13), (5.19) and (5.23) give a *stress* ``u = m`` in place of the 1, and an
 overall factor 1/u.  The printed edition is ``u = 1`` with ``m~ = min(m, 1)`` for m; the repaired one is
 ``u = m`` with m itself.  They agree in the unit of stress in which m = 1.
 
-In both editions every number but C1 is monotone in m, M, C_R and x = C_K, so an enclosure of the constants gives one
-of the results: their values where m is largest and the others least, and the other way round.  Beyond C2, where C1 need
-not be monotone, D and Q at opposite ends enclose it.  ``docs/verified.md`` has the proof.
+In both editions every number but C1 is monotone in m, M, C_R and x = C_K, so enclosed constants give enclosed results:
+their values where m is largest and the others least, and the other way round.  Beyond C2, where C1 need not be
+monotone, D and Q at opposite ends enclose it.  ``docs/verified.md`` has the proof.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ Conclusion = Literal["contraction", "no conclusion"]
 #: Why there is no ``interval_proved``.
 NO_PROVED_INTERVAL = "the constants have no enclosures, or some of those enclosed have no interval"
 
-#: The ends of the open intervals count as outside, decided with a margin far above the rounding of the evaluation.
+#: The ends of the open intervals count as outside, with a margin far above the rounding of the evaluation.
 MARGIN = Decimal(10) ** -(DIGITS // 2)
 
 #: Newton's steps in :func:`inverse_G`: the start exceeds the root by a factor of at most sqrt(3), and the excess falls
@@ -89,7 +89,7 @@ def lipschitz(m: Scalar, M: Scalar, C_R: Scalar, x: Scalar) -> Scalar:
 
 
 def C0(m: Scalar, M: Scalar, C_R: Scalar) -> Scalar:
-    """C_0 (5.37): from here on the coefficient of |||T psi - T psi~||| squared is non-negative."""
+    """C_0 (5.37): from this theta on the coefficient of |||T psi - T psi~|||^2 is non-negative."""
     return 2 * m**2 / ((M * C_R) ** 2 + 2 * m**2)
 
 
@@ -132,7 +132,7 @@ def P(x: Scalar, m: Scalar, M: Scalar, C_R: Scalar, u: Scalar) -> Scalar:
 
 
 def D(x: Scalar, m: Scalar, M: Scalar, C_R: Scalar, u: Scalar) -> Scalar:
-    """``C_T^2/C_R^2 - P >= 0``: what the proof of a >= 1, b <= -2 after (5.39) needs, without subtracting.
+    """``C_T^2/C_R^2 - P >= 0``, which proves a >= 1, b <= -2 after (5.39), without subtracting.
 
     With ``A = M C_R``, ``s = sqrt(m x)`` and ``r = m/u <= 1`` the term m x of the square cancels that of P.
     """
@@ -223,7 +223,7 @@ class Answer:
         Parameters
         ----------
         found : dict
-            Among others ``low``, ``high``, ``factor``: None where there is no interval, or theta outside it.
+            Among others ``low``, ``high``, ``factor``: None without an interval, or with theta outside it.
         corners : list of dict
             The same where the theorem gives most, and where it gives least; empty without enclosures.
         level : {'exact', 'verified', 'guaranteed', 'float'}

@@ -42,11 +42,7 @@ def take(key: str, value: Numeric, needed: str, holds: Callable[[Fraction], bool
 
 
 def relaxation_factor(value: Numeric) -> Fraction:
-    """Read theta exactly; Section 3 needs 0 < theta < 1.
-
-    Raises
-    ------
-    HypothesisError
+    """Read theta exactly; HypothesisError unless 0 < theta < 1, as Section 3 needs.
 
     Examples
     --------

@@ -1,23 +1,21 @@
-"""The theorem in energy norms: the same proof as Section 5, with no constant larger than it must be.
+"""The theorem in energy norms: the proof of Section 5 with the least possible constants.
 
 For two forces psi, psi~ let d_1, d_2 be the differences of the traces of the contact body and of the Neumann body, with
 ``|d_a|^2 = a^a(R d_a, R d_a)``, and ``x = |d_1| / |d_2|``; ``|d_2|`` is the norm (5.21) of psi - psi~.  Then
 
-* ``|||T psi - T psi~|||^2 <= rho x^2 |d_2|^2`` takes the place of (5.18), (5.22), (5.38),
-* ``x <= r``, with ``r^2 = (sqrt(rho) + kappa_1) r + kappa_2``, that of (5.11),
-* ``<T psi - T psi~, d_2> <= f(x) |d_2|^2``, with ``f(x) = kappa_2 + kappa_1 x - x^2``, that of (5.29) and (5.30).
+* ``|||T psi - T psi~|||^2 <= rho x^2 |d_2|^2`` replaces (5.18), (5.22), (5.38),
+* ``x <= r``, with ``r^2 = (sqrt(rho) + kappa_1) r + kappa_2``, replaces (5.11),
+* ``<T psi - T psi~, d_2> <= f(x) |d_2|^2``, with ``f(x) = kappa_2 + kappa_1 x - x^2``, replaces (5.29) and (5.30).
 
 So by (5.24) ``q(theta)^2``, the largest ``(1-theta)^2 + 2 theta (1-theta) f(x) + theta^2 rho x^2`` over 0 <= x <= r,
 bounds the square of the Lipschitz constant of T_theta.  The proof, step by step, is in ``docs/energy.md``.
 
-Every formula is written over any scalar (float, Decimal, Fraction where roots are rational, sympy, mpmath, an interval,
-an object that records the operations made with it); branches go through :func:`ndtheory.scalar.where`.  All arguments
-and results are numbers without unit.
+Every formula applies to any scalar, as in :mod:`ndtheory.bounds`.  All arguments and results are numbers without unit.
 
-r grows with rho, kappa_1 and kappa_2, and at each x in [0, r] the expression above does, as 0 < theta <= 1: so does q.
+r grows with rho, kappa_1 and kappa_2, and so does the expression above at each x in [0, r], as 0 < theta <= 1: q grows.
 As q grows, the thetas with q < 1, an interval, become fewer: its upper end does not grow, the least q does not fall,
 and neither multiple of friction grows, up to which every small theta and some theta has q < 1.  So an enclosure of the
-three (rho_normal in the place of rho where there is no friction) gives one of each result: its values at both ends.
+three (rho_normal in place of rho without friction) gives one of each result: its values at both ends.
 """
 
 from __future__ import annotations
@@ -187,14 +185,8 @@ def tied_factor(theta: Scalar, rho_min: Scalar, rho: Scalar) -> Scalar:
 def predicted_factor(theta: Scalar, rho: Scalar) -> Scalar:
     """``max(|1 - theta|, |1 - theta (1 + rho)|)``: q(theta) without friction, and a prediction with it.
 
-    The first is the factor of a node that stays open, the second that of the stiffest mode in contact.  Without
-    friction it is attained, with friction q is never less (theta <= 1).
-
-    Parameters
-    ----------
-    theta : dimensionless, 0 < theta <= 1
-    rho : dimensionless
-        rho_normal without friction.
+    The first is the factor of a node that stays open, the second the factor of the stiffest mode in contact.  Without
+    friction (rho is rho_normal then) it is attained, with friction q is never less; 0 < theta <= 1.
 
     Examples
     --------
@@ -224,7 +216,7 @@ def end_quadratic(rho: Scalar, kappa_1: Scalar, kappa_2: Scalar) -> tuple[Scalar
 def contraction_ends(
     rho: Scalar, kappa_1: Scalar, kappa_2: Scalar, margin: Scalar = 0
 ) -> tuple[Scalar, Scalar, Scalar]:
-    """Both ends of the interval of the thetas with q < 1, and the condition that there is one.
+    """Both ends of the interval of the thetas with q < 1, and the condition that it exists.
 
     ``q < 1`` means ``2 (f - 1) + theta (1 - 2 f + rho x^2) < 0`` for every x in [0, r].  Each is linear in theta, so
     their maximum h is convex, and ``h < 0`` on one interval.  Its ends are 0, 1, ``2/(1 + sqrt(rho) r)`` or roots of
@@ -275,7 +267,7 @@ def best_theta(rho: Scalar, kappa_1: Scalar, kappa_2: Scalar, margin: Scalar = 0
 
 
 def best_between(low: Scalar, high: Scalar, rho: Scalar, kappa_1: Scalar, kappa_2: Scalar) -> Scalar:
-    """The theta of least q, where the interval in which q < 1 is known.
+    """The theta of least q, given the interval in which q < 1.
 
     q grows above :func:`turning_theta`; below it, where q < 1, it has one minimum, since ``q <= c`` holds on one
     interval for each c <= 1.
@@ -305,7 +297,7 @@ class EnergyBounds(Answer):
     Attributes
     ----------
     rho : Number
-        The one at work: rho_normal without friction, where it is known.
+        The one that enters q: rho_normal without friction, where it is known.
     kappa_1, kappa_2 : Number
     ratio : Number
         r, the largest ``|d_1|/|d_2|``.

@@ -1,7 +1,6 @@
-"""The numbered statements of the paper, and facts of ours: what each claims, and what is wrong with it if anything is.
+"""The numbered statements of the paper, and facts of ours: what each claims, and what is wrong with it, if anything.
 
-The texts are data, in ``statements.toml`` beside this module.  Verdicts are not among them: those are earned
-(:mod:`verification.ledger`).
+The texts are data, in ``statements.toml`` beside this module.  Verdicts come from :mod:`verification.ledger`.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ Fault = Literal["false as printed", "does not follow", "gap", "typo"]
 
 @dataclass(frozen=True, kw_only=True)
 class Statement:
-    """A statement, told in our own words with formulas in TeX.
+    """A statement in our own words, with formulas in TeX.
 
     Attributes
     ----------

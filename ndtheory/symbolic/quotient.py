@@ -40,7 +40,7 @@ class Quotient:
         Raises
         ------
         NotRational
-            The expression is no such quotient.
+            The expression is not such a quotient.
 
         Examples
         --------
