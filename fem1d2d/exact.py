@@ -25,7 +25,7 @@ from fem1d2d.mesh import Cells, Ints
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Shapes:
+class Shapes(Cells):
     """The cells of a mesh up to translations, as cells that share no node.
 
     Attributes
@@ -36,14 +36,7 @@ class Shapes:
         The shape of each cell of the mesh.
     """
 
-    points: NDArray[Any]
-    cells: Ints
     of_cell: Ints
-
-    @property
-    def dimension(self) -> int:
-        """1 or 2."""
-        return int(self.points.shape[1])
 
     @classmethod
     def of(cls, points: NDArray[Any], cells: Ints) -> Shapes:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from itertools import pairwise
 from types import MappingProxyType
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,24 +26,21 @@ class MeshError(ValueError):
 LARGEST = 1e30
 
 
-class Cells(Protocol):
-    """The part of a mesh that element matrices need."""
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Cells:
+    """The part of a mesh that element matrices need: ``points`` of shape (n, d), and ``cells``, the nodes of each."""
 
-    @property
-    def points(self) -> NDArray[Any]:
-        """Coordinates of the nodes, shape (n, d)."""
-
-    @property
-    def cells(self) -> Ints:
-        """The nodes of each cell, shape (c, k)."""
+    points: NDArray[Any]
+    cells: Ints
 
     @property
     def dimension(self) -> int:
         """1 or 2."""
+        return int(self.points.shape[1])
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class Mesh:
+class Mesh(Cells):
     """A mesh of intervals or convex polygons of one kind, whose cells meet only in common facets.
 
     It may have holes, and pieces that share only single nodes or nothing.
@@ -69,8 +66,6 @@ class Mesh:
         that lie on each other or touch without being joined, a side with a facet inside the body or listed twice.
     """
 
-    points: NDArray[Any]
-    cells: Ints
     sides: Mapping[str, Ints]
     boundary: Ints = field(init=False, repr=False)
 
@@ -132,11 +127,6 @@ class Mesh:
 
     def __reduce__(self) -> tuple[Any, ...]:  # a read-only mapping cannot be pickled, and numpy returns writable arrays
         return partial(Mesh, points=self.points, cells=self.cells, sides=dict(self.sides)), ()
-
-    @property
-    def dimension(self) -> int:
-        """1 or 2."""
-        return int(self.points.shape[1])
 
 
 def _whole(what: str, values: Any, columns: int) -> Ints:

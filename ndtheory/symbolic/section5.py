@@ -77,10 +77,12 @@ ROOTS = {m: mu**2, M: (mu * (1 + b)) ** 2}
 #: As CONSTANTS for m <= 1 and for m >= 1, with m~ = min(m, 1).
 SMALL_M = {m: 1 / (1 + o) ** 2, m_tilde: 1 / (1 + o) ** 2, M: (2 + b) / (1 + o) ** 2, C_R: 1 + c, x: xi**2}
 LARGE_M = {m: (1 + o) ** 2, m_tilde: 1, M: (2 + b) * (1 + o) ** 2, C_R: 1 + c, x: xi**2}
+TILDE = (with_theta(SMALL_M), with_theta(LARGE_M))
 
 w1, v1, w2, v2, psi2 = map(Vector, ("w1", "w~1", "w2", "w~2", "psi~"))
 lift, lift2 = linear("R1"), linear("R2")
 delta1, delta2 = w1 - v1, w2 - v2
+reaction = lambda w, v: -a1(w, lift(v)) + L1(lift(v))  # what body 1 with the displacement w does to a trace
 
 #: d_1 <= X d_2, by (5.14).
 X = (A + x) / m + sp.sqrt(x / m)
@@ -106,10 +108,8 @@ u1, u2, field = Vector("u1"), Vector("u2"), Vector("w")
 check(
     id="5.1",
     text="At the limit (III) reads g = theta (-a_1(u1, R v) + L_1(R v)) + (1-theta) g: g is that functional.",
-    goals=lambda form: equal(
-        theta * (-a1(u1, lift(test)) + L1(lift(test))) + (1 - theta) * form, form, {theta: 1 / (1 + y)}
-    ),
-    forms={"printed": -a1(u1, lift(test)) + L1(lift(test))},
+    goals=lambda form: equal(theta * reaction(u1, test) + (1 - theta) * form, form, {theta: 1 / (1 + y)}),
+    forms={"printed": reaction(u1, test)},
     mutants={"the sign of a_1": a1(u1, lift(test)) + L1(lift(test)), "without the lift": -a1(u1, test) + L1(test)},
 )
 
@@ -151,23 +151,19 @@ check(
     mutants={"without the lift": 0, "the sign of the lift": -1},
 )
 
+Y = positive("Y")
+strip = (sp.integrate(Y**2 + 1, (Y, 0, 1)) + 1) / 4  # |v|^2: v = x and |grad v| = 1, then v = 1; thickness 1/4
+
 check(
     id="5.8",
     text="A bar-like strip (0, 2) x (0, 1/4), clamped at x = 0, Gamma_c its upper side for 1 < x < 2, v = (min(x, 1),"
     " 0): |v_T|^2 = 1 in L2(Gamma_c) and |v|^2 = 7/12.  Into H^1/2 the tangential trace has a constant of 1 at most"
     " there, as (v_1, 0) lifts it: (5.13) does not follow with that constant.",
     one_case=True,
-    goals=lambda form: at_most(form * _strip(), sp.Integer(1)),
+    goals=lambda form: at_most(form * strip, sp.Integer(1)),
     forms={"step": sp.Integer(1), "repaired": sp.Rational(12, 7)},
     mutants={"3/2": sp.Rational(3, 2)},
 )
-
-
-def _strip() -> Any:
-    """|v|^2 in H1 of the strip."""
-    X = positive("X")
-    left = sp.integrate(X**2 + 1, (X, 0, 1))  # v = x, |grad v| = 1
-    return (left + 1) / 4  # and v = 1 on the right half; thickness 1/4
 
 
 check(
@@ -188,7 +184,7 @@ check(
 
 
 def _spike(n: Any) -> Any:
-    Y = positive("Y")
+    """|w_n|^2."""
     w = Y * (1 - n * Y) ** 2
     return sp.integrate(sp.expand(w**2 + sp.diff(w, Y) ** 2), (Y, 0, 1 / n))
 
@@ -289,7 +285,7 @@ check(
 check(
     id="5.17",
     text="The definition of T for psi and psi~, subtracted: the loads cancel.",
-    goals=lambda form: equal((-a1(w1, lift(test)) + L1(lift(test))) - (-a1(v1, lift(test)) + L1(lift(test))), form),
+    goals=lambda form: equal(reaction(w1, test) - reaction(v1, test), form),
     forms={"printed": -a1(w1 - v1, lift(test))},
     mutants={"the sign": a1(w1 - v1, lift(test)), "without the lift": -a1(w1 - v1, test)},
 )
@@ -432,9 +428,7 @@ check(
 check(
     id="5.27",
     text="(5.17) with v = w2-w~2.",
-    goals=lambda form: equal(
-        (-a1(w1, lift(delta2)) + L1(lift(delta2))) - (-a1(v1, lift(delta2)) + L1(lift(delta2))), form
-    ),
+    goals=lambda form: equal(reaction(w1, delta2) - reaction(v1, delta2), form),
     forms={"printed": -a1(delta1, lift(delta2))},
     mutants={"the sign": a1(delta1, lift(delta2)), "the lift of w1": -a1(delta1, lift(delta1))},
 )
@@ -557,7 +551,7 @@ check(
 check(
     id="5.36",
     text="(5.33) with m~ for m in each coefficient.",
-    goals=lambda form: at_most(form, of_36(m, P), with_theta(SMALL_M), with_theta(LARGE_M)),
+    goals=lambda form: at_most(form, of_36(m, P), *TILDE),
     forms={"step": of_36(m_tilde, printed_P(m_tilde)), "repaired": of_36(m, P)},
     mutants={"without friction": of_36(m, 0), "M for M^2 in the first term": of_36(m * sp.sqrt(M), P)},
     states=lambda form: Relation(t**2, "<=", form),
@@ -628,8 +622,7 @@ check(
     goals=lambda form: equal(
         form.subs(of_edition, simultaneous=True),
         (printed_a * theta**2 + printed_b * theta + 1).subs(of_edition, simultaneous=True),
-        with_theta(SMALL_M),
-        with_theta(LARGE_M),
+        *TILDE,
     ),
     forms={"step": first_line(C_T), "repaired": first_line(C_T_tilde)},
     mutants={"C_T for C~_T": first_line(C_T), "the friction term halved": of_h1(m_tilde, tilde_P / 2, tilde_Q)},
@@ -857,7 +850,6 @@ check(
 )
 
 slope = sp.Symbol("a'", real=True)
-TILDE = (with_theta(SMALL_M), with_theta(LARGE_M))
 h2_of = lambda slope, theta: slope * theta**2 - (1 + slope) * theta + 1
 
 check(
@@ -944,7 +936,7 @@ check(
 
 def proposition(number: int, text: str, goals: Callable[[Any], list[Goal]], form: Any, mutants: dict[str, Any]) -> None:
     """One of the four claims; the bound (5.36) they rest on is its step."""
-    bound = lambda form: at_most(form, of_36(m, P), with_theta(SMALL_M), with_theta(LARGE_M))
+    bound = lambda form: at_most(form, of_36(m, P), *TILDE)
     check(
         id=f"prop-5.6.{number}",
         text=f"{text}; with (5.36) for the P that the proof supplies.",
