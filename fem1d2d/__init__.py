@@ -12,8 +12,7 @@ from fem1d2d.mesh_files import from_file
 from fem1d2d.outline import depths
 from fem1d2d.pencil import Eigenvalue, Extremes, extremes_by_solves, largest, largest_of, largest_sparse
 from fem1d2d.supports import Supports, rigid_motions, supports
-from fem1d2d.trace import facing, surface, trapezoid
-from fem1d2d.transfer import mortar
+from fem1d2d.trace import facing, mortar, surface, trapezoid
 
 __all__ = [
     "FEW",

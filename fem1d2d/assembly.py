@@ -64,14 +64,8 @@ def side_load(mesh: Mesh, facets: Ints, traction: Sequence[float]) -> Floats:
 def facet_weights(mesh: Mesh, facets: Ints, between: tuple[float, float] | None = None) -> Floats:
     """``int v`` over facets for every hat function v, shape (n,), unit length^(d - 1).
 
-    In 1D a facet is a point of measure 1.
-
-    Parameters
-    ----------
-    facets : int array, shape (f, d)
-        The nodes of each facet.
-    between : pair of float, optional
-        In 2D, the part of the x axis over which to integrate; no facet may be vertical then.
+    ``facets`` are the nodes of each facet, shape (f, d); in 1D a facet is a point of measure 1.  In 2D ``between`` is
+    the part of the x axis over which to integrate; no facet may be vertical then.
     """
     p = mesh.points[facets].astype(float)
     sizes = np.ones(len(facets)) if mesh.dimension == 1 else np.linalg.norm(p[:, 1] - p[:, 0], axis=1)

@@ -180,16 +180,10 @@ class Condensation:
 
 
 class Uncoupled(Condensation):
-    """A condensation of a matrix that couples no two components of the unknowns, such as the matrix of a norm.
+    """A :class:`Condensation` of a matrix that couples no two components of the unknowns, such as the matrix of a norm.
 
-    Each component is eliminated by itself, and those with the same matrix share one factorisation.
-
-    Parameters
-    ----------
-    matrix, interface, order
-        As for :class:`Condensation`.
-    component : int array, shape (n,)
-        The component of each unknown.
+    Each component is eliminated by itself, and those with the same matrix share one factorisation; ``component``, int
+    array of shape (n,), is the component of each unknown.
 
     Examples
     --------
@@ -241,12 +235,7 @@ class Uncoupled(Condensation):
 
 
 class Lifted(Condensation):
-    """A condensation of few unknowns in dense matrices, by the formulas that define it.
-
-    Parameters
-    ----------
-    matrix, interface, singular
-        As for :class:`Condensation`.
+    """A :class:`Condensation` of few unknowns in dense matrices, by the formulas that define it.
 
     Examples
     --------
@@ -255,7 +244,7 @@ class Lifted(Condensation):
     """
 
     def __init__(self, matrix: sp.csc_array, interface: Ints, *, singular: bool = False) -> None:
-        super().__init__(matrix, interface, interface[:0], singular=singular)  # nothing here asks for an order
+        super().__init__(matrix, interface, interface[:0], singular=singular)  # without an order: none is used
         self._dense: Floats = matrix.toarray()
 
     def _block(self, rows: Ints, columns: Ints) -> Any:

@@ -117,10 +117,9 @@ class Mesh(Cells):
                 raise MeshError(f"side {name!r} lists the facet {twice} {count.max()} times: once is needed")
         for array in (points, cells, boundary, *sides.values()):
             array.setflags(write=False)
-        object.__setattr__(self, "points", points)
-        object.__setattr__(self, "cells", cells)
-        object.__setattr__(self, "sides", MappingProxyType(sides))
-        object.__setattr__(self, "boundary", boundary)
+        kept = {"points": points, "cells": cells, "sides": MappingProxyType(sides), "boundary": boundary}
+        for name, value in kept.items():
+            object.__setattr__(self, name, value)
 
     def __repr__(self) -> str:
         return f"<Mesh: {len(self.points)} nodes, {len(self.cells)} cells, sides {', '.join(self.sides) or 'none'}>"

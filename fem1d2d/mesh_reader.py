@@ -80,11 +80,8 @@ def contents(path: Path) -> dict[str, Any]:
     others = sorted(set(read.cells_dict) - {"triangle", "line", "vertex"})
     if others:
         raise NotRead(f"needed only triangles, it has {', '.join(others)} too")
-    if materials:
-        split = sorted(materials) if len(materials) > 1 else []
-    else:
-        split = _split(read, groups, len(triangles))
-    if split:
+    split = sorted(materials) if materials else _split(read, groups, len(triangles))
+    if len(split) > 1:
         named = ", ".join(
             [json.dumps(name[:40], ensure_ascii=False) for name in split[:5]] + ["..."] * (len(split) > 5)
         )
@@ -140,7 +137,7 @@ def _groups(read: Any, kind: str, dimension: int) -> dict[str, Ints]:
 
 
 def _split(read: Any, groups: dict[str, Ints], count: int) -> list[str]:
-    """Names of the groups that split the triangles; none if one of them holds all.
+    """Names of the groups that share the triangles; none if one of them holds all.
 
     Named surfaces of a Gmsh file are materials.  Element sets of an Abaqus file may also be neighbours of a side: they
     count as materials only if each triangle lies in one of them.
@@ -158,7 +155,7 @@ def _split(read: Any, groups: dict[str, Ints], count: int) -> list[str]:
         names += [f"physical surface {tag}" for tag in sorted({*tags[~covered].tolist()} - {0})]
     elif not covered.all():
         return []
-    return names if len(names) > 1 else []
+    return names
 
 
 def _abaqus_materials(path: Path) -> set[str]:

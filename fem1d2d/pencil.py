@@ -160,15 +160,10 @@ def largest_of(
 
 @dataclass(frozen=True, kw_only=True)
 class Extremes:
-    """The ends of a spectrum, as Lanczos found them.
+    """The ends of a spectrum that Lanczos found in ``steps`` products with A.
 
-    Attributes
-    ----------
-    least, largest : Eigenvalue
-        Some eigenvalue lies within the residual of each.  The least eigenvalue is at most ``least.value``, the largest
-        one at least ``largest.value``, up to rounding: they are Rayleigh quotients.
-    steps : int
-        Products with A.
+    Some eigenvalue lies within the residual of each.  The least eigenvalue is at most ``least.value``, the largest one
+    at least ``largest.value``, up to rounding: they are Rayleigh quotients.
     """
 
     least: Eigenvalue
@@ -194,11 +189,8 @@ def extremes_by_solves(
 
     Parameters
     ----------
-    apply_A : callable
-        ``x -> A x`` for vectors of shape (n,); A symmetric.
-    solve_B : callable
-        ``r -> B^-1 r``; B symmetric positive definite.
-    n : int
+    apply_A, solve_B, n
+        As for :func:`largest_of`.
     tolerance, least_tolerance : float
         Residuals of the largest and of the least eigenvalue at which it stops, as parts of the largest one.
     most : int
@@ -271,16 +263,8 @@ def largest_sparse(
 ) -> Eigenvalue:
     """Largest eigenvalue of a large pencil of sparse matrices, as :func:`largest_of`.
 
-    Parameters
-    ----------
-    A, B : sparse array, shape (n, n)
-        A symmetric, B symmetric positive definite.
-    solve_B : callable
-        ``r -> B^-1 r``.
-    above : float, optional
-        An upper bound of the spectrum: eigenvalues that crowd below it are separated by their distance to it.
-    order : int array, shape (n,), optional
-        An order of elimination for ``above * B - A``, see :func:`fem1d2d.condense.elimination_order`.
+    ``above`` is an upper bound of the spectrum, ``order`` an order of elimination for ``above * B - A``, see
+    :func:`fem1d2d.condense.elimination_order`.
     """
     n = A.shape[0]
     if n <= DENSE:

@@ -40,10 +40,7 @@ class Supports:
 def supports(mesh: Mesh, sides: Mapping[str, Sequence[float | None]]) -> Supports:
     """Collect the displacements that sides prescribe.
 
-    Parameters
-    ----------
-    sides : mapping from side name to d numbers
-        Displacements in the mesh's unit of length of some sides of the mesh; None leaves a component free.
+    ``sides`` maps names of sides to d displacements in the mesh's unit of length; None leaves a component free.
 
     Raises
     ------

@@ -218,17 +218,9 @@ class Answer:
     def shared(
         found: dict[str, Any], corners: list[dict[str, Any]], level: Level, theta: Fraction | None
     ) -> dict[str, Any]:
-        """The intervals, theta and the verdict by name, of what a theorem gives for the constants and at their ends.
+        """The intervals, theta and the verdict by name, from the ``low``, ``high`` and ``factor`` that a theorem found.
 
-        Parameters
-        ----------
-        found : dict
-            Among others ``low``, ``high``, ``factor``: None without an interval, or with theta outside it.
-        corners : list of dict
-            The same where the theorem gives most, and where it gives least; empty without enclosures.
-        level : {'exact', 'verified', 'guaranteed', 'float'}
-            The level of the constants.
-        theta : Fraction or None
+        ``corners`` has them where the theorem gives most and where it gives least, or is empty without enclosures.
         """
         proved = None
         if corners and all(corner["high"] is not None for corner in corners):

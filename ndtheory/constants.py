@@ -27,13 +27,7 @@ Given: TypeAlias = Numeric | Number
 
 
 def take(key: str, value: Numeric, needed: str, holds: Callable[[Fraction], bool]) -> Fraction:
-    """Read a number exactly and check its hypothesis.
-
-    Raises
-    ------
-    HypothesisError
-        Not a number, or the hypothesis does not hold; ``needed`` is quoted.
-    """
+    """Read a number exactly; HypothesisError, quoting ``needed``, if it is none or the hypothesis does not hold."""
     with suppress(ValueError):
         number = exact(value)
         if holds(number):

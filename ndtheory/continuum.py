@@ -34,20 +34,16 @@ FOUR_OVER_PI_SQUARE = Fraction(40529, 100000)
 
 @dataclass(frozen=True, kw_only=True)
 class Rectangle:
-    """A body whose side opposite Gamma_c is clamped, and no other side held.
+    """A body whose side opposite Gamma_c is clamped, and no other side held; HypothesisError for other values.
 
     Attributes
     ----------
     left, right : Fraction
-        Its ends along Gamma_c, unit length.
+        Its ends along Gamma_c, left < right, unit length.
     thickness : Fraction
-        d, from Gamma_c to the clamped side.
+        d > 0, from Gamma_c to the clamped side.
     body : Moduli
         Not incompressible, kappa > 1.
-
-    Raises
-    ------
-    HypothesisError
     """
 
     left: Fraction
@@ -71,7 +67,7 @@ class Rectangle:
 
 @dataclass(frozen=True, kw_only=True)
 class TwoRectangles:
-    """Two rectangles in contact.
+    """Two rectangles in contact; HypothesisError for other values.
 
     Attributes
     ----------
@@ -81,10 +77,6 @@ class TwoRectangles:
         Ends of Gamma_c, inside both.
     radius : Fraction
         r > 0 of the hat kernel.
-
-    Raises
-    ------
-    HypothesisError
 
     Examples
     --------
@@ -271,10 +263,6 @@ def statement(constants: ContinuumConstants, *, friction: Numeric, theta: Numeri
     rho = constants.rho_normal if k == 0 and constants.rho_normal is not None else constants.rho
     if rho is None:
         return None
-
-    def proved(value: Fraction) -> Number:
-        hi = above(value)
-        return Number(value=hi, lo=hi, hi=hi, level="guaranteed")
-
-    kappa_1, kappa_2 = map(proved, constants.kappa(k))
-    return evaluate_energy(EnergyConstants(rho=proved(rho), kappa_1=kappa_1, kappa_2=kappa_2), theta)
+    bounds = map(above, (rho, *constants.kappa(k)))
+    rho_, kappa_1, kappa_2 = (Number(value=hi, lo=hi, hi=hi, level="guaranteed") for hi in bounds)
+    return evaluate_energy(EnergyConstants(rho=rho_, kappa_1=kappa_1, kappa_2=kappa_2), theta)

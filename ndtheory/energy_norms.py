@@ -342,13 +342,7 @@ class EnergyBounds(Answer):
 
 
 def evaluate_energy(constants: EnergyConstants, theta: Numeric | None = None) -> EnergyBounds:
-    """Evaluate the theorem in energy norms.
-
-    Parameters
-    ----------
-    constants : EnergyConstants
-    theta : number, optional
-        Relaxation factor, 0 < theta < 1, read exactly.
+    """Evaluate the theorem in energy norms, at a relaxation factor 0 < theta < 1 if one is given, read exactly.
 
     Returns
     -------

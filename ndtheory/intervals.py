@@ -46,13 +46,7 @@ class Interval:
 
     @classmethod
     def between(cls, lo: Any, hi: Any) -> Interval:
-        """The enclosure of all numbers between two exact ones.
-
-        Raises
-        ------
-        ValueError
-            Unless lo <= hi.
-        """
+        """The enclosure of all numbers between two exact ones; ValueError unless lo <= hi."""
         if not lo <= hi:
             raise ValueError(f"interval from {lo} to {hi}: the first end must be the smaller one")
         return cls(_rounded(lo, _down), _rounded(hi, _up))

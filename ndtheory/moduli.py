@@ -32,7 +32,7 @@ Plane = Literal["strain", "stress", "3d"]
 
 @dataclass(frozen=True, kw_only=True)
 class Moduli:
-    """A homogeneous isotropic body, in the plane or in space.
+    """A homogeneous isotropic body, in the plane or in space; HypothesisError for values outside these ranges.
 
     Attributes
     ----------
@@ -41,11 +41,7 @@ class Moduli:
     poisson : Fraction
         -1 < nu <= 1/2.
     plane : {'strain', 'stress', '3d'}
-        ``'3d'`` is a body in space, whose plane waves are those of plane strain.
-
-    Raises
-    ------
-    HypothesisError
+        ``'3d'`` is a body in space, whose plane waves are waves of plane strain.
 
     Examples
     --------
@@ -154,11 +150,8 @@ def end(contact: Moduli, neumann: Moduli, openings: tuple[float, float]) -> tupl
     ----------
     contact, neumann : Moduli
     openings : pair of float
-        The angles of the contact body and of the Neumann body at that end, in radians; pi where the surface goes on.
-
-    Raises
-    ------
-    HypothesisError
+        The angles of the contact body and of the Neumann body at that end, in radians, pi where the surface goes on;
+        HypothesisError unless they lie between 0 and 2 pi.
 
     Examples
     --------

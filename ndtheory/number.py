@@ -191,14 +191,9 @@ def working_precision(digits: int = DIGITS) -> Iterator[None]:
 def rounded(value: Decimal | None, ends: Sequence[Decimal | None], level: Level) -> Number | None:
     """A result of ``DIGITS`` digits as a Number, inside :func:`working_precision`.
 
-    Parameters
-    ----------
-    value : Decimal or None
-        None remains None.
-    ends : sequence of Decimal or None
-        The same result at both ends of an enclosure in which it is monotone, in any order.  The result has no enclosure
-        if one of them is missing, or smaller than ``SLACK`` but not 0: it may be pure rounding error.
-    level : {'exact', 'verified', 'guaranteed', 'float'}
+    ``ends`` are the same result at both ends of an enclosure in which it is monotone, in any order.  The Number has no
+    enclosure if one of them is missing, or smaller than ``SLACK`` but not 0: it may be pure rounding error.  None
+    remains None.
     """
     if value is None:
         return None

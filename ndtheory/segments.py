@@ -116,10 +116,7 @@ def zones(length: Fraction, lo: Fraction, hi: Fraction, kappa: Fraction) -> list
     Every choice gives a proof; this one is the best of a search in doubles.  Where a side is nearer than one thickness,
     a zone at that side has one segment along that side or as far towards it as there is room, and one into the body.
 
-    Raises
-    ------
-    HypothesisError
-        Unless 0 <= lo < hi <= length.
+    HypothesisError unless 0 <= lo < hi <= length.
 
     Examples
     --------

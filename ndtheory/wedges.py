@@ -36,7 +36,7 @@ STEP, HALVINGS = 1.4, 10
 
 @dataclass(frozen=True, kw_only=True)
 class Wedge:
-    """A body near an end of Gamma_c.
+    """A body near an end of Gamma_c; HypothesisError for other values.
 
     Attributes
     ----------
@@ -46,10 +46,6 @@ class Wedge:
         Its opening there, 0 < degrees < 360; 180 where the surface goes on.
     clamped : bool
         True if the side beyond Gamma_c is clamped; it is free otherwise.
-
-    Raises
-    ------
-    HypothesisError
     """
 
     body: Moduli

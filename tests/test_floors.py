@@ -29,7 +29,7 @@ FLOORS: dict[str, dict[str, str]] = {
     "elastic bodies": {
         "fem1d2d": (
             "__init__ assembly condense element enclosed exact loewner material mesh mesh_files mesh_reader outline "
-            "pencil proved supports trace transfer"
+            "pencil proved supports trace"
         )
     },
     "for all of verification": {

@@ -416,6 +416,7 @@ check(
 
 largest = root_rho + kappa_1 + extra  # r, with kappa_2 = e_ (s + kappa_1 + e_): every kappa_2 >= 0 once
 ENERGY = (root_rho**2, kappa_1, extra * largest)
+f = lambda x: energy_norms.work(x, *ENERGY[1:])
 
 check(
     id="x-ratio",
@@ -423,17 +424,11 @@ check(
     " -sqrt(rho) x e^2.  So x^2 <= (sqrt(rho) + kappa_1) x + kappa_2, which no x above its positive root r satisfies;"
     " f(r) = -sqrt(rho) r.",
     goals=lambda form: [
-        at_most(
-            energy_norms.work(ratio, *ENERGY[1:]) * e**2,
-            -(ratio**2) * e**2 + kappa_1 * ratio * e**2 + ENERGY[2] * e**2 - q - p,
-        ),
-        equal(
-            energy_norms.work(ratio, *ENERGY[1:]) + root_rho * ratio,
-            (root_rho + kappa_1) * ratio + ENERGY[2] - ratio**2,
-        ),
+        at_most(f(ratio) * e**2, -(ratio**2) * e**2 + kappa_1 * ratio * e**2 + ENERGY[2] * e**2 - q - p),
+        equal(f(ratio) + root_rho * ratio, (root_rho + kappa_1) * ratio + ENERGY[2] - ratio**2),
         equal(energy_norms.largest_ratio(*ENERGY), form),
         less((root_rho + kappa_1) * (form + y) + ENERGY[2], (form + y) ** 2),
-        equal(energy_norms.work(form, *ENERGY[1:]), -root_rho * form),
+        equal(f(form), -root_rho * form),
     ],
     forms={"repaired": largest},
     mutants={"without kappa_2": root_rho + kappa_1, "half as large": largest / 2},
@@ -452,7 +447,7 @@ check(
         at_most(
             form(ratio, value) * e**2,
             (1 - value) ** 2 * e**2
-            + 2 * value * (1 - value) * (energy_norms.work(ratio, *ENERGY[1:]) - q) * e**2
+            + 2 * value * (1 - value) * (f(ratio) - q) * e**2
             + value**2 * ENERGY[0] * ratio**2 * e**2 / (1 + p),
         )
         for value in (any_theta, sp.Integer(1))
@@ -504,6 +499,8 @@ check(
     mutants={"2/(2+rho)": 2 / (2 + s_**2) * (1 + kappa_1), "half of theta_s": turn / 2},
 )
 
+work_there = energy_norms.work(ratio, kappa_1, kappa_2)
+
 check(
     id="x-energy-interval",
     text="The square at x is below 1 exactly where 2 (f - 1) + theta (1 - 2 f + rho x^2) < 0: linear in theta for each"
@@ -511,11 +508,8 @@ check(
     goals=lambda form: equal(
         energy_norms.square_at(ratio, theta, root_rho**2, kappa_1, kappa_2) - 1, theta * form, {theta: any_theta}
     ),
-    forms={
-        "repaired": 2 * (energy_norms.work(ratio, kappa_1, kappa_2) - 1)
-        + theta * (1 - 2 * energy_norms.work(ratio, kappa_1, kappa_2) + root_rho**2 * ratio**2)
-    },
-    mutants={"the factor 2 dropped": energy_norms.work(ratio, kappa_1, kappa_2) - 1 + theta * root_rho**2 * ratio**2},
+    forms={"repaired": 2 * (work_there - 1) + theta * (1 - 2 * work_there + root_rho**2 * ratio**2)},
+    mutants={"the factor 2 dropped": work_there - 1 + theta * root_rho**2 * ratio**2},
 )
 
 check(
