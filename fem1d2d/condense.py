@@ -115,12 +115,8 @@ class Condensation:
     def solver(self) -> Callable[[Floats], Floats]:
         """``load -> A^-1 load`` on all unknowns, as :func:`solver`; its factorisation gives the Schur complement too.
 
-        The factorisation, the largest part of the memory, lives as long as the function that is returned.
-
-        Raises
-        ------
-        ValueError
-            The matrix is singular.
+        The factorisation, the largest part of the memory, lives as long as the function that is returned.  ValueError
+        if the matrix is singular.
         """
         self._needs_definite()
         factor = _factor(self.matrix, self.order)

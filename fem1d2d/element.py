@@ -17,10 +17,7 @@ from fem1d2d.mesh import Cells, Floats, MeshError, measures
 
 
 class Element(ABC):
-    """Shape functions on the cells of a mesh, and how to integrate them.
-
-    To add an element, put it into :data:`ELEMENTS`: meshes of such cells then have matrices and loads.
-    """
+    """Shape functions on the cells of a mesh, and their integrals; :data:`ELEMENTS` lists the elements in use."""
 
     @abstractmethod
     def points(self, mesh: Cells) -> Sequence[tuple[NDArray[Any], NDArray[Any]]]:

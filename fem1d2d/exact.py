@@ -7,7 +7,6 @@ of the sums over cells is bounded.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
@@ -22,6 +21,7 @@ from fem1d2d.assembly import assemble, unknowns
 from fem1d2d.enclosed import Enclosed, gamma, nearest
 from fem1d2d.material import Material
 from fem1d2d.mesh import Cells, Ints
+from fem1d2d.outline import whole_numbers
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -49,11 +49,8 @@ class Shapes(Cells):
         >>> len(mesh.cells), len(Shapes.of(mesh.points, mesh.cells).cells)
         (48, 4)
         """
-        # in units of which all coordinates are multiples: whole numbers are faster than fractions
-        flat = points.ravel().tolist()
-        unit = math.lcm(*(value.denominator for value in flat))
-        whole = np.array([value.numerator * (unit // value.denominator) for value in flat], dtype=object)
-        corners = whole.reshape(points.shape)[cells]
+        whole, unit = whole_numbers(points)
+        corners = whole[cells]
         known: dict[tuple[Any, ...], int] = {}
         spokes = (corners[:, 1:] - corners[:, :1]).reshape(len(corners), -1)
         of_cell = [known.setdefault(tuple(row), len(known)) for row in spokes.tolist()]

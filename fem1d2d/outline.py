@@ -57,9 +57,8 @@ def fault(points: NDArray[Any], edges: Ints) -> str | None:
         points = np.ldexp(points, -np.frexp(np.abs(points).max(axis=0))[1])
     start, end = points[edges[:, 0]], points[edges[:, 1]]
     floats = start.astype(float), end.astype(float)
-    if not rounding:  # in whole numbers: the same digits, and quicker than fractions
-        unit = math.lcm(*(Fraction(x).denominator for x in points.ravel()))
-        start, end = (np.frompyfunc(lambda x: int(x * unit), 1, 1)(ends) for ends in (start, end))
+    if not rounding:
+        start, end = whole_numbers(points)[0][edges.T]
     if _convex(edges, (start, end), floats):
         return None
     for i, j in _near(*floats):
@@ -78,6 +77,14 @@ def fault(points: NDArray[Any], edges: Ints) -> str | None:
         if covered.any():
             return f"the boundary edge {of(np.argmax(covered))} lies inside another cell"
     return None
+
+
+def whole_numbers(values: NDArray[Any]) -> tuple[NDArray[Any], int]:
+    """Rationals as multiples of 1/unit, and that unit: whole numbers are faster than fractions."""
+    exact = [Fraction(x) for x in values.ravel().tolist()]
+    unit = math.lcm(*(x.denominator for x in exact))
+    whole = np.array([x.numerator * (unit // x.denominator) for x in exact], dtype=object)
+    return whole.reshape(values.shape), unit
 
 
 def _convex(edges: Ints, exactly: tuple[NDArray[Any], NDArray[Any]], floats: tuple[Floats, Floats]) -> bool:

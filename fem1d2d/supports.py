@@ -41,11 +41,7 @@ def supports(mesh: Mesh, sides: Mapping[str, Sequence[float | None]]) -> Support
     """Collect the displacements that sides prescribe.
 
     ``sides`` maps names of sides to d displacements in the mesh's unit of length; None leaves a component free.
-
-    Raises
-    ------
-    MeshError
-        Two sides prescribe different values at a common node.
+    MeshError if two sides prescribe different values at a common node.
 
     Examples
     --------

@@ -51,12 +51,8 @@ def surface(mesh: Mesh, *, upper: bool, ends: tuple[float, float] | None = None)
 def facing(mesh: Mesh, *, upper: bool, ends: tuple[float, float]) -> Ints:
     """Nodes of the boundary that faces up (or down) between two positions, from left to right (2D).
 
-    The surface may be curved, like a cylinder on a plane.  ``ends`` are used as by :func:`surface`.
-
-    Raises
-    ------
-    MeshError
-        Two points of the surface lie above each other.
+    The surface may be curved, like a cylinder on a plane; MeshError if two of its points lie above each other.
+    ``ends`` are used as by :func:`surface`.
     """
     edges = mesh.boundary
     x = mesh.points[:, 0].astype(float)
@@ -110,12 +106,8 @@ def mortar(contact: NDArray[Any], neumann: NDArray[Any]) -> NDArray[Any]:
     ----------
     contact, neumann : array, shapes (n_c,), (n_n,)
         Increasing positions, n_c >= 2; of the second grid all nodes whose hat functions reach into the interval of the
-        first, so that the outermost may lie outside.  Rational entries (object arrays) give rational ones.
-
-    Raises
-    ------
-    ValueError
-        The second grid does not cover the interval of the first.
+        first, so that the outermost may lie outside; ValueError if it does not cover that interval.  Rational entries
+        (object arrays) give rational ones.
 
     Examples
     --------

@@ -154,7 +154,7 @@ def predicted_rate(rho: Scalar) -> Scalar:
 def tied_theta(rho_min: Scalar, rho: Scalar) -> Scalar:
     """``2/(2 + rho_min + rho)``: the best theta where nothing opens or slips, so that every step is linear.
 
-    Below 2/(1 + rho), and so safe without friction where something opens after all.
+    Below 2/(1 + rho), and so safe without friction even if something opens.
 
     Examples
     --------

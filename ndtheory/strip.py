@@ -76,10 +76,7 @@ class Strip:
     def form(self, part: Part) -> tuple[Interval, ...]:
         """TT, NN and NT enclosed for all wave numbers of a part, unit stress/length.
 
-        Raises
-        ------
-        ValueError
-            A part without end: use :meth:`over_wave_number`.
+        ValueError for a part without end: use :meth:`over_wave_number`.
 
         Examples
         --------

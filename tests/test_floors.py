@@ -107,8 +107,8 @@ FLOORS: dict[str, dict[str, str]] = {
 
 #: Lines of each package at most, those of packages inside it apart: whoever needs more says here how many.
 BUDGET = {
-    "fem1d2d": 3300,
-    "ndtheory": 6100,
+    "fem1d2d": 3000,
+    "ndtheory": 5600,
     "verification": 1300,
     "verification.advice": 4900,
     "verification.algorithm": 2300,
