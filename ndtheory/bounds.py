@@ -194,7 +194,7 @@ class Answer:
     Attributes
     ----------
     interval : tuple of float or None
-        Contraction for lo < theta < hi <= 1; None where no theta contracts.
+        Contraction is proved for lo < theta < hi <= 1; None where it is proved for no theta.
     interval_proved : tuple of float or None
         Thetas that contract whichever of the constants enclosed are the true ones; None if there are none, or no
         enclosures.
@@ -260,7 +260,7 @@ NAMES = ("C_K", "C_T", "C_T_tilde", "C0", "C1", "C2", "C3", "C4", "C5", "C6", "f
 
 @dataclass(frozen=True, kw_only=True)
 class Bounds(Answer):
-    """The answer of one edition of the theorem; ``factor`` is K(theta), ``interval`` the four cases of Proposition 5.6.
+    """The answer of an edition: ``factor`` is K(theta), ``interval`` has all cases of Proposition 5.6, None from C2 on.
 
     Attributes
     ----------

@@ -114,7 +114,7 @@ class GivenConstants:
         return low, high
 
     def enclosures(self, *keys: str) -> list[tuple[Fraction, Fraction]] | None:
-        """The ends of some constants; None unless a Number was given and all of these ends are of ordinary size.
+        """The ends of some constants; None unless a Number was given and all of these have ends of ordinary size.
 
         Friction may be arbitrarily small: that makes no cancellation worse.
         """

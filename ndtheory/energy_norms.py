@@ -292,7 +292,7 @@ def _last_where(holds: Callable[[Scalar], bool], low: Scalar, high: Scalar) -> S
 
 @dataclass(frozen=True, kw_only=True)
 class EnergyBounds(Answer):
-    """The answer of the theorem in energy norms; ``factor`` is q(theta).
+    """The answer of the theorem in energy norms: ``factor`` is q(theta), ``interval`` is None where q >= 1 everywhere.
 
     Attributes
     ----------

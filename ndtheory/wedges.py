@@ -2,8 +2,8 @@ r"""Lower bounds of rho from an end of Gamma_c: the stiffness of a wedge against
 
 A wedge ``0 < phi < omega`` has its side phi = 0 on Gamma_c; the side phi = omega is free, or clamped.  A displacement
 ``r^(i xi) h`` of the side on Gamma_c costs the energy ``h* S(xi) h`` for each real xi (:meth:`Wedge.symbol`), and
-displacements with different xi are orthogonal.  For large xi, S is the form of a half-plane; for small xi and a free
-wedge it is ``E* xi^2/2`` times the eigenvalues of :func:`ndtheory.moduli.wedge`.
+displacements with different xi are orthogonal.  For large xi, S is the form of a half-plane; for small xi the
+eigenvalues of a free wedge are ``E* xi^2/2`` times the stiffnesses of :func:`ndtheory.moduli.wedge`.
 
 For two wedges that share the side on Gamma_c the largest eigenvalue of ``(S_contact, S_neumann)`` is a lower bound of
 rho in the continuum, at every xi.  The proof is in ``docs/continuum.md``.  Numbers are enclosed in decimals that are
