@@ -1,6 +1,7 @@
-"""The numbered statements of the paper, and facts of ours: what each claims, and what is wrong with it, if anything.
+"""The numbered statements of the paper, and facts of ours: what each claims, and what is wrong with it if anything is.
 
-The texts are data, in ``statements.toml`` beside this module.  Verdicts come from :mod:`verification.ledger`.
+The texts are data, in ``statements.toml`` beside this module.  Verdicts are not among them: those are earned
+(:mod:`verification.ledger`).
 """
 
 from __future__ import annotations
