@@ -81,9 +81,8 @@ FLOORS: dict[str, dict[str, str]] = {
         ),
         "verification.reproduce": "__init__ claims experiments readings refutation",
         "verification.ledger": (
-            "__init__ cases convergence differences draws enclosed_pairs enclosures evidence experiments "
-            "field_problems found inequalities large_friction moves rational_pairs reading record rows sheets "
-            "solutions sources weak_forms worst"
+            "__init__ cases convergence differences enclosures evidence experiments inequalities large_friction "
+            "rational_pairs record rows sheets solutions sources weak_forms worst"
         ),
     },
     "parts of results": {

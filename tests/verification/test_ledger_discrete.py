@@ -18,8 +18,16 @@ from scipy.linalg import eigh
 
 from verification.ledger import inequalities
 from verification.ledger.cases import NAMED
-from verification.ledger.differences import Difference, Differences, DrawnSetting, along, between
-from verification.ledger.draws import directions, pieces, uniform_piece
+from verification.ledger.differences import (
+    Difference,
+    Differences,
+    DrawnSetting,
+    along,
+    between,
+    directions,
+    pieces,
+    uniform_piece,
+)
 from verification.ledger.evidence import Evidence
 from verification.ledger.inequalities import ALLOWANCE, INEQUALITIES, LEVELS, SHARES, Inequality, Reading
 from verification.ledger.worst import Trial, WorstTally, discrete, draw_cases, pairs_of

@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from verification.ledger.cases import NAMED
-from verification.ledger.differences import along
-from verification.ledger.draws import uniform_piece
-from verification.ledger.enclosed_pairs import EnclosedBodies
+from verification.ledger.differences import along, uniform_piece
 from verification.ledger.enclosures import (
     CONTRACTION,
     LAYER,
@@ -18,6 +16,7 @@ from verification.ledger.enclosures import (
     OF_STICKING,
     ON_LAYER,
     PLATE,
+    EnclosedBodies,
     EnclosedConstants,
     decide,
     enclosed,

@@ -1,4 +1,4 @@
-"""Convergence of the iteration: (3.1) III, Proposition 5.1, Theorem 5.9 and (5.47), held against runs."""
+"""Convergence of the iteration: (3.1) III, Proposition 5.1, Theorem 5.9 and (5.47), compared with runs."""
 
 from __future__ import annotations
 
@@ -22,11 +22,22 @@ from verification.algorithm.theta import CLOSEST_TO_ONE
 from verification.constants import measure
 from verification.contact import ContactError
 from verification.interface.body import Body
+from verification.ledger.cases import CONVERGENT, PLANE
 from verification.ledger.evidence import Evidence, Level, figure
-from verification.ledger.field_problems import CONVERGENT, PLANE
-from verification.ledger.found import Found, equations, evidence, on_problems
-from verification.ledger.reading import Reading
-from verification.ledger.weak_forms import CLEAR, EXACT, LIMIT, Case, Weak, cases, image_of
+from verification.ledger.inequalities import Reading
+from verification.ledger.weak_forms import (
+    CLEAR,
+    EXACT,
+    LIMIT,
+    Case,
+    Found,
+    Weak,
+    cases,
+    equations,
+    evidence,
+    image_of,
+    on_problems,
+)
 from verification.problem.specification import Problem
 
 #: Steps of (3.1) with the printed sign.
@@ -147,7 +158,7 @@ def forces_carry_displacements(setting: RunsOfLevel) -> list[Evidence]:
             if not case.grids_differ:
                 ratios = strong_convergence(case.weak, clear, float(case.run.theta), reading.m)
                 estimate[case.name] = float(ratios.max())
-    ends = [Found(case=c, values=np.array([apart(c)]), limit=LIMIT) for c in setting.cases if c.run.converged]
+    ends = [Found(c, np.array([apart(c)]), LIMIT) for c in setting.cases if c.run.converged]
     lost = min((there_and_back(case) for case in setting.cases if case.grids_differ), default=1.0)
     kept = f"which needs one grid (with mortar transfers both ways a^1(z, R^1 R^2 z) falls to {lost:.2g} of a^1(z, z))"
     return [
@@ -188,7 +199,7 @@ class Convergence:
 
     @cached_property
     def ratio(self) -> float:
-        """The largest ``|||g_i - g||| / |||g_{i-1} - g|||`` while the distance stands clear of rounding.
+        """The largest ``|||g_i - g||| / |||g_{i-1} - g|||`` while the distance is far above rounding.
 
         g is the functional of Theorem 5.9, from the displacement of body 1.
         """
@@ -260,7 +271,7 @@ def _falling(of: Any, text: str, runs: Sequence[Convergence]) -> Evidence:
     ratios = {r.case.name: r.ratio / r.factor for r in runs}
     where = max(ratios, key=lambda name: figure(ratios[name]))
     converged = [r for r in runs if r.case.run.converged]
-    ends = [Found(case=r.case, values=np.array([end_of(r.case)]), limit=LIMIT) for r in converged]
+    ends = [Found(r.case, np.array([end_of(r.case)]), LIMIT) for r in converged]
     arrived = equations(of, "", ends)
     data = {
         "problems": list(ratios),
@@ -291,7 +302,7 @@ def end_of(case: Case) -> float:
 
 def fields_converge(setting: RunsOfLevel) -> list[Evidence]:
     def arrive(of: Any, text: str, runs: Sequence[Convergence]) -> Evidence:
-        ends = [Found(case=r.case, values=np.array([apart(r.case)]), limit=LIMIT) for r in runs if r.case.run.converged]
+        ends = [Found(r.case, np.array([apart(r.case)]), LIMIT) for r in runs if r.case.run.converged]
         return equations(of, f"u_i at the end of runs {text}, against the global method in V", ends)
 
     return [
@@ -302,7 +313,7 @@ def fields_converge(setting: RunsOfLevel) -> list[Evidence]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RunsOfLevel:
-    """What the checks share."""
+    """The problems and runs that the checks share."""
 
     level: Level
 

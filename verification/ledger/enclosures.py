@@ -9,24 +9,254 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
+from decimal import Decimal
 from fractions import Fraction
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, Literal
 
+import numpy as np
+from scipy.linalg import eigh
+
 from fem1d2d import plane_strain
+from fem1d2d.enclosed import Enclosed, upwards
+from fem1d2d.mesh import Floats
+from fem1d2d.proved import Ends
+from ndtheory import Number, energy_norms
 from ndtheory import bounds as formulas
-from ndtheory import energy_norms
 from ndtheory.intervals import Interval
 from ndtheory.number import SLACK, decimal, directed, working_precision
+from verification.constants.proved import Between, Proof, entries
+from verification.interface.body import Condensed
 from verification.ledger.cases import NAMED, three_digits
-from verification.ledger.enclosed_pairs import MUCH, Apart, EnclosedBodies
+from verification.ledger.differences import directions, uniform_piece
 from verification.ledger.evidence import Evidence, Level
+from verification.ledger.inequalities import SEED
+from verification.ledger.worst import Trial
+from verification.problem.specification import Problem
+from verification.progress import silent
 from verification.threads import one_thread
+
+#: So many times the friction of its problems, what Section 5 prints from (5.31) on fails in a small unit of stress.
+MUCH = Fraction(10**8)
+
+
+class EnclosedBodies:
+    """The bodies of a problem of NAMED whose grids are one, with what is proved of them.
+
+    "1" is the contact body and "2" the Neumann body.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name, self.problem = name, Problem.from_dict(NAMED[name])
+        self.case = Trial.of(name, self.problem)
+        self.proof = Proof(self.case.measured, self.case.pair, silent)
+        self.measured = self.proof.result()
+        self.names = self.proof.contact, self.proof.neumann
+
+    def number(self, name: str) -> Interval:
+        """A constant of both bodies."""
+        return _interval(getattr(self.measured, name))
+
+    def of_bodies(self, name: str) -> list[Interval]:
+        """m or M of the contact body and of the Neumann body."""
+        return [_interval(getattr(getattr(self.measured, body), name)) for body in self.names]
+
+    @cached_property
+    def N(self) -> list[Between]:
+        """H1 norms squared of the lifts."""
+        found = [self.proof.lift(self.proof.bodies[name]) for name in self.names]
+        return [self._known(form) for form in found]
+
+    @property
+    def E(self) -> list[Between]:
+        """The norms squared of H^1/2(Gamma_c)."""
+        return [self._known(self.proof.E[name]) for name in self.names]
+
+    @property
+    def S(self) -> list[Between]:
+        """The energies squared of the lifts."""
+        return [self._known(self.proof.S[name]) for name in self.names]
+
+    @staticmethod
+    def _known(form: Between | None) -> Between:
+        if form is None:
+            raise ArithmeticError("rounding errors exceed what is to be proved")
+        return form
+
+    def top(self, form: Between, against: Between) -> Interval:
+        """The largest eigenvalue of a pencil."""
+        return _ends(self.proof.largest(form, against))
+
+    @cached_property
+    def contrast(self) -> list[Interval]:
+        """``M^a/m^a``."""
+        return [M / m for M, m in zip(self.of_bodies("M"), self.of_bodies("m"), strict=True)]
+
+    def across(self, forms: list[Between]) -> list[Interval]:
+        """Each of two forms against the norm of the other body's traces."""
+        return [self.top(forms[0], self.E[1]), self.top(forms[1], self.E[0])]
+
+    @cached_property
+    def slides(self) -> Slides:
+        """A pair of forces on which the friction term is large."""
+        return Slides(self)
+
+    @cached_property
+    def slides_much(self) -> Slides:
+        """The same at much more friction."""
+        return Slides(self, MUCH)
+
+    @cached_property
+    def sticks(self) -> Sticks:
+        """A pair of forces to which T answers with a large difference."""
+        return Sticks(self)
+
+
+class Apart:
+    """The difference of two solutions on a piece of T where d_2 is u.
+
+    Attributes
+    ----------
+    energy_1, work, friction : Interval
+        ``a^1(w^1 - w~^1, w^1 - w~^1)``, ``<T psi - T psi~, w^2 - w~^2>`` and the friction term.
+    size_1, size_2 : Interval
+        ``|w^a - w~^a|_a`` in H1.
+    norm, norm_T, dual, dual_T : Interval
+        The norm (5.21) of ``psi - psi~`` and of ``T psi - T psi~``, and their norms in the dual of V^2.
+    """
+
+    energy_1: Interval
+    work: Interval
+    friction: Interval
+    size_1: Interval
+    norm_T: Interval
+    dual_T: Interval
+
+    def __init__(self, bodies: EnclosedBodies, u: Floats) -> None:
+        self.u, self._proof, pair = u, bodies.proof, bodies.case.pair
+        sides = (pair.contact, pair.neumann)
+        self._S_1, self._S_2 = (_turned(form, side) for form, side in zip(bodies.S, sides, strict=True))
+        self._N_1, N_2 = (_turned(form, side) for form, side in zip(bodies.N, sides, strict=True))
+        self._E_2 = _turned(bodies.E[1], pair.neumann)
+        self._force = entries(self._S_2).times(Enclosed.exactly(u[:, None]))
+        self.size_2, self.norm = _form(N_2, u).sqrt(), _form(self._S_2, u).sqrt()
+        self.dual = self._inverse_form(self._E_2, self._force)[0].sqrt()
+
+    def _inverse_form(self, form: Between, x: Enclosed) -> tuple[Interval, Floats, Decimal]:
+        identity = Enclosed.exactly(np.eye(len(self.u)))
+        return _inverse_form(form, x, self._proof.largest((identity, identity), form)[1])  # 1/least eigenvalue
+
+    def _answer(self, reaction: Enclosed) -> None:
+        """Take ``T psi - T psi~``, the inner product of whose forces with those of psi is the work."""
+        self.work = _scalar(reaction.T.times(Enclosed.exactly(self.u[:, None])))
+        self.norm_T = self._inverse_form(self._S_2, reaction)[0].sqrt()
+        self.dual_T = self._inverse_form(self._E_2, reaction)[0].sqrt()
+
+    def step(self, theta: Fraction) -> Interval:
+        """``|||T_theta psi - T_theta psi~|||^2`` (5.7)."""
+        rest = 1 - theta
+        return theta**2 * self.norm_T.square() + rest**2 * self.norm.square() + 2 * theta * rest * self.work
+
+    def gain(self, theta: Fraction) -> Interval:
+        """``(|||psi - psi~|||^2 - |||T_theta psi - T_theta psi~|||^2)/theta``, in which small thetas lose nothing."""
+        norm, norm_T = self.norm.square(), self.norm_T.square()
+        return 2 * (norm - self.work) - theta * (norm - 2 * self.work + norm_T)
+
+
+class Sticks(Apart):
+    """All nodes touch and stick; the direction is that of the largest stiffness of body 1 relative to body 2."""
+
+    def __init__(self, bodies: EnclosedBodies) -> None:
+        pair = bodies.case.pair
+        n = len(pair.neumann.stiffness)
+        u = eigh(pair.contact.stiffness, pair.neumann.stiffness, subset_by_index=[n - 1] * 2)[1][:, 0]
+        super().__init__(bodies, u)
+        back = entries(self._S_1).times(Enclosed.exactly(u[:, None]))
+        self.energy_1, self.size_1 = _form(self._S_1, u), _form(self._N_1, u).sqrt()
+        self.friction = Interval.of(0)
+        self._answer(Enclosed(middle=-back.middle, radius=back.radius))
+
+
+class Slides(Apart):
+    """All nodes are open and slip one way, at ``more`` times the friction, with the largest friction term."""
+
+    def __init__(self, bodies: EnclosedBodies, more: Fraction = Fraction(1)) -> None:
+        pair, case = bodies.case.pair, bodies.case
+        piece = uniform_piece(pair, touching=False, sliding=1)
+        random = np.random.default_rng(SEED)
+        forms = case.setting.forms
+        worst = max(
+            (forms.root @ y for y in directions(case.setting, piece, random)),
+            key=lambda g: (
+                float((piece.bound @ g) @ -(piece.jump @ g)[: pair.contact.grid.t]) / float(g @ forms.inverse @ g)
+            ),
+        )
+        super().__init__(bodies, forms.inverse @ worst)
+        t, kernel = pair.contact.grid.t, bodies.proof.joint.kernel
+        assert kernel is not None
+        zeta = kernel.times(self._force.block(np.arange(t, len(self.u)), np.arange(1)))
+        signed = Enclosed(middle=piece.sign[:, None] * zeta.middle, radius=zeta.radius)
+        friction = _times(more * bodies.problem.contact.friction)
+        bound = bodies.proof.joint.weights.times(signed).times(friction)
+        nothing = np.zeros((len(self.u) - t, 1))
+        reaction = Enclosed(middle=np.vstack([bound.middle, nothing]), radius=np.vstack([bound.radius, nothing]))
+        self._answer(reaction)
+        self.energy_1, y, off = self._inverse_form(self._S_1, reaction)
+        self.friction = self.energy_1 + self.work
+        error = (Interval.of(off) / bodies.of_bodies("m")[0]).sqrt()  # of the H1 norm
+        size = _form(self._N_1, y).sqrt()
+        self.size_1 = Interval.between(max((size - error).lo, Decimal(0)), (size + error).hi)
+
+
+def _interval(number: Number) -> Interval:
+    return _ends((number.lo, number.hi))
+
+
+def _ends(ends: Ends) -> Interval:
+    low, high = ends
+    if low is None or high is None:
+        raise ArithmeticError("rounding errors exceed what is to be proved")
+    return Interval.between(low, high)
+
+
+def _turned(form: Between, side: Condensed) -> Between:
+    """A form in the directions of the pair of bodies."""
+    low, high = (Enclosed(middle=side.orient_form(X.middle), radius=X.radius) for X in form)
+    return low, high
+
+
+def _times(factor: Fraction) -> Enclosed:
+    return Enclosed.rounded(np.array([[factor]], dtype=object))
+
+
+def _scalar(found: Enclosed) -> Interval:
+    value, radius = (Fraction(float(part[0, 0])) for part in (found.middle, found.radius))
+    return Interval.between(value - radius, value + radius)
+
+
+def _form(form: Between, x: Floats) -> Interval:
+    """``x' X x``."""
+    return Interval.between(form[0].form(x)[0], form[1].form(x)[1])
+
+
+def _inverse_form(form: Between, x: Enclosed, inverse: float | None) -> tuple[Interval, Floats, Decimal]:
+    """``x' Y^-1 x``, a vector of doubles near ``Y^-1 x``, and how far it may be from it, squared in the norm of Y."""
+    if inverse is None:
+        raise ArithmeticError("a form that is not proved to be definite")
+    Y = entries(form)
+    y = np.linalg.solve(Y.middle, x.middle[:, 0])
+    column = Enclosed.exactly(y[:, None])
+    residual = x.plus(-1.0, Y.times(column))
+    sizes = np.abs(residual.middle) + residual.radius
+    off = Interval.of(Fraction(float(upwards((sizes**2).sum(), sizes.size + 4)))) * Fraction(inverse)
+    value = 2 * _scalar(x.T.times(column)) - _form(form, y)
+    return Interval(value.lo, (value + off).hi), y, off.hi
+
 
 #: The bodies on which most is decided, and those on which (5.30) as printed fails, in a unit of stress.
 PLATE, LAYER = "plate of thickness 0.01 clamped at one end", "layer of a ten-thousandth on a block"
 
-#: Of stress, in units of the file: the one in which (5.30) as printed fails, and that of the file.
+#: Units of stress in units of the file: the one in which (5.30) as printed fails, and the file's.
 SMALL, OWN = Fraction(1, 10**6), Fraction(1)
 
 #: The unit of stress in which what is printed from (5.31) on fails on the layer with much friction, as it does on any
@@ -51,13 +281,12 @@ class EnclosedConstants:
 
     Attributes
     ----------
-    bodies : EnclosedBodies
     printed : bool
-        Whether the bracket of (5.30) adds a stress to 1.
+        True if the bracket of (5.30) adds a stress to 1.
     unit : Fraction
-        Of stress, in units of the file.
+        The unit of stress in units of the file.
     share : Fraction
-        Of the friction of the bodies, at which the constants are read.
+        The friction over that of the bodies.
     """
 
     bodies: EnclosedBodies
@@ -71,7 +300,7 @@ class EnclosedConstants:
 
     @property
     def C_R(self) -> Interval:
-        """Of both lifts."""
+        """The constant of both lifts."""
         return self.bodies.number("C_R")
 
     @property
@@ -157,7 +386,7 @@ class EnclosedConstants:
         return found
 
     def inside(self, share: Fraction) -> Fraction:
-        """A theta between the ends of Proposition 5.6, the upper one C_1; share is about that of the way."""
+        """A theta at about this share of the way between the ends of Proposition 5.6, the upper one being C_1."""
         low = Interval.of(0) if self.P.hi <= 1 else formulas.C6(self.P)
         high = formulas.C1(self.D, self.Q)
         theta = three_digits(float(low.hi) + float(share) * (float(high.lo) - float(low.hi)))
@@ -190,7 +419,7 @@ class EnclosedConstants:
 ONE = Interval.of(1)
 
 
-#: Of the bodies alone; both sides are squares.
+#: Only of the bodies; both sides are squares.
 OF_BODIES: Mapping[Key, Callable[[EnclosedBodies], Sides]] = {
     ("4.7", "printed"): lambda b: [(b.top(b.E[1], b.N[0]), ONE), (b.top(b.E[0], b.N[1]), ONE)],
     ("4.7", "repaired"): lambda b: [(b.top(E, N), ONE) for E, N in zip(b.E, b.N, strict=True)],
@@ -233,7 +462,7 @@ STEPS: Mapping[str, Callable[[Apart, EnclosedConstants], tuple[Interval, Interva
     "5.44": lambda d, r: (d.step(r.below_C_0), r.h_2(r.below_C_0) * d.norm.square()),
 }
 
-#: Of a pair of forces at much friction, in a small unit of stress.
+#: For a pair of forces at much friction, in a small unit of stress.
 OF_MUCH: Pairs = {(id, "printed"): sides for id, sides in STEPS.items()}
 
 #: A friction just below C_2, and theta at this share of the way through the interval of Proposition 5.6.
@@ -245,7 +474,7 @@ CONTRACTION: Mapping[Key, Fraction] = {
     ("x-merged-interval", "repaired"): Fraction(1, 10),
 }
 
-#: Of a pair of forces where all nodes stick.
+#: For a pair of forces where all nodes stick.
 OF_STICKING: Pairs = {
     ("5.38", "printed"): lambda d, r: (r.weight(HALF) * d.norm_T.square(), r.weight(HALF) * r.Q * d.norm.square()),
     ("x-ratio", "printed"): lambda d, r: (d.energy_1, (r.ratio * d.norm).square()),
@@ -253,7 +482,7 @@ OF_STICKING: Pairs = {
     **{key: partial(contracts, share=share) for key, share in CONTRACTION.items()},
 }
 
-#: Of a pair of forces where all nodes are open and slip one way, at theta = 1/2 where none is said.
+#: For a pair of forces where all nodes are open and slip one way, at theta = 1/2 where none is said.
 OF_PAIRS: Pairs = {
     ("5.11", "printed"): lambda d, r: (d.size_1, r.X * d.size_2),
     ("5.13", "printed"): lambda d, r: (
@@ -320,15 +549,7 @@ def enclosed(
 
 
 def decide(bodies: EnclosedBodies, id: str, of: Literal["printed", "step", "repaired"]) -> Evidence | None:
-    """The evidence of an inequality on some bodies; None where the enclosures overlap.
-
-    Parameters
-    ----------
-    bodies : EnclosedBodies
-    id : str
-        Of the statement.
-    of : {'printed', 'step', 'repaired'}
-    """
+    """The evidence of an inequality on some bodies; None where the enclosures overlap."""
     key: Key = (id, of)
     unit = SMALL if key == ("5.30", "printed") else TINY if key in OF_MUCH else OWN
     share = MUCH if key in OF_MUCH else Fraction(1)
