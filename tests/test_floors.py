@@ -93,7 +93,7 @@ FLOORS: dict[str, dict[str, str]] = {
     },
     "figures": {
         "verification.figures": (
-            "__init__ best_theta bodies factor of_results region reproduction residuals rules style sweep waterfall"
+            "__init__ best_theta bodies factor of_results region reproduction residuals style sweep waterfall"
         )
     },
     "files": {"verification.output": "__init__ files folder report"},

@@ -24,18 +24,12 @@ if TYPE_CHECKING:
 
 
 class Folder:
-    """A folder for results; refused at once where it cannot be written, before anything long is computed.
-
-    Parameters
-    ----------
-    path : Path
-    kind : {'run', 'solve', 'compare', 'verify', 'reproduce'}
-        What will be written: none of those files may be somebody else's.
+    """A folder for results of one kind, checked before anything long is computed.
 
     Raises
     ------
     ProblemError
-        Not a folder, not writable, or it holds a file of that name that is not ours.
+        Not a folder, not writable, or it holds a file with a name of this kind that another program has written.
     """
 
     def __init__(self, path: Path, kind: Kind) -> None:
@@ -52,15 +46,9 @@ class Folder:
             check_place(path / "problem.toml")  # a file of a user's stays as it is
 
     def write_problem(self, text: str) -> Path:
-        """Write ``problem.toml``.
-
-        Raises
-        ------
-        ProblemError
-            A different problem.toml is there: an edited one is not overwritten.
-        """
+        """Write ``problem.toml``; ProblemError if an edited one is there, which is not overwritten."""
         target = self.path / "problem.toml"
-        if target.exists() and (target.is_dir() or not _may_go(target.read_bytes(), text)):
+        if target.exists() and (target.is_dir() or not _replaceable(target.read_bytes(), text)):
             needed = "differs from the built-in problem: needed another folder (-o), or run compare on this file"
             raise ProblemError(str(target), "", None, needed)
         with staged(self.path, shown=target) as room:
@@ -133,8 +121,8 @@ class Folder:
                 _text(room / "verdicts.json", sheets.verdicts(ledger))
 
 
-def _may_go(there: bytes, text: str) -> bool:
-    """Whether a problem file may be replaced by a text: it is the same, or was written beside a result."""
+def _replaceable(there: bytes, text: str) -> bool:
+    """True if a problem file is the same as a text, or was written beside a result."""
     return there == text.encode() or MARKS[".toml"] in there
 
 
