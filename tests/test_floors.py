@@ -87,8 +87,7 @@ FLOORS: dict[str, dict[str, str]] = {
     },
     "parts of results": {
         "verification.sections": (
-            "advice advised bounds certificate comparison constants continuum ledger logs moduli of_results region "
-            "reproduction run setting sweep tex"
+            "advice bounds certificate comparison constants ledger of_results reproduction run setting sweep"
         )
     },
     "figures": {

@@ -111,7 +111,7 @@ def _prove_continuum(
     from ndtheory.strip import Unproved
     from verification.certificate.continuum import certify_continuum
     from verification.output.files import writing
-    from verification.sections.continuum import sections
+    from verification.sections.certificate import continuum
 
     problem = load_problem(file, keys, theta=theta, swap=swap)
     try:
@@ -120,7 +120,7 @@ def _prove_continuum(
     except Unproved as error:
         return fail(error, "not proved", "nothing is proved")
     typed = Typed(file=file, keys=keys, theta=theta, swap=swap)
-    deliver(found, sections, as_json, writing(found, target), target, typing=typed.command)
+    deliver(found, continuum, as_json, writing(found, target), target, typing=typed.command)
     return 0 if found.contracts else 1
 
 

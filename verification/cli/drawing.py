@@ -32,7 +32,7 @@ def region(file: Path, keys: dict[str, str], swap: bool, target: Path, store: Pa
     from verification import figures
     from verification.bounds.region import chart
     from verification.output.files import staged
-    from verification.sections.region import sections
+    from verification.sections.sweep import plane as sections
 
     problem = load_problem(file, keys, swap=swap)
     check_place(target)
