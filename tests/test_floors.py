@@ -99,8 +99,7 @@ FLOORS: dict[str, dict[str, str]] = {
     "names for users": {"verification": "__init__"},
     "commands, test kit": {
         "verification.cli": (
-            "__init__ advising calculator certifying console drawing failing forms ledger main matrices options "
-            "problems remedies reproducing shell sweeping typed"
+            "__init__ advising calculator certifying console forms ledger main options problems sweeping"
         ),
         "verification.testing": "__init__ bounds laws properties rules steps strategies transforms",
     },

@@ -65,6 +65,16 @@ def check_ours(target: Path) -> None:
         raise ProblemError(str(target), "", None, "not written by this program; needed another folder or name (-o)")
 
 
+def check_folder(room: Path, option: str = "") -> None:
+    """Make a folder; ProblemError, with the option that named it, if it cannot be written to."""
+    try:
+        room.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=room).close()
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise ProblemError(str(room), "", None, f"needed a folder to write to{option}: {why}") from None
+
+
 def check_place(target: Path) -> None:
     """Raise ProblemError for the name of a folder."""
     if target.is_dir():

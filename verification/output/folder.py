@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +11,7 @@ from verification.algorithm.runs import Run
 from verification.interface.files import write_interface, write_transfer
 from verification.interrupts import undisturbed
 from verification.ledger import sheets
-from verification.output.files import FILES, MARKS, MOST_BYTES, Kind, check_ours, check_place, staged
+from verification.output.files import FILES, MARKS, MOST_BYTES, Kind, check_folder, check_ours, check_place, staged
 from verification.problem.tables import ProblemError, unreadable
 from verification.spreadsheet import as_csv
 
@@ -34,12 +33,7 @@ class Folder:
 
     def __init__(self, path: Path, kind: Kind) -> None:
         self.path = path
-        try:
-            path.mkdir(parents=True, exist_ok=True)
-            tempfile.TemporaryFile(dir=path).close()
-        except (OSError, ValueError) as error:
-            why = getattr(error, "strerror", None) or error
-            raise ProblemError(str(path), "", None, f"needed a folder to write to: {why}") from None
+        check_folder(path)
         for name in FILES[kind]:
             check_ours(path / name)
         if kind not in ("verify", "reproduce"):

@@ -1,6 +1,7 @@
 """The sections of all results of this program: importing a module registers its functions."""
 
-from verification.sections import advice, bounds, certificate, comparison, constants, ledger, reproduction, run, sweep  # noqa: F401
+# ruff: noqa: F401
+from verification.sections import advice, bounds, certificate, comparison, constants, ledger, reproduction, run, sweep
 from verification.sections.parts import of
 
 __all__ = ["of"]
