@@ -11,8 +11,8 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from fractions import Fraction
-from functools import cached_property, partial
-from typing import Any, Literal
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh
@@ -29,8 +29,8 @@ from verification.constants.proved import Between, Proof, entries
 from verification.interface.body import Condensed
 from verification.ledger.cases import NAMED, three_digits
 from verification.ledger.differences import directions, uniform_piece
-from verification.ledger.evidence import Evidence, Level
-from verification.ledger.inequalities import SEED
+from verification.ledger.evidence import Evidence, Form, Level
+from verification.ledger.inequalities import ENTRIES, SEED, RightSides, terms_of
 from verification.ledger.worst import Trial
 from verification.problem.specification import Problem
 from verification.progress import silent
@@ -96,6 +96,17 @@ class EnclosedBodies:
         """Each of two forms against the norm of the other body's traces."""
         return [self.top(forms[0], self.E[1]), self.top(forms[1], self.E[0])]
 
+    @property
+    def largest(self) -> list[Interval]:
+        """M^a."""
+        return self.of_bodies("M")
+
+    @property
+    def continuity(self) -> list[Interval]:
+        """The bounds of M^a that follow from the materials."""
+        specs = (getattr(self.problem, name) for name in self.names)
+        return [Interval.of(plane_strain(spec.young, spec.poisson).continuity(2)) for spec in specs]
+
     @cached_property
     def slides(self) -> Slides:
         """A pair of forces on which the friction term is large."""
@@ -152,15 +163,21 @@ class Apart:
         self.norm_T = self._inverse_form(self._S_2, reaction)[0].sqrt()
         self.dual_T = self._inverse_form(self._E_2, reaction)[0].sqrt()
 
-    def step(self, theta: Fraction) -> Interval:
-        """``|||T_theta psi - T_theta psi~|||^2`` (5.7)."""
-        rest = 1 - theta
-        return theta**2 * self.norm_T.square() + rest**2 * self.norm.square() + 2 * theta * rest * self.work
+    @property
+    def inner(self) -> Interval:
+        """The inner product of ``T psi - T psi~`` and ``psi - psi~`` is the work, by (5.25) and (5.26)."""
+        return self.work
 
-    def gain(self, theta: Fraction) -> Interval:
-        """``(|||psi - psi~|||^2 - |||T_theta psi - T_theta psi~|||^2)/theta``, in which small thetas lose nothing."""
-        norm, norm_T = self.norm.square(), self.norm_T.square()
-        return 2 * (norm - self.work) - theta * (norm - 2 * self.work + norm_T)
+    @property
+    def step(self) -> Interval:
+        """``|||psi - T psi - (psi~ - T psi~)|||``."""
+        return (self.norm.square() - 2 * self.work + self.norm_T.square()).sqrt()
+
+    def relaxed(self, theta: Fraction) -> Interval:
+        """``|||T_theta psi - T_theta psi~|||`` (5.7)."""
+        rest = 1 - theta
+        square = theta**2 * self.norm_T.square() + rest**2 * self.norm.square() + 2 * theta * rest * self.work
+        return square.sqrt()
 
 
 class Sticks(Apart):
@@ -272,11 +289,11 @@ JUST_BELOW = Fraction(99, 100)
 Sides = list[tuple[Interval, Interval]]
 
 #: A statement, and what of it is decided.
-Key = tuple[str, Literal["printed", "step", "repaired"]]
+Key = tuple[str, Form]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class EnclosedConstants:
+class EnclosedConstants(RightSides):
     """The constants as Section 5 reads them, and its right sides, all enclosed.
 
     Attributes
@@ -294,34 +311,41 @@ class EnclosedConstants:
     unit: Fraction = OWN
     share: Fraction = Fraction(1)
 
-    def stress(self, name: str) -> Interval:
-        """A constant that is a stress, in that unit."""
-        return self.bodies.number(name) * self.unit * (self.share if name == "C_K" else 1)
+    @property
+    def m(self) -> Interval:
+        return self.bodies.number("m") * self.unit
+
+    @property
+    def M(self) -> Interval:
+        return self.bodies.number("M") * self.unit
+
+    @property
+    def C_K(self) -> Interval:
+        return self.bodies.number("C_K") * self.unit * self.share
 
     @property
     def C_R(self) -> Interval:
-        """The constant of both lifts."""
         return self.bodies.number("C_R")
 
     @property
-    def A(self) -> Interval:
-        """``M C_R``."""
-        return self.stress("M") * self.C_R
+    def C_K_half(self) -> Interval:
+        """``k C_s C_tr`` with C_tr into H^1/2 (5.8), in the unit of the file."""
+        of = self.bodies
+        return of.problem.contact.friction * of.number("C_s") * of.number("C_tr_half")
 
     @property
-    def give(self) -> Interval:
-        """``m^2/(M C_R)^2`` of (5.29)."""
-        return (self.stress("m") / self.A).square()
+    def energy(self) -> tuple[Interval, ...]:
+        """rho, kappa_1, kappa_2 of the theorem in energy norms."""
+        return tuple(map(self.bodies.number, ("rho_max", "kappa_1", "kappa_2")))
 
     @property
-    def X(self) -> Interval:
+    def X(self) -> Any:
         """The factor of (5.11)."""
-        m, x = self.stress("m"), self.stress("C_K")
-        return (self.A + x + (x * m).sqrt()) / m
+        return (self.A + self.C_K + (self.C_K * self.m).sqrt()) / self.m
 
     def grows(self, formula: Callable[..., Any]) -> Interval:
         """A formula of C_K, m, M, C_R and u that falls with m and grows with the others (:mod:`ndtheory.bounds`)."""
-        x, m, M, C_R = (self.stress("C_K"), self.stress("m"), self.stress("M"), self.C_R)
+        x, m, M, C_R = self.C_K, self.m, self.M, self.C_R
         edition = formulas.PRINTED if self.printed else formulas.REPAIRED
         with working_precision():
             low = formula(x.lo, m.hi, M.lo, C_R.lo, edition.unit(m.hi)) * (1 - SLACK)
@@ -338,20 +362,6 @@ class EnclosedConstants:
         """(5.16)."""
         return self.grows(lambda x, m, M, C_R, u: formulas.lipschitz(m, M, C_R, x))
 
-    def weight(self, theta: Fraction) -> Interval:
-        """The coefficient of ``|||T psi - T psi~|||^2`` in (5.32)."""
-        return theta**2 - 2 * theta * (1 - theta) * self.give
-
-    def h_1(self, theta: Fraction) -> Interval:
-        """After (5.39)."""
-        gain: Interval = formulas.one_minus_h1(theta, self.D, self.Q)
-        return 1 - gain
-
-    def h_2(self, theta: Fraction) -> Interval:
-        """(5.45)."""
-        gain: Interval = formulas.one_minus_h2(theta, self.P)
-        return 1 - gain
-
     @property
     def D(self) -> Interval:
         """``C_T^2/C_R^2 - P``."""
@@ -360,10 +370,10 @@ class EnclosedConstants:
     @property
     def Q(self) -> Interval:
         """The Lipschitz constant of T squared, as h_1 has it."""
-        return (self.C_T * self.stress("M") / self.stress("m")).square()
+        return (self.C_T * self.M / self.m).square()
 
     @property
-    def C_0(self) -> Interval:
+    def C_0(self) -> Any:
         """(5.37)."""
         return 2 * self.give / (1 + 2 * self.give)
 
@@ -379,7 +389,7 @@ class EnclosedConstants:
 
     def contracting(self) -> EnclosedConstants:
         """The same at a friction below C_2, as repaired."""
-        slight = three_digits(float(JUST_BELOW) * self.bodies.case.reading.threshold / float(self.stress("C_K").hi))
+        slight = three_digits(float(JUST_BELOW) * self.bodies.case.reading.threshold / float(self.C_K.hi))
         found = replace(self, share=slight)
         if not found.P.hi < (1 + found.give).lo:
             raise ArithmeticError("the friction is not proved to lie below C_2")
@@ -395,15 +405,14 @@ class EnclosedConstants:
         return theta
 
     def gain(self, theta: Fraction) -> Interval:
-        """``(1 - K(theta)^2)/theta``."""
-        h_1, h_2 = (2 * (1 + self.D) - theta * (1 + 2 * self.D + self.Q), (2 - theta) - 2 * (1 - theta) * self.P)
+        """``1 - K(theta)^2``."""
+        h_1, h_2 = formulas.one_minus_h1(theta, self.D, self.Q), formulas.one_minus_h2(theta, self.P)
         return Interval(min(h_1.lo, h_2.lo), min(h_1.hi, h_2.hi))
 
     def _energy(self, formula: Callable[..., Any]) -> Interval:
         """A formula of rho, kappa_1 and kappa_2 that grows with each (:mod:`ndtheory.energy_norms`)."""
-        constants = [self.bodies.number(name) for name in ("rho_max", "kappa_1", "kappa_2")]
         with working_precision():
-            low, high = formula(*(c.lo for c in constants)), formula(*(c.hi for c in constants))
+            low, high = formula(*(c.lo for c in self.energy)), formula(*(c.hi for c in self.energy))
             return Interval.between(low * (1 - SLACK), high * (1 + SLACK))
 
     @property
@@ -416,54 +425,21 @@ class EnclosedConstants:
         return self._energy(lambda *constants: 1 - energy_norms.one_minus_square(decimal(theta), *constants))
 
 
-ONE = Interval.of(1)
+#: The statements that are decided only of the bodies.
+OF_BODIES: tuple[Key, ...] = tuple(key for key, each in ENTRIES.items() if each.about == "bodies")
 
+#: The statements that follow from (5.30), for theta at or close to C_0, where they say most.
+STEPS = ("5.31", "5.32", "5.33", "5.36", "5.39", "5.44")
 
-#: Only of the bodies; both sides are squares.
-OF_BODIES: Mapping[Key, Callable[[EnclosedBodies], Sides]] = {
-    ("4.7", "printed"): lambda b: [(b.top(b.E[1], b.N[0]), ONE), (b.top(b.E[0], b.N[1]), ONE)],
-    ("4.7", "repaired"): lambda b: [(b.top(E, N), ONE) for E, N in zip(b.E, b.N, strict=True)],
-    ("4.8", "repaired"): lambda b: [(b.top(N, E), c) for N, E, c in zip(b.N, b.E, b.contrast, strict=True)],
-    ("prop-4.1.1", "repaired"): lambda b: [
-        (b.top(b.N[i], b.N[1 - i]), b.contrast[i] * b.across(b.E)[i]) for i in (0, 1)
-    ],
-    ("prop-4.1.2", "printed"): lambda b: [
-        (lifted, c * between) for lifted, c, between in zip(b.across(b.N), b.contrast, b.across(b.E), strict=True)
-    ],
-    ("x-continuity", "printed"): lambda b: [
-        (M, Interval.of(plane_strain(spec.young, spec.poisson).continuity(2)))
-        for M, spec in zip(b.of_bodies("M"), (getattr(b.problem, name) for name in b.names), strict=True)
-    ],
-    ("x-lift-bound", "printed"): lambda b: [(b.top(N, E), c) for N, E, c in zip(b.N, b.E, b.contrast, strict=True)],
-}
+#: For a pair of forces where all nodes are open and slip one way.
+OF_PAIRS: tuple[Key, ...] = (
+    *((id, "printed") for id in ("5.11", "5.13", "5.14", "5.15", "prop-5.4", "5.18", "5.19", "5.22", "5.23")),
+    *((id, "printed") for id in ("x-root-M", "5.29", "5.30", "x-reaction", "x-friction-energy")),
+    *((id, "repaired") for id in ("5.13", "5.30", *STEPS)),
+)
 
-Pairs = Mapping[Key, Callable[[Apart, EnclosedConstants], tuple[Interval, Interval]]]
-
-
-def contracts(d: Apart, r: EnclosedConstants, share: Fraction) -> tuple[Interval, Interval]:
-    """``1 - K(theta)^2`` is at most what a step takes away, both over theta; share as for ``inside``."""
-    slight = r.contracting()
-    theta = slight.inside(share)
-    return slight.gain(theta) * d.norm.square(), d.gain(theta)
-
-
-def of_step(d: Apart, r: EnclosedConstants, theta: Fraction) -> tuple[Interval, Interval]:
-    """(5.32), with the term of ``|||T psi - T psi~|||^2`` on the side on which it is positive."""
-    term, weight = d.norm_T.square(), r.weight(theta)
-    left, right = d.step(theta), r.h_2(theta) * d.norm.square()
-    return (left, right + weight * term) if weight.lo >= 0 else (left - weight * term, right)
-
-
-#: What follows from (5.30), close to C_0 where it says most.
-STEPS: Mapping[str, Callable[[Apart, EnclosedConstants], tuple[Interval, Interval]]] = {
-    "5.31": lambda d, r: (d.work + r.give * d.norm_T.square(), r.P * d.norm.square()),
-    **{id: lambda d, r: of_step(d, r, r.below_C_0) for id in ("5.32", "5.33", "5.36")},
-    "5.39": lambda d, r: (d.step(r.at_C_0), r.h_1(r.at_C_0) * d.norm.square()),
-    "5.44": lambda d, r: (d.step(r.below_C_0), r.h_2(r.below_C_0) * d.norm.square()),
-}
-
-#: For a pair of forces at much friction, in a small unit of stress.
-OF_MUCH: Pairs = {(id, "printed"): sides for id, sides in STEPS.items()}
+#: For such a pair at much friction, in a small unit of stress.
+OF_MUCH: tuple[Key, ...] = tuple((id, "printed") for id in STEPS)
 
 #: A friction just below C_2, and theta at this share of the way through the interval of Proposition 5.6.
 CONTRACTION: Mapping[Key, Fraction] = {
@@ -475,66 +451,44 @@ CONTRACTION: Mapping[Key, Fraction] = {
 }
 
 #: For a pair of forces where all nodes stick.
-OF_STICKING: Pairs = {
-    ("5.38", "printed"): lambda d, r: (r.weight(HALF) * d.norm_T.square(), r.weight(HALF) * r.Q * d.norm.square()),
-    ("x-ratio", "printed"): lambda d, r: (d.energy_1, (r.ratio * d.norm).square()),
-    ("x-energy", "printed"): lambda d, r: (d.step(HALF), r.q_squared(HALF) * d.norm.square()),
-    **{key: partial(contracts, share=share) for key, share in CONTRACTION.items()},
-}
+OF_STICKING: tuple[Key, ...] = (("5.38", "printed"), ("x-ratio", "printed"), ("x-energy", "printed"), *CONTRACTION)
 
-#: For a pair of forces where all nodes are open and slip one way, at theta = 1/2 where none is said.
-OF_PAIRS: Pairs = {
-    ("5.11", "printed"): lambda d, r: (d.size_1, r.X * d.size_2),
-    ("5.13", "printed"): lambda d, r: (
-        d.friction,
-        r.bodies.problem.contact.friction
-        * r.bodies.number("C_s")
-        * r.bodies.number("C_tr_half")
-        * (d.size_1 * d.size_2 + d.size_2.square()),
-    ),
-    ("5.13", "repaired"): lambda d, r: (d.friction, r.stress("C_K") * (d.size_1 * d.size_2 + d.size_2.square())),
-    ("5.14", "printed"): lambda d, r: (
-        r.stress("m") * d.size_1.square(),
-        (r.A + r.stress("C_K")) * d.size_1 * d.size_2 + r.stress("C_K") * d.size_2.square(),
-    ),
-    ("5.15", "printed"): lambda d, r: (
-        r.stress("m") * (d.size_1 - (r.A + r.stress("C_K")) / (2 * r.stress("m")) * d.size_2).square(),
-        ((r.A + r.stress("C_K")).square() / (4 * r.stress("m")) + r.stress("C_K")) * d.size_2.square(),
-    ),
-    ("prop-5.4", "printed"): lambda d, r: (d.dual_T, r.C_T * d.dual),
-    ("5.18", "printed"): lambda d, r: (d.dual_T, r.A * d.size_1),
-    ("5.19", "printed"): lambda d, r: (d.size_2, d.dual / r.stress("m")),
-    ("5.22", "printed"): lambda d, r: (d.norm, d.dual / r.stress("m").sqrt()),
-    ("5.23", "printed"): lambda d, r: (d.dual, r.stress("M") / r.stress("m").sqrt() * d.norm),
-    ("x-root-M", "printed"): lambda d, r: (d.dual, r.stress("M").sqrt() * d.norm),
-    ("5.29", "printed"): lambda d, r: (r.give * d.norm_T.square(), d.energy_1),
-    ("5.30", "printed"): lambda d, r: (d.friction, r.P * d.norm.square()),
-    ("5.30", "repaired"): lambda d, r: (d.friction, r.P * d.norm.square()),
-    **{(id, "repaired"): STEPS[id] for id in ("5.39", "5.44")},
-    ("5.31", "repaired"): lambda d, r: (d.work + r.give * d.norm_T.square(), r.P * d.norm.square()),
-    **{
-        (id, "repaired"): lambda d, r: (
-            d.step(HALF),
-            r.weight(HALF) * d.norm_T.square() + r.h_2(HALF) * d.norm.square(),
-        )
-        for id in ("5.32", "5.33", "5.36")
-    },
-    ("x-reaction", "printed"): lambda d, r: (d.norm_T.square(), r.bodies.number("rho_max") * d.energy_1),
-    ("x-friction-energy", "printed"): lambda d, r: (
-        d.friction,
-        r.bodies.number("kappa_1") * d.energy_1.sqrt() * d.norm + r.bodies.number("kappa_2") * d.norm.square(),
-    ),
-}
+#: All of them, in the order in which they are decided.
+DECIDED: tuple[Key, ...] = (*OF_BODIES, *OF_PAIRS, *OF_MUCH, *OF_STICKING)
 
 #: On the layer: what fails as printed, and where the interval of Proposition 5.6 is the widest.
 ON_LAYER = {("4.7", "printed"), ("5.30", "printed"), *OF_MUCH, *CONTRACTION}
+
+
+def both_sides(d: Any, r: Any, key: Key) -> Sides:
+    """Both sides of an inequality for two bodies, or for a pair of forces, each term on the side where it is positive.
+
+    theta is 1/2 unless the inequality is sharper at another one.  Contraction is decided as in Proposition 5.6: the
+    gain ``1 - K(theta)^2`` is at most the gain of a step, both over theta.
+    """
+    (id, of), inequality, theta = key, ENTRIES[key], HALF
+    if key in OF_BODIES:
+        sides = (map(Interval.of, side(d, r, 0)) for side in (inequality.left, inequality.right))
+        return list(zip(*sides, strict=True))
+    if key in CONTRACTION:
+        inequality, r = ENTRIES["prop-5.6.1", of], r.contracting()
+        theta = r.inside(CONTRACTION[key])
+    elif id == "5.39":
+        theta = r.at_C_0
+    elif id == "5.44" or key in OF_MUCH:
+        theta = r.below_C_0
+    terms = [*terms_of(inequality.left(d, r, theta)), *(-term for term in terms_of(inequality.right(d, r, theta)))]
+    left = sum((term for term in terms if term.hi > 0), Interval.of(0))
+    right = sum((-term for term in terms if term.hi <= 0), Interval.of(0))
+    # the squares of both sides, without the root of energy_1
+    return [(left.square(), right.square())] if id == "x-ratio" else [(left, right)]
 
 
 def enclosed(
     ids: Collection[str] | None = None, level: Level = "quick", watch: Callable[[float], None] = lambda done: None
 ) -> dict[str, list[Evidence]]:
     """Decide inequalities on named bodies by enclosures of both sides: a ``Source``, the same at both levels."""
-    wanted = [key for key in (*OF_BODIES, *OF_PAIRS, *OF_MUCH, *OF_STICKING) if ids is None or key[0] in ids]
+    wanted = [key for key in DECIDED if ids is None or key[0] in ids]
     found: dict[str, list[Evidence]] = {}
     with one_thread():
         known: dict[str, EnclosedBodies] = {}
@@ -548,7 +502,7 @@ def enclosed(
     return found
 
 
-def decide(bodies: EnclosedBodies, id: str, of: Literal["printed", "step", "repaired"]) -> Evidence | None:
+def decide(bodies: EnclosedBodies, id: str, of: Form) -> Evidence | None:
     """The evidence of an inequality on some bodies; None where the enclosures overlap."""
     key: Key = (id, of)
     unit = SMALL if key == ("5.30", "printed") else TINY if key in OF_MUCH else OWN
@@ -556,19 +510,17 @@ def decide(bodies: EnclosedBodies, id: str, of: Literal["printed", "step", "repa
     where = bodies.name
     try:
         reading = EnclosedConstants(bodies=bodies, printed=of == "printed", unit=unit, share=share)
-        if key in OF_BODIES:
-            sides = OF_BODIES[key](bodies)
-        elif key in OF_STICKING:
-            sides = [OF_STICKING[key](bodies.sticks, reading)]
-            where += ", all nodes sticking"
+        subject: Any = bodies
+        if key in OF_STICKING:
+            subject, where = bodies.sticks, f"{where}, all nodes sticking"
             if key in CONTRACTION:
                 where += f", k just below C_2, theta at {float(CONTRACTION[key]):g} of the interval"
-        elif key in OF_MUCH:
-            sides = [OF_MUCH[key](bodies.slides_much, reading)]
-            where += f", all nodes open and slipping one way, k = {float(share * bodies.problem.contact.friction):g}"
-        else:
-            sides = [OF_PAIRS[key](bodies.slides, reading)]
+        elif key not in OF_BODIES:
+            subject = bodies.slides_much if key in OF_MUCH else bodies.slides
             where += ", all nodes open and slipping one way"
+            if key in OF_MUCH:
+                where += f", k = {float(share * bodies.problem.contact.friction):g}"
+        sides = both_sides(subject, reading, key)
     except ArithmeticError:  # a bound that was not proved
         return None
     fails = any(left.lo > right.hi for left, right in sides)

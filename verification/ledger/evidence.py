@@ -10,6 +10,7 @@ from verification.threads import one_thread
 
 Level = Literal["quick", "full"]
 Method = Literal["symbolic", "dimension", "verified", "discrete", "reading"]
+Form = Literal["printed", "step", "repaired"]
 Verdict = Literal["PROVED", "REPAIRED", "REFUTED", "NUMERICAL", "ASSUMED", "INCONCLUSIVE"]
 
 #: Strongest first.
@@ -37,7 +38,7 @@ class Evidence:
     """
 
     method: Method
-    of: Literal["printed", "step", "repaired"]
+    of: Form
     holds: bool | None
     text: str
     data: Mapping[str, Any] = field(default_factory=dict)

@@ -9,7 +9,7 @@ bracket of (5.30): there the right side depends on the unit of stress, so severa
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -19,13 +19,47 @@ import numpy as np
 
 from ndtheory import PRINTED, energy_norms
 from ndtheory import bounds as formulas
-from verification.bounds.losses import top
+from ndtheory.intervals import Interval
 from verification.constants import Measured
 from verification.ledger.differences import Difference
+from verification.ledger.evidence import Form
+
+
+class RightSides:
+    """Right sides of Section 5 over numbers of any type, from the constants of a class that inherits."""
+
+    m: Any
+    M: Any
+    C_R: Any
+    P: Any
+    D: Any
+    Q: Any
+
+    @property
+    def A(self) -> Any:
+        """``M C_R``."""
+        return self.M * self.C_R
+
+    @property
+    def give(self) -> Any:
+        """``m^2/(M C_R)^2`` of (5.29)."""
+        return (self.m / self.A) ** 2
+
+    def weight(self, theta: Any) -> Any:
+        """The coefficient of ``|||T psi - T psi~|||^2`` in (5.32): positive above C_0."""
+        return theta**2 - 2 * theta * (1 - theta) * self.give
+
+    def h_1(self, theta: Any) -> Any:
+        """After (5.39)."""
+        return 1 - formulas.one_minus_h1(theta, self.D, self.Q)
+
+    def h_2(self, theta: Any) -> Any:
+        """(5.45)."""
+        return 1 - formulas.one_minus_h2(theta, self.P)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reading:
+class Reading(RightSides):
     """The constants as an inequality reads them, and the right sides that contain them.
 
     Attributes
@@ -85,11 +119,6 @@ class Reading:
         return replace(self, m=PRINTED.coercivity(self.m), u=PRINTED.unit(self.m))
 
     @cached_property
-    def A(self) -> float:
-        """``M C_R``."""
-        return self.M * self.C_R
-
-    @cached_property
     def C_T(self) -> float:
         """(5.16), where m is m itself in both editions."""
         return float(formulas.lipschitz(self.coercivity, self.M, self.C_R, self.C_K))
@@ -97,12 +126,7 @@ class Reading:
     @cached_property
     def X(self) -> float:
         """The factor of (5.11), by (5.16)."""
-        return self.C_T * self.coercivity / self.A
-
-    @cached_property
-    def give(self) -> float:
-        """``m^2/(M C_R)^2`` of (5.29)."""
-        return (self.m / self.A) ** 2
+        return float(self.C_T * self.coercivity / self.A)
 
     @cached_property
     def P(self) -> float:
@@ -123,18 +147,6 @@ class Reading:
     def C_0(self) -> float:
         """(5.37)."""
         return float(formulas.C0(self.m, self.M, self.C_R))
-
-    def weight(self, theta: float) -> float:
-        """The coefficient of ``|||T psi - T psi~|||^2`` in (5.32): positive above C_0."""
-        return theta**2 - 2 * theta * (1 - theta) * self.give
-
-    def h_1(self, theta: float) -> float:
-        """After (5.39)."""
-        return 1 - float(formulas.one_minus_h1(theta, self.D, self.Q))
-
-    def h_2(self, theta: float) -> float:
-        """(5.45)."""
-        return 1 - float(formulas.one_minus_h2(theta, self.P))
 
     def gain(self, theta: float) -> float:
         """``1 - K(theta)^2``."""
@@ -158,6 +170,11 @@ class Reading:
         """C_0 and the thetas above it inside the interval."""
         C0, inside = float(formulas.C0(self.m, self.M, self.C_R)), self.contracting()
         return (C0, *(theta for theta in inside if theta > C0)) if inside else ()
+
+    @property
+    def ratio(self) -> float:
+        """r, the largest ``|w^1 - w~^1|/|w^2 - w~^2|`` in energy norms."""
+        return float(energy_norms.largest_ratio(*self.energy))
 
     def q_squared(self, theta: float) -> float:
         """``q(theta)^2`` of the theorem in energy norms."""
@@ -187,7 +204,7 @@ SHARES = (Fraction(1, 100), Fraction(99, 100))
 
 #: Numbers, or arrays of them.
 Terms = Any
-Side = Callable[[Any, Reading, float], Terms]
+Side = Callable[[Any, Any, Any], Terms]
 
 everywhere = lambda r: THETAS
 above = lambda r: tuple(theta for theta in (1.5 * r.C_0, *THETAS) if r.C_0 < theta < 1)
@@ -202,7 +219,9 @@ class Inequality:
     ----------
     left, right : callable
         Difference (or :class:`verification.ledger.worst.Trial`), constants, theta -> a number; several numbers are
-        added, or compared one by one where ``about`` is 'bodies'.  Of several differences: arrays of them.
+        added, or compared one by one where ``about`` is 'bodies'.  Of several differences: arrays of them.  The same
+        formulas take intervals (:mod:`verification.ledger.enclosures`) and rationals
+        (:mod:`verification.ledger.rational_pairs`).
     equality : bool
         Then both sides may be vectors whose Euclidean norm is (5.21).
     about : {'pairs', 'contraction', 'bodies'}
@@ -213,6 +232,8 @@ class Inequality:
         Constants -> the thetas tried.
     units : tuple of float
         Units of stress tried, in units of the file.
+    squares : bool
+        True if both sides are squares of norms; the ratio is that of the norms.
     one_grid : bool
         True to try it only where both bodies have one grid along Gamma_c.
     remark : str
@@ -220,7 +241,7 @@ class Inequality:
     """
 
     id: str
-    of: Literal["printed", "step", "repaired"] = "printed"
+    of: Form = "printed"
     left: Side
     right: Side
     equality: bool = False
@@ -228,6 +249,7 @@ class Inequality:
     reading: Callable[[Reading], Reading] = lambda r: r
     thetas: Callable[[Reading], Sequence[float]] | None = None
     units: tuple[float, ...] = (1.0,)
+    squares: bool = False
     one_grid: bool = False
     remark: str = ""
 
@@ -239,13 +261,14 @@ class Inequality:
         """
         left, right = self.left(subject, reading, theta), self.right(subject, reading, theta)
         if self.about == "bodies":
-            return float(np.max(np.asarray(left) / np.asarray(right)))
+            worst = float(np.max(np.asarray(left) / np.asarray(right)))
+            return math.sqrt(worst) if self.squares else worst
         if self.equality:
             apart, size = np.abs(left - right), subject.size
             if np.ndim(apart) > np.ndim(size):
                 apart, size = np.linalg.norm(apart, axis=-1), np.sqrt(size)
             return 1 + apart / size
-        terms = [*_terms(left), *(-term for term in _terms(right))]
+        terms = [*terms_of(left), *(-term for term in terms_of(right))]
         positive = sum(np.maximum(term, 0.0) for term in terms)
         negative = sum(np.maximum(-term, 0.0) for term in terms)
         infinite = ~np.isfinite(positive + negative)  # also what is not a number
@@ -256,7 +279,8 @@ class Inequality:
         return np.where(infinite, math.inf, ratio)[()]
 
 
-def _terms(side: Terms) -> tuple[Any, ...]:
+def terms_of(side: Terms) -> tuple[Any, ...]:
+    """The terms of a side."""
     return side if isinstance(side, tuple) else (side,)
 
 
@@ -265,6 +289,16 @@ def _editions(id: str, left: Side, right: Side, *, early: bool = False, **option
     read: Callable[[Reading], Reading] = (lambda r: r.bracket) if early else (lambda r: r.printed)
     printed = Inequality(id=id, of="printed", left=left, right=right, reading=read, units=UNITS, **options)
     return [printed, Inequality(id=id, of="repaired", left=left, right=right, **options)]
+
+
+def _root(x: Any) -> Any:
+    """The square root of an interval, or of numbers, where a negative one is rounding."""
+    return x.sqrt() if isinstance(x, Interval) else np.sqrt(np.maximum(x, 0.0))
+
+
+def _lifts(b: Any, r: Reading, theta: float) -> Any:
+    """The squared norms of both lifts."""
+    return [b.top(N, E) for N, E in zip(b.N, b.E, strict=True)]
 
 
 def _square_of_step(d: Difference, r: Reading, theta: float) -> float:
@@ -280,52 +314,40 @@ INEQUALITIES: tuple[Inequality, ...] = (
     Inequality(
         id="4.7",
         about="bodies",
+        squares=True,
         one_grid=True,
-        left=lambda b, r, _: np.sqrt([top(b.E[1], b.N[0]), top(b.E[0], b.N[1])]),
-        right=lambda b, r, _: np.ones(2),
+        left=lambda b, r, _: [b.top(b.E[1], b.N[0]), b.top(b.E[0], b.N[1])],
+        right=lambda b, r, _: [1, 1],
     ),
     Inequality(
         id="4.7",
         of="repaired",
         about="bodies",
-        left=lambda b, r, _: np.sqrt([top(b.E[0], b.N[0]), top(b.E[1], b.N[1])]),
-        right=lambda b, r, _: np.ones(2),
+        squares=True,
+        left=lambda b, r, _: [b.top(E, N) for E, N in zip(b.E, b.N, strict=True)],
+        right=lambda b, r, _: [1, 1],
     ),
-    Inequality(
-        id="4.8",
-        of="repaired",
-        about="bodies",
-        left=lambda b, r, _: np.sqrt([top(N, E) for N, E in zip(b.N, b.E, strict=True)]),
-        right=lambda b, r, _: np.sqrt(b.contrast),
-    ),
+    Inequality(id="4.8", of="repaired", about="bodies", squares=True, left=_lifts, right=lambda b, r, _: b.contrast),
     # by the constant between the norms of traces, which a mesh always has and the proof must supply
     Inequality(
         id="prop-4.1.1",
         of="repaired",
         about="bodies",
+        squares=True,
         one_grid=True,
-        left=lambda b, r, _: np.sqrt([top(b.N[0], b.N[1]), top(b.N[1], b.N[0])]),
-        right=lambda b, r, _: np.sqrt(b.contrast * b.between_traces),
+        left=lambda b, r, _: [b.top(b.N[0], b.N[1]), b.top(b.N[1], b.N[0])],
+        right=lambda b, r, _: [c * between for c, between in zip(b.contrast, b.across(b.E), strict=True)],
     ),
     Inequality(
         id="prop-4.1.2",
         about="bodies",
+        squares=True,
         remark=" (there of the contact body's lift alone, as nothing leads from its grid to the other one)",
-        left=lambda b, r, _: np.sqrt(b.lifted_across),
-        right=lambda b, r, _: np.sqrt(b.contrast[: len(b.between_traces)] * b.between_traces),
+        left=lambda b, r, _: b.across(b.N),
+        right=lambda b, r, _: [c * between for c, between in zip(b.contrast, b.across(b.E), strict=False)],
     ),
-    Inequality(
-        id="x-continuity",
-        about="bodies",
-        left=lambda b, r, _: np.array([largest for _, largest in b.spectra]),
-        right=lambda b, r, _: np.array([body.material.continuity(body.mesh.dimension) for body in b.bodies]),
-    ),
-    Inequality(
-        id="x-lift-bound",
-        about="bodies",
-        left=lambda b, r, _: np.array([top(N, E) for N, E in zip(b.N, b.E, strict=True)]),
-        right=lambda b, r, _: b.contrast,
-    ),
+    Inequality(id="x-continuity", about="bodies", left=lambda b, r, _: b.largest, right=lambda b, r, _: b.continuity),
+    Inequality(id="x-lift-bound", about="bodies", left=_lifts, right=lambda b, r, _: b.contrast),
     # --- Section 5: two forces
     Inequality(id="5.11", left=lambda d, r, _: d.size_1, right=lambda d, r, _: r.X * d.size_2),
     Inequality(id="5.12", left=lambda d, r, _: d.energy_1, right=lambda d, r, _: (d.mixed_1, d.friction)),
@@ -359,9 +381,9 @@ INEQUALITIES: tuple[Inequality, ...] = (
     ),
     Inequality(id="5.18", left=lambda d, r, _: d.dual_T, right=lambda d, r, _: r.A * d.size_1),
     Inequality(id="5.19", left=lambda d, r, _: d.size_2, right=lambda d, r, _: d.dual / r.m),
-    Inequality(id="5.22", left=lambda d, r, _: d.norm, right=lambda d, r, _: d.dual / math.sqrt(r.m)),
-    Inequality(id="5.23", left=lambda d, r, _: d.dual, right=lambda d, r, _: r.M / math.sqrt(r.m) * d.norm),
-    Inequality(id="x-root-M", left=lambda d, r, _: d.dual, right=lambda d, r, _: math.sqrt(r.M) * d.norm),
+    Inequality(id="5.22", left=lambda d, r, _: d.norm, right=lambda d, r, _: d.dual / _root(r.m)),
+    Inequality(id="5.23", left=lambda d, r, _: d.dual, right=lambda d, r, _: r.M / _root(r.m) * d.norm),
+    Inequality(id="x-root-M", left=lambda d, r, _: d.dual, right=lambda d, r, _: _root(r.M) * d.norm),
     Inequality(
         id="5.24",
         equality=True,
@@ -399,13 +421,9 @@ INEQUALITIES: tuple[Inequality, ...] = (
     Inequality(
         id="x-friction-energy",
         left=lambda d, r, _: d.friction,
-        right=lambda d, r, _: r.energy[1] * np.sqrt(np.maximum(d.energy_1, 0.0)) * d.norm + r.energy[2] * d.norm**2,
+        right=lambda d, r, _: r.energy[1] * _root(d.energy_1) * d.norm + r.energy[2] * d.norm**2,
     ),
-    Inequality(
-        id="x-ratio",
-        left=lambda d, r, _: np.sqrt(np.maximum(d.energy_1, 0.0)),
-        right=lambda d, r, _: float(energy_norms.largest_ratio(*r.energy)) * d.norm,
-    ),
+    Inequality(id="x-ratio", left=lambda d, r, _: _root(d.energy_1), right=lambda d, r, _: r.ratio * d.norm),
     Inequality(
         id="x-energy", thetas=everywhere, left=_square_of_step, right=lambda d, r, t: r.q_squared(t) * d.norm**2
     ),
@@ -430,3 +448,6 @@ INEQUALITIES: tuple[Inequality, ...] = (
         thetas=Reading.contracting,
     ),
 )
+
+#: The inequalities by statement and form.
+ENTRIES: Mapping[tuple[str, Form], Inequality] = {(each.id, each.of): each for each in INEQUALITIES}

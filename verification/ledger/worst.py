@@ -90,35 +90,36 @@ class Trial:
         return [getattr(self.measured, body.name).M.value for body in self.bodies]
 
     @property
-    def contrast(self) -> Floats:
+    def contrast(self) -> list[float]:
         """``M^a/m^a``."""
-        return np.array([M / m for M, m in zip(self.M, self.m, strict=True)])
+        return [M / m for M, m in zip(self.M, self.m, strict=True)]
+
+    @property
+    def largest(self) -> list[float]:
+        """M^a from the whole spectrum."""
+        return [largest for _, largest in self.spectra]
+
+    @property
+    def continuity(self) -> list[float]:
+        """The bounds of M^a that follow from the materials."""
+        return [body.material.continuity(body.mesh.dimension) for body in self.bodies]
+
+    #: The largest eigenvalue of a pencil.
+    top = staticmethod(top)
 
     @property
     def grids_differ(self) -> bool:
         """True if the bodies have different grids along Gamma_c."""
         return self.pair.interface.transfer is not None
 
-    @property
-    def between_traces(self) -> Floats:
-        """The constants between the squared norms of H^1/2(Gamma_c): from the other body's into each body's.
+    def across(self, forms: tuple[Floats, Floats]) -> list[float]:
+        """The largest quotients of each form over the other body's squared norm of H^1/2(Gamma_c).
 
-        Where the grids differ, only into the contact body's: nothing leads from its grid to the other one.
+        Where the grids differ only of the contact body's form: nothing leads from its grid to the other one.
         """
-        return self._across(self.E)
-
-    @property
-    def lifted_across(self) -> Floats:
-        """The largest ``|R_D^1 gamma v|^2 / |v|^2`` for v of the other body, and with the bodies exchanged.
-
-        Where the grids differ, only ``R_D^1 P gamma v``: nothing leads from the contact grid to the other one.
-        """
-        return self._across(self.N)
-
-    def _across(self, forms: tuple[Floats, Floats]) -> Floats:
         one, other = forms
         values = [top(self.pair.interface.carry_form(one), self.E[1])]
-        return np.array(values if self.grids_differ else [*values, top(other, self.E[0])])
+        return values if self.grids_differ else [*values, top(other, self.E[0])]
 
     def at_share(self, share: Fraction) -> Trial:
         """The same bodies at a share of the friction C_2 of the repaired bound."""
