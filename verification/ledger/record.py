@@ -5,21 +5,15 @@ Pages and screens take verdicts and texts from here, so that none of them contra
 
 from __future__ import annotations
 
-import json
-from functools import lru_cache
-from importlib.resources import files
-
 from ndtheory.statements import statements
 
 #: The texts of a statement that may be quoted.
 TEXTS = ("title", "claims", "wrong", "repair", "proof", "note")
 
 
-@lru_cache(maxsize=1)
 def recorded() -> dict[str, str]:
     """The recorded verdicts by id."""
-    text = files("verification").joinpath("data/verdicts.json").read_text("utf-8")
-    return dict(json.loads(text)["verdicts"])
+    return {id: statement.verdict for id, statement in statements().items() if statement.verdict}
 
 
 def quote(id: str, what: str = "verdict") -> str:

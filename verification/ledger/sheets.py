@@ -179,6 +179,6 @@ def errata(ledger: Ledger) -> str:
 
 
 def verdicts(ledger: Ledger) -> str:
-    """The verdicts as they are recorded in ``verification/data/verdicts.json``."""
+    """The verdicts by statement, as a JSON document."""
     found = {row.statement.id: row.verdict for row in ledger.rows}
     return json.dumps({"schema": "ndtheory.verdicts/1", "verdicts": found}, indent=2)
