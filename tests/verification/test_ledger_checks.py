@@ -185,7 +185,8 @@ def test_on_two_bars_the_printed_sign_gives_the_factor_of_the_cobweb():
 
 @pytest.mark.parametrize("of", [PRINTED, REPAIRED])
 def test_a_contraction_factor_one_per_cent_too_small_is_found_out(of):
-    runs = {PRINTED: convergence.inside("quick"), REPAIRED: convergence.energy("quick")}
+    quick = RunsOfLevel(level="quick")
+    runs = {PRINTED: quick.inside, REPAIRED: quick.energy}
     verdict = lambda: holds(convergence.forces_converge(SimpleNamespace(inside=runs[PRINTED], energy=runs[REPAIRED])))
     assert verdict() == [(PRINTED, True), (REPAIRED, True)]
     runs[of] = [replace(run, factor=0.99 * run.factor) for run in runs[of]]

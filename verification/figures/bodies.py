@@ -22,7 +22,7 @@ SHARE = 0.06
 
 
 def draw_bodies(result: Run | Solution) -> Figure:
-    """Deformed meshes above, pressure, shear and states along Gamma_c below; for a run those of the last iterate."""
+    """Deformed meshes above, pressure, shear and states along Gamma_c below; of a run the last iterate is drawn."""
     bodies = result.bodies
     moved = [float(np.abs(u).max()) for u in result.displacements if u is not None]
     size = max(float(np.ptp(body.mesh.points[:, 0])) for body in bodies.elastic)

@@ -171,7 +171,7 @@ CONVERGENT: dict[str, dict[str, Any]] = {
         "iteration": {**RUN},
     },
 }
-#: Plane bodies; :func:`verification.ledger.convergence.inside` gives them a friction below their C_2.
+#: Plane bodies; :class:`verification.ledger.convergence.RunsOfLevel` gives them a friction below their C_2.
 PLANE: dict[str, dict[str, Any]] = {
     "squares": {
         "body1": rectangle([0, 1], [-1, 0], [3, 3], 1, 0, fixed=["bottom"]),

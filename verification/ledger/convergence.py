@@ -210,51 +210,68 @@ class Convergence:
         return float((distance[1:count] / distance[: count - 1]).max(initial=0.0))
 
 
-def inside(level: Level) -> list[Convergence]:
-    """Runs inside Proposition 5.6, as printed and as repaired: theta = C_0, and k half of its bound.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RunsOfLevel:
+    """The problems and runs that the checks share, each solved when it is first asked for."""
 
-    The plane ones take thousands of steps; quick makes the first few hundred.
-    """
-    result = []
-    for name, data in (CONVERGENT | PLANE).items():
-        problem = Problem.from_dict(data)
-        measured = measure(problem)
-        if name in PLANE:
-            constants = measured.with_friction(1e-12).constants()
+    level: Level
+
+    @property
+    def count(self) -> int:
+        """Random test functions of each kind."""
+        return 10 if self.level == "quick" else 60
+
+    @cached_property
+    def cases(self) -> list[Case]:
+        """The problems of the level."""
+        return cases(self.level)
+
+    @cached_property
+    def inside(self) -> list[Convergence]:
+        """Runs inside Proposition 5.6, as printed and as repaired: theta = C_0, and k half of its bound.
+
+        The plane ones take thousands of steps; quick makes the first few hundred.
+        """
+        result = []
+        for name, data in (CONVERGENT | PLANE).items():
+            problem = Problem.from_dict(data)
+            measured = measure(problem)
+            if name in PLANE:
+                constants = measured.with_friction(1e-12).constants()
+                assert constants is not None
+                thresholds = [evaluate(edition, constants).C2 for edition in EDITIONS]
+                k = Fraction(min(c.value for c in thresholds if c is not None) / 2).limit_denominator(10**9)
+                steps = 300 if self.level == "quick" else 20_000
+                iteration = replace(problem.iteration, max_iterations=steps)
+                problem = replace(problem, contact=replace(problem.contact, friction=k), iteration=iteration)
+                measured = measured.with_friction(float(k))
+            constants = measured.constants()
             assert constants is not None
-            thresholds = [evaluate(edition, constants).C2 for edition in EDITIONS]
-            k = Fraction(min(c.value for c in thresholds if c is not None) / 2).limit_denominator(10**9)
-            steps = 300 if level == "quick" else 20_000
-            iteration = replace(problem.iteration, max_iterations=steps)
-            problem = replace(problem, contact=replace(problem.contact, friction=k), iteration=iteration)
-            measured = measured.with_friction(float(k))
-        constants = measured.constants()
-        assert constants is not None
-        theta = min(evaluate(edition, constants).C0.value for edition in EDITIONS)
-        factors = [evaluate(edition, constants, theta=theta).factor for edition in EDITIONS]
-        factor = max(2.0 if f is None else f.value for f in factors)
-        result.append(Convergence(case=Case(name=name, problem=problem.with_theta(theta)), factor=factor))
-    return result
+            theta = min(evaluate(edition, constants).C0.value for edition in EDITIONS)
+            factors = [evaluate(edition, constants, theta=theta).factor for edition in EDITIONS]
+            factor = max(2.0 if f is None else f.value for f in factors)
+            result.append(Convergence(case=Case(name=name, problem=problem.with_theta(theta)), factor=factor))
+        return result
 
-
-def energy(level: Level) -> list[Convergence]:
-    """Runs with half the friction that the theorem in energy norms allows, at its best theta."""
-    result = []
-    for name, problem in ((case.name, case.problem) for case in cases(level)):
-        measured = measure(problem)
-        threshold = measured.friction_threshold
-        if threshold is not None and float(problem.contact.friction) > threshold.value / 2:
-            k = Fraction(threshold.value / 2).limit_denominator(10**6)
-            problem = replace(problem, contact=replace(problem.contact, friction=k))
-            measured = measured.with_friction(float(k))
-        constants = measured.energy_constants()
-        assert constants is not None
-        bounds = evaluate_energy(constants)
-        if bounds.theta_proved is not None and bounds.factor_proved is not None:
-            theta = min(bounds.theta_proved, CLOSEST_TO_ONE)
-            case = Case(name=name, problem=problem.with_theta(theta))
-            result.append(Convergence(case=case, factor=bounds.factor_proved.value))
-    return result
+    @cached_property
+    def energy(self) -> list[Convergence]:
+        """Runs with half the friction that the theorem in energy norms allows, at its best theta."""
+        result = []
+        for name, problem in ((case.name, case.problem) for case in cases(self.level)):
+            measured = measure(problem)
+            threshold = measured.friction_threshold
+            if threshold is not None and float(problem.contact.friction) > threshold.value / 2:
+                k = Fraction(threshold.value / 2).limit_denominator(10**6)
+                problem = replace(problem, contact=replace(problem.contact, friction=k))
+                measured = measured.with_friction(float(k))
+            constants = measured.energy_constants()
+            assert constants is not None
+            bounds = evaluate_energy(constants)
+            if bounds.theta_proved is not None and bounds.factor_proved is not None:
+                theta = min(bounds.theta_proved, CLOSEST_TO_ONE)
+                case = Case(name=name, problem=problem.with_theta(theta))
+                result.append(Convergence(case=case, factor=bounds.factor_proved.value))
+        return result
 
 
 def forces_converge(setting: RunsOfLevel) -> list[Evidence]:
@@ -309,30 +326,3 @@ def fields_converge(setting: RunsOfLevel) -> list[Evidence]:
         arrive("printed", "inside the intervals of Proposition 5.6", setting.inside),
         arrive("repaired", "inside the interval of the theorem in energy norms", setting.energy),
     ]
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class RunsOfLevel:
-    """The problems and runs that the checks share."""
-
-    level: Level
-
-    @cached_property
-    def cases(self) -> list[Case]:
-        """The problems, solved when first asked."""
-        return cases(self.level)
-
-    @cached_property
-    def inside(self) -> list[Convergence]:
-        """Runs inside Proposition 5.6."""
-        return inside(self.level)
-
-    @cached_property
-    def energy(self) -> list[Convergence]:
-        """Runs inside the theorem in energy norms."""
-        return energy(self.level)
-
-    @property
-    def count(self) -> int:
-        """Random test functions of each kind."""
-        return 10 if self.level == "quick" else 60

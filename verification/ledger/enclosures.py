@@ -181,7 +181,7 @@ class Apart:
 
 
 class Sticks(Apart):
-    """All nodes touch and stick; the direction is that of the largest stiffness of body 1 relative to body 2."""
+    """All nodes touch and stick, in the direction in which body 1 is stiffest relative to body 2."""
 
     def __init__(self, bodies: EnclosedBodies) -> None:
         pair = bodies.case.pair
@@ -303,7 +303,7 @@ class EnclosedConstants(RightSides):
     unit : Fraction
         The unit of stress in units of the file.
     share : Fraction
-        The friction over that of the bodies.
+        The friction over the friction of the bodies.
     """
 
     bodies: EnclosedBodies

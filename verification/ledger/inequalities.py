@@ -233,7 +233,7 @@ class Inequality:
     units : tuple of float
         Units of stress tried, in units of the file.
     squares : bool
-        True if both sides are squares of norms; the ratio is that of the norms.
+        True if both sides are squares of norms, whose ratio is then taken.
     one_grid : bool
         True to try it only where both bodies have one grid along Gamma_c.
     remark : str

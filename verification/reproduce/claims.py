@@ -30,7 +30,7 @@ ZONES: tuple[tuple[str, float], ...] = (("stick", 0.6), ("slip", 1.0), ("open", 
 class Claim:
     """A claim of the paper in short, and the criterion by which a reading reproduces it.
 
-    ``axes`` maps the axes of a sweep to their values, none for Figure 5; ``labels`` are those of its curves, in order.
+    ``axes`` maps the axes of a sweep to their values, none for Figure 5; ``labels`` name its curves, in order.
     """
 
     name: str

@@ -53,7 +53,7 @@ def sections(finished: Run) -> Sections:
 
 
 def happened(finished: Run, *, alone: bool) -> Section:
-    """The course of a run; ``alone`` if no verdict says why there is no forecast."""
+    """The course of a run; ``alone`` if no verdict explains a missing forecast."""
     problem = finished.problem
     assert problem is not None  # see `sections`
     rate, linear, made = finished.observed_rate, finished.linearised, finished.forecast
