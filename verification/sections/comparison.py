@@ -1,4 +1,4 @@
-"""A comparison: each section when it is known, or all of them of one that has ended."""
+"""A comparison: each section as soon as it is known, or all of them at the end."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from verification.sections.parts import Labelled, Note, Section, Sections, follo
 from verification.sections.run import happened
 from verification.sections.setting import limits, outside_the_theorem, setting
 
-#: What the table of verdicts shows, and the figure of the losses.
+#: The captions of the table of verdicts and of the figure of the losses.
 RATIOS = (
     "Each bound beside the largest ratio of successive residuals in the norm (5.21), in which forces count by the "
     "energy that they store in the Neumann body; linearised: the forecast beside the end of the run."
@@ -38,14 +38,9 @@ WATERFALL = (
 
 
 class Parts(Listener):
-    """Hands on the sections of a comparison, each when it is known.
+    """Passes the sections of a comparison to ``show``, each when it is known; several of one id may follow each other.
 
-    Parameters
-    ----------
-    pair : ContactPair
-        What is compared, made from a problem.
-    show : callable
-        Takes a tuple of sections; those of one id may come one after the other.
+    The pair is made from a problem.
     """
 
     def __init__(self, pair: ContactPair, show: Callable[[Sections], None]) -> None:
@@ -101,7 +96,7 @@ def verdicts(result: Comparison) -> Sections:
 
 @of.register
 def sections(result: Comparison) -> Sections:
-    """The sections; a report has more at the begin and at the end: warnings, the theta, all constants."""
+    """The sections; a report has more at its beginning and end: warnings, the theta, all constants."""
     if result.problem is None:
         return ()
     found: list[Section] = []

@@ -17,7 +17,7 @@ COMPARED = ("m", "M", "C_R", "C_s", "C_tr", "C_K", "rho_max")
 
 @of.register
 def sections(measured: Measured) -> Sections:
-    """The sections; none of constants that come from matrices alone."""
+    """The sections; none if the constants come from matrices without a problem."""
     problem = measured.problem
     if problem is None:
         return ()
@@ -70,7 +70,7 @@ def _units(measured: Measured) -> Mapping[str, str]:
 
 
 def _between_bounds(measured: Measured, names: Sequence[str]) -> list[Shown]:
-    """Constants with the bounds that are proved of them, and why there are none."""
+    """Constants with their proved bounds, and the reasons where there are none."""
     units, rows = _units(measured), []
     for name in names:
         number, unit = getattr(measured, name), units.get(name, "")

@@ -41,7 +41,7 @@ PICTURES = (
 
 @of.register
 def sections(finished: Run) -> Sections:
-    """The sections; none of a run on matrices alone."""
+    """The sections; none of a run on matrices without a problem."""
     if finished.problem is None:
         return ()
     nodes = sum(len(body.mesh.points) for body in finished.bodies.elastic)
@@ -53,7 +53,7 @@ def sections(finished: Run) -> Sections:
 
 
 def happened(finished: Run, *, alone: bool) -> Section:
-    """What a run did; ``alone`` where no verdict says why there is no forecast."""
+    """The course of a run; ``alone`` if no verdict explains a missing forecast."""
     problem = finished.problem
     assert problem is not None  # see `sections`
     rate, linear, made = finished.observed_rate, finished.linearised, finished.forecast
@@ -117,7 +117,7 @@ def solution(found: Solution) -> Sections:
 
 
 def _grids(contact_body: int, interface: Interface) -> list[Shown]:
-    """Who carries the contact grid, where there are two."""
+    """The body that carries the contact grid, if there are two grids."""
     if interface.transfer is None:
         return []
     names = {1: "lower", 2: "upper"}
@@ -127,7 +127,7 @@ def _grids(contact_body: int, interface: Interface) -> list[Shown]:
 
 
 def _contact(problem: Problem, contact: ContactFields, solved: str = "") -> list[Shown]:
-    """What happens along Gamma_c, in totals, and how well it was solved."""
+    """States and forces along Gamma_c, in totals, and the residual of step II."""
     units, total = problem.units, contact.force
     normal = f"{figures(total['normal'], 6)} normal"
     nodes = Labelled("nodes", ", ".join(f"{number} {name}" for name, number in contact.pattern.items()))
