@@ -87,7 +87,7 @@ FLOORS: dict[str, dict[str, str]] = {
     },
     "parts of results": {
         "verification.sections": (
-            "advice bounds certificate comparison constants ledger of_results reproduction run setting sweep"
+            "advice answer bounds certificate comparison constants ledger of_results reproduction run setting sweep"
         )
     },
     "figures": {
