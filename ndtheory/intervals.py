@@ -87,6 +87,12 @@ class Interval:
         size = self.modulus()
         return size * size
 
+    def __pow__(self, exponent: Any) -> Interval:
+        """``x**2`` and ``x**0.5``, as formulas write them for numbers of any type."""
+        if exponent not in (2, 0.5):
+            raise ValueError(f"interval to the power {exponent}: needed 2 or 0.5")
+        return self.square() if exponent == 2 else self.sqrt()
+
     def modulus(self) -> Interval:
         """The moduli of its numbers."""
         if self.lo >= 0:

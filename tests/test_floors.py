@@ -78,28 +78,25 @@ FLOORS: dict[str, dict[str, str]] = {
         ),
         "verification.reproduce": "__init__ claims experiments readings refutation",
         "verification.ledger": (
-            "__init__ cases convergence differences draws enclosed_pairs enclosures evidence experiments "
-            "field_problems found inequalities large_friction moves rational_pairs reading record rows sheets "
-            "solutions sources weak_forms worst"
+            "__init__ cases convergence differences enclosures evidence experiments inequalities large_friction "
+            "rational_pairs record rows sheets solutions sources weak_forms worst"
         ),
     },
     "parts of results": {
         "verification.sections": (
-            "advice advised bounds certificate comparison constants continuum ledger logs moduli of_results region "
-            "reproduction run setting sweep tex"
+            "advice answer bounds certificate comparison constants ledger of_results reproduction run setting sweep"
         )
     },
     "figures": {
         "verification.figures": (
-            "__init__ best_theta bodies factor of_results region reproduction residuals rules style sweep waterfall"
+            "__init__ best_theta bodies factor of_results region reproduction residuals style sweep waterfall"
         )
     },
     "files": {"verification.output": "__init__ files folder report"},
     "names for users": {"verification": "__init__"},
     "commands, test kit": {
         "verification.cli": (
-            "__init__ advising calculator certifying console drawing failing forms ledger main matrices options "
-            "problems remedies reproducing shell sweeping typed"
+            "__init__ advising calculator certifying console forms ledger main options problems sweeping"
         ),
         "verification.testing": "__init__ bounds laws properties rules steps strategies transforms",
     },
