@@ -120,7 +120,7 @@ BUDGET = {
     "verification.output": 500,
     "verification.problem": 1700,
     "verification.reproduce": 800,
-    "verification.sections": 2000,
+    "verification.sections": 2050,
     "verification.sweeps": 2700,
     "verification.testing": 1700,
 }

@@ -21,8 +21,8 @@ from verification.ledger.record import on_the_printed_proof
 from verification.output.folder import Folder
 from verification.output.report import report
 from verification.sections.bounds import thetas
-from verification.sections.layout import text
 from verification.sections.comparison import WORDS
+from verification.sections.layout import text
 from verification.verdicts import RunVerdict
 
 ROOT = Path(__file__).parents[2]

@@ -102,8 +102,8 @@ class Parts(Listener):
             total = sum(loss.decades for loss in estimates)
             unit = sum(loss.decades for loss in friction) - total
             links = ", ".join(f"10^{loss.decades:.1f} by {loss.label}" for loss in estimates)
-            found = f"Bound (5.30), repaired, is 10^{total:.1f} times the largest friction term found"
-            parts.append(f"{found}: {links}. As printed it is 10^{unit:.1f} times more, by the unit of stress.")
+            sizes = f"10^{total:.1f} times the largest friction term found (10^{total + unit:.1f} as printed)"
+            parts.append(f"(5.30) is {sizes}: {links}.")
         if parts:
             self.show((section("losses", "HOW MUCH DOES EACH ESTIMATE LOSE?", *parts, pictures=WATERFALL),))
 
