@@ -119,7 +119,7 @@ BUDGET = {
     "verification.contact": 1000,
     "verification.figures": 800,
     "verification.interface": 2900,
-    "verification.ledger": 4350,
+    "verification.ledger": 4320,
     "verification.output": 410,
     "verification.problem": 1700,
     "verification.reproduce": 630,
