@@ -57,7 +57,7 @@ def check_bound(bound: Bound, *, examples: int = 20) -> Report:
         The mirror image has the same factor.
 
     Where a bound draws no conclusion at a drawn theta, one of the interval that it names is taken.  ``examples`` is the
-    number of cases for each property; the first property that fails raises :class:`Refused`.
+    number of cases for each property; the first property that fails raises Refused.
     """
     kit = Kit(f"bound {bound.name!r}", examples)
     findings = _holds(kit, bound)

@@ -53,7 +53,7 @@ def check_law(law: Law, *, examples: int = 20, length: float = 1.0) -> Report:
         in the norm (5.21) into L2(Gamma_c), settles when the mesh is halved.  A local law fails here, so its
         ``outside`` must name the reason why the theorem does not apply.
 
-    ``examples`` is the number of cases for each property; the first property that fails raises :class:`Refused`.
+    ``examples`` is the number of cases for each property; the first property that fails raises Refused.
     ``length`` is the length of Gamma_c in the cases, of the order of the law's lengths.  The last property is followed
     down to cells of 1/64 of it.
     """

@@ -63,7 +63,7 @@ def check_rule(rule: Rule, *, examples: int = 20) -> Report:
         ``|g_n - g| <= 4 sqrt(1 + rho) rate^n |g_0 - g|`` in the norm (5.21), where it claims a rate; ``attained`` where
         some run refutes 0.9 of that rate.
 
-    ``examples`` is the number of cases for each property; the first property that fails raises :class:`Refused`.
+    ``examples`` is the number of cases for each property; the first property that fails raises Refused.
     """
     kit = Kit(f"rule {rule.name!r}", examples)
     tests: dict[str, tuple[Any, Any]] = {
