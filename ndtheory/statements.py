@@ -17,7 +17,7 @@ Fault = Literal["false as printed", "does not follow", "gap", "typo"]
 
 @dataclass(frozen=True, kw_only=True)
 class Statement:
-    """A statement, told in our own words with formulas in TeX.
+    """A statement in our own words, with formulas in TeX.
 
     Attributes
     ----------

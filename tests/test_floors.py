@@ -20,19 +20,16 @@ BEGIN, END = "<!-- floors: python tests/test_floors.py -->", "<!-- end of floors
 #: From the ground upwards: floor -> package -> its modules.  A module imports from its own floor and from those below.
 FLOORS: dict[str, dict[str, str]] = {
     "theory": {
-        "ndtheory.symbolic": (
-            "__init__ checks contraction dimension energy engine estimates further intervals mechanics "
-            "one_node one_step printed quotient symbols weak_form"
-        ),
+        "ndtheory.symbolic": "__init__ checks dimension engine further mechanics quotient section5 symbols",
         "ndtheory": (
-            "__init__ bounds constants continuum energy energy_bounds energy_norms errors intervals moduli "
+            "__init__ bounds constants continuum energy_norms errors intervals moduli "
             "number scalar segments statements strip texts wedges"
         ),
     },
     "elastic bodies": {
         "fem1d2d": (
-            "__init__ assembly condense element enclosed exact lifted loewner material mesh mesh_files "
-            "mesh_reader outline overlap pencil proved strain supports trace transfer"
+            "__init__ assembly condense element enclosed exact loewner material mesh mesh_files mesh_reader outline "
+            "pencil proved supports trace"
         )
     },
     "for all of verification": {
@@ -87,7 +84,7 @@ FLOORS: dict[str, dict[str, str]] = {
     },
     "parts of results": {
         "verification.sections": (
-            "advice bounds certificate comparison constants ledger of_results reproduction run setting sweep"
+            "advice answer bounds certificate comparison constants ledger of_results reproduction run setting sweep"
         )
     },
     "figures": {
@@ -107,8 +104,8 @@ FLOORS: dict[str, dict[str, str]] = {
 
 #: Lines of each package at most, those of packages inside it apart: whoever needs more says here how many.
 BUDGET = {
-    "fem1d2d": 3300,
-    "ndtheory": 6100,
+    "fem1d2d": 3000,
+    "ndtheory": 5600,
     "verification": 1300,
     "verification.advice": 4900,
     "verification.algorithm": 2300,

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 from fem1d2d import plane_strain, rectangle, stiffness
 from ndtheory import HypothesisError, evaluate_energy
+from ndtheory.constants import EnergyConstants
 from ndtheory.continuum import (
     Rectangle,
     TwoRectangles,
@@ -25,7 +26,6 @@ from ndtheory.continuum import (
     friction_threshold,
     statement,
 )
-from ndtheory.energy import EnergyConstants
 from ndtheory.intervals import Interval, sinc
 from ndtheory.moduli import Moduli, half_planes, mirror
 from ndtheory.segments import Zone, bound, bound_at_end, meeting, zones

@@ -6,6 +6,7 @@ import os
 import shutil
 import sys
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from shlex import quote
@@ -290,7 +291,7 @@ def _compare(problem: Problem, typed: Typed, folder: Path | None, solver: Any, a
     pair = build(problem)
     _warn(pair.warnings)
     parts = None if as_json else Parts(pair, one_by_one(needed=write is not None))
-    with stages() as tell, progress(tell, problem.iteration.tolerance) as watch:
+    with stages() as tell, progress(tell, problem.iteration.tolerance) as watch, parts or nullcontext():
         comparison = verdicts.compare(pair, solver=solver, watch=watch, progress=tell, listener=parts, **asked)
     _warn(comparison.run.warnings[len(pair.warnings) :])
     deliver(comparison, end, as_json, write, folder, typing=typed.command)

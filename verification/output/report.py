@@ -34,12 +34,12 @@ GLOSSARY = {
 }
 
 VERDICTS = {
-    "CONSISTENT": "The largest ratio seen, rounding included, is below the bound, or attains it.",
-    "VIOLATED": "It is above: for a proved bound a bug or an error in the proof, for the printed one a finding; for "
+    "consistent": "The largest ratio seen, rounding included, is below the bound, or attains it.",
+    "violated": "It is above: for a proved bound a bug or an error in the proof, for the printed one a finding; for "
     "linearised, a forecast that missed.",
-    "INCONCLUSIVE": "The difference is smaller than rounding.",
-    "HYPOTHESES_NOT_MET": "The theorem draws no conclusion at this friction and theta.",
-    "NOT_COMPUTED": "There is nothing to hold against the run; the reason stands beside it.",
+    "inconclusive": "The difference is smaller than rounding.",
+    "no conclusion": "The theorem draws no conclusion at this friction and theta.",
+    "not computed": "No number was available to compare with the run; the reason is given.",
 }
 
 #: Beyond three columns, or with cells longer than this, a table is shown row by row on a phone.
