@@ -120,7 +120,7 @@ BUDGET = {
     "verification.output": 410,
     "verification.problem": 1700,
     "verification.reproduce": 630,
-    "verification.sections": 1900,
+    "verification.sections": 2030,
     "verification.sweeps": 2700,
     "verification.testing": 1570,
 }
