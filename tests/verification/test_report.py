@@ -207,7 +207,7 @@ def test_every_warning_of_the_run_stands_in_the_report(tmp_path):
     problem = vf.example("two-bars")
     compared = vf.compare(problem, bounds=["energy"])
     assert any("strain" in warning for warning in compared.run.warnings)
-    Folder(tmp_path, "compare").write_comparison(compared)
+    Folder(tmp_path, "compare").write(compared)
     page = (tmp_path / "report.html").read_text("utf-8")
     assert all(html.escape(warning) in page for warning in compared.run.warnings)
     quiet = vf.compare(problem.with_keys({"body2.prescribed.right": "[-0.0001]"}), bounds=["energy"])

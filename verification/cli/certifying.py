@@ -98,7 +98,7 @@ def certify(
         return fail(error, "not proved", "no certificate")
     typed = Typed(file=file, keys=keys, theta=theta, swap=swap)
     shown = lambda found: sections(found, target)
-    deliver(found, shown, as_json, writing(found, target), target, typing=typed.command)
+    deliver(found, shown, as_json, writing(target), target, typing=typed.command)
     return 0
 
 
@@ -118,7 +118,7 @@ def _prove_continuum(
     except Unproved as error:
         return fail(error, "not proved", "nothing is proved")
     typed = Typed(file=file, keys=keys, theta=theta, swap=swap)
-    deliver(found, continuum, as_json, writing(found, target), target, typing=typed.command)
+    deliver(found, continuum, as_json, writing(target), target, typing=typed.command)
     return 0 if found.contracts else 1
 
 

@@ -180,7 +180,7 @@ def deliver(
     document: D,
     sections: Callable[[D], Sections],
     as_json: bool,
-    write: Callable[[], None] | None = None,
+    write: Callable[[D], None] | None = None,
     folder: Path | None = None,
     *,
     typing: Typing = nothing_typed,
@@ -201,7 +201,7 @@ def deliver(
     try:
         with stages() as tell:
             tell(f"drawing and writing {folder}", None)
-            write()
+            write(document)
     except KeyboardInterrupt:
         complain(f"interrupted while {folder} was written; the result is shown above")
         raise Interrupted from None

@@ -42,14 +42,13 @@ def verify(ids: tuple[str, ...], level: Any, folder: Path | None, as_json: bool)
     from verification.output.folder import Folder
     from verification.sections.ledger import sections
 
-    target = None if folder is None else Folder(folder, "verify")
+    write = None if folder is None else Folder(folder, "verify").write
     try:
         with stages() as watch:
             found = check(chosen, level=level, watch=watch)
     except KeyboardInterrupt:
         complain("interrupted before every check was done: no verdict is reached")
         raise Interrupted from None
-    write = None if target is None else lambda: target.write_ledger(found)
     deliver(found, sections, as_json, write, folder)
     return 1 if found.changed else 0
 
@@ -94,8 +93,7 @@ def reproduce(figure: str, jobs: int | None, store: Path | None, folder: Path | 
     from verification.reproduce import reproduce as run_again
     from verification.sections.reproduction import sections
 
-    target = None if folder is None else Folder(folder, "reproduce")
+    write = None if folder is None else Folder(folder, "reproduce").write
     with stages() as tell:
         found = run_again(FIGURES if figure == "all" else (figure,), jobs=jobs or -1, store=store, progress=tell)
-    write = None if target is None else lambda: target.write_reproduction(found)
     deliver(found, sections, as_json, write, folder)

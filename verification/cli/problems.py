@@ -149,7 +149,7 @@ def run(file: Path, solver: Any, start: Path | None, folder: Path | None, as_jso
     from verification.output.folder import Folder
     from verification.sections.run import sections
 
-    target = None if folder is None else Folder(folder, "run")
+    write = None if folder is None else Folder(folder, "run").write
     pair = build(problem)
     g = None if start is None else forces(read_matrix(start), pair, str(start))
     _warn(pair.warnings)
@@ -161,7 +161,6 @@ def run(file: Path, solver: Any, start: Path | None, folder: Path | None, as_jso
         except KeyboardInterrupt:  # costs no run
             finished = replace(finished, interrupted=True).linearise()
     _warn(finished.warnings[len(pair.warnings) :])
-    write = None if target is None else lambda: target.write_run(finished)
     deliver(finished, sections, as_json, write, folder, typing=Typed(file=file, **changes).command)
     return _status_of_run(finished, changes["swap"])
 
@@ -188,14 +187,13 @@ def solve(file: Path, keys: dict[str, str], folder: Path | None, as_json: bool) 
     from verification.sections import run
 
     problem = load_problem(file, keys)
-    target = None if folder is None else Folder(folder, "solve")
+    write = None if folder is None else Folder(folder, "solve").write
     bodies = discretise(problem)
     _warn(bodies.warnings)
     with stages() as tell:
         tell("solving both bodies at once", None)
         solution = monolithic.solve(bodies)
     _warn(list(solution.checks.warnings))
-    write = None if target is None else lambda: target.write_solution(solution)
     deliver(solution, run.solution, as_json, write, folder, typing=Typed(file=file, keys=keys).command)
     return 0
 
@@ -289,14 +287,13 @@ def _compare(problem: Problem, typed: Typed, folder: Path | None, solver: Any, a
     from verification.sections.comparison import Parts
     from verification.sections.comparison import verdicts as end
 
-    target = None if folder is None else Folder(folder, "compare")
+    write = None if folder is None else Folder(folder, "compare").write
     pair = build(problem)
     _warn(pair.warnings)
-    parts = None if as_json else Parts(pair, one_by_one(needed=target is not None))
+    parts = None if as_json else Parts(pair, one_by_one(needed=write is not None))
     with stages() as tell, progress(tell, problem.iteration.tolerance) as watch, parts or nullcontext():
         comparison = verdicts.compare(pair, solver=solver, watch=watch, progress=tell, listener=parts, **asked)
     _warn(comparison.run.warnings[len(pair.warnings) :])
-    write = None if target is None else lambda: target.write_comparison(comparison)
     deliver(comparison, end, as_json, write, folder, typing=typed.command)
     return _status_of_comparison(comparison, typed.swap)
 

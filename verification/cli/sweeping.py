@@ -130,7 +130,7 @@ def sweep(
         found,
         sections,
         as_json,
-        lambda: _write(found, targets),
+        lambda found: _write(found, targets),
         target,
         typing=Typed(file=Path(problem.source)).command,
     )

@@ -3,15 +3,22 @@
 Where the bounds of the sides do not overlap, the inequality is decided on these bodies: one that fails there is
 refuted by proof, and of one that holds this is one case.  Where they overlap nothing is said.  Equalities, which cannot
 be decided so, are left to :mod:`verification.ledger.rational_pairs`.  In all units taken m is below 1, so that m~ is m.
+
+A pair of forces differs on a piece of T by d_2 = u, a vector of doubles, and ``g = S_n u``.  Where all nodes are open
+and slip one way ``p_T = w k sign S g_N``, ``p_N = 0``, and ``d_1 = -S_c^-1 p``; where all stick ``d_1 = u`` and
+``p = -S_c u``.  An inverse is enclosed in two ways, for a vector y that a solver gives and its residual
+``r = x - Y y``:
+
+    x' Y^-1 x = 2 x' y - y' Y y + r' Y^-1 r,      |Y^-1 x - y|_Y^2 = r' Y^-1 r <= |r|^2 / least eigenvalue of Y.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from fractions import Fraction
-from functools import cached_property
+from functools import cache, cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -29,12 +36,11 @@ from verification.constants.proved import Between, Proof, entries
 from verification.interface.body import Condensed
 from verification.ledger.cases import NAMED, three_digits
 from verification.ledger.differences import directions, uniform_piece
-from verification.ledger.evidence import Evidence, Form, Level
+from verification.ledger.evidence import Evidence, Form, source
 from verification.ledger.inequalities import ENTRIES, SEED, RightSides, terms_of
 from verification.ledger.worst import Trial
 from verification.problem.specification import Problem
 from verification.progress import silent
-from verification.threads import one_thread
 
 #: So many times the friction of its problems, what Section 5 prints from (5.31) on fails in a small unit of stress.
 MUCH = Fraction(10**8)
@@ -484,24 +490,6 @@ def both_sides(d: Any, r: Any, key: Key) -> Sides:
     return [(left.square(), right.square())] if id == "x-ratio" else [(left, right)]
 
 
-def enclosed(
-    ids: Collection[str] | None = None, level: Level = "quick", watch: Callable[[float], None] = lambda done: None
-) -> dict[str, list[Evidence]]:
-    """Decide inequalities on named bodies by enclosures of both sides: a ``Source``, the same at both levels."""
-    wanted = [key for key in DECIDED if ids is None or key[0] in ids]
-    found: dict[str, list[Evidence]] = {}
-    with one_thread():
-        known: dict[str, EnclosedBodies] = {}
-        for done, key in enumerate(wanted):
-            watch(done / len(wanted))
-            name = LAYER if key in ON_LAYER else PLATE
-            bodies = known[name] = known.get(name) or EnclosedBodies(name)
-            if (evidence := decide(bodies, *key)) is not None:
-                found.setdefault(key[0], []).append(evidence)
-    watch(1.0)
-    return found
-
-
 def decide(bodies: EnclosedBodies, id: str, of: Form) -> Evidence | None:
     """The evidence of an inequality on some bodies; None where the enclosures overlap."""
     key: Key = (id, of)
@@ -542,3 +530,13 @@ def decide(bodies: EnclosedBodies, id: str, of: Form) -> Evidence | None:
     }
     text = f"{said}{squares} ({where}{in_unit}): both sides between proved bounds, for the exact data"
     return Evidence(method="verified", of=of, holds=not fails, text=text, data=data)
+
+
+def _decided(id: str, known: Callable[[str], EnclosedBodies]) -> list[Evidence]:
+    """The evidence of all forms of a statement."""
+    found = [decide(known(LAYER if key in ON_LAYER else PLATE), *key) for key in DECIDED if key[0] == id]
+    return [evidence for evidence in found if evidence is not None]
+
+
+#: Inequalities on named bodies, decided by enclosures of both sides, the same at both levels.
+enclosed = source({id: partial(_decided, id) for id, _ in DECIDED}, lambda level: cache(EnclosedBodies))

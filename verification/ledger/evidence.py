@@ -71,21 +71,24 @@ def figure(value: float, digits: int = 6) -> float:
     return float(f"{value:.{digits - 1}e}")
 
 
-def gather(
-    checks: Mapping[str, Callable[[Any], list[Evidence]]],
-    shared: Any,
-    ids: Collection[str] | None,
-    watch: Callable[[float], None],
-) -> dict[str, list[Evidence]]:
-    """Ask the checks of the statements that are wanted, all of them if ids is None; each receives what they share."""
-    chosen = [id for id in checks if ids is None or id in ids]
-    found = {}
-    with one_thread():
-        for done, id in enumerate(chosen):
-            watch(done / len(chosen))
-            found[id] = checks[id](shared)
-    watch(1.0)
-    return found
+def source(checks: Mapping[str, Callable[[Any], list[Evidence]]], shared: Callable[[Level], Any]) -> Source:
+    """A source with one check for each statement; the checks share an object, made for the level if any is wanted."""
+
+    def gather(
+        ids: Collection[str] | None = None, level: Level = "quick", watch: Callable[[float], None] = lambda done: None
+    ) -> dict[str, list[Evidence]]:
+        chosen = [id for id in checks if ids is None or id in ids]
+        found = {}
+        with one_thread():
+            given = shared(level) if chosen else None
+            for done, id in enumerate(chosen):
+                watch(done / len(chosen))
+                if entries := checks[id](given):
+                    found[id] = entries
+        watch(1.0)
+        return found
+
+    return gather
 
 
 def settle(evidence: Sequence[Evidence]) -> tuple[Verdict, Method | None]:

@@ -7,7 +7,7 @@ paper's.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
@@ -19,7 +19,7 @@ from fem1d2d.mesh import Floats
 from verification.algorithm.runs import Run, run
 from verification.interface.fields import ContactFields
 from verification.interface.pair import ContactPair
-from verification.ledger.evidence import Evidence, Level, figure, gather
+from verification.ledger.evidence import Evidence, Level, figure, source
 from verification.monolithic import solution_force
 from verification.reproduce import READINGS, ModelReading, reproduce
 from verification.reproduce.claims import CLAIMS, HARD, OPTIMUM, SERVES, SOFT, Claim, Curve, zones
@@ -326,12 +326,5 @@ CHECKS: dict[str, Callable[[Section6], list[Evidence]]] = {
     "x-increment-test": _stopping,
 }
 
-
-def experiments(
-    ids: Collection[str] | None = None, level: Level = "quick", watch: Callable[[float], None] = lambda done: None
-) -> dict[str, list[Evidence]]:
-    """Evidence for the numerical results of Section 6: a ``Source``.
-
-    Quick takes the mesh of 190 nodes, full all four.
-    """
-    return gather(CHECKS, Section6(level), ids, watch)
+#: Evidence for the numerical results of Section 6.  Quick takes the mesh of 190 nodes, full all four.
+experiments = source(CHECKS, Section6)

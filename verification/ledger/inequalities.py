@@ -24,6 +24,26 @@ from verification.constants import Measured
 from verification.ledger.differences import Difference
 from verification.ledger.evidence import Form
 
+SEED = 2008
+
+#: Random problems, of 2 to 9 contact nodes; starts of each search over pieces; pairs of random forces per problem.
+LEVELS: dict[str, tuple[int, int, int]] = {"quick": (30, 1, 6), "full": (400, 3, 12)}
+
+#: Relative error granted to a ratio: the constants are eigenvalues right to about 1e-12, and equalities are seen to
+#: hold to 3e-13 of the energies at conditions of S_1 up to 1e5, the thin bodies included.
+ALLOWANCE = 1e-9
+
+#: Where terms of different sizes are added: what is granted over the energies behind them; 6e-13 is seen.
+ROUNDING = 1e-11
+
+#: Units of stress, in units of the file.
+UNITS = (1.0, 1e3, 1e-3, 1e-6)
+
+THETAS = (0.1, 0.5, 0.9)
+
+#: Shares of C_2 at which contraction is tested.
+SHARES = (Fraction(1, 100), Fraction(99, 100))
+
 
 class RightSides:
     """Right sides of Section 5 over numbers of any type, from the constants of a class that inherits."""
@@ -181,27 +201,6 @@ class Reading(RightSides):
         return 1 - float(energy_norms.one_minus_square(theta, *self.energy))
 
 
-SEED = 2008
-
-#: Random problems, of 2 to 9 contact nodes; starts of each search over pieces; pairs of random forces per problem.
-LEVELS: dict[str, tuple[int, int, int]] = {"quick": (30, 1, 6), "full": (400, 3, 12)}
-
-#: Relative error granted to a ratio: the constants are eigenvalues right to about 1e-12, and equalities are seen to
-#: hold to 3e-13 of the energies at conditions of S_1 up to 1e5, the thin bodies included.
-ALLOWANCE = 1e-9
-
-#: Where terms of different sizes are added: what is granted over the energies behind them; 6e-13 is seen.
-ROUNDING = 1e-11
-
-#: Units of stress, in units of the file.
-UNITS = (1.0, 1e3, 1e-3, 1e-6)
-
-THETAS = (0.1, 0.5, 0.9)
-
-#: Shares of C_2 at which contraction is tested.
-SHARES = (Fraction(1, 100), Fraction(99, 100))
-
-
 #: Numbers, or arrays of them.
 Terms = Any
 Side = Callable[[Any, Any, Any], Terms]
@@ -220,8 +219,7 @@ class Inequality:
     left, right : callable
         Difference (or :class:`verification.ledger.worst.Trial`), constants, theta -> a number; several numbers are
         added, or compared one by one where ``about`` is 'bodies'.  Of several differences: arrays of them.  The same
-        formulas take intervals (:mod:`verification.ledger.enclosures`) and rationals
-        (:mod:`verification.ledger.rational_pairs`).
+        formulas take intervals (:mod:`verification.ledger.enclosures`).
     equality : bool
         Then both sides may be vectors whose Euclidean norm is (5.21).
     about : {'pairs', 'contraction', 'bodies'}
@@ -262,7 +260,7 @@ class Inequality:
         left, right = self.left(subject, reading, theta), self.right(subject, reading, theta)
         if self.about == "bodies":
             worst = float(np.max(np.asarray(left) / np.asarray(right)))
-            return math.sqrt(worst) if self.squares else worst
+            return float(np.sqrt(worst)) if self.squares else worst
         if self.equality:
             apart, size = np.abs(left - right), subject.size
             if np.ndim(apart) > np.ndim(size):

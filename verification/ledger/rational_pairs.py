@@ -7,10 +7,10 @@ rationals is taken only where it satisfies every condition of step II exactly.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -24,9 +24,8 @@ from verification.interface.body import Condensed
 from verification.interface.exact_bodies import ExactInterface, exact_points
 from verification.interface.pair import build
 from verification.ledger.cases import rectangle
-from verification.ledger.evidence import Evidence, Level
+from verification.ledger.evidence import Evidence, source
 from verification.problem.specification import Problem
-from verification.threads import one_thread
 
 #: Rationals.
 Exact = NDArray[Any]
@@ -221,20 +220,6 @@ AT_MOST: Mapping[str, Sides] = {
 }
 
 
-def in_rationals(
-    ids: Collection[str] | None = None, level: Level = "quick", watch: Callable[[float], None] = lambda done: None
-) -> dict[str, list[Evidence]]:
-    """Decide equalities on one pair of bodies in rationals: a ``Source``, the same at both levels."""
-    wanted = [id for id in (*EQUAL, *AT_MOST) if ids is None or id in ids]
-    found: dict[str, list[Evidence]] = {}
-    if wanted:
-        with one_thread():
-            pair = RationalPair()
-            found = {id: [decide(pair, id)] for id in wanted}
-    watch(1.0)
-    return found
-
-
 def decide(pair: RationalPair, id: str) -> Evidence:
     """The evidence of an equality or inequality; nothing is rounded, so that there always is some."""
     left, right = EQUAL[id](pair) if id in EQUAL else AT_MOST[id](pair)
@@ -251,3 +236,11 @@ def decide(pair: RationalPair, id: str) -> Evidence:
     }
     text = f"{said} ({where}), computed in rationals"
     return Evidence(method="verified", of="printed", holds=holds, text=text, data=data)
+
+
+def _decided(id: str, pair: RationalPair) -> list[Evidence]:
+    return [decide(pair, id)]
+
+
+#: Equalities on one pair of bodies, decided in rationals, the same at both levels.
+in_rationals = source({id: partial(_decided, id) for id in (*EQUAL, *AT_MOST)}, lambda level: RationalPair())

@@ -1,8 +1,12 @@
-"""Statements about solutions and iterates, checked with the weak forms (:mod:`verification.ledger.weak_forms`)."""
+"""Statements about solutions and iterates, checked with the weak forms (:mod:`verification.ledger.weak_forms`).
+
+>>> [e.holds for e in solutions(["2.3"], "quick")["2.3"]]
+[False, True]
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,7 +20,7 @@ from verification.ledger.convergence import (
     forces_converge,
     strong_form,
 )
-from verification.ledger.evidence import Evidence, Level, figure, gather
+from verification.ledger.evidence import Evidence, figure, source
 from verification.ledger.weak_forms import (
     EXACT,
     LIMIT,
@@ -250,17 +254,6 @@ CHECKS: dict[str, Check] = {
     "thm-5.9.2": fields_converge,
 }
 
-
-def solutions(
-    ids: Collection[str] | None = None, level: Level = "quick", watch: Callable[[float], None] = lambda done: None
-) -> dict[str, list[Evidence]]:
-    """Evidence for statements about solutions, iterates and their limit: a ``Source``.
-
-    Full halves the meshes too, draws problems at random and runs to the end.
-
-    Examples
-    --------
-    >>> [e.holds for e in solutions(["2.3"], "quick")["2.3"]]
-    [False, True]
-    """
-    return gather(CHECKS, RunsOfLevel(level=level), ids, watch)
+#: Evidence for statements about solutions, iterates and their limit.  Full halves the meshes too, draws problems at
+#: random and runs to the end.
+solutions = source(CHECKS, lambda level: RunsOfLevel(level=level))

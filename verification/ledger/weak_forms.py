@@ -6,6 +6,9 @@ The algorithm works only on the interface, with condensed matrices.  Here a disp
 Indices are the paper's: body 1 is the contact body, body 2 the Neumann body.  Normal components are along n^1, and an
 initial gap d, which the paper does not have, turns ``[v_N] <= 0`` into ``[v_N] <= d``.  Traces and forces are on the
 grid of their body; where the grids differ v^2 enters a jump, K and R_D^1 as ``P v^2`` at the contact nodes.
+
+Test functions are random ones and those for which an inequality is close to equality.  Values of a check on several
+problems become evidence by :func:`equations` and :func:`inequalities`.
 """
 
 from __future__ import annotations
@@ -320,6 +323,9 @@ def _over(value: Floats, scale: Floats) -> Floats:
     return np.asarray(np.divide(value, scale, out=np.zeros(np.broadcast(value, scale).shape), where=scale > 0))
 
 
+# Test functions.
+
+
 def directions(rng: np.random.Generator, body: Body, count: int) -> Floats:
     """Rough and smooth random fields of a body, largest value 1, as columns."""
     rough = rng.standard_normal((len(body.free), count))
@@ -400,6 +406,9 @@ def obstacle_tests(weak: Weak, u: Fields, rng: np.random.Generator, count: int) 
 
 def largest(u: Fields) -> float:
     return float(max(np.abs(u.one).max(), np.abs(u.two).max()))
+
+
+# Evidence.
 
 
 @dataclass(frozen=True)

@@ -159,12 +159,12 @@ def _remove(room: Path) -> None:
         room.rmdir()
 
 
-def writing(found: Document, target: Path | None) -> Callable[[], None] | None:
-    """A function that writes a document into a file; None where no name was given."""
+def writing(target: Path | None) -> Callable[[Document], None] | None:
+    """A function that writes a document into a file; None if no name was given."""
     if target is None:
         return None
 
-    def write() -> None:
+    def write(found: Document) -> None:
         with staged(target.parent, shown=target) as room:
             (room / target.name).write_text(found.to_json(), encoding="utf-8")
 

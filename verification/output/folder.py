@@ -17,6 +17,7 @@ from verification.spreadsheet import as_csv
 
 if TYPE_CHECKING:
     from verification.comparison import Comparison
+    from verification.figures import Figure
     from verification.ledger import Ledger
     from verification.monolithic import Solution
     from verification.reproduce import Reproduction
@@ -32,7 +33,7 @@ class Folder:
     """
 
     def __init__(self, path: Path, kind: Kind) -> None:
-        self.path = path
+        self.path, self.kind = path, kind
         check_folder(path)
         for name in FILES[kind]:
             check_ours(path / name)
@@ -49,30 +50,29 @@ class Folder:
             (room / target.name).write_text(text, encoding="utf-8")
         return target
 
-    def write_run(self, run: Run) -> None:
-        """Write ``run.json``, the tables, the interface, the problem and the figures."""
-        with staged(self.path, FILES["run"]) as room:
-            _text(room / "run.json", run.to_json())
-            self._tables(room, run)
-            _pictures(room, run)
+    def write(self, found: Any) -> None:
+        """Write a result of this kind: its document with tables, matrices, the problem, figures or pages."""
+        with staged(self.path, FILES[self.kind]) as room:
+            _text(room / FILES[self.kind][0], found.to_json())
+            match self.kind:
+                case "verify":
+                    _pages(room, found)
+                case "reproduce":
+                    _reproduced(room, found)
+                case "compare":
+                    self._compared(room, found)
+                case _:
+                    self._tables(room, found)
+                    _pictures(room, found)
 
-    def write_solution(self, solution: Solution) -> None:
-        """Write ``solve.json``, the table of Gamma_c, the problem and the figure of the bodies."""
-        with staged(self.path, FILES["solve"]) as room:
-            _text(room / "solve.json", solution.to_json())
-            self._tables(room, solution)
-            _pictures(room, solution)
-
-    def write_comparison(self, comparison: Comparison) -> None:
-        """Write ``compare.json``, the tables, the interface, the problem, the figures and ``report.html``."""
+    def _compared(self, room: Path, comparison: Comparison) -> None:
+        """The files of the run, and ``report.html``."""
         from verification.output.report import report
 
-        with staged(self.path, FILES["compare"]) as room:
-            _text(room / "compare.json", comparison.to_json())
-            self._tables(room, comparison.run)
-            names = _pictures(room, comparison.run, comparison)
-            figures = {name: (room / f"{name}.svg").read_text("utf-8") for name in names}
-            _text(room / "report.html", report(comparison, figures))
+        self._tables(room, comparison.run)
+        names = _pictures(room, comparison.run, comparison)
+        figures = {name: (room / f"{name}.svg").read_text("utf-8") for name in names}
+        _text(room / "report.html", report(comparison, figures))
 
     def _tables(self, room: Path, result: Run | Solution) -> None:
         """Gamma_c and the history as CSV, the interface as matrices, and the problem where a user has none there."""
@@ -90,29 +90,23 @@ class Folder:
         if result.problem is not None and ours:
             _text(room / "problem.toml", f"{MARKS['.toml'].decode()}\n{result.problem.to_toml()}")
 
-    def write_reproduction(self, found: Reproduction) -> None:
-        """Write ``reproduce.json``, the rows behind each figure and the figures."""
-        from verification import figures
 
-        with staged(self.path, FILES["reproduce"]) as room:
-            _text(room / "reproduce.json", found.to_json())
-            for result in found.results:
-                names = list(dict.fromkeys(name for row in result.rows for name in row))
-                columns = {name: [row.get(name) for row in result.rows] for name in names}
-                units = "x, gap, slip in mm; pressure, shear, young1, young2 in MPa"
-                _csv(room / f"{result.figure}.csv", f"{result.figure} of Section 6, by reading; {units}", columns)
-            figure = found.plot()
-            for ending in ("png", "svg"):
-                figures.save(figure, room / f"reproduce.{ending}")
+def _reproduced(room: Path, found: Reproduction) -> None:
+    """The rows behind each figure, and the figures."""
+    for result in found.results:
+        names = list(dict.fromkeys(name for row in result.rows for name in row))
+        columns = {name: [row.get(name) for row in result.rows] for name in names}
+        units = "x, gap, slip in mm; pressure, shear, young1, young2 in MPa"
+        _csv(room / f"{result.figure}.csv", f"{result.figure} of Section 6, by reading; {units}", columns)
+    _save(room, {"reproduce": found.plot()})
 
-    def write_ledger(self, ledger: Ledger) -> None:
-        """Write ``ledger.json``, ``ledger.md``, and of a whole ledger ``errata.md`` and ``verdicts.json``."""
-        with staged(self.path, FILES["verify"]) as room:
-            _text(room / "ledger.json", ledger.to_json())
-            _text(room / "ledger.md", sheets.page(ledger))
-            if ledger.whole:
-                _text(room / "errata.md", sheets.errata(ledger))
-                _text(room / "verdicts.json", sheets.verdicts(ledger))
+
+def _pages(room: Path, ledger: Ledger) -> None:
+    """``ledger.md``, and of a whole ledger ``errata.md`` and ``verdicts.json``."""
+    _text(room / "ledger.md", sheets.page(ledger))
+    if ledger.whole:
+        _text(room / "errata.md", sheets.errata(ledger))
+        _text(room / "verdicts.json", sheets.verdicts(ledger))
 
 
 def _replaceable(there: bytes, text: str) -> bool:
@@ -140,7 +134,14 @@ def _pictures(room: Path, result: Run | Solution, comparison: Comparison | None 
         drawn["residuals"] = figures.draw_residuals(result, [] if comparison is None else comparison.computed)
     if comparison is not None and comparison.losses is not None:
         drawn["waterfall"] = figures.draw_waterfall(comparison.losses, comparison.units["stress"])
+    _save(room, drawn)
+    return list(drawn)
+
+
+def _save(room: Path, drawn: Mapping[str, Figure]) -> None:
+    """Write figures as PNG and SVG."""
+    from verification.figures import save
+
     for name, figure in drawn.items():
         for ending in ("png", "svg"):
-            figures.save(figure, room / f"{name}.{ending}")
-    return list(drawn)
+            save(figure, room / f"{name}.{ending}")

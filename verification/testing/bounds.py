@@ -17,7 +17,7 @@ from verification.constants import measure
 from verification.interface.build import build
 from verification.interface.pair import ContactPair
 from verification.problem import Problem
-from verification.testing.properties import Fails, Finding, Refused, Report, examine, over
+from verification.testing.properties import Fails, Finding, Kit, Report, over
 from verification.testing.strategies import SEEDS, bar_problems, forces, matrix_pairs, plane_problems
 from verification.testing.transforms import problem_in_units, problem_mirrored
 
@@ -57,10 +57,10 @@ def check_bound(bound: Bound, *, examples: int = 20) -> Report:
         The mirror image has the same factor.
 
     Where a bound draws no conclusion at a drawn theta, one of the interval that it names is taken.  ``examples`` is the
-    number of cases for each property; the first property that fails raises :class:`Refused`.
+    number of cases for each property; the first property that fails raises Refused.
     """
-    subject = f"bound {bound.name!r}"
-    findings = list(_holds(subject, bound, examples))
+    kit = Kit(f"bound {bound.name!r}", examples)
+    findings = _holds(kit, bound)
     scaled: dict[str, Any] = {
         "knows no unit of stress": lambda problem: problem_in_units(problem, stress=Fraction(4096)),
         "knows no unit of length": lambda problem: problem_in_units(problem, length=Fraction(1, 1024)),
@@ -72,8 +72,8 @@ def check_bound(bound: Bound, *, examples: int = 20) -> Report:
             findings.append(Finding(property=property, verdict="not asked", detail=why))
             continue
         test = lambda problem, theta, seen=image: _same(bound, problem, seen(problem), theta)
-        findings.append(examine(subject, property, _problems(), test, examples=examples))
-    return Report(subject=subject, findings=tuple(findings))
+        findings.append(kit.examine(property, _problems(), test))
+    return kit.report(*findings)
 
 
 # --- cases ------------------------------------------------------------------------------------------------------------
@@ -142,7 +142,7 @@ def observed(pair: ContactPair, theta: float, force: Floats, other: Floats, seed
 # --- tests ------------------------------------------------------------------------------------------------------------
 
 
-def _holds(subject: str, bound: Bound, examples: int) -> list[Finding]:
+def _holds(kit: Kit, bound: Bound) -> list[Finding]:
     asked = 0
     factor_refuted = gain_refuted = 0
     share = 0.0
@@ -162,7 +162,7 @@ def _holds(subject: str, bound: Bound, examples: int) -> list[Finding]:
         gain_refuted += 1 - seen < gain / MUTANT - NOISE
         share = max(share, gain / (1 - seen)) if seen < 1 else share
 
-    holds = examine(subject, "bounds every step", _pushed(), test, examples=examples)
+    holds = kit.examine("bounds every step", _pushed(), test)
     holds = replace(holds, detail=f"{over(asked)} with a conclusion, of {holds.detail}")
     if not asked:
         why = f"it drew no conclusion in any of {holds.detail}"
@@ -172,7 +172,7 @@ def _holds(subject: str, bound: Bound, examples: int) -> list[Finding]:
         f" at most {share:.3g} of the gain seen is claimed"
     )
     if bound.attained and asked >= ENOUGH and not (factor_refuted and gain_refuted):
-        raise Refused(subject, "attained", f"no step comes near it: {said}", {})
+        raise kit.refused("attained", f"no step comes near it: {said}")
     verdict = "attained" if factor_refuted and gain_refuted else "not attained"
     return [holds, Finding(property="attained", verdict=verdict, detail=said)]
 

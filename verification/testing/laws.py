@@ -17,7 +17,7 @@ from verification.interface.grid import Grid
 from verification.interface.interface import Interface, Law
 from verification.interface.pair import ContactPair
 from verification.problem import Problem
-from verification.testing.properties import Fails, Finding, Refused, Report, examine
+from verification.testing.properties import Fails, Finding, Kit, Report
 from verification.testing.strategies import SEEDS, forces, plane_problems
 
 #: Two operators are the same up to this part of their largest entry.
@@ -53,11 +53,11 @@ def check_law(law: Law, *, examples: int = 20, length: float = 1.0) -> Report:
         in the norm (5.21) into L2(Gamma_c), settles when the mesh is halved.  A local law fails here, so its
         ``outside`` must name the reason why the theorem does not apply.
 
-    ``examples`` is the number of cases for each property; the first property that fails raises :class:`Refused`.
+    ``examples`` is the number of cases for each property; the first property that fails raises Refused.
     ``length`` is the length of Gamma_c in the cases, of the order of the law's lengths.  The last property is followed
     down to cells of 1/64 of it.
     """
-    subject = f"law {law.name!r}"
+    kit = Kit(f"law {law.name!r}", examples)
     grids = st.fixed_dictionaries({"law": st.just(law), "interface": _interfaces(law, length)})
     tests: dict[str, tuple[Any, Any]] = {
         "a matrix of its grids": (grids, _is_matrix),
@@ -66,8 +66,8 @@ def check_law(law: Law, *, examples: int = 20, length: float = 1.0) -> Report:
         "sees no left or right": (grids, _sees_no_sides),
         "bounds friction": (_pressed(law, length), _bounds_friction),
     }
-    findings = [examine(subject, name, cases, test, examples=examples) for name, (cases, test) in tests.items()]
-    return Report(subject=subject, findings=(*findings, _maps_into_L2(subject, law, length)))
+    findings = [kit.examine(name, cases, test) for name, (cases, test) in tests.items()]
+    return kit.report(*findings, _maps_into_L2(kit, law, length))
 
 
 # --- cases ------------------------------------------------------------------------------------------------------------
@@ -210,7 +210,7 @@ def norms(law: Law, length: float = 1.0) -> list[float]:
     return found
 
 
-def _maps_into_L2(subject: str, law: Law, length: float) -> Finding:
+def _maps_into_L2(kit: Kit, law: Law, length: float) -> Finding:
     property = "maps into L2"
     found = norms(law, length)
     growth = found[-1] / found[-2] if found[-2] else 1.0
@@ -219,5 +219,5 @@ def _maps_into_L2(subject: str, law: Law, length: float) -> Finding:
         return Finding(property=property, verdict="not asked", detail=f"it is {law.outside!r}; {shown}")
     if not growth <= GROWS:
         how = f"the norm of S grows with the mesh, so that the theorem does not speak of it: {shown}"
-        raise Refused(subject, property, how, {"length": length})
+        raise kit.refused(property, how, length=length)
     return Finding(property=property, verdict="holds", detail=shown)

@@ -81,51 +81,64 @@ def over(cases: int) -> str:
     return f"{cases} case{'s' if cases != 1 else ''}"
 
 
-def examine(
-    subject: str, property: str, cases: st.SearchStrategy[dict[str, Any]], test: Callable[..., None], *, examples: int
-) -> Finding:
-    """Test a property on drawn cases; raise Refused with the simplest case found in which it fails.
+@dataclass(frozen=True)
+class Kit:
+    """The tests of one subject, with so many drawn cases for each property."""
 
-    A case is the keywords of ``test``, which raises :class:`Fails` where the property does not hold.
-    """
-    seen: list[Refused] = []
-    tried = more = 0
+    subject: str
+    examples: int
 
-    @st.composite
-    def counted(draw: st.DrawFn) -> dict[str, Any]:
-        nonlocal more
-        more += bool(seen)
-        if more > SIMPLER:
-            raise _Enough
-        return draw(cases)
+    def refused(self, property: str, how: str, /, **case: Any) -> Refused:
+        """The error for a property that does not hold in a case."""
+        return Refused(self.subject, property, how, case)
 
-    @settings(
-        max_examples=examples,
-        deadline=None,
-        database=None,
-        phases=PHASES,
-        report_multiple_bugs=False,
-        suppress_health_check=list(HealthCheck),
-    )
-    @given(case=counted())
-    def run(case: dict[str, Any]) -> None:
-        nonlocal tried
-        tried += 1
+    def examine(self, property: str, cases: st.SearchStrategy[dict[str, Any]], test: Callable[..., None]) -> Finding:
+        """Test a property on drawn cases; raise Refused with the simplest case found in which it fails.
+
+        A case is the keywords of ``test``, which raises :class:`Fails` where the property does not hold.
+        """
+        seen: list[Refused] = []
+        tried = more = 0
+
+        @st.composite
+        def counted(draw: st.DrawFn) -> dict[str, Any]:
+            nonlocal more
+            more += bool(seen)
+            if more > SIMPLER:
+                raise _Enough
+            return draw(cases)
+
+        @settings(
+            max_examples=self.examples,
+            deadline=None,
+            database=None,
+            phases=PHASES,
+            report_multiple_bugs=False,
+            suppress_health_check=list(HealthCheck),
+        )
+        @given(case=counted())
+        def run(case: dict[str, Any]) -> None:
+            nonlocal tried
+            tried += 1
+            try:
+                test(**case)
+            except Fails as failure:
+                seen.append(self.refused(property, str(failure), **case))
+                raise seen[-1] from None
+
         try:
-            test(**case)
-        except Fails as failure:
-            seen.append(Refused(subject, property, str(failure), case))
+            run()
+        except _Enough:
             raise seen[-1] from None
+        except Flaky:  # what remembers earlier cases does not fail the same way twice
+            if not seen:
+                raise
+            raise seen[-1] from None
+        return Finding(property=property, verdict="holds", detail=over(tried))
 
-    try:
-        run()
-    except _Enough:
-        raise seen[-1] from None
-    except Flaky:  # what remembers earlier cases does not fail the same way twice
-        if not seen:
-            raise
-        raise seen[-1] from None
-    return Finding(property=property, verdict="holds", detail=over(tried))
+    def report(self, *findings: Finding) -> Report:
+        """The report of all findings."""
+        return Report(subject=self.subject, findings=findings)
 
 
 def describe(value: Any) -> str:

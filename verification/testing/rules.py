@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from fractions import Fraction
+from functools import partial
 from itertools import islice
 from math import sqrt
 from typing import Any
@@ -20,7 +21,7 @@ from verification.algorithm.theta import below_one, choose, energy_bounds
 from verification.constants import measure
 from verification.contact import ContactError
 from verification.interface.pair import ContactPair
-from verification.testing.properties import Fails, Finding, Refused, Report, examine, over
+from verification.testing.properties import Fails, Finding, Kit, Report, over
 from verification.testing.strategies import force_scale, forces, pairs
 from verification.testing.transforms import in_units, mirrored, reflect, upside_down
 
@@ -62,21 +63,17 @@ def check_rule(rule: Rule, *, examples: int = 20) -> Report:
         ``|g_n - g| <= 4 sqrt(1 + rho) rate^n |g_0 - g|`` in the norm (5.21), where it claims a rate; ``attained`` where
         some run refutes 0.9 of that rate.
 
-    ``examples`` is the number of cases for each property; the first property that fails raises :class:`Refused`.
+    ``examples`` is the number of cases for each property; the first property that fails raises Refused.
     """
-    subject = f"rule {rule.name!r}"
+    kit = Kit(f"rule {rule.name!r}", examples)
     tests: dict[str, tuple[Any, Any]] = {
         "stays at the solution": (SOLVED_PAIRS, _stays),
         "knows no units": (_begun(), _knows_no_units),
         "starts afresh": (st.fixed_dictionaries({"case": _begun(), "other": _begun()}), _starts_afresh),
         "sees no left, right, top or bottom": (_begun(), _sees_no_sides),
     }
-    findings = [
-        examine(subject, property, cases, lambda test=test, **case: test(rule, **case), examples=examples)
-        for property, (cases, test) in tests.items()
-    ]
-    findings.insert(1, _ends(subject, rule, examples))
-    return Report(subject=subject, findings=(*findings, _rate(subject, rule, examples)))
+    stays, *others = (kit.examine(name, cases, partial(test, rule)) for name, (cases, test) in tests.items())
+    return kit.report(stays, _ends(kit, rule), *others, _rate(kit, rule))
 
 
 # --- cases ------------------------------------------------------------------------------------------------------------
@@ -164,7 +161,7 @@ def _stays(rule: Rule, pair: ContactPair) -> None:
             raise Fails(f"T g = g, and step {n} moves g by {moved:.2g} of {at.scale:.2g} in the norm (5.21)")
 
 
-def _ends(subject: str, rule: Rule, examples: int) -> Finding:
+def _ends(kit: Kit, rule: Rule) -> Finding:
     outcomes: list[str] = []
 
     def test(pair: ContactPair) -> None:
@@ -188,11 +185,11 @@ def _ends(subject: str, rule: Rule, examples: int) -> Finding:
             if done.converged and not off <= 2 * allowed + 1e-12 * done.last.scale:
                 raise Fails(f"its run converged {off:.2g} away from the solution, {done.last.scale:.2g} large")
 
-    finding = examine(subject, "ends at the solution", SOLVED_PAIRS, test, examples=examples)
+    finding = kit.examine("ends at the solution", SOLVED_PAIRS, test)
     reached = outcomes.count("converged")
     if not reached:
         how = f"none of {len(outcomes)} runs converged, and a constant theta is proved to in each"
-        raise Refused(subject, finding.property, how, {"outcomes": sorted(set(outcomes))})
+        raise kit.refused(finding.property, how, outcomes=sorted(set(outcomes)))
     return replace(finding, detail=f"{reached} of {len(outcomes)} runs converged")
 
 
@@ -252,7 +249,7 @@ def _compare(own: list[Floats], other: list[Floats], where: str, same: float = S
 # --- the proved rate --------------------------------------------------------------------------------------------------
 
 
-def _rate(subject: str, rule: Rule, examples: int) -> Finding:
+def _rate(kit: Kit, rule: Rule) -> Finding:
     property = "keeps its proved rate"
     if rule.proved_rate(1.0) is None:
         return Finding(property=property, verdict="not asked", detail="it claims none")
@@ -291,7 +288,7 @@ def _rate(subject: str, rule: Rule, examples: int) -> Finding:
                 break
         refuted += beaten
 
-    finding = examine(subject, property, cases(), test, examples=examples)
+    finding = kit.examine(property, cases(), test)
     if not refuted:
         return replace(finding, verdict="not attained", detail=f"no run refutes {MUTANT} of it; {over(tried)}")
     return replace(finding, verdict="attained", detail=f"{refuted} of {tried} runs refute {MUTANT} of it")

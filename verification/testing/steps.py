@@ -19,7 +19,7 @@ from verification.bounds.multipliers import QuadraticForms
 from verification.constants import Measured, measure
 from verification.interface.build import build
 from verification.interface.pair import ContactPair
-from verification.testing.properties import Fails, Finding, Refused, Report, examine
+from verification.testing.properties import Fails, Finding, Kit, Report
 from verification.testing.strategies import forces
 
 #: A step T: from nodal forces on the Neumann body to those that the contact body answers with.
@@ -85,23 +85,15 @@ def check_step(
     else:
         loaded = True
     check = _Check(T, pair, tolerance)
-    subject = f"step T on {pair.neumann.grid.n} nodes"
-    cases = _cases(pair)
-    findings = [
-        examine(subject, "stays below its bound", cases, check.stays_below, examples=examples),
-        check.converges(subject),
-        examine(subject, "knows no units", cases, check.knows_no_units, examples=examples),
-    ]
+    kit = Kit(f"step T on {pair.neumann.grid.n} nodes", examples)
+    pushed = {"force": forces(pair), "other": forces(pair), "share": st.sampled_from([0.3, 1.0, 1.0, 1.2])}
+    cases = st.fixed_dictionaries(pushed)
+    below = kit.examine("stays below its bound", cases, check.stays_below)
+    converges = check.converges(kit)
+    units = kit.examine("knows no units", cases, check.knows_no_units)
     ours, where = (check.is_ours, "with its loads") if loaded else (check.is_ours_far, "far from its loads")
-    same = examine(subject, "is the step of these matrices", cases, ours, examples=examples)
-    findings.append(replace(same, detail=f"{same.detail}, {where}"))
-    return Report(subject=subject, findings=tuple(findings))
-
-
-def _cases(pair: ContactPair) -> st.SearchStrategy[dict[str, Any]]:
-    return st.fixed_dictionaries(
-        {"force": forces(pair), "other": forces(pair), "share": st.sampled_from([0.3, 1.0, 1.0, 1.2])}
-    )
+    same = kit.examine("is the step of these matrices", cases, ours)
+    return kit.report(below, converges, units, replace(same, detail=f"{same.detail}, {where}"))
 
 
 class _Check:
@@ -173,7 +165,7 @@ class _Check:
         neumann = self.pair.neumann.stiffness
         return np.asarray(neumann @ eigh(contact, neumann)[1][:, -1])
 
-    def converges(self, subject: str) -> Finding:
+    def converges(self, kit: Kit) -> Finding:
         property = "converges at the advised theta"
         if not self.proved:
             return Finding(property=property, verdict="not asked", detail="no theta is proved of these matrices")
@@ -184,14 +176,14 @@ class _Check:
             try:
                 image = self.image(g)
             except Fails as failure:
-                raise Refused(subject, property, str(failure), {"g": self.pair.neumann.orient(g)}) from None
+                raise kit.refused(property, str(failure), g=self.pair.neumann.orient(g)) from None
             scale = max(scale, self.norm(image))
             residual = self.norm(image - g)
             if residual <= limit * scale:
                 return Finding(property=property, verdict="holds", detail=f"{n} steps at theta = {theta:.4g}")
             g = theta * image + (1 - theta) * g
         how = f"after {MOST} steps the residual is {residual / scale:.2g} of the forces at theta = {theta:.4g}"
-        raise Refused(subject, property, how, {"theta": theta})
+        raise kit.refused(property, how, theta=theta)
 
     def far(self, force: Floats) -> Floats:
         """A force in the direction of a given one that no longer feels loads and gaps."""
