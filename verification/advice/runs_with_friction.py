@@ -1,4 +1,4 @@
-"""Advice from runs with friction: what their residuals prove, and the run to make next.
+"""Advice from runs with friction: bounds that their residuals prove, and the run to make next.
 
 With friction no ratio of residuals bounds rho.  The theorem in energy norms bounds one step by a factor q of rho,
 kappa_1 and kappa_2 together, and a mode that slides has a complex eigenvalue.  Three things are left:
@@ -23,7 +23,6 @@ from typing import Any
 
 from ndtheory.number import above, below
 from verification.advice.ends import DEAR, SWIFT
-from verification.advice.next_run import kept
 from verification.advice.readings import (
     LARGEST_TO_PASTE,
     SAME,
@@ -31,6 +30,8 @@ from verification.advice.readings import (
     NextRun,
     Observed,
     RunReading,
+    few,
+    kept,
     rounded_down,
 )
 from verification.advice.seen import SeenLog
@@ -48,7 +49,7 @@ _SAYS = {
 
 @dataclass(frozen=True, kw_only=True)
 class FrictionBounds:
-    """Proofs from runs with friction.
+    """Bounds that runs with friction prove.
 
     Attributes
     ----------
@@ -127,7 +128,7 @@ def friction_bounds(
 
 
 def readings_with_friction(readings: Sequence[RunReading]) -> tuple[RunReading, ...]:
-    """The readings of a run without what they say of rho; a plateau needs a tied interface."""
+    """The readings of a run without bounds of rho; a plateau needs a tied interface."""
     return tuple(RunReading(kind=one.kind, says=_SAYS[one.kind]) for one in readings if one.kind in _SAYS)
 
 
@@ -144,10 +145,10 @@ def next_with_friction(falling: Sequence[tuple[Fraction, Observed]], rising: Seq
     if not falling:
         parts = 2 if len(rising) == 1 else 4
         share = "half" if parts == 2 else "a quarter"
-        why = f"{share} of {float(min(rising)):.4g}, which does not converge; come back with what you see there"
+        why = f"{share} of {few(min(rising))}, which does not converge; come back with what you see there"
         return NextRun(theta=rounded_down(min(rising) / parts), why=why)
     theta, ratio = min(falling, key=lambda run: (run[1].value, run[0]))
-    pace = f"its residual changes by {float(ratio.value):.4g} a step"
+    pace = f"its residual changes by {few(ratio.value)} a step"
     if ratio.most <= SWIFT:
         return kept(theta, f"{pace}, and none much faster is to be found")
     made = [other for other, _ in falling] + list(rising)
@@ -162,11 +163,10 @@ def next_with_friction(falling: Sequence[tuple[Fraction, Observed]], rising: Seq
         return kept(theta, f"{pace}, and between {low:.4g} and {high:.4g} none takes less than 1/{DEAR:g} of its steps")
     if max(middle / low, high / middle) < SHORTEST_STEP:
         return kept(theta, f"{pace}, and the runs next to it leave no room for a faster one")
-    below_it = middle / low > high / middle
-    next_theta = math.sqrt(middle * (low if below_it else high))
-    where = "smaller" if below_it else "larger"
+    where, end = ("smaller", low) if middle / low > high / middle else ("larger", high)
+    next_theta = math.sqrt(middle * end)
     why = f"{where} than {middle:.4g}, the fastest so far: {pace}; come back with what you see there"
-    return NextRun(theta=rounded_down(Fraction(next_theta)), why=why)
+    return NextRun(theta=rounded_down(next_theta), why=why)
 
 
 def least_rate(points: Sequence[tuple[float, float, float]], theta: float) -> float:

@@ -327,16 +327,6 @@ class Bound(ABC):
         return BoundResult(name=self.name, proved=False, not_computed=why)
 
 
-def why_not(
-    interval: tuple[float, float] | None, threshold: Number | None, friction: float, theta: float | None
-) -> str:
-    """Why a bound draws no conclusion at a theta."""
-    if interval is not None and theta is not None:
-        return f"theta = {theta:g} is outside ({interval[0]:.2g}, {interval[1]:.2g})"
-    scale = threshold.value if threshold is not None else float("inf")
-    return f"friction {friction:g} is not below {scale:.2g}"
-
-
 def bounded(results: Iterable[BoundResult]) -> str:
     """What the thresholds of a table bound, ``k`` or ``C_K``."""
     return next((result.friction.on for result in results if result.friction.on in ("k", "C_K")), "k")
@@ -369,8 +359,3 @@ class Removed(Bound):
 
     def evaluate(self, subject: Subject, theta: Numeric | None = None, *, progress: Progress = silent) -> BoundResult:
         return self.absent("it is not registered")
-
-
-def by_name(bounds: Iterable[Bound]) -> dict[str, Bound]:
-    """Bounds by name, in their order."""
-    return {bound.name: bound for bound in bounds}

@@ -13,7 +13,7 @@ from fem1d2d.mesh import Floats
 from ndtheory.energy_norms import turning_theta, worst_ratio
 from verification.bounds import LARGEST
 from verification.bounds.program import Optimum, Program, Weights
-from verification.bounds.trace_forms import TraceForms
+from verification.bounds.trace_forms import TraceForms, families
 from verification.constants import Measured
 from verification.interface.pair import ContactPair
 
@@ -40,16 +40,16 @@ TINY = 1e-300
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Pieces:
-    """Affine pieces of T that have something in common at some nodes.
+    """Affine pieces of T that have something in common at some nodes; 0 where nothing is fixed.
 
     Attributes
     ----------
     signs : int array, shape (t,)
-        eps where ``p_T v_T = eps w k zeta v_T``: the sign of slip against S sigma_N; 0 where it may be either.
+        eps where ``p_T v_T = eps w k zeta v_T``: the sign of slip against S sigma_N.
     normal : int array, shape (n,)
-        1 where the node touches, -1 where it is open, 0 where it may be either.
+        1 where the node touches, -1 where it is open.
     slip : int array, shape (t,)
-        1 where it slides (its sign is fixed, too), -1 where it sticks, 0 where it may do either.
+        1 where it slides (its sign is fixed, too), -1 where it sticks.
     """
 
     signs: Signs
@@ -63,17 +63,17 @@ class Pieces:
 
     @property
     def any(self) -> bool:
-        """Whether anything is fixed."""
+        """True if anything is fixed."""
         return bool(self.signs.any() or self.normal.any() or self.slip.any())
 
     @property
     def zeros(self) -> tuple[NDArray[np.bool_], ...]:
-        """Where the jump, the normal force, the slip and ``p_T - eps w k zeta`` are 0."""
+        """The nodes at which the jump, the normal force, the slip and ``p_T - eps w k zeta`` are 0."""
         return self.normal > 0, self.normal < 0, self.slip < 0, self.slip > 0
 
     @property
     def key(self) -> bytes:
-        """What tells them from others of the same bodies."""
+        """A key by which they differ from others of the same bodies."""
         return self.signs.tobytes() + self.normal.tobytes() + self.slip.tobytes()
 
     def where(self, name: str, node: int, value: int) -> Pieces:
@@ -86,16 +86,14 @@ class Pieces:
 class Conditions:
     """The quadratic forms of a pair of bodies, in coordinates in which ``|g|`` and ``|d_1|`` are Euclidean norms.
 
-    ``carried`` takes those of d_1 to forces p on the contact grid.
-
-    What the solver proposes in them is checked in traces (:class:`verification.bounds.trace_forms.TraceForms`).
+    ``carried`` takes the coordinates of d_1 to forces p on the contact grid.  Proposals of a solver are checked in
+    traces (:class:`verification.bounds.trace_forms.TraceForms`).
 
     Parameters
     ----------
     pair : ContactPair
-        The bodies whose conditions of step II are multiplied.
     measured : Measured
-        Their constants.
+        Its constants.
     friction : float, optional
         k; the problem's by default.
 
@@ -115,7 +113,7 @@ class Conditions:
         measured = measured.with_friction(k)
         constants = measured.energy_constants()
         if constants is None:
-            raise ValueError("the theorem in energy norms does not speak of it: " + measured.why_no_energy)
+            raise ValueError("the theorem in energy norms does not apply to it: " + measured.why_no_energy)
         if pair.contact.lifts:
             raise ValueError(LIFTS if k else LIFTS_SMOOTHLY)
         self._measured = measured
@@ -137,29 +135,20 @@ class Conditions:
         self.p = np.hstack([np.zeros((neumann.size, neumann.size)), back])
         force = np.hstack([np.zeros((contact.size, neumann.size)), B])
         jump = np.hstack([-interface.carry(pair.neumann.flexibility(L_2)), -flexible @ B])
-        normal = contact.normal
-        families = [(force[normal], jump[normal])]
+        weight = zeta = None
         if k:
             assert interface.kernel is not None
-            zeta = interface.kernel @ np.hstack([L_2[neumann.normal], np.zeros((neumann.n, B.shape[1]))])
             weight = np.sqrt(k * contact.weights)[:, None]
-            slide = contact.tangential
-            slip = weight * jump[slide]
-            zeta = weight * zeta
-            shear = force[slide]
-            families += [(shear, jump[slide]), (zeta, zeta), (slip, slip), (zeta, slip)]  # from here on for Pieces
-            families += [(jump[normal], jump[normal]), (force[normal], force[normal]), (shear, shear), (shear, zeta)]
+            zeta = weight * (interface.kernel @ np.hstack([L_2[neumann.normal], np.zeros((neumann.n, B.shape[1]))]))
             self.weight = weight[:, 0]
             self.reach = weight * zeta  # w k zeta
-        self.families = families
+        self.families = families(contact, force, jump, weight, zeta)
         self.carried = B
 
     def conditions(self, multipliers: Weights) -> Floats:
         """The sum over the nodes of the multiplied conditions, a symmetric matrix."""
         total = np.zeros((self.g.shape[1],) * 2)
-        for values, (a, b) in zip(
-            multipliers, self.families, strict=False
-        ):  # the last families are there for Pieces alone
+        for values, (a, b) in zip(multipliers, self.families, strict=False):  # the last families are only for Pieces
             total += a.T @ (values[:, None] * b)
         return (total + total.T) / 2
 
@@ -175,10 +164,10 @@ class Conditions:
         return np.asarray(cross + cross.T) / 2
 
     def square_from_below(self, found: Optimum) -> np.polynomial.Polynomial:
-        """What a program at one theta says of all others: a parabola in theta below the square of what each can prove.
+        """A parabola in theta below the square of the factor that a program at any theta can prove, from one program.
 
-        Its moments satisfy the dual constraints, in which theta does not stand.  At its own theta the parabola gives
-        what the solver found, up to its accuracy.
+        Its moments satisfy the dual constraints, which do not depend on theta.  At its own theta the parabola has the
+        value that the solver found, up to its accuracy.
         """
         move = self.p - self.g
         inner = lambda a, b: float(np.vdot(a @ found.moments, b))
@@ -186,10 +175,10 @@ class Conditions:
         return np.polynomial.Polynomial(coefficients) / float(np.vdot(found.moments, self.free))
 
     def rows(self, multipliers: Weights, pieces: Pieces) -> tuple[Floats, Floats, Cones, Floats, Floats]:
-        """The rows of the products, what of their multipliers lies in cones, these, and the most they may be.
+        """Left and right rows of the products, positions of multipliers in cones, the multipliers, and their limits.
 
-        Where a sign is fixed the two sums of friction are one product, ``tau (p_T - eps w k zeta) v_T``; what is 0 at a
-        node enters by its square, with a multiplier up to :data:`LARGE`.
+        Where a sign is fixed the two sums of friction are one product, ``tau (p_T - eps w k zeta) v_T``; a form that is
+        0 at a node enters by its square, with a multiplier up to :data:`LARGE`.
         """
         (force, jump), *friction = self.families[:4]
         if not friction:
@@ -209,7 +198,7 @@ class Conditions:
         return left, right, cones, y, np.concatenate([np.full(len(y) - len(squares), np.inf), LARGE * squares])
 
     def by_node(self, y: Floats, pieces: Pieces) -> Weights:
-        """The multipliers of :meth:`rows` as those of the families, node by node; those below 0 become 0."""
+        """The multipliers of :meth:`rows` as multipliers of the families, node by node; 0 in place of negative ones."""
         y, n = np.maximum(y, 0.0), len(self.families[0][0])
         if len(self.families) == 1:
             return (y,)
@@ -241,7 +230,7 @@ class Conditions:
         return (lam, tau, a, b), rest
 
     def started(self, fixed: Floats, early: tuple[float, Floats], parent: Pieces, pieces: Pieces) -> Program:
-        """The program of the least s for those of some pieces with more signs fixed, from where theirs has been.
+        """The program of the least s for pieces with more signs fixed than ``parent``, from an early point of its own.
 
         The matrix stays positive definite there: the equation of a sign takes the place of an inequality, with the same
         multiplier, and takes less.

@@ -6,8 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from verification.advice.readings import LARGEST_TO_PASTE
-from verification.advice.role import Role, in_steps, steps
-from verification.advice.roles import Advice
+from verification.advice.roles import Advice, Role, in_steps, steps
 from verification.advice.snippets import SNIPPETS
 from verification.problem.vocabulary import vocabulary
 from verification.sections import logs, moduli

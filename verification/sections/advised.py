@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from verification.advice.readings import NextRun
-from verification.advice.seen_matrices import SeenMatrices
+from verification.advice.sides import SeenMatrices
 from verification.sections.numbers import figures
 from verification.sections.parts import Block, Section, section
 
