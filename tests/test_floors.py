@@ -53,7 +53,7 @@ FLOORS: dict[str, dict[str, str]] = {
         ),
         "verification.contact": "__init__ active_set existence kkt model step system",
     },
-    "constants": {"verification.constants": "__init__ measured measuring of_body operators pencils proved"},
+    "constants": {"verification.constants": "__init__ measured measuring operators proved"},
     "iteration": {
         "verification": "monolithic",
         "verification.algorithm": (

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ndtheory import EnergyConstants, Number, evaluate_energy
-from verification.constants.pencils import of_energy
+from verification.constants.measuring import of_energy
 from verification.interface.pair import build
 from verification.problem import Problem, ProblemError
 from verification.progress import Progress, silent
