@@ -70,7 +70,7 @@ FLOORS: dict[str, dict[str, str]] = {
             "__init__ bound conditions exact interior_point lipschitz losses model "
             "multipliers neighbours pattern_search program region table trace_forms"
         ),
-        "verification.certificate": "__init__ check claims continuum contraction description file_mesh",
+        "verification.certificate": "__init__ check claims continuum contraction",
     },
     "answers": {
         "verification": "comparison verdicts",

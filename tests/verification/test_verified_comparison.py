@@ -13,9 +13,8 @@ from verification.algorithm.rates import StepRatio
 from verification.bounds.bound import BoundResult
 from verification.bounds.lipschitz import work_out
 from verification.bounds.multipliers import QuadraticForms
-from verification.certificate.claims import Claims, Confirmation, NoCertificate
+from verification.certificate.claims import Claims, Confirmation, NoCertificate, describe
 from verification.certificate.contraction import certify
-from verification.certificate.description import describe
 from verification.constants import measure
 from verification.constants.proved import verify
 from verification.interface.exact_bodies import NotExact

@@ -48,14 +48,8 @@ MOST = 12
 class Fewest:
     """The thetas of fewest steps among those that were run.
 
-    Attributes
-    ----------
-    steps : int
-    low, high : float
-        The smallest and the largest theta that took so many steps.
-    below, above : float or None
-        The next thetas that were run on either side, which took more steps or did not arrive; None where there are
-        none: fewer steps may lie beyond.
+    From ``low`` to ``high`` they took so many ``steps``; ``below`` and ``above`` are the next thetas that were run,
+    which took more steps or did not arrive; None where there are none: fewer steps may lie beyond.
     """
 
     steps: int
@@ -71,13 +65,9 @@ class Fewest:
 
     @classmethod
     def of(cls, rows: Sequence[Row], column: str = "iterations") -> Fewest | None:
-        """From rows of a sweep that differ in theta alone; None where no run arrived.
+        """From rows of a sweep that differ only in theta; None where no run arrived.
 
-        Parameters
-        ----------
-        rows : sequence of row
-        column : {'iterations', 'iterations_paper'}
-            The test that ends the count.
+        ``column`` is 'iterations' or 'iterations_paper', the test that ends the count.
 
         Examples
         --------
@@ -114,10 +104,8 @@ class BestTheta:
 
     Attributes
     ----------
-    rho : float
-        rho_normal without friction, rho with it.
-    predicted : float
-        ``2/(2 + rho)``.
+    rho, predicted : float
+        rho_normal without friction, rho with it; and ``2/(2 + rho)``.
     seen : Fewest or None
         None where no run arrived, or none was made.
     linearised : Least or None
@@ -146,9 +134,9 @@ def best_theta(
     ----------
     problem : Problem, ContactPair or path
     runs : bool
-        Whether to look for the theta of fewest steps, by runs at the predicted theta and at eight around it.
+        True to find the theta of fewest steps, by runs at the predicted theta and at eight around it.
     semidefinite : bool
-        Whether to look for the least factor that the semidefinite bound proves: some five programs.
+        True to find the least factor that the semidefinite bound proves: some five programs.
 
     Raises
     ------
@@ -163,7 +151,7 @@ def best_theta(
     >>> round(found.predicted, 12), round(found.energy.theta, 12), round(found.energy.factor, 12)
     (0.5, 0.5, 0.5)
 
-    One bar in contact has one mode, which theta = 1/3 removes in one step; the proof speaks of open bars too.
+    One bar in contact has one mode, which theta = 1/3 removes in one step; the proof covers open bars, too.
 
     >>> round(found.linearised.theta, 3), abs(found.seen.theta - 1/3) < 0.03
     (0.333, True)
@@ -178,7 +166,7 @@ def best_theta(
     reason: dict[str, str] = {}
 
     def found(name: str, why_not: str, work: Callable[[], Any], none: str = "") -> Any:
-        """What is asked for and can be worked out; else None, with the reason."""
+        """The result of some work; None, with the reason, where it was not asked for or cannot be worked out."""
         value = None
         try:
             value = None if why_not else work()

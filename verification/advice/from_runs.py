@@ -121,18 +121,9 @@ def advice_of_runs(
 ) -> Advice:
     """The advice from runs: a theta to paste where they decide rho, else a run that was not made yet.
 
-    Parameters
-    ----------
-    made : sequence of Made
-    readings : sequence of RunReading
-        Their possible meanings; those that need nodes that open are left out where the interface is tied.
-    following : NextRun
-        The theta to paste, or the run that is proposed.
-    rho : Fraction or None
-        None while several readings are left.
-    tied : bool
-    **known
-        Other attributes of the advice.
+    ``following`` is the theta to paste, or the run that is proposed; ``rho`` is None while several readings are left;
+    readings that need nodes that open are left out where the interface is tied; ``known`` are other attributes of the
+    advice.
     """
     if rho is not None and (paste := pasted_or_not(following, made)) is not None:
         following = paste

@@ -42,10 +42,9 @@ class Column:
         absolute residual; taken as absolute because nothing says otherwise.
     windows : tuple of array
         The residuals of each time window in their order.
-    digits : float
-        Rounding of a number relative to its size, as its digits have it.
-    decimals : float
-        Rounding of a number that is written with a fixed number of decimals, else 0.
+    digits, decimals : float
+        Rounding of a number relative to its size, as its digits have it; rounding of a number that is written with a
+        fixed number of decimals, else 0.
     """
 
     name: str
@@ -59,15 +58,7 @@ class Column:
 class Log:
     """A log as it was read.
 
-    Attributes
-    ----------
-    path : Path
-    form : {'preCICE', 'Kratos CoSimulation', 'columns'}
-    columns : tuple of Column
-    theta : float or None
-        The relaxation factor that the log itself names.
-    notes : tuple of str
-        Lines that were left out.
+    ``theta`` is the relaxation factor that the log itself names, ``notes`` are about lines that were left out.
     """
 
     path: Path

@@ -68,10 +68,9 @@ class Pace:
         Number of steps of the series that can be read.
     height : float
         The last residual as a share of the largest one; where it is lost in rounding or zero, the share of rounding.
-    lost : bool
-        True if the series ends in inf or nan.
-    arrived : bool
-        True if it ends in rounding or in zero, a step after those that can be read.
+    lost, arrived : bool
+        True if the series ends in inf or nan; True if it ends in rounding or in zero, a step after those that can be
+        read.
     """
 
     kind: Kind
@@ -100,21 +99,12 @@ class Pace:
 
 
 def pace(residuals: Floats, column: Column, theta: Fraction) -> Pace:
-    """The course of a series of residuals.
+    """The course of the residuals of one time window.
 
     The ratio is the median over the last ``steps`` steps of geometric means over an even number of consecutive ones, a
     fifth of the steps: contact that is open and closed alternately makes them alternate, and noise is smaller in a
     mean.  It is steady where these means scatter little between their deciles, and their medians in both halves agree.
     It must be steady over the steps that theta needs; over fewer where the residual has fallen to CONVERGED.
-
-    Parameters
-    ----------
-    residuals : array
-        Of one time window.
-    column : Column
-        Kind and rounding of the residuals.
-    theta : Fraction
-        The relaxation factor.
     """
     relative, steps = column.residual == "relative", steps_needed(theta)
     usable = np.flatnonzero(np.isfinite(residuals) & (residuals > 0))
@@ -247,15 +237,8 @@ def pooled(windows: Sequence[Floats], *, relative: bool, steps: int) -> Observed
     """Median ratio of many time windows that are too short to be read one by one, and its limits.
 
     Only the second half of the steps of each window counts, where the slowest mode leads.  A mode that is slower than a
-    window is long does not show, so that this is a pace and no bound.
-
-    Parameters
-    ----------
-    windows : sequence of array
-    relative : bool
-        True if residuals are ``|T x - x|/|T x|``; they count below SMALL then.
-    steps : int
-        So many steps must count in all.
+    window is long does not show, so that this is a pace and no bound.  Relative residuals ``|T x - x|/|T x|`` count
+    below SMALL; so many ``steps`` must count in all.
     """
     ratios, count = [], 0
     for window in windows:

@@ -48,10 +48,9 @@ class RunReading:
         The cause of the pace: the stiffest mode in contact, which changes sign in every step; the softest one, which
         keeps its sign; contact that opens and closes alternately, so that the residual stays at a level; a tied run
         that diverges, so that its relative residual stays at a plateau; nodes that are open.
-    value : float or None
-        rho where all of Gamma_c is closed and nothing slides; None where the reading gives a bound at most.
-    lo : float or None
-        If this reading is right, rho is at least this without friction, or tied.
+    value, lo : float or None
+        rho where all of Gamma_c is closed and nothing slides, None where the reading gives a bound at most; if this
+        reading is right, rho is at least ``lo`` without friction, or tied.
     says : str
         The same in words.
     """
@@ -74,16 +73,10 @@ class RunReading:
 
 @dataclass(frozen=True, kw_only=True)
 class NextRun:
-    """The run to make next: its theta, and what it will show.
+    """The run to make next: its theta, and why.
 
-    Attributes
-    ----------
-    theta : float
-    why : str
-    kept : bool
-        True if a run with this theta was made and is to be kept.
-    again : bool
-        True if that run is to be made again because its log was too short or not steady.
+    ``kept`` is True if a run with this theta was made and is to be kept, ``again`` if it is to be made again because
+    its log was too short or not steady.
     """
 
     theta: float
@@ -98,14 +91,7 @@ class NextRun:
 
 @dataclass(frozen=True, kw_only=True)
 class SeenRun:
-    """A run of any code with constant theta, as it was given.
-
-    Attributes
-    ----------
-    theta : Fraction
-    ratio : Fraction
-        Of the residual ``|T g - g|``, absolute and before relaxation, from one step to the next.
-    """
+    """A run of any code with constant theta, and the ratio of its absolute unrelaxed residual from step to step."""
 
     theta: Fraction
     ratio: Fraction
@@ -127,12 +113,7 @@ class SeenRun:
 
 @dataclass(frozen=True, kw_only=True)
 class Observed:
-    """A number that was read from a run, and its limits.
-
-    Attributes
-    ----------
-    value, least, most : Fraction
-    """
+    """A number that was read from a run, and its limits."""
 
     value: Fraction
     least: Fraction
@@ -158,17 +139,9 @@ class Observed:
 
 @dataclass(frozen=True, kw_only=True)
 class Made:
-    """A run that was made.
+    """A run that was made: its residual ``falls`` to the end of the log, or it ``rises``: it does not converge.
 
-    Attributes
-    ----------
-    theta : Fraction
-    falls : bool
-        True if its residual falls to the end of the log.
-    rises : bool
-        True if the run does not converge.
-    ratio : Fraction or None
-        The ratio by which it falls or grows at most, where it is steady.
+    ``ratio`` is the ratio by which it falls or grows at most, None where it is not steady.
     """
 
     theta: Fraction

@@ -188,14 +188,10 @@ def role_of(
     ----------
     neumann_body : {1, 2} or None
     rho : Number or Fraction
-    bounds : EnergyBounds, optional
-        The theorem for this rho, and for the friction there is.
-    nothing : str
-        Why nothing is proved; empty where the bounds are.
-    threshold : Number, optional
-        Friction below which every small theta is proved.
-    no_threshold : str
-        Why that is None, if it is not for want of a proof.
+    bounds, nothing : EnergyBounds, optional, and str
+        The theorem for this rho, and for the friction there is; why nothing is proved, empty where the bounds are.
+    threshold, no_threshold : Number, optional, and str
+        Friction below which every small theta is proved; why there is none, if it is not for want of a proof.
     reason : mapping, optional
         Why other values are None.
     **known

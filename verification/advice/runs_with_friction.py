@@ -56,10 +56,9 @@ class FrictionBounds:
     image : float or None
         The Lipschitz constant of T in the norm (5.21) is at least this, and so is ``sqrt(rho) R``; None where the runs
         are too fast for a bound above 0.
-    theta, rate : float or None
-        The largest theta whose residual falls, and its ratio at most; None where none falls.
-    eigenvalue : tuple of float or None
-        Limits of ``|1 + lambda|`` of the slowest mode of that run.
+    theta, rate, eigenvalue : float or None, and tuple of float or None
+        The largest theta whose residual falls, its ratio at most, and limits of ``|1 + lambda|`` of its slowest mode;
+        None where no residual falls.
     """
 
     image: float | None
@@ -108,10 +107,7 @@ def friction_bounds(
 ) -> FrictionBounds:
     """Bounds from runs whose residual falls by a ratio, and from those that do not converge.
 
-    Parameters
-    ----------
-    falling, rising : sequences of tuple
-        theta and the steady ratio of each; None for a residual that stays at a level.
+    Both are sequences of theta and its steady ratio; None for a residual that stays at a level.
     """
     known = [(theta, ratio.least) for theta, ratio in (*falling, *rising) if ratio is not None]
     image = max([1 - (1 - least) / theta for theta, least in known] + [Fraction(1)] * bool(rising), default=Fraction(0))
@@ -135,12 +131,8 @@ def readings_with_friction(readings: Sequence[RunReading]) -> tuple[RunReading, 
 def next_with_friction(falling: Sequence[tuple[Fraction, Observed]], rising: Sequence[Fraction]) -> NextRun:
     """The run to make next, or the theta of the fastest run where no other one is much faster.
 
-    Parameters
-    ----------
-    falling : sequence of tuple
-        theta and ratio of the runs whose residual falls.
-    rising : sequence of Fraction
-        The thetas that do not converge; at least one run of either kind.
+    ``falling`` are theta and ratio of the runs whose residual falls, ``rising`` the thetas that do not converge; at
+    least one run of either kind is given.
     """
     if not falling:
         parts = 2 if len(rising) == 1 else 4
@@ -170,13 +162,7 @@ def next_with_friction(falling: Sequence[tuple[Fraction, Observed]], rising: Seq
 
 
 def least_rate(points: Sequence[tuple[float, float, float]], theta: float) -> float:
-    """Least ratio that a theta can have by convexity.
-
-    Parameters
-    ----------
-    points : sequence of tuple
-        theta, least and largest ratio.
-    theta : float
+    """Least ratio that a theta can have by convexity, from points (theta, least and largest ratio).
 
     Examples
     --------

@@ -43,13 +43,11 @@ class SeenColumn:
 
     Attributes
     ----------
-    name : str
-    residual : str
-        ``absolute``, ``relative``, ``drop``, or ``assumed``: taken as absolute.
-    paces : tuple of Pace
-        Of the time windows that were read.
-    windows : int
-        Number of time windows of the log; short ones are not read where there are others, of many the last ones.
+    name, residual : str
+        The kind is ``absolute``, ``relative``, ``drop``, or ``assumed``: taken as absolute.
+    paces, windows : tuple of Pace, int
+        Of the time windows that were read, and the number of all; short ones are not read where there are others, of
+        many the last ones.
     ratio, plateau : Observed or None
         Of the windows put together.
     pooled : Observed or None
@@ -123,16 +121,12 @@ class SeenLog:
 
     Attributes
     ----------
-    file : str
-    form : str
-    theta : Fraction
+    file, form, theta : str, str, Fraction
     columns : tuple of SeenColumn
-    readings : tuple of RunReading
-        Possible meanings of this log; empty where nothing in it is steady.
+    readings, rho : tuple of RunReading, Fraction or None
+        Possible meanings of this log, none where nothing in it is steady; rho of the only reading.
     next : NextRun
         The run to make next if this were the only log.
-    rho : Fraction or None
-        Of its only reading.
     notes : tuple of str
     """
 
@@ -225,15 +219,7 @@ class SeenLog:
 
 @dataclass(frozen=True, kw_only=True)
 class LogBound:
-    """A bound of rho, the log that it comes from, and its assumption.
-
-    Attributes
-    ----------
-    value : Fraction
-    log : SeenLog
-    says : str
-    assumes : str
-    """
+    """A bound of rho, the log that it comes from, the reason in words, and its assumption."""
 
     value: Fraction
     log: SeenLog
@@ -253,14 +239,7 @@ class LogBound:
 
 @dataclass(frozen=True, kw_only=True)
 class RhoInterval:
-    """Bounds of rho from the logs of one coupling together.
-
-    Attributes
-    ----------
-    lo, hi : LogBound or None
-    contradiction : str or None
-        Why no rho lies between them.
-    """
+    """Bounds of rho from the logs of one coupling together; ``contradiction`` says why no rho lies between them."""
 
     lo: LogBound | None
     hi: LogBound | None

@@ -44,15 +44,13 @@ class SeenMatrix:
 
     Attributes
     ----------
-    rows : int
-    form : {'matrix', 'operator'}
+    rows, form : int, {'matrix', 'operator'}
     asymmetry : float or None
         ``max |A - A'| / max |A|``; of an operator ``|x'Ay - y'Ax|`` over the size of its terms for two random vectors;
         None where only its solves are known.
-    zeros : float or None
-        The share of zeros off the diagonal; None of an operator.
-    free_motions : int or None
-        Number of rigid motions that its supports leave; None of an operator.
+    zeros, free_motions : float or None, int or None
+        The share of zeros off the diagonal, and the number of rigid motions that its supports leave; None of an
+        operator.
     """
 
     rows: int
@@ -87,15 +85,8 @@ class SeenMatrix:
 class SeenLanczos:
     """The ends of the spectrum of (S_c, S_n) for one role, by Lanczos.
 
-    Attributes
-    ----------
-    neumann_body : {1, 2}
-    rho, rho_min : float
-        The largest and the least value found: Rayleigh quotients, so that the largest eigenvalue is at least ``rho``
-        and the least one at most ``rho_min``.
-    residual, residual_min : float
-        Some eigenvalue lies within it.
-    steps : int
+    ``rho`` and ``rho_min`` are Rayleigh quotients, so that the largest eigenvalue is at least ``rho`` and the least one
+    at most ``rho_min``; some eigenvalue lies within each residual.
     """
 
     neumann_body: BodyNumber
@@ -113,10 +104,8 @@ class SeenMatrices:
     Attributes
     ----------
     S1, S2 : SeenMatrix
-    transfer : tuple of int or None
-        Rows and columns of P as given; None where there is none.
-    neumann_body : {1, 2} or None
-        The body from whose unknowns P leads; None without P.
+    transfer, neumann_body : tuple of int or None, {1, 2} or None
+        Rows and columns of P as given, and the body from whose unknowns it leads; None without P.
     ordering : str or None
         The ordering that is assumed; None where rho does not depend on it.
     lanczos : tuple of SeenLanczos
@@ -181,16 +170,7 @@ def dense(name: str, matrix: Any) -> Floats:
 
 @dataclass(frozen=True, kw_only=True)
 class Side:
-    """One body.
-
-    Attributes
-    ----------
-    seen : SeenMatrix
-    matrix : Stiffness or None
-        None of an operator.
-    apply, solve : callable or None
-        ``u -> S u`` and ``f -> S^-1 f``; None where that is not known.
-    """
+    """One body: its matrix, None of an operator, and ``u -> S u`` and ``f -> S^-1 f``, None if not known."""
 
     seen: SeenMatrix
     matrix: Stiffness | None = None
@@ -340,18 +320,9 @@ def _function(name: str, given: Any, n: int) -> Apply | None:
 
 @dataclass(frozen=True, kw_only=True)
 class Transfer:
-    """The transfer P between two grids.
+    """The transfer P between two grids as it was given, from the unknowns of ``neumann_body``.
 
-    Attributes
-    ----------
-    P : array, sparse array or LinearOperator
-        As given.
-    neumann_body : {1, 2}
-        The body from whose unknowns it leads.
-    components : int
-        Number of components at each node to which it applies one by one.
-    chosen : bool
-        True if its shape fits both ways.
+    It applies to each of the ``components`` at the nodes; ``chosen`` is True if its shape fits both ways.
     """
 
     P: Any

@@ -1,7 +1,7 @@
-"""What to paste into the configuration of a coupling library: the roles, theta, and who reads what.
+"""Lines for the configuration of a coupling library: the roles, theta, and which solver reads which field.
 
 The keys are those of preCICE 3.4.1, of the CoSimulationApplication of Kratos Multiphysics and of Norma.jl 0.1.0;
-``docs/coupling.md`` names the files of their sources in which they stand.
+``docs/coupling.md`` names the files of their sources that have them.
 """
 
 from __future__ import annotations
@@ -20,18 +20,16 @@ ROOM, UNKNOWN = 2, 200
 
 @dataclass(frozen=True, kw_only=True)
 class Coupling:
-    """What a snippet says.
+    """Content of a snippet.
 
     Attributes
     ----------
     neumann_body : {1, 2} or None
-        Whose solver reads forces and writes displacements; None where advice is for the roles that a run had.
-    theta : float
-        The relaxation factor.
+        Its solver reads forces and writes displacements; None where advice is for the roles that a run had.
+    theta, tied : float, bool
+        The relaxation factor; True if nothing opens or slips.
     steps : int or None
         To 1e-9 of the first error, by the rate of the advice.
-    tied : bool
-        Whether nothing opens or slips.
     """
 
     neumann_body: Literal[1, 2] | None

@@ -40,16 +40,11 @@ TINY = 1e-300
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Pieces:
-    """Affine pieces of T that have something in common at some nodes; 0 where nothing is fixed.
+    """Affine pieces of T with fixed states at some nodes; 0 where nothing is fixed.
 
-    Attributes
-    ----------
-    signs : int array, shape (t,)
-        eps where ``p_T v_T = eps w k zeta v_T``: the sign of slip against S sigma_N.
-    normal : int array, shape (n,)
-        1 where the node touches, -1 where it is open.
-    slip : int array, shape (t,)
-        1 where it slides (its sign is fixed, too), -1 where it sticks.
+    ``signs``, shape (t,), is eps where ``p_T v_T = eps w k zeta v_T``: the sign of slip against S sigma_N.  ``normal``,
+    shape (n,), is 1 where the node touches, -1 where it is open.  ``slip``, shape (t,), is 1 where the node slides
+    (then its sign is fixed, too), -1 where it sticks.
     """
 
     signs: Signs
@@ -87,15 +82,7 @@ class Conditions:
     """The quadratic forms of a pair of bodies, in coordinates in which ``|g|`` and ``|d_1|`` are Euclidean norms.
 
     ``carried`` takes the coordinates of d_1 to forces p on the contact grid.  Proposals of a solver are checked in
-    traces (:class:`verification.bounds.trace_forms.TraceForms`).
-
-    Parameters
-    ----------
-    pair : ContactPair
-    measured : Measured
-        Its constants.
-    friction : float, optional
-        k; the problem's by default.
+    traces (:class:`verification.bounds.trace_forms.TraceForms`).  ``friction`` is k, the pair's by default.
 
     Raises
     ------

@@ -58,22 +58,16 @@ PROMISING = 0.995
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Enclosure:
-    """What is known of the Lipschitz constant of T_theta in the norm (5.21), over all loads and gaps.
+    """Bounds of the Lipschitz constant of T_theta in the norm (5.21), over all loads and gaps.
 
     Attributes
     ----------
-    upper : Certified
-        What multipliers prove for every set of pieces.
-    whole : Certified
-        What those of one program prove for all pieces together.
-    lower : float
-        The largest ``|J|`` found.
-    piece : Piece
-        Where.
-    programs : int
-        How many semidefinite programs were solved.
-    why_apart : str
-        Why the gap is larger than was asked for; empty where it is not.
+    upper, whole : Certified
+        Proved by multipliers for every set of pieces, and by one program for all pieces together.
+    lower, piece : float, Piece
+        The largest ``|J|`` found, and its piece.
+    programs, why_apart : int, str
+        Number of programs that were solved; why the gap is larger than was asked for.
     """
 
     upper: Certified
@@ -91,7 +85,7 @@ class Enclosure:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Leaf:
-    """Some pieces: what is proved for them, and the program's answer."""
+    """Some pieces: the bound proved for them, and the program's answer."""
 
     pieces: Pieces
     upper: Certified
@@ -99,7 +93,7 @@ class Leaf:
 
 
 def budget(n: int) -> int:
-    """How many programs are solved for n contact nodes: as many as take some seconds.
+    """Number of programs to solve for n contact nodes: as many as take some seconds.
 
     Examples
     --------
@@ -118,22 +112,10 @@ def enclose(
     programs: int | None,
     progress: Progress = silent,
 ) -> Enclosure:
-    """Enclose the Lipschitz constant of T_theta.
+    """Enclose the Lipschitz constant of T_theta for 0 < theta <= 1.
 
-    Parameters
-    ----------
-    pair : ContactPair
-        The bodies.
-    forms : QuadraticForms
-        Their quadratic forms.
-    theta : float
-        In (0, 1].
-    gap : float
-        The search ends where ``upper <= (1 + gap) lower``.
-    programs : int or None
-        The most programs that are solved, as in :func:`budget`; None for no limit.
-    progress : callable
-        Told how close both bounds are.
+    The search ends where ``upper <= (1 + gap) lower``, or after so many ``programs`` (see :func:`budget`); None: no
+    limit.
 
     Raises
     ------
@@ -176,7 +158,7 @@ def enclose(
 
 
 def _solved(forms: QuadraticForms, parent: Leaf, part: Pieces, theta: float, stop: Stop) -> Leaf:
-    """What is proved for a part of a set of pieces: by its own program, or for the whole set."""
+    """The bound for a part of a set of pieces: by its own program, or from the whole set."""
     start = None
     if parent.proposal is not None and (part.signs != parent.pieces.signs).any():  # by what a node does is too far away
         start = parent.pieces, parent.proposal
@@ -190,7 +172,7 @@ def _solved(forms: QuadraticForms, parent: Leaf, part: Pieces, theta: float, sto
 def _mirrored(
     forms: QuadraticForms, mirror: Mirror, bounded: dict[bytes, Leaf], part: Pieces, theta: float
 ) -> Leaf | None:
-    """What the image of its multipliers proves for the image of a set of pieces; None where neither is known."""
+    """The bound from images of multipliers for the image of a set of pieces; None where neither is known."""
     other = bounded.get(mirror.pieces(part).key)
     if other is None or other.proposal is None:
         return None
@@ -203,8 +185,8 @@ def _mirrored(
 def _divided(forms: QuadraticForms, leaf: Leaf, lower: float) -> list[Pieces]:
     """A set of pieces in two, at the node where that promises most in the moments of the worst pairs.
 
-    First by signs, whose relaxation costs what is lost between ``tau |zeta| |v_T|`` and ``tau |zeta v_T|``; where that
-    is little of what the bound is too large by, by what a node does.
+    First by signs, whose relaxation costs the difference of ``tau |zeta| |v_T|`` and ``tau |zeta v_T|``; where that is
+    little of the excess of the bound, by the state of a node.
     """
     if leaf.proposal is None or len(forms.families) == 1:
         return []
@@ -235,7 +217,7 @@ def _divided(forms: QuadraticForms, leaf: Leaf, lower: float) -> list[Pieces]:
 
 
 def _read_off(forms: QuadraticForms, leaf: Leaf, sign: Signs) -> Iterator[tuple[NDArray[np.bool_], Signs]]:
-    """What each node does in the pairs of forces that are worst in the moments of a leaf: touching, sliding."""
+    """State of each node, touching and sliding, in the pairs of forces that are worst in the moments of a leaf."""
     if leaf.proposal is None:
         return
     normal = leaf.pieces.normal

@@ -86,11 +86,8 @@ class Form:
 class Cones:
     """Small blocks of one size: ``fixed_j + sum_k y_{j,k} E_{j,k}``, symmetric of 1 or 2 rows.
 
-    Parameters
-    ----------
-    fixed : array, shape (n, r, r)
-    terms : sequence of (int array of shape (n,), array of shape (n, r, r))
-        Positions in (s, y), and the coefficients E of what stands there.
+    ``fixed`` has the shape (n, r, r); ``terms`` are positions in (s, y), shape (n,), with their coefficients E, (n, r,
+    r).
     """
 
     def __init__(self, fixed: Floats, terms: Sequence[tuple[Indices, Floats]]) -> None:
@@ -275,7 +272,7 @@ def _moved(matrices: list[Floats], along: float, steps: list[Floats]) -> list[Fl
 
 
 def _longest(roots: list[Floats], steps: list[Floats]) -> float:
-    """How far matrices with these inverse roots stay positive semidefinite along steps, at most."""
+    """Largest step, at most, along which matrices with these inverse roots stay positive semidefinite."""
     low = min(
         _least(root[0], d[0]) if d.shape[1] > LANCZOS else float(np.linalg.eigvalsh(root @ d @ _turned(root)).min())
         for root, d in zip(roots, steps, strict=True)

@@ -27,7 +27,7 @@ NOT_CERTIFIED = "checked in doubles with a bound on their rounding, for the inte
 
 @dataclass(frozen=True, kw_only=True)
 class Semidefinite:
-    """What the semidefinite bound says of a pair of bodies at one theta.
+    """Result of the semidefinite bound for a pair of bodies at one theta.
 
     Attributes
     ----------
@@ -35,29 +35,22 @@ class Semidefinite:
         A Lipschitz constant of T_theta in the norm (5.21), checked in doubles with a bound on their rounding.
     lower : float
         The largest factor found, of an affine piece of T_theta that some loads and gaps bring about.
-    programs : int
-        How many programs brought both so close.
-    why_apart : str
-        Why they are further apart than was asked for; empty where they are not.
+    programs, why_apart : int, str
+        Number of programs that brought both so close; why they are further apart than was asked for.
     theta_max : Number or None
         Every smaller theta contracts; None where none is proved to.
-    friction_threshold : Number or None
-        Every small theta contracts below it; None without a law of friction.
+    friction_threshold, no_threshold : Number or None, str
+        Every small theta contracts below it; why there is none, as without a law of friction.
     gave_up : str
-        Why the solver proposed no multipliers at this theta, so that the known ones alone stand behind ``lipschitz``;
-        empty where it did.
-    no_threshold : str
-        Why there is no friction threshold.
-    whole : Certified or None
-        What the multipliers of one program prove for all pieces of T together.
-    divided : Number or None
-        Where ``lipschitz`` is proved: the smaller one in doubles that dividing the pieces of T gives.
+        Why the solver proposed no multipliers at this theta, so that ``lipschitz`` comes from the known ones.
+    whole, divided : Certified or None, Number or None
+        The proof of one program for all pieces of T together, and the smaller ``lipschitz`` in doubles, beside a proved
+        one, that dividing the pieces gives.
     largest : tuple of arrays
         The multipliers behind ``theta_max``, over theta.
-    not_proved : str
-        Why ``lipschitz`` is not proved; empty where it is.
-    unverified : mapping or None
-        Why ``theta_max`` or ``friction_threshold`` is not proved, where that was tried; None where it was not.
+    not_proved, unverified : str, mapping or None
+        Why ``lipschitz`` is not proved; why ``theta_max`` or ``friction_threshold`` is not, None where that was not
+        tried.
     """
 
     lipschitz: Number
@@ -81,17 +74,17 @@ class Semidefinite:
 
     @property
     def gap(self) -> float:
-        """How far the bound is above the largest factor found, relatively."""
+        """Relative distance of the bound from the largest factor found."""
         return self.lipschitz.value / self.lower - 1
 
     @property
     def certified(self) -> bool:
-        """Whether the factor is more than a number in doubles."""
+        """True if the factor is proved beyond a computation in doubles."""
         return self.lipschitz.level != "float"
 
     @property
     def why_no_factor(self) -> str:
-        """Why there is no conclusion at this theta; empty where there is."""
+        """Why this theta has no conclusion; empty where it has one."""
         if self.factor is not None:
             return ""
         return self.gave_up or f"its bound {self.lipschitz.value:.3g} of the Lipschitz constant is not below 1"
@@ -124,20 +117,10 @@ class Semidefinite:
     def proved(
         self, pair: ContactPair, measured: Measured, theta: Fraction, *, progress: Progress = silent
     ) -> Semidefinite:
-        """The same with numbers that are proved for the rational data, or the reasons why some are not.
+        """The same for its pair with numbers that are proved for the rational data, or the reasons why some are not.
 
-        The Lipschitz constant that is proved is that of a single program: its multipliers hold for all pieces of T at
-        once, and one quadratic form decides.  What dividing the pieces gives beyond it stays in ``divided``.
-
-        Parameters
-        ----------
-        pair : ContactPair
-            Of which this is said.
-        measured : Measured
-            Its constants.
-        theta : Fraction
-            At which it is.
-        progress : callable
+        The proved Lipschitz constant comes from a single program: its multipliers hold for all pieces of T at once, and
+        one quadratic form decides.  A smaller one from dividing the pieces stays in ``divided``.
         """
         assert self.whole is not None
         try:
@@ -183,15 +166,7 @@ def work_out(
 ) -> Semidefinite:
     """Solve the programs of a pair of bodies at one theta.
 
-    Parameters
-    ----------
-    pair : ContactPair
-    measured : Measured
-        Its constants.
-    theta : float
-    exact : bool
-        Go on to a gap of :data:`verification.bounds.exact.CLOSE`, however many programs that takes.
-    progress : callable
+    With ``exact`` it goes on to a gap of :data:`verification.bounds.exact.CLOSE`, however many programs that takes.
 
     Raises
     ------

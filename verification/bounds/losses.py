@@ -1,4 +1,4 @@
-"""What each inequality of Section 5 gives away, in decades: where a threshold of 1e-21 comes from.
+"""Loss of each inequality of Section 5, in decades: where a threshold of 1e-21 comes from.
 
 An inequality ``left <= right`` loses ``log10(right/left)`` at the pair of forces that comes closest to equality.  Where
 both sides are linear in one unknown that pair is an eigenvector; where T is involved it is the best one of a search
@@ -36,7 +36,7 @@ STARTS = 2
 
 @dataclass(frozen=True, kw_only=True)
 class Loss:
-    """What one inequality gives away.
+    """Loss of one inequality.
 
     Attributes
     ----------
@@ -45,9 +45,9 @@ class Loss:
     decades : float
         ``log10(right/left)`` at the worst pair, >= 0; of an inequality between squares it counts the squares.
     searched : bool
-        Whether that pair was found by search (the loss may then be smaller), not as an eigenvector.
+        True if that pair was found by search (the loss may then be smaller), not as an eigenvector.
     only_unit : bool
-        Whether nothing is given away: what a change of the unit of stress alone would do.
+        True if nothing is lost: the effect of a change of the unit of stress.
     """
 
     label: str
@@ -85,12 +85,7 @@ class Losses:
 class LossForms:
     """The quadratic forms of Section 5 in y with ``psi - psi~ = L_2 y``, so that the length of y is the norm (5.21).
 
-    "1" is the contact body and "2" the Neumann body, whatever their numbers in the file.
-
-    Parameters
-    ----------
-    pair : ContactPair
-        A problem in which no contact node is held.
+    "1" is the contact body and "2" the Neumann body, whatever their numbers in the file; no contact node is held.
     """
 
     def __init__(self, pair: ContactPair) -> None:
@@ -130,18 +125,9 @@ def square(rows: Floats, gram: Floats) -> Floats:
 
 
 def locate(pair: ContactPair, measured: Measured, *, seed: int = 0, progress: Progress = silent) -> Losses | None:
-    """Find what each inequality gives away at the problem's friction.
+    """Find the loss of each inequality at the problem's friction.
 
-    Parameters
-    ----------
-    pair : ContactPair
-        The bodies on whose forces the inequalities are tried.
-    measured : Measured
-        Their constants.
-    seed : int
-        Of the search.
-    progress : callable
-        Told how many of the searches are done.
+    ``seed`` is for the search, ``progress`` is called with the share of the searches that are done.
 
     Returns
     -------

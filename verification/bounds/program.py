@@ -21,15 +21,7 @@ class LMIError(RuntimeError):
 
 @dataclass(frozen=True, kw_only=True)
 class Stop:
-    """Where a solver may end.
-
-    Attributes
-    ----------
-    accuracy : float
-        Where it knows s so well, relatively.
-    enough : float
-        At any s below.
-    """
+    """End of a solver: where it knows s up to ``accuracy``, relatively, or at any s below ``enough``."""
 
     accuracy: float = 1e-7
     enough: float = -math.inf
@@ -54,13 +46,11 @@ class Program:
     cones : int array, shape (n, 3)
         Positions of (tau, a, b) among the multipliers.
     most : array, shape (K,)
-        Multipliers may not exceed it; inf where they may.
-    s : float
-    y : array, shape (K,)
-        Where a search may start: the matrix is positive definite there, and every inequality strict.
+        Largest multipliers; inf without a limit.
+    s, y : float, array of shape (K,)
+        A start of a search: the matrix is positive definite there, and every inequality strict.
     highest : float or None
         Where given, the largest s up to it is wanted instead of the least.
-    stop : Stop
     """
 
     fixed: Floats
@@ -77,21 +67,18 @@ class Program:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Optimum:
-    """What a solver found.
+    """A solver's answer.
 
     Attributes
     ----------
-    s : float
-    y : array, shape (K,)
-        The multipliers.
+    s, y : float, array of shape (K,)
+        The value and the multipliers.
     moments : array, shape (d, d)
         The dual variable of the matrix: the second moments of the pairs of forces that are worst for it.
-    steps : int
-    converged : bool
-        Whether the gap to the dual value is below the accuracy asked for.
+    steps, converged : int, bool
+        Number of steps; True if the gap to the dual value is below the accuracy asked for.
     early : (float, array of shape (K,)), optional
-        s and y on the way, close to the central path and far from its end: a program with more conditions may start
-        there.
+        s and y close to the central path and far from its end: a program with more conditions may start there.
     """
 
     s: float

@@ -45,16 +45,7 @@ class Point:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Plane(Document):
-    """Regions by bound, and runs.
-
-    Attributes
-    ----------
-    title : str
-    regions : mapping from the name of a bound to Region
-    points : tuple of Point
-    reason : mapping
-        Why a bound has no region; ``points`` where Ctrl-C left some out.
-    """
+    """Regions by bound, and runs; ``reason`` says why a bound has no region, or that Ctrl-C left ``points`` out."""
 
     schema: ClassVar[str] = "ndtheory.region/1"
 
@@ -71,7 +62,7 @@ class Plane(Document):
 
     @property
     def interrupted(self) -> bool:
-        """Whether Ctrl-C left something out."""
+        """True if Ctrl-C left something out."""
         return "points" in self.reason
 
     def content(self) -> dict[str, Any]:
@@ -94,13 +85,7 @@ class Plane(Document):
 def chart(problem: Problem, *, store: Path | None = None, progress: Progress = silent) -> Plane:
     """Trace the regions of all bounds for a problem's bodies, and run a grid of theta and k.
 
-    Parameters
-    ----------
-    problem : Problem
-    store : path, optional
-        A file that keeps the runs, and has those that were made before.
-    progress : callable
-        Told what is being done.
+    ``store`` is a file that keeps the runs, and has those that were made before.
 
     Raises
     ------
@@ -153,7 +138,7 @@ def chart(problem: Problem, *, store: Path | None = None, progress: Progress = s
 
 
 def _point(row: Row) -> Point:
-    """What a run did, of its row in a sweep.
+    """Outcome of a run, from its row in a sweep.
 
     Raises
     ------

@@ -24,17 +24,10 @@ from verification.interface.pair import ContactPair
 def families(
     contact: Grid, force: Floats, jump: Floats, weight: Floats | None, zeta: Floats | None
 ) -> list[tuple[Floats, Floats]]:
-    """Factors of the multiplied conditions, a row for each node; only of (2.4) without a friction ``weight``.
+    """Factors of the multiplied conditions, a row for each node; only of (2.4) without friction.
 
-    Those behind the fourth are for :class:`verification.bounds.conditions.Pieces`.
-
-    Parameters
-    ----------
-    contact : Grid
-    force, jump : array
-        Forms p and v, a row for each component.
-    weight, zeta : array or None
-        ``sqrt(w k)`` as a column, and ``sqrt(w k) zeta``.
+    Those behind the fourth are for :class:`verification.bounds.conditions.Pieces`.  ``force`` and ``jump`` are the
+    forms p and v, ``weight`` is ``sqrt(w k)`` as a column and ``zeta`` the form zeta times it.
     """
     press, gap = force[contact.normal], jump[contact.normal]
     if weight is None or zeta is None:
@@ -46,20 +39,15 @@ def families(
 
 
 class TraceForms:
-    """The forms of a pair of bodies at a friction k > 0, or at 0.
+    """The forms of a pair of bodies at a friction k > 0, or at 0, in place of the pair's.
 
     Without friction p has no tangential part: c is then the normal part of a trace and P has S_1 with the tangential
     components condensed out.
 
     Parameters
     ----------
-    pair : ContactPair
-    k : float
-        Friction, in place of the pair's.
-    S_1 : array, shape (m, m)
-        From c to the components of p that are not 0.
-    carries : slice
-        These components of p.
+    S_1, carries : array of shape (m, m), slice
+        From c to the components of p that are not 0, and these components.
     near : array, shape (N + m, N + m)
         Changes of (d, c), as columns, in which the forms are of size 1: the nearer, the less is lost to rounding.
     """

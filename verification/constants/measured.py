@@ -234,7 +234,7 @@ class Measured(Document):
 
 
 def product(k: Fraction, a: Number, b: Number) -> Number:
-    """``k a b`` of numbers >= 0 with what is known of them: each end that both have, rounded outwards."""
+    """``k a b`` of numbers >= 0 with its enclosure: each end that both have, rounded outwards."""
     value = float(k) * a.value * b.value
     low = None if a.lo is None or b.lo is None else below(k * Fraction(a.lo) * Fraction(b.lo))
     high = None if a.hi is None or b.hi is None else above(k * Fraction(a.hi) * Fraction(b.hi))
