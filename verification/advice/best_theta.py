@@ -20,8 +20,8 @@ from scipy.optimize import minimize_scalar
 from ndtheory import EnergyBounds
 from verification.algorithm.linearisation import NotLinear
 from verification.algorithm.theta import energy_bounds
+from verification.bounds.interior_point import LMIError
 from verification.bounds.multipliers import QuadraticForms
-from verification.bounds.program import LMIError
 from verification.constants import Measured, measure
 from verification.contact import ContactError
 from verification.interface.build import pair_of

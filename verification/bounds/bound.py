@@ -86,15 +86,7 @@ class Subject:
         """The same bodies at another friction."""
         assert self.measured is not None
         assert self.pair is not None
-        measured = self.measured.with_friction(k)
-        return Subject(
-            constants=measured.constants(),
-            energy=measured.energy_constants(),
-            pair=self.pair.at(friction=k),
-            measured=measured,
-            why=self.why,
-            why_energy=self.why_energy,
-        )
+        return Subject.of(self.pair.at(friction=k), self.measured.with_friction(k))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,7 +12,7 @@ from scipy.linalg import block_diag, cho_factor, cho_solve, solve_triangular
 from fem1d2d.mesh import Floats
 from ndtheory.energy_norms import turning_theta, worst_ratio
 from verification.bounds import LARGEST
-from verification.bounds.program import Optimum, Program, Weights
+from verification.bounds.interior_point import Optimum, Program, Weights
 from verification.bounds.trace_forms import TraceForms, families
 from verification.constants import Measured
 from verification.interface.pair import ContactPair

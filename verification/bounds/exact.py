@@ -21,9 +21,9 @@ from scipy.linalg import block_diag
 from fem1d2d.mesh import Floats
 from verification.algorithm.affine_piece import Piece
 from verification.bounds.conditions import TINY, Conditions, Pieces, Signs
+from verification.bounds.interior_point import LMIError, Optimum, Stop, Weights
 from verification.bounds.multipliers import Certified, QuadraticForms
 from verification.bounds.pattern_search import factor_search
-from verification.bounds.program import LMIError, Optimum, Stop, Weights
 from verification.interface.grid import Grid
 from verification.interface.pair import ContactPair
 from verification.progress import Progress, silent

@@ -12,16 +12,16 @@ import numpy as np
 from ndtheory import Number
 from ndtheory.number import above, below
 from verification.bounds.exact import CLOSE, GAP, budget, enclose
+from verification.bounds.interior_point import LMIError as LMIError
+from verification.bounds.interior_point import Weights
 from verification.bounds.multipliers import Certified, QuadraticForms, friction_threshold
-from verification.bounds.program import LMIError as LMIError
-from verification.bounds.program import Weights
 from verification.certificate.claims import Confirmation, NoCertificate
 from verification.constants import Measured
 from verification.interface.pair import ContactPair
 from verification.progress import Progress, silent
-from verification.value import freeze
+from verification.value import freeze, to_plain
 
-#: Why no value of this bound is called certified.
+#: Why the values of this bound are not called certified.
 NOT_CERTIFIED = "checked in doubles with a bound on their rounding, for the interface matrices as computed"
 
 
@@ -91,20 +91,15 @@ class Semidefinite:
 
     def to_dict(self) -> dict[str, Any]:
         """The object ``lmi`` of ``ndtheory.compare/1``."""
-        numbers = {
-            "factor": self.factor,
-            "lipschitz": self.lipschitz,
-            "theta_max": self.theta_max,
-            "friction_threshold": self.friction_threshold,
-        }
         reasons = {
             "factor": self.why_no_factor,
+            "lipschitz": "",
             "theta_max": "no theta is proved to contract at this friction",
             "friction_threshold": self.no_threshold,
         }
-        reason = {name: reasons[name] for name, number in numbers.items() if number is None}
+        reason = {name: why for name, why in reasons.items() if getattr(self, name) is None}
         return {
-            **{name: None if number is None else number.to_dict() for name, number in numbers.items()},
+            **{name: to_plain(getattr(self, name)) for name in reasons},
             "lower": self.lower,
             "gap": self.gap,
             "programs": self.programs,

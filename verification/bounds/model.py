@@ -8,7 +8,7 @@ from typing import Any
 import cvxpy as cp
 import numpy as np
 
-from verification.bounds.program import LMIError, Optimum, Program
+from verification.bounds.interior_point import LMIError, Optimum, Program
 from verification.threads import one_thread
 
 

@@ -31,7 +31,7 @@ from fem1d2d.mesh import Floats
 from ndtheory.energy_norms import contraction_interval
 from verification.bounds import interior_point
 from verification.bounds.conditions import Conditions, Pieces, inside, mixed, times
-from verification.bounds.program import USUAL, LMIError, Optimum, Program, Stop, Weights
+from verification.bounds.interior_point import USUAL, LMIError, Optimum, Program, Stop, Weights
 from verification.constants import Measured
 from verification.interface.pair import ContactPair
 from verification.progress import Progress, silent

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from verification.bounds.program import Weights
+from verification.bounds.interior_point import Weights
 from verification.certificate.check import check, surface_stiffness
 from verification.constants.measured import FROM_MATRICES
 from verification.interface.body import Body

@@ -15,8 +15,8 @@ from typing import Any, ClassVar
 from ndtheory.number import Numeric
 from verification.algorithm.theta import choose
 from verification.bounds.bound import Subject
+from verification.bounds.interior_point import LMIError
 from verification.bounds.multipliers import QuadraticForms
-from verification.bounds.program import LMIError
 from verification.bounds.table import BOUNDS, certifying, strongest
 from verification.certificate import check
 from verification.certificate.claims import NOT_CONFIRMED, Claims, NoCertificate, describe, same, written
@@ -56,15 +56,9 @@ class Checked(Document):
         return f"accepted: {self.words}" if self.accepted else f"refused: {self.why}"
 
     def content(self) -> dict[str, Any]:
-        reason = {} if self.same is not None else {"same": "no problem was given to hold it against"}
-        return {
-            "accepted": self.accepted,
-            "why": self.why,
-            "words": self.words,
-            "sha256": self.sha256,
-            "same": self.same,
-            "reason": reason,
-        }
+        reason = {} if self.same is not None else {"same": "no problem was given to compare it with"}
+        names = ("accepted", "why", "words", "sha256", "same")
+        return {**{name: getattr(self, name) for name in names}, "reason": reason}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
