@@ -105,10 +105,6 @@ def advise_matrices(
     progress : callable
         Called with steps, value and residual of Lanczos.
 
-    Returns
-    -------
-    Advice
-
     Raises
     ------
     ValueError

@@ -66,10 +66,6 @@ def advise_moduli(
     flat : bool
         True if a body into which such an image fits is at least twice as wide as high, and held along its other side.
 
-    Returns
-    -------
-    Advice
-
     Raises
     ------
     HypothesisError

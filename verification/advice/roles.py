@@ -227,17 +227,18 @@ def plain_role(neumann_body: BodyNumber, rho: Fraction, **settings: Any) -> Role
     return role_of(neumann_body, bounds.rho, bounds=bounds, **settings)
 
 
-def with_both_ends(roles: Sequence[Role]) -> tuple[Role, ...]:
+def with_both_ends(roles: Sequence[Role], rho: Sequence[Number | None] = ()) -> tuple[Role, ...]:
     """Both roles of a pair on the same unknowns, with the ends of the spectrum where neither is refused.
 
-    The eigenvalues of (S_n, S_c) and (S_c, S_n) are reciprocal: ``rho_min`` of one role is one over ``rho`` of the
-    other.
+    The eigenvalues of (S_n, S_c) and (S_c, S_n) are reciprocal: ``rho_min`` of one role is one over rho of the other.
+    Both ``rho`` are given where the roles have rho_normal.
     """
-    one, other = (role.rho for role in roles)
+    one, other = rho or [role.rho for role in roles]
     if one is None or other is None:
         return tuple(roles)
-    least = [Number.of_float(1 / Fraction(rho.value)) for rho in (other, one)]
-    return tuple(replace(role, rho_min=low, rho_tied=role.rho) for role, low in zip(roles, least, strict=True))
+    least = [Number.of_float(1 / Fraction(number.value)) for number in (other, one)]
+    ends = zip(roles, least, (one, other), strict=True)
+    return tuple(replace(role, rho_min=low, rho_tied=high) for role, low, high in ends)
 
 
 def steps(rate: float, tolerance: float = 1e-9) -> int | None:
@@ -427,11 +428,9 @@ class Advice(Document):
         origins = ("run", "readings", "next", "logs", "interval", "friction_bounds", "moduli", "matrices")
         names = ("neumann_body", "theta", "tied", "assumes", "quote", "roles", *origins)
         found = {name: to_plain(getattr(self, name)) for name in names}
-        same = self.moduli is not None and not self.neumann_body
+        same = "both roles have the same bounds"
         missing = {
-            "neumann_body": "both roles have the same bounds"
-            if same
-            else "one run tells nothing of the other assignment",
+            "neumann_body": same if self.moduli else "one run tells nothing of the other assignment",
             "run": "logs were given" if self.logs else "no run was given",
             "next": "no run was given",
             "interval": "no logs were given",
@@ -460,10 +459,6 @@ def advise(problem: Problem | ContactPair | Path | str, *, tied: bool = False, p
     progress : callable
         Called with the steps of Lanczos where there are too many contact nodes for matrices.
 
-    Returns
-    -------
-    Advice
-
     Raises
     ------
     ProblemError
@@ -479,11 +474,10 @@ def advise(problem: Problem | ContactPair | Path | str, *, tied: bool = False, p
     pair: ContactPair | TwoBodies
     try:
         pair = pair_or_bodies(problem)
-        roles = (
-            _roles_without_matrices(pair, tied, progress)
-            if isinstance(pair, TwoBodies)
-            else (_role(pair), _exchanged(pair))
-        )
+        if isinstance(pair, TwoBodies):
+            roles = _roles_without_matrices(pair, tied, progress)
+        else:
+            roles = (_role(pair), _exchanged(pair))
     except SingularRole as error:
         assert not isinstance(problem, ContactPair)  # made with roles that are not singular
         given = problem if isinstance(problem, Problem) else load(problem)
@@ -541,28 +535,17 @@ def _roles_without_matrices(bodies: TwoBodies, tied: bool, progress: Progress) -
     for why in pencils.reason.values():
         raise ProblemError(problem.source, "contact", None, f"no advice: {why}")
     needed, rubs, outside = needs_matrices(bodies), bool(bodies.friction), bodies.outside
-    roles = []
-    for neumann in (problem.iteration.neumann_body, problem.swapped().iteration.neumann_body):
-        rho = pencils.largest(neumann_body=neumann, normal=not rubs).value
-        nothing = f"outside the theorem: {outside[0]}" if outside else needed if rubs else ""
-        role = plain_role(
-            neumann, Fraction(rho), nothing=nothing, no_threshold=nothing or needed, reason={"theta_auto": needed}
-        )
-        roles.append(role)
+    nothing = f"outside the theorem: {outside[0]}" if outside else needed if rubs else ""
+    reason, order = {"theta_auto": needed}, (problem.iteration.neumann_body, problem.contact_body)
+    if not (rubs or tied):
+        more = "without friction rho is rho_normal, and a tied interface needs two more eigenvalues: ask for tied"
+        reason["rho_min"] = more
+    settings = {"nothing": nothing, "no_threshold": nothing or needed, "reason": reason}
+    largest = lambda body, normal: pencils.largest(neumann_body=body, normal=normal).value
+    roles = [plain_role(body, Fraction(largest(body, not rubs)), **settings) for body in order]
     if rubs:
         return with_both_ends(roles)
-    if not tied:
-        more = "without friction rho is rho_normal, and a tied interface needs two more eigenvalues: ask for tied"
-        return tuple(replace(role, reason={**role.reason, "rho_min": more}) for role in roles)
-    bodies_of = (problem.iteration.neumann_body, problem.contact_body)
-    ends = with_both_ends(
-        [
-            replace(role, rho=Number.of_float(pencils.largest(neumann_body=neumann).value))
-            for role, neumann in zip(roles, bodies_of, strict=True)
-        ]
-    )
-    pairs = zip(roles, ends, strict=True)
-    return tuple(replace(role, rho_min=end.rho_min, rho_tied=end.rho_tied) for role, end in pairs)
+    return with_both_ends(roles, [Number.of_float(largest(body, False)) for body in order]) if tied else tuple(roles)
 
 
 def _rho(role: Role, tied: bool) -> str:

@@ -11,6 +11,7 @@ from ndtheory.number import above, below
 from verification.advice.log_files import Column
 from verification.advice.pace import MOST_WINDOWS, Pace, pace, pooled, together
 from verification.advice.readings import FEWEST_STEPS, Made, NextRun, Observed, RunReading, few, steps_needed
+from verification.value import to_plain
 
 #: A residual below this share of its largest value has fallen, although the log is too short for a ratio.
 FALLEN = 0.1
@@ -92,7 +93,7 @@ class SeenColumn:
             "residual": self.residual,
             "windows": self.windows,
             "read": {kind: self.count(kind) for kind in _WORDS},
-            **{name: None if number is None else number.to_dict() for name, number in numbers.items()},
+            **{name: to_plain(number) for name, number in numbers.items()},
             "says": self.says,
             "reason": {name: why for name, why in _WHY_NOT.items() if numbers[name] is None},
         }
@@ -211,8 +212,8 @@ class SeenLog:
             "form": self.form,
             "theta": float(self.theta),
             "steady_over": self.steps,
-            "columns": [column.to_dict() for column in self.columns],
-            "readings": [reading.to_dict() for reading in self.readings],
+            "columns": to_plain(self.columns),
+            "readings": to_plain(self.readings),
             "notes": list(self.notes),
         }
 

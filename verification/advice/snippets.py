@@ -108,6 +108,10 @@ def kratos(c: Coupling) -> str:
     """The members of ``solver_settings`` beside ``solvers``, in which each body has the data displacement and force."""
     one, other = c.neumann, c.contact
     force: dict[str, Any] = {"solver": one, "data_name": "force"}
+    mapped: dict[str, Any] = {"data_transfer_operator": "mapper"}
+    reads = {"data": "displacement", "from_solver": one, "from_solver_data": "displacement", **mapped}
+    writes = {"data": "force", "to_solver": one, "to_solver_data": "force", **mapped}
+    writes["data_transfer_operator_options"] = ["use_transpose", "swap_sign"]
     settings = {
         "type": "coupled_solvers.gauss_seidel_strong",
         "num_coupling_iterations": c.iterations,
@@ -120,26 +124,7 @@ def kratos(c: Coupling) -> str:
         },
         "coupling_sequence": [
             {"name": one, "input_data_list": [], "output_data_list": []},
-            {
-                "name": other,
-                "input_data_list": [
-                    {
-                        "data": "displacement",
-                        "from_solver": one,
-                        "from_solver_data": "displacement",
-                        "data_transfer_operator": "mapper",
-                    }
-                ],
-                "output_data_list": [
-                    {
-                        "data": "force",
-                        "to_solver": one,
-                        "to_solver_data": "force",
-                        "data_transfer_operator": "mapper",
-                        "data_transfer_operator_options": ["use_transpose", "swap_sign"],
-                    }
-                ],
-            },
+            {"name": other, "input_data_list": [reads], "output_data_list": [writes]},
         ],
     }
     return json.dumps({"solver_settings": settings}, indent=2)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from ndtheory import Constants, EnergyConstants, Number
 from ndtheory.number import Level, Numeric
 from verification.progress import Progress, silent
+from verification.value import to_plain
 
 if TYPE_CHECKING:
     from verification.bounds.exact import Enclosure
@@ -159,16 +160,15 @@ class BoundResult:
         if self.detail is not None:
             document: dict[str, Any] = self.detail.to_dict()
             return document
-        number = lambda value: None if value is None else value.to_dict()
         concludes = "contraction" if self.factor is not None else "no conclusion"
         found = {
             "theta": self.theta,
             "verdict": None if self.theta is None else concludes,
-            "factor": number(self.factor),
-            "one_minus_factor": number(self.one_minus_factor),
-            "interval": None if self.interval is None else list(self.interval),
-            "every_small_theta": number(self.friction.every),
-            "some_theta": number(self.friction.some),
+            "factor": to_plain(self.factor),
+            "one_minus_factor": to_plain(self.one_minus_factor),
+            "interval": to_plain(self.interval),
+            "every_small_theta": to_plain(self.friction.every),
+            "some_theta": to_plain(self.friction.some),
             "threshold_on": self.friction.on,
         }
         why = dict.fromkeys(found, "not worked out")

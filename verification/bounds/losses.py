@@ -27,11 +27,8 @@ from verification.interface.pair import ContactPair
 from verification.progress import Progress, silent
 from verification.threads import one_thread
 
-#: How often the patterns are searched for the losses of one problem.
-SEARCHES = 6
-
-#: Where each of them starts.
-STARTS = 2
+#: Number of searches of patterns for the losses of one problem, and of starts of each.
+SEARCHES, STARTS = 6, 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,16 +55,10 @@ class Loss:
 
 @dataclass(frozen=True, kw_only=True)
 class Losses:
-    """The losses link by link.
+    """The losses of each inequality, ``links``, and of two chains, whose steps add up.
 
-    Attributes
-    ----------
-    links : tuple of Loss
-        Each inequality by itself.
-    friction : tuple of Loss
-        The steps from the largest friction term found to its bound (5.30), repaired and then printed; they add up.
-    lipschitz : tuple of Loss
-        The steps from the largest ``|||T psi - T psi~||| / |||psi - psi~|||`` found to its bound (5.38); they add up.
+    ``friction`` leads from the largest friction term found to its bound (5.30), repaired and then printed,
+    ``lipschitz`` from the largest ``|||T psi - T psi~||| / |||psi - psi~|||`` found to its bound (5.38).
     """
 
     links: tuple[Loss, ...]
@@ -76,10 +67,7 @@ class Losses:
 
     def to_dict(self) -> dict[str, Any]:
         """The object ``losses`` of ``ndtheory.compare/1``."""
-        return {
-            name: [vars(loss) for loss in losses]
-            for name, losses in (("links", self.links), ("friction", self.friction), ("lipschitz", self.lipschitz))
-        }
+        return {name: [vars(loss) for loss in losses] for name, losses in vars(self).items()}
 
 
 class LossForms:

@@ -110,11 +110,10 @@ def chart(problem: Problem, *, store: Path | None = None, progress: Progress = s
         raise ProblemError(problem.source, "contact.radius", None, "needed a law of friction to vary k")
     subject = Subject.of(pair, measured)
     regions: dict[str, Region] = {}
-    reason: dict[str, str] = {}
+    reason = dict.fromkeys((*BOUNDS, "points"), INTERRUPTED)
     points: list[Point] = []
     limited = replace(pair.settings, relaxation="constant", max_iterations=MOST_STEPS)
     grid = SweepGrid.of({"theta": THETAS, "friction": FRICTIONS})
-    reason |= dict.fromkeys((*BOUNDS, "points"), INTERRUPTED)
     try:
         for bound in BOUNDS.values():
             try:

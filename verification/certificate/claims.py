@@ -54,11 +54,7 @@ class Claims:
 
     def __init__(self, discrete: dict[str, Any], progress: Progress, known: dict[Any, Any] | None = None) -> None:
         self.discrete, self.progress = discrete, progress
-        self._known: dict[Any, Any] = {} if known is None else known
-
-    def at(self, discrete: dict[str, Any]) -> Claims:
-        """Claims about the same bodies, joined otherwise."""
-        return Claims(discrete, self.progress, self._known)
+        self.known: dict[Any, Any] = {} if known is None else known
 
     def accepted(self, theta: Fraction, factor: Fraction, multipliers: dict[str, Any]) -> dict[str, Any] | None:
         """The claim of a factor with the bits in which the checker accepts it; None where it does not."""
@@ -69,9 +65,9 @@ class Claims:
 
             def eliminated(body: dict[str, Any], both: bool, bits: int = bits) -> Any:
                 key = (json.dumps(body), both, bits)
-                if key not in self._known:
-                    self._known[key] = surface_stiffness(body, both=both)
-                return self._known[key]
+                if key not in self.known:
+                    self.known[key] = surface_stiffness(body, both=both)
+                return self.known[key]
 
             try:
                 check(self.discrete, claim, eliminated)
@@ -106,7 +102,7 @@ class Confirmation:
             claims = Claims(describe(pair.problem, pair), progress)
         except NotExact as error:
             raise NoCertificate(str(error)) from None
-        self.pair, self.problem, self._claims = pair, pair.problem, claims
+        self.pair, self.problem, self.progress, self._claims = pair, pair.problem, progress, claims
 
     def factor(self, theta: Fraction, factor: float, multipliers: Weights) -> Fraction:
         """A factor of one step that is confirmed, larger than the one that the multipliers prove in doubles.
@@ -152,7 +148,9 @@ class Confirmation:
         """
         for share in LESS:
             found = _decimal(k * (1 - share), ROUND_DOWN)
-            claims = self._claims.at(describe(self.problem, replace(self.pair, friction=found)))
+            claims = Claims(
+                describe(self.problem, replace(self.pair, friction=found)), self.progress, self._claims.known
+            )
             multipliers = propose(float(found))
             for theta in SMALL:
                 if claims.accepted(theta, Fraction(1), written(_times(float(theta), multipliers))):

@@ -47,10 +47,6 @@ def measure(
     progress : callable
         Called with the mesh that is measured.
 
-    Returns
-    -------
-    Measured
-
     Raises
     ------
     ProblemError
