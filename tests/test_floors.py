@@ -67,7 +67,7 @@ FLOORS: dict[str, dict[str, str]] = {
     },
     "bounds, proofs": {
         "verification.bounds": (
-            "__init__ bound conditions exact interior_point lipschitz losses model "
+            "__init__ bound conditions interior_point lipschitz losses model "
             "multipliers neighbours pattern_search region table trace_forms"
         ),
         "verification.certificate": "__init__ check claims continuum contraction",

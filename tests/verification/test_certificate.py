@@ -16,7 +16,7 @@ from problem_list import blocks, changed, plates, small
 
 import verification as vf
 from verification.bounds.bound import Subject
-from verification.bounds.exact import enclose
+from verification.bounds.lipschitz import enclose
 from verification.bounds.multipliers import QuadraticForms
 from verification.bounds.table import BOUNDS
 from verification.certificate import check

@@ -164,7 +164,7 @@ def test_the_documents_of_both_differ_in_what_is_proved_alone(whole, plain):
 
 NOT_PROVED = {
     "bars": (bars(iteration={"theta": "0.2"}), "plane problem"),
-    "beyond what one program proves": (changed(small(), contact={"friction": "3"}), "no contraction"),
+    "beyond what one program proves": (changed(small(), contact={"friction": "3"}), "does not contract"),
 }
 
 

@@ -21,10 +21,10 @@ from verification.interface.pair import UNITS
 #: Sizes of E, and how close nu may come to -1 and to 1/2: bounds of rho then stay between 1e-75 and 1e75.
 LARGEST_YOUNG, CLOSEST = 10**24, Fraction(1, 10**12)
 
-#: Why there is no friction threshold beside the values that are proved for k = 0.
+#: Reason for a missing friction threshold beside the values that are proved for k = 0.
 NO_FRICTION = "a mirror image proves nothing of friction: the proved values are for k = 0"
 
-#: Why there is no theta for a tied interface.
+#: Reason for a missing theta for a tied interface.
 ONE_END = "moduli bound rho from below, and no other end of the spectrum"
 
 
@@ -171,7 +171,7 @@ def _as_role(role: ModuliRole, bounds: LowerBounds) -> Role:
     reason = {
         "theta_predicted": "moduli bound rho from below, which predicts no theta",
         "rate_predicted": "moduli bound rho from below, which predicts no rate",
-        "friction_threshold": NO_FRICTION if role.start else "moduli alone say nothing of friction",
+        "friction_threshold": NO_FRICTION if role.start else "moduli say nothing about friction",
         "rho_min": ONE_END,
     }
     proved: dict[str, Any] = dict.fromkeys(PROVED)

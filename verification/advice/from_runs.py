@@ -30,7 +30,7 @@ from verification.advice.roles import Advice, role_of
 from verification.advice.runs_with_friction import friction_bounds, next_with_friction, readings_with_friction
 from verification.interface.pair import UNITS
 
-#: Why there is no theta for a tied interface.
+#: Reason for a missing theta for a tied interface.
 ONE_END = "residuals show one end of the spectrum"
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -25,7 +26,7 @@ MOST_BYTES = 500_000_000
 LOOKED_AT = 200
 
 #: Advice for a log whose relaxation was not constant.
-RUN_AGAIN = "run again with constant relaxation: where it changes, the ratios of residuals say nothing of rho"
+RUN_AGAIN = "run again with constant relaxation: where it changes, the ratios of residuals say nothing about rho"
 
 Residual = Literal["absolute", "relative", "drop", "assumed"]
 
@@ -337,7 +338,7 @@ class _LogTable:
             rows.append(row)
             self.numbers.append(line)
         if not self.numbers:
-            raise _refused(self.path, "needed residuals, there is no line of numbers in it")
+            raise _refused(self.path, "needed residuals, it has no line of numbers")
         data = np.concatenate([block.reshape(-1, width), np.reshape(rows, (-1, width))])
         if not self.complete and len(data) > 1 and self.numbers[-1] == last:
             end, before = (self._split(self.lines[line - 1])[-1] for line in (last, self.numbers[-2]))
@@ -349,13 +350,10 @@ class _LogTable:
 
     def _block(self, start: int, width: int) -> Floats:
         """All lines but the last one at once, which is fast; none where one of them is anything but numbers."""
-        lines = self.lines[start:-1]
-        try:
-            if len(lines) < 2 or self.separator == ";":
-                return np.empty((0, width))
-            block = np.loadtxt(lines, delimiter=self.separator, comments=None, ndmin=2)
-        except ValueError:
-            return np.empty((0, width))
+        lines, block = self.lines[start:-1], np.empty((0, width))
+        if len(lines) > 1 and self.separator != ";":
+            with suppress(ValueError):
+                block = np.loadtxt(lines, delimiter=self.separator, comments=None, ndmin=2)
         return block if block.shape == (len(lines), width) else np.empty((0, width))
 
     def _row(self, line: int, words: list[str], width: int) -> list[float] | None:

@@ -128,9 +128,6 @@ def _chosen(names: list[str], name: str) -> str:
     return names[0]
 
 
-# --- numpy and scipy --------------------------------------------------------------------------------------------------
-
-
 def _numpy(path: Path, name: str) -> np.ndarray:
     with path.open("rb") as file:
         _within(max(_rows(file), default=0))
@@ -159,9 +156,6 @@ def _rows(file: BinaryIO) -> Iterator[int]:
         yield math.isqrt(header.entries)
 
 
-# --- Matrix Market ----------------------------------------------------------------------------------------------------
-
-
 def _market(path: Path, name: str) -> np.ndarray:
     rows, columns, entries, _, field, _ = scipy.io.mminfo(path)
     if field not in ("real", "double", "integer", "unsigned-integer"):
@@ -169,9 +163,6 @@ def _market(path: Path, name: str) -> np.ndarray:
     _within(max(rows, columns, math.isqrt(entries)))
     found = scipy.io.mmread(path, spmatrix=False)
     return _dense(found) if sp.issparse(found) else np.asarray(found)
-
-
-# --- MATLAB -----------------------------------------------------------------------------------------------------------
 
 
 def _matlab(path: Path, name: str) -> np.ndarray:
@@ -214,9 +205,6 @@ def _unpacked(file: BinaryIO) -> int:
     return total
 
 
-# --- texts ------------------------------------------------------------------------------------------------------------
-
-
 def _text(path: Path, name: str) -> np.ndarray:
     """Rows of numbers; what begins with # or % is a comment."""
     rows: list[Floats] = []
@@ -250,7 +238,7 @@ def _numbers(cells: list[str], line: int, *, first: bool) -> Floats:
     if "," in bad and _is_number(bad.replace(",", ".")):
         raise _Refusal(f"{shown}, a decimal comma: needed a decimal point")
     if first and not any(map(_is_number, cells)):
-        raise _Refusal(f"{shown}, so that it looks like a header: needed numbers alone, delete it")
+        raise _Refusal(f"{shown}, so that it looks like a header: needed only numbers, delete it")
     raise _Refusal(f"{shown}: needed a number")
 
 

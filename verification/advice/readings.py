@@ -275,12 +275,12 @@ def read_plateau(theta: Fraction, plateau: Observed) -> tuple[tuple[RunReading, 
 def level(theta: Fraction, bounds: bool = True) -> RunReading:
     """A residual that stays at a level, or grows only for a while; with ``bounds`` it bounds rho without friction."""
     least = 2 / theta - 1
-    says = "contact opens and closes in turn, and the residual stays at a level or grows for a while only"
+    says = "contact opens and closes alternately, and the residual stays at a level or grows for a while only"
     if bounds:
         says += f": without friction rho is at least {_at_least(least)}, nothing more"
         says += "; with friction this does not bound rho"
     else:
-        says += ", or the solvers of both sides are no more accurate: this says nothing of rho"
+        says += ", or the solvers of both sides are not more accurate: this says nothing about rho"
     return RunReading(kind="level", lo=below(least) if bounds else None, says=says)
 
 

@@ -223,7 +223,7 @@ def role_of(
 def plain_role(neumann_body: BodyNumber, rho: Fraction, **settings: Any) -> Role:
     """The role without friction, from rho; ``settings`` are parameters of :func:`role_of`."""
     bounds = evaluate_energy(EnergyConstants(rho=rho))
-    settings.setdefault("no_threshold", "matrices alone say nothing of friction: the proved values are for k = 0")
+    settings.setdefault("no_threshold", "matrices say nothing about friction: the proved values are for k = 0")
     return role_of(neumann_body, bounds.rho, bounds=bounds, **settings)
 
 
@@ -352,7 +352,7 @@ class Advice(Document):
 
     @property
     def why_no_theta(self) -> str:
-        """Why there is no theta to paste; empty where there is one."""
+        """Why the advice has no theta to paste; empty where it has one."""
         if self.theta is not None:
             return ""
         if self.moduli is not None:
@@ -413,7 +413,7 @@ class Advice(Document):
 
     @property
     def best(self) -> Role:
-        """The role that is advised; the only one where there is no choice.
+        """The role that is advised, or the only one.
 
         Raises
         ------
@@ -421,7 +421,7 @@ class Advice(Document):
             The ratio of a run has several readings: ``next`` is the run to make.
         """
         if not self.roles:
-            raise ValueError("no reading is left alone: make the run that `next` names")
+            raise ValueError("several readings are left: make the run that `next` names")
         return next((r for r in self.roles if r.neumann_body == self.neumann_body), self.roles[0])
 
     def content(self) -> dict[str, Any]:

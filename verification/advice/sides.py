@@ -69,7 +69,7 @@ class SeenMatrix:
             found.append(
                 f"{100 * self.zeros:.0f} % of the entries of {name} off the diagonal are 0, as in an assembled"
                 f" stiffness matrix ({100 * SPARSE:.0f} % or more); a Schur complement on the interface is dense."
-                "  If it is the matrix of a whole body, condense it first: rho below is not that of the coupling"
+                "  If it is the matrix of a whole body, condense it first: rho below is not the coupling's"
             )
         return found
 
@@ -349,7 +349,7 @@ class Transfer:
 
 
 def read_transfer(given: Any, rows: dict[int, int], neumann_body: BodyNumber | None) -> Transfer | None:
-    """The direction of P, by its shape; None without one.
+    """The transfer P, whose direction its shape decides; None without one.
 
     Raises
     ------

@@ -17,7 +17,7 @@ from verification.progress import Progress, silent
 from verification.value import to_plain
 
 if TYPE_CHECKING:
-    from verification.bounds.exact import Enclosure
+    from verification.bounds.lipschitz import Enclosure
     from verification.bounds.multipliers import QuadraticForms
     from verification.constants import Measured
     from verification.interface.pair import ContactPair
@@ -107,7 +107,7 @@ class BoundResult:
         Of the interval: at any level but ``float`` each theta in it is proved to contract.
     friction : Thresholds
     why, not_computed : str
-        Why there is no factor; why nothing was worked out.
+        Why the factor is missing; why nothing was worked out.
     detail : object, optional
         Full result of this bound beyond these attributes; its ``to_dict`` is the document then.
     """

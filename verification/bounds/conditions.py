@@ -24,15 +24,10 @@ Cones = NDArray[np.intp]
 #: How much the square of a form of length 1 may weigh that is 0: the more, the nearer to leaving it out.
 LARGE = 1e2
 
-#: Why no multipliers are sought where a rigid motion lifts the contact body off: without friction, and with it.
-LIFTS_SMOOTHLY = (
-    "the contact body can be lifted rigidly, which only multipliers of (2.4) that are equal at all nodes allow; without"
-    " friction these prove the bound in energy norms, and none prove less"
-)
-LIFTS = (
-    "the contact body can be lifted rigidly, which only multipliers of (2.4) that are equal at all nodes allow, as"
-    " those of the bound in energy norms are; others are not sought"
-)
+#: Why no multipliers are sought where a rigid motion lifts the contact body off; with friction and without.
+LIFTS = "the contact body can be lifted rigidly, which only multipliers of (2.4) that are equal at all nodes allow"
+OTHERS = ", like the multipliers of the bound in energy norms; others are not sought"
+SMOOTHLY = "; without friction these prove the bound in energy norms, and none prove less"
 
 #: Lengths and squares smaller than this are 0.
 TINY = 1e-300
@@ -102,7 +97,7 @@ class Conditions:
         if constants is None:
             raise ValueError("the theorem in energy norms does not apply to it: " + measured.why_no_energy)
         if pair.contact.lifts:
-            raise ValueError(LIFTS if k else LIFTS_SMOOTHLY)
+            raise ValueError(LIFTS + (OTHERS if k else SMOOTHLY))
         self._measured = measured
         self.energy_bounds = float(constants.at_work), float(constants.kappa_1), float(constants.kappa_2)
         contact, neumann, interface = pair.contact.grid, pair.neumann.grid, pair.interface
@@ -217,7 +212,7 @@ class Conditions:
         return (lam, tau, a, b), rest
 
     def started(self, fixed: Floats, early: tuple[float, Floats], parent: Pieces, pieces: Pieces) -> Program:
-        """The program of the least s for pieces with more signs fixed than ``parent``, from an early point of its own.
+        """The program of the least s for pieces with more signs fixed than ``parent``, from an early point of that.
 
         The matrix stays positive definite there: the equation of a sign takes the place of an inequality, with the same
         multiplier, and takes less.

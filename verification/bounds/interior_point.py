@@ -190,7 +190,7 @@ class Cones:
 
 @one_thread()
 def solve(program: Program) -> Optimum:
-    """The least s (or the largest), with the multipliers and moments that belong to it.
+    """The least s (or the largest), with its multipliers and moments.
 
     Raises
     ------

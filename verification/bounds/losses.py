@@ -113,14 +113,9 @@ def square(rows: Floats, gram: Floats) -> Floats:
 
 
 def locate(pair: ContactPair, measured: Measured, *, seed: int = 0, progress: Progress = silent) -> Losses | None:
-    """Find the loss of each inequality at the problem's friction.
+    """Find the loss of each inequality at the problem's friction; None if a constant does not exist or a node is held.
 
     ``seed`` is for the search, ``progress`` is called with the share of the searches that are done.
-
-    Returns
-    -------
-    Losses or None
-        None where a constant does not exist or a contact node is held.
     """
     constants = measured.constants()
     if constants is None or pair.held:

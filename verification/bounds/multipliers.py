@@ -1,6 +1,6 @@
 """The semidefinite bound: nearly the exact Lipschitz constant of T_theta, by a program whose answer is checked.
 
-For a pair of forces let g, p be the differences of psi and of T psi, v that of the jump and zeta that of S sigma_N.
+For a pair of forces let g, p, v and zeta be the differences of psi, T psi, the jump and S sigma_N.
 Step II gives, node by node::
 
     p_N v_N >= 0                                             (2.4)
@@ -43,10 +43,10 @@ NARROW = 1e-2
 #: It is given up below this share of the threshold of the theorem in energy norms, which it should exceed.
 LEAST = 1e-2
 
-#: So many of them are tried in turn, before the rest is bisected.
+#: So many of them are tried one by one, before the rest is bisected.
 ENOUGH = 3
 
-#: Shares of what a solver proposes, the rest known multipliers, that are tried in turn.
+#: Shares of a solver's proposal, the rest known multipliers, that are tried one after the other.
 DRAWN = (1.0, 0.9999, 0.999, 0.99, 0.9)
 
 #: By how much a is larger and b smaller than known, from one start to the next, until one is inside.

@@ -90,7 +90,7 @@ def responses(pair: ContactPair, g: Floats, patterns: Patterns, sign: NDArray[np
     systems = contact.stiffness * (moves[:, :, None] & moves[:, None, :])
     diagonal = np.einsum("cii->ci", systems)
     diagonal[~moves] = 1.0
-    if contact.loose:  # motions that a pattern leaves free are pinned: its reaction does not know of them
+    if contact.loose:  # motions that a pattern leaves free are pinned, without effect on its reaction
         for system, still in zip(systems, ~moves, strict=True):
             free = vanishing(contact.motions, np.flatnonzero(still))
             system += float(np.diag(contact.stiffness).max()) * free @ free.T
@@ -128,7 +128,7 @@ class Neighbours:
         block = transform[self._at[:, :, None], self._at[:, None, :]]
         self._systems = np.where(self._swapped[..., None], block, np.eye(each.shape[1]))
         self._unknown = np.zeros(len(node), dtype=bool)
-        if contact.loose:  # what leaves a motion free has an answer of its own
+        if contact.loose:  # a pattern that leaves a motion free has a separate answer
             self._unknown |= _leave_free(contact, ~self._moves[None])[0] | _leave_free(contact, ~_moves(pair, patterns))
             self._systems[self._unknown] = np.eye(each.shape[1])
         # what a unit of each component adds to the answers

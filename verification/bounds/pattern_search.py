@@ -29,7 +29,7 @@ from verification.threads import one_thread
 #: A sum of forces that cancels up to this share of their sizes may be 0.
 CANCELLED = 1e-6
 
-#: Digits by which values are told apart: the way uphill is the same however a processor rounds.
+#: Digits in which values differ: the way uphill is the same however a processor rounds.
 DIGITS = 9
 
 Form = Callable[[Piece], Floats]
@@ -66,10 +66,10 @@ def signs(pair: ContactPair) -> NDArray[np.int8]:
 class Search:
     """The affine pieces of T, and the way uphill among them to a large value of a quadratic form.
 
+    The loads of ``pair`` do not matter, as each piece occurs for suitable ones.
+
     Parameters
     ----------
-    pair : ContactPair
-        Its loads do not matter, as each piece occurs for suitable ones.
     form : callable
         Piece -> symmetric matrix, in y with ``g = L y`` (:attr:`verification.interface.body.Condensed.root`).
     against : array, optional

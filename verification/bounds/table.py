@@ -19,7 +19,7 @@ from verification.progress import Progress, silent
 from verification.value import to_plain
 
 if TYPE_CHECKING:
-    from verification.bounds.exact import Enclosure
+    from verification.bounds.lipschitz import Enclosure
     from verification.bounds.multipliers import QuadraticForms
     from verification.constants import Measured
     from verification.interface.pair import ContactPair
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 #: Number of friction values that trace the border of the region of the semidefinite bound.
 TRACED = 12
 
-#: The constants of Section 5 that may be given to the calculator, and those of the theorem in energy norms.
+#: The constants that may be given to the calculator, for Section 5 and for the theorem in energy norms.
 SECTION_5, ENERGY = ("m", "M", "C_R", "C_s", "C_tr", "k", "C_K"), ("rho", "kappa_1", "kappa_2")
 
 
@@ -143,7 +143,8 @@ class SemidefiniteBound(Bound):
             return self.absent("needed a pair of bodies and a theta")
         if subject.pair.contact.grid.n > LARGEST:
             return self.absent(f"{subject.pair.contact.grid.n} contact nodes: worked out up to {LARGEST}")
-        from verification.bounds.lipschitz import LMIError, work_out
+        from verification.bounds.interior_point import LMIError
+        from verification.bounds.lipschitz import work_out
 
         chosen = relaxation_factor(theta)
         theta = float(chosen)
@@ -182,12 +183,13 @@ class SemidefiniteBound(Bound):
         return tuple(said)
 
     def enclose(self, pair: ContactPair, forms: QuadraticForms, theta: float) -> Enclosure:
-        from verification.bounds.exact import enclose
+        from verification.bounds.lipschitz import enclose
 
         return enclose(pair, forms, theta, gap=float("inf"), programs=1)
 
     def region(self, subject: Subject, *, progress: Progress = silent) -> Region:
-        from verification.bounds.lipschitz import LMIError, thetas
+        from verification.bounds.interior_point import LMIError
+        from verification.bounds.lipschitz import thetas
 
         pair, measured = subject.pair, subject.measured
         if pair is None or measured is None or measured.friction_threshold is None:
@@ -243,12 +245,7 @@ def strongest() -> str:
 
 
 def chosen(names: Sequence[str] | str | None) -> tuple[str, ...]:
-    """The names of some bounds, in the order of :data:`BOUNDS`.
-
-    Parameters
-    ----------
-    names : sequence of str, str or None
-        A text has commas between the names; None stands for all bounds.
+    """The names of some bounds, of a sequence or of a text with commas, in the order of :data:`BOUNDS`; None for all.
 
     Raises
     ------

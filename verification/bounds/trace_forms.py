@@ -94,10 +94,7 @@ class TraceForms:
     ) -> Callable[[float], bool]:
         """Test of ``square |g|^2 - cross <g, p> - weight |a p + b g|^2 - conditions``, ``step`` being (a, b) if any.
 
-        Returns
-        -------
-        callable
-            square -> True if the form is positive definite for sure.
+        The result takes the square, and is True if the form is positive definite for sure.
         """
         form = -cross * self._d.T @ self._p - _conditions(multipliers, self._families)
         size = abs(cross) * self._d.T @ self._p_size + _conditions([np.abs(m) for m in multipliers], self._sizes)

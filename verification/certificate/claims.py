@@ -112,7 +112,7 @@ class Confirmation:
         NoCertificate
         """
         if not factor < 1:
-            raise NoCertificate(f"the factor of one program is {factor:.4g}, which is no contraction")
+            raise NoCertificate(f"the factor of one program is {factor:.4g}, which does not contract")
         claim = self._claims.confirmed(theta, 1 - factor, written(multipliers))
         if claim is None:
             raise NoCertificate(f"the factor of one program {NOT_CONFIRMED.format(1 - factor)}")

@@ -230,7 +230,7 @@ def two_rectangles(problem: Problem) -> TwoRectangles:
             raise refuse(f"{name}.shape", body.shape, 'needed "rectangle"')
         held = {*body.fixed, *body.prescribed}
         if held != {outer}:
-            raise refuse(f"{name}.fixed", sorted(held), f'needed a body held at "{outer}" alone, fixed or prescribed')
+            raise refuse(f"{name}.fixed", sorted(held), f'needed a body held at "{outer}" only, fixed or prescribed')
         if None in body.prescribed.get(outer, ()):
             raise refuse(f"{name}.prescribed.{outer}", "free", "needed both components")
         if not body.poisson < Fraction(1, 2):

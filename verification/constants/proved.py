@@ -55,19 +55,8 @@ ZERO = Number(value=0.0, lo=0.0, hi=0.0, level="exact")
 def verify(measured: Measured, of: ContactPair | TwoBodies, *, progress: Progress = silent) -> Measured:
     """The same constants between proved bounds, for the exact data of the problem on its mesh.
 
-    Parameters
-    ----------
-    measured : Measured
-        Its values are taken as guesses, and kept where they lie between the bounds.
-    of : ContactPair or TwoBodies
-        The bodies that were measured.
-    progress : callable
-        Called with the constant that is proved.
-
-    Returns
-    -------
-    Measured
-        With numbers at level ``verified``; ``unverified`` says why where a number still is ``float``.
+    The values of ``measured`` are taken as guesses, and kept where they lie between the bounds.  Proved numbers have
+    the level ``verified``; ``unverified`` says why a number still is ``float``.
     """
     if of.problem is None:
         return replace(measured, unverified=dict.fromkeys(_known(measured), FROM_MATRICES))
