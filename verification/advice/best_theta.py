@@ -79,15 +79,10 @@ class Fewest:
         least = min((steps for _, steps in counts if steps is not None), default=None)
         if least is None:
             return None
-        thetas = [theta for theta, _ in counts]
-        best = [i for i, (_, steps) in enumerate(counts) if steps == least]
-        return cls(
-            steps=least,
-            low=thetas[best[0]],
-            high=thetas[best[-1]],
-            below=thetas[best[0] - 1] if best[0] else None,
-            above=thetas[best[-1] + 1] if best[-1] + 1 < len(thetas) else None,
-        )
+        thetas = [None, *(theta for theta, _ in counts), None]
+        best = [i for i, (_, steps) in enumerate(counts, 1) if steps == least]
+        low, high = best[0], best[-1]
+        return cls(steps=least, low=thetas[low], high=thetas[high], below=thetas[low - 1], above=thetas[high + 1])
 
 
 @dataclass(frozen=True, kw_only=True)

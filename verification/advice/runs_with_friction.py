@@ -71,14 +71,8 @@ class FrictionBounds:
         reason = {} if self.image is not None else {"image": "every run is as fast as with open nodes alone"}
         if self.eigenvalue is None:
             reason |= dict.fromkeys(("theta", "rate", "eigenvalue"), "no residual falls steadily")
-        low, high = self.eigenvalue or (None, None)
-        return {
-            "image": self.image,
-            "theta": self.theta,
-            "rate": self.rate,
-            "eigenvalue": None if self.eigenvalue is None else {"least": low, "most": high},
-            "reason": reason,
-        }
+        modes = None if self.eigenvalue is None else dict(zip(("least", "most"), self.eigenvalue, strict=True))
+        return {**vars(self), "eigenvalue": modes, "reason": reason}
 
 
 Runs = list[tuple[Fraction, Observed]]

@@ -248,18 +248,13 @@ class RhoInterval:
 
     def to_dict(self) -> dict[str, Any]:
         """The object ``interval``."""
-        reason = {}
-        if self.lo is None:
-            reason["lo"] = "no log bounds rho from below without a reading"
-        if self.hi is None:
-            reason["hi"] = "no log converges"
-        if self.contradiction is None:
-            reason["contradiction"] = "the logs agree" if self.lo and self.hi else "one bound alone contradicts nothing"
+        agree = "the logs agree" if self.lo and self.hi else "one bound alone contradicts nothing"
+        why = {"lo": "no log bounds rho from below without a reading", "hi": "no log converges", "contradiction": agree}
         return {
             "lo": None if self.lo is None else self.lo.to_dict(up=False),
             "hi": None if self.hi is None else self.hi.to_dict(up=True),
             "contradiction": self.contradiction,
-            "reason": reason,
+            "reason": {name: words for name, words in why.items() if getattr(self, name) is None},
         }
 
 

@@ -15,6 +15,7 @@ from ndtheory.number import above
 from verification.advice import BodyNumber
 from verification.advice.readings import LARGEST_TO_PASTE, rounded_down
 from verification.problem.writing import written_number
+from verification.value import to_plain
 
 Corners = Literal["none", "1", "2", "both"]
 
@@ -107,7 +108,7 @@ class ModuliRole:
         return {
             "neumann_body": self.neumann_body,
             "bounds": [{"corners": name} | bounds.to_dict() for name, bounds in self.corners.items()],
-            "start": None if self.start is None else self.start.to_dict(),
+            "start": to_plain(self.start),
             "reason": {"start": self.why_no_start} if self.start is None else {},
         }
 
@@ -167,7 +168,7 @@ class SeenModuli:
             "mirror": list(self.mirror),
             "flat": self.flat,
             "neumann_body_frictionless": self.smaller("slide"),
-            "roles": [role.to_dict() for role in self.roles],
+            "roles": to_plain(self.roles),
             "reason": ({} if self.corners else {"corners": "not told"})
             | ({} if self.smaller("slide") else {"neumann_body_frictionless": "both roles have the same bound"}),
         }

@@ -15,6 +15,7 @@ from fem1d2d import solver_with_inertia
 from fem1d2d.mesh import Floats
 from verification.advice import BodyNumber
 from verification.interface.matrices import MOST_ROWS, Stiffness, real_array, size, stiffness
+from verification.value import to_plain
 
 #: Up to this asymmetry the symmetric part of a matrix is taken, with a note.
 TOLD = 1e-3
@@ -127,13 +128,8 @@ class SeenMatrices:
         why = dict.fromkeys(("transfer", "neumann_body"), "no transfer was given")
         why["ordering"] = "rho does not depend on it, so long as both have the same"
         return {
-            "S1": self.S1.to_dict(),
-            "S2": self.S2.to_dict(),
-            "transfer": None if self.transfer is None else list(self.transfer),
-            "neumann_body": self.neumann_body,
-            "ordering": self.ordering,
+            **{name: to_plain(value) for name, value in vars(self).items()},
             "lanczos": [asdict(found) for found in self.lanczos],
-            "notes": list(self.notes),
             "reason": {name: words for name, words in why.items() if getattr(self, name) is None},
         }
 

@@ -170,7 +170,9 @@ class ContinuumCertificate(Document):
         for name in ("C_s", "C_t1", "C_t2"):
             uppers[name] = Interval.of(getattr(c, f"{name}_square")).sqrt().hi
         uppers["kappa_1"], uppers["kappa_2"] = c.kappa(k)
-        moduli = [Moduli(young=body.young, poisson=body.poisson) for body in bodies(self.problem)]
+        order = 1 if self.problem.contact_body == 1 else -1  # the contact body first
+        bodies = (self.problem.body1, self.problem.body2)[::order]
+        moduli = [Moduli(young=body.young, poisson=body.poisson) for body in bodies]
         return {
             "kind": "continuum",
             "constants": {
@@ -198,12 +200,6 @@ class ContinuumCertificate(Document):
 
 #: Keys of the document that need a bound of rho.
 OF_ENERGY = ("interval", "theta_max_proved", "theta_proved", "factor_proved", "factor", "theta", "friction_limit")
-
-
-def bodies(problem: Problem) -> tuple[Any, Any]:
-    """The contact body and the Neumann body of a problem."""
-    pair = (problem.body1, problem.body2)
-    return pair if problem.contact_body == 1 else (pair[1], pair[0])
 
 
 def two_rectangles(problem: Problem) -> TwoRectangles:
