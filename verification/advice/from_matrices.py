@@ -105,6 +105,10 @@ def advise_matrices(
     progress : callable
         Called with steps, value and residual of Lanczos.
 
+    Returns
+    -------
+    Advice
+
     Raises
     ------
     ValueError

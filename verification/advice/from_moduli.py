@@ -66,6 +66,10 @@ def advise_moduli(
     flat : bool
         True if a body into which such an image fits is at least twice as wide as high, and held along its other side.
 
+    Returns
+    -------
+    Advice
+
     Raises
     ------
     HypothesisError
@@ -174,25 +178,17 @@ def _as_role(role: ModuliRole, bounds: LowerBounds) -> Role:
         "friction_threshold": NO_FRICTION if role.start else "moduli say nothing about friction",
         "rho_min": ONE_END,
     }
-    proved: dict[str, Any] = dict.fromkeys(PROVED)
     if role.start is None:
-        reason |= dict.fromkeys(proved, role.why_no_start)
-    else:
-        s = role.start.s
-        most = min(2 / (1 + s), Fraction(1))
-        proved = {
-            "theta_proved": float(predicted_theta(s)),
-            "factor_proved": exactly(predicted_rate(s)),
-            "theta_max_proved": exactly(most),
-        }
+        reason |= dict.fromkeys(PROVED, role.why_no_start)
+        return Role(neumann_body=role.neumann_body, rho=bounds.stick, reason=reason)
+    s = role.start.s
     return Role(
         neumann_body=role.neumann_body,
         rho=bounds.stick,
-        theta_predicted=None,
-        rate_predicted=None,
-        friction_threshold=None,
+        theta_proved=float(predicted_theta(s)),
+        factor_proved=exactly(predicted_rate(s)),
+        theta_max_proved=exactly(min(2 / (1 + s), Fraction(1))),
         reason=reason,
-        **proved,
     )
 
 

@@ -73,12 +73,12 @@ class Role:
 
     neumann_body: BodyNumber | None
     rho: Number | None
-    theta_proved: float | None
-    factor_proved: Number | None
-    theta_max_proved: Number | None
-    theta_predicted: float | None
-    rate_predicted: float | None
-    friction_threshold: Number | None
+    theta_proved: float | None = None
+    factor_proved: Number | None = None
+    theta_max_proved: Number | None = None
+    theta_predicted: float | None = None
+    rate_predicted: float | None = None
+    friction_threshold: Number | None = None
     reason: Mapping[str, str]
     singular: bool = False
     theta_auto: Choice | None = None
@@ -199,7 +199,7 @@ def role_of(
     """
     ratio = Fraction(rho.value) if isinstance(rho, Number) else rho
     theta, rate = float(predicted_theta(ratio)), float(predicted_rate(ratio))
-    proved: dict[str, Any] = dict.fromkeys(PROVED)
+    proved: dict[str, Any] = {}
     because = dict.fromkeys(PROVED, nothing)
     if bounds is not None:
         theta, rate = bounds.theta_predicted, bounds.rate_predicted
@@ -458,6 +458,10 @@ def advise(problem: Problem | ContactPair | Path | str, *, tied: bool = False, p
         True to advise for an interface where nothing opens or slips.
     progress : callable
         Called with the steps of Lanczos where there are too many contact nodes for matrices.
+
+    Returns
+    -------
+    Advice
 
     Raises
     ------

@@ -150,12 +150,7 @@ def is_operator(S: Any) -> bool:
 
 
 def dense(name: str, matrix: Any) -> Floats:
-    """A matrix of real numbers, dense.
-
-    Raises
-    ------
-    ValueError
-    """
+    """A matrix of real numbers, dense."""
     if matrix is None:
         raise ValueError(f"no {name}: needed S1 and S2, or an operator for each")
     array = np.asarray(matrix.toarray() if sp.issparse(matrix) else matrix)

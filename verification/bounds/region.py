@@ -137,13 +137,7 @@ def chart(problem: Problem, *, store: Path | None = None, progress: Progress = s
 
 
 def _point(row: Row) -> Point:
-    """Outcome of a run, from its row in a sweep.
-
-    Raises
-    ------
-    ContactError
-        Step II did not reach its certificate.
-    """
+    """Outcome of a run, from its row in a sweep; ContactError where step II did not reach its certificate."""
     if row["steps"] is None:
         raise ContactError(row["reason"])
     return Point(

@@ -129,6 +129,10 @@ def certify(
         Name of the bound that proposes factor and multipliers: one of those that certify, by default the strongest.
     progress : callable
 
+    Returns
+    -------
+    Certificate
+
     Raises
     ------
     NoCertificate
@@ -173,6 +177,10 @@ def check_again(document: Any, problem: Problem | None = None) -> Checked:
         As ``certificate.json`` holds it.
     problem : Problem, optional
         The problem whose bodies the certificate should be about.
+
+    Returns
+    -------
+    Checked
 
     Raises
     ------

@@ -47,6 +47,10 @@ def measure(
     progress : callable
         Called with the mesh that is measured.
 
+    Returns
+    -------
+    Measured
+
     Raises
     ------
     ProblemError
