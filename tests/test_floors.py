@@ -115,7 +115,7 @@ BUDGET = {
     "verification.advice": 4500,
     "verification.algorithm": 2300,
     "verification.bounds": 3200,
-    "verification.certificate": 1000,
+    "verification.certificate": 1100,
     "verification.cli": 2500,
     "verification.constants": 1100,
     "verification.contact": 1000,
