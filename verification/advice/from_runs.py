@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
-from ndtheory.constants import take
-from ndtheory.energy import LARGEST, SMALLEST
+from ndtheory.constants import LARGEST, SMALLEST, take
 from ndtheory.energy_norms import predicted_theta
 from ndtheory.number import Numeric
 from verification.advice.readings import (
