@@ -45,3 +45,10 @@ def freeze(value: Any) -> Any:
     elif hasattr(value, "indptr"):  # a sparse matrix
         freeze((value.data, value.indices, value.indptr))
     return value
+
+
+def to_plain(value: Any) -> Any:
+    """A value, or a tuple of values, as documents hold it: by its ``to_dict`` where it has one."""
+    if isinstance(value, tuple):
+        return [to_plain(member) for member in value]
+    return value.to_dict() if hasattr(value, "to_dict") else value

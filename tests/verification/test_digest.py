@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 import verification as vf
-from verification.certificate import contraction, description
+from verification.certificate import claims, contraction
 from verification.problem import changes, digest, reading, specification
 from verification.problem.specification import Problem
 from verification.problem.specs import ContactSpec, Settings
@@ -146,7 +146,7 @@ def certified():
 
 def describing(monkeypatch, more):
     """Let descriptions have more keys."""
-    describe = description.describe
+    describe = claims.describe
     monkeypatch.setattr(contraction, "describe", lambda *given: describe(*given) | more)
 
 

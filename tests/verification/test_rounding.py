@@ -13,8 +13,8 @@ from strategies import AT_NIGHT
 import verification as vf
 from fem1d2d.enclosed import UNIT, Enclosed
 from fem1d2d.loewner import positive_definite
+from verification.bounds.interior_point import LMIError
 from verification.bounds.multipliers import QuadraticForms
-from verification.bounds.program import LMIError
 from verification.constants import measure
 from verification.interface.pair import build
 

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from verification.bounds.losses import Loss, Losses
-from verification.bounds.section5 import Printed, Repaired
+from verification.bounds.table import Printed, Repaired
 from verification.figures.style import STATES, new_figure, styled
 
 

@@ -6,12 +6,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from verification.advice.readings import LARGEST_TO_PASTE, NextRun, RunReading, SeenRun
-from verification.advice.role import Role, in_steps, steps
-from verification.advice.roles import Advice
+from verification.advice.roles import Advice, Role, in_steps, steps
 from verification.advice.runs_with_friction import FrictionBounds
 from verification.advice.seen import LogBound, RhoInterval, SeenLog
-from verification.advice.seen_matrices import SeenMatrices
 from verification.advice.seen_moduli import Corners, ModuliRole, SeenModuli, excluded_from
+from verification.advice.sides import SeenMatrices
 from verification.advice.snippets import SNIPPETS
 from verification.problem.vocabulary import vocabulary
 from verification.sections.numbers import NONE, count, figures, near_one, rounded

@@ -6,8 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from ndtheory import Bounds, EnergyBounds
 from verification.bounds.bound import BoundResult, bounded
-from verification.bounds.calculated import Calculated
-from verification.bounds.table import named
+from verification.bounds.table import Calculated, named
 from verification.ledger.record import on_the_printed_proof
 from verification.sections.numbers import LEGEND, NONE, at_least, factor, figures, interval, marked
 from verification.sections.parts import (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from verification.advice.role import steps
+from verification.advice.roles import steps
 from verification.algorithm.runs import Run
 from verification.interface.fields import ContactFields
 from verification.interface.interface import Interface
