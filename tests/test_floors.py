@@ -39,12 +39,7 @@ FLOORS: dict[str, dict[str, str]] = {
         "verification": "dense interrupts progress spreadsheet threads value",
         "verification.sections": "__init__ layout numbers parts",
     },
-    "input": {
-        "verification.problem": (
-            "__init__ changes digest examples files meshes read_only reading specification specs tables toml "
-            "vocabulary writing"
-        )
-    },
+    "input": {"verification.problem": "__init__ examples files meshes reading specification specs tables writing"},
     "results, extras": {"verification": "document extras"},
     "bodies": {
         "verification.interface": (
@@ -135,8 +130,8 @@ BUDGET = {
 BY_NAME = {
     ("verification.document", "verification.figures.of_results"): "a figure knows the types of results",
     ("verification.document", "verification.sections.of_results"): "so does what is shown of them",
-    ("verification.problem.vocabulary", "verification.interface.friction"): "laws act on what is made from problems",
-    ("verification.problem.vocabulary", "verification.algorithm.relaxation"): "rules act on what is made from problems",
+    ("verification.problem.reading", "verification.interface.friction"): "laws act on what is made from problems",
+    ("verification.problem.reading", "verification.algorithm.relaxation"): "rules act on what is made from problems",
 }
 
 #: Imports inside functions: who, what, and why not at the top of the module.

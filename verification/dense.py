@@ -29,7 +29,6 @@ def vanishing(motions: Floats, rows: Ints) -> Floats:
     Parameters
     ----------
     motions : array, shape (n, k)
-    rows : int array
     """
     k = motions.shape[1]
     if not k or not len(rows):
@@ -48,7 +47,6 @@ def pinned(S: Floats, rows: Ints, motions: Floats) -> Floats:
     ----------
     S : array, shape (n, n)
         Symmetric, positive semidefinite.
-    rows : int array
     motions : array, shape (n, k)
         An orthonormal basis of the kernel.
     """

@@ -74,10 +74,6 @@ class Document(Value, ABC):
     def plot(self) -> Figure:
         """The main figure of the result.
 
-        Returns
-        -------
-        matplotlib.figure.Figure
-
         Raises
         ------
         ValueError

@@ -41,11 +41,6 @@ def coupled_residual(pair: ContactPair, iterate: Iterate) -> float | None:
     The rest hold by construction: step I balances the Neumann body with g, and step II lets nothing penetrate.  What
     violates a condition is a nodal force, of which the norm is taken.
 
-    Parameters
-    ----------
-    pair : ContactPair
-    iterate : Iterate
-
     Returns
     -------
     float or None
@@ -82,12 +77,7 @@ def arrived(pair: ContactPair, iterate: Iterate) -> bool:
 
 
 class Ending:
-    """The end of a run, from its residuals one by one.
-
-    Parameters
-    ----------
-    settings : Settings
-    """
+    """The end of a run, from its residuals one by one."""
 
     def __init__(self, settings: Settings) -> None:
         self._tolerance, self._most = settings.tolerance, settings.max_iterations
@@ -98,7 +88,6 @@ class Ending:
 
         Parameters
         ----------
-        iteration : int
         residual, scale : float
             Those of the iterate.
         joined : callable

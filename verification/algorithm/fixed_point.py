@@ -53,12 +53,7 @@ class FixedPointMap:
         self._all_free = bool(contact.free.all())
 
     def __call__(self, g: Floats) -> tuple[Floats, ContactSolution]:
-        """Steps I and II: the displacement of the Neumann body and the solved contact step.
-
-        Raises
-        ------
-        ContactError
-        """
+        """Steps I and II: the displacement of the Neumann body and the solved contact step."""
         u = self.displacement(g)
         return u, self.contact(g, u)
 

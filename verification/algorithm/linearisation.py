@@ -67,7 +67,6 @@ class _Near:
 
     Attributes
     ----------
-    piece : Piece
     J : array
         In the coordinates of ``piece.basis``.
     error : array
@@ -87,12 +86,7 @@ class _Near:
 
 
 def _near(pair: ContactPair, iterate: Iterate, theta: float, piece: Piece | None = None) -> _Near:
-    """Linearise T_theta at an iterate close to the solution: no node may change its state in between.
-
-    Raises
-    ------
-    NotLinear
-    """
+    """Linearise T_theta at an iterate close to the solution: no node may change its state in between."""
     if pair.contact.grid.n > MOST_NODES:
         raise NotLinear(f"{pair.contact.grid.n} contact nodes: T is linearised up to {MOST_NODES}")
     piece = piece or piece_of(pair, iterate.g, iterate.contact.pattern)
@@ -121,7 +115,6 @@ def linearise(pair: ContactPair, iterate: Iterate, theta: float, history: Sequen
         What was run.
     iterate : Iterate
         Close to the solution: no node may change its state in between.
-    theta : float
     history : sequence of Iterate
         The run that led there; its error decides what is excited.
 
@@ -164,7 +157,6 @@ def linearised_rate(piece: Piece, iterate: Iterate, theta: float, first: Floats 
         That of the iterate.
     iterate : Iterate
         Close to the solution.
-    theta : float
     first : array, optional
         The g with which a run came onto this piece for good; its error decides what is excited.
 
@@ -214,7 +206,6 @@ def forecast(pair: ContactPair, iterates: Sequence[Iterate], theta: float, toler
         What was run.
     iterates : sequence of Iterate
         The run; those after the one half way are not looked at.
-    theta : float
     tolerance : float
         Of the relative residual.
     most : int

@@ -25,10 +25,6 @@ class Noise:
     ``S2 u = g + l2``, which leaves an error of that size in each equation, ``|S2| |u| + |g| + |l2|``, and ``|S2^-1|``
     times that in u: far more than u has of its own where the body is as slender as a cantilever.  Step II adds
     ``|S1|`` times u and the loads.
-
-    Parameters
-    ----------
-    pair : ContactPair
     """
 
     def __init__(self, pair: ContactPair) -> None:

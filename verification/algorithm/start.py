@@ -104,7 +104,6 @@ def begin_at(T: FixedPointMap, given: ArrayLike | None = None) -> Start:
 
     Parameters
     ----------
-    T : FixedPointMap
     given : array, shape (2 n,), optional
         Nodal forces on the Neumann grid.
 
@@ -140,8 +139,6 @@ def forces(given: ArrayLike, pair: ContactPair, source: str = "") -> Floats:
 
     Parameters
     ----------
-    given : array
-    pair : ContactPair
     source : str
         The file that an error names; the source of the pair by default.
 

@@ -36,7 +36,6 @@ class Choice:
 
     Attributes
     ----------
-    theta : Fraction
     source : {'given', 'proved', 'predicted'} or str
         The name of a rule that takes its own step for this rho, as 'momentum' does.
     rho : float or None
@@ -141,7 +140,6 @@ def automatic(energy: EnergyBounds, outside: Sequence[str] = (), tolerance: floa
 
     Parameters
     ----------
-    energy : EnergyBounds
     outside : sequence of str
         Why the theorem does not speak of the problem; empty where it does.
     tolerance : float

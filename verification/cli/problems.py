@@ -84,13 +84,13 @@ def load_problem(
     ProblemError, HypothesisError
     """
     from verification.problem import ProblemError, load
-    from verification.problem.vocabulary import vocabulary
+    from verification.problem.reading import takes_theta
 
     chosen = {} if relaxation is None else {"iteration.relaxation": relaxation}
     problem = load(file).with_keys({**keys, **chosen})
     if theta is not None:
         rule = problem.iteration.relaxation
-        if not vocabulary().takes_theta(rule):
+        if not takes_theta(rule):
             needed = f'needed no theta beside relaxation = "{rule}", which takes its step from rho'
             raise ProblemError(str(file), "--theta", theta, needed)
         problem = problem.with_theta(theta)

@@ -76,7 +76,6 @@ class System:
     ----------
     S : array, shape (t + n, t + n)
     free : bool array, shape (t + n,)
-    pattern : Pattern
     motions : array, shape (t + n, k), optional
         The kernel of S, where contact alone holds the body.  Motions that the pattern leaves free are pinned: the
         force does not know of them, and where the loads work in one the equilibrium fails.

@@ -39,8 +39,6 @@ class ContactSolution(Value):
         Tangential slip and normal penetration (<= 0: minus the gap), unit of length.
     force : array, shape (t + n,)
         Nodal forces on the other body.
-    pattern : Pattern
-    kkt : KKT
     solver : {'cvxpy', 'active-set'}
         Who found the active set.
     """

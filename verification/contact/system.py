@@ -286,7 +286,6 @@ class Equilibrium:
     force : array, shape (t + n,)
     motion : array, shape (k,)
         Coefficients of the rigid motions.
-    branches : Branches
     """
 
     force: Floats

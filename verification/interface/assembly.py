@@ -44,7 +44,6 @@ def held_bodies(problem: Problem, *, law: Law | None = None, dense: bool = True)
 
     Parameters
     ----------
-    problem : Problem
     law : Law, optional
         As for :func:`verification.interface.pair.build`.
     dense : bool
@@ -106,7 +105,6 @@ def discretise(problem: Problem, *, law: Law | None = None, dense: bool = True) 
 
     Parameters
     ----------
-    problem : Problem
     law : Law, optional
         A law of friction in place of the problem's.
     dense : bool

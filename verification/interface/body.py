@@ -33,8 +33,6 @@ class Body(Value):
     Attributes
     ----------
     name : {'body1', 'body2'}
-    mesh : Mesh
-    material : Material
     poisson : float
         Poisson's ratio; 0 for a bar.
     known : Supports
@@ -179,7 +177,6 @@ class Condensed(Value):
 
     Attributes
     ----------
-    grid : Grid
     stiffness : array, shape (2 n, 2 n)
         S_a, stress (times length in 1D per unit thickness).
     load : array, shape (2 n,)
@@ -233,8 +230,6 @@ class Condensed(Value):
 
         Parameters
         ----------
-        body : Body
-        grid : Grid
         like : Body, optional
             Where it differs in Young's modulus and loads alone its condensation serves: the stiffness is a multiple,
             and the lift the same.

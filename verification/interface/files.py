@@ -130,12 +130,7 @@ def read_interface(path: Path) -> ContactPair:
 
 
 def _check_sizes(arrays: dict[str, np.ndarray]) -> None:
-    """Refuse numbers of which a product of a few overflows a double, or vanishes.
-
-    Raises
-    ------
-    ValueError
-    """
+    """Refuse numbers of which a product of a few overflows a double, or vanishes."""
     for name, array in arrays.items():
         if array.dtype.kind not in "fiu" or not np.isfinite(array).all():
             continue

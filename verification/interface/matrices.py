@@ -93,8 +93,6 @@ def stiffness(name: str, matrix: Floats, *, asymmetry: float = ASYMMETRY) -> Sti
 
     Parameters
     ----------
-    name : str
-    matrix : array
     asymmetry : float
         The largest asymmetry allowed.
 

@@ -26,7 +26,6 @@ class SingularRole(ProblemError):
 
     Parameters
     ----------
-    source : str
     body : {1, 2}
     motions : int
         How many rigid motions its supports leave.

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from verification.problem.tables import Unfit, text, unreadable
 
-#: Largest size of a mesh file: that of the largest mesh as text, several times over.
+#: Largest size of a mesh file: several times the size of the largest mesh as text.
 MOST_BYTES = 200_000_000
 
 
@@ -30,18 +30,12 @@ class MeshFile:
 
     @classmethod
     def read(cls, path: Path, sha256: str | None = None) -> MeshFile:
-        """The file at a path.
-
-        Parameters
-        ----------
-        path : Path
-        sha256 : str, optional
-            What the content must have.
+        """Return the file at a path.
 
         Raises
         ------
         Unfit
-            Not a file, too large, or another content.
+            Not a file, too large, or with another SHA-256 than the one given.
         """
         file = cls(path=path.absolute(), sha256=sha256 or _fingerprint(path))
         why = file.unusable() if sha256 else None
@@ -50,7 +44,7 @@ class MeshFile:
         return file
 
     def unusable(self) -> str | None:
-        """Why the file is not the one that was read, or None where it is."""
+        """Return why the file is not the one that was read, or None where it is."""
         try:
             found = _fingerprint(self.path)
         except Unfit as error:

@@ -9,7 +9,7 @@ from verification.advice.readings import LARGEST_TO_PASTE
 from verification.advice.role import Role, in_steps, steps
 from verification.advice.roles import Advice
 from verification.advice.snippets import SNIPPETS
-from verification.problem.vocabulary import vocabulary
+from verification.problem.reading import takes_theta
 from verification.sections import logs, moduli
 from verification.sections.advised import given, pasted, which_body
 from verification.sections.numbers import NONE, count, figures, near_one
@@ -70,7 +70,7 @@ def _after_a_problem(found: Advice) -> Next | str:
         return "ndtheory advise --help"
     if found.best.theta_auto is None:  # too large for a run
         return following("constants")
-    taken = found.theta is not None and vocabulary().takes_theta(found.problem.iteration.relaxation)
+    taken = found.theta is not None and takes_theta(found.problem.iteration.relaxation)
     theta = ["--theta", f"{found.theta:g}"] if taken else []
     return following("run", *theta, exchanged=found.roles[0].neumann_body != found.neumann_body)
 

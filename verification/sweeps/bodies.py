@@ -31,8 +31,6 @@ class RowSetting:
 
     Attributes
     ----------
-    pair : ContactPair
-    measured : Measured
     pieces : KnownPieces
         The affine pieces of T that runs have passed through.
     """

@@ -83,7 +83,6 @@ class SweepGrid:
 
         Parameters
         ----------
-        given : mapping
         source, table : str
             What errors name: a file, and the table of the axes in it.
 

@@ -23,8 +23,6 @@ class Kept:
     ----------
     path : Path
         Made where there is none.
-    start : Problem or ContactPair
-    grid : SweepGrid
     fresh : bool
         Whether all rows count as missing; they are replaced once they are made again.
     retry : bool

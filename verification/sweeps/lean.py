@@ -149,12 +149,7 @@ def key_of(piece: Piece) -> tuple[bytes, ...]:
 
 
 class KnownPieces:
-    """What the runs of one pair share: its affine pieces, and the solution of the global method.
-
-    Parameters
-    ----------
-    pair : ContactPair
-    """
+    """What the runs of one pair share: its affine pieces, and the solution of the global method."""
 
     def __init__(self, pair: ContactPair) -> None:
         self.pair = pair
@@ -224,7 +219,6 @@ class KnownPieces:
         ----------
         T : FixedPointMap
             A new :meth:`map`.
-        theta : float
 
         Raises
         ------

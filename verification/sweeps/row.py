@@ -79,7 +79,6 @@ def row(problem: Problem | ContactPair, values: Mapping[str, Any], bodies: Share
 
     Parameters
     ----------
-    problem : Problem or ContactPair
     values : mapping
         As :meth:`verification.sweeps.grid.SweepGrid.rows` yields them: the name of an axis to its value.
     bodies : SharedBodies, optional

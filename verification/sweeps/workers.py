@@ -49,7 +49,6 @@ class NoWorkers(ProblemError):
 
     Parameters
     ----------
-    where : str
     why : str
         What happened.
     """
@@ -86,7 +85,6 @@ class Handed:
 
     Attributes
     ----------
-    rows : list
     seconds : float
         How long they took.
     version : str
@@ -223,7 +221,6 @@ class Batches:
     ----------
     wanted : sequence
         Values of rows by their places.
-    workers : int
     """
 
     def __init__(self, wanted: Sequence[tuple[int, Row]], workers: int) -> None:
