@@ -46,7 +46,7 @@ FLOORS: dict[str, dict[str, str]] = {
             "__init__ array_headers assembly body build checks exact_bodies fields files friction grid "
             "interface joining matrices pair two_bodies"
         ),
-        "verification.contact": "__init__ active_set existence kkt model step system",
+        "verification.contact": "__init__ active_set kkt model step system",
     },
     "constants": {"verification.constants": "__init__ measured measuring of_body operators pencils proved"},
     "iteration": {
@@ -147,7 +147,7 @@ INSIDE = (
     ("verification.output.folder", "verification.figures", "matplotlib is loaded once there is something to draw"),
     ("verification.output.folder", "verification.output.report", "jinja2 is loaded once there is a comparison"),
     ("verification.contact.step", "verification.contact.model", "cvxpy takes a second, and few steps need it"),
-    ("verification.contact.existence", "scipy.optimize", "heavy; only bodies that contact alone holds need it"),
+    ("verification.contact.step", "scipy.optimize", "heavy; only bodies that contact alone holds need it"),
     ("verification.threads", "threadpoolctl", "ledger records are read without it"),
     ("verification.sweeps.workers", "joblib", "heavy; only processes of one's own need it"),
     ("verification.sweeps.workers", "multiprocessing", "heavy; only processes of one's own need it"),

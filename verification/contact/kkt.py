@@ -39,7 +39,7 @@ class KKT:
 
     @property
     def residual(self) -> float:
-        """The largest of them; not a number where one is none."""
+        """The largest of them; NaN where one is NaN."""
         lengths = self.non_penetration, self.complementarity, self.slip
         return worst(np.array([self.equilibrium, self.compression, self.bound, *lengths]))
 
@@ -54,7 +54,7 @@ class KKTCertificate:
     S : array, shape (t + n, t + n)
         Stiffness, symmetric; t tangential components (0 in 1D) and then n normal ones.
     free : bool array, shape (t + n,), optional
-        Components that are unknown; equilibrium is asked of them alone.
+        Unknown components; equilibrium is checked only on these.
     """
 
     def __init__(self, S: Floats, free: NDArray[np.bool_] | None = None) -> None:
