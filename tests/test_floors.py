@@ -43,8 +43,7 @@ FLOORS: dict[str, dict[str, str]] = {
     "results, extras": {"verification": "document extras"},
     "bodies": {
         "verification.interface": (
-            "__init__ array_headers assembly body build checks exact_bodies fields files friction grid "
-            "interface joining matrices pair two_bodies"
+            "__init__ assembly body build checks exact_bodies fields files friction interface joining matrices pair "
         ),
         "verification.contact": "__init__ active_set kkt model step system",
     },

@@ -26,12 +26,11 @@ import numpy as np
 from fem1d2d.mesh import Floats
 from verification.contact.system import ContactSystem, SolveError
 from verification.document import Document
-from verification.interface.assembly import discretise
+from verification.interface.assembly import TwoBodies, discretise
 from verification.interface.body import Body
 from verification.interface.checks import Checks, check_state
 from verification.interface.fields import ContactFields
 from verification.interface.pair import ContactPair
-from verification.interface.two_bodies import TwoBodies
 from verification.problem import Problem, load
 from verification.threads import one_thread
 
@@ -89,7 +88,7 @@ class Solution(Document):
                 load[body.interface] += sign * self.bodies.force_on(body, self.force)[body.unknown]
                 full = body.known.values.ravel().copy()
                 k = body.motions.shape[1]
-                full[body.free] = body.solve(load) + body.motions @ self.motion[used : used + k]
+                full[body.positions] = body.solve(load) + body.motions @ self.motion[used : used + k]
                 used += k
                 fields[i] = full.reshape(body.mesh.points.shape)
         return fields[0], fields[1]
@@ -213,7 +212,7 @@ def contact_system(bodies: TwoBodies) -> ContactSystem:
 
 def _flexibility(body: Body) -> tuple[Floats, Floats]:
     """``(A^-1)_BB`` and the trace of the solution without contact, on all interface components."""
-    columns = np.zeros((len(body.free), len(body.interface)))
+    columns = np.zeros((len(body.positions), len(body.interface)))
     columns[body.interface, np.arange(len(body.interface))] = 1.0
     inverse = body.solve(columns)[body.interface]
     rows = np.flatnonzero(body.unknown)

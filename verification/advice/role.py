@@ -11,7 +11,7 @@ from typing import Any, Literal
 from ndtheory import EnergyBounds, EnergyConstants, Number
 from ndtheory.energy_norms import predicted_rate, predicted_theta, tied_factor, tied_rate, tied_theta
 from verification.algorithm.theta import Choice
-from verification.interface.two_bodies import SingularRole
+from verification.interface.assembly import SingularRole
 from verification.problem import ProblemError
 
 #: What a refused role has a value of.

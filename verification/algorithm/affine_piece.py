@@ -156,7 +156,7 @@ class Piece(Value):
     def modes(self) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
         """A Schur form of the transpose of ``jacobian`` and its vectors, which serve the J of every theta."""
         form, vectors = schur(self.jacobian.T, output="complex")
-        return freeze((np.asfortranarray(form), np.asfortranarray(vectors)))  # type: ignore[no-any-return]
+        return freeze((np.asfortranarray(form), np.asfortranarray(vectors)))
 
     @cached_property
     def changes(self) -> Changes:

@@ -26,11 +26,11 @@ from verification.algorithm.theta import Choice, begin
 from verification.constants import Measured
 from verification.contact import ContactError, Solver
 from verification.document import Document
+from verification.interface.assembly import TwoBodies
 from verification.interface.build import pair_of
 from verification.interface.checks import Checks, check_state
 from verification.interface.fields import ContactFields
 from verification.interface.pair import ContactPair
-from verification.interface.two_bodies import TwoBodies
 from verification.interrupts import INTERRUPTED
 from verification.monolithic import SolveError, solution_force
 from verification.problem import Problem

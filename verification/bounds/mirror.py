@@ -17,7 +17,7 @@ from scipy.linalg import block_diag
 from fem1d2d.mesh import Floats
 from verification.bounds.conditions import Conditions, Pieces
 from verification.bounds.program import Optimum, Weights
-from verification.interface.grid import Grid
+from verification.interface.interface import Grid
 from verification.interface.pair import ContactPair
 
 #: Entries that differ by less, relative to the diagonal or to the largest, are equal: rounding leaves 1e-14 on Section

@@ -14,7 +14,7 @@ import numpy as np
 
 from ndtheory import EnergyConstants, Number, evaluate_energy
 from verification.constants.pencils import of_energy
-from verification.interface.pair import build
+from verification.interface.pair import pair_from
 from verification.problem import Problem, ProblemError
 from verification.progress import Progress, silent
 from verification.threads import one_thread
@@ -96,7 +96,7 @@ def file_mesh(problem: Problem, progress: Progress = silent) -> FileMesh:
     progress("measuring rho on the mesh of the file", None)
     try:
         with one_thread():
-            pair = build(problem)
+            pair = pair_from(problem)
             grid = pair.contact.grid
             found = of_energy(pair, np.arange(grid.size) < grid.t)
     except ProblemError as error:

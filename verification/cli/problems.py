@@ -147,12 +147,12 @@ def run(file: Path, solver: Any, start: Path | None, folder: Path | None, as_jso
     from verification.advice.matrix_files import read_matrix
     from verification.algorithm import runs
     from verification.algorithm.start import forces
-    from verification.interface.pair import build
+    from verification.interface.pair import pair_from
     from verification.output.folder import Folder
     from verification.sections.run import sections
 
     target = None if folder is None else Folder(folder, "run")
-    pair = build(problem)
+    pair = pair_from(problem)
     g = None if start is None else forces(read_matrix(start), pair, str(start))
     _warn(pair.warnings)
     with stages() as tell, progress(tell, problem.iteration.tolerance) as watch:
@@ -287,13 +287,13 @@ def demo(folder: Path, as_json: bool) -> int:
 
 def _compare(problem: Problem, typed: Typed, folder: Path | None, solver: Any, as_json: bool, **asked: Any) -> int:
     from verification import comparison as verdicts
-    from verification.interface.pair import build
+    from verification.interface.pair import pair_from
     from verification.output.folder import Folder
     from verification.sections.comparison import Parts
     from verification.sections.comparison import verdicts as end
 
     target = None if folder is None else Folder(folder, "compare")
-    pair = build(problem)
+    pair = pair_from(problem)
     _warn(pair.warnings)
     parts = None if as_json else Parts(pair, one_by_one(needed=target is not None))
     with stages() as tell, progress(tell, problem.iteration.tolerance) as watch:

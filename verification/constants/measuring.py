@@ -14,8 +14,8 @@ from verification.constants.of_body import constants_of
 from verification.constants.operators import Pencils, needs_matrices, pair_or_bodies
 from verification.constants.pencils import of_energy, of_section_5
 from verification.constants.proved import verify
+from verification.interface.assembly import TwoBodies
 from verification.interface.pair import ContactPair
-from verification.interface.two_bodies import TwoBodies
 from verification.problem import Problem
 from verification.progress import Progress, silent
 from verification.threads import one_thread

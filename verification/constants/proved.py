@@ -30,10 +30,10 @@ from ndtheory import Number
 from verification.constants.measured import ENERGY_NAMES, FROM_MATRICES, NAMES, Measured, product
 from verification.constants.of_body import BodyConstants
 from verification.constants.operators import needs_matrices
+from verification.interface.assembly import TwoBodies
 from verification.interface.body import Name
 from verification.interface.exact_bodies import ExactBody, ExactInterface, NotExact
 from verification.interface.pair import ContactPair
-from verification.interface.two_bodies import TwoBodies
 from verification.progress import Progress, silent
 from verification.threads import one_thread
 

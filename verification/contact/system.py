@@ -158,7 +158,7 @@ class ContactSystem:
         return None
 
     def start(self) -> Branches:
-        """Return the branches of the bodies without contact forces, sticking; all touch if contact has to hold a body."""
+        """Return branches for d_0, without contact forces, sticking; all touch if contact has to hold a body."""
         touching = self.d0[self.t :] > 0 if self.M.shape[1] == 0 else np.ones(len(self.d0) - self.t, dtype=bool)
         signs = np.ones(self.t, dtype=np.int8)
         return Branches(touching=touching, sliding=0 * signs, threshold=signs)

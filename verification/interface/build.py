@@ -1,4 +1,4 @@
-"""A contact pair from a problem, a problem file, an interface file, or matrices."""
+"""Makes a contact pair from a problem, a problem file, an interface file, or matrices."""
 
 from __future__ import annotations
 
@@ -14,8 +14,7 @@ from verification.interface import pair as pairs
 from verification.interface.body import NO_MOTIONS, Condensed
 from verification.interface.files import read_interface
 from verification.interface.friction import GivenOperator
-from verification.interface.grid import Grid
-from verification.interface.interface import Interface, Law
+from verification.interface.interface import Grid, Interface, Law
 from verification.interface.matrices import check_matrix, check_nodes, real_array, size, stiffness
 from verification.interface.pair import ContactPair
 from verification.problem import Problem, load
@@ -37,7 +36,7 @@ def build(
     friction: Numeric = 0,
     neumann_body: Literal[1, 2] = 2,
 ) -> ContactPair:
-    """A contact pair from a problem, or from the interface matrices of any code.
+    """Make a contact pair from a problem, or from the interface matrices of any code.
 
     Interface vectors list all tangential components from left to right, then all normal ones along y, which points from
     body 1 to body 2.
@@ -89,9 +88,9 @@ def build(
         if S1 is not None or S2 is not None:
             raise ValueError("received a problem and matrices: needed one of them")
         if isinstance(problem, Problem):
-            return pairs.build(problem, law=law)
+            return pairs.pair_from(problem, law=law)
         if Path(problem).suffix != ".npz":
-            return pairs.build(load(problem), law=law)
+            return pairs.pair_from(load(problem), law=law)
         if law is not None:
             raise ValueError("received a law and an interface file: its operator S is a matrix already")
         return read_interface(Path(problem))
@@ -133,7 +132,7 @@ def build(
 
 
 def pair_of(problem: Problem | ContactPair | Path | str) -> ContactPair:
-    """The pair that a problem, a file or a pair stands for."""
+    """Return the pair that a problem, a file or a pair stands for."""
     return problem if isinstance(problem, ContactPair) else build(problem)
 
 

@@ -2,10 +2,10 @@
 
 Arrays: S1, S2, load1, load2, x, weights, gap; x_neumann and weights_neumann, the nodes of the Neumann body; kernel and
 transfer where there are such; known1, known2, free1, free2 (which interface components Gamma_u leaves free, and the
-displacement of the others); motions1 or motions2, where contact alone holds a body, an orthonormal basis of the kernel
-of its matrix.  Texts: friction, neumann_body, dimension, theta, tolerance, max_iterations as numbers are
-written; law and outside, the words of a law of friction; ndtheory, the version.  Interface vectors list all tangential
-components from left to right, then all normal ones along y.
+displacement of the others); motions1 or motions2, where only contact holds a body, an orthonormal basis of the kernel
+of its matrix.  Texts: friction, neumann_body, dimension, theta, tolerance, max_iterations, with numbers as texts; law
+and outside, the words of a law of friction; ndtheory, the version.  Interface vectors list all tangential components
+from left to right, then all normal ones along y.
 """
 
 from __future__ import annotations
@@ -18,12 +18,10 @@ import scipy.sparse as sp
 
 from ndtheory import HypothesisError, __version__, exact
 from verification.dense import pinned
-from verification.interface.array_headers import headers
 from verification.interface.body import NO_MOTIONS, Condensed
 from verification.interface.friction import GivenOperator
-from verification.interface.grid import Grid
-from verification.interface.interface import Interface
-from verification.interface.matrices import ASYMMETRY, UNREADABLE, check_matrix, check_nodes, real_array
+from verification.interface.interface import Grid, Interface
+from verification.interface.matrices import ASYMMETRY, UNREADABLE, check_matrix, check_nodes, headers, real_array
 from verification.interface.pair import ContactPair
 from verification.problem import ProblemError, Settings
 from verification.problem.reading import at_least_one, factor, tolerance
@@ -32,13 +30,13 @@ from verification.problem.tables import TomlTable, choice, label, non_negative, 
 #: Largest size of an interface file, and of what it unpacks to: two matrices of 4000 rows, and what else there is.
 MOST_BYTES = 600_000_000
 
-#: Size of numbers in an interface file, at most.
+#: Largest size of a number in an interface file.
 LARGEST = 1e60
 
-#: What every interface file has.
+#: Names in every interface file.
 NEEDED = ("S1", "S2", "load1", "load2", "x", "weights", "gap", "friction", "neumann_body", "dimension")
 
-#: What is a text in an interface file, or a single number.
+#: Names of texts and single numbers in an interface file.
 SCALARS = ("friction", "neumann_body", "dimension", "theta", "tolerance", "max_iterations", "law", "outside")
 
 
@@ -78,20 +76,11 @@ def write_transfer(interface: Interface, path: Path) -> None:
     P leads from nodal values on the Neumann grid to those on the contact grid, its transpose from nodal forces back.
     """
     P = sp.csr_array(interface.transfer)
-    arrays = {
-        "format": b"csr",
-        "shape": P.shape,
-        "data": P.data,
-        "indices": P.indices,
-        "indptr": P.indptr,
-        "x_contact": interface.contact.x,
-        "weights_contact": interface.contact.weights,
-        "x_neumann": interface.neumann.x,
-        "weights_neumann": interface.neumann.weights,
-        "ndtheory": __version__,
-    }
+    arrays = {"format": b"csr", "shape": P.shape, "data": P.data, "indices": P.indices, "indptr": P.indptr}
+    for name, grid in (("contact", interface.contact), ("neumann", interface.neumann)):
+        arrays |= {f"x_{name}": grid.x, f"weights_{name}": grid.weights}
     with path.open("wb") as file:
-        np.savez(file, **arrays)
+        np.savez(file, **arrays, ndtheory=__version__)
 
 
 def read_interface(path: Path) -> ContactPair:
@@ -130,7 +119,7 @@ def read_interface(path: Path) -> ContactPair:
 
 
 def _check_sizes(arrays: dict[str, np.ndarray]) -> None:
-    """Refuse numbers of which a product of a few overflows a double, or vanishes."""
+    """Raise ValueError for numbers of which a product of a few overflows a double, or vanishes."""
     for name, array in arrays.items():
         if array.dtype.kind not in "fiu" or not np.isfinite(array).all():
             continue
@@ -142,13 +131,8 @@ def _check_sizes(arrays: dict[str, np.ndarray]) -> None:
             raise ValueError(f"the largest entry of {name} is {largest:.2g}: {needed}")
 
 
-def _texts(arrays: dict[str, np.ndarray], source: str) -> TomlTable:
-    """The texts of an interface file, to be read as the keys of a problem file are."""
-    return TomlTable({name: _scalar(arrays[name]) for name in SCALARS if name in arrays}, source)
-
-
 def _scalar(array: np.ndarray) -> Any:
-    """A single value as a text or a whole number; several values as a list, which every key refuses."""
+    """Return a single value as a text or a whole number; several as a list, which every key refuses."""
     if array.shape != ():
         return array.tolist()
     text = str(array)
@@ -161,7 +145,7 @@ def _scalar(array: np.ndarray) -> Any:
 
 def _pair(arrays: dict[str, np.ndarray], source: str) -> ContactPair:
     _check_sizes(arrays)
-    texts = _texts(arrays, source)
+    texts = TomlTable({name: _scalar(arrays[name]) for name in SCALARS if name in arrays}, source)
     dimension: Literal[1, 2] = texts.take("dimension", choice(1, 2))
     neumann_body: Literal[1, 2] = texts.take("neumann_body", choice(1, 2))
     x, n = arrays["x"], len(arrays["x"])

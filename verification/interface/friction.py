@@ -1,7 +1,7 @@
-"""Laws of friction: the operator S that turns normal forces into the stress that friction feels.
+"""Laws of friction: the operator S from normal forces to the stress that bounds friction.
 
-A law is an object with an operator, its words, and what the theorem says of it.  :class:`Nonlocal` and :class:`Local`
-are those of problem files; another one derives from :class:`Law` and is handed to :func:`verification.build`.
+A law is an object with an operator, its words, and its relation to the theorem.  :class:`Nonlocal` and :class:`Local`
+are in problem files; another one derives from :class:`Law` and is handed to :func:`verification.build`.
 """
 
 from __future__ import annotations
@@ -21,10 +21,8 @@ SHARE = 0.1
 
 
 def hat(t: Floats, radius: float) -> Floats:
-    """The kernel ``omega_r(t) = max(0, 1 - |t|/r)/r``, of integral 1, unit 1/length.
+    """Return the kernel ``omega_r(t) = max(0, 1 - |t|/r)/r``, of integral 1, unit 1/length.
 
-    Examples
-    --------
     >>> hat(np.array([0.0, 0.5, 2.0]), 1.0)
     array([1. , 0.5, 0. ])
     """
@@ -73,7 +71,7 @@ class Nonlocal(Law):
         x, weights, kernel = interface.neumann.x, interface.contact.weights, interface.kernel
         assert kernel is not None
         r, width, length = self.radius, float(np.diff(x).max()), float(np.ptp(interface.contact.x))
-        # What a sliding body carries under an even pressure, as a part of k times the normal force.
+        # the force that a sliding body carries under an even pressure, as a part of k times the normal force
         share = float(weights @ kernel @ interface.neumann.weights / weights.sum())
         if r < width * (1 - 1e-9):
             return [
@@ -130,15 +128,9 @@ class LocalOfContact(Law):
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class GivenOperator(Value, Law):
-    """An operator S that was given as a matrix.
+    """An operator S given as a matrix, shape (contact nodes, Neumann nodes), unit 1/length.
 
-    Attributes
-    ----------
-    matrix : array, shape (contact nodes, Neumann nodes)
-    words : str
-        The law it comes from, where that is known.
-    outside : str
-        Why the theorem does not speak of that law; empty where it does.
+    ``words`` and ``outside`` are those of the law it comes from, where that is known.
     """
 
     name, label = "given", "given"

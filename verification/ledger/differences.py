@@ -38,7 +38,7 @@ def lifted_energy(body: Body) -> Floats:
     It equals the Schur complement because the lift is a-harmonic, which is used nowhere here.
     """
     elastic = body.elastic
-    fields = np.zeros((len(body.free), len(elastic.interface)))
+    fields = np.zeros((len(body.positions), len(elastic.interface)))
     fields[elastic.interface] = np.eye(len(elastic.interface))
     fields[elastic.inside] = elastic.lift
     energy = fields.T @ (body.stiffness @ fields)

@@ -11,15 +11,15 @@ from verification.ledger.weak_forms import Fields, Weak
 
 def directions(rng: np.random.Generator, body: Body, count: int) -> Floats:
     """Rough and smooth random fields of a body, largest value 1, as columns."""
-    rough = rng.standard_normal((len(body.free), count))
-    smooth = body.solve(rng.standard_normal((len(body.free), count)))
+    rough = rng.standard_normal((len(body.positions), count))
+    smooth = body.solve(rng.standard_normal((len(body.positions), count)))
     columns = np.concatenate([rough, smooth], axis=1)
     return np.asarray(columns / np.abs(columns).max(axis=0))
 
 
 def hats(body: Body) -> Floats:
     """Both signs of the hat function of every interface unknown, as columns."""
-    columns = np.zeros((len(body.free), len(body.interface)))
+    columns = np.zeros((len(body.positions), len(body.interface)))
     columns[body.interface, np.arange(len(body.interface))] = 1.0
     return np.concatenate([columns, -columns], axis=1)
 

@@ -23,7 +23,7 @@ from verification.algorithm.iterate import Iterate
 from verification.algorithm.runs import Run, run
 from verification.contact import ContactError
 from verification.interface.body import Body, Condensed
-from verification.interface.pair import ContactPair, build
+from verification.interface.pair import ContactPair, pair_from
 from verification.ledger.evidence import Level
 from verification.ledger.field_problems import PROBLEMS, drawn
 from verification.monolithic import solve
@@ -70,14 +70,14 @@ class Weak:
     def _lifts(self) -> dict[str, Any]:
         inside: dict[str, Any] = {}
         for body in (self.one, self.two):
-            rows = np.setdiff1d(np.arange(len(body.free)), body.interface)
+            rows = np.setdiff1d(np.arange(len(body.positions)), body.interface)
             inside[body.name] = rows, solver(body.stiffness[rows][:, rows])
         return inside
 
     def lift(self, body: Body, trace: Floats) -> Floats:
         """R_D phi of (4.5)."""
         rows, solved = self._lifts[body.name]
-        field = np.zeros((len(body.free), *trace.shape[1:]))
+        field = np.zeros((len(body.positions), *trace.shape[1:]))
         field[body.interface] = self._side(body).orient(trace)
         field[rows] = -solved(np.asarray(body.stiffness[rows][:, body.interface] @ field[body.interface]))
         return field
@@ -119,7 +119,7 @@ class Weak:
     def of(self, displacements: tuple[Floats | None, Floats | None]) -> Fields:
         """The unknowns of two displacement fields, the lower body's first."""
         first, second = (
-            displacement.ravel()[body.free] if displacement is not None else np.zeros(len(body.free))
+            displacement.ravel()[body.positions] if displacement is not None else np.zeros(len(body.positions))
             for body, displacement in zip(self.pair.on_meshes().elastic, displacements, strict=True)
         )
         return Fields(one=first, two=second) if self.pair.neumann_body == 2 else Fields(one=second, two=first)
@@ -148,7 +148,7 @@ class Case:
     @cached_property
     def weak(self) -> Weak:
         """The weak forms."""
-        return Weak(pair=build(self.problem))
+        return Weak(pair=pair_from(self.problem))
 
     @property
     def grids_differ(self) -> bool:

@@ -85,6 +85,10 @@ class Problem(ProblemSpec):
         """
         return cls(**vars(read_problem(data, source)))
 
+    def refuse(self, key: str, value: object, needed: str) -> ProblemError:
+        """Return the error for a key of this problem."""
+        return ProblemError(self.source, key, value, needed)
+
     def to_dict(self) -> dict[str, Any]:
         """Return the nested dictionary of the problem file, from which :meth:`from_dict` makes an equal problem.
 
@@ -108,7 +112,7 @@ class Problem(ProblemSpec):
         try:
             written.encode()
         except UnicodeEncodeError:
-            raise ProblemError(self.source, "mesh", None, "needed a mesh file whose path is UTF-8") from None
+            raise self.refuse("mesh", None, "needed a mesh file whose path is UTF-8") from None
         return written
 
     @property
@@ -176,7 +180,7 @@ class Problem(ProblemSpec):
         for name, pair in {"young": young, "poisson": poisson, "cells": cells}.items():
             if pair is not None and (not isinstance(pair, (list, tuple)) or len(pair) != 2):
                 needed = "needed two values, for body 1 and body 2 (None leaves a body as it is)"
-                raise ProblemError(self.source, name, pair, needed)
+                raise self.refuse(name, pair, needed)
             given |= {(f"body{i}", name): value for i, value in enumerate(pair or (), 1)}
         return self._with({key: value for key, value in given.items() if value is not None})
 
@@ -208,7 +212,7 @@ class Problem(ProblemSpec):
                 table = table.setdefault(parent, {})
                 if not isinstance(table, dict):
                     needed = f"unknown key; {'.'.join(key[:depth])} is no table"
-                    raise ProblemError(self.source, ".".join(key), None, needed)
+                    raise self.refuse(".".join(key), None, needed)
             table[name] = value
         return Problem.from_dict(data, self.source)
 
@@ -248,11 +252,11 @@ class Problem(ProblemSpec):
                 return body
             if body.cells is None:
                 named = body.mesh.path.name if body.mesh else None
-                raise ProblemError(self.source, f"{name}.mesh", named, "a mesh file cannot be halved")
+                raise self.refuse(f"{name}.mesh", named, "a mesh file cannot be halved")
             cells = tuple(n * 2**halvings for n in body.cells)
             if math.prod(cells) > MOST_CELLS:
                 needed = f"needed at most {MOST_CELLS} cells after {halvings} halvings"
-                raise ProblemError(self.source, f"{name}.cells", list(cells), needed)
+                raise self.refuse(f"{name}.cells", list(cells), needed)
             return replace(body, cells=cells)
 
         if not isinstance(halvings, int) or halvings < 0:  # type: ignore[redundant-expr]  # a caller need not be typed

@@ -10,7 +10,7 @@ from typing import Any
 
 from verification.constants import Measured, measure
 from verification.interface.interface import Law
-from verification.interface.pair import ContactPair, build
+from verification.interface.pair import ContactPair, pair_from
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
 from verification.sweeps.lean import KnownPieces
@@ -99,7 +99,7 @@ class SharedBodies:
         """The bodies of the problem on a mesh halved so often."""
         if isinstance(self.start, ContactPair) and not refine:
             return self.start
-        return build(self._refined(refine), law=self._law)
+        return pair_from(self._refined(refine), law=self._law)
 
     def _refined(self, refine: int) -> Problem:
         if self.problem is None:
@@ -121,7 +121,7 @@ class SharedBodies:
             if not changed:
                 raise
             law = None if {"law", "radius"} & changed.keys() else self._law
-            return build(self._refined(refine).changed(**changed), law=law)
+            return pair_from(self._refined(refine).changed(**changed), law=law)
         return base.changed(**changed) if changed else base
 
     def _measure(self, refine: int, changes: Changes) -> Measured:
