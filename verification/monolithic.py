@@ -149,14 +149,11 @@ def solve(problem: Problem | TwoBodies | ContactPair | Path | str) -> Solution:
         found = system.solve()
         jump = system.jump(found.force, found.motion)
         residual = system.residual(found.force, found.motion)
-    branches = found.branches
     return Solution(
         bodies=bodies,
         force=found.force,
         motion=found.motion,
-        contact=ContactFields.of(
-            bodies.interface.contact, force=found.force, jump=jump, touching=branches.touching, sliding=branches.sliding
-        ),
+        contact=ContactFields.of(bodies.interface.contact, force=found.force, jump=jump, state=found.branches),
         kkt_residual=residual,
         linear_solves=system.linear_solves,
     )

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fem1d2d.mesh import Floats
+from verification.contact.active_set import Pattern
+from verification.contact.system import Branches
 from verification.interface.interface import Grid
 from verification.value import Value
 
@@ -48,9 +49,7 @@ class ContactFields(Value):
         return ", ".join(f"{count} {name}" for name, count in self.pattern.items())
 
     @classmethod
-    def of(
-        cls, grid: Grid, *, force: Floats, jump: Floats, touching: NDArray[np.bool_], sliding: NDArray[Any]
-    ) -> ContactFields:
+    def of(cls, grid: Grid, *, force: Floats, jump: Floats, state: Pattern | Branches) -> ContactFields:
         """Make the fields from interface vectors on the contact grid, tangential components first.
 
         Parameters
@@ -59,11 +58,12 @@ class ContactFields(Value):
             Nodal forces: tangential on body 2, normal compressive.
         jump : array
             ``u1_T - u2_T`` and ``[u_N] - gap <= 0``.
-        touching, sliding : array, shapes (n,) and (n,) or (0,)
+        state : Pattern or Branches
+            Which nodes touch, shape (n,), and the sign of their slip, shape (n,) or (0,).
         """
         plane, zero = grid.t > 0, np.zeros(grid.n)
-        slides = sliding != 0 if plane else np.ones(grid.n, dtype=bool)
-        names = np.where(touching, np.where(slides, "slip", "stick"), "open")
+        slides = state.sliding != 0 if plane else np.ones(grid.n, dtype=bool)
+        names = np.where(state.touching, np.where(slides, "slip", "stick"), "open")
         return cls(
             x=grid.x,
             weights=grid.weights,

@@ -16,12 +16,12 @@ from fem1d2d.mesh import Floats
 from verification.algorithm.affine_piece import Piece, piece_of
 from verification.algorithm.fixed_point import FixedPointMap, iterate_at
 from verification.algorithm.iterate import Iterate
-from verification.algorithm.linearisation import NotLinear
+from verification.algorithm.linearisation import NotLinear, at_solution
 from verification.algorithm.rates import Noise
 from verification.algorithm.start import Start, begin_at
 from verification.contact.active_set import SLACK, Pattern, Systems
 from verification.interface.pair import ContactPair
-from verification.monolithic import SolveError, solution_force
+from verification.monolithic import SolveError
 
 #: Steps that are taken together: few at first, as the pattern changes most then.
 FEWEST, MOST = 4, 64
@@ -184,11 +184,9 @@ class KnownPieces:
 
     @cached_property
     def _solution(self) -> Iterate | Exception:
-        if self.pair.problem is None:
-            return NotLinear("the run did not arrive, and without meshes the global method has nothing to solve")
         try:
-            return iterate_at(self.map(), solution_force(self.pair))
-        except (SolveError, RuntimeError) as error:
+            return at_solution(self.map())
+        except (NotLinear, SolveError, RuntimeError) as error:
             return error
 
     def solution(self) -> Iterate:
