@@ -56,7 +56,7 @@ FLOORS: dict[str, dict[str, str]] = {
     },
     "runs over grids": {
         "verification.sweeps": (
-            "__init__ bodies cluster course export grid identity keeping lean row store sweep sweep_file tally workers"
+            "__init__ bodies cluster course export grid identity keeping lean row store sweep workers"
         )
     },
     "bounds, proofs": {

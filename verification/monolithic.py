@@ -1,6 +1,6 @@
 """The global method: both bodies at once, without decomposition.
 
-It shares the problem, the meshes and the assembled matrices with the iteration and nothing else.  The unknown is the
+It shares only the problem, the meshes and the assembled matrices with the iteration.  The unknown is the
 contact force lambda (on body 2; compressive in the normal direction).  With the flexibilities F_a of the bodies on
 Gamma_c the jump is
 
@@ -70,7 +70,7 @@ class Solution(Document):
 
     @property
     def problem(self) -> Problem:  # type: ignore[override]
-        """What was solved."""
+        """The problem that was solved."""
         return self.bodies.problem
 
     @property
@@ -95,12 +95,12 @@ class Solution(Document):
 
     @cached_property
     def checks(self) -> Checks:
-        """The bodies outside Gamma_c, and their strains."""
+        """Checks of the bodies outside Gamma_c, and of their strains."""
         return check_state(self.bodies, lambda: self.displacements)
 
     @property
     def warnings(self) -> list[str]:
-        """Why the numbers may be wrong."""
+        """Reasons why the numbers may be wrong."""
         return [*self.bodies.warnings, *self.checks.warnings]
 
     def content(self) -> dict[str, Any]:
@@ -168,7 +168,7 @@ def _bodies(problem: Problem | TwoBodies | ContactPair | Path | str) -> TwoBodie
 
 
 def solution_force(pair: ContactPair) -> Floats:
-    """g at the solution of the global method, as the iteration of the pair has it.
+    """Return g of the iteration at the solution of the global method.
 
     Raises
     ------
@@ -208,7 +208,7 @@ def contact_system(bodies: TwoBodies) -> ContactSystem:
 
 
 def _flexibility(body: Body) -> tuple[Floats, Floats]:
-    """``(A^-1)_BB`` and the trace of the solution without contact, on all interface components."""
+    """Return ``(A^-1)_BB`` and the trace of the solution without contact, on all interface components."""
     columns = np.zeros((len(body.positions), len(body.interface)))
     columns[body.interface, np.arange(len(body.interface))] = 1.0
     inverse = body.solve(columns)[body.interface]

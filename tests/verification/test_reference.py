@@ -103,7 +103,7 @@ def test_every_rule_is_repeated_from_its_beginning(run, relaxation):
 
 
 def test_a_run_is_repeated_from_its_own_start():
-    """At g = 0 nothing holds this block, so that its run starts from the tied bodies; there the program has no answer."""
+    """At g = 0 nothing holds this block and the program has no answer: its run starts from the tied bodies."""
     pushed = plates(body2={"prescribed": None, "traction": {"top": [0, -3000]}, "body_force": [2, 0]})
     done = vf.run(vf.Problem.from_dict(pushed))
     found = by_cvxpy_alone(done)

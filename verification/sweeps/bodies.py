@@ -1,4 +1,4 @@
-"""What the runs of a sweep share: condensed bodies for every law, modulus and role, constants for every friction."""
+"""Data that runs of a sweep share: condensed bodies for every law, modulus and role; constants for every friction."""
 
 from __future__ import annotations
 
@@ -21,18 +21,15 @@ OF_BODIES = ("young", "neumann_body", "law", "radius")
 #: Values of those axes, as pairs of name and value.
 Changes = tuple[tuple[str, Any], ...]
 
-#: So many pairs and constants are kept: rows that share them stand together.
+#: Number of pairs and constants that are kept: rows that share them are neighbours.
 KEPT = 16
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RowSetting:
-    """What rows share that differ in theta or in the rule alone.
+    """Shared data of rows that differ only in theta or in the rule.
 
-    Attributes
-    ----------
-    pieces : KnownPieces
-        The affine pieces of T that runs have passed through.
+    ``pieces`` are the affine pieces of T that runs have passed through.
     """
 
     pair: ContactPair
@@ -47,15 +44,10 @@ class RowSetting:
 
 
 class SharedBodies:
-    """The pairs and the constants of a sweep, each made once while it is in use.
+    """The pairs and the constants of a sweep of ``start``, each made once while it is in use.
 
-    What a row gets does not depend on the rows before it: bodies are always scaled from those of the problem on the
-    mesh of the row, and constants always measured for the modulus of body 2 that the problem has.
-
-    Parameters
-    ----------
-    start : Problem or ContactPair
-        What a sweep varies.
+    A row does not depend on the rows before it: bodies are always scaled from those of the problem on the mesh of the
+    row, and constants always measured for the modulus of body 2 that the problem has.
     """
 
     def __init__(self, start: Problem | ContactPair) -> None:
@@ -68,12 +60,7 @@ class SharedBodies:
         self._setting = lru_cache(maxsize=KEPT)(self._set)
 
     def setting(self, values: Mapping[str, Any]) -> RowSetting:
-        """What a row has in common with the rows of the same bodies and friction.
-
-        Raises
-        ------
-        ProblemError, HypothesisError
-        """
+        """Return the data that a row shares with the rows of the same bodies and friction."""
         return self._setting(*self._key(values), values.get("friction"))
 
     def _set(self, refine: int, changes: Changes, friction: Fraction | None) -> RowSetting:
@@ -96,7 +83,7 @@ class SharedBodies:
         return values.get("refine", 0), tuple((name, values[name]) for name in OF_BODIES if name in values)
 
     def _condense(self, refine: int) -> ContactPair:
-        """The bodies of the problem on a mesh halved so often."""
+        """Condense the bodies of the problem on a mesh halved so often."""
         if isinstance(self.start, ContactPair) and not refine:
             return self.start
         return pair_from(self._refined(refine), law=self._law)
@@ -125,7 +112,7 @@ class SharedBodies:
         return base.changed(**changed) if changed else base
 
     def _measure(self, refine: int, changes: Changes) -> Measured:
-        """rho and the constants of the energy norms; those of Section 5 are left out."""
+        """Measure rho and the constants of the energy norms, not those of Section 5."""
         pair = self._pair(refine, changes)
         contact, neumann = replace(pair.contact, body=None), replace(pair.neumann, body=None)
         return measure(replace(pair, contact=contact, neumann=neumann, problem=None))

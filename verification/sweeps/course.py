@@ -1,4 +1,4 @@
-"""What one run of a sweep does: when it ends, by which test, and at which rate."""
+"""One run of a sweep: when it ends, by which test, and at which rate."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from verification.sweeps.lean import KnownPieces, key_of, lengths
 #: The bound of the test of Section 6.3.
 PAPER = 1e-9
 
-#: After so many steps without a new least residual a run most likely stalls; few that do not have as many.
+#: Steps without a new least residual after which a run most likely stalls; few other runs have as many.
 WANDERS = 12
 
 #: A residual within this share of the tolerance is on either side of it by rounding: it has about seven digits there.
@@ -37,7 +37,7 @@ TIE = 1e-6
 
 @dataclass(frozen=True, kw_only=True)
 class Course:
-    """What a run did.
+    """Result of a run.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class Course:
         n at which the test of Section 6.3 is met.
     outcome : {'converged', 'stalled', 'limit', 'diverged'}
     observed_rate, linearised_rate, coupled_residual : float or None
-        As a run has them.
+        As in a run.
     reason : mapping
         Why a value is None, or why the outcome is not ``converged``.
     """
@@ -62,7 +62,7 @@ class Course:
 
 
 def meets_paper_test(g: Floats, before: Floats) -> NDArray[np.bool_]:
-    """The test of Section 6.3: ``|g_n - g_{n-1}|/|g_n| < 1e-9`` or ``|g_n - g_{n-1}| < 1e-9``, for every column.
+    """Apply the test of Section 6.3, ``|g_n - g_{n-1}|/|g_n| < 1e-9`` or ``|g_n - g_{n-1}| < 1e-9``, to every column.
 
     Norms are Euclidean; the second part is in the unit of force of the file.
     """
@@ -71,7 +71,7 @@ def meets_paper_test(g: Floats, before: Floats) -> NDArray[np.bool_]:
 
 
 def course(pair: ContactPair, rule: Rule, choice: Choice, step: Step, pieces: KnownPieces) -> Course:
-    """Run from its start until both tests are met, or the run stalls, runs away or reaches its limit.
+    """Run from the start of a pair until both tests are met, or the run stalls, runs away or reaches its limit.
 
     Raises
     ------

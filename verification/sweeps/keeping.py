@@ -1,4 +1,4 @@
-"""The rows of one sweep in a store: which are there, which are not used, and how new ones get in."""
+"""The rows of one sweep in a store: those that are there, those that are not used, and new ones."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ class Kept:
     Parameters
     ----------
     path : Path
-        Made where there is none.
+        Created if it does not exist.
     fresh : bool
         Whether all rows count as missing; they are replaced once they are made again.
     retry : bool
-        Whether those do that ended in an error.
+        Whether rows that ended in an error do.
 
     Raises
     ------
     ProblemError
-        A law or a rule that no store can tell from another one.
+        A law or a rule that no store can distinguish from another one.
     StoreError
     """
 
@@ -60,7 +60,7 @@ class Kept:
             raise
 
     def _forms(self, identity: Identity) -> list[Identity]:
-        """The forms of an identity under which the store has rows: the present one, and those of 0.1.0 by version."""
+        """Return the forms of an identity under which the store has rows: the present one, and those of 0.1.0."""
         studies = self._store.studies()
         versions = dict.fromkeys(studies.values())
         forms = [identity, *(identity.before(identity.numerics, version) for version in versions)]
@@ -73,22 +73,17 @@ class Kept:
         self._store.close()
 
     def add(self, rows: Sequence[tuple[int, Row]]) -> None:
-        """Keep rows by their places in the grid.
-
-        Raises
-        ------
-        StoreError
-        """
+        """Keep rows by their places in the grid; may raise StoreError."""
         self._store.add(self._study, [(self._keys[i], row) for i, row in rows])
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is there and is not used, or ended in an error, in words."""
+        """Sentences about rows that are there and not used, or ended in an error."""
         return notes(self._store.path, self.others, self.known.damaged, self.known.errors)
 
 
 def notes(path: Path, others: Mapping[str, int], damaged: int, errors: int) -> tuple[str, ...]:
-    """What a store has that is not used, or may not be wanted, in words."""
+    """Return sentences about rows of a store that are not used, or may not be wanted."""
     found = [
         f"{path}: {count} of these rows are of version {version} with other numerics; they are not used, and stay"
         for version, count in others.items()
@@ -102,22 +97,22 @@ def notes(path: Path, others: Mapping[str, int], damaged: int, errors: int) -> t
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Plan(Document):
-    """What a sweep would do.
+    """Numbers of rows that a sweep would make and use.
 
     Attributes
     ----------
     asked : int
-        How many rows the grid has.
+        Number of rows of the grid.
     stored : int
-        How many of them the store has and would not be made again.
+        Number of them that the store has and that would not be made again.
     damaged : int
-        How many more it has damaged.
+        Number of further rows that it has damaged.
     errors : int
-        How many of the stored rows ended in an error.
+        Number of the stored rows that ended in an error.
     others : mapping from a version of this library to a number
         Rows of this sweep that were made under other numerics: they are not used.
     store : Path or None
-        Where rows are kept.
+        The store of the rows.
     """
 
     schema: ClassVar[str] = "ndtheory.sweep-plan/1"
@@ -133,7 +128,7 @@ class Plan(Document):
 
     @property
     def left(self) -> int:
-        """How many rows would be made."""
+        """Number of rows that would be made."""
         return self.asked - self.stored
 
     @property
@@ -142,7 +137,7 @@ class Plan(Document):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the store has that would not be used, or ended in an error, in words."""
+        """Sentences about rows of the store that would not be used, or ended in an error."""
         return () if self.store is None else notes(self.store, self.others, self.damaged, self.errors)
 
     def content(self) -> dict[str, Any]:
@@ -165,13 +160,7 @@ def plan(
     fresh: bool = False,
     retry: bool = False,
 ) -> Plan:
-    """What a sweep would do; nothing is run, and no store is made.
-
-    Raises
-    ------
-    ProblemError
-        As for a sweep.
-    """
+    """Count the rows that a sweep would make; nothing is run, no store is made, and errors are those of a sweep."""
     known, others = Known(), dict[str, int]()
     if store is not None and store.exists():
         with Kept(store, start, grid, fresh=fresh, retry=retry) as kept:

@@ -1,7 +1,7 @@
 """Constant relaxation on the affine pieces of T: many steps by a few products of matrices.
 
-While each contact node keeps what it does, T is affine.  Such steps are taken together, and every sign that step II
-asks for is then held against each of them.  Where one fails T is evaluated as elsewhere, with its certificate.
+While each contact node keeps its state, T is affine.  Such steps are taken together, and then every sign that step II
+requires is checked for each of them.  Where one fails T is evaluated as elsewhere, with its certificate.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from verification.contact.active_set import SLACK, Pattern, Systems
 from verification.interface.pair import ContactPair
 from verification.monolithic import SolveError
 
-#: Steps that are taken together: few at first, as the pattern changes most then.
+#: Number of steps that are taken together: few at first, as the pattern changes most then.
 FEWEST, MOST = 4, 64
 
-#: Pieces of one pair that are kept.
+#: Number of pieces of one pair that are kept.
 KEPT = 64
 
 
@@ -54,15 +54,7 @@ class Steps:
 
 
 class Affine:
-    """T on one affine piece, with the signs that hold there.
-
-    Parameters
-    ----------
-    piece : Piece
-        Of a pair none of whose contact nodes is held.
-    systems : Systems
-        Of its contact body.
-    """
+    """T on one affine piece of a pair without held contact nodes, with the signs that hold there."""
 
     def __init__(self, piece: Piece, systems: Systems) -> None:
         pair = piece.pair
@@ -88,14 +80,14 @@ class Affine:
         self._sliding = piece.pattern.sliding.astype(float)[:, None]
 
     def relaxed(self, theta: float) -> tuple[Floats, Floats]:
-        """T_theta as a matrix and what it makes of 0."""
+        """Return T_theta as a matrix and its value at 0."""
         matrix, offset = self._image
         relaxed = theta * matrix
         relaxed[np.diag_indices_from(relaxed)] += 1 - theta
         return relaxed, theta * offset
 
     def on(self, g: Floats, norm: Norm) -> tuple[Steps, int]:
-        """T at the columns of g, and how many of them, from the first on, the signs of the piece admit."""
+        """Evaluate T at the columns of g, and count those, from the first on, that the signs of the piece admit."""
         pair = self.piece.pair
         interface, t = pair.interface, pair.contact.grid.t
         found, size = self._matrix @ g + self._offset, pair.contact.grid.size
@@ -125,7 +117,7 @@ class Affine:
 
 
 class Norm:
-    """The norm (5.21) of columns, what each may owe to rounding, and how far friction goes at each node."""
+    """The norm (5.21) of columns, the rounding of each, and the limit of friction at each node."""
 
     def __init__(self, pair: ContactPair) -> None:
         self._factor = np.linalg.inv(pair.neumann.root)
@@ -133,23 +125,23 @@ class Norm:
         self.limits = (float(pair.friction) * pair.contact.grid.weights)[:, None]
 
     def of(self, force: Floats) -> Floats:
-        """``sqrt(force' S2^-1 force)`` of every column."""
+        """Return ``sqrt(force' S2^-1 force)`` of every column."""
         return lengths(self._factor @ force)
 
 
 def lengths(columns: Floats) -> Floats:
-    """The Euclidean norm of every column."""
+    """Return the Euclidean norm of every column."""
     found: Floats = np.sqrt(np.einsum("ij,ij->j", columns, columns))
     return found
 
 
 def key_of(piece: Piece) -> tuple[bytes, ...]:
-    """Equal for equal pieces of one pair; its first member is the pattern."""
+    """Return a key that is equal for equal pieces of one pair; its first member is the pattern."""
     return piece.pattern.key, piece.sign.tobytes(), piece.still.tobytes()
 
 
 class KnownPieces:
-    """What the runs of one pair share: its affine pieces, and the solution of the global method."""
+    """Shared data of the runs of one pair: its affine pieces, and the solution of the global method."""
 
     def __init__(self, pair: ContactPair) -> None:
         self.pair = pair
@@ -159,11 +151,11 @@ class KnownPieces:
         self._affine: dict[tuple[bytes, ...], Affine] = {}
 
     def map(self) -> FixedPointMap:
-        """T for one run: which pattern it tries first depends on what it did before."""
+        """Return T for one run: the pattern it tries first depends on the steps before."""
         return FixedPointMap(self.pair, systems=self._systems)
 
     def piece(self, g: Floats, pattern: Pattern) -> Piece:
-        """The piece around g."""
+        """Return the piece around g."""
         new = piece_of(self.pair, g, pattern)
         if len(self._found) >= KEPT:
             self._found.clear()
@@ -171,7 +163,7 @@ class KnownPieces:
         return self._found.setdefault(key_of(new), new)
 
     def affine(self, piece: Piece) -> Affine:
-        """T on a piece."""
+        """Return T on a piece."""
         key = key_of(piece)
         if key not in self._affine:
             self._affine[key] = Affine(piece, self._systems)
@@ -190,38 +182,18 @@ class KnownPieces:
             return error
 
     def solution(self) -> Iterate:
-        """T at the solution of the global method.
-
-        Raises
-        ------
-        NotLinear, RuntimeError
-        """
+        """Return T at the solution of the global method; may raise NotLinear, SolveError or RuntimeError."""
         if isinstance(self._solution, Exception):
             raise self._solution
         return self._solution
 
     @cached_property
     def start(self) -> Start:
-        """Start of the runs.
-
-        Raises
-        ------
-        ContactError
-        """
+        """Start of the runs."""
         return begin_at(self.map())
 
     def steps(self, T: FixedPointMap, theta: float) -> Iterator[Steps]:
-        """The run with constant relaxation from its start, without end.
-
-        Parameters
-        ----------
-        T : FixedPointMap
-            A new :meth:`map`.
-
-        Raises
-        ------
-        ContactError
-        """
+        """Yield the run of a new :meth:`map` with constant relaxation from its start, without end."""
         g = self.start.g
         while True:
             found = iterate_at(T, g)
@@ -248,7 +220,7 @@ class KnownPieces:
 
 
 def _walk(matrix: Floats, offset: Floats, g: Floats, count: int) -> Floats:
-    """So many iterates as columns, from g on."""
+    """Return so many iterates as columns, from g on."""
     walked = np.empty((len(g), count))
     for i in range(count):
         walked[:, i] = g

@@ -26,7 +26,7 @@ Row = dict[str, Any]
 #: The columns of a row that the grid may vary.
 GIVEN = ("theta", "friction", "young1", "young2", "neumann_body", "refine", "law", "radius", "rule")
 
-#: Outcomes of a row that has no run.  What is refused is refused again; an error may have had a reason that passes.
+#: Outcomes of a row without a run.  A refused row is refused again; an error may have had a reason that passes.
 REFUSED, ERROR = "refused", "error"
 FAILED = (REFUSED, ERROR)
 
@@ -45,14 +45,14 @@ TEXTS = ("law", "rule", "outcome", "reason")
 
 
 def is_row(found: Any) -> bool:
-    """True if a value that was read from JSON has the columns of a row, each of its type and printable."""
+    """Return True if a value that was read from JSON has the columns of a row, each of its type and printable."""
     if not isinstance(found, dict) or found.keys() != {*GIVEN, *RESULTS} or not found["outcome"]:
         return False
     return all(value is None or _fits(name, value) for name, value in found.items())
 
 
 def renamed(found: Any) -> Any:
-    """A value that was read from JSON; in a row the columns have their present names, in their order.
+    """Return a value that was read from JSON; in a row the columns have their present names, in their order.
 
     >>> renamed({"rho": 2.0, "sharp_factor": None, "reason": "sharp_factor: outside"})
     {'rho': 2.0, 'energy_factor': None, 'reason': 'energy_factor: outside'}
@@ -75,14 +75,14 @@ def _fits(name: str, value: Any) -> bool:
 
 
 def row(problem: Problem | ContactPair, values: Mapping[str, Any], bodies: SharedBodies | None = None) -> Row:
-    """Run a problem with other values, and say what happened.
+    """Run a problem with other values, and return the row of results.
 
     Parameters
     ----------
     values : mapping
         As :meth:`verification.sweeps.grid.SweepGrid.rows` yields them: the name of an axis to its value.
     bodies : SharedBodies, optional
-        What is condensed already, of the same problem; no digit of the row depends on it.
+        Condensed bodies of the same problem; no digit of the row depends on it.
 
     Returns
     -------
@@ -114,7 +114,7 @@ def row(problem: Problem | ContactPair, values: Mapping[str, Any], bodies: Share
 
 
 def lost(problem: Problem | ContactPair, values: Mapping[str, Any], words: str) -> Row:
-    """The row of a run that ended with the process that made it."""
+    """Return the row of a run that ended with the process that made it."""
     return _closed(
         _given(SharedBodies(problem), values) | dict.fromkeys(RESULTS) | {"outcome": ERROR}, {"outcome": words}
     )
@@ -129,7 +129,7 @@ def _closed(found: Row, why: Mapping[str, str]) -> Row:
 
 
 def _given(bodies: SharedBodies, values: Mapping[str, Any]) -> Row:
-    """The columns of the grid; what does not vary is what the problem has."""
+    """Return the columns of the grid; those that do not vary have the values of the problem."""
     problem = bodies.problem
     rule = values.get("rule", "constant" if problem is None else problem.iteration.relaxation)
     start: Row = dict.fromkeys(("theta", "friction", "young1", "young2", "neumann_body"))
@@ -155,14 +155,14 @@ def _given(bodies: SharedBodies, values: Mapping[str, Any]) -> Row:
 
 
 def _of_pair(pair: ContactPair) -> Row:
-    """What the pair itself knows better than the problem: a friction, roles and a law of its own."""
+    """Return the values that a pair may have of its own, other than its problem's: friction, roles and law."""
     law = pair.interface.law
     found: Row = {"friction": float(pair.friction), "neumann_body": pair.neumann_body}
     return found if law is None else found | {"law": law.name}
 
 
 def _run(found: Row, setting: RowSetting, values: Mapping[str, Any]) -> dict[str, str]:
-    """Fill the columns of a run; returns why some of them are None."""
+    """Fill the columns of a run; return why some of them are None."""
     pair, measured = setting.pair, setting.measured
     found["rho"] = None if measured.rho_max is None else measured.rho_max.value
     why = {} if measured.rho_max else {"rho": measured.reason["rho_max"]}
@@ -186,7 +186,7 @@ def _run(found: Row, setting: RowSetting, values: Mapping[str, Any]) -> dict[str
 
 
 def _proved(setting: RowSetting, rule: Rule, choice: Choice) -> tuple[Row, dict[str, str]]:
-    """The columns that a theorem gives, and why one is None."""
+    """Return the columns that a theorem gives, and why one is None."""
     pair, factor, rate = setting.pair, None, None
     outside = pair.outside + ([words] if (words := rule.outside(pair.friction)) else [])
     of_factor = of_rate = outside[0] if outside else "rho or the constants of friction do not exist"
@@ -203,5 +203,5 @@ def _proved(setting: RowSetting, rule: Rule, choice: Choice) -> tuple[Row, dict[
 
 
 def energy_factor(energy: tuple[float, float, float] | None, theta: float) -> float | None:
-    """q(theta) of the theorem in energy norms, also where it is 1 or more; None where its constants do not exist."""
+    """Return q(theta) of the theorem in energy norms, even if it is 1 or more; None without its constants."""
     return None if energy is None else math.sqrt(max(1 - one_minus_square(theta, *energy), 0.0))

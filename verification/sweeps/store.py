@@ -22,10 +22,10 @@ from verification.problem.tables import ProblemError
 from verification.sweeps.identity import Identity
 from verification.sweeps.row import ERROR, FAILED, Row, is_row, renamed
 
-#: Tells a store from other files of SQLite: "ndth".
+#: The application id of a store, which distinguishes it from other files of SQLite: "ndth".
 APPLICATION = 0x6E647468
 
-#: What the tables look like.
+#: Number of the layout of the tables.
 FORMAT = 1
 
 TABLES = """
@@ -36,13 +36,13 @@ CREATE TABLE rows (key BLOB PRIMARY KEY, study INTEGER NOT NULL, outcome TEXT, r
 #: Seconds to wait for a process that is about to let go of a store.
 PATIENCE = 2.0
 
-#: A file that SQLite reads, and whose content is not what was written.
+#: The message for a file that SQLite reads, but with changed content.
 DAMAGED = "the file is damaged; it is left as it is: needed another name (--store), or move the file away"
 
-#: How SQLite begins where it repeats text of a damaged file, which may be anything.
+#: Beginnings of messages in which SQLite repeats text of a damaged file, which may be anything.
 REPEATS = ("malformed database schema", "Could not decode to UTF-8")
 
-#: What SQLite says, in the words of a user; what stands here for no error of it is repeated as it stands.
+#: Messages of SQLite in the words of a user; any other message is repeated.
 WORDS = {
     "database is locked": "another sweep is at work on it: needed another store (--store), or wait until that one ends",
     "database or disk is full": "the disk is full: needed room on it",
@@ -60,15 +60,15 @@ class StoreError(ProblemError):
 
 @dataclass(frozen=True, kw_only=True)
 class Known:
-    """What a store has of some keys.
+    """The rows that a store has for some keys.
 
     Attributes
     ----------
     rows : dict from the number of a key to its row as :func:`written` has it
     failed : int
-        How many of them have no run.
+        Number of them without a run.
     errors : int
-        How many of those ended in an error.
+        Number of those that ended in an error.
     damaged : int
         Number of rows whose checksum or columns are wrong; they count as missing.
     """
@@ -79,7 +79,7 @@ class Known:
     damaged: int = 0
 
     def __or__(self, other: Known) -> Known:
-        """The rows of a store that have these keys, and the number of others."""
+        """Join the rows and add the other numbers."""
         return Known(
             rows=self.rows | other.rows,
             failed=self.failed + other.failed,
@@ -89,12 +89,7 @@ class Known:
 
 
 class Store:
-    """Rows by their keys, in a file that this process alone holds.
-
-    Parameters
-    ----------
-    path : Path
-        Made where there is none.
+    """Rows by their keys, in a file that only this process holds; it is created if it does not exist.
 
     Raises
     ------
@@ -141,7 +136,7 @@ class Store:
         run("CREATE TEMP TABLE wanted (number INTEGER PRIMARY KEY, key BLOB NOT NULL)")
 
     def _schema(self) -> list[str]:
-        """Statements that make the tables, views and triggers of the file; an index changes no answer."""
+        """Return the statements that make the tables, views and triggers of the file; an index changes no answer."""
         return sorted(row[0] for row in self._file.execute("SELECT sql FROM sqlite_master WHERE type != 'index'"))
 
     def __enter__(self) -> Store:
@@ -158,17 +153,9 @@ class Store:
             self._file.close()
 
     def known(self, keys: Mapping[int, bytes], again: Callable[[str], bool] = lambda outcome: False) -> Known:
-        """The rows of some keys.
+        """Return the rows of some keys, given by the numbers of the rows.
 
-        Parameters
-        ----------
-        keys : mapping from the number of a row to its key
-        again : callable
-            From an outcome to whether rows that have it count as missing.
-
-        Raises
-        ------
-        StoreError
+        Rows whose outcome is one for which ``again`` returns True count as missing.
         """
         found: dict[int, bytes] = {}
         damaged = failed = errors = 0
@@ -187,12 +174,7 @@ class Store:
         return Known(rows=found, failed=failed, errors=errors, damaged=damaged)
 
     def count(self, keys: Mapping[int, bytes]) -> dict[str, int]:
-        """The number of keys that have a row, by the version of this library that made it.
-
-        Raises
-        ------
-        StoreError
-        """
+        """Count the keys that have a row, by the version of this library that made it."""
         with self._told(), self._wanted(keys):
             rows = self._file.execute(
                 "SELECT version, count(*) FROM temp.wanted JOIN rows ON rows.key = wanted.key"
@@ -201,23 +183,13 @@ class Store:
             return {str(version): int(count) for version, count in rows}
 
     def studies(self) -> dict[str, str]:
-        """The studies of this store, and by which version of this library each was made.
-
-        Raises
-        ------
-        StoreError
-        """
+        """Return the studies of this store, with the version of this library that made each."""
         with self._told():
             rows = self._file.execute("SELECT identity, version FROM studies ORDER BY version").fetchall()
         return {str(identity): str(version) for identity, version in rows}
 
     def begin(self, identity: Identity, problem: Problem | None) -> int:
-        """The number of a study: what rows are made from, with the problem as its file has it.
-
-        Raises
-        ------
-        StoreError
-        """
+        """Return the number of a study, the origin of rows, with the problem as its file has it."""
         written = None if problem is None else json.dumps(problem.to_dict())
         with self._told(), self._transaction():
             self._file.execute(
@@ -228,12 +200,7 @@ class Store:
         return int(row[0])
 
     def add(self, study: int, rows: Sequence[tuple[bytes, Row]]) -> None:
-        """Keep rows, all of them or none; a row that is there already is replaced.
-
-        Raises
-        ------
-        StoreError
-        """
+        """Keep rows, all of them or none; a row that is there already is replaced."""
         values = [(key, study, row["outcome"], text := written(row), _crc(key, text)) for key, row in rows]
         with self._told(), self._transaction():
             self._file.executemany(
@@ -266,7 +233,7 @@ class Store:
 
     @contextlib.contextmanager
     def _told(self) -> Iterator[None]:
-        """Say in words what SQLite complains of."""
+        """Turn errors of SQLite into StoreError, with a message in words."""
         try:
             yield
         except (sqlite3.Error, UnicodeDecodeError) as error:  # what SQLite says of a damaged file may be no text
@@ -281,17 +248,17 @@ class Store:
 
 
 def _tables() -> list[str]:
-    """The statements that make the tables, as SQLite keeps them."""
+    """Return the statements that make the tables, as SQLite keeps them."""
     return [table.strip() for table in TABLES.split(";") if table.strip()]
 
 
 def written(row: Row) -> bytes:
-    """A row as text; it reads back to the last digit."""
+    """Write a row as text that reads back to the last digit."""
     return json.dumps(row, separators=(",", ":")).encode("ascii")
 
 
 def _read(key: object, outcome: object, text: object, crc: object) -> bytes | None:
-    """The row that a store has of a key, with its columns as they are named now; None where this program wrote none."""
+    """Return the row of a key, its columns with their present names; None if this program did not write it."""
     if not (isinstance(key, bytes) and isinstance(text, bytes) and crc == _crc(key, text)):
         return None
     try:
