@@ -1,6 +1,6 @@
-"""The theorem held against the finite elements: problem files, constants, the iteration, verdicts.
+"""The theorem compared with finite elements: problem files, constants, the iteration, verdicts.
 
-Everything is imported when first asked for: ``ndtheory bounds`` starts without numpy.
+Each name is imported at its first use: ``ndtheory bounds`` starts without numpy.
 
 >>> import verification as vf
 >>> bars = vf.Problem.from_dict({
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from verification.problem.tables import ProblemError
     from verification.sweeps.sweep import Sweep, sweep
 
-#: Where each public name lives.  No module at this level bears the name of a public function: it would hide it.
+#: The module of each public name.  No module at this level has the name of a public function: it would hide it.
 _HOME = {
     "Advice": "advice.roles",
     "Comparison": "comparison",

@@ -312,7 +312,7 @@ def _comes_with_programs() -> str:
 
 
 def _reference(finished: Run) -> tuple[Reference | None, str]:
-    """Run by cvxpy only, or return why there is no run."""
+    """Run by cvxpy only, or return why that failed."""
     try:
         return by_cvxpy_alone(finished), ""
     except ContactError as error:

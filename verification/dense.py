@@ -19,7 +19,7 @@ STILL = 1e-9
 
 def times(S: Floats, v: Floats) -> Floats:
     """Return ``S v`` for a symmetric S, of which one triangle is read: half the memory of a general product."""
-    product: Floats = dsymv(1.0, S if S.flags.f_contiguous else S.T, v)  # a transpose is no copy
+    product: Floats = dsymv(1.0, S if S.flags.f_contiguous else S.T, v)  # a transpose copies nothing
     return product
 
 

@@ -38,7 +38,7 @@ class Value:
 
 
 def freeze(value: T) -> T:
-    """Make an array, the arrays of a sparse matrix, or those of a tuple read-only, and return the same object."""
+    """Make an array, or all arrays of a sparse matrix or a tuple, read-only, and return the same object."""
     held: Any = value
     if hasattr(held, "setflags"):  # numpy is not imported: the calculator starts without it
         held.setflags(write=False)

@@ -101,7 +101,7 @@ class Piece(Value):
     def balanced(self) -> bool:
         """True if friction on this piece does no work in a rigid motion that it leaves free.
 
-        Otherwise there is no affine piece: a change of the bound sets the contact body in motion, or stops it.
+        Otherwise T is not affine here: a change of the bound sets the contact body in motion, or stops it.
         """
         moves = np.concatenate([self.pattern.sliding != 0, ~self.pattern.touching])
         free = vanishing(self.pair.contact.motions, np.flatnonzero(~moves))

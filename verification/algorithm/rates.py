@@ -86,7 +86,7 @@ class ObservedRate:
 def observed_rate(pair: ContactPair, iterates: Sequence[Iterate]) -> ObservedRate | None:
     """Return the rate that a run shows at its end, or None where fewer than two step ratios are clear of the noise.
 
-    Every residual is compared with the noise of its own iterate; nothing after the first one that is not clear of it
+    Every residual is compared with the noise of the same iterate; nothing after the first one that is not clear of it
     counts.
     """
     return rate_of(
@@ -165,7 +165,7 @@ class StepRatio:
 def largest_step_ratio(pair: ContactPair, iterates: Sequence[Iterate]) -> StepRatio | None:
     """Return the largest step ratio clear of the noise, or None where there is none.
 
-    A step is judged by the noise of its own two iterates; it may end below the noise, not begin there.  Where steps
+    A step is judged by the noise of its two iterates; it may end below the noise, not begin there.  Where steps
     begin far above it, only these count.
     """
     if not iterates:

@@ -407,7 +407,7 @@ def run(
         if not seen:
             raise
         outcome = "interrupted"
-    assert outcome is not None  # the iterates have no end of their own
+    assert outcome is not None  # the iterates do not end
     return Run(
         pair=pair,
         rule=relaxation,

@@ -124,7 +124,7 @@ def begin_at(T: FixedPointMap, given: ArrayLike | None = None) -> Start:
 
 
 def forces(given: ArrayLike, pair: ContactPair, source: str = "") -> Floats:
-    """Return a given g_0 as an array, shape (2 n,); errors name ``source``, or that of the pair.
+    """Return a given g_0 as an array, shape (2 n,); errors name ``source``, by default the pair's.
 
     Raises
     ------

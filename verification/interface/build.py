@@ -49,20 +49,20 @@ def build(
     law : Law, optional
         A law of friction in place of the problem's, or of a kernel.
     S1, S2 : array, shapes (2 n1, 2 n1), (2 n2, 2 n2)
-        Schur complements of the stiffness matrices on the contact nodes: symmetric, positive definite; that of the
-        contact body may be singular, where contact alone holds it.
+        Schur complements of the stiffness matrices on the contact nodes: symmetric, positive definite; for the
+        contact body it may be singular, where only contact holds it.
     load1, load2 : array, shapes (2 n1,), (2 n2,), optional
         Loads condensed onto the contact nodes; 0 by default.
     x : array, shape (n,)
         Positions of the contact nodes of the contact body, increasing.
     weights : array, shape (n,), optional
-        Weights of the quadrature on them; those of the trapezoid rule by default.
+        Weights of the quadrature on them; by default the trapezoid rule.
     gap : float or array, shape (n,)
         Initial distance at them; negative where the bodies overlap.
     kernel : array, shape (n, nodes of the Neumann body), optional
         The operator S: normal nodal forces on the Neumann body to normal stress at the contact nodes.
     transfer : array, shape (n, nodes of the Neumann body), optional
-        P: from values at the nodes of the Neumann body to values at those of the contact body; the identity by default.
+        P: from values at the nodes of the Neumann body to values at the contact body's nodes; the identity by default.
     friction : number
         k >= 0; needs a kernel or a law.
     neumann_body : {1, 2}
@@ -76,7 +76,7 @@ def build(
     ProblemError
         A problem that has no two elastic bodies facing each other.
     ValueError
-        Matrices that do not fit, or are no stiffness matrices.
+        Matrices that do not fit, or cannot be stiffness matrices.
 
     Examples
     --------

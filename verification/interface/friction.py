@@ -130,7 +130,7 @@ class LocalOfContact(Law):
 class GivenOperator(Value, Law):
     """An operator S given as a matrix, shape (contact nodes, Neumann nodes), unit 1/length.
 
-    ``words`` and ``outside`` are those of the law it comes from, where that is known.
+    ``words`` and ``outside`` come from its law, where that is known.
     """
 
     name, label = "given", "given"

@@ -30,7 +30,7 @@ MOTIONLESS = 1e-12
 #: An eigenvalue above minus this is still rounding.
 BELOW_ZERO = 1e-10
 
-#: The errors of numpy, scipy and zipfile for a file that is no matrix.
+#: The errors of numpy, scipy and zipfile for a file without a matrix.
 UNREADABLE = (
     ArithmeticError, AttributeError, EOFError, LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError,
     struct.error, tokenize.TokenError, SyntaxError, zipfile.BadZipFile, zlib.error,

@@ -120,7 +120,7 @@ class ContactPair(Value):
 
         Condensed matrices are shared: a body is condensed anew only where its mesh, its supports or its Poisson ratio
         change. Young's modulus multiplies its stiffness.  A law that was given to the pair stays unless ``law`` or
-        ``radius`` is given; the settings are those of the changed problem.
+        ``radius`` is given; the settings come from the changed problem.
 
         Raises
         ------
@@ -137,7 +137,7 @@ class ContactPair(Value):
     def swapped(self) -> ContactPair:
         """Return the same bodies with the roles exchanged; condensed matrices are shared.
 
-        Where the grids differ the transfer changes: it is that of the problem with these roles.
+        Where the grids differ the transfer is made anew, from the problem with these roles.
 
         Raises
         ------

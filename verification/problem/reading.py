@@ -226,7 +226,7 @@ def _read_body(table: TomlTable, dimension: int, source: str) -> BodySpec:
         table.close()
         return BodySpec(**shape)
     known: dict[str, tuple[str, ...]] = {"rectangle": RECTANGLE_SIDES, "interval": INTERVAL_SIDES}
-    sides = known.get(shape["shape"])  # those of a mesh file are known only later
+    sides = known.get(shape["shape"])  # the sides of a mesh file are known only later
     parts = _read_parts(table.table("parts"), sides, dimension)
     if sides is not None:
         sides += tuple(parts)

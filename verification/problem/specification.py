@@ -106,7 +106,7 @@ class Problem(ProblemSpec):
         Raises
         ------
         ProblemError
-            The path of a mesh file is no text, so that no TOML can name it.
+            The path of a mesh file is not UTF-8, so that TOML cannot name it.
         """
         written = toml(self.to_dict())
         try:
@@ -151,7 +151,7 @@ class Problem(ProblemSpec):
         tolerance: Numeric | None = None,
         max_iterations: int | None = None,
     ) -> Problem:
-        """Return the same problem with other values, read and refused as those of a file are.
+        """Return the same problem with other values, read and refused like the values of a file.
 
         Parameters
         ----------

@@ -32,7 +32,7 @@ MOST_FRICTION = Fraction(10**9)
 
 
 class ReadOnly(Mapping[str, V]):
-    """An immutable mapping that a frozen dataclass can hold; equal ones iterate in the same order, that of the keys.
+    """An immutable mapping that a frozen dataclass can hold; equal ones iterate alike, in the order of the keys.
 
     >>> ReadOnly({"top": 1, "left": 2})
     {'left': 2, 'top': 1}

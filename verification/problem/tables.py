@@ -70,7 +70,7 @@ def short(text: str, most: int = 100) -> str:
 
 
 def unreadable(path: Path, most: int) -> str | None:
-    """Return why a path is no regular file of at most ``most`` bytes, or None where it is one.
+    """Return why a path is not a regular file of at most ``most`` bytes, or None where it is.
 
     Call it before opening a file: a pipe or a device may have no end.
     """
@@ -259,7 +259,7 @@ class TomlTable:
     def close(self) -> None:
         """Raise ProblemError for a key that was not taken, naming it and the nearest known one."""
         for name, value in self._data.items():
-            # body3 is no misspelling of body2: names that differ only in their number are meant as they are
+            # body3 does not misspell body2: names that differ only in their number are meant as they are
             others = [known for known in self._known if known.rstrip(digits) != str(name).rstrip(digits)]
             near = nearest(str(name), others)
             known = f"did you mean {near[0]!r}?" if near else "known here: " + ", ".join(self._known)

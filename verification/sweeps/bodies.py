@@ -74,7 +74,7 @@ class SharedBodies:
             second = self.problem.body2.young
             named["young"] = (lower / upper * second, second)
         measured = self._constants(refine, tuple(named.items()))
-        if measured.of_friction:  # else there is no friction, or its constants do not exist
+        if measured.of_friction:  # else friction is absent, or its constants do not exist
             measured = measured.with_friction(float(pair.friction))
         return RowSetting(pair=pair, measured=measured, pieces=KnownPieces(pair))
 
@@ -104,7 +104,7 @@ class SharedBodies:
             return base if roles == base.neumann_body else base.swapped()
         try:
             base = self._base(refine)
-        except ProblemError:  # with the roles or the law of the problem; those of the row may fit
+        except ProblemError:  # the roles or the law of the problem do not fit; those of the row may
             if not changed:
                 raise
             law = None if {"law", "radius"} & changed.keys() else self._law

@@ -146,8 +146,8 @@ def read_sweep(path: Path | str) -> tuple[Problem, SweepGrid]:
     Parameters
     ----------
     path : path
-        A TOML file.  ``problem`` is a problem file, looked for beside it, or the name of a built-in problem where there
-        is no such file; ``[grid]`` has a list of values for each axis, or ``{ start, stop, step }`` with both ends.
+        A TOML file.  ``problem`` is a problem file beside it, or else the name of a built-in
+        problem; ``[grid]`` has a list of values for each axis, or ``{ start, stop, step }`` with both ends.
 
     Raises
     ------

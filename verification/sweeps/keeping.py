@@ -160,7 +160,7 @@ def plan(
     fresh: bool = False,
     retry: bool = False,
 ) -> Plan:
-    """Count the rows that a sweep would make; nothing is run, no store is made, and errors are those of a sweep."""
+    """Count the rows that a sweep would make; nothing is run, no store is made, and a sweep has the same errors."""
     known, others = Known(), dict[str, int]()
     if store is not None and store.exists():
         with Kept(store, start, grid, fresh=fresh, retry=retry) as kept:

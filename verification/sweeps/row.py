@@ -155,7 +155,7 @@ def _given(bodies: SharedBodies, values: Mapping[str, Any]) -> Row:
 
 
 def _of_pair(pair: ContactPair) -> Row:
-    """Return the values that a pair may have of its own, other than its problem's: friction, roles and law."""
+    """Return the values of a pair that may differ from its problem's: friction, roles and law."""
     law = pair.interface.law
     found: Row = {"friction": float(pair.friction), "neumann_body": pair.neumann_body}
     return found if law is None else found | {"law": law.name}
@@ -194,7 +194,7 @@ def _proved(setting: RowSetting, rule: Rule, choice: Choice) -> tuple[Row, dict[
         factor = energy_factor(setting.energy, float(choice.theta))
         if factor is not None:
             rate, of_rate = (factor, "") if factor < 1 else (None, "q(theta) is not below 1")
-    elif not outside:  # q is about steps with one factor, even where the rule has a proved rate of its own
+    elif not outside:  # q is about steps with one factor, even where the rule itself has a proved rate
         of_factor = f"{rule.words}: no constant theta"
         rate = None if choice.rho is None else rule.proved_rate(choice.rho)
     found = {"energy_factor": factor, "proved_rate": rate}

@@ -94,7 +94,7 @@ class Store:
     Raises
     ------
     StoreError
-        The file is no store, is damaged, cannot be written, or another process holds it.
+        The file is not a store, is damaged, cannot be written, or another process holds it.
     """
 
     def __init__(self, path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Workers that make the rows of a sweep: this process, several on this machine, or those of a cluster."""
+"""Workers that make the rows of a sweep: this process, several on this machine, or the workers of a cluster."""
 
 from __future__ import annotations
 
