@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from itertools import takewhile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fem1d2d.mesh import Floats
 from verification.algorithm.ending import NO_FORCE, PATIENCE, RUNAWAY, Ending, Outcome, arrived, coupled_residual
-from verification.algorithm.fixed_point import iterate_at, iterates
+from verification.algorithm.fixed_point import FixedPointMap, iterate_at, iterates
 from verification.algorithm.iterate import Iterate
 from verification.algorithm.linearisation import NotLinear, linearised_rate
-from verification.algorithm.rates import noises, rate_of
+from verification.algorithm.rates import rate_of
 from verification.algorithm.relaxation import Constant, Relaxation, Rule, Step
 from verification.algorithm.theta import Choice
 from verification.contact import ContactError
 from verification.interface.pair import ContactPair
 from verification.monolithic import SolveError
-from verification.sweeps.lean import KnownPieces, key_of, lengths
+from verification.sweeps.lean import KnownPieces, Steps, lengths
 
 #: The bound of the test of Section 6.3.
 PAPER = 1e-9
@@ -78,9 +76,13 @@ def course(pair: ContactPair, rule: Rule, choice: Choice, step: Step, pieces: Kn
     ContactError
         Step II did not reach its certificate before the run ended.
     """
-    went = _lean(pieces, step.theta) if isinstance(step, Relaxation) and not pair.held else None
-    # where rounding decides the steps of `run` do: a residual that wanders at a level, or meets the tolerance exactly
-    went = went or _stepwise(pieces, step)
+    T, went = pieces.map(), None
+    if isinstance(step, Relaxation) and not pair.held:
+        went = _follow(pieces, pieces.steps(T, step.theta), T, lean=True)
+    if went is None:  # any rule, and where rounding decides: a residual that wanders, or meets the tolerance exactly
+        T = pieces.map()
+        went = _follow(pieces, map(pieces.single, iterates(T, step, pieces.start.g)), T, lean=False)
+    assert went is not None  # only lean steps leave it to others
     reason = _reason(went.outcome, len(went.residuals) - 1, went.paper, went.why)
     observed = None if went.outcome == "diverged" else rate_of(went.residuals, went.floors, went.kinds)
     if observed is None:
@@ -98,7 +100,7 @@ def course(pair: ContactPair, rule: Rule, choice: Choice, step: Step, pieces: Kn
     try:
         if not isinstance(rule, Constant):
             raise NotLinear(f"the {rule.name} relaxation is no constant theta")
-        here, first = (end, went.entry()) if end and went.outcome == "converged" else (pieces.solution(), None)
+        here, first = (end, went.entry) if end and went.outcome == "converged" else (pieces.solution(), None)
         linear = linearised_rate(pieces.piece(here.g, here.contact.pattern), here, float(choice.theta), first)
     except (NotLinear, SolveError, ContactError) as error:
         reason["linearised_rate"] = str(error)
@@ -115,22 +117,22 @@ def course(pair: ContactPair, rule: Rule, choice: Choice, step: Step, pieces: Kn
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Went:
-    """How a run went.
+    """The steps of a run.
 
     Attributes
     ----------
     outcome : {'converged', 'stalled', 'limit', 'diverged'}
     residuals, floors : list of float
-        Those of every evaluation until it ended, and the rounding of each.
+        Of every evaluation until it ended, and the rounding of each.
     kinds : list
-        What tells one contact pattern from another, for each.
+        The contact pattern of each, in a form that can be compared.
     paper : int or None
         n at which the test of Section 6.3 is met.
     why : str
-        What ended it before that test was met, other than its outcome.
+        The error that ended it before that test was met.
     end : callable
         T at its last g.
-    entry : callable
+    entry : array
         The g with which it came onto the piece of the last g for good.
     """
 
@@ -141,23 +143,27 @@ class _Went:
     paper: int | None
     why: str
     end: Callable[[], Iterate]
-    entry: Callable[[], Floats]
+    entry: Floats
 
 
-def _lean(pieces: KnownPieces, theta: float) -> _Went | None:
-    """With constant relaxation: steps on one affine piece are taken together; None where rounding decides the count."""
-    pair, settings, T = pieces.pair, pieces.pair.settings, pieces.map()
-    ending, bound = Ending(settings), settings.tolerance
-    joined = lambda g: arrived(pair, iterate_at(T, g))
+def _follow(pieces: KnownPieces, batches: Iterable[Steps], T: FixedPointMap, *, lean: bool) -> _Went | None:
+    """Follow a run, and go on until the test of Section 6.3 is met or the run is given up.
+
+    Lean steps, which are not evaluated one by one, give None where rounding decides when the run ends.
+    """
+    pair, bound = pieces.pair, pieces.pair.settings.tolerance
+    ending = Ending(pair.settings)
     residuals: list[float] = []
     walked: list[tuple[Floats, Floats]] = []
     kinds: list[object] = []
     outcome: Outcome | None = None
     paper, why, n, least, since = None, "", -1, math.inf, 0
-    before = last = first = np.zeros(0)
+    before = first = np.zeros(0)
     piece: tuple[bytes, ...] = ()
+    evaluated: Callable[[], Iterate]
+    joined = lambda here: arrived(pair, here())
     try:
-        for taken in pieces.steps(T, theta):
+        for taken in batches:
             if paper is None:
                 paper = _paper(taken.g, before, n)
             if outcome is None:
@@ -165,16 +171,15 @@ def _lean(pieces: KnownPieces, theta: float) -> _Went | None:
                 if taken.piece != piece:
                     piece, first = taken.piece, taken.g[:, 0]
             for i, (residual, scale) in enumerate(zip(taken.residual.tolist(), taken.scale.tolist(), strict=True)):
-                n, g = n + 1, taken.g[:, i]
-                ended = ending.at(n, residual, scale, partial(joined, g))
+                n += 1
+                here = partial(_evaluated, T, taken, i)
+                ended = ending.at(n, residual, scale, partial(joined, here))
                 if outcome is None:
-                    if abs(residual - bound * scale) <= TIE * bound * scale:
-                        return None
                     residuals.append(residual)
                     kinds.append(taken.pattern)
-                    outcome, last = ended, g
+                    outcome, evaluated = ended, here
                     least, since = (residual, 0) if residual < least else (least, since + 1)
-                    if since > WANDERS:
+                    if lean and (since > WANDERS or abs(residual - bound * scale) <= TIE * bound * scale):
                         return None
                 if outcome and ((paper is not None and paper <= n) or ending.given_up(n, residual)):
                     paper = None if paper is None or paper > n else paper
@@ -187,70 +192,34 @@ def _lean(pieces: KnownPieces, theta: float) -> _Went | None:
         if outcome is None:
             raise
         why = str(error)
-    assert outcome is not None  # the iterates have no end of their own
+    assert outcome is not None  # the iterates do not end
     gs, us = (np.hstack(parts)[:, : len(residuals)] for parts in zip(*walked, strict=True))
     return _Went(
         outcome=outcome,
         residuals=residuals,
-        floors=pieces.norm.rounding(gs, us).tolist(),
+        floors=pieces.noise.of(gs, us).tolist(),
         kinds=kinds,
         paper=paper,
         why=why,
-        end=lambda: iterate_at(T, last),
-        entry=lambda: first,
+        end=evaluated,
+        entry=first,
     )
 
 
+def _evaluated(T: FixedPointMap, taken: Steps, i: int) -> Iterate:
+    """Return T at one of some steps."""
+    return taken.found or iterate_at(T, taken.g[:, i])
+
+
 def _paper(g: Floats, before: Floats, last: int) -> int | None:
-    """n of the first column of g at which :func:`meets_paper_test` is true, where ``last`` columns came before."""
+    """Return n of the first column of g at which :func:`meets_paper_test` is true; ``last`` is n of the one before."""
     columns = np.column_stack([before, g]) if len(before) else g
     met = np.flatnonzero(meets_paper_test(columns[:, 1:], columns[:, :-1]))
     return None if not len(met) else last + int(met[0]) + (1 if len(before) else 2)
 
 
-def _stepwise(pieces: KnownPieces, step: Step) -> _Went:
-    """With any rule: as :func:`verification.run` goes."""
-    pair = pieces.pair
-    seen: list[Iterate] = []
-    ending, paper, why = Ending(pair.settings), None, ""
-    outcome: Outcome | None = None
-    before: Floats | None = None
-    try:
-        for found in iterates(pieces.map(), step, pieces.start.g):
-            if paper is None and before is not None and meets_paper_test(found.g[:, None], before[:, None])[0]:
-                paper = found.iteration
-            if outcome is None:
-                seen.append(found)
-            ended = ending.at(found.iteration, found.residual, found.scale, partial(arrived, pair, found))
-            outcome = outcome or ended
-            if outcome is not None and (paper is not None or ending.given_up(found.iteration, found.residual)):
-                break
-            before = found.g
-    except ContactError as error:
-        if outcome is None:
-            raise
-        why = str(error)
-    assert outcome is not None  # the iterates have no end of their own
-
-    def entry() -> Floats:
-        last = key_of(pieces.piece(seen[-1].g, seen[-1].contact.pattern))
-        same = takewhile(lambda each: key_of(pieces.piece(each.g, each.contact.pattern)) == last, reversed(seen))
-        return deque(same, maxlen=1)[0].g
-
-    return _Went(
-        outcome=outcome,
-        residuals=[each.residual for each in seen],
-        floors=noises(pair, seen),
-        kinds=[each.contact.pattern for each in seen],
-        paper=paper,
-        why=why,
-        end=lambda: seen[-1],
-        entry=entry,
-    )
-
-
 def _reason(outcome: Outcome, steps: int, paper: int | None, why: str) -> dict[str, str]:
-    """Why a run has no count of steps."""
+    """Return why a run has no count of steps."""
     found = {
         "converged": {},
         "limit": {"iterations": f"not converged in {steps} steps"},

@@ -7,7 +7,7 @@ requires is checked for each of them.  Where one fails T is evaluated as elsewhe
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -42,6 +42,8 @@ class Steps:
         ``|||T g - g|||`` and the larger of ``|||g|||`` and ``|||T g|||`` in the norm (5.21).
     pattern, piece : object
         Equal for steps of one contact pattern, and of one affine piece.
+    found : Iterate or None
+        The one step, for other rules than constant relaxation.
     """
 
     g: Floats
@@ -51,6 +53,12 @@ class Steps:
     scale: Floats
     pattern: bytes
     piece: tuple[bytes, ...]
+    found: Iterate | None = None
+
+    def first(self, count: int) -> Steps:
+        """Return the first of them."""
+        arrays = {name: getattr(self, name)[..., :count] for name in ("g", "u", "image", "residual", "scale")}
+        return replace(self, **arrays)
 
 
 class Affine:
@@ -117,11 +125,10 @@ class Affine:
 
 
 class Norm:
-    """The norm (5.21) of columns, the rounding of each, and the limit of friction at each node."""
+    """The norm (5.21) of columns, and the limit of friction at each node."""
 
     def __init__(self, pair: ContactPair) -> None:
         self._factor = np.linalg.inv(pair.neumann.root)
-        self.rounding = Noise(pair).of
         self.limits = (float(pair.friction) * pair.contact.grid.weights)[:, None]
 
     def of(self, force: Floats) -> Floats:
@@ -175,6 +182,11 @@ class KnownPieces:
         return Norm(self.pair)
 
     @cached_property
+    def noise(self) -> Noise:
+        """The rounding of one evaluation of T."""
+        return Noise(self.pair)
+
+    @cached_property
     def _solution(self) -> Iterate | Exception:
         try:
             return at_solution(self.map())
@@ -198,7 +210,7 @@ class KnownPieces:
         while True:
             found = iterate_at(T, g)
             piece = self.piece(g, found.contact.pattern)
-            yield self._single(found, piece)
+            yield replace(self.single(found), found=None)
             g = theta * found.image + (1 - theta) * g
             affine, count = self.affine(piece), FEWEST
             relaxed, kept = affine.relaxed(theta), count
@@ -206,17 +218,17 @@ class KnownPieces:
                 with np.errstate(over="ignore", invalid="ignore"):  # of a run that diverges; no sign admits it
                     taken, kept = affine.on(_walk(*relaxed, g, count), self.norm)
                 if kept:
-                    yield _first(taken, kept)
+                    yield taken.first(kept)
                     g = theta * taken.image[:, kept - 1] + (1 - theta) * taken.g[:, kept - 1]
                 if kept == count:
                     kept = count = min(2 * count, MOST)
 
-    def _single(self, found: Iterate, piece: Piece) -> Steps:
-        g = found.g[:, None]
+    def single(self, found: Iterate) -> Steps:
+        """Return one evaluation of T with its piece."""
+        key = key_of(self.piece(found.g, found.contact.pattern))
+        g, u, image = (column[:, None] for column in (found.g, found.displacement, found.image))
         residual, scale = np.array([found.residual]), np.array([found.scale])
-        key = key_of(piece)
-        u = found.displacement[:, None]
-        return Steps(g=g, u=u, image=found.image[:, None], residual=residual, scale=scale, pattern=key[0], piece=key)
+        return Steps(g=g, u=u, image=image, residual=residual, scale=scale, pattern=key[0], piece=key, found=found)
 
 
 def _walk(matrix: Floats, offset: Floats, g: Floats, count: int) -> Floats:
@@ -226,15 +238,3 @@ def _walk(matrix: Floats, offset: Floats, g: Floats, count: int) -> Floats:
         walked[:, i] = g
         g = matrix @ g + offset
     return walked
-
-
-def _first(steps: Steps, count: int) -> Steps:
-    return Steps(
-        g=steps.g[:, :count],
-        u=steps.u[:, :count],
-        image=steps.image[:, :count],
-        residual=steps.residual[:count],
-        scale=steps.scale[:count],
-        pattern=steps.pattern,
-        piece=steps.piece,
-    )
