@@ -39,7 +39,7 @@ FLOORS: dict[str, dict[str, str]] = {
         "verification": "dense interrupts progress spreadsheet threads value",
         "verification.sections": "__init__ layout numbers parts",
     },
-    "input": {"verification.problem": "__init__ examples files meshes reading specification specs tables writing"},
+    "input": {"verification.problem": "__init__ examples files reading specification specs tables writing"},
     "results, extras": {"verification": "document extras"},
     "bodies": {
         "verification.interface": (
@@ -55,9 +55,7 @@ FLOORS: dict[str, dict[str, str]] = {
         ),
     },
     "runs over grids": {
-        "verification.sweeps": (
-            "__init__ bodies cluster course export grid identity keeping lean row store sweep workers"
-        )
+        "verification.sweeps": ("__init__ bodies cluster course export grid identity keeping row store sweep workers")
     },
     "bounds, proofs": {
         "verification.bounds": (

@@ -93,8 +93,6 @@ def judge_bound(result: BoundResult, seen: StepRatio | None, outside: str) -> Ju
     if result.not_computed:
         return Judgement(verdict="NOT_COMPUTED", reason=result.not_computed)
     factor = result.factor
-    if factor is None:
-        return judge(None, seen, result.why)
-    if factor.hi is None or not result.proved:
-        return judge(factor.value, seen, result.why)
-    return judge(factor.hi, seen, result.why, proved=True)
+    if factor is not None and factor.hi is not None and result.proved:
+        return judge(factor.hi, seen, result.why, proved=True)
+    return judge(None if factor is None else factor.value, seen, result.why)

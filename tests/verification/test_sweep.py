@@ -18,7 +18,7 @@ from verification.contact import ContactError, active_set
 from verification.interface import body
 from verification.sweeps import course, grid, workers
 from verification.sweeps.bodies import SharedBodies
-from verification.sweeps.lean import KnownPieces
+from verification.sweeps.course import KnownPieces
 from verification.sweeps.row import RESULTS, row
 
 SMALL = vf.example("section6").changed(cells=((10, 2), (8, 2)), radius="0.2", max_iterations=200)

@@ -48,11 +48,9 @@ def write_interface(pair: ContactPair, path: Path) -> None:
         arrays |= {f"S{i}": side.stiffness, f"load{i}": side.load, f"known{i}": side.known, f"free{i}": side.free}
         if side.loose:
             arrays[f"motions{i}"] = side.motions
+    for name, grid in (("", interface.contact), ("_neumann", interface.neumann)):
+        arrays |= {f"x{name}": grid.x, f"weights{name}": grid.weights}
     arrays |= {
-        "x": interface.contact.x,
-        "weights": interface.contact.weights,
-        "x_neumann": interface.neumann.x,
-        "weights_neumann": interface.neumann.weights,
         "gap": interface.gap,
         "friction": str(pair.friction),
         "neumann_body": str(pair.neumann_body),

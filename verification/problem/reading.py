@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import importlib
 import math
+import re
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
 from ndtheory import HypothesisError
-from verification.problem.meshes import MeshFile, sha256_text
 from verification.problem.specs import (
     INTERVAL_SIDES,
     MOST_CELLS,
@@ -21,6 +21,7 @@ from verification.problem.specs import (
     Components,
     ContactSpec,
     IterationSpec,
+    MeshFile,
     ProblemSpec,
     SidePart,
     Theta,
@@ -127,18 +128,13 @@ def _read_shape(table: TomlTable, dimension: int, source: str) -> dict[str, Any]
             if name in table:
                 raise table.refuse(name, None, "needed either mesh or shape, x, y and cells, not both")
         return {"shape": "mesh", "mesh": _read_mesh(table, source)}
-    natural = "interval" if dimension == 1 else "rectangle"
-    shape = table.take("shape", choice(natural, "rigid"))
+    axes = ("x", "y")[:dimension]
+    shape = table.take("shape", choice("interval" if dimension == 1 else "rectangle", "rigid"))
     if shape == "rigid":
-        read_rigid = {"x": table.take("x", ends, None)}
-        if dimension == 2:
-            read_rigid["y"] = table.take("y", ends, None)
-        return {"shape": shape, **read_rigid}
-    if dimension == 1:
-        read: dict[str, Any] = {"x": table.take("x", ends), "cells": (table.take("cells", at_least_one),)}
-    else:
-        pair = several(at_least_one, 2, "two whole numbers >= 1, along x and y")
-        read = {"x": table.take("x", ends), "y": table.take("y", ends), "cells": table.take("cells", pair)}
+        return {"shape": shape, **{axis: table.take(axis, ends, None) for axis in axes}}
+    read: dict[str, Any] = {axis: table.take(axis, ends) for axis in axes}
+    pair = several(at_least_one, 2, "two whole numbers >= 1, along x and y")
+    read["cells"] = table.take("cells", pair) if dimension == 2 else (table.take("cells", at_least_one),)
     if math.prod(read["cells"]) > MOST_CELLS:
         raise table.refuse("cells", list(read["cells"]), f"needed at most {MOST_CELLS} cells")
     return {"shape": shape, **read}
@@ -156,7 +152,7 @@ def _read_mesh(table: TomlTable, source: str) -> MeshFile:
     if isinstance(given, MeshFile):
         return given
     if isinstance(given, TomlTable):
-        name, sha256 = given.take("path", text), given.take("sha256", sha256_text)
+        name, sha256 = given.take("path", text), given.take("sha256", _sha256)
         given.close()
     else:
         name, sha256 = given, None
@@ -165,6 +161,14 @@ def _read_mesh(table: TomlTable, source: str) -> MeshFile:
         return MeshFile.read(path, sha256)
     except Unfit as error:
         raise table.refuse("mesh", path, str(error)) from None
+
+
+def _sha256(value: object) -> str:
+    """Read a SHA-256 in hexadecimal digits."""
+    given = text(value)
+    if not re.fullmatch("[0-9a-f]{64}", given):
+        raise Unfit("needed the SHA-256 of the mesh file, 64 hexadecimal digits")
+    return given
 
 
 def _components(dimension: int, *, free: bool) -> Any:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from fractions import Fraction
+from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 from ndtheory import HypothesisError, relaxation_factor
-from verification.problem.meshes import MeshFile
+from verification.problem.tables import Unfit, unreadable
 
 V = TypeVar("V")
 
@@ -20,6 +22,9 @@ Theta = Fraction | Literal["auto"]
 
 RECTANGLE_SIDES = ("left", "right", "bottom", "top")
 INTERVAL_SIDES = ("left", "right")
+
+#: Largest size of a mesh file: several times the size of the largest mesh as text.
+MOST_MESH_BYTES = 200_000_000
 
 #: Largest number of cells of a body, so that a typing error does not fill the memory.
 MOST_CELLS = 250_000
@@ -57,6 +62,58 @@ class ReadOnly(Mapping[str, V]):
 
     def __repr__(self) -> str:
         return repr(self._values)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeshFile:
+    """A mesh file as it was when the problem was read.
+
+    Attributes
+    ----------
+    path : Path
+        Absolute, so that it means the same file wherever the process or the problem goes.
+    sha256 : str
+        Of the content, in hexadecimal digits.
+    """
+
+    path: Path
+    sha256: str
+
+    @classmethod
+    def read(cls, path: Path, sha256: str | None = None) -> MeshFile:
+        """Return the file at a path.
+
+        Raises
+        ------
+        Unfit
+            Not a file, too large, or with another SHA-256 than the one given.
+        """
+        file = cls(path=path.absolute(), sha256=sha256 or _fingerprint(path))
+        why = file.unusable() if sha256 else None
+        if why:
+            raise Unfit(why)
+        return file
+
+    def unusable(self) -> str | None:
+        """Return why the file is not the one that was read, or None where it is."""
+        try:
+            found = _fingerprint(self.path)
+        except Unfit as error:
+            return str(error)
+        if found == self.sha256:
+            return None
+        return f"its content has changed: needed the file with sha256 {self.sha256}, this one has {found}"
+
+
+def _fingerprint(path: Path) -> str:
+    why = unreadable(path, MOST_MESH_BYTES)
+    if why:
+        raise Unfit(why)
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise Unfit(f"cannot be read: {error.strerror}") from None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,8 +11,7 @@ from typing import Any
 from ndtheory import exact
 from ndtheory.number import LARGEST_EXPONENT
 from ndtheory.texts import CONTROL
-from verification.problem.meshes import MeshFile
-from verification.problem.specs import BodySpec, ProblemSpec
+from verification.problem.specs import BodySpec, MeshFile, ProblemSpec
 
 #: Integers up to this size are doubles: readers of JSON agree on them.
 LARGEST_INTEGER = 2**53

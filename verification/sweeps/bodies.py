@@ -13,7 +13,7 @@ from verification.interface.interface import Law
 from verification.interface.pair import ContactPair, pair_from
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
-from verification.sweeps.lean import KnownPieces
+from verification.sweeps.course import KnownPieces
 
 #: The axes of a grid that change bodies or what joins them; friction and theta do not.
 OF_BODIES = ("young", "neumann_body", "law", "radius")
