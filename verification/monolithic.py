@@ -85,7 +85,8 @@ class Solution(Document):
         for i, (body, sign) in enumerate(((self.bodies.body1, -1.0), (self.bodies.body2, 1.0))):
             if body is not None:
                 load = body.load.copy()
-                load[body.interface] += sign * self.bodies.force_on(body, self.force)[body.unknown]
+                force = self.force if body is not self.bodies.neumann else self.bodies.interface.carry_back(self.force)
+                load[body.interface] += sign * force[body.unknown]
                 full = body.known.values.ravel().copy()
                 k = body.motions.shape[1]
                 full[body.positions] = body.solve(load) + body.motions @ self.motion[used : used + k]

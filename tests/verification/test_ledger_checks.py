@@ -28,7 +28,7 @@ def loaded(case, force):
     weak, fields = case.weak, []
     for body, own in zip((weak.one, weak.two), force, strict=True):
         load = body.load.copy()
-        load[body.interface] += weak.pair.orient(own)
+        load[body.interface] += weak.pair.contact.orient(own)
         fields.append(body.solve(load))
     return Fields(one=fields[0], two=fields[1])
 

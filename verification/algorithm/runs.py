@@ -42,6 +42,9 @@ R = TypeVar("R")
 #: Why a run is not linearised: that takes longer than the run, and is done only on request.
 NOT_ASKED = "not worked out: linearise() does"
 
+#: The values that a linearisation adds to the document of a run.
+LINEARISED = ("linearised_rate", "linearised_norm", "linearised_radius", "linearised_margin", "predicted_rate")
+
 #: Bytes that the iterates of a run may fill, and the measured size of each without its four arrays.
 MOST_BYTES, ITERATE_BYTES = 2_000_000_000, 1600
 
@@ -267,13 +270,15 @@ class Run(Document):
         reason: dict[str, str] = {"start": self.start.why} if self.start.why else {}
         if proved is None:
             reason["proved_rate"] = "momentum without friction has one; for a constant theta see the bounds"
+        linearised: dict[str, float | None] = dict.fromkeys(LINEARISED)
         if linear is None:
-            names = ("linearised_rate", "linearised_norm", "linearised_radius", "linearised_margin", "predicted_rate")
-            reason |= dict.fromkeys(names, self.why_not_linearised)
+            reason |= dict.fromkeys(LINEARISED, self.why_not_linearised)
         else:
+            found = (linear.rate, linear.norm, linear.radius, _finite(linear.margin), linear.predicted)
+            linearised = dict(zip(LINEARISED, found, strict=True))
             if linear.predicted is None:
                 reason["predicted_rate"] = "the run did not end in a stretch of steps without a change of state"
-            if not np.isfinite(linear.margin):
+            if linearised["linearised_margin"] is None:
                 reason["linearised_margin"] = "no change of g changes a state"
         if self.coupled_residual is None:
             reason["coupled_residual"] = NO_FORCE
@@ -303,11 +308,7 @@ class Run(Document):
             "observed_rate_interval": None if rate is None else [rate.lo, rate.hi],
             "observed_growth": self.observed_growth,
             "forecast": None if self.forecast is None else vars(self.forecast),
-            "linearised_rate": None if linear is None else linear.rate,
-            "linearised_norm": None if linear is None else linear.norm,
-            "linearised_radius": None if linear is None else linear.radius,
-            "linearised_margin": None if linear is None or not np.isfinite(linear.margin) else linear.margin,
-            "predicted_rate": None if linear is None else linear.predicted,
+            **linearised,
             "unrelaxed_residual": _finite(self.last.relative_residual),
             "coupled_residual": None if self.coupled_residual is None else _finite(self.coupled_residual),
             "kkt_residual": self.last.contact.kkt.residual,

@@ -8,7 +8,7 @@ and the reaction on the other body is ``force = q - S v``.  ``model`` is the pro
 exactly, ``kkt`` certifies either.
 """
 
-from verification.contact.kkt import KKT, TOLERANCE, certify
+from verification.contact.kkt import KKT, TOLERANCE
 from verification.contact.step import ContactError, ContactSolution, ContactStep, NoMinimiser, Solver
 
-__all__ = ["KKT", "TOLERANCE", "ContactError", "ContactSolution", "ContactStep", "NoMinimiser", "Solver", "certify"]
+__all__ = ["KKT", "TOLERANCE", "ContactError", "ContactSolution", "ContactStep", "NoMinimiser", "Solver"]

@@ -86,10 +86,3 @@ class KKTCertificate:
             bound=worst(size[:t] - bound) / forces,
             slip=worst(np.minimum(length[:t], np.abs(force[:t] - bound * np.sign(v[:t])))) / forces,
         )
-
-
-def certify(
-    S: Floats, q: Floats, bound: Floats, v: Floats, force: Floats, free: NDArray[np.bool_] | None = None
-) -> KKT:
-    """Measure how far (v, force) is from solving step II; see :class:`KKTCertificate`."""
-    return KKTCertificate(S, free).measure(q, bound, v, force)

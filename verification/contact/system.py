@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem1d2d.mesh import Floats, Ints
+from verification.contact.active_set import Pattern
 from verification.dense import STILL
 
 #: A solution is accepted below this relative KKT residual.
@@ -30,26 +31,15 @@ class SolveError(RuntimeError):
     """The global method did not reach its KKT certificate."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Branches:
-    """The branch that each complementarity condition takes.
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Branches(Pattern):
+    """The branch of each complementarity condition: the state of each node, and the sign of S lambda_N, shape (t,)."""
 
-    Attributes
-    ----------
-    touching : bool array, shape (n,)
-    sliding : int array, shape (t,)
-        0 where the node sticks, else the sign of its slip.
-    threshold : int array, shape (t,)
-        Sign of S lambda_N.
-    """
-
-    touching: NDArray[np.bool_]
-    sliding: NDArray[np.int8]
     threshold: NDArray[np.int8]
 
+    @property
     def key(self) -> bytes:
-        """Bytes that are equal for equal branches."""
-        return self.touching.tobytes() + self.sliding.tobytes() + self.threshold.tobytes()
+        return super().key + self.threshold.tobytes()
 
 
 class ContactSystem:
@@ -167,14 +157,14 @@ class ContactSystem:
         """Solve for the branches and correct them by the signs found until they agree; None where they repeat."""
         seen: set[bytes] = set()
         for _ in range(LIMIT):
-            if branches.key() in seen:
+            if branches.key in seen:
                 return None
-            seen.add(branches.key())
+            seen.add(branches.key)
             solved = self._equilibrium(branches)
             if solved is None:
                 return None
             mended = self._mend(branches, *solved)
-            if mended.key() == branches.key():
+            if mended.key == branches.key:
                 found = Equilibrium(force=solved[0], motion=solved[1], branches=branches)
                 return found if self.residual(*solved) <= TOLERANCE else None
             branches = mended

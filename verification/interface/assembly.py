@@ -96,10 +96,6 @@ class TwoBodies(Value):
         """The body whose traces reach the contact grid by the transfer; None where it is rigid."""
         return self.body2 if self.problem.contact_body == 1 else self.body1
 
-    def force_on(self, body: Body, force: Floats) -> Floats:
-        """Return nodal forces on the contact grid as the grid of a body receives them."""
-        return self.interface.carry_back(force) if body is self.neumann else force
-
     @property
     def elastic(self) -> list[Body]:
         """The bodies that are not rigid."""

@@ -9,7 +9,6 @@ import numpy as np
 
 from fem1d2d.mesh import Floats
 from verification.contact.active_set import Pattern
-from verification.contact.system import Branches
 from verification.interface.interface import Grid
 from verification.value import Value
 
@@ -49,7 +48,7 @@ class ContactFields(Value):
         return ", ".join(f"{count} {name}" for name, count in self.pattern.items())
 
     @classmethod
-    def of(cls, grid: Grid, *, force: Floats, jump: Floats, state: Pattern | Branches) -> ContactFields:
+    def of(cls, grid: Grid, *, force: Floats, jump: Floats, state: Pattern) -> ContactFields:
         """Make the fields from interface vectors on the contact grid, tangential components first.
 
         Parameters
@@ -58,8 +57,7 @@ class ContactFields(Value):
             Nodal forces: tangential on body 2, normal compressive.
         jump : array
             ``u1_T - u2_T`` and ``[u_N] - gap <= 0``.
-        state : Pattern or Branches
-            Which nodes touch, shape (n,), and the sign of their slip, shape (n,) or (0,).
+        state : Pattern
         """
         plane, zero = grid.t > 0, np.zeros(grid.n)
         slides = state.sliding != 0 if plane else np.ones(grid.n, dtype=bool)

@@ -95,10 +95,6 @@ class ContactPair(Value):
         """+1 where the outward normal of the contact body points up (body 1), -1 where it points down (body 2)."""
         return 1.0 if self.neumann_body == 2 else -1.0
 
-    def orient(self, interface: Floats) -> Floats:
-        """Turn interface vectors of the contact grid between y and n of the contact body (its own inverse)."""
-        return self.contact.orient(interface)
-
     def at(self, *, friction: Numeric) -> ContactPair:
         """Return the same bodies at another friction; condensed matrices are shared.
 

@@ -27,7 +27,7 @@ def hats(body: Body) -> Floats:
 def closing(weak: Weak, u: Fields) -> Floats:
     """Moves of body 1 by hat functions that undo the jump of u at one node, in one direction."""
     count = len(weak.one.interface)
-    return np.asarray(hats(weak.one)[:, :count] * -weak.pair.orient(weak.jump(u.one, u.two)))
+    return np.asarray(hats(weak.one)[:, :count] * -weak.pair.contact.orient(weak.jump(u.one, u.two)))
 
 
 def _sizes(rng: np.random.Generator, size: float, count: int) -> Floats:

@@ -8,9 +8,10 @@ evaluated as elsewhere, with its certificate.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -256,32 +257,6 @@ def _walk(matrix: Floats, offset: Floats, g: Floats, count: int) -> Floats:
     return walked
 
 
-@dataclass(frozen=True, kw_only=True)
-class Course:
-    """Result of a run.
-
-    Attributes
-    ----------
-    steps : int
-        Steps until it ended, as :attr:`verification.algorithm.runs.Run.iterations` counts them.
-    paper : int or None
-        n at which the test of Section 6.3 is met.
-    outcome : {'converged', 'stalled', 'limit', 'diverged'}
-    observed_rate, linearised_rate, coupled_residual : float or None
-        As in a run.
-    reason : mapping
-        Why a value is None, or why the outcome is not ``converged``.
-    """
-
-    steps: int
-    paper: int | None
-    outcome: Outcome
-    observed_rate: float | None
-    linearised_rate: float | None
-    coupled_residual: float | None
-    reason: Mapping[str, str] = field(default_factory=dict)
-
-
 def meets_paper_test(g: Floats, before: Floats) -> NDArray[np.bool_]:
     """Apply the test of Section 6.3, ``|g_n - g_{n-1}|/|g_n| < 1e-9`` or ``|g_n - g_{n-1}| < 1e-9``, to every column.
 
@@ -291,8 +266,19 @@ def meets_paper_test(g: Floats, before: Floats) -> NDArray[np.bool_]:
     return (increment < PAPER) | (increment < PAPER * lengths(g))
 
 
-def course(pair: ContactPair, rule: Rule, choice: Choice, step: Step, pieces: KnownPieces) -> Course:
-    """Run from the start of a pair until both tests are met, or the run stalls, runs away or reaches its limit.
+def course(
+    pair: ContactPair, rule: Rule, choice: Choice, step: Step, pieces: KnownPieces
+) -> tuple[dict[str, Any], dict[str, str]]:
+    """Run a pair from its start until both tests are met, or the run stalls, runs away or reaches its limit.
+
+    Returns
+    -------
+    dict
+        The columns of the run in its row, by name: ``steps``, the number until the run ended; ``iterations``, the same
+        if it converged; ``iterations_paper``, n at which the test of Section 6.3 is met; ``outcome``; the other three
+        as a run has them.
+    dict
+        Why a column is None, by its name.
 
     Raises
     ------
@@ -306,10 +292,12 @@ def course(pair: ContactPair, rule: Rule, choice: Choice, step: Step, pieces: Kn
         T = pieces.map()
         went = _follow(pieces, map(pieces.single, iterates(T, step, pieces.start.g)), T, lean=False)
     assert went is not None  # only lean steps leave it to others
-    reason = _reason(went.outcome, len(went.residuals) - 1, went.paper, went.why)
+    steps = len(went.residuals) - 1
+    reason = _reason(went.outcome, steps, went.paper, went.why)
     observed = None if went.outcome == "diverged" else rate_of(went.residuals, went.floors, went.kinds)
     if observed is None:
-        reason["observed_rate"] = _no_rate(went.outcome)
+        diverged = went.outcome == "diverged"
+        reason["observed_rate"] = "the run diverged" if diverged else "too few steps stand clear of the rounding"
     end: Iterate | None = None
     coupled, linear = None, None
     try:
@@ -327,15 +315,16 @@ def course(pair: ContactPair, rule: Rule, choice: Choice, step: Step, pieces: Kn
         linear = linearised_rate(pieces.piece(here.g, here.contact.pattern), here, float(choice.theta), first)
     except (NotLinear, SolveError, ContactError) as error:
         reason["linearised_rate"] = str(error)
-    return Course(
-        steps=len(went.residuals) - 1,
-        paper=went.paper,
-        outcome=went.outcome,
-        observed_rate=None if observed is None else observed.value,
-        linearised_rate=linear,
-        coupled_residual=coupled,
-        reason=reason,
-    )
+    columns = {
+        "iterations": steps if went.outcome == "converged" else None,
+        "iterations_paper": went.paper,
+        "steps": steps,
+        "outcome": went.outcome,
+        "observed_rate": None if observed is None else observed.value,
+        "linearised_rate": linear,
+        "coupled_residual": coupled,
+    }
+    return columns, reason
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -453,7 +442,3 @@ def _reason(outcome: Outcome, steps: int, paper: int | None, why: str) -> dict[s
     if paper is None:
         found["iterations_paper"] = why or f"not met before the run ended: {outcome}"
     return found
-
-
-def _no_rate(outcome: Outcome) -> str:
-    return "the run diverged" if outcome == "diverged" else "too few steps stand clear of the rounding"

@@ -1,10 +1,13 @@
-"""One row of a sweep: a function of a problem and the values of a grid, which never raises."""
+"""One row of a sweep, a function of a problem and the values of a grid which never raises; and what rows share."""
 
 from __future__ import annotations
 
 import math
 import sys
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cached_property, lru_cache
 from typing import Any
 
 from ndtheory import HypothesisError
@@ -12,16 +15,26 @@ from ndtheory.energy_norms import one_minus_square
 from ndtheory.texts import clean, printable
 from verification.algorithm.relaxation import Constant, Rule, rule_of
 from verification.algorithm.theta import Choice, begin
+from verification.constants import Measured, measure
 from verification.contact import ContactError
-from verification.interface.pair import ContactPair
+from verification.interface.interface import Law
+from verification.interface.pair import ContactPair, pair_from
 from verification.monolithic import SolveError
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
-from verification.sweeps.bodies import RowSetting, SharedBodies
-from verification.sweeps.course import Course, course
+from verification.sweeps.course import KnownPieces, course
 from verification.threads import one_thread
 
 Row = dict[str, Any]
+
+#: The axes of a grid that change bodies or what joins them; friction and theta do not.
+OF_BODIES = ("young", "neumann_body", "law", "radius")
+
+#: Values of those axes, as pairs of name and value.
+Changes = tuple[tuple[str, Any], ...]
+
+#: Number of pairs and constants that are kept: rows that share them are neighbours.
+KEPT = 16
 
 #: The columns of a row that the grid may vary.
 GIVEN = ("theta", "friction", "young1", "young2", "neumann_body", "refine", "law", "radius", "rule")
@@ -42,6 +55,99 @@ RENAMED = {"sharp_factor": "energy_factor"}
 #: The columns of whole numbers and of texts; the others are numbers.
 WHOLE = ("neumann_body", "refine", "iterations", "iterations_paper", "steps")
 TEXTS = ("law", "rule", "outcome", "reason")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RowSetting:
+    """Shared data of rows that differ only in theta or in the rule.
+
+    ``pieces`` are the affine pieces of T that runs have passed through.
+    """
+
+    pair: ContactPair
+    measured: Measured
+    pieces: KnownPieces
+
+    @cached_property
+    def energy(self) -> tuple[float, float, float] | None:
+        """rho, kappa_1 and kappa_2 of the theorem in energy norms; None where they do not exist."""
+        found = self.measured.energy_constants()
+        return None if found is None else (float(found.at_work), float(found.kappa_1), float(found.kappa_2))
+
+
+class SharedBodies:
+    """The pairs and the constants of a sweep of ``start``, each made once while it is in use.
+
+    A row does not depend on the rows before it: bodies are always scaled from those of the problem on the mesh of the
+    row, and constants always measured for the modulus of body 2 that the problem has.
+    """
+
+    def __init__(self, start: Problem | ContactPair) -> None:
+        self.start = start
+        self.problem = start if isinstance(start, Problem) else start.problem
+        self._law: Law | None = None if isinstance(start, Problem) else start.interface.law
+        self._base = lru_cache(maxsize=2)(self._condense)
+        self._pair = lru_cache(maxsize=KEPT)(self._change)
+        self._constants = lru_cache(maxsize=KEPT)(self._measure)
+        self._setting = lru_cache(maxsize=KEPT)(self._set)
+
+    def setting(self, values: Mapping[str, Any]) -> RowSetting:
+        """Return the data that a row shares with the rows of the same bodies and friction."""
+        return self._setting(*self._key(values), values.get("friction"))
+
+    def _set(self, refine: int, changes: Changes, friction: Fraction | None) -> RowSetting:
+        pair = self._pair(refine, changes)
+        if friction is not None:
+            pair = pair.at(friction=friction)
+        named = dict(changes)
+        if "young" in named and self.problem is not None:
+            # rho and the kappas do not change where both moduli are multiplied by one number
+            lower, upper = named["young"]
+            second = self.problem.body2.young
+            named["young"] = (lower / upper * second, second)
+        measured = self._constants(refine, tuple(named.items()))
+        if measured.of_friction:  # else friction is absent, or its constants do not exist
+            measured = measured.with_friction(float(pair.friction))
+        return RowSetting(pair=pair, measured=measured, pieces=KnownPieces(pair))
+
+    @staticmethod
+    def _key(values: Mapping[str, Any]) -> tuple[int, Changes]:
+        return values.get("refine", 0), tuple((name, values[name]) for name in OF_BODIES if name in values)
+
+    def _condense(self, refine: int) -> ContactPair:
+        """Condense the bodies of the problem on a mesh halved so often."""
+        if isinstance(self.start, ContactPair) and not refine:
+            return self.start
+        return pair_from(self._refined(refine), law=self._law)
+
+    def _refined(self, refine: int) -> Problem:
+        if self.problem is None:
+            raise ProblemError("<matrices>", "refine", refine, "needed a problem, whose mesh can be halved")
+        return self.problem.refined(refine)
+
+    def _change(self, refine: int, changes: Changes) -> ContactPair:
+        changed = dict(changes)
+        if self.problem is None:
+            base = self._base(refine)
+            roles = changed.pop("neumann_body", base.neumann_body)
+            if changed:
+                name, value = next(iter(changed.items()))
+                raise ProblemError("<matrices>", name, value, "needed a problem, whose values can change")
+            return base if roles == base.neumann_body else base.swapped()
+        try:
+            base = self._base(refine)
+        except ProblemError:  # the roles or the law of the problem do not fit; those of the row may
+            if not changed:
+                raise
+            law = None if {"law", "radius"} & changed.keys() else self._law
+            return pair_from(self._refined(refine).changed(**changed), law=law)
+        return base.changed(**changed) if changed else base
+
+    def _measure(self, refine: int, changes: Changes) -> Measured:
+        """Measure rho and the constants of the energy norms, not those of Section 5."""
+        pair = self._pair(refine, changes)
+        contact, neumann = replace(pair.contact, body=None), replace(pair.neumann, body=None)
+        return measure(replace(pair, contact=contact, neumann=neumann, problem=None))
 
 
 def is_row(found: Any) -> bool:
@@ -172,17 +278,9 @@ def _run(found: Row, setting: RowSetting, values: Mapping[str, Any]) -> dict[str
     proved, unproved = _proved(setting, chosen_rule, choice)
     found |= proved
     why |= unproved
-    went: Course = course(pair, chosen_rule, choice, step, setting.pieces)
-    found |= {
-        "iterations": went.steps if went.outcome == "converged" else None,
-        "iterations_paper": went.paper,
-        "steps": went.steps,
-        "outcome": went.outcome,
-        "observed_rate": went.observed_rate,
-        "linearised_rate": went.linearised_rate,
-        "coupled_residual": went.coupled_residual,
-    }
-    return why | dict(went.reason)
+    columns, unmet = course(pair, chosen_rule, choice, step, setting.pieces)
+    found |= columns
+    return why | unmet
 
 
 def _proved(setting: RowSetting, rule: Rule, choice: Choice) -> tuple[Row, dict[str, str]]:

@@ -18,8 +18,7 @@ from verification.interface.pair import ContactPair
 from verification.interrupts import begin_child, undisturbed
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
-from verification.sweeps.bodies import SharedBodies
-from verification.sweeps.row import Row, row
+from verification.sweeps.row import Row, SharedBodies, row
 
 #: Rows by their places in the grid.
 Placed = list[tuple[int, Row]]
