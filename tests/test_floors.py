@@ -55,7 +55,7 @@ FLOORS: dict[str, dict[str, str]] = {
         ),
     },
     "runs over grids": {
-        "verification.sweeps": ("__init__ cluster course export grid identity keeping row store sweep workers")
+        "verification.sweeps": ("__init__ cluster course export grid identity row store sweep workers")
     },
     "bounds, proofs": {
         "verification.bounds": (

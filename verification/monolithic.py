@@ -144,7 +144,12 @@ def solve(problem: Problem | TwoBodies | ContactPair | Path | str) -> Solution:
     >>> round(float(solve(example("two-bars")).contact.pressure[0]), 12)
     0.075
     """
-    bodies = _bodies(problem)
+    if isinstance(problem, ContactPair):
+        bodies = problem.on_meshes()
+    elif isinstance(problem, TwoBodies):
+        bodies = problem
+    else:
+        bodies = discretise(problem if isinstance(problem, Problem) else load(problem))
     with one_thread():
         system = contact_system(bodies)
         found = system.solve()
@@ -158,14 +163,6 @@ def solve(problem: Problem | TwoBodies | ContactPair | Path | str) -> Solution:
         kkt_residual=residual,
         linear_solves=system.linear_solves,
     )
-
-
-def _bodies(problem: Problem | TwoBodies | ContactPair | Path | str) -> TwoBodies:
-    if isinstance(problem, TwoBodies):
-        return problem
-    if isinstance(problem, ContactPair):
-        return problem.on_meshes()
-    return discretise(problem if isinstance(problem, Problem) else load(problem))
 
 
 def solution_force(pair: ContactPair) -> Floats:

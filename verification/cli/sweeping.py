@@ -99,7 +99,7 @@ def sweep(
     from verification.output.files import check_ours
     from verification.sections import sweep as shown
     from verification.sweeps.grid import read_sweep
-    from verification.sweeps.keeping import plan
+    from verification.sweeps.store import plan
     from verification.sweeps.sweep import sweep_grid, work_of
 
     if dask is not None and jobs is not None:

@@ -133,10 +133,6 @@ def _show(place: Place | None) -> str:
     return "" if place is None else f"({', '.join(f'{c:.6g}' for c in place)})"
 
 
-def _place(point: Floats) -> Place:
-    return tuple(float(c) for c in point)
-
-
 def _strain(bodies: TwoBodies, moved: Displacements) -> tuple[float, Place | None]:
     """Return the largest absolute principal strain, and the centre of its element."""
     largest, at = 0.0, None
@@ -145,7 +141,10 @@ def _strain(bodies: TwoBodies, moved: Displacements) -> tuple[float, Place | Non
             strains = largest_strains(body.mesh, u)
             cell = int(np.argmax(strains))
             if strains[cell] > largest:
-                largest, at = float(strains[cell]), _place(body.mesh.points[body.mesh.cells[cell]].mean(axis=0))
+                largest, at = (
+                    float(strains[cell]),
+                    tuple(map(float, body.mesh.points[body.mesh.cells[cell]].mean(axis=0))),
+                )
     return largest, at
 
 
@@ -195,7 +194,9 @@ def _penetration(bodies: TwoBodies, moved: Displacements) -> tuple[float, Place 
         depth = depths(own.moved, other.start, other.end)
         if len(depth) and depth.max() > max(deepest, rounding):
             deepest = float(depth.max())
-            at = _place(own.drawn[np.argmax(depth >= (1 - SAME) * deepest)])  # the first of those equal up to rounding
+            at = tuple(
+                own.drawn[np.argmax(depth >= (1 - SAME) * deepest)].tolist()
+            )  # the first of those equal up to rounding
     return deepest, at
 
 

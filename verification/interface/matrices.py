@@ -155,17 +155,7 @@ def check_nodes(x: Floats, weights: Floats) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Header:
-    """The header of one array in a file.
-
-    Attributes
-    ----------
-    name : str
-        Of the array in its file; empty where the file is one array.
-    entries : int
-        Number of its numbers, truth values or texts.
-    entry_bytes : int
-        Memory for one of them.
-    """
+    """The header of one array: its name, empty in a file of one array, the number of entries and the bytes of one."""
 
     name: str
     entries: int

@@ -293,7 +293,13 @@ def course(
         went = _follow(pieces, map(pieces.single, iterates(T, step, pieces.start.g)), T, lean=False)
     assert went is not None  # only lean steps leave it to others
     steps = len(went.residuals) - 1
-    reason = _reason(went.outcome, steps, went.paper, went.why)
+    reason = {
+        "limit": {"iterations": f"not converged in {steps} steps"},
+        "stalled": {"iterations": f"no new least residual over {PATIENCE} steps"},
+        "diverged": {"iterations": f"the residual grew by more than {RUNAWAY:g}"},
+    }.get(went.outcome, {})
+    if went.paper is None:
+        reason["iterations_paper"] = went.why or f"not met before the run ended: {went.outcome}"
     observed = None if went.outcome == "diverged" else rate_of(went.residuals, went.floors, went.kinds)
     if observed is None:
         diverged = went.outcome == "diverged"
@@ -428,17 +434,3 @@ def _paper(g: Floats, before: Floats, last: int) -> int | None:
     columns = np.column_stack([before, g]) if len(before) else g
     met = np.flatnonzero(meets_paper_test(columns[:, 1:], columns[:, :-1]))
     return None if not len(met) else last + int(met[0]) + (1 if len(before) else 2)
-
-
-def _reason(outcome: Outcome, steps: int, paper: int | None, why: str) -> dict[str, str]:
-    """Return why a run has no count of steps."""
-    found = {
-        "converged": {},
-        "limit": {"iterations": f"not converged in {steps} steps"},
-        "stalled": {"iterations": f"no new least residual over {PATIENCE} steps"},
-        "diverged": {"iterations": f"the residual grew by more than {RUNAWAY:g}"},
-        "interrupted": {},
-    }[outcome]
-    if paper is None:
-        found["iterations_paper"] = why or f"not met before the run ended: {outcome}"
-    return found

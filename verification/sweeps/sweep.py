@@ -19,8 +19,8 @@ from verification.problem.specification import Problem
 from verification.progress import Progress, silent
 from verification.spreadsheet import as_csv
 from verification.sweeps.grid import SweepGrid
-from verification.sweeps.keeping import Kept
 from verification.sweeps.row import FAILED, Row
+from verification.sweeps.store import Kept
 from verification.sweeps.workers import Work, alone, together
 
 if TYPE_CHECKING:
@@ -239,14 +239,12 @@ def sweep(
     >>> [(round(row["theta"], 3), row["iterations"], round(row["rho"], 12)) for row in found.rows]
     [(0.333, 1, 2.0), (0.5, 32, 2.0)]
     """
-    start: Problem | ContactPair
     if isinstance(problem, (Problem, ContactPair)):
         start = problem
     else:
         start = read_interface(Path(problem)) if Path(problem).suffix == ".npz" else load(problem)
-    of = start.source if start.source else "<dict>"
     axes = {"theta": theta, "friction": friction, "young": young, "neumann_body": neumann_body, "refine": refine}
-    grid = SweepGrid.of(axes | {"law": law, "radius": radius, "rule": rule}, of)
+    grid = SweepGrid.of(axes | {"law": law, "radius": radius, "rule": rule}, start.source)
     place = None if store is None else Path(store)
     return sweep_grid(start, grid, work=work_of(jobs, dask), store=place, fresh=fresh, retry=retry, progress=progress)
 
