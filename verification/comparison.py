@@ -264,11 +264,11 @@ def compare(
     reason = {name: why for name, why in missing.items() if why}
     seen = largest_step_ratio(pair, finished.iterates)
     if seen is None:
-        reason["step_ratio"] = "no step stands clear of rounding"
+        reason["step_ratio"] = "no step is clear of rounding"
 
     outside = "outside the theorem: " + "; ".join(finished.outside) if finished.outside else ""
     if not isinstance(finished.rule, Constant) and not outside:
-        outside = f"the bounds speak of a constant theta, not of {finished.relaxation}"
+        outside = f"the bounds hold for a constant theta, not for {finished.relaxation}"
     verdicts = {name: judge_bound(result, seen, outside) for name, result in results.items()}
     verdicts["linearised"] = judge_forecast(finished)
     return Comparison(

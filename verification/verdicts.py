@@ -49,7 +49,7 @@ def judge(bound: float | None, seen: StepRatio | None, why_none: str, *, proved:
     if bound is None:
         return Judgement(verdict="HYPOTHESES_NOT_MET", reason=why_none)
     if seen is None:
-        return Judgement(verdict="INCONCLUSIVE", reason="no step stands clear of rounding")
+        return Judgement(verdict="INCONCLUSIVE", reason="no step is clear of rounding")
     if seen.steps == 0:
         return Judgement(verdict="NOT_COMPUTED", reason="no step was taken")
     digits = 4 if seen.hi <= bound else 6  # six where the bound is attained or violated

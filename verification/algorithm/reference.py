@@ -85,7 +85,7 @@ def by_cvxpy_alone(run: Run) -> Reference:
         whole=True,
         observed_rate=None if rate is None else rate.value,
         largest_difference=max(_over(error, found.scale) for error, found in zip(errors, seen, strict=True)),
-        why="" if rate is not None else "fewer than two step ratios stand clear of the program's errors",
+        why="" if rate is not None else "fewer than two step ratios are clear of the program's errors",
     )
 
 

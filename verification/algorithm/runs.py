@@ -282,7 +282,7 @@ class Run(Document):
                 reason["linearised_margin"] = "no change of g changes a state"
         if self.coupled_residual is None:
             reason["coupled_residual"] = NO_FORCE
-        few = "fewer than two step ratios stand clear of rounding"
+        few = "fewer than two step ratios are clear of rounding"
         if rate is None:
             why = "the run diverged: it shows growth, not a rate" if self.outcome == "diverged" else few
             reason |= {"observed_rate": why, "observed_rate_interval": why}

@@ -225,7 +225,7 @@ def discretise(problem: Problem, *, law: Law | None = None, dense: bool = True) 
         body1=body1, body2=body2, interface=interface, friction=problem.contact.friction, problem=problem
     )
     if len(bodies.elastic) == 2 and _move_together(bodies):
-        needed = "body1 and body2 can move rigidly together, each held by the other alone: fix or prescribe some sides"
+        needed = "body1 and body2 can move rigidly together, each held only by the other: fix or prescribe some sides"
         raise problem.refuse("body2", None, needed)
     return bodies
 
@@ -284,7 +284,9 @@ def _with_parts(problem: Problem, name: Name, mesh: Mesh) -> Mesh:
     for key, part in getattr(problem, name).parts.items():
         refuse = lambda needed, key=key: problem.refuse(f"{name}.parts.{key}", None, needed)
         if key in mesh.sides or part.side not in mesh.sides:
-            raise refuse(f"needed a part of a side, under a name of its own; sides: {short(', '.join(mesh.sides))}")
+            raise refuse(
+                f"needed a part of a side, with a name that no side has; sides: {short(', '.join(mesh.sides))}"
+            )
         edges, slack = mesh.sides[part.side], SAME * extent(mesh)
         along = mesh.points[edges, "xy".index(part.axis)].astype(float)
         low, high = map(float, part.ends)

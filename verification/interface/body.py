@@ -254,7 +254,7 @@ class Condensed(Value):
         turn = self.grid.turn
         return replace(
             self,
-            stiffness=self.grid.turn_form(self.stiffness),
+            stiffness=turn(turn(self.stiffness).T),
             load=turn(self.load),
             known=turn(self.known),
             upward=not self.upward,

@@ -83,10 +83,6 @@ class Grid(Value):
         turned[self.normal] *= -1.0
         return turned
 
-    def turn_form(self, matrix: Floats) -> Floats:
-        """Do the same with a symmetric matrix on interface vectors."""
-        return self.turn(self.turn(matrix).T)
-
 
 class Law(ABC):
     """A law of friction: the friction bound at a contact node is ``w_j k |(S sigma_N)_j|``, with S linear.
@@ -248,5 +244,5 @@ class Interface(Value):
             The grids differ: each direction has its own transfer.
         """
         if self.transfer is not None:
-            raise ValueError("the grids differ: needed a pair built for these roles, with a transfer of its own")
+            raise ValueError("the grids differ: needed a pair built for these roles, with its own transfer")
         return Interface(contact=self.neumann, neumann=self.contact, gap=self.gap, law=self.law)

@@ -135,7 +135,7 @@ def _read(values: Any, read: Callable[[Any], Any], refuse: Callable[[Any, str], 
         except Unfit as error:
             raise refuse(value, str(error)) from None
         if one in found:
-            raise refuse(value, f"needed each value once, {show(value)} stands there twice")
+            raise refuse(value, f"needed each value once, {show(value)} is listed twice")
         found[one] = None
     return tuple(found)
 
