@@ -32,7 +32,7 @@ T = TypeVar("T")
 
 
 class Listener:
-    """Receives each part of a comparison as soon as it is known, in the order of these methods.
+    """A receiver of each part of a comparison as soon as it is known, in the order of these methods.
 
     This one ignores them; a screen shows them.  A part that was not asked for is left out.  Ctrl-C in a method leaves
     out all later parts.
@@ -284,7 +284,7 @@ def compare(
 
 
 class _UntilCtrlC:
-    """Computes the remaining parts.  After Ctrl-C no further part is computed, but each is still reported."""
+    """The remaining parts of a comparison.  After Ctrl-C no further one is computed, but each is still reported."""
 
     def __init__(self, interrupted: bool) -> None:
         self.interrupted = interrupted

@@ -78,7 +78,7 @@ def arrived(pair: ContactPair, iterate: Iterate) -> bool:
 
 
 class Ending:
-    """Decides when a run ends, from its residuals one by one."""
+    """The rule that ends a run, from its residuals one by one."""
 
     def __init__(self, settings: Settings) -> None:
         self._tolerance, self._most = settings.tolerance, settings.max_iterations

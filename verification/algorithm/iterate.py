@@ -35,7 +35,7 @@ class Iterate(Value):
     scale : float
         ``max(|||g|||, |||T g|||)``, the present size of the forces, with which the residual is compared.  An earlier
         size would mislead: a stiff contact body may throw the bodies apart in the first step, and g then decays
-        without contact. A run whose loads give no force has a fixed scale instead, see
+        without contact.  A run whose loads give no force has a fixed scale instead, see
         :func:`verification.algorithm.start.least_scale`.
     """
 

@@ -1,4 +1,4 @@
-"""Makes a contact pair from a problem, a problem file, an interface file, or matrices."""
+"""A contact pair from a problem, a problem file, an interface file, or matrices."""
 
 from __future__ import annotations
 

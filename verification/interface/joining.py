@@ -1,4 +1,4 @@
-"""Gamma_c: finds where the surfaces of two bodies lie opposite each other, and joins their grids there."""
+"""Gamma_c, where the surfaces of two bodies lie opposite each other, and the join of their grids there."""
 
 from __future__ import annotations
 

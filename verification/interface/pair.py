@@ -101,7 +101,7 @@ class ContactPair(Value):
         Raises
         ------
         HypothesisError
-            Unless k >= 0, or where friction has no law.
+            Unless k >= 0, or if friction has no law.
         """
         law = self.interface.kernel is not None
         needed = "a number >= 0" if law else "0: without a law of friction there is none"
@@ -115,7 +115,7 @@ class ContactPair(Value):
         """Return the pair of its problem with other values, which are those of :meth:`verification.Problem.changed`.
 
         Condensed matrices are shared: a body is condensed anew only where its mesh, its supports or its Poisson ratio
-        change. Young's modulus multiplies its stiffness.  A law that was given to the pair stays unless ``law`` or
+        change.  Young's modulus multiplies its stiffness.  A law that was given to the pair stays unless ``law`` or
         ``radius`` is given; the settings come from the changed problem.
 
         Raises

@@ -1,4 +1,4 @@
-"""Reads the tables of a problem file: from nested dictionaries to the validated data of a problem."""
+"""Reading of the tables of a problem file: from nested dictionaries to the validated data of a problem."""
 
 from __future__ import annotations
 

@@ -125,7 +125,7 @@ class Sweep(Document):
 
 @dataclass(kw_only=True)
 class Tally:
-    """Counts rows as they come in, and reports the rows done, failed and left, and the time to go."""
+    """A count of rows as they come in: done, failed and left, with the time to go."""
 
     asked: int
     stored: int
