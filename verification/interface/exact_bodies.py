@@ -1,6 +1,6 @@
 """The discrete problem of the exact rationals of a problem: matrices with radii, and the join of the grids.
 
-The topology (which nodes lie on which side, and which unknowns they hold) is that of the bodies in doubles.  The
+The topology (which nodes lie on which side, and which unknowns they hold) is taken from the bodies in doubles.  The
 numbers are not: ends, moduli, length and radius are the rationals of the problem, the nodes of a rectangle divide its
 exact sides, and the nodes of a mesh file are the doubles read from it.
 """

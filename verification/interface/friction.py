@@ -15,8 +15,9 @@ from fem1d2d.mesh import Floats
 from verification.interface.interface import Interface, Law
 from verification.value import Value
 
-#: Part of the friction that the kernel may lose or add without a warning.  The share under an even pressure agrees with
-#: that of a block that slides as a whole within 0.01: 0.93 and 0.92 at radius 0.2 on a length of 1, 0.67 and 0.67 at 1.
+#: Part of the friction that the kernel may lose or add without a warning.  The share under an even pressure agrees
+#: within 0.01 with the share of a block that slides as a whole: 0.93 and 0.92 at radius 0.2 on a length of 1, 0.67 and
+#: 0.67 at 1.
 SHARE = 0.1
 
 

@@ -78,8 +78,8 @@ class RowSetting:
 class SharedBodies:
     """The pairs and the constants of a sweep of ``start``, each made once while it is in use.
 
-    A row does not depend on the rows before it: bodies are always scaled from those of the problem on the mesh of the
-    row, and constants always measured for the modulus of body 2 that the problem has.
+    A row does not depend on the rows before it: bodies are always scaled from the problem's own bodies on the mesh of
+    the row, and constants always measured for the modulus of body 2 that the problem has.
     """
 
     def __init__(self, start: Problem | ContactPair) -> None:

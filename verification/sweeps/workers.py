@@ -190,9 +190,9 @@ def _start_trackers() -> None:
 def _stop(executor: Any, waiting: Collection[Future[Handed]]) -> None:
     """End the processes at once: their results are not wanted any more.
 
-    The executor's thread looks up every batch that it was given, also those that it forgot when it was told to end,
-    and then shows a traceback.  So it is told only once it has put all of them into its queue, which holds `AHEAD` for
-    each process.
+    The executor's thread looks up every batch that it was given, also one that it dropped when it had to end, and then
+    shows a traceback.  So it must end only once it has put all of them into its queue, which holds `AHEAD` for each
+    process.
     """
     if executor is None:
         return
