@@ -18,7 +18,7 @@ BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
 sys.path += [str(BENCHMARKS), str(Path(__file__).resolve().parent)]  # folders of scripts, not packages
 
 import speed_page  # noqa: E402
-from builder import commands  # noqa: E402
+from builder import api, cheat_sheet, commands  # noqa: E402
 
 project = "ndtheory"
 author = "The ndtheory maintainers"
@@ -54,6 +54,7 @@ autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented"
 autodoc_member_order = "bysource"
 autodoc_use_type_comments = False  # there are none: looking for them takes seconds
+viewcode_follow_imported_members = False  # else the sources of the standard library become pages
 # An attribute that a docstring lists is looked for by its bare name in all classes, of which two may have it.  Nothing
 # else warns under this name; references to what does not exist are found by the tests.
 suppress_warnings = ["ref.python"]
@@ -69,6 +70,9 @@ html_static_path = [
     str(distribution("sphinx-mathjax-offline").locate_file(f"sphinx-mathjax-offline/static/mathjax/{MATHJAX}")),
 ]
 html_css_files = ["site.css"]
+html_search_scorer = str(
+    Path(__file__).with_name("search_scores.js")
+)  # pages that explain come before those of the API
 mathjax_path = MATHJAX
 mathjax3_config = {
     "tex": {
@@ -113,6 +117,16 @@ def write_commands(app: Sphinx) -> None:
     (source / "generated" / "commands.md").write_text(commands.page(cli, "ndtheory"), encoding="utf-8")
 
 
+def write_api(app: Sphinx) -> None:
+    """The pages of the API, one for each module that there is."""
+    api.write(Path(app.srcdir) / "generated")
+
+
+def write_cheat_sheet(app: Sphinx) -> None:
+    """The cheat sheet as a page and a PDF, with the numbers of Section 6 as they are computed now."""
+    cheat_sheet.write(Path(app.srcdir) / "generated")
+
+
 def prepare_kernels(app: Sphinx, env: BuildEnvironment, pages: list[str]) -> None:
     """Before the first page is read, so that all processes that read have what the kernels need."""
     if pages:
@@ -154,6 +168,8 @@ def setup(app: Sphinx) -> None:
     app.connect("builder-inited", write_ledger)
     app.connect("builder-inited", write_commands)
     app.connect("builder-inited", write_speed)
+    app.connect("builder-inited", write_api)
+    app.connect("builder-inited", write_cheat_sheet)
     app.connect("env-before-read-docs", prepare_kernels)
     for name in ("verdict", "ledger"):
         app.add_role(name, FromLedger())

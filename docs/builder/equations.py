@@ -22,7 +22,7 @@ PACKAGES = ("fem1d2d", "ndtheory", "verification")
 GENERATED = "generated"
 
 #: Of more places the first ones are shown.
-SHOWN = 6
+SHOWN = 8
 
 
 #: Where a number between quotation marks is that of a statement, and not a number.

@@ -48,12 +48,16 @@ class gallery(nodes.General, nodes.Element):
 
 
 class GalleryDirective(SphinxDirective):
-    """``{gallery}``: the main picture and the title of each page named in its lines, as links."""
+    """``{gallery}``: the main picture and the title of each page named in its lines, as links.
+
+    A line ``page | words`` shows these words, and no number and title.
+    """
 
     has_content = True
 
     def run(self) -> list[nodes.Node]:
-        return [gallery(pages=[line.strip() for line in self.content if line.strip()])]
+        lines = [line.partition("|") for line in self.content if line.strip()]
+        return [gallery(pages=[(page.strip(), words.strip()) for page, _, words in lines])]
 
 
 def fill_galleries(app: Sphinx, doctree: nodes.document, page: str) -> None:
@@ -66,7 +70,7 @@ def fill_galleries(app: Sphinx, doctree: nodes.document, page: str) -> None:
     """
     for place in list(doctree.findall(gallery)):
         cards = nodes.container(classes=["gallery"])
-        for number, name in enumerate(place["pages"], 1):
+        for number, (name, words) in enumerate(place["pages"], 1):
             if name not in app.env.found_docs:
                 raise ExtensionError(f"{page}: no page {name!r} for the gallery")
             shown = next(app.env.get_doctree(name).findall(nodes.figure), None)
@@ -74,7 +78,7 @@ def fill_galleries(app: Sphinx, doctree: nodes.document, page: str) -> None:
                 raise ExtensionError(f"{page}: {name} has no figure for the gallery")
             picture = next(shown.findall(nodes.image)).deepcopy()
             link = nodes.reference("", "", internal=True, refuri=app.builder.get_relative_uri(page, name))
-            link += [picture, nodes.inline("", f"{number}. {app.env.titles[name].astext()}")]
+            link += [picture, nodes.inline("", words or f"{number}. {app.env.titles[name].astext()}")]
             cards += nodes.paragraph("", "", link, classes=["card"])
         place.replace_self(cards)
 
@@ -102,13 +106,15 @@ class Navigation:
     """The navigation of a page, which shows the titles of the others; kept where it would be made anew for each page.
 
     Sphinx copies all headings and all names of the API for every page, a quarter of a second, and drops them again:
-    here they are left out before.  Pages of source code stand in no table of contents, and no document in their folder:
-    those that lie equally deep share one navigation, as marks and relative links are the same.
+    here they are left out before.  Pages of modules and of their source code are in no table of contents: those in
+    equally deep folders share one navigation, as marks and relative links are the same.
     """
+
+    SHARING = ("_modules/", "generated/api/")
 
     def __init__(self) -> None:
         self.titles: dict[str, Any] = {}  # page -> its table of contents, without what lies below its titles
-        self.known: dict[tuple[Any, ...], str] = {}  # of source code: depth and options -> HTML
+        self.known: dict[tuple[Any, ...], str] = {}  # for pages that share: depth and options -> HTML
 
     def of_titles(self, tocs: dict[str, Any]) -> dict[str, Any]:
         """The tables of contents of all pages without what ``titles_only`` drops."""
@@ -136,7 +142,7 @@ class Navigation:
         make = context["toctree"]
 
         def toctree(**options: Any) -> str:
-            if not page.startswith("_modules/"):
+            if not page.startswith(self.SHARING):
                 return self.made(app, make, options)
             key = (page.count("/"), *sorted(options.items()))
             if key not in self.known:

@@ -1,4 +1,4 @@
-"""The README shows what the program prints."""
+"""README and the page on the first run show what the program prints."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ from verification.cli import main
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text("utf-8")
+FIRST_RUN = (ROOT / "docs" / "first_run.md").read_text("utf-8")
 
 
-def test_the_first_screen_is_the_output_of_demo(
+def test_the_page_on_the_first_run_shows_the_output_of_demo(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    shown = re.search(r"```text\n(.*?)```", README, re.S)
+    shown = re.search(r"```text\n(.*?)```", FIRST_RUN, re.S)
     assert shown is not None
     monkeypatch.chdir(tmp_path)
     assert main(["demo"]) == 0
@@ -47,3 +48,20 @@ def test_the_way_from_make_to_the_command_is_told_before_the_first_command_is_sh
 def test_every_command_shown_exists(capsys: pytest.CaptureFixture[str]) -> None:
     for name in sorted(set(re.findall(r"^    ndtheory (\w+)", README, re.M))):
         assert main([name, "--help"]) == 0
+
+
+def test_the_readme_names_pages_and_pictures_that_exist() -> None:
+    named = {*re.findall(r"`(docs/[\w./]+)`", README), *re.findall(r"\]\(([\w./]+)\)", README)} - {"docs/_build/html"}
+    assert {"docs/first_run.md", "docs/algorithm.svg"} <= named
+    assert [name for name in named if not (ROOT / name).is_file()] == []
+
+
+def test_the_numbers_that_the_readme_explains_are_those_of_section_6() -> None:
+    import verification as vf
+
+    advice = vf.advise(vf.example("section6"))
+    lower, upper = advice.roles
+    text = " ".join(README.split())
+    assert f"rho = {lower.rho.value:.3f} allows every theta up to 1 (2/1.475 = {2 / (1 + lower.rho.value):.2f})" in text
+    assert f"2/2.475 = {lower.theta_predicted:.2f}" in text
+    assert f"the same model has rho = {upper.rho.value:.1f}" in text

@@ -1,4 +1,4 @@
-"""The navigation of a page is made of titles, and once for pages of source code that lie equally deep."""
+"""The navigation of a page is made of titles, and once for pages of modules in equally deep folders."""
 
 import sys
 from pathlib import Path
@@ -19,7 +19,7 @@ def navigation(site_tools):
     return Navigation()
 
 
-def test_only_pages_of_source_code_that_lie_equally_deep_share_their_navigation(navigation):
+def test_only_pages_of_modules_and_source_code_in_equally_deep_folders_share_their_navigation(navigation):
     made = []
 
     def shown(page, **options):
@@ -34,10 +34,11 @@ def test_only_pages_of_source_code_that_lie_equally_deep_share_their_navigation(
     first = shown("_modules/fem1d2d/mesh", collapse=False)
     assert first == "the tree as _modules/fem1d2d/mesh links it, {'collapse': False}"
     assert shown("_modules/ndtheory/bounds", collapse=False) == first
-    others = [("_modules/ndtheory/bounds", True), ("_modules/index", False), ("api/ndtheory", False)]
-    for page, collapse in [*others, ("api/fem1d2d", False)]:
+    assert shown("generated/api/ndtheory.bounds", collapse=False) == first
+    others = [("_modules/ndtheory/bounds", True), ("_modules/index", False), ("api/index", False)]
+    for page, collapse in [*others, ("examples/index", False)]:
         assert page in shown(page, collapse=collapse)
-    assert made == ["_modules/fem1d2d/mesh", *(page for page, _ in others), "api/fem1d2d"]
+    assert made == ["_modules/fem1d2d/mesh", *(page for page, _ in others), "examples/index"]
 
 
 def test_what_lies_below_titles_is_left_out_while_titles_alone_are_asked_for(navigation):

@@ -98,6 +98,23 @@ def roles_left_over(html_dir: Path) -> list[str]:
     return found
 
 
+def foreign_sources(html_dir: Path) -> list[str]:
+    """Pages of source code that belong to no package of ours."""
+    pages = (path.relative_to(html_dir / "_modules") for path in sorted(html_dir.glob("_modules/**/*.html")))
+    return [
+        f"_modules/{path}: not our code" for path in pages if path.with_suffix("").parts[0] not in (*NAMED, "index")
+    ]
+
+
+def test_source_pages_of_other_packages_are_found(tmp_path):
+    for name in ("index", "fractions", "fem1d2d/mesh", "ndtheory", "numpy/ma/core"):
+        path = tmp_path / "_modules" / f"{name}.html"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("", encoding="utf-8")
+    found = foreign_sources(tmp_path)
+    assert [line.partition(":")[0] for line in found] == ["_modules/fractions.html", "_modules/numpy/ma/core.html"]
+
+
 @pytest.mark.parametrize(
     ("text", "count"),
     [
@@ -208,8 +225,8 @@ if __name__ == "__main__":
     if len(sys.argv) != 2 or not (Path(sys.argv[1]) / "index.html").exists():
         sys.exit("usage: python tests/docs/test_site.py DIRECTORY, the directory of a built site")
     site = Path(sys.argv[1])
-    faults = [*external_requests(site), *pictures_without_words(site), *roles_left_over(site)]
-    print("\n".join(faults) or "the site asks no other host, every picture has words, and every role was read")
+    faults = [*external_requests(site), *pictures_without_words(site), *roles_left_over(site), *foreign_sources(site)]
+    print("\n".join(faults) or "no request to another host, all pictures have words, all roles were read")
     sys.exit(bool(faults))
 
 

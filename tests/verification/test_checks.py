@@ -169,12 +169,15 @@ def test_matrices_and_runs_that_diverge_have_no_checks_and_say_why():
         assert all(why in said["reason"][name] for name in ("penetration_outside", "largest_strain"))
 
 
-def test_run_and_solve_say_the_same_of_one_problem():
-    problem = vf.Problem.from_dict(TOO_SHORT)
+@pytest.mark.parametrize("stiffer", [1, 3, 11])
+def test_run_and_solve_say_the_same_of_one_problem(stiffer):
+    """Of mirror images the same one, in all units of stress."""
+    problem = vf.Problem.from_dict(TOO_SHORT).changed(young=(70000 * stiffer, 20000 * stiffer))
     one, other = (found.to_dict()["checks"] for found in (vf.solve(problem), vf.run(problem)))
     assert one.keys() == other.keys()
     for name in ("penetration_outside", "largest_strain", "penetration_at", "strain_at"):
         assert one[name] == pytest.approx(other[name], rel=1e-6)
+    assert one["penetration_at"] == [0.4, 0.0]
 
 
 def test_runs_and_sweeps_check_nothing_before_they_are_asked(monkeypatch):

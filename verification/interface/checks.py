@@ -26,6 +26,9 @@ LARGE_STRAIN = 0.05
 #: of it is no more than the strains of the second order, which linear elasticity drops, and the mesh leave open.
 SHARE = 0.01
 
+#: Two measures of one state are equal up to this part: runs end 1e-9 from the solution, ``solve`` at rounding.
+TIE = 1e-6
+
 Place = tuple[float, ...]
 Displacements = Sequence[Floats | None]
 
@@ -133,18 +136,24 @@ def _show(place: Place | None) -> str:
     return "" if place is None else f"({', '.join(f'{c:.6g}' for c in place)})"
 
 
+def _place(point: Floats) -> Place:
+    return tuple(float(c) for c in point)
+
+
+def _first_largest(values: Floats) -> int:
+    """Return the index of the first of the largest values, so that rounding does not choose between mirror images."""
+    return int(np.argmax(values >= values.max() * (1 - TIE)))
+
+
 def _strain(bodies: TwoBodies, moved: Displacements) -> tuple[float, Place | None]:
     """Return the largest absolute principal strain, and the centre of its element."""
     largest, at = 0.0, None
     for body, u in zip((bodies.body1, bodies.body2), moved, strict=True):
         if body is not None and u is not None:
             strains = largest_strains(body.mesh, u)
-            cell = int(np.argmax(strains))
-            if strains[cell] > largest:
-                largest, at = (
-                    float(strains[cell]),
-                    tuple(map(float, body.mesh.points[body.mesh.cells[cell]].mean(axis=0))),
-                )
+            cell = _first_largest(strains)
+            if strains[cell] > largest * (1 + TIE):
+                largest, at = float(strains[cell]), _place(body.mesh.points[body.mesh.cells[cell]].mean(axis=0))
     return largest, at
 
 
@@ -192,11 +201,8 @@ def _penetration(bodies: TwoBodies, moved: Displacements) -> tuple[float, Place 
     rounding = SAME * max(float(np.ptp(surface.start, axis=0).max()) for surface in (one, two))
     for own, other in ((one, two), (two, one)):
         depth = depths(own.moved, other.start, other.end)
-        if len(depth) and depth.max() > max(deepest, rounding):
-            deepest = float(depth.max())
-            at = tuple(
-                own.drawn[np.argmax(depth >= (1 - SAME) * deepest)].tolist()
-            )  # the first of those equal up to rounding
+        if len(depth) and depth.max() > max(deepest * (1 + TIE), rounding):
+            deepest, at = float(depth.max()), _place(own.drawn[_first_largest(depth)])
     return deepest, at
 
 

@@ -1,0 +1,44 @@
+"""Each module has a page of the API and one line in the list of modules."""
+
+import importlib
+import pkgutil
+from pathlib import Path
+
+
+def test_each_module_but_those_of_commands_has_a_page(builder):
+    tops = [importlib.import_module(name) for name in ("fem1d2d", "ndtheory", "verification")]
+    inside = {found.name for top in tops for found in pkgutil.walk_packages(top.__path__, f"{top.__name__}.")}
+    every = {top.__name__ for top in tops} | inside
+    commands = {name for name in every if name.split(".")[:2] == ["verification", "cli"]}
+    assert set(builder.api.modules()) == every - commands
+
+
+def test_a_page_shows_the_members_of_its_module(builder):
+    pages = builder.api.pages({"a": Path("a/__init__.py"), "a.b": Path("a/b.py")})
+    assert ".. automodule:: a.b\n   :members:" in pages["a.b"]
+    assert ".. automodule:: a\n   :no-members:" in pages["a"]
+    assert all(page.startswith("---\norphan: true\n---\n") for page in pages.values())
+
+
+def test_the_list_has_each_module_once_with_its_first_sentence(builder):
+    found = builder.api.modules()
+    lines = builder.api.index(found).splitlines()
+    rows = [line for line in lines if line.startswith("| {doc}")]
+    assert sorted(row.split("`")[1].split(" ")[0] for row in rows) == sorted(found)
+    assert [row for row in rows if row.endswith("|  |")] == []
+    assert "| {doc}`ndtheory.bounds <api/ndtheory.bounds>` | " in "\n".join(rows)
+
+
+def test_pages_of_modules_that_are_gone_are_removed(builder, tmp_path):
+    source = tmp_path / "source"
+    for name in ("ndtheory", "fem1d2d", "verification"):
+        (source / name).mkdir(parents=True)
+        (source / name / "__init__.py").write_text(f'"""The package {name}."""\n', encoding="utf-8")
+    (source / "ndtheory" / "old.py").write_text('"""An old module."""\n', encoding="utf-8")
+    builder.api.write(tmp_path / "made", source)
+    assert (tmp_path / "made" / "api" / "ndtheory.old.md").exists()
+    (source / "ndtheory" / "old.py").unlink()
+    builder.api.write(tmp_path / "made", source)
+    pages = {path.name for path in (tmp_path / "made" / "api").iterdir()}
+    assert pages == {"ndtheory.md", "fem1d2d.md", "verification.md"}
+    assert "old" not in (tmp_path / "made" / "modules.md").read_text("utf-8")
