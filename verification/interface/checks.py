@@ -136,10 +136,6 @@ def _show(place: Place | None) -> str:
     return "" if place is None else f"({', '.join(f'{c:.6g}' for c in place)})"
 
 
-def _place(point: Floats) -> Place:
-    return tuple(float(c) for c in point)
-
-
 def _first_largest(values: Floats) -> int:
     """Return the index of the first of the largest values, so that rounding does not choose between mirror images."""
     return int(np.argmax(values >= values.max() * (1 - TIE)))
@@ -153,7 +149,8 @@ def _strain(bodies: TwoBodies, moved: Displacements) -> tuple[float, Place | Non
             strains = largest_strains(body.mesh, u)
             cell = _first_largest(strains)
             if strains[cell] > largest * (1 + TIE):
-                largest, at = float(strains[cell]), _place(body.mesh.points[body.mesh.cells[cell]].mean(axis=0))
+                centre = body.mesh.points[body.mesh.cells[cell]].mean(axis=0)
+                largest, at = float(strains[cell]), tuple(map(float, centre))
     return largest, at
 
 
@@ -202,7 +199,7 @@ def _penetration(bodies: TwoBodies, moved: Displacements) -> tuple[float, Place 
     for own, other in ((one, two), (two, one)):
         depth = depths(own.moved, other.start, other.end)
         if len(depth) and depth.max() > max(deepest * (1 + TIE), rounding):
-            deepest, at = float(depth.max()), _place(own.drawn[_first_largest(depth)])
+            deepest, at = float(depth.max()), tuple(map(float, own.drawn[_first_largest(depth)]))
     return deepest, at
 
 

@@ -173,10 +173,7 @@ class Interface(Value):
     def kernel(self) -> Floats | None:
         """S as a matrix: normal nodal forces on the Neumann grid to normal stress at the contact nodes.
 
-        Raises
-        ------
-        ValueError
-            The grids differ, and the law takes the forces of the contact grid.
+        ValueError where the grids differ, and the law takes the forces of the contact grid.
         """
         if self.law is None or self.contact.dimension == 1:
             return None
@@ -236,13 +233,7 @@ class Interface(Value):
         return form if self.transfer is None else self.carry_back(self.carry_back(form).T)
 
     def swapped(self) -> Interface:
-        """Return the interface with the roles of the grids exchanged.
-
-        Raises
-        ------
-        ValueError
-            The grids differ: each direction has its own transfer.
-        """
+        """Return the interface with the roles of the grids exchanged; ValueError where the grids differ."""
         if self.transfer is not None:
             raise ValueError("the grids differ: needed a pair built for these roles, with its own transfer")
         return Interface(contact=self.neumann, neumann=self.contact, gap=self.gap, law=self.law)
