@@ -20,19 +20,16 @@ BEGIN, END = "<!-- floors: python tests/test_floors.py -->", "<!-- end of floors
 #: From the ground upwards: floor -> package -> its modules.  A module imports from its own floor and from those below.
 FLOORS: dict[str, dict[str, str]] = {
     "theory": {
-        "ndtheory.symbolic": (
-            "__init__ checks contraction dimension energy engine estimates further intervals mechanics "
-            "one_node one_step printed quotient symbols weak_form"
-        ),
+        "ndtheory.symbolic": "__init__ checks dimension engine further mechanics quotient section5 symbols",
         "ndtheory": (
-            "__init__ bounds constants continuum energy energy_bounds energy_norms errors intervals moduli "
+            "__init__ bounds constants continuum energy_norms errors intervals moduli "
             "number scalar segments statements strip texts wedges"
         ),
     },
     "elastic bodies": {
         "fem1d2d": (
-            "__init__ assembly condense element enclosed exact lifted loewner material mesh mesh_files "
-            "mesh_reader outline overlap pencil proved strain supports trace transfer"
+            "__init__ assembly condense element enclosed exact loewner material mesh mesh_files mesh_reader outline "
+            "pencil proved supports trace"
         )
     },
     "for all of verification": {
@@ -73,28 +70,25 @@ FLOORS: dict[str, dict[str, str]] = {
         ),
         "verification.reproduce": "__init__ claims experiments readings refutation",
         "verification.ledger": (
-            "__init__ cases convergence differences draws enclosed_pairs enclosures evidence experiments "
-            "field_problems found inequalities large_friction moves rational_pairs reading record rows sheets "
-            "solutions sources weak_forms worst"
+            "__init__ cases convergence differences enclosures evidence experiments inequalities large_friction "
+            "rational_pairs record rows sheets solutions sources weak_forms worst"
         ),
     },
     "parts of results": {
         "verification.sections": (
-            "advice advised bounds certificate comparison constants continuum ledger logs moduli of_results region "
-            "reproduction run setting sweep tex"
+            "advice answer bounds certificate comparison constants ledger of_results reproduction run setting sweep"
         )
     },
     "figures": {
         "verification.figures": (
-            "__init__ best_theta bodies factor of_results region reproduction residuals rules style sweep waterfall"
+            "__init__ best_theta bodies factor of_results region reproduction residuals style sweep waterfall"
         )
     },
     "files": {"verification.output": "__init__ files folder report"},
     "names for users": {"verification": "__init__"},
     "commands, test kit": {
         "verification.cli": (
-            "__init__ advising calculator certifying console drawing failing forms ledger main matrices options "
-            "problems remedies reproducing shell sweeping typed"
+            "__init__ advising calculator certifying console forms ledger main options problems sweeping"
         ),
         "verification.testing": "__init__ bounds laws properties rules steps strategies transforms",
     },
@@ -102,8 +96,8 @@ FLOORS: dict[str, dict[str, str]] = {
 
 #: Lines of each package at most, those of packages inside it apart: whoever needs more says here how many.
 BUDGET = {
-    "fem1d2d": 3300,
-    "ndtheory": 6100,
+    "fem1d2d": 3000,
+    "ndtheory": 5600,
     "verification": 1200,
     "verification.advice": 4900,
     "verification.algorithm": 2130,

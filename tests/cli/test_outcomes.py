@@ -12,6 +12,7 @@ from verification import comparison, figures, verdicts
 from verification.cli.problems import examples
 from verification.contact import ContactError
 from verification.monolithic import SolveError
+from verification.sections.comparison import WORDS
 from verification.verdicts import Judgement
 
 DONE, NOT_MET, BAD_INPUT, INCONCLUSIVE, INTERRUPTED, CRASH = 0, 1, 2, 3, 130, 70
@@ -41,7 +42,8 @@ def test_a_command_ends_with_its_status_in_words_and_as_a_document(call, write, 
     assert (run["outcome"], answer.status) == (outcome, status)
     screen = call(command, file)
     assert screen.status == status
-    assert re.search(rf"^  observed .* {outcome}$", screen.out, flags=re.M)
+    line = rf"^  seen +{outcome} after " if command == "compare" else rf"^  observed .* {outcome}$"
+    assert re.search(line, screen.out, flags=re.M)
     assert answer.err == screen.err
 
 
@@ -70,7 +72,7 @@ def test_the_worst_verdict_decides(call, write, monkeypatch, judged, edits, stat
     answer = call("compare", write(edits))
     assert answer.status == status
     for name, verdict in judged.items():
-        assert re.search(rf"^  {name} +{verdict} +made up$", answer.out, flags=re.M)
+        assert re.search(rf"^  {name} +{WORDS[verdict]} +made up$", answer.out, flags=re.M)
 
 
 def test_bad_input_wins_over_everything(call, write, monkeypatch):

@@ -26,7 +26,7 @@ from verification.bounds.neighbours import squared
 from verification.bounds.pattern_search import FoundFactor, worst_piece
 from verification.constants import Measured, measure
 from verification.interface.pair import ContactPair, pair_from
-from verification.ledger.draws import uniform_piece
+from verification.ledger.differences import uniform_piece
 
 #: Labels whose worst pair is an eigenvector; of the others it is searched.
 EIGENVALUES = ("(5.18)", "(5.19)", "(5.22)", "(5.23)", "(5.29)")

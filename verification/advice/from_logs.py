@@ -9,8 +9,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from ndtheory.constants import take
-from ndtheory.energy import SMALLEST
+from ndtheory.constants import SMALLEST, take
 from ndtheory.energy_norms import predicted_rate, predicted_theta
 from ndtheory.number import below
 from verification.advice.columns import seen_column

@@ -7,8 +7,7 @@ from fractions import Fraction
 from typing import Any
 
 from ndtheory import Number
-from ndtheory.constants import take
-from ndtheory.energy import LARGEST, SMALLEST
+from ndtheory.constants import LARGEST, SMALLEST, take
 from ndtheory.energy_norms import predicted_theta
 from ndtheory.number import Numeric
 from verification.advice.next_run import Made, anew, pasted_or_not

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import os
+import shutil
+import sys
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from verification.cli.console import Interrupted, complain, deliver, one_by_one, progress, say, stages
-from verification.cli.failing import remember
-from verification.cli.options import FILE, FOLDER, JSON, SET, SWAP, folder_name, of_a_run
-from verification.cli.remedies import remedy
-from verification.cli.typed import Typed
+from verification.cli.console import Interrupted, complain, deliver, one_by_one, progress, remember, say, stages
+from verification.cli.options import FILE, FOLDER, JSON, SET, SWAP, Typed, folder_name, of_a_run
 
 if TYPE_CHECKING:
     from verification.algorithm.runs import Run
     from verification.comparison import Comparison
+    from verification.interface.pair import ContactPair
     from verification.problem.specification import Problem
 
 
@@ -77,12 +80,7 @@ def _title(text: str) -> str:
 def load_problem(
     file: Path, keys: Mapping[str, str], *, theta: str | None = None, relaxation: str | None = None, swap: bool = False
 ) -> Problem:
-    """The problem of a file with what the options change: first --set, then the others.
-
-    Raises
-    ------
-    ProblemError, HypothesisError
-    """
+    """The problem of a file, changed by the options: first --set, then the others."""
     from verification.problem import ProblemError, load
     from verification.problem.reading import takes_theta
 
@@ -274,7 +272,6 @@ def demo(folder: Path, as_json: bool) -> int:
     Example:
       ndtheory demo -o section6
     """
-    from verification.cli.shell import unreached
     from verification.output.folder import Folder
     from verification.problem import load
 
@@ -296,7 +293,7 @@ def _compare(problem: Problem, typed: Typed, folder: Path | None, solver: Any, a
     pair = pair_from(problem)
     _warn(pair.warnings)
     parts = None if as_json else Parts(pair, one_by_one(needed=target is not None))
-    with stages() as tell, progress(tell, problem.iteration.tolerance) as watch:
+    with stages() as tell, progress(tell, problem.iteration.tolerance) as watch, parts or nullcontext():
         comparison = verdicts.compare(pair, solver=solver, watch=watch, progress=tell, listener=parts, **asked)
     _warn(comparison.run.warnings[len(pair.warnings) :])
     write = None if target is None else lambda: target.write_comparison(comparison)
@@ -329,3 +326,66 @@ def _status_of_comparison(comparison: Comparison, swapped: bool) -> int:
     if outcome in ("stalled", "diverged"):
         return _status_of_run(comparison.run, swapped)
     return 3 if comparison.inconclusive else 0
+
+
+def remedy(finished: Run, swapped: bool) -> str:
+    """Advice after a run that did not converge, with ``--swap-roles`` or without, in one sentence."""
+    from verification.algorithm.ending import MOST
+    from verification.algorithm.rates import noise
+    from verification.constants import measure
+
+    pair, theta, last = finished.pair, float(finished.theta), finished.last
+    apart = finished.coupled_residual is not None and finished.coupled_residual > MOST
+    if finished.outcome == "limit" and not apart:
+        return "not converged: max_iterations was reached while the residual still fell; raise it, or change theta"
+    if last.residual <= 100 * noise(pair, last):
+        reached = f"{last.relative_residual:.1e}"
+        return f"{finished.outcome}: the residual fell to rounding, {reached}; the tolerance must be larger than that"
+    if theta < 1e-9:
+        return f"{finished.outcome}: a step of theta = {theta:g} is lost in rounding; try a larger theta"
+    rho = measure(pair)
+    here = f"{finished.outcome}: theta = {theta:g} does not contract here"
+    if finished.outcome == "limit":
+        here = "not converged: max_iterations was reached far from a state of contact"
+    roles = "without --swap-roles" if swapped else "--swap-roles"
+    exchanged = _exchanged(pair)
+    if rho.rho_max is None:
+        return f"{here}; try a smaller theta" + (f", or {roles}" if exchanged else "")
+    beside = None if exchanged is None else measure(exchanged).rho_max
+    good, other = _worth_trying(rho.rho_max.value), 0.0 if beside is None else _worth_trying(beside.value)
+    better = f", or {roles} with --theta {other:.2g}" if other > good else ""
+    if theta <= good:
+        return f"{here}; try --theta {theta / 2:.2g}{better}"
+    return f"{here}; try --theta {good:.2g} (2/(2 + rho), rho = {rho.rho_max.value:.3g}){better}"
+
+
+def _exchanged(pair: ContactPair) -> ContactPair | None:
+    """The pair with its roles exchanged; None if these roles are refused."""
+    try:
+        return pair.swapped()
+    except ValueError:  # problem errors are such
+        return None
+
+
+def _worth_trying(rho: float) -> float:
+    """2/(2 + rho), and below 1 when it is written with two figures."""
+    return min(2 / (2 + rho), 0.99)
+
+
+def unreached() -> list[str]:
+    """Messages for a user whose shell does not find the command that was started by the name ``ndtheory``.
+
+    Empty if it does, or if the program was started in another way.
+    """
+    started = Path(sys.argv[0])
+    if started.name != "ndtheory" or not started.exists():
+        return []
+    found = shutil.which("ndtheory")
+    if found is not None and os.path.samefile(found, started):
+        return []
+    near = os.path.relpath(started) if started.absolute().is_relative_to(Path.cwd()) else str(started)
+    activate = os.path.join(os.path.dirname(near), "activate")
+    said = [f"`ndtheory` is not on the PATH of this shell: type {quote(near)} for it"]
+    if os.path.exists(activate):
+        said.append(f"or, once in each shell: source {quote(activate)}")
+    return said

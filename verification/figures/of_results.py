@@ -29,19 +29,7 @@ from verification.sweeps.sweep import Sweep
 
 @singledispatch
 def draw(result: Any, **options: Any) -> Figure:
-    """Draw the main figure of a result.
-
-    Parameters
-    ----------
-    result : Document
-    options
-        What the ``plot`` of its type takes.
-
-    Raises
-    ------
-    ValueError
-        There is nothing to draw.
-    """
+    """Draw the main figure of a result with the options of its ``plot``; ValueError if there is nothing to draw."""
     raise ValueError(f"a {type(result).__name__} has no figure")
 
 

@@ -23,6 +23,7 @@ from verification.algorithm.fixed_point import FixedPointMap
 from verification.interface.body import Condensed
 from verification.interface.exact_bodies import ExactInterface, exact_points
 from verification.interface.pair import pair_from
+from verification.ledger.cases import rectangle
 from verification.ledger.evidence import Evidence, Level
 from verification.problem.specification import Problem
 from verification.threads import one_thread
@@ -32,24 +33,8 @@ Exact = NDArray[Any]
 
 #: Two blocks with three contact nodes and a body inside, on one grid.
 BLOCKS: Mapping[str, Any] = {
-    "body1": {
-        "shape": "rectangle",
-        "x": [0, 2],
-        "y": [-1, 0],
-        "cells": [2, 2],
-        "young": 3,
-        "poisson": "1/4",
-        "fixed": ["bottom"],
-    },
-    "body2": {
-        "shape": "rectangle",
-        "x": [0, 2],
-        "y": [0, 1],
-        "cells": [2, 2],
-        "young": 2,
-        "poisson": "1/3",
-        "fixed": ["top"],
-    },
+    "body1": rectangle([0, 2], [-1, 0], [2, 2], 3, "1/4", fixed=["bottom"]),
+    "body2": rectangle([0, 2], [0, 1], [2, 2], 2, "1/3", fixed=["top"]),
     "contact": {"friction": "1/2", "radius": 1},
 }
 
@@ -81,13 +66,7 @@ def solved(A: Exact, B: Exact) -> Exact:
 
 
 class ExactSide:
-    """A body in rationals, as its contact nodes feel it.
-
-    Parameters
-    ----------
-    problem : Problem
-    side : Condensed
-        The same in doubles.
+    """A body, condensed to its contact nodes in rationals; ``side`` is the same in doubles.
 
     Attributes
     ----------
@@ -121,19 +100,7 @@ class ExactSide:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RationalSolution:
-    """Steps I and II for one force, in rationals.
-
-    Attributes
-    ----------
-    g, reaction : array of Fraction
-        psi and T psi.
-    w_1, w_2 : array of Fraction
-        Traces of both bodies.
-    slip, bound : array of Fraction
-        Tangential jump, and ``w k |S sigma_N|``, by node.
-    state : str
-        What the nodes do.
-    """
+    """Steps I and II for the force g, with ``reaction = T g``, traces w_1 and w_2, and ``bound = w k |S sigma_N|``."""
 
     g: Exact
     reaction: Exact
@@ -145,15 +112,7 @@ class RationalSolution:
 
 
 class RationalPair:
-    """The difference of two solutions of steps I and II, every number of which is rational.
-
-    Parameters
-    ----------
-    table : mapping
-        A problem without loads, whose grids are one.
-    forces : pair of arrays of Fraction
-        psi and psi~.
-    """
+    """The difference of two solutions of steps I and II for a problem without loads on one grid, all rational."""
 
     def __init__(self, table: Mapping[str, Any] = BLOCKS, forces: tuple[Exact, ...] = FORCES) -> None:
         problem = Problem.from_dict(table)
@@ -172,13 +131,7 @@ class RationalPair:
         self.friction = -((one.bound - other.bound) @ (abs(one.slip) - abs(other.slip)))
 
     def solve(self, g: Exact) -> RationalSolution:
-        """Steps I and II.
-
-        Raises
-        ------
-        ArithmeticError
-            What doubles say of the nodes leads to no exact solution.
-        """
+        """Steps I and II; ArithmeticError if the states found in doubles lead to no exact solution."""
         n, S = self.n, self.one.S
         assert self.kernel is not None
         _, found = FixedPointMap(self.pair, "active-set")(g.astype(float))
@@ -199,7 +152,7 @@ class RationalPair:
             and (force[:n] * slip == bound * abs(slip)).all()
         )
         if not satisfied:
-            raise ArithmeticError("what doubles say of the nodes leads to no exact solution of step II")
+            raise ArithmeticError("the states of the nodes in doubles lead to no exact solution of step II")
         state = f"{int(touching.sum())} of {n} nodes touch, {int((sliding != 0).sum())} slip"
         return RationalSolution(g=g, reaction=force, w_1=w_2 + v, w_2=w_2, slip=slip, bound=bound, state=state)
 
@@ -243,7 +196,7 @@ class RationalPair:
 
 
 def _number(product: Any) -> Fraction:
-    """A product of vectors of rationals: what numpy makes of it is no array."""
+    """A product of vectors of rationals, which numpy returns as an object."""
     return Fraction(product)
 
 
@@ -283,14 +236,7 @@ def in_rationals(
 
 
 def decide(pair: RationalPair, id: str) -> Evidence:
-    """The evidence of an equality or inequality; nothing is rounded, so that there always is some.
-
-    Parameters
-    ----------
-    pair : RationalPair
-    id : str
-        Of the statement.
-    """
+    """The evidence of an equality or inequality; nothing is rounded, so that there always is some."""
     left, right = EQUAL[id](pair) if id in EQUAL else AT_MOST[id](pair)
     holds = bool(np.all(left == right) if id in EQUAL else left <= right)
     apart = max(map(abs, np.atleast_1d(left - right)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +11,7 @@ from verification.algorithm.runs import Run
 from verification.interface.files import write_interface, write_transfer
 from verification.interrupts import undisturbed
 from verification.ledger import sheets
-from verification.output.files import FILES, MARKS, MOST_BYTES, Kind, check_ours, check_place, staged
+from verification.output.files import FILES, MARKS, MOST_BYTES, Kind, check_folder, check_ours, check_place, staged
 from verification.problem.tables import ProblemError, unreadable
 from verification.spreadsheet import as_csv
 
@@ -24,43 +23,26 @@ if TYPE_CHECKING:
 
 
 class Folder:
-    """A folder for results; refused at once where it cannot be written, before anything long is computed.
-
-    Parameters
-    ----------
-    path : Path
-    kind : {'run', 'solve', 'compare', 'verify', 'reproduce'}
-        What will be written: none of those files may be somebody else's.
+    """A folder for results of one kind, checked before anything long is computed.
 
     Raises
     ------
     ProblemError
-        Not a folder, not writable, or it holds a file of that name that is not ours.
+        Not a folder, not writable, or it holds a file with a name of this kind that another program has written.
     """
 
     def __init__(self, path: Path, kind: Kind) -> None:
         self.path = path
-        try:
-            path.mkdir(parents=True, exist_ok=True)
-            tempfile.TemporaryFile(dir=path).close()
-        except (OSError, ValueError) as error:
-            why = getattr(error, "strerror", None) or error
-            raise ProblemError(str(path), "", None, f"needed a folder to write to: {why}") from None
+        check_folder(path)
         for name in FILES[kind]:
             check_ours(path / name)
         if kind not in ("verify", "reproduce"):
             check_place(path / "problem.toml")  # a file of a user's stays as it is
 
     def write_problem(self, text: str) -> Path:
-        """Write ``problem.toml``.
-
-        Raises
-        ------
-        ProblemError
-            A different problem.toml is there: an edited one is not overwritten.
-        """
+        """Write ``problem.toml``; ProblemError if an edited one is there, which is not overwritten."""
         target = self.path / "problem.toml"
-        if target.exists() and (target.is_dir() or not _may_go(target.read_bytes(), text)):
+        if target.exists() and (target.is_dir() or not _replaceable(target.read_bytes(), text)):
             needed = "differs from the built-in problem: needed another folder (-o), or run compare on this file"
             raise ProblemError(str(target), "", None, needed)
         with staged(self.path, shown=target) as room:
@@ -133,8 +115,8 @@ class Folder:
                 _text(room / "verdicts.json", sheets.verdicts(ledger))
 
 
-def _may_go(there: bytes, text: str) -> bool:
-    """Whether a problem file may be replaced by a text: it is the same, or was written beside a result."""
+def _replaceable(there: bytes, text: str) -> bool:
+    """True if a problem file is the same as a text, or was written beside a result."""
     return there == text.encode() or MARKS[".toml"] in there
 
 

@@ -1,4 +1,4 @@
-"""What must be true of a bound on the factor of one step."""
+"""Properties of every bound on the factor of one step."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from verification.testing.properties import Fails, Finding, Refused, Report, exa
 from verification.testing.strategies import SEEDS, bar_problems, forces, matrix_pairs, plane_problems
 from verification.testing.transforms import problem_in_units, problem_mirrored
 
-#: Two factors are the same up to this; those of a convex program up to what its solver leaves.
+#: Two factors are the same up to this, and up to the error of its solver where a convex program gives them.
 SAME, SAME_BY_SOLVER = 1e-8, 1e-4
 
-#: An observed factor is not told from a bound below it by less than this.
+#: An observed factor may exceed its bound by this rounding error.
 NOISE = 1e-10
 
-#: The share of a factor, and of what is gained beside it, that the mutants claim.
+#: The share of a factor that one mutant claims; another one claims 1/MUTANT of the gain.
 MUTANT = 0.9
 
-#: A bound that is attained is refused where none of so many conclusions, or more, came near a step.
+#: A bound that is attained is refused if none of so many conclusions, or more, came near a step.
 ENOUGH = 5
 
 #: Distances of two random forces, over their size.
@@ -38,7 +38,7 @@ DISTANCES = (1e-2, 1.0, 1e2)
 
 
 def check_bound(bound: Bound, *, examples: int = 20) -> Report:
-    """Hold a bound on the factor of one step against what must be true of every one.
+    """Test a bound on the factor of one step.
 
     ``bounds every step``
         ``|T_theta f - T_theta g| <= factor |f - g|`` in the norm (5.21), for random forces, and for the two forces
@@ -52,26 +52,12 @@ def check_bound(bound: Bound, *, examples: int = 20) -> Report:
         The factor is the same with both moduli and all loads 4096 times as large.  Not asked of a bound whose
         violation is a finding (``finding``): that may depend on the unit, and is proved only where m >= 1.
     ``knows no unit of length``
-        The factor is the same with all lengths 1024 times as small, that of the norm too.
+        The factor is the same with all lengths 1024 times as small, the length of the norm too.
     ``sees no left or right``
-        The factor is that of the mirror image.
+        The mirror image has the same factor.
 
-    Where a bound draws no conclusion at a drawn theta, one of the interval that it names is taken.
-
-    Parameters
-    ----------
-    bound : Bound
-    examples : int
-        Cases drawn for each property.
-
-    Returns
-    -------
-    Report
-
-    Raises
-    ------
-    Refused
-        The first property that fails.
+    Where a bound draws no conclusion at a drawn theta, one of the interval that it names is taken.  ``examples`` is the
+    number of cases for each property; the first property that fails raises :class:`Refused`.
     """
     subject = f"bound {bound.name!r}"
     findings = list(_holds(subject, bound, examples))
@@ -126,7 +112,7 @@ def _pushed(draw: st.DrawFn) -> dict[str, Any]:
 
 
 def conclusion(bound: Bound, pair: ContactPair, theta: Fraction) -> BoundResult:
-    """What a bound says at theta, or inside the interval that it names where it has no factor at theta."""
+    """The result of a bound at theta, or inside the interval that it names where it has no factor at theta."""
     subject = Subject.of(pair, measure(pair))
     result = bound.evaluate(subject, theta)
     if result.factor is None and result.interval is not None:

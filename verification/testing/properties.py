@@ -1,4 +1,4 @@
-"""What a property test says: a report of what holds, or a refusal with its counterexample."""
+"""Results of property tests: a report of what holds, or a refusal with its counterexample."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ SIMPLER = 40
 
 
 class Fails(Exception):
-    """What a test of one case raises where a property fails: how, in words."""
+    """A test of one case failed; the message describes how."""
 
 
 class _Enough(BaseException):
-    """The counterexample is simple enough; hypothesis stops at what is no ``Exception``."""
+    """The counterexample is simple enough; hypothesis stops only at a ``BaseException``."""
 
 
 class Refused(AssertionError):
@@ -50,14 +50,9 @@ class Refused(AssertionError):
 
 @dataclass(frozen=True, kw_only=True)
 class Finding:
-    """What became of one property.
+    """The verdict on one property: 'holds', 'attained', 'not attained' or 'not asked'.
 
-    Attributes
-    ----------
-    property : str
-    verdict : {'holds', 'attained', 'not attained', 'not asked'}
-    detail : str
-        Over how many cases, by how much, or why it was not asked.
+    ``detail`` says over how many cases, by how much, or why it was not asked.
     """
 
     property: str
@@ -67,13 +62,7 @@ class Finding:
 
 @dataclass(frozen=True, kw_only=True)
 class Report:
-    """What holds of a subject.
-
-    Attributes
-    ----------
-    subject : str
-    findings : tuple of Finding
-    """
+    """The findings on a subject, by property."""
 
     subject: str
     findings: tuple[Finding, ...]
@@ -88,28 +77,16 @@ class Report:
 
 
 def over(cases: int) -> str:
-    """How many cases a property was held against."""
+    """The number of cases in words."""
     return f"{cases} case{'s' if cases != 1 else ''}"
 
 
 def examine(
     subject: str, property: str, cases: st.SearchStrategy[dict[str, Any]], test: Callable[..., None], *, examples: int
 ) -> Finding:
-    """Hold a property against drawn cases.
+    """Test a property on drawn cases; raise Refused with the simplest case found in which it fails.
 
-    Parameters
-    ----------
-    cases : strategy of dict
-        The keywords of ``test``.
-    test : callable
-        Raises :class:`Fails` where the property does not hold.
-    examples : int
-        How many cases are drawn.
-
-    Raises
-    ------
-    Refused
-        With the simplest case found.
+    A case is the keywords of ``test``, which raises :class:`Fails` where the property does not hold.
     """
     seen: list[Refused] = []
     tried = more = 0

@@ -1,4 +1,4 @@
-"""What must be true of a relaxation rule."""
+"""Properties of every relaxation rule."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ CLEAR = 1e-4
 #: Tolerance, and most steps, of a run that looks for the solution, and of one of the rule that is checked.
 SOLVED, ARRIVED, MOST = 1e-13, 1e-9, 300
 
-#: What a rate is claimed of: ``|g_n - g| <= 4 sqrt(1 + rho) rate^n |g_0 - g|`` in the norm (5.21).  Of the triple
+#: A rate claims that ``|g_n - g| <= 4 sqrt(1 + rho) rate^n |g_0 - g|`` in the norm (5.21).  Of the triple
 #: momentum method it is proved, where 4 stands for 2 (1 + p)/(2 - p) with p < 1.
 CONSTANT = 4.0
 
@@ -45,7 +45,7 @@ MUTANT = 0.9
 
 
 def check_rule(rule: Rule, *, examples: int = 20) -> Report:
-    """Hold a relaxation rule against what must be true of every one.
+    """Test a relaxation rule.
 
     ``stays at the solution``
         Where ``T g = g`` the next g is g.
@@ -62,24 +62,11 @@ def check_rule(rule: Rule, *, examples: int = 20) -> Report:
         ``|g_n - g| <= 4 sqrt(1 + rho) rate^n |g_0 - g|`` in the norm (5.21), where it claims a rate; ``attained`` where
         some run refutes 0.9 of that rate.
 
-    Parameters
-    ----------
-    rule : Rule
-    examples : int
-        Cases drawn for each property.
-
-    Returns
-    -------
-    Report
-
-    Raises
-    ------
-    Refused
-        The first property that fails.
+    ``examples`` is the number of cases for each property; the first property that fails raises :class:`Refused`.
     """
     subject = f"rule {rule.name!r}"
     tests: dict[str, tuple[Any, Any]] = {
-        "stays at the solution": (_solved(), _stays),
+        "stays at the solution": (SOLVED_PAIRS, _stays),
         "knows no units": (_begun(), _knows_no_units),
         "starts afresh": (st.fixed_dictionaries({"case": _begun(), "other": _begun()}), _starts_afresh),
         "sees no left, right, top or bottom": (_begun(), _sees_no_sides),
@@ -107,9 +94,7 @@ def _contracting(draw: st.DrawFn) -> ContactPair:
     return pair.at(friction=min(pair.friction, Fraction(allowed) / 2))
 
 
-@st.composite
-def _solved(draw: st.DrawFn) -> dict[str, Any]:
-    return {"pair": draw(_contracting())}
+SOLVED_PAIRS = st.fixed_dictionaries({"pair": _contracting()})
 
 
 @st.composite
@@ -141,12 +126,7 @@ def proved_theta(pair: ContactPair) -> tuple[Fraction, float]:
 def solution(pair: ContactPair) -> tuple[Floats, float]:
     """The only fixed point of T and a bound on its error in the norm (5.21), for a pair with a proved theta.
 
-    ``|g - g*| <= theta |T g - g|/(1 - q)``, whatever found g.
-
-    Raises
-    ------
-    Fails
-        No rule of this project found it.
+    ``|g - g*| <= theta |T g - g|/(1 - q)`` for every g; Fails where no rule of this project found it.
     """
     theta, q = proved_theta(pair)
     settings = replace(pair.settings, tolerance=SOLVED, max_iterations=40 * MOST)
@@ -160,7 +140,7 @@ def solution(pair: ContactPair) -> tuple[Floats, float]:
 
 
 def steps(rule: Rule, pair: ContactPair, theta: Fraction, start: Floats, count: int = STEPS) -> list[Floats]:
-    """The g of the first steps of a run, as long as the residual stands clear of rounding."""
+    """The g of the first steps of a run, as long as the residual is far above rounding."""
     choice = choose(pair, theta, rule=rule)
     found: list[Floats] = []
     for step in islice(iterates(FixedPointMap(pair), rule.begin(pair, float(choice.theta), choice.rho), start), count):
@@ -208,7 +188,7 @@ def _ends(subject: str, rule: Rule, examples: int) -> Finding:
             if done.converged and not off <= 2 * allowed + 1e-12 * done.last.scale:
                 raise Fails(f"its run converged {off:.2g} away from the solution, {done.last.scale:.2g} large")
 
-    finding = examine(subject, "ends at the solution", _solved(), test, examples=examples)
+    finding = examine(subject, "ends at the solution", SOLVED_PAIRS, test, examples=examples)
     reached = outcomes.count("converged")
     if not reached:
         how = f"none of {len(outcomes)} runs converged, and a constant theta is proved to in each"
@@ -217,7 +197,7 @@ def _ends(subject: str, rule: Rule, examples: int) -> Finding:
 
 
 def _in(role: ContactPair, other: ContactPair, error: float) -> float:
-    """An error in the norm (5.21) of one role as one in that of the other: at most sqrt(rho) times as large."""
+    """An error in the norm (5.21) of one role, in the norm of the other role: at most sqrt(rho) times as large."""
     rho = measure(role).rho_max if other.interface.transfer is None else None
     # g' S_b^-1 g <= lambda g' S_a^-1 g with lambda = lambda_max(S_a, S_b)
     assert rho is not None

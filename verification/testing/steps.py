@@ -1,4 +1,4 @@
-"""What must be true of a step T of another code."""
+"""Properties of a step T of another code."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ POWER = 12
 def check_step(
     T: StepMap, pair: ContactPair | None = None, *, examples: int = 20, tolerance: float = 1e-6, **matrices: Any
 ) -> Report:
-    """Hold a step T of another code against the theorem for its matrices, and against the step of this project.
+    """Compare a step T of another code with the theorem for its matrices, and with the step of this project.
 
     T takes and gives nodal forces on the Neumann body (per unit thickness): all tangential components from left to
     right, then all normal ones along y, which points from body 1 to body 2.
@@ -46,7 +46,7 @@ def check_step(
     ``stays below its bound``
         ``|T_theta f - T_theta g| <= factor |f - g|`` in the norm (5.21), ``T_theta = theta T + (1 - theta)``, at the
         theta that is proved to be best for the matrices and at others; for random forces, and for differences that T
-        itself has enlarged.  The factor is that of the theorem in energy norms, or the semidefinite bound where that
+        itself has enlarged.  The theorem in energy norms gives the factor, or the semidefinite bound where that theorem
         draws no conclusion.
     ``converges at the advised theta``
         Asked where the theorem proves that it does: ``g <- T_theta g`` reaches a fixed point.
@@ -68,10 +68,6 @@ def check_step(
         How accurately T is computed, relative to the size of the forces.
     examples : int
         Cases drawn for each property.
-
-    Returns
-    -------
-    Report
 
     Raises
     ------
@@ -150,7 +146,7 @@ class _Check:
         for start, difference in ((force, other), (self.pressed(force), self.steepest())):
             at = self.image(start)
             d = difference * (norm(start) / (norm(difference) or 1.0))
-            for _ in range(POWER):  # T sends the difference it enlarges most to itself, but for its sign
+            for _ in range(POWER):  # T sends the difference it enlarges most to minus a multiple of itself
                 change = self.image(start + d) - at
                 size = norm(change) + norm(at)
                 relaxed = norm(float(theta) * change + (1 - float(theta)) * d)
