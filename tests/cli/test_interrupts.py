@@ -287,15 +287,15 @@ def test_an_import_that_ctrl_c_breaks_is_no_bug(write, tmp_path, module):
 def test_constants_keep_the_meshes_that_were_measured(call, write, monkeypatch):
     from verification.interface import pair
 
-    build, built = pair.build, []
+    pair_from, built = pair.pair_from, []
 
     def interrupt(problem, law=None):
         built.append(problem)
         if len(built) == 3:
             signal.raise_signal(signal.SIGINT)
-        return build(problem)
+        return pair_from(problem)
 
-    monkeypatch.setattr(pair, "build", interrupt)
+    monkeypatch.setattr(pair, "pair_from", interrupt)
     answer = call("constants", write(), "--refine", "4", "--json")
     assert answer.status == 130
     assert len(answer.document["levels"]) == 2

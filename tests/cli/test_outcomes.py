@@ -88,7 +88,7 @@ def test_a_crash_says_that_it_is_one_and_is_no_status_of_the_interface(call, wri
     def fail(problem, law=None):
         raise error
 
-    monkeypatch.setattr("verification.interface.pair.build", fail)
+    monkeypatch.setattr("verification.interface.pair.pair_from", fail)
     answer = call(command, write())
     assert answer.status == CRASH
     assert answer.out == ""
@@ -177,7 +177,7 @@ def test_ctrl_c_before_anything_was_computed_says_so(call, write, monkeypatch, c
     def interrupt(problem, law=None):
         signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr("verification.interface.pair.build", interrupt)
+    monkeypatch.setattr("verification.interface.pair.pair_from", interrupt)
     answer = call(command, write())
     assert (answer.status, answer.out) == (INTERRUPTED, "")
     assert answer.err.strip() == "interrupted before anything was computed"

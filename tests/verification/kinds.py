@@ -17,7 +17,7 @@ from verification.ledger.record import recorded
 from verification.ledger.rows import Row
 from verification.reproduce import reproduce
 from verification.sweeps.grid import SweepGrid
-from verification.sweeps.keeping import plan
+from verification.sweeps.store import plan
 
 
 def problem(cells: int) -> vf.Problem:

@@ -9,7 +9,7 @@ import pytest
 from ledger_evidence import HOLDS, PRINTED, REPAIRED, STEP, holds
 
 from fem1d2d import Condensation
-from verification.interface.pair import build
+from verification.interface.pair import pair_from
 from verification.ledger import cases, convergence, weak_forms
 from verification.ledger import solutions as ledger
 from verification.ledger.convergence import RunsOfLevel
@@ -28,7 +28,7 @@ def loaded(case, force):
     weak, fields = case.weak, []
     for body, own in zip((weak.one, weak.two), force, strict=True):
         load = body.load.copy()
-        load[body.interface] += weak.pair.orient(own)
+        load[body.interface] += weak.pair.contact.orient(own)
         fields.append(body.solve(load))
     return Fields(one=fields[0], two=fields[1])
 
@@ -112,7 +112,7 @@ class OtherBody(Weak):
 @pytest.mark.parametrize("statement", ["2.6", "4.4", "4.9.2", "5.2", "5.3", "5.5"])
 def test_a_friction_bound_one_per_mille_too_small_is_found_out(statement):
     case = pressed()
-    wrong = given(case, weak=Slippery(pair=build(case.problem)))
+    wrong = given(case, weak=Slippery(pair=pair_from(case.problem)))
     assert holds(asked(statement, wrong))[-1][1] is False
 
 

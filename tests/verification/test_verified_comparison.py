@@ -18,7 +18,7 @@ from verification.certificate.contraction import certify
 from verification.constants import measure
 from verification.constants.proved import verify
 from verification.interface.exact_bodies import NotExact
-from verification.interface.pair import build
+from verification.interface.pair import pair_from
 from verification.verdicts import judge, judge_bound
 
 SMALL = vf.Problem.from_dict(small())
@@ -95,7 +95,7 @@ def test_the_largest_theta_and_the_friction_threshold_are_proved_from_below(whol
 
 
 def semidefinite(problem, theta):
-    pair = build(problem)
+    pair = pair_from(problem)
     measured = measure(pair)
     return pair, measured, work_out(pair, measured, theta)
 

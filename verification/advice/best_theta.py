@@ -28,7 +28,7 @@ from verification.interface.build import pair_of
 from verification.interface.pair import ContactPair
 from verification.monolithic import SolveError
 from verification.problem.specification import Problem
-from verification.sweeps.lean import KnownPieces
+from verification.sweeps.course import KnownPieces
 from verification.sweeps.row import Row
 from verification.sweeps.sweep import sweep
 

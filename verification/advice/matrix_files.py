@@ -15,9 +15,8 @@ import scipy.sparse as sp
 from scipy.io.matlab import MatReadError
 
 from fem1d2d.mesh import Floats
-from verification.interface.array_headers import headers
 from verification.interface.files import NEEDED
-from verification.interface.matrices import MOST_ROWS, UNREADABLE
+from verification.interface.matrices import MOST_ROWS, UNREADABLE, headers
 from verification.problem.tables import ProblemError, short, unreadable
 
 #: Largest size of a matrix file: a full matrix of MOST_ROWS rows, with the two indices of each entry.

@@ -22,9 +22,9 @@ from verification.algorithm.theta import Choice, automatic, by_prediction, energ
 from verification.constants import measure
 from verification.constants.operators import Pencils, needs_matrices, pair_or_bodies
 from verification.document import Document
+from verification.interface.assembly import SingularRole, TwoBodies
 from verification.interface.build import build
 from verification.interface.pair import UNITS, ContactPair
-from verification.interface.two_bodies import SingularRole, TwoBodies
 from verification.problem import Problem, load
 from verification.problem.tables import ProblemError
 from verification.progress import Progress, silent

@@ -29,7 +29,7 @@ from verification.bounds.multipliers import Certified, QuadraticForms, friction_
 from verification.bounds.pattern_search import factor_search
 from verification.certificate.claims import Confirmation, NoCertificate
 from verification.constants import Measured
-from verification.interface.grid import Grid
+from verification.interface.interface import Grid
 from verification.interface.pair import ContactPair
 from verification.progress import Progress, silent
 from verification.threads import one_thread

@@ -17,7 +17,7 @@ from verification.constants.measured import SLIDES
 from verification.contact import ContactError
 from verification.document import Document
 from verification.interface.friction import LAWS
-from verification.interface.pair import build
+from verification.interface.pair import pair_from
 from verification.interrupts import INTERRUPTED
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
@@ -95,7 +95,7 @@ def chart(problem: Problem, *, store: Path | None = None, progress: Progress = s
         Before the first region was traced; later it leaves out what was still to come.
     """
     progress("tracing the regions", None)
-    pair = build(problem)
+    pair = pair_from(problem)
     law = problem.contact.law
     if LAWS[law].outside:
         raise ProblemError(problem.source, "contact.law", law, 'no region is proved of it; needed "nonlocal"')

@@ -17,7 +17,7 @@ from scipy.linalg import block_diag
 from fem1d2d.enclosed import Enclosed, gamma, upwards
 from fem1d2d.loewner import positive_definite
 from fem1d2d.mesh import Floats
-from verification.interface.grid import Grid
+from verification.interface.interface import Grid
 from verification.interface.pair import ContactPair
 
 

@@ -21,7 +21,7 @@ from verification.certificate.check import check, surface_stiffness
 from verification.constants.measured import FROM_MATRICES
 from verification.interface.body import Body
 from verification.interface.exact_bodies import ExactInterface, NotExact, exact_points
-from verification.interface.pair import ContactPair, build
+from verification.interface.pair import ContactPair, pair_from
 from verification.problem import Problem
 from verification.problem.specs import BodySpec
 from verification.progress import Progress, silent
@@ -187,7 +187,7 @@ def describe(problem: Problem, pair: ContactPair | None = None) -> dict[str, Any
 
     Coordinates of a mesh file are the doubles that were read from it.
     """
-    pair = build(problem) if pair is None else pair
+    pair = pair_from(problem) if pair is None else pair
     meshed = [side.mesh_body for side in (pair.body1, pair.body2)]
     points = [exact_points(spec, body) for spec, body in zip((problem.body1, problem.body2), meshed, strict=True)]
     along = [p[body.nodes, 0] for p, body in zip(points, meshed, strict=True)]

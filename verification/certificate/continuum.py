@@ -30,7 +30,7 @@ from ndtheory.intervals import Interval
 from ndtheory.moduli import Moduli, half_planes
 from verification.constants.measuring import of_energy
 from verification.document import Document
-from verification.interface.pair import build
+from verification.interface.pair import pair_from
 from verification.problem import Problem, ProblemError
 from verification.progress import Progress, silent
 from verification.threads import one_thread
@@ -285,7 +285,7 @@ def file_mesh(problem: Problem, progress: Progress = silent) -> FileMesh:
     progress("measuring rho on the mesh of the file", None)
     try:
         with one_thread():
-            pair = build(problem)
+            pair = pair_from(problem)
             grid = pair.contact.grid
             found = of_energy(pair, np.arange(grid.size) < grid.t)
     except ProblemError as error:

@@ -22,7 +22,7 @@ from verification.certificate import check
 from verification.certificate.claims import NOT_CONFIRMED, Claims, NoCertificate, describe, same, written
 from verification.constants import Measured, measure
 from verification.document import Document
-from verification.interface.pair import UNITS, ContactPair, build
+from verification.interface.pair import UNITS, ContactPair, pair_from
 from verification.problem import Problem, ProblemError
 from verification.progress import Progress, silent
 
@@ -153,7 +153,7 @@ def certify(
         raise ValueError(f"edition {edition!r}: needed one of {', '.join(certifying())}")
     if problem.dimension != 2:
         raise refuse("dimension", "needed a plane problem: in 1D rho is a ratio of exact numbers")
-    pair = build(problem)
+    pair = pair_from(problem)
     measured = measure(pair)
     if pair.outside:
         raise refuse("contact", f"outside the theorem: {pair.outside[0]}")

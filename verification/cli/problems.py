@@ -82,13 +82,13 @@ def load_problem(
 ) -> Problem:
     """The problem of a file, changed by the options: first --set, then the others."""
     from verification.problem import ProblemError, load
-    from verification.problem.vocabulary import vocabulary
+    from verification.problem.reading import takes_theta
 
     chosen = {} if relaxation is None else {"iteration.relaxation": relaxation}
     problem = load(file).with_keys({**keys, **chosen})
     if theta is not None:
         rule = problem.iteration.relaxation
-        if not vocabulary().takes_theta(rule):
+        if not takes_theta(rule):
             needed = f'needed no theta beside relaxation = "{rule}", which takes its step from rho'
             raise ProblemError(str(file), "--theta", theta, needed)
         problem = problem.with_theta(theta)
@@ -145,12 +145,12 @@ def run(file: Path, solver: Any, start: Path | None, folder: Path | None, as_jso
     from verification.advice.matrix_files import read_matrix
     from verification.algorithm import runs
     from verification.algorithm.start import forces
-    from verification.interface.pair import build
+    from verification.interface.pair import pair_from
     from verification.output.folder import Folder
     from verification.sections.run import sections
 
     write = None if folder is None else Folder(folder, "run").write
-    pair = build(problem)
+    pair = pair_from(problem)
     g = None if start is None else forces(read_matrix(start), pair, str(start))
     _warn(pair.warnings)
     with stages() as tell, progress(tell, problem.iteration.tolerance) as watch:
@@ -282,13 +282,13 @@ def demo(folder: Path, as_json: bool) -> int:
 
 def _compare(problem: Problem, typed: Typed, folder: Path | None, solver: Any, as_json: bool, **asked: Any) -> int:
     from verification import comparison as verdicts
-    from verification.interface.pair import build
+    from verification.interface.pair import pair_from
     from verification.output.folder import Folder
     from verification.sections.comparison import Parts
     from verification.sections.comparison import verdicts as end
 
     write = None if folder is None else Folder(folder, "compare").write
-    pair = build(problem)
+    pair = pair_from(problem)
     _warn(pair.warnings)
     parts = None if as_json else Parts(pair, one_by_one(needed=write is not None))
     with stages() as tell, progress(tell, problem.iteration.tolerance) as watch, parts or nullcontext():

@@ -98,9 +98,9 @@ def sweep(
     from verification.extras import require
     from verification.output.files import check_folder, check_ours
     from verification.sections import sweep as shown
-    from verification.sweeps.keeping import plan
+    from verification.sweeps.grid import read_sweep
+    from verification.sweeps.store import plan
     from verification.sweeps.sweep import sweep_grid, work_of
-    from verification.sweeps.sweep_file import read_sweep
 
     if dask is not None and jobs is not None:
         raise click.UsageError("needed either --jobs, for this machine, or --dask, for a cluster")

@@ -24,9 +24,9 @@ from verification.constants.measured import (
 from verification.constants.operators import TRACES_DIFFER, Pencils, needs_matrices, pair_or_bodies
 from verification.constants.proved import verify
 from verification.dense import Cholesky, pinned
+from verification.interface.assembly import TwoBodies
 from verification.interface.body import Body, Condensed
 from verification.interface.pair import ContactPair
-from verification.interface.two_bodies import TwoBodies
 from verification.problem import Problem
 from verification.progress import Progress, silent
 from verification.threads import one_thread

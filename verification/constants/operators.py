@@ -28,11 +28,10 @@ from fem1d2d import Condensation, Eigenvalue, largest_of, solver_with_inertia
 from fem1d2d.mesh import Floats, Ints
 from fem1d2d.pencil import LANCZOS
 from verification.interface import assembly
-from verification.interface.assembly import TooManyContactNodes, held_bodies
+from verification.interface.assembly import TooManyContactNodes, TwoBodies, held_bodies
 from verification.interface.body import Body
 from verification.interface.build import pair_of
 from verification.interface.pair import ContactPair
-from verification.interface.two_bodies import TwoBodies
 from verification.problem import Problem, ProblemError, load
 from verification.progress import Progress, silent
 from verification.threads import one_thread

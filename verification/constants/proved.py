@@ -29,10 +29,10 @@ from fem1d2d.proved import Ends, enclose_largest, inverse, root
 from ndtheory import Number
 from verification.constants.measured import ALL_NAMES, FROM_MATRICES, PRODUCTS, BodyConstants, Measured, product
 from verification.constants.operators import needs_matrices
+from verification.interface.assembly import TwoBodies
 from verification.interface.body import Name
 from verification.interface.exact_bodies import ExactBody, ExactInterface, NotExact
 from verification.interface.pair import ContactPair
-from verification.interface.two_bodies import TwoBodies
 from verification.progress import Progress, silent
 from verification.threads import one_thread
 

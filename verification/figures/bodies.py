@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from fem1d2d.mesh import Floats
 from verification.algorithm.runs import Run
 from verification.figures.style import BODY1, BODY2, PRESSURE, SHEAR, STATES, legend_beside, new_figure, plain, styled
+from verification.interface.assembly import TwoBodies
 from verification.interface.fields import ContactFields
-from verification.interface.two_bodies import TwoBodies
 from verification.monolithic import Solution
 
 #: Displacements are drawn so that the largest is about this fraction of the picture.

@@ -102,7 +102,7 @@ class Norms:
 
     def dual(self, force: Floats) -> float:
         """The norm of V^2' of nodal forces on Gamma_c."""
-        load = np.zeros(len(self.weak.two.free))
+        load = np.zeros(len(self.weak.two.positions))
         load[self.weak.two.interface] = self.weak.pair.neumann.orient(force)
         return float(np.sqrt(max(float(load @ self._solve(load)), 0.0)))
 

@@ -40,7 +40,7 @@ NO_MOTION = 1e-20
 def lifted_energy(body: Body) -> Floats:
     """``a^a(R phi, R chi)`` on the interface from the lifted fields; that the lift is a-harmonic is not used."""
     elastic = body.elastic
-    fields = np.zeros((len(body.free), len(elastic.interface)))
+    fields = np.zeros((len(body.positions), len(elastic.interface)))
     fields[elastic.interface] = np.eye(len(elastic.interface))
     fields[elastic.inside] = elastic.lift
     energy = fields.T @ (body.stiffness @ fields)

@@ -22,7 +22,7 @@ from fem1d2d.material import plane_strain
 from verification.algorithm.fixed_point import FixedPointMap
 from verification.interface.body import Condensed
 from verification.interface.exact_bodies import ExactInterface, exact_points
-from verification.interface.pair import build
+from verification.interface.pair import pair_from
 from verification.ledger.cases import rectangle
 from verification.ledger.evidence import Evidence, source
 from verification.problem.specification import Problem
@@ -85,7 +85,7 @@ class ExactSide:
         for corners, entries in zip(cells, local, strict=True):
             unknowns = (2 * corners[:, None] + np.arange(2)).ravel()
             A[np.ix_(unknowns, unknowns)] += entries.reshape(len(unknowns), -1)
-        A = A[np.ix_(body.free, body.free)]
+        A = A[np.ix_(body.positions, body.positions)]
         b = body.interface
         inside = np.setdiff1d(np.arange(len(A)), b)
         lift = np.full((len(A), len(b)), Fraction(0), dtype=object)
@@ -115,7 +115,7 @@ class RationalPair:
 
     def __init__(self, table: Mapping[str, Any] = BLOCKS, forces: tuple[Exact, ...] = FORCES) -> None:
         problem = Problem.from_dict(table)
-        self.pair = pair = build(problem)
+        self.pair = pair = pair_from(problem)
         self.one, self.two = (ExactSide(problem, side) for side in (pair.contact, pair.neumann))
         x = [exact_points(getattr(problem, s.mesh_body.name), s.mesh_body) for s in (pair.contact, pair.neumann)]
         nodes = [p[s.mesh_body.nodes, 0] for p, s in zip(x, (pair.contact, pair.neumann), strict=True)]

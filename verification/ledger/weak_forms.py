@@ -27,7 +27,7 @@ from verification.algorithm.iterate import Iterate
 from verification.algorithm.runs import Run, run
 from verification.contact import ContactError
 from verification.interface.body import Body, Condensed
-from verification.interface.pair import ContactPair, build
+from verification.interface.pair import ContactPair, pair_from
 from verification.ledger.cases import PROBLEMS, drawn
 from verification.ledger.evidence import Evidence, Level, figure
 from verification.monolithic import solve
@@ -74,14 +74,14 @@ class Weak:
     def _lifts(self) -> dict[str, Any]:
         inside: dict[str, Any] = {}
         for body in (self.one, self.two):
-            rows = np.setdiff1d(np.arange(len(body.free)), body.interface)
+            rows = np.setdiff1d(np.arange(len(body.positions)), body.interface)
             inside[body.name] = rows, solver(body.stiffness[rows][:, rows])
         return inside
 
     def lift(self, body: Body, trace: Floats) -> Floats:
         """R_D phi of (4.5)."""
         rows, solved = self._lifts[body.name]
-        field = np.zeros((len(body.free), *trace.shape[1:]))
+        field = np.zeros((len(body.positions), *trace.shape[1:]))
         field[body.interface] = self._side(body).orient(trace)
         field[rows] = -solved(np.asarray(body.stiffness[rows][:, body.interface] @ field[body.interface]))
         return field
@@ -123,7 +123,7 @@ class Weak:
     def of(self, displacements: tuple[Floats | None, Floats | None]) -> Fields:
         """The unknowns of two displacement fields, the lower body's first."""
         first, second = (
-            displacement.ravel()[body.free] if displacement is not None else np.zeros(len(body.free))
+            displacement.ravel()[body.positions] if displacement is not None else np.zeros(len(body.positions))
             for body, displacement in zip(self.pair.on_meshes().elastic, displacements, strict=True)
         )
         return Fields(one=first, two=second) if self.pair.neumann_body == 2 else Fields(one=second, two=first)
@@ -152,7 +152,7 @@ class Case:
     @cached_property
     def weak(self) -> Weak:
         """The weak forms."""
-        return Weak(pair=build(self.problem))
+        return Weak(pair=pair_from(self.problem))
 
     @property
     def grids_differ(self) -> bool:
@@ -328,15 +328,15 @@ def _over(value: Floats, scale: Floats) -> Floats:
 
 def directions(rng: np.random.Generator, body: Body, count: int) -> Floats:
     """Rough and smooth random fields of a body, largest value 1, as columns."""
-    rough = rng.standard_normal((len(body.free), count))
-    smooth = body.solve(rng.standard_normal((len(body.free), count)))
+    rough = rng.standard_normal((len(body.positions), count))
+    smooth = body.solve(rng.standard_normal((len(body.positions), count)))
     columns = np.concatenate([rough, smooth], axis=1)
     return np.asarray(columns / np.abs(columns).max(axis=0))
 
 
 def hats(body: Body) -> Floats:
     """Both signs of the hat function of every interface unknown, as columns."""
-    columns = np.zeros((len(body.free), len(body.interface)))
+    columns = np.zeros((len(body.positions), len(body.interface)))
     columns[body.interface, np.arange(len(body.interface))] = 1.0
     return np.concatenate([columns, -columns], axis=1)
 
@@ -344,7 +344,7 @@ def hats(body: Body) -> Floats:
 def closing(weak: Weak, u: Fields) -> Floats:
     """Moves of body 1 by hat functions that undo the jump of u at one node, in one direction."""
     count = len(weak.one.interface)
-    return np.asarray(hats(weak.one)[:, :count] * -weak.pair.orient(weak.jump(u.one, u.two)))
+    return np.asarray(hats(weak.one)[:, :count] * -weak.pair.contact.orient(weak.jump(u.one, u.two)))
 
 
 def _sizes(rng: np.random.Generator, size: float, count: int) -> Floats:

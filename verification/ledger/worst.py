@@ -16,7 +16,7 @@ from fem1d2d.mesh import Floats
 from verification.bounds.losses import top
 from verification.constants import Measured, measure
 from verification.interface.body import Body
-from verification.interface.pair import ContactPair, build
+from verification.interface.pair import ContactPair, pair_from
 from verification.ledger.cases import NAMED, problem
 from verification.ledger.differences import Differences, DrawnSetting, draw_pairs
 from verification.ledger.evidence import Evidence, figure
@@ -45,7 +45,7 @@ class Trial:
     @classmethod
     def of(cls, name: str, problem: Problem) -> Trial:
         """Build the bodies of a problem and measure its constants."""
-        pair = build(problem)
+        pair = pair_from(problem)
         return cls(name=name, pair=pair, measured=measure(pair))
 
     @cached_property

@@ -15,9 +15,8 @@ from verification.interface.pair import ContactPair
 from verification.reproduce.claims import NODES, PRINTED_THETA, SERVES, Claim
 from verification.reproduce.experiments import THETAS, Outcome, curve_of, outcome_of
 from verification.reproduce.readings import ModelReading
-from verification.sweeps.bodies import SharedBodies
 from verification.sweeps.grid import SweepGrid
-from verification.sweeps.row import FAILED, REFUSED, Row, row
+from verification.sweeps.row import FAILED, REFUSED, Row, SharedBodies, row
 
 #: The mesh of 190 nodes with the friction and the moduli of the text: a curve that Figures 10 to 12 have in common.
 COMMON: Mapping[str, Any] = {"refine": NODES.index(190)}

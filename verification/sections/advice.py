@@ -12,7 +12,7 @@ from verification.advice.seen import LogBound, RhoInterval, SeenLog
 from verification.advice.seen_moduli import Corners, ModuliRole, SeenModuli, excluded_from
 from verification.advice.sides import SeenMatrices
 from verification.advice.snippets import SNIPPETS
-from verification.problem.vocabulary import vocabulary
+from verification.problem.reading import takes_theta
 from verification.sections.numbers import NONE, count, figures, near_one, rounded
 from verification.sections.parts import (
     Block,
@@ -86,7 +86,7 @@ def _after_a_problem(found: Advice) -> Next | str:
         return "ndtheory advise --help"
     if found.best.theta_auto is None:  # too large for a run
         return following("constants")
-    taken = found.theta is not None and vocabulary().takes_theta(found.problem.iteration.relaxation)
+    taken = found.theta is not None and takes_theta(found.problem.iteration.relaxation)
     theta = ["--theta", f"{found.theta:g}"] if taken else []
     return following("run", *theta, exchanged=found.roles[0].neumann_body != found.neumann_body)
 

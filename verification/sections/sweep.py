@@ -11,8 +11,8 @@ from verification.bounds.table import named
 from verification.problem.specification import Problem
 from verification.sections.numbers import NONE, count, figures, near_one
 from verification.sections.parts import Cell, Facts, Next, Quantity, Sections, closing, following, of, section, table
-from verification.sweeps.keeping import Plan
 from verification.sweeps.row import Row
+from verification.sweeps.store import Plan
 from verification.sweeps.sweep import Sweep
 
 #: Lines of a table that are shown; the file has them all.

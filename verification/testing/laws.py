@@ -13,8 +13,7 @@ from fem1d2d import Condensation, plane_strain, rectangle, stiffness, supports, 
 from fem1d2d.mesh import Floats
 from verification.algorithm.fixed_point import FixedPointMap
 from verification.interface.build import build
-from verification.interface.grid import Grid
-from verification.interface.interface import Interface, Law
+from verification.interface.interface import Grid, Interface, Law
 from verification.interface.pair import ContactPair
 from verification.problem import Problem
 from verification.testing.properties import Fails, Finding, Kit, Report

@@ -15,7 +15,7 @@ import numpy as np
 from fem1d2d.mesh import Floats
 from verification.interface.body import Condensed
 from verification.interface.friction import GivenOperator
-from verification.interface.grid import Grid
+from verification.interface.interface import Grid
 from verification.interface.pair import ContactPair
 from verification.problem import Problem
 from verification.problem.specs import BodySpec
