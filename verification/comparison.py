@@ -244,7 +244,8 @@ def compare(
     linearised = left.work(finished.linearise, None)
     finished = linearised or replace(finished, interrupted=True).linearise()  # which says why there is nothing
     left.tell(listener.run, finished)
-    none: tuple[None, str] = (None, INTERRUPTED if programs else _comes_with_programs())
+    slow = " or ".join(name for name, bound in BOUNDS.items() if not bound.calculated)
+    none: tuple[None, str] = (None, INTERRUPTED if programs else f"{NOT_ASKED}: it comes with {slow}")
     reference: tuple[Reference | None, str] = none
     lost: tuple[Losses | None, str] = none
     if programs:
@@ -304,11 +305,6 @@ class _UntilCtrlC:
             method(*parts)
         except KeyboardInterrupt:
             self.interrupted = True
-
-
-def _comes_with_programs() -> str:
-    """Return the reason for leaving out a slow part that belongs to bounds that were not asked for."""
-    return f"{NOT_ASKED}: it comes with {' or '.join(name for name, bound in BOUNDS.items() if not bound.calculated)}"
 
 
 def _reference(finished: Run) -> tuple[Reference | None, str]:
