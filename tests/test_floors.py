@@ -97,7 +97,7 @@ FLOORS: dict[str, dict[str, str]] = {
 BUDGET = {
     "fem1d2d": 3000,
     "ndtheory": 5600,
-    "verification": 1200,
+    "verification": 1210,
     "verification.advice": 4500,
     "verification.algorithm": 2130,
     "verification.bounds": 3200,
@@ -111,7 +111,7 @@ BUDGET = {
     "verification.output": 410,
     "verification.problem": 1490,
     "verification.reproduce": 630,
-    "verification.sections": 2000,
+    "verification.sections": 2030,
     "verification.sweeps": 2340,
     "verification.testing": 1570,
 }
