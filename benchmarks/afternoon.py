@@ -24,4 +24,4 @@ def contact_step(pair: ContactPair, u: np.ndarray, bound: np.ndarray) -> np.ndar
     problem = cp.Problem(cp.Minimize(energy + friction), [phi[n:] <= u[n:] + pair.interface.gap])
     problem.solve(solver=cp.CLARABEL)
     trace = w.value[body.elastic.interface]
-    return pair.contact.load - pair.contact.stiffness @ trace
+    return pair.contact.load - pair.contact.schur @ trace

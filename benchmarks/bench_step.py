@@ -39,7 +39,7 @@ def sides(pair: ContactPair) -> tuple[Callable[[], object], Callable[[], object]
     last = vf.run(pair).last
     moves = np.concatenate([last.contact.pattern.sliding != 0, ~last.contact.pattern.touching])
     rows = np.flatnonzero(moves)
-    S1, S2, g = pair.contact.stiffness, cho_factor(pair.neumann.stiffness), np.array(last.g)
+    S1, S2, g = pair.contact.schur, cho_factor(pair.neumann.schur), np.array(last.g)
     block, right = cho_factor(S1[np.ix_(rows, rows)]), g[rows]
     steps = vf.iterate(pair, start=g)
 

@@ -27,7 +27,7 @@ def once(compute: Callable[..., Any], shared: Shared) -> Callable[..., Any]:
 
     def answer(pair: ContactPair, measured: Measured, *given: Any, progress: Any = None, **options: Any) -> Any:
         sides, interface = (pair.contact, pair.neumann), pair.interface
-        arrays = (*(side.stiffness for side in sides), interface.gap, interface.contact.weights, interface.kernel)
+        arrays = (*(side.schur for side in sides), interface.gap, interface.contact.weights, interface.kernel)
         meshes = (() if side.body is None else side.gram.tobytes() for side in sides)
         bytes_ = (b"" if array is None else array.tobytes() for array in arrays)
         key = (compute.__name__, pair.friction, pair.neumann_body, given, *options.items(), *bytes_, *meshes)
@@ -42,7 +42,7 @@ def repeated_once(repeat: Callable[[Run], Reference], shared: Shared) -> Callabl
 
     def answer(run: Run) -> Reference:
         pair = run.pair
-        arrays = [pair.contact.stiffness, pair.neumann.stiffness, *(each.g for each in run.iterates)]
+        arrays = [pair.contact.schur, pair.neumann.schur, *(each.g for each in run.iterates)]
         given = (pair.settings, pair.friction, pair.neumann_body, run.rule, run.theta, run.evaluations)
         key = (repeat.__name__, *given, *(array.tobytes() for array in arrays))
         return shared(key, lambda: repeat(run))

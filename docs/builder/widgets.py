@@ -99,7 +99,7 @@ def section6_in_both_roles() -> tuple[vf.Problem, vf.Problem]:
 
 def _role(problem: vf.Problem) -> dict[str, Any]:
     pair = vf.build(problem)
-    contact, neumann = (side.stiffness[np.ix_(side.free, side.free)] for side in (pair.contact, pair.neumann))
+    contact, neumann = (side.schur[np.ix_(side.free, side.free)] for side in (pair.contact, pair.neumann))
     runs = []
     for theta in THETAS:
         states, residuals = [], []

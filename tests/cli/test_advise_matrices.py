@@ -14,7 +14,7 @@ from verification.interface.pair import pair_from
 @pytest.fixture
 def matrices(write):
     pair = pair_from(vf.load(write("wrong roles")))
-    return pair.contact.stiffness, pair.neumann.stiffness  # bodies 1 and 2
+    return pair.contact.schur, pair.neumann.schur  # bodies 1 and 2
 
 
 def one_array(path, matrix):

@@ -78,8 +78,8 @@ def pair(S_1, S_2, l_1, l_2, transfer):
     interface = Factor(transfer=number(transfer))
     return SimpleNamespace(
         interface=interface,
-        contact=SimpleNamespace(stiffness=number(S_1), load=number(l_1)[0]),
-        neumann=SimpleNamespace(stiffness=number(S_2), inverse=number(1 / S_2), load=number(l_2)[0]),
+        contact=SimpleNamespace(schur=number(S_1), load=number(l_1)[0]),
+        neumann=SimpleNamespace(schur=number(S_2), inverse=number(1 / S_2), load=number(l_2)[0]),
     )
 
 
@@ -103,8 +103,8 @@ def test_the_noise_has_every_term_whatever_its_sign(negative, zero):
 
 #: A pair whose noise at a state is 4 eps |g|.
 PLAIN = pair(1, 1, 0, 0, 1)
-PLAIN.contact.stiffness[:] = 0
-PLAIN.neumann.stiffness[:] = 0
+PLAIN.contact.schur[:] = 0
+PLAIN.neumann.schur[:] = 0
 
 
 def states(residuals, noises):

@@ -79,7 +79,7 @@ def state_of(
     half of what friction could.
     """
     t, n = pair.contact.grid.t, pair.contact.grid.n
-    contact = pair.contact.stiffness
+    contact = pair.contact.schur
     bound = pair.bound(g)
     large = lambda size: random.uniform(0.5, 1, size)
     length = np.linalg.norm(g) / np.linalg.norm(contact, 2)

@@ -110,7 +110,7 @@ def assert_affine(
     ahead, behind = T(g + step), T(g - step)
     bound = pair.bound
     # rounding: some units in the last place of all that is added up, over the length of the step
-    u = np.abs(pair.contact.stiffness) @ (np.abs(state.displacement) + np.abs(state.contact.v))
+    u = np.abs(pair.contact.schur) @ (np.abs(state.displacement) + np.abs(state.contact.v))
     terms = u + np.abs(pair.contact.load) + np.abs(g)
     rounding = 1e-14 * np.linalg.norm(terms) / length
     flexible = np.linalg.norm(pair.contact.inverse, 2)

@@ -64,8 +64,8 @@ class Sticking:
 
     def largest(self, kept: np.ndarray) -> float:
         """The contact body's least energy for given components, at most, over the Neumann body's."""
-        form = condensed(self.pair.contact.stiffness, kept)
-        return float(eigh(form, self.pair.neumann.stiffness, eigvals_only=True)[-1])
+        form = condensed(self.pair.contact.schur, kept)
+        return float(eigh(form, self.pair.neumann.schur, eigvals_only=True)[-1])
 
     @cached_property
     def rho_A(self) -> float:
@@ -75,7 +75,7 @@ class Sticking:
     def P(self) -> np.ndarray:
         """The selfadjoint part of -T', in the coordinates of the piece, where (5.21) is the Euclidean norm."""
         carried = self.pair.neumann.flexibility(self.piece.basis)
-        return np.asarray(carried.T @ condensed(self.pair.contact.stiffness, self.held) @ carried)
+        return np.asarray(carried.T @ condensed(self.pair.contact.schur, self.held) @ carried)
 
     @cached_property
     def F(self) -> np.ndarray:
@@ -91,7 +91,7 @@ class Sticking:
     def kernel_size(self) -> float:
         """``sigma``: root of the sum of w_j times the energy of the Neumann body with the kernel at x_j as trace."""
         K, n = self.pair.interface.kernel, self.pair.neumann.grid.n
-        energies = np.einsum("ji,il,jl->j", K, self.pair.neumann.stiffness[n:, n:], K)
+        energies = np.einsum("ji,il,jl->j", K, self.pair.neumann.schur[n:, n:], K)
         return float(np.sqrt(self.pair.contact.grid.weights @ energies))
 
     @cached_property
@@ -99,7 +99,7 @@ class Sticking:
         """C_t1 and C_t2."""
         mass = np.diag(np.concatenate([self.pair.contact.grid.weights, 0 * self.pair.contact.grid.weights]))
         sides = self.pair.contact, self.pair.neumann
-        first, second = (float(eigh(mass, side.stiffness, eigvals_only=True)[-1]) ** 0.5 for side in sides)
+        first, second = (float(eigh(mass, side.schur, eigvals_only=True)[-1]) ** 0.5 for side in sides)
         return first, second
 
     def least(self, theta: float) -> float:
@@ -139,8 +139,8 @@ def fixed_point(
     g[: grid.t] = bound * np.where(sliding != 0, sliding, random.uniform(-0.9, 0.9, grid.n))
     apart = np.where((bound == 0) & (sliding == 0), 1, sliding)
     v = np.concatenate([apart * positive(), np.where(touching, 0.0, -positive())])
-    v *= np.abs(g).max() / np.abs(pair.contact.stiffness).max()
-    contact = replace(pair.contact, load=pair.contact.stiffness @ v + g)
+    v *= np.abs(g).max() / np.abs(pair.contact.schur).max()
+    contact = replace(pair.contact, load=pair.contact.schur @ v + g)
     loaded = replace(pair, contact=contact, neumann=replace(pair.neumann, load=-g))
     state = Evaluated(loaded)(g)
     assert np.abs(state.image - g).max() <= 1e-9 * np.abs(g).max()

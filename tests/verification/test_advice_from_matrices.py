@@ -128,7 +128,7 @@ def test_a_body_that_contact_alone_holds_is_refused_as_neumann_body_alone(singul
     fixed = {"body1": {**data["body1"]}, "body2": {**data["body2"], "prescribed": {"top": ["free", "-0.015"]}}}
     problem = vf.Problem.from_dict({**data, **fixed}).changed(neumann_body=1, friction="0.1")
     pair = vf.build(problem)
-    lower, upper = (side.stiffness for side in pair.along_y)
+    lower, upper = (side.schur for side in pair.along_y)
     S1, S2 = (lower, upper) if singular == 2 else (upper, lower)
     rubbing = {"friction": friction, "x": pair.contact.grid.x, "kernel": pair.interface.kernel}
     beside = {} if friction is None else rubbing

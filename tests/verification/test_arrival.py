@@ -52,7 +52,7 @@ def test_the_coupled_residual_is_that_of_each_condition_at_each_node(data, step)
     pair = vf.build(vf.Problem.from_dict(data))
     iterate = next(state for state in vf.iterate(pair) if state.iteration == step)
     found = coupled_residual(pair, iterate)
-    flexibility = np.linalg.inv(pair.neumann.stiffness)
+    flexibility = np.linalg.inv(pair.neumann.schur)
     norm = lambda force: np.sqrt(max(force @ flexibility @ force, 0.0))
     nothing = max(2 * pair.settings.tolerance * iterate.scale, noise(pair, iterate))  # a force of rounding, too
     if norm(iterate.g) <= nothing:  # there is no force as yet
@@ -132,9 +132,9 @@ def test_tied_bodies_have_one_trace_and_balance(data):
     u = neumann.known + neumann.flexibility(g + neumann.load)
     trace = interface.carry(u).copy()
     trace[contact.grid.normal] += interface.gap
-    reaction = interface.carry_back(contact.load - contact.stiffness @ trace)
+    reaction = interface.carry_back(contact.load - contact.schur @ trace)
     moved = np.abs(u).max() + np.abs(interface.gap).max()  # of which little may be left where they cancel
-    size = (np.abs(contact.load) + np.abs(contact.stiffness).sum(axis=1) * moved).max()
+    size = (np.abs(contact.load) + np.abs(contact.schur).sum(axis=1) * moved).max()
     assert np.abs(reaction - g).max() <= 1e-9 * (size + np.abs(g).max())
 
 

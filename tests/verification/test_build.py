@@ -25,8 +25,8 @@ def as_matrices(pair: ContactPair) -> dict[str, object]:
     """What `build` takes to make the same pair from matrices: normal components along y."""
     lower, upper = pair.along_y
     return {
-        "S1": lower.stiffness,
-        "S2": upper.stiffness,
+        "S1": lower.schur,
+        "S2": upper.schur,
         "load1": lower.load,
         "load2": upper.load,
         "x": pair.contact.grid.x,
@@ -139,9 +139,9 @@ def test_across_unlike_grids_T_returns_what_equilibrium_and_contact_ask_for(seed
     n = 4
     g = case.random.normal(size=12)
     u, solution = FixedPointMap(pair)(g)
-    assert pair.neumann.stiffness @ u == pytest.approx(g + pair.neumann.load)
+    assert pair.neumann.schur @ u == pytest.approx(g + pair.neumann.load)
     trace = P @ u + solution.v + np.concatenate([np.zeros(n), pair.interface.gap])
-    assert pair.contact.load - pair.contact.stiffness @ trace == pytest.approx(solution.force, abs=1e-9)
+    assert pair.contact.load - pair.contact.schur @ trace == pytest.approx(solution.force, abs=1e-9)
     bound = 0.4 * pair.contact.grid.weights * np.abs(pair.interface.kernel @ g[6:])
     slip, gap = solution.v[:n], -solution.v[n:]
     assert np.all(np.abs(solution.force[:n]) <= bound + 1e-9)
@@ -221,10 +221,10 @@ def test_exchanged_roles_are_those_of_the_file_and_twice_exchanged_the_old_ones(
     swapped, file = pair.swapped(), build(small().swapped())
     assert swapped.neumann_body == file.neumann_body
     assert swapped.problem == file.problem
-    assert np.array_equal(swapped.contact.stiffness, file.contact.stiffness)
+    assert np.array_equal(swapped.contact.schur, file.contact.schur)
     assert np.array_equal(swapped.neumann.load, file.neumann.load)
     assert swapped.contact.body is pair.neumann.body
-    assert np.array_equal(swapped.swapped().contact.stiffness, pair.contact.stiffness)
+    assert np.array_equal(swapped.swapped().contact.schur, pair.contact.schur)
 
 
 @pytest.mark.parametrize(("friction", "why"), [("-1", ">= 0"), ("nan", ">= 0"), ("much", ">= 0")])

@@ -107,7 +107,7 @@ def test_the_checker_condenses_the_bodies_as_the_library_does(certificate):
         found = check.surface_stiffness(certificate["discrete"][f"body{i}"], both=True)
         doubles = np.array([[float(entry.mid()) for entry in row] for row in found.tolist()])
         widest = max(float(entry.rad()) for row in found.tolist() for entry in row)
-        assert doubles == pytest.approx(side.stiffness, rel=0, abs=1e-12 * np.abs(side.stiffness).max())
+        assert doubles == pytest.approx(side.schur, rel=0, abs=1e-12 * np.abs(side.schur).max())
         assert widest < 1e-30 * np.abs(doubles).max()
 
 

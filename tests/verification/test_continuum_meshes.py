@@ -101,7 +101,7 @@ LARGER: dict[str, tuple[Statement, str, str]] = {
     "both components of the trace without friction": (lambda s: s.largest(np.tile(s.A, 2)), "0", "any"),
     "the whole of Gamma_c": (lambda s: s.largest(np.ones_like(s.g, dtype=bool)), "1", "stick"),
     "traces on A that are 0 elsewhere": (
-        lambda s: float(np.linalg.eigvals(np.linalg.solve(s.pair.neumann.stiffness, rows_of_A(s))).real.max()),
+        lambda s: float(np.linalg.eigvals(np.linalg.solve(s.pair.neumann.schur, rows_of_A(s))).real.max()),
         "1",
         "open",
     ),
@@ -110,7 +110,7 @@ LARGER: dict[str, tuple[Statement, str, str]] = {
 
 def rows_of_A(state: Sticking) -> np.ndarray:
     """The stiffness of the contact body on A, not condensed."""
-    return np.where(np.outer(state.prescribed, state.prescribed), state.pair.contact.stiffness, 0.0)
+    return np.where(np.outer(state.prescribed, state.prescribed), state.pair.contact.schur, 0.0)
 
 
 @pytest.mark.parametrize("name", LARGER)
@@ -144,7 +144,7 @@ def many_modes(f: Callable[[Sticking], float]) -> Statement:
 
     def statement(state: Sticking) -> float:
         carried = state.pair.neumann.flexibility(state.pair.neumann.root)
-        p = np.linalg.eigvalsh(carried.T @ condensed(state.pair.contact.stiffness, state.prescribed) @ carried)[::-1]
+        p = np.linalg.eigvalsh(carried.T @ condensed(state.pair.contact.schur, state.prescribed) @ carried)[::-1]
         return float((p - f(state) * np.sqrt(2 / np.arange(1, len(p) + 1))).max())
 
     return statement

@@ -22,7 +22,7 @@ def known(problem, few):
         pair = vf.build(problem)
         sides = (pair.contact, pair.neumann)
         assert [side.mesh_body.few for side in sides] == [few > 0] * 2
-        arrays = [array for side in sides for array in (side.stiffness, side.load)]
+        arrays = [array for side in sides for array in (side.schur, side.load)]
         arrays += [side.mesh_body.displacement(np.arange(1.0, side.grid.size + 1)) for side in sides]
         values = vf.measure(pair)
     return arrays, {name: x.value for name, x in vars(values).items() if isinstance(x, Number)}

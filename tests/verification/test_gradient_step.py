@@ -34,8 +34,8 @@ def energy(pair, g):
     one = u + solution.v
     one[pair.contact.grid.normal] += pair.interface.gap
     two = u - pair.neumann.known
-    value = two @ pair.neumann.stiffness @ two / 2 - pair.neumann.load @ two
-    value += one @ pair.contact.stiffness @ one / 2 - pair.contact.load @ one
+    value = two @ pair.neumann.schur @ two / 2 - pair.neumann.load @ two
+    value += one @ pair.contact.schur @ one / 2 - pair.contact.load @ one
     return value, g - solution.force, solution.pattern.touching
 
 
@@ -64,7 +64,7 @@ def test_the_energy_lies_between_two_parabolas_over_its_tangent(seed):
             if other is g:
                 continue
             d = pair.neumann.flexibility(other - g)
-            square = d @ pair.neumann.stiffness @ d
+            square = d @ pair.neumann.schur @ d
             above = there - value - slope @ d
             slack = ROUNDING * (abs(value) + abs(there) + square)
             assert square / 2 - slack <= above <= (1 + rho) * square / 2 + slack
@@ -92,7 +92,7 @@ def test_the_slope_of_the_energy_is_the_force_less_its_image(seed):
 def factors(pair, random, theta):
     """What T_theta does to two pairs of forces: all nodes open; all touching, in the worst direction."""
     n, t = pair.contact.grid.n, pair.contact.grid.t
-    one, two = pair.contact.stiffness, pair.neumann.stiffness
+    one, two = pair.contact.schur, pair.neumann.schur
     condensed = [s[t:, t:] - s[t:, :t] @ np.linalg.solve(s[:t, :t], s[:t, t:]) for s in (one, two)]
     worst = eigh(*condensed)[1][:, -1]
     step = np.concatenate([np.zeros(t), condensed[1] @ worst])

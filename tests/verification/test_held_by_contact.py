@@ -251,10 +251,10 @@ def test_the_constants_are_the_limits_of_those_of_a_body_held_by_ever_softer_spr
     if measured.rho_max is None:
         assert pair.held
         return
-    S_n, t = pair.neumann.stiffness, contact.grid.t
+    S_n, t = pair.neumann.schur, contact.grid.t
     carry = pair.interface.carry_form
-    spring = 1e-7 * np.diag(contact.stiffness).max()
-    S = contact.stiffness + spring * contact.motions @ contact.motions.T
+    spring = 1e-7 * np.diag(contact.schur).max()
+    S = contact.schur + spring * contact.motions @ contact.motions.T
     top = lambda A, B: float(np.linalg.eigvals(np.linalg.solve(B, A)).real.max())
     assert free.all()
     assert measured.rho_max.value == pytest.approx(top(carry(S), S_n), rel=1e-5)
@@ -346,7 +346,7 @@ def test_without_friction_the_refusal_of_the_semidefinite_bound_names_the_one_in
     assert pair.contact.lifts
     for words in ("lifted rigidly", "prove the bound in energy norms", "none prove less"):
         assert words in found.verdicts["lmi"].reason
-    S1, S2, normal = pair.contact.stiffness, pair.neumann.stiffness, pair.contact.grid.normal
+    S1, S2, normal = pair.contact.schur, pair.neumann.schur, pair.contact.grid.normal
     S1_normal = S1[t:, t:] - S1[t:, :t] @ np.linalg.solve(S1[:t, :t], S1[:t, t:])
     values, modes = scipy.linalg.eigh(S1_normal, np.linalg.inv(pair.neumann.inverse[normal, normal]))
     d = pair.neumann.inverse[:, normal] @ np.linalg.solve(pair.neumann.inverse[normal, normal], modes[:, -1])

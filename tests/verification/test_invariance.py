@@ -49,11 +49,11 @@ def magnitude(runs: list[Run]) -> tuple[float, float]:
         body = dense_body(pair, name)
         acting = np.abs(body.forces) + np.abs(body.everything) @ np.abs(body.values)
         load = np.abs(body.R).T @ acting[~body.held]
-        give = np.abs(np.linalg.pinv(side.stiffness))  # 0 where the body is held along Gamma_c
+        give = np.abs(np.linalg.pinv(side.schur))  # 0 where the body is held along Gamma_c
         for run in runs:
             state = run.last
             u = np.abs(state.displacement) + np.abs(state.contact.v) + float(pair.problem.contact.gap) + give @ load
-            force = max(force, float((np.abs(side.stiffness) @ u + load + np.abs(state.image)).max()))
+            force = max(force, float((np.abs(side.schur) @ u + load + np.abs(state.image)).max()))
             displacement = max(displacement, float((u + give @ np.abs(state.image)).max()))
     return force, displacement
 

@@ -167,7 +167,7 @@ def test_all_solvers_give_the_same_iterates_and_certify_each(name):
 def test_each_state_follows_from_the_one_before(data):
     """(III), and the residual and the size in the norm (5.21)."""
     pair = pair_from(vf.Problem.from_dict(data))
-    theta, S2 = float(data["iteration"]["theta"]), pair.neumann.stiffness
+    theta, S2 = float(data["iteration"]["theta"]), pair.neumann.schur
     try:
         states = list(islice(vf.iterate(pair, solver="active-set"), 4))
     except ContactError:

@@ -113,7 +113,7 @@ def test_J_theta_is_theta_times_the_derivative_and_1_minus_theta_times_the_ident
 def test_between_two_bars_the_derivative_is_minus_rho_in_contact_and_0_apart(data, theta):
     """In contact the force vanishes after a step of g*/rho; |J| = rho(J) = |1 - theta - theta rho|."""
     pair = pair_from(vf.Problem.from_dict(data))
-    rho = pair.contact.stiffness[0, 0] / pair.neumann.stiffness[0, 0]
+    rho = pair.contact.schur[0, 0] / pair.neumann.schur[0, 0]
     state = at_solution(pair)
     assume(state is not None)  # the loads may be equal to the last digit, and T g mere rounding
     piece = piece_of(pair, state.g, state.contact.pattern)
@@ -123,7 +123,7 @@ def test_between_two_bars_the_derivative_is_minus_rho_in_contact_and_0_apart(dat
         factor = abs(1 - theta - theta * rho)
     else:
         assert piece.force[0, 0] == 0
-        assert piece.jump[0, 0] == pytest.approx(-1 / pair.neumann.stiffness[0, 0], rel=1e-12)
+        assert piece.jump[0, 0] == pytest.approx(-1 / pair.neumann.schur[0, 0], rel=1e-12)
         factor = 1 - theta
     assert piece.factor(theta) == pytest.approx(factor, rel=1e-9, abs=1e-12)
     assert piece.bound.shape == (0, 1)

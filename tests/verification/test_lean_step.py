@@ -81,7 +81,7 @@ def pairs():
 def test_the_displacement_that_follows_is_the_one_solved_for_g(made):
     """(I) by its sum against (I) solved, in the energy norm: 35 units in the last place were seen."""
     pair = made()
-    T, S2 = FixedPointMap(pair), pair.neumann.stiffness
+    T, S2 = FixedPointMap(pair), pair.neumann.schur
     for theta in (0.02, 0.1) if AT_NIGHT else (0.02,):
         for state in islice(iterates(T, Constant().begin(pair, theta, None)), 100):
             u = T.displacement(state.g)
@@ -121,11 +121,11 @@ def test_every_step_keeps_a_certificate_of_its_own(name):
     pair = pair_named(name)
     for state in islice(vf.iterate(pair), 2 * RENEWED):
         obstacle = state.displacement + np.concatenate([np.zeros(pair.contact.grid.t), pair.interface.gap])
-        q = pair.contact.load - pair.contact.stiffness @ obstacle
+        q = pair.contact.load - pair.contact.schur @ obstacle
         solved, bound = state.contact, pair.bound(state.g)
         assert solved.kkt.residual <= 1e-11
         if pair.contact.free.all():
-            found = KKTCertificate(pair.contact.stiffness).measure(q, bound, solved.v, solved.force)
+            found = KKTCertificate(pair.contact.schur).measure(q, bound, solved.v, solved.force)
             assert found.residual <= 1e-11
             assert abs(found.residual - solved.kkt.residual) <= 1e-13
 
@@ -317,7 +317,7 @@ def test_other_values_cost_no_condensation_and_the_pair_is_that_of_the_file(valu
     assert other.interface.law == file.interface.law
     for one, two in ((other.contact, file.contact), (other.neumann, file.neumann)):
         assert one.upward == two.upward
-        for name in ("stiffness", "load", "known"):
+        for name in ("schur", "load", "known"):
             expected = getattr(two, name)
             assert np.abs(getattr(one, name) - expected).max() <= 1e-13 * np.abs(expected).max()
     again = vf.run(file)
@@ -344,7 +344,7 @@ def test_a_body_of_another_matrix_is_condensed_anew(values, anew, monkeypatch):
     other = pair.changed(**values)
     assert len(calls) == anew
     for one, two in ((other.contact, file.contact), (other.neumann, file.neumann)):
-        assert np.abs(one.stiffness - two.stiffness).max() <= 1e-13 * np.abs(two.stiffness).max()
+        assert np.abs(one.schur - two.schur).max() <= 1e-13 * np.abs(two.schur).max()
 
 
 def test_what_does_not_change_is_the_same_object():

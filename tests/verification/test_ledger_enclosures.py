@@ -118,7 +118,7 @@ def test_the_energy_of_sticking_nodes_lies_between_its_bounds(bodies):
     """What a pair where all nodes stick consists of, by solves in doubles with the matrices of the program."""
     for one in bodies.values():
         u, pair, d = one.sticks.u, one.case.pair, one.sticks
-        S_1, S_2 = pair.contact.stiffness, pair.neumann.stiffness
+        S_1, S_2 = pair.contact.schur, pair.neumann.schur
         p = -S_1 @ u
         expected = {"energy_1": u @ S_1 @ u, "work": p @ u, "norm": np.sqrt(u @ S_2 @ u)}
         expected["norm_T"] = np.sqrt(p @ np.linalg.solve(S_2, p))

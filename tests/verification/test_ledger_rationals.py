@@ -46,7 +46,7 @@ def test_an_inequality_without_its_friction_term_is_refuted(pair, id, monkeypatc
 def test_the_rational_bodies_and_solutions_are_those_of_the_program(pair):
     for side, own in ((pair.one, pair.pair.contact), (pair.two, pair.pair.neumann)):
         assert (side.energy == side.S).all()
-        assert np.allclose(side.S.astype(float), own.stiffness, rtol=1e-13, atol=1e-14)
+        assert np.allclose(side.S.astype(float), own.schur, rtol=1e-13, atol=1e-14)
     for solution, g in zip(pair.solutions, FORCES, strict=True):
         u, found = FixedPointMap(pair.pair, "cvxpy")(g.astype(float))
         assert np.allclose(solution.w_2.astype(float), u, atol=1e-13)

@@ -105,7 +105,7 @@ def chosen(pair: ContactPair, touching: list[bool], sliding: list[int], random: 
     bound = pair.bound(np.concatenate([np.zeros(t), pressure]))
     shear = np.where(np.array(sliding) != 0, sliding, random.uniform(-0.5, 0.5, t)) * bound
     g = np.concatenate([shear, pressure])
-    length = np.linalg.norm(g) / np.linalg.norm(pair.contact.stiffness, 2)
+    length = np.linalg.norm(g) / np.linalg.norm(pair.contact.schur, 2)
     slide, gap = np.array(sliding) * random.uniform(0.5, 1, t), np.where(touching, 0.0, -random.uniform(0.5, 1, n))
     return g, length * np.concatenate([slide, gap])
 

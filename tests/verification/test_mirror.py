@@ -18,8 +18,8 @@ def section_6(**changes):
 
 def matrices(pair):
     return {
-        "S1": np.array(pair.neumann.stiffness),  # the lower body has the Neumann problem
-        "S2": np.array(pair.contact.stiffness),
+        "S1": np.array(pair.neumann.schur),  # the lower body has the Neumann problem
+        "S2": np.array(pair.contact.schur),
         "kernel": np.array(pair.interface.kernel),
         "weights": np.array(pair.contact.grid.weights),
     }

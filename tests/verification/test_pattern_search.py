@@ -121,7 +121,7 @@ def test_what_t_makes_of_a_force_on_several_patterns_is_what_it_makes_of_it_on_e
 
 def forms_of(pair):
     """Forms of Section 5 by pieces, in y with ``g = L y``, and by their factors."""
-    root, inverse, gram, t = pair.neumann.root, pair.neumann.inverse, pair.contact.stiffness, pair.contact.grid.t
+    root, inverse, gram, t = pair.neumann.root, pair.neumann.inverse, pair.contact.schur, pair.contact.grid.t
     force, trace = lambda piece: piece.force @ root, lambda piece: (pair.interface.carry(inverse) + piece.jump) @ root
     slid = lambda piece: (piece.pattern.sliding[:, None] * piece.bound @ root).T @ piece.jump[:t] @ root
     symmetric = lambda form: (form + form.T) / 2

@@ -22,8 +22,8 @@ EPSILON = sys.float_info.epsilon
 SAME = lambda values: values
 PAIR = SimpleNamespace(
     interface=SimpleNamespace(transfer=None, carry=SAME, carry_back=SAME),
-    neumann=SimpleNamespace(stiffness=np.zeros((1, 1)), inverse=np.eye(1), load=np.zeros(1)),
-    contact=SimpleNamespace(stiffness=np.zeros((1, 1)), load=np.zeros(1)),
+    neumann=SimpleNamespace(schur=np.zeros((1, 1)), inverse=np.eye(1), load=np.zeros(1)),
+    contact=SimpleNamespace(schur=np.zeros((1, 1)), load=np.zeros(1)),
 )
 
 
@@ -175,9 +175,9 @@ def solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 def exact_image(pair: vf.ContactPair, state) -> np.ndarray:
     """T at an iterate in rationals, by steps I and II written out for its contact pattern; one grid, friction acts."""
-    S, t, pattern = exact(pair.contact.stiffness), pair.contact.grid.t, state.contact.pattern
+    S, t, pattern = exact(pair.contact.schur), pair.contact.grid.t, state.contact.pattern
     g = exact(state.g)
-    phi = exact(pair.neumann.known) + solved(pair.neumann.stiffness, g + exact(pair.neumann.load))
+    phi = exact(pair.neumann.known) + solved(pair.neumann.schur, g + exact(pair.neumann.load))
     phi[pair.contact.grid.normal] += exact(pair.interface.gap)
     pressure = exact(pair.interface.kernel) @ g[pair.neumann.grid.normal]
     friction = exact(pair.contact.grid.weights) * Fraction(pair.friction) * abs(pressure) * exact(pattern.sliding)
@@ -187,7 +187,7 @@ def exact_image(pair: vf.ContactPair, state) -> np.ndarray:
     moves = np.flatnonzero(np.concatenate([pattern.sliding != 0, ~pattern.touching]))
     v = exact(np.zeros(len(q)))
     if len(moves):
-        v[moves] = solved(pair.contact.stiffness[np.ix_(moves, moves)], right[moves])
+        v[moves] = solved(pair.contact.schur[np.ix_(moves, moves)], right[moves])
     return q - S @ v
 
 

@@ -39,13 +39,13 @@ def test_no_active_set_stands_behind_it(run, monkeypatch):
     monkeypatch.setattr(ActiveSet, "solve", None)
     again = FixedPointMap(run.pair, step=ProgramStep)(g)[1]
     assert np.array_equal(again.v, expected.v)
-    assert again.force == pytest.approx(run.pair.contact.load - run.pair.contact.stiffness @ moved(run, g, again))
+    assert again.force == pytest.approx(run.pair.contact.load - run.pair.contact.schur @ moved(run, g, again))
 
 
 def moved(run, g, solved):
     """The trace of the contact body, from step I and the program's jump."""
     pair = run.pair
-    u = np.linalg.solve(pair.neumann.stiffness, g + pair.neumann.load)
+    u = np.linalg.solve(pair.neumann.schur, g + pair.neumann.load)
     return u + solved.v + np.concatenate([np.zeros(pair.contact.grid.t), pair.interface.gap])
 
 

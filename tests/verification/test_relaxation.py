@@ -246,9 +246,9 @@ def test_aitken_finds_the_force_between_two_bars_from_two_residuals_without_a_ch
     step = RULES["aitken"].begin(pair, float(theta), None)
     seen = list(islice(iterates(FixedPointMap(pair, "active-set"), step), 6))
     touching = [bool(state.contact.pattern.touching[0]) for state in seen]
-    rho = pair.contact.stiffness[0, 0] / pair.neumann.stiffness[0, 0]
+    rho = pair.contact.schur[0, 0] / pair.neumann.schur[0, 0]
     terms = abs(pair.contact.load[0]) + rho * (abs(pair.neumann.load[0]) + max(abs(s.g[0]) for s in seen))
-    terms += pair.contact.stiffness[0, 0] * pair.interface.gap[0]
+    terms += pair.contact.schur[0, 0] * pair.interface.gap[0]
     arrives = lambda i: abs(seen[i].image[0] - seen[i].g[0]) <= 1e-11 * terms
     for i in range(4):
         if touching[i] == touching[i + 1] == touching[i + 2]:

@@ -110,7 +110,7 @@ def exact_form(pair, multipliers, theta: float, square: Fraction) -> Exact:
     Positive definite if and only if ``square |g|^2 - |theta p + (1 - theta) g|^2 - conditions`` is.
     """
     n, size = pair.contact.grid.n, pair.contact.grid.size
-    S_1, S_2, R = (exact(m) for m in (pair.contact.stiffness, pair.neumann.stiffness, pair.interface.kernel))
+    S_1, S_2, R = (exact(m) for m in (pair.contact.schur, pair.neumann.schur, pair.interface.kernel))
     k, t = Fraction(float(pair.friction)), Fraction(theta)
     w = [Fraction(float(v)) for v in pair.contact.grid.weights]
     lam, tau, a, b = ([Fraction(float(v)) for v in m] for m in multipliers)
@@ -172,7 +172,7 @@ def test_the_multipliers_prove_the_factor_in_rationals(seed):
 def test_near_singular_stiffness_makes_the_factor_larger_never_too_small(length, condition):
     """The value that is given is proved in rationals; it gives away at most a thousandth for it."""
     pair = pair_from(slender(length))
-    assert np.linalg.cond(pair.contact.stiffness) > condition
+    assert np.linalg.cond(pair.contact.schur) > condition
     found = QuadraticForms(pair, measure(pair)).factor(0.5)
     assert found.evaluated < found.value < 1.001 * found.evaluated
     assert definite(exact_form(pair, found.multipliers, 0.5, Fraction(found.value) ** 2 * (1 + Fraction(1, 10**15))))

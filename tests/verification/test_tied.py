@@ -64,7 +64,7 @@ def test_a_tied_interface_prefers_the_same_role_as_contact_does(ends):
 def test_a_bonded_iteration_never_takes_longer_steps_than_the_tied_rate_and_comes_to_it(neumann_body):
     problem = vf.Problem.from_dict(plates(iteration={"neumann_body": neumann_body}))
     pair, role = vf.build(problem), vf.advise(problem).roles[0]
-    S_c, S_n = pair.contact.stiffness, pair.neumann.stiffness
+    S_c, S_n = pair.contact.schur, pair.neumann.schur
     values, modes = eigh(S_c, S_n)
     assert (role.rho_min.value, role.rho_tied.value) == pytest.approx((values[0], values[-1]), rel=1e-9)
     every, ends = modes.sum(axis=1), modes[:, 0] + modes[:, -1]

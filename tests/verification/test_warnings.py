@@ -193,7 +193,7 @@ def step_by_step(name, path):
         pair = vf.build(pressed(name, down))
         contact, shift = pair.contact, np.zeros(pair.contact.grid.size)
         shift[contact.grid.tangential] = pair.upward * before  # slip is u1_T - u2_T; the contact body is body 2
-        moved = replace(contact, load=contact.load - contact.stiffness @ shift)
+        moved = replace(contact, load=contact.load - contact.schur @ shift)
         run = vf.run(replace(pair, contact=moved, settings=replace(pair.settings, tolerance=1e-12)))
         assert run.converged
         found, before = run.contact, before + run.contact.slip

@@ -90,9 +90,9 @@ class Piece(Value):
         rows = np.flatnonzero(moves & contact.free)
         result = np.zeros(carried.shape)
         if len(rows):
-            load = -contact.stiffness @ carried
+            load = -contact.schur @ carried
             load[:t] -= self.pattern.sliding[:, None] * self.bound
-            result[rows] = Cholesky(contact.stiffness, rows, contact.motions).solve(load)[rows]
+            result[rows] = Cholesky(contact.schur, rows, contact.motions).solve(load)[rows]
         held = np.flatnonzero(~contact.free)
         result[held] = -carried[held]
         return freeze(result)
@@ -112,7 +112,7 @@ class Piece(Value):
     def reaction(self) -> Floats:
         """Derivative of the nodal forces on the contact grid by g, shape (2 n, 2 n)."""
         t, sliding = self.pair.contact.grid.t, self.pattern.sliding
-        result = -self.pair.contact.stiffness @ (self._carried + self.jump)
+        result = -self.pair.contact.schur @ (self._carried + self.jump)
         slides = np.flatnonzero(sliding)
         result[slides] = sliding[slides, None] * self.bound[slides]
         result[t:][~self.pattern.touching] = 0.0

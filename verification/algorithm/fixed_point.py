@@ -49,7 +49,7 @@ class FixedPointMap:
         contact = pair.contact
         near, motions = pair.nearly_incompressible, contact.motions
         body = f"body {pair.contact_body}"
-        self._step = step(contact.stiffness, contact.free, contact.grid.t, solver, near, motions, body, systems)
+        self._step = step(contact.schur, contact.free, contact.grid.t, solver, near, motions, body, systems)
         self._all_free = bool(contact.free.all())
 
     def __call__(self, g: Floats) -> tuple[Floats, ContactSolution]:
@@ -68,7 +68,7 @@ class FixedPointMap:
         obstacle = interface.carry(u).copy()
         obstacle[contact.grid.normal] += interface.gap
         bound = self.pair.bound(g)
-        solution = self._step.solve(contact.load - times(contact.stiffness, obstacle), bound)
+        solution = self._step.solve(contact.load - times(contact.schur, obstacle), bound)
         return solution if self._all_free else self._held(solution, obstacle, bound)
 
     def _held(self, solution: ContactSolution, obstacle: Floats, bound: Floats) -> ContactSolution:

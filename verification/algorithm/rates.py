@@ -32,8 +32,8 @@ class Noise:
         if interface.transfer is not None:
             interface = replace(interface, transfer=np.abs(interface.transfer))
         self._interface = interface
-        self._stiffness, self._flexibility = np.abs(pair.contact.stiffness), np.abs(pair.neumann.inverse)
-        self._neumann_stiffness = np.abs(pair.neumann.stiffness)
+        self._stiffness, self._flexibility = np.abs(pair.contact.schur), np.abs(pair.neumann.inverse)
+        self._neumann_stiffness = np.abs(pair.neumann.schur)
         self._load, self._neumann_load = (np.abs(side.load)[:, None] for side in (pair.contact, pair.neumann))
 
     def of(self, g: Floats, u: Floats) -> Floats:

@@ -153,12 +153,12 @@ def tied_force(pair: ContactPair) -> Floats:
     contact, neumann, interface = pair.contact, pair.neumann, pair.interface
     apart = interface.carry(neumann.known).copy()
     apart[contact.grid.normal] += interface.gap
-    matrix = neumann.stiffness + interface.carry_form(contact.stiffness)
-    right = neumann.load + interface.carry_back(contact.load - contact.stiffness @ apart)
+    matrix = neumann.schur + interface.carry_form(contact.schur)
+    right = neumann.load + interface.carry_back(contact.load - contact.schur @ apart)
     free = neumann.free
     u = np.zeros(len(right))
     u[free] = solve(matrix[np.ix_(free, free)], right[free], assume_a="pos")
-    force: Floats = np.where(free, neumann.stiffness @ u - neumann.load, 0.0)
+    force: Floats = np.where(free, neumann.schur @ u - neumann.load, 0.0)
     return force
 
 

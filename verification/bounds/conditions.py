@@ -108,7 +108,7 @@ class Conditions:
         turn = solve_triangular(np.linalg.cholesky(inner).T, np.eye(len(inner)), lower=False)
         B = np.zeros((contact.size, len(inner)))
         B[carries] = turn
-        S_1 = pair.contact.stiffness if k else cho_solve(cho_factor(inner), np.eye(len(inner)))
+        S_1 = pair.contact.schur if k else cho_solve(cho_factor(inner), np.eye(len(inner)))
         near = block_diag(pair.neumann.flexibility(L_2), inner @ turn)
         self.traces = TraceForms(pair, k, S_1=S_1, carries=carries, near=near)
         self.size = neumann.size

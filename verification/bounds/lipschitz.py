@@ -275,7 +275,7 @@ class Mirror:
         )
         if interface.transfer is not None:
             same = same and _alike(interface.transfer, interface.transfer[::-1, ::-1])
-        if not (same and _is_even(contact.stiffness, contact.grid) and _is_even(neumann.stiffness, neumann.grid)):
+        if not (same and _is_even(contact.schur, contact.grid) and _is_even(neumann.schur, neumann.grid)):
             return None
         L_2, carried = neumann.root, forms.carried
         turns = (

@@ -126,7 +126,7 @@ def locate(pair: ContactPair, measured: Measured, *, seed: int = 0, progress: Pr
     with one_thread():
         forms = LossForms(pair)
         N_1, N_2, dual, d_2 = forms.N_1, forms.N_2, forms.dual, forms.d_2
-        S_1, size2 = pair.contact.stiffness, square(d_2, N_2)
+        S_1, size2 = pair.contact.schur, square(d_2, N_2)
         felt = pair.interface.carry_back(S_1)  # the contact body's reaction, as the Neumann body receives it
         norm = square(forms.root, dual)
 

@@ -87,17 +87,17 @@ def responses(pair: ContactPair, g: Floats, patterns: Patterns, sign: NDArray[np
     rubbing = np.zeros((len(patterns.sliding), len(carried)))
     rubbing[:, :t] = patterns.sliding * _bound(pair, g[:, None], sign)[:, 0]
     moves = _moves(pair, patterns)
-    systems = contact.stiffness * (moves[:, :, None] & moves[:, None, :])
+    systems = contact.schur * (moves[:, :, None] & moves[:, None, :])
     diagonal = np.einsum("cii->ci", systems)
     diagonal[~moves] = 1.0
     if contact.loose:  # motions that a pattern leaves free are pinned, without effect on its reaction
         for system, still in zip(systems, ~moves, strict=True):
             free = vanishing(contact.motions, np.flatnonzero(still))
-            system += float(np.diag(contact.stiffness).max()) * free @ free.T
-    load = np.where(moves, -contact.stiffness @ carried - rubbing, 0.0)
+            system += float(np.diag(contact.schur).max()) * free @ free.T
+    load = np.where(moves, -contact.schur @ carried - rubbing, 0.0)
     jump = np.asarray(np.linalg.solve(systems, load[..., None])[..., 0], dtype=float)
     jump[:, ~contact.free] = -carried[~contact.free]
-    gs, reaction = np.repeat(g[None], len(jump), axis=0), -(carried + jump) @ contact.stiffness
+    gs, reaction = np.repeat(g[None], len(jump), axis=0), -(carried + jump) @ contact.schur
     return Responses(pair=pair, g=gs, jump=jump, reaction=reaction)
 
 
@@ -220,7 +220,7 @@ def _exchanged(contact: Condensed, moves: NDArray[np.bool_]) -> Floats:
 
     Motions that are left free are pinned.
     """
-    S, free, fixed = contact.stiffness, np.flatnonzero(moves), np.flatnonzero(~moves)
+    S, free, fixed = contact.schur, np.flatnonzero(moves), np.flatnonzero(~moves)
     inverse = np.linalg.inv(pinned(S, free, contact.motions) if contact.loose else S[np.ix_(free, free)])
     across = inverse @ S[np.ix_(free, fixed)]
     result = np.empty_like(S)

@@ -54,7 +54,7 @@ class TraceForms:
 
     def __init__(self, pair: ContactPair, k: float, *, S_1: Floats, carries: slice, near: Floats) -> None:
         contact, neumann, interface = pair.contact.grid, pair.neumann.grid, pair.interface
-        S_2, size = pair.neumann.stiffness, neumann.size
+        S_2, size = pair.neumann.schur, neumann.size
         still = np.zeros((contact.size, len(S_1)))
         moved, pressed = still.copy(), still.copy()
         moved[carries], pressed[carries] = np.eye(len(S_1)), S_1

@@ -283,7 +283,7 @@ def _smallest(pair: ContactPair, carried: Floats, neumann: Floats, contact: Floa
 
 
 def _free(side: Condensed) -> Floats:
-    return side.stiffness[np.ix_(side.free, side.free)]
+    return side.schur[np.ix_(side.free, side.free)]
 
 
 def _motions(side: Condensed) -> Floats | None:

@@ -176,7 +176,7 @@ class Condensed(Value):
 
     Attributes
     ----------
-    stiffness : array, shape (2 n, 2 n)
+    schur : array, shape (2 n, 2 n)
         S_a, stress (times length in 1D per unit thickness).
     load : array, shape (2 n,)
         l_a: loads condensed onto the interface.
@@ -195,7 +195,7 @@ class Condensed(Value):
     """
 
     grid: Grid
-    stiffness: Floats
+    schur: Floats
     load: Floats
     known: Floats
     free: NDArray[np.bool_]
@@ -240,7 +240,7 @@ class Condensed(Value):
             matrix[np.ix_(rows, rows)] = elastic.schur if times is None else times * elastic.schur
         return cls(
             grid=grid,
-            stiffness=matrix,
+            schur=matrix,
             load=load,
             known=body.known_trace,
             free=body.unknown.copy(),
@@ -254,7 +254,7 @@ class Condensed(Value):
         turn = self.grid.turn
         return replace(
             self,
-            stiffness=turn(turn(self.stiffness).T),
+            schur=turn(turn(self.schur).T),
             load=turn(self.load),
             known=turn(self.known),
             upward=not self.upward,
@@ -292,7 +292,7 @@ class Condensed(Value):
 
     @cached_property
     def _factor(self) -> Cholesky:
-        return Cholesky(self.stiffness, np.flatnonzero(self.free), self.motions)
+        return Cholesky(self.schur, np.flatnonzero(self.free), self.motions)
 
     def flexibility(self, force: Floats) -> Floats:
         """Return ``S_a^-1 force`` on the free components, 0 on held ones, for one force or columns of them.
@@ -310,7 +310,7 @@ class Condensed(Value):
     def root(self) -> Floats:
         """L with ``S_a = L L'``, shape (2 n, free components): columns orthonormal in the norm (5.21)."""
         result = np.zeros((len(self.free), int(self.free.sum())))
-        result[self.free] = cholesky(self.stiffness[np.ix_(self.free, self.free)], lower=True)
+        result[self.free] = cholesky(self.schur[np.ix_(self.free, self.free)], lower=True)
         return freeze(result)
 
     @cached_property

@@ -142,7 +142,7 @@ def _condensed(
     S = np.array(matrix, dtype=float)
     condensed = Condensed(
         grid=grid,
-        stiffness=(S + S.T) / 2,
+        schur=(S + S.T) / 2,
         load=np.zeros(grid.size) if load is None else real_array(f"the load of the {name} body", load, (grid.size,)),
         known=np.zeros(grid.size),
         free=np.ones(grid.size, dtype=bool),

@@ -45,7 +45,7 @@ def write_interface(pair: ContactPair, path: Path) -> None:
     interface, settings = pair.interface, pair.settings
     arrays: dict[str, Any] = {}
     for i, side in enumerate(pair.along_y, 1):
-        arrays |= {f"S{i}": side.stiffness, f"load{i}": side.load, f"known{i}": side.known, f"free{i}": side.free}
+        arrays |= {f"S{i}": side.schur, f"load{i}": side.load, f"known{i}": side.known, f"free{i}": side.free}
         if side.loose:
             arrays[f"motions{i}"] = side.motions
     for name, grid in (("", interface.contact), ("_neumann", interface.neumann)):
@@ -203,7 +203,7 @@ def _side(arrays: dict[str, np.ndarray], i: int, grid: Grid) -> Condensed:
         check_matrix(f"S{i}", stiffness[np.ix_(free, free)])
     return Condensed(
         grid=grid,
-        stiffness=stiffness,
+        schur=stiffness,
         load=real_array(f"load{i}", arrays[f"load{i}"], size),
         known=real_array(f"known{i}", arrays.get(f"known{i}", np.zeros(size)), size),
         free=free,

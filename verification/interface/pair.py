@@ -271,7 +271,7 @@ def pair_from(problem: Problem, *, law: Law | None = None, like: ContactPair | N
 
 def _check_digits(problem: Problem, name: str, side: Condensed) -> None:
     """Refuse a body so slender, or of cells so stretched, that rounding hides its stiffness in the softest motion."""
-    found = reciprocal_condition(side.stiffness, np.flatnonzero(side.free), side.motions)
+    found = reciprocal_condition(side.schur, np.flatnonzero(side.free), side.motions)
     if not found > LEAST_RCOND:
         needed = (
             f"its stiffness on Gamma_c is lost in rounding (1/condition {found:.1g}): needed more than {LEAST_RCOND:g},"

@@ -138,7 +138,7 @@ def there_and_back(case: Case) -> float:
     The proof of Proposition 5.1 takes it for 1.  Where the grids differ z must reach body 2 by some transfer, which
     the algorithm does not have: here by the mortar transfer of the other direction.
     """
-    interface, stiffness = case.weak.pair.interface, case.weak.pair.contact.stiffness
+    interface, stiffness = case.weak.pair.interface, case.weak.pair.contact.schur
     x = interface.contact.x.copy()
     x[0], x[-1] = min(x[0], interface.neumann.x[0]), max(x[-1], interface.neumann.x[-1])  # ends that differ by rounding
     blocks = np.split(np.eye(interface.contact.size), interface.contact.dimension)

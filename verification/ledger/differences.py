@@ -228,7 +228,7 @@ def between(setting: DrawnSetting, psi: Floats, other: Floats) -> Difference:
         image = pair.interface.carry_back(solution.force)
         w_1 = pair.interface.carry(u) + solution.v
         w_1[pair.contact.grid.normal] += pair.interface.gap
-        parts = ((w_1, pair.contact.stiffness), (force + pair.neumann.load, forms.inverse), (image, forms.inverse))
+        parts = ((w_1, pair.contact.schur), (force + pair.neumann.load, forms.inverse), (image, forms.inverse))
         size += sum(_norm(v, gram) ** 2 for v, gram in parts)
         solutions.append(solution)
         states.append(u)
@@ -282,13 +282,13 @@ def along(setting: DrawnSetting, piece: Piece, y: Floats) -> Difference:
     bound, slip = piece.bound @ force, piece.pattern.sliding * jump[:t]
     d_1 = carried + jump
     parts = (
-        (d_1, pair.contact.stiffness),
-        (carried, pair.contact.stiffness),
+        (d_1, pair.contact.schur),
+        (carried, pair.contact.schur),
         (force, forms.inverse),
         (reaction, forms.inverse),
     )
     size = sum(_norm(v, gram) ** 2 for v, gram in parts) + float(np.abs(bound) @ np.abs(slip))
-    moves = _norm(d_1, pair.contact.stiffness) ** 2 > NO_MOTION * size
+    moves = _norm(d_1, pair.contact.schur) ** 2 > NO_MOTION * size
     return Difference(
         setting=setting,
         force=force,

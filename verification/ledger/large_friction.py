@@ -86,7 +86,7 @@ def loaded(pair: ContactPair, g: Floats, v: Floats, force: Floats) -> ContactPai
     neumann, contact = pair.neumann, pair.contact
     u = pair.interface.carry(neumann.known + neumann.flexibility(g + neumann.load)) + v
     u[pair.contact.grid.normal] += pair.interface.gap
-    return replace(pair, contact=replace(contact, load=force + contact.stiffness @ u), problem=None)
+    return replace(pair, contact=replace(contact, load=force + contact.schur @ u), problem=None)
 
 
 def witness(case: Trial, random: np.random.Generator) -> Witness:
@@ -111,7 +111,7 @@ def witness(case: Trial, random: np.random.Generator) -> Witness:
     length = STEP * np.abs(g[felt.normal]).min() / np.abs(setting.forms.root @ y).max()
     change = along(setting, uniform_piece(pair, touching=False, sliding=1), length * y)
     # nodes slide and are open by more than the two forces change
-    far = np.linalg.norm(g) / np.linalg.norm(pair.contact.stiffness, 2)
+    far = np.linalg.norm(g) / np.linalg.norm(pair.contact.schur, 2)
     far = max(far, np.abs(change.d_1 - pair.interface.carry(change.d_2)).max() / STEP)
     jump = far * np.concatenate([random.uniform(0.5, 1, grid.t), -random.uniform(0.5, 1, grid.n)])
     pair = loaded(pair, g, jump, np.concatenate([pair.bound(g), np.zeros(grid.n)]))

@@ -89,19 +89,19 @@ class Affine:
         obstacle = unloaded.copy()
         obstacle[contact.grid.normal] += interface.gap
         trace = interface.carry(pair.neumann.inverse)
-        start = contact.load - contact.stiffness @ obstacle  # q of step II at g = 0, where the bound is 0 as well
+        start = contact.load - contact.schur @ obstacle  # q of step II at g = 0, where the bound is 0 as well
         v, force = systems.of(piece.pattern).solve(start, np.zeros(contact.grid.t))
         parts = [
             (piece.reaction, force),
             (piece.jump, v),
-            (-contact.stiffness @ trace, start),
+            (-contact.schur @ trace, start),
             (pair.neumann.inverse, pair.neumann.unloaded),
             (piece.force, interface.carry_back(force)),
         ]
         self._matrix = np.vstack([matrix for matrix, _ in parts])
         self._offset = np.concatenate([offset for _, offset in parts])[:, None]
         self._image = parts[-1]
-        self._stiffness = float(np.diag(contact.stiffness).max())
+        self._stiffness = float(np.diag(contact.schur).max())
         self._sliding = piece.pattern.sliding.astype(float)[:, None]
 
     def relaxed(self, theta: float) -> tuple[Floats, Floats]:
@@ -170,7 +170,7 @@ class KnownPieces:
     def __init__(self, pair: ContactPair) -> None:
         self.pair = pair
         contact = pair.contact
-        self._systems = Systems(contact.stiffness, contact.free, contact.motions)
+        self._systems = Systems(contact.schur, contact.free, contact.motions)
         self._found: dict[tuple[bytes, ...], Piece] = {}
         self._affine: dict[tuple[bytes, ...], Affine] = {}
 

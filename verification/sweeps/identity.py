@@ -29,10 +29,10 @@ SOLVER = "auto"
 #: Raised by every change of a digit of a row, and only by these: 2 since a residual is compared with present forces.
 NUMERICS = 2
 
-#: Settings and arrays that always enter the key of a pair; a later setting enters where it differs from its default, a
-#: later array where there is one, so that keys stay.
+#: Settings and arrays (name in the key: attribute) that always enter the key of a pair; a later setting enters where it
+#: differs from its default, a later array where there is one, so that keys stay.
 SETTINGS = ("theta", "relaxation", "tolerance", "max_iterations")
-ARRAYS = ("stiffness", "load", "known", "free", "motions")
+ARRAYS = {"stiffness": "schur", "load": "load", "known": "known", "free": "free", "motions": "motions"}
 
 #: Why a rule or a law of a user's own has no key.
 NEEDED = "needed a {} of this library, as nothing tells two versions of another one apart; or no store"
@@ -143,8 +143,7 @@ def _of_pair(pair: ContactPair) -> dict[str, Any]:
     }
     arrays: dict[str, Any] = {"gap": interface.gap, "transfer": interface.transfer}
     for name, side in (("contact", pair.contact), ("neumann", pair.neumann)):
-        for part in ARRAYS:
-            arrays[f"{name}.{part}"] = getattr(side, part)
+        arrays |= {f"{name}.{part}": getattr(side, attribute) for part, attribute in ARRAYS.items()}
         arrays |= {f"{name}.x": side.grid.x, f"{name}.weights": side.grid.weights}
     return {
         "matrices": {name: None if array is None else _content(array) for name, array in arrays.items()},

@@ -153,8 +153,8 @@ def describe(value: Any) -> str:
         return f"build(Problem.from_dict({value.problem.to_dict()!r}))"
     (lower, upper), interface = value.along_y, value.interface
     given = {
-        "S1": lower.stiffness,
-        "S2": upper.stiffness,
+        "S1": lower.schur,
+        "S2": upper.schur,
         "load1": lower.load,
         "load2": upper.load,
         "x": value.contact.grid.x,

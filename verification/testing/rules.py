@@ -103,7 +103,7 @@ def _begun(draw: st.DrawFn) -> dict[str, Any]:
 def opened(pair: ContactPair) -> ContactPair:
     """The same bodies so far apart that their loads do not bring them together."""
     sides = (pair.contact, pair.neumann)
-    soft = min(float(np.linalg.eigvalsh(side.stiffness[np.ix_(side.free, side.free)])[0]) for side in sides)
+    soft = min(float(np.linalg.eigvalsh(side.schur[np.ix_(side.free, side.free)])[0]) for side in sides)
     far = 1e4 * force_scale(pair) * pair.neumann.grid.size / soft  # further than the largest of `forces` moves them
     return replace(pair, interface=replace(pair.interface, gap=pair.interface.gap + far), problem=None)
 

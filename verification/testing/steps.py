@@ -156,13 +156,13 @@ class _Check:
         grid, neumann = self.pair.neumann.grid, self.pair.neumann
         even = np.zeros(grid.size)
         even[grid.normal] = -1.0  # displacement towards the contact body, along its normal
-        pressing = neumann.stiffness @ even
+        pressing = neumann.schur @ even
         return pressing * max(100 * self.norm(neumann.load), self.norm(force)) / self.norm(pressing)
 
     def steepest(self) -> Floats:
         """The force that a pair which sticks everywhere enlarges most."""
-        contact = self.pair.interface.carry_form(self.pair.contact.stiffness)
-        neumann = self.pair.neumann.stiffness
+        contact = self.pair.interface.carry_form(self.pair.contact.schur)
+        neumann = self.pair.neumann.schur
         return np.asarray(neumann @ eigh(contact, neumann)[1][:, -1])
 
     def converges(self, kit: Kit) -> Finding:

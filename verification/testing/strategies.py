@@ -263,8 +263,8 @@ def force_scale(pair: ContactPair) -> float:
     """A force that is typical of a pair: of the order of its loads."""
     sides, interface = (pair.contact, pair.neumann), pair.interface
     loads = max(float(np.abs(side.load).max()) for side in sides)
-    closing = min(float(np.abs(side.stiffness).max()) for side in sides) * float(interface.gap.max())
-    return loads or closing or float(np.abs(pair.neumann.stiffness).max())
+    closing = min(float(np.abs(side.schur).max()) for side in sides) * float(interface.gap.max())
+    return loads or closing or float(np.abs(pair.neumann.schur).max())
 
 
 @st.composite

@@ -50,7 +50,7 @@ def in_units(pair: ContactPair, *, force: float = 1.0, stress: float = 1.0, leng
         return replace(
             given,
             grid=scaled,
-            stiffness=of_stiffness * given.stiffness,
+            schur=of_stiffness * given.schur,
             load=of_forces * given.load,
             known=force * length * given.known,
         )
@@ -81,7 +81,7 @@ def mirrored(pair: ContactPair) -> ContactPair:
         return replace(
             given,
             grid=Grid(x=-grid.x[::-1], weights=grid.weights[::-1]),
-            stiffness=_reflected(grid, _reflected(grid, given.stiffness).T),
+            schur=_reflected(grid, _reflected(grid, given.schur).T),
             load=_reflected(grid, given.load),
             known=_reflected(grid, given.known),
             free=np.concatenate([given.free[grid.tangential][::-1], given.free[grid.normal][::-1]]),
