@@ -15,10 +15,10 @@ from timing import in_turn, timed
 
 import verification as vf
 from verification.bounds import interior_point, model
-from verification.bounds.exact import GAP, budget, enclose
+from verification.bounds.interior_point import LMIError, Optimum, Program
+from verification.bounds.lipschitz import GAP, budget, enclose
 from verification.bounds.losses import locate
 from verification.bounds.multipliers import QuadraticForms, friction_threshold
-from verification.bounds.program import LMIError, Optimum, Program
 from verification.ledger.cases import problem as random_problem
 
 THETA = 0.7

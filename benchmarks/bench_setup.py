@@ -20,7 +20,7 @@ from timing import peak, timed
 import verification as vf
 from fem1d2d import Condensation
 from verification.interface import body
-from verification.interface.pair import build
+from verification.interface.pair import pair_from
 
 #: Cells of the benchmark problem are scaled by these: 4,860 to 99,280 unknowns, and with --full to 1,001,000.
 FACTORS, MORE = (1.0, 2.0, 3.0, 4.56), (7.0, 10.0, 14.43)
@@ -61,11 +61,11 @@ def once(factor: float, by_lifts: bool) -> tuple[int, float, float, dict[str, fl
     p = scaled(factor)
 
     def constants() -> tuple[vf.ContactPair, vf.Measured]:
-        pair = build(p)
+        pair = pair_from(p)
         return pair, vf.measure(pair)
 
     seconds, (pair, measured) = timed(constants)
-    unknowns = sum(len(b.free) for b in pair.on_meshes().elastic)
+    unknowns = sum(len(b.positions) for b in pair.on_meshes().elastic)
     return unknowns, seconds, peak(), {name: getattr(measured, name).value for name in NAMES}
 
 

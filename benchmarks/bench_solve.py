@@ -23,7 +23,7 @@ def main() -> None:
     for factor in FACTORS + MORE * chosen.full:
         problem = scaled(factor)
         bodies = discretise(problem).elastic
-        unknowns = sum(len(body.free) for body in bodies)
+        unknowns = sum(len(body.positions) for body in bodies)
         if unknowns > chosen.largest:
             break
         pairs = in_turn(

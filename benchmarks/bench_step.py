@@ -22,7 +22,7 @@ from timing import in_turn, timed
 
 import verification as vf
 from verification.algorithm.fixed_point import FixedPointMap
-from verification.interface.pair import ContactPair, build
+from verification.interface.pair import ContactPair, pair_from
 
 #: Interface nodes; more with --full.
 SIZES, MORE = (61, 121, 241, 481), (961,)
@@ -53,7 +53,7 @@ def sides(pair: ContactPair) -> tuple[Callable[[], object], Callable[[], object]
 
 def against_the_program(nodes: int, steps: int) -> Row:
     """Steps from the start of the iteration, by T and by the rebuilt program."""
-    pair = build(longer(nodes))
+    pair = pair_from(longer(nodes))
     T = FixedPointMap(pair)
     T(np.zeros(len(pair.neumann.load)))  # the first step compiles the program
     pairs, apart = [], 0.0
@@ -70,7 +70,7 @@ def main() -> None:
     sizes = [nodes for nodes in SIZES + MORE * chosen.full if nodes <= chosen.largest]
     rows = []
     for nodes in sizes:
-        ours, bare = sides(build(longer(nodes)))
+        ours, bare = sides(pair_from(longer(nodes)))
         rows.append(row(nodes, in_turn(ours, bare, rounds=BATCHES, calls=BATCH)))
     record = Record(
         name="step",

@@ -23,12 +23,10 @@ from recording import Record, Row, options, report
 from timing import clock, timed
 
 import verification as vf
-from verification.sweeps.bodies import SharedBodies
 from verification.sweeps.grid import SweepGrid
 from verification.sweeps.identity import LENGTH, Identity
-from verification.sweeps.keeping import Kept
-from verification.sweeps.row import row
-from verification.sweeps.store import Store
+from verification.sweeps.row import SharedBodies, row
+from verification.sweeps.store import Kept, Store
 from verification.sweeps.sweep import sweep_grid, work_of
 
 #: Rows of a sweep on the mesh of 190 nodes along both bodies; more with --full.

@@ -25,8 +25,8 @@ from contraction_truth import Truth, condensed, doubles, number
 from joblib import Parallel, delayed
 
 import verification as vf
+from verification.bounds.interior_point import LMIError
 from verification.bounds.multipliers import QuadraticForms
-from verification.bounds.program import LMIError
 from verification.certificate import check
 from verification.certificate.claims import NoCertificate
 from verification.threads import one_thread

@@ -1,20 +1,18 @@
 """Elastic bodies on meshes: P1 elements on intervals and triangles, plane strain, condensed onto an interface.
 
-A small core in which every matrix is exact for its mesh.  It knows nothing of contact or of any theorem.
+A small core in which every matrix is exact for its mesh.  Contact and the theorem do not enter.
 """
 
 from fem1d2d.assembly import body_load, facet_weights, gram, side_load, stiffness
-from fem1d2d.condense import Condensation, Uncoupled, elimination_order, solver, solver_with_inertia
-from fem1d2d.lifted import FEW, Lifted
+from fem1d2d.condense import FEW, Condensation, Lifted, Uncoupled, elimination_order, solver, solver_with_inertia
+from fem1d2d.element import largest_strains
 from fem1d2d.material import Material, bar, plane_strain
 from fem1d2d.mesh import Mesh, MeshError, interval, rectangle, rectangle_points, sector
 from fem1d2d.mesh_files import from_file
 from fem1d2d.outline import depths
 from fem1d2d.pencil import Eigenvalue, Extremes, extremes_by_solves, largest, largest_of, largest_sparse
-from fem1d2d.strain import largest_strains
 from fem1d2d.supports import Supports, rigid_motions, supports
-from fem1d2d.trace import facing, surface, trapezoid
-from fem1d2d.transfer import mortar
+from fem1d2d.trace import facing, mortar, surface, trapezoid
 
 __all__ = [
     "FEW",

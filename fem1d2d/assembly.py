@@ -10,36 +10,32 @@ from numpy.typing import NDArray
 
 from fem1d2d import element
 from fem1d2d.material import Material
-from fem1d2d.mesh import Floats, Ints, Mesh
+from fem1d2d.mesh import Cells, Floats, Ints, Mesh
 
 
-def _assemble(nodes: Ints, entries: NDArray[np.float64], size: int) -> sp.csc_array:
+def assemble(nodes: Ints, entries: NDArray[np.float64], size: int) -> sp.csc_array:
     """Sum element matrices, shape (c, k, k), of the unknowns ``nodes``, shape (c, k)."""
     rows = np.repeat(nodes, nodes.shape[1], axis=1).ravel()
     columns = np.tile(nodes, nodes.shape[1]).ravel()
     return sp.coo_array((entries.ravel(), (rows, columns)), shape=(size, size)).tocsc()
 
 
+def unknowns(mesh: Cells) -> Ints:
+    """The unknowns of each cell, shape (c, d k)."""
+    d = mesh.dimension
+    return np.asarray((d * mesh.cells[:, :, None] + np.arange(d)).reshape(len(mesh.cells), -1))
+
+
 def stiffness(mesh: Mesh, material: Material) -> sp.csc_array:
     """``a(u, v)`` of (4.1), shape (d n, d n), unit stress x length^(d - 2)."""
-    d = mesh.dimension
-    unknowns = (d * mesh.cells[:, :, None] + np.arange(d)).reshape(len(mesh.cells), -1)
-    local = element.stiffness(mesh, material).reshape(len(mesh.cells), unknowns.shape[1], unknowns.shape[1])
-    return _assemble(unknowns, local.astype(float), d * len(mesh.points))
+    local, nodes = element.stiffness(mesh, material), unknowns(mesh)
+    return assemble(nodes, local.reshape(*nodes.shape, -1).astype(float), mesh.dimension * len(mesh.points))
 
 
 def gram(mesh: Mesh, length: float = 1.0) -> sp.csc_array:
     """The norm ``int |v|^2 / L^2 + |grad v|^2`` of H1, shape (d n, d n), unit length^(d - 2).
 
-    Parameters
-    ----------
-    length : float
-        L > 0, unit length; the paper is L = 1 in the file's unit.
-
-    Raises
-    ------
-    ValueError
-        Unless L > 0.
+    ``length`` is L, in the unit of length; the paper has L = 1 in the file's unit.  ValueError unless L > 0.
     """
     if not length > 0:
         raise ValueError(f"length {length}: a positive number is needed")
@@ -47,47 +43,29 @@ def gram(mesh: Mesh, length: float = 1.0) -> sp.csc_array:
     local = (element.laplace(mesh) + element.mass(mesh) / length**2).astype(float)
     # each component has a copy of every cell
     cells = np.concatenate([d * mesh.cells + p for p in range(d)])
-    return _assemble(cells, np.concatenate([local] * d), d * len(mesh.points))
+    return assemble(cells, np.concatenate([local] * d), d * len(mesh.points))
 
 
 def body_load(mesh: Mesh, force: Sequence[float]) -> Floats:
-    """``int f . v`` of a constant force f, shape (n, d), unit stress x length^(d - 1).
-
-    Parameters
-    ----------
-    force : sequence of float, shape (d,)
-        Unit stress / length.
-    """
+    """``int f . v`` of a constant force f, unit stress / length: shape (n, d), unit stress x length^(d - 1)."""
     volumes = element.element_of(mesh).volumes(mesh).astype(float)
     weights = np.bincount(mesh.cells.ravel(), volumes.ravel(), minlength=len(mesh.points))
     return np.asarray(weights[:, None] * np.asarray(force, dtype=float))
 
 
 def side_load(mesh: Mesh, facets: Ints, traction: Sequence[float]) -> Floats:
-    """``int t . v`` over facets of a constant traction t, shape (n, d), unit stress x length^(d - 1).
+    """``int t . v`` over facets of a constant traction t, unit stress: shape (n, d), unit stress x length^(d - 1).
 
-    Parameters
-    ----------
-    facets : int array, shape (f, d)
-        The nodes of each facet.
-    traction : sequence of float, shape (d,)
-        Unit stress.
+    ``facets`` are the nodes of each facet, shape (f, d).
     """
-    weights = facet_weights(mesh, facets)
-    return np.asarray(weights[:, None] * np.asarray(traction, dtype=float))
+    return np.asarray(facet_weights(mesh, facets)[:, None] * np.asarray(traction, dtype=float))
 
 
 def facet_weights(mesh: Mesh, facets: Ints, between: tuple[float, float] | None = None) -> Floats:
     """``int v`` over facets for every hat function v, shape (n,), unit length^(d - 1).
 
-    In 1D a facet is a point of measure 1.
-
-    Parameters
-    ----------
-    facets : int array, shape (f, d)
-        The nodes of each facet.
-    between : pair of float, optional
-        In 2D, the part of the x axis over which to integrate; no facet may stand upright then.
+    ``facets`` are the nodes of each facet, shape (f, d); in 1D a facet is a point of measure 1.  In 2D ``between`` is
+    the part of the x axis over which to integrate; no facet may be vertical then.
     """
     p = mesh.points[facets].astype(float)
     sizes = np.ones(len(facets)) if mesh.dimension == 1 else np.linalg.norm(p[:, 1] - p[:, 0], axis=1)

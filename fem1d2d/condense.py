@@ -1,4 +1,4 @@
-"""Factor once, then everything on the interface: Schur complement, forms on lifts, condensed loads."""
+"""Condensation of a matrix onto an interface: Schur complement, forms on lifts, condensed loads, solves."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.linalg import lu_factor, lu_solve
 from scipy.sparse.linalg import spilu, splu
 
 from fem1d2d.mesh import Floats, Ints
@@ -16,12 +17,15 @@ from fem1d2d.mesh import Floats, Ints
 #: Right-hand sides solved at once; more of them leave the cache.
 BLOCK = 16
 
-#: SuperLU for a matrix whose diagonal can be trusted as pivots.  Panels of 8 columns stay in the cache: a tenth faster
-#: than its own 20.
+#: SuperLU for a matrix whose diagonal entries can serve as pivots.  Panels of 8 columns stay in the cache: a tenth
+#: faster than SuperLU's default of 20.
 SYMMETRIC: dict[str, Any] = {"diag_pivot_thresh": 0.0, "panel_size": 8, "options": {"SymmetricMode": True}}
 
 #: The step of a derivative taken along the imaginary axis, relative to the matrix: its square is far below rounding.
 STEP = 2.0**-70
+
+#: Up to so many unknowns dense matrices cost less than sparse ones: a tenth at 100, as much at 270.
+FEW = 200
 
 
 class Condensation:
@@ -41,7 +45,7 @@ class Condensation:
         An order of elimination that ends with the interface, as :func:`elimination_order` finds it; matrices of one
         mesh can share it.
     singular : bool
-        Whether the matrix is semidefinite alone.  What eliminates it then meets last pivots of 0: the block of the
+        True if the matrix is only semidefinite.  Elimination would then end with pivots of 0: the block of the
         interface is shifted meanwhile, which shifts the Schur complement by as much and changes nothing else.
     """
 
@@ -76,8 +80,8 @@ class Condensation:
 
     @cached_property
     def lift(self) -> Floats:
-        """``-A_II^-1 A_IB``, shape (n - b, b): dense, and large where the body is; nothing else here needs it."""
-        lift = -self._solve_inside(self._coupling.toarray())
+        """``-A_II^-1 A_IB``, shape (n - b, b): dense, and as large as the body; computed only where it is read."""
+        lift = -self._solve_inside(self.matrix[:, self.interface][self.inside].toarray())
         lift.setflags(write=False)
         return lift
 
@@ -89,7 +93,7 @@ class Condensation:
         return self._unshifted(self._rest(_factor(self._shifted(self.matrix), self.order)))
 
     def _unshifted(self, schur: Floats) -> Floats:
-        """The Schur complement of the matrix from that of the shifted one."""
+        """The Schur complement of the matrix, given the one of the shifted matrix."""
         return symmetric(schur - self._shift * np.eye(len(schur)) if self._shift else schur)
 
     def _shifted(self, matrix: Any) -> Any:
@@ -101,13 +105,7 @@ class Condensation:
         return (matrix + sp.diags_array(diagonal, format="csc")).tocsc()
 
     def times(self, trace: Floats) -> Floats:
-        """``schur @ trace`` without the matrix: one solve inside, shape (b,), a force of the matrix's unit.
-
-        Parameters
-        ----------
-        trace : float array, shape (b,)
-            Displacements, in the order of the interface.
-        """
+        """``schur @ trace`` for displacements of the interface, shape (b,), by one solve inside."""
         return np.asarray(self._on_interface @ trace - self._coupling.T @ self._solve_inside(self._coupling @ trace))
 
     def _needs_definite(self) -> None:
@@ -117,12 +115,8 @@ class Condensation:
     def solver(self) -> Callable[[Floats], Floats]:
         """``load -> A^-1 load`` on all unknowns, as :func:`solver`; its factorisation gives the Schur complement too.
 
-        The factorisation lives as long as what is returned: it is the largest part of the memory.
-
-        Raises
-        ------
-        ValueError
-            The matrix is singular.
+        The factorisation, the largest part of the memory, lives as long as the function that is returned.  ValueError
+        if the matrix is singular.
         """
         self._needs_definite()
         factor = _factor(self.matrix, self.order)
@@ -133,29 +127,25 @@ class Condensation:
     def on_lifts(self, form: sp.csc_array) -> Floats:
         """``R' X R``, shape (b, b): a symmetric form X on all unknowns, evaluated at lifted interface values.
 
-        It is the derivative of the Schur complement of ``A + t X`` at t = 0: the lift minimises the energy, so that its
-        own change does not count.  The step is taken along the imaginary axis, where no difference cancels, and one
-        factorisation gives all entries to rounding.
+        It is the derivative of the Schur complement of ``A + t X`` at t = 0: the lift minimises the energy, so that a
+        change of the lift has no effect of first order.  The step is taken along the imaginary axis, where no
+        difference cancels, and one factorisation gives all entries to rounding.
         """
         step = STEP * _power_of_two(self.matrix) / _power_of_two(form)
         return self._rest(_factor(self._shifted(self.matrix + 1j * step * form), self.order)).imag / step
 
     def _rest(self, factor: Any) -> NDArray[Any]:
-        """``X_BB - X_BI X_II^-1 X_IB`` of a factorised matrix X: what the elimination of I leaves on B."""
+        """``X_BB - X_BI X_II^-1 X_IB`` of a factorised matrix X."""
         # the last rows and columns, unless SuperLU moved some that do not depend on each other
         last = factor.perm_c[len(self.inside) :]
         L, U = (part[:, last][last].toarray() for part in (factor.L, factor.U))
         return symmetric(L @ U)
 
     def condense(self, load: Floats) -> Floats:
-        """The load as the interface feels it: ``load_B + lift' load_I``, shape (b,), of its unit.
+        """The load condensed onto the interface, ``load_B + lift' load_I``, shape (b,), of its unit.
 
-        Where the Schur complement is not known yet, the factorisation that this takes gives it too.
-
-        Parameters
-        ----------
-        load : float array, shape (n,)
-            A force for each unknown.
+        ``load`` is a force for each unknown, shape (n,).  If the Schur complement is not known yet, the factorisation
+        made here gives it too.
         """
         inner = load[self.inside]
         if not inner.any():  # without a load there is nothing to factorise for
@@ -169,14 +159,14 @@ class Condensation:
         return np.asarray(load[self.interface] - self._coupling.T @ self._solve_inside(inner))
 
     def extend(self, trace: Floats, load: Floats | None = None) -> Floats:
-        """Values on all unknowns with the given interface values, in equilibrium with ``load`` inside, shape (n,).
+        """Displacements of all unknowns, shape (n,), in equilibrium with the forces that ``load`` has inside.
 
         Parameters
         ----------
         trace : float array, shape (b,)
-            Displacements, in the order of the interface; of their unit is the result.
+            Displacements of the interface, in its order; the result has their unit.
         load : float array, shape (n,), optional
-            Forces, of which those inside count; none if left out.
+            None for no forces.
         """
         full = np.empty(self.matrix.shape[0])
         full[self.interface] = trace
@@ -186,16 +176,10 @@ class Condensation:
 
 
 class Uncoupled(Condensation):
-    """A condensation of a matrix that couples no two components of the unknowns, as that of a norm.
+    """A :class:`Condensation` of a matrix that couples no two components of the unknowns, such as the matrix of a norm.
 
-    Each component is eliminated alone, and those with the same matrix share one factorisation.
-
-    Parameters
-    ----------
-    matrix, interface, order
-        As for :class:`Condensation`.
-    component : int array, shape (n,)
-        The component of each unknown.
+    Each component is eliminated by itself, and those with the same matrix share one factorisation; ``component``, int
+    array of shape (n,), is the component of each unknown.
 
     Examples
     --------
@@ -246,8 +230,50 @@ class Uncoupled(Condensation):
         return solve
 
 
+class Lifted(Condensation):
+    """A :class:`Condensation` of few unknowns in dense matrices, by the formulas that define it.
+
+    Examples
+    --------
+    >>> Lifted(sp.csc_array(np.array([[2.0, -1.0], [-1.0, 2.0]])), np.array([1])).schur
+    array([[1.5]])
+    """
+
+    def __init__(self, matrix: sp.csc_array, interface: Ints, *, singular: bool = False) -> None:
+        super().__init__(matrix, interface, interface[:0], singular=singular)  # without an order: none is used
+        self._dense: Floats = matrix.toarray()
+
+    def _block(self, rows: Ints, columns: Ints) -> Any:
+        return self._dense[np.ix_(rows, columns)]
+
+    @cached_property
+    def _solve_inside(self) -> Callable[[Floats], Floats]:
+        return _dense_solver(self._block(self.inside, self.inside))
+
+    @cached_property
+    def schur(self) -> Floats:
+        """``A_BB + A_BI lift``, shape (b, b)."""
+        return symmetric(self._on_interface + self._coupling.T @ self.lift)
+
+    def solver(self) -> Callable[[Floats], Floats]:
+        """As :meth:`Condensation.solver`."""
+        self._needs_definite()
+        return _dense_solver(self._dense)
+
+    def on_lifts(self, form: sp.csc_array) -> Floats:
+        """``R' X R``, shape (b, b): a symmetric form X on all unknowns, evaluated at lifted interface values."""
+        fields = np.zeros((len(self._dense), len(self.interface)))
+        fields[self.interface] = np.eye(len(self.interface))
+        fields[self.inside] = self.lift
+        return symmetric(fields.T @ (form @ fields))
+
+    def condense(self, load: Floats) -> Floats:
+        """As :meth:`Condensation.condense`."""
+        return np.asarray(load[self.interface] + self.lift.T @ load[self.inside])
+
+
 def _equal(one: sp.csc_array, other: sp.csc_array, *places: Ints) -> bool:
-    """Whether two matrices are stored alike, and two lists of places are the same."""
+    """True if two matrices are stored alike, and two lists of places are the same."""
     pairs = [(one.data, other.data), (one.indices, other.indices), (one.indptr, other.indptr), places]
     return all(bool(np.array_equal(a, b)) for a, b in pairs)
 
@@ -265,10 +291,7 @@ def _power_of_two(matrix: sp.csc_array) -> float:
 
 
 def elimination_order(matrix: sp.csc_array, interface: Ints) -> Ints:
-    """An order of elimination with little fill: the unknowns inside, then those of the interface, shape (n,).
-
-    Only the pattern of the matrix counts.
-    """
+    """An order of elimination with little fill, first the unknowns inside, shape (n,); it uses only the pattern."""
     inside = np.delete(np.arange(matrix.shape[0]), interface)
     if len(inside) == 0:
         return interface
@@ -279,7 +302,7 @@ def elimination_order(matrix: sp.csc_array, interface: Ints) -> Ints:
 
 
 def _factor(matrix: sp.csc_array, order: Ints | None) -> Any:
-    """``L U`` of the matrix with its unknowns in the given order; without one, in an order that SuperLU finds."""
+    """``L U`` of the matrix with its unknowns in the given order; without one, SuperLU chooses it."""
     if order is None:
         return splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", **SYMMETRIC)
     ordered = matrix[:, order][order].tocsc()
@@ -294,7 +317,7 @@ def solver(matrix: sp.csc_array, order: Ints | None = None) -> Callable[[Floats]
     ----------
     matrix : sparse array, shape (n, n)
     order : int array, shape (n,), optional
-        An order of elimination that is known already.
+        An order of elimination, if one is known.
 
     Returns
     -------
@@ -309,18 +332,14 @@ def solver(matrix: sp.csc_array, order: Ints | None = None) -> Callable[[Floats]
 def solver_with_inertia(matrix: sp.csc_array) -> tuple[Callable[[Floats], Floats], int | None]:
     """Factorise a symmetric matrix that may be indefinite, and count its negative eigenvalues.
 
-    By Sylvester's law of inertia they are as many as the negative pivots.  The pivots stay on the diagonal: rounding
-    makes them those of a matrix near the given one, as long as they are not small beside what they divide.
-
-    Parameters
-    ----------
-    matrix : sparse array, shape (n, n)
+    By Sylvester's law of inertia they are as many as the negative pivots.  The pivots stay on the diagonal: with
+    rounding they belong to a matrix near the given one, as long as they are not small beside what they divide.
 
     Returns
     -------
     callable, int or None
-        ``b -> matrix^-1 b`` for one column, shape (n,), or several, shape (n, k); the number of negative eigenvalues,
-        None where a pivot of 0 on the diagonal had to be avoided, so that the signs tell nothing.
+        As :func:`solver`; the number of negative eigenvalues, None if a pivot of 0 on the diagonal had to be avoided,
+        so that the signs show nothing.
 
     Examples
     --------
@@ -346,3 +365,11 @@ def _solving(factor: Any, order: Ints | None) -> Callable[[Floats], Floats]:
         return result
 
     return solve
+
+
+def _dense_solver(matrix: Floats) -> Callable[[Floats], Floats]:
+    """``right -> matrix^-1 right``, factorised once."""
+    if len(matrix) == 0:
+        return lambda right: right
+    factor = lu_factor(matrix, check_finite=False)
+    return lambda right: np.asarray(lu_solve(factor, right, check_finite=False))

@@ -1,4 +1,4 @@
-"""Element matrices: P1 in closed form, one formula for floats and for exact rationals; others by quadrature.
+"""Element matrices and strains: P1 in closed form, one formula for floats and exact rationals; others by quadrature.
 
 All arrays have the cells first.  d is the dimension, k the number of nodes of a cell.
 """
@@ -13,14 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem1d2d.material import Material
-from fem1d2d.mesh import Cells, MeshError, measures
+from fem1d2d.mesh import Cells, Floats, MeshError, measures
 
 
 class Element(ABC):
-    """Shape functions on the cells of a mesh, and how to integrate them.
-
-    One of one's own is put into :data:`ELEMENTS`, and meshes of such cells then have matrices and loads.
-    """
+    """Shape functions on the cells of a mesh, and their integrals; :data:`ELEMENTS` lists the elements in use."""
 
     @abstractmethod
     def points(self, mesh: Cells) -> Sequence[tuple[NDArray[Any], NDArray[Any]]]:
@@ -56,13 +53,7 @@ ELEMENTS: dict[tuple[int, int], Element] = {(1, 2): P1(), (2, 3): P1()}
 
 
 def element_of(mesh: Cells) -> Element:
-    """The element of the cells of a mesh.
-
-    Raises
-    ------
-    MeshError
-        There is none for so many nodes.
-    """
+    """The element of the cells of a mesh; MeshError if there is none for so many nodes."""
     nodes = mesh.cells.shape[1]
     if (mesh.dimension, nodes) not in ELEMENTS:
         known = " or ".join(str(k) for d, k in ELEMENTS if d == mesh.dimension)
@@ -109,3 +100,28 @@ def laplace(mesh: Cells) -> NDArray[Any]:
 def mass(mesh: Cells) -> NDArray[Any]:
     """``int u v`` of scalar functions, shape (c, k, k), unit length^d."""
     return element_of(mesh).mass(mesh)
+
+
+def largest_strains(mesh: Cells, displacement: Floats) -> Floats:
+    """Largest absolute principal strain of each cell, shape (c,), a pure number.
+
+    In the plane the principal strains of ``eps = (grad u + grad u') / 2``, u the displacement of the nodes, shape
+    (n, d), unit of length, are ``(eps_xx + eps_yy)/2 +- sqrt((eps_xx - eps_yy)^2/4 + eps_xy^2)``; the third one of
+    plane strain is 0.
+
+    Examples
+    --------
+    >>> from fem1d2d import rectangle
+    >>> mesh = rectangle((0.0, 1.0), (0.0, 1.0), (1, 1))
+    >>> float(largest_strains(mesh, mesh.points * [0.25, -0.5]).max())
+    0.5
+    """
+    found = []
+    for _, gradients in element_of(mesh).points(mesh):
+        slopes = np.einsum("cip,ciq->cpq", gradients, displacement[mesh.cells])
+        if mesh.dimension == 1:
+            found.append(np.abs(slopes[:, 0, 0]))
+            continue
+        (xx, xy), (yx, yy) = np.moveaxis(slopes, 0, -1)
+        found.append(np.abs(xx + yy) / 2 + np.hypot((xx - yy) / 2, (xy + yx) / 2))
+    return np.asarray(np.max(found, axis=0))

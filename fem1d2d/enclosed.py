@@ -21,7 +21,7 @@ from fem1d2d.mesh import Floats, Ints
 #: Half the distance from 1 to the next double: the largest relative error of one rounding.
 UNIT = float(np.finfo(float).eps) / 2
 
-#: Far above the error of any number of operations that underflow, and far below any number of ordinary size.
+#: Far above the error of any number of operations that underflow, and far below numbers of ordinary size.
 TINY = 2.0**-1000
 
 #: Sizes between which entries and multipliers are taken, so that no product of two of them underflows or overflows.
@@ -61,26 +61,12 @@ class Enclosed:
 
     @classmethod
     def rounded(cls, exact: NDArray[Any]) -> Enclosed:
-        """A dense matrix of rationals, each entry rounded to the nearest double; those that doubles hold have radius 0.
-
-        Raises
-        ------
-        TypeError
-            Entries that were computed in doubles.
-        ValueError
-            Entries beyond SMALLEST or LARGEST.
-        """
+        """A dense matrix of rationals, each entry rounded by :func:`nearest`; doubles have radius 0."""
         middle = nearest(exact)
         return cls(middle=middle, radius=np.where(middle == exact, 0.0, UNIT * np.abs(middle)))
 
     def plus(self, times: float, other: Enclosed, factor: float = 1.0) -> Enclosed:
-        """``factor self + times other``.
-
-        Raises
-        ------
-        ValueError
-            Multipliers beyond SMALLEST or LARGEST.
-        """
+        """``factor self + times other``; ValueError if a multiplier lies beyond SMALLEST or LARGEST."""
         if not all(SMALLEST <= abs(a) <= LARGEST for a in (factor, times)):
             raise ValueError(f"multipliers {factor:g}, {times:g}: needed numbers of ordinary size")
         middle = factor * self.middle + times * other.middle
@@ -105,12 +91,12 @@ class Enclosed:
         return Enclosed(middle=self.middle.T, radius=self.radius.T)
 
     def symmetric(self) -> Enclosed:
-        """The symmetric ones among them, about a symmetric middle; dense."""
+        """The symmetric matrices among these dense ones, about a symmetric middle."""
         middle = np.tril(self.middle) + np.tril(self.middle, -1).T
         return Enclosed(middle=middle, radius=np.tril(self.radius) + np.tril(self.radius, -1).T)
 
     def form(self, x: Floats) -> tuple[float, float]:
-        """An enclosure of ``x' X x`` for all of them and a vector of doubles.
+        """An enclosure of ``x' X x`` for all these matrices and a vector of doubles.
 
         Examples
         --------

@@ -1,13 +1,12 @@
 """Stiffness and Gram matrices of the exact mesh and moduli: element matrices as rationals, rounded once.
 
-A mesh of rationals and moduli of rationals have rational element matrices.  Cells that are translates of each other
-share theirs, so that few are computed where a mesh is regular.  Each entry is rounded to the nearest double, and the
-rounding of the sums over cells is bounded.
+A rational mesh and rational moduli give rational element matrices.  Cells that are translates of each other share
+them, so that few are computed where a mesh is regular.  Each entry is rounded to the nearest double, and the rounding
+of the sums over cells is bounded.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
@@ -18,13 +17,15 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from fem1d2d import element
+from fem1d2d.assembly import assemble, unknowns
 from fem1d2d.enclosed import Enclosed, gamma, nearest
 from fem1d2d.material import Material
 from fem1d2d.mesh import Cells, Ints
+from fem1d2d.outline import whole_numbers
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Shapes:
+class Shapes(Cells):
     """The cells of a mesh up to translations, as cells that share no node.
 
     Attributes
@@ -35,23 +36,11 @@ class Shapes:
         The shape of each cell of the mesh.
     """
 
-    points: NDArray[Any]
-    cells: Ints
     of_cell: Ints
-
-    @property
-    def dimension(self) -> int:
-        """1 or 2."""
-        return int(self.points.shape[1])
 
     @classmethod
     def of(cls, points: NDArray[Any], cells: Ints) -> Shapes:
-        """The shapes of cells with these exact nodes.
-
-        Parameters
-        ----------
-        points : array of Fraction, shape (n, d)
-        cells : int array, shape (c, k)
+        """The shapes of cells, shape (c, k), with exact nodes: ``points`` are Fractions, shape (n, d).
 
         Examples
         --------
@@ -60,11 +49,8 @@ class Shapes:
         >>> len(mesh.cells), len(Shapes.of(mesh.points, mesh.cells).cells)
         (48, 4)
         """
-        # in units of which all coordinates are multiples: whole numbers are faster than fractions
-        flat = points.ravel().tolist()
-        unit = math.lcm(*(value.denominator for value in flat))
-        whole = np.array([value.numerator * (unit // value.denominator) for value in flat], dtype=object)
-        corners = whole.reshape(points.shape)[cells]
+        whole, unit = whole_numbers(points)
+        corners = whole[cells]
         known: dict[tuple[Any, ...], int] = {}
         spokes = (corners[:, 1:] - corners[:, :1]).reshape(len(corners), -1)
         of_cell = [known.setdefault(tuple(row), len(known)) for row in spokes.tolist()]
@@ -95,7 +81,7 @@ def stiffness(mesh: Cells, material: Material, shapes: Shapes | None = None) -> 
     material : Material
         Of rationals.
     shapes : Shapes, optional
-        Those of the exact mesh, where the coordinates of this one are rounded; else its doubles are meant.
+        The shapes of the exact mesh, if the coordinates of this one are rounded; otherwise its doubles are exact.
 
     Raises
     ------
@@ -104,43 +90,24 @@ def stiffness(mesh: Cells, material: Material, shapes: Shapes | None = None) -> 
     ValueError
         Entries that are not of ordinary size.
     """
-    d = mesh.dimension
-    unknowns = (d * mesh.cells[:, :, None] + np.arange(d)).reshape(len(mesh.cells), -1)
-    return _assembled(mesh, shapes, unknowns, lambda cells: element.stiffness(cells, material), d * len(mesh.points))
+    return _assembled(mesh, shapes, unknowns(mesh), lambda cells: element.stiffness(cells, material))
 
 
 def gram(mesh: Cells, length: Fraction = Fraction(1), shapes: Shapes | None = None) -> Enclosed:
-    """As :func:`fem1d2d.assembly.gram`, with its radius.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    length : Fraction
-        L > 0, unit length.
-    shapes : Shapes, optional
-        As for :func:`stiffness`.
-
-    Raises
-    ------
-    TypeError, ValueError
-        As :func:`stiffness`.
-    """
+    """As :func:`fem1d2d.assembly.gram` for a rational L, with its radius; else as :func:`stiffness`."""
     local = lambda cells: element.laplace(cells) + element.mass(cells) / length**2
-    scalar = _assembled(mesh, shapes, mesh.cells, local, len(mesh.points))
+    scalar = _assembled(mesh, shapes, mesh.cells, local)
     each = lambda matrix: sp.kron(matrix, sp.eye_array(mesh.dimension), format="csc")
     return Enclosed(middle=each(scalar.middle), radius=each(scalar.radius))
 
 
-def _assembled(
-    mesh: Cells, shapes: Shapes | None, nodes: Ints, local: Callable[[Cells], NDArray[Any]], size: int
-) -> Enclosed:
+def _assembled(mesh: Cells, shapes: Shapes | None, nodes: Ints, local: Callable[[Cells], NDArray[Any]]) -> Enclosed:
     """The sum of element matrices of the unknowns ``nodes``, shape (c, k), and a bound of its rounding."""
     shapes = Shapes.of(fractions(mesh.points), mesh.cells) if shapes is None else shapes
-    k = nodes.shape[1]
-    entries = nearest(local(shapes)).reshape(-1, k * k)[shapes.of_cell].ravel()
-    rows, columns = np.repeat(nodes, k, axis=1).ravel(), np.tile(nodes, k).ravel()
-    summed = lambda values: sp.coo_array((values, (rows, columns)), shape=(size, size)).tocsc()
-    middle, moduli, terms = (summed(values) for values in (entries, np.abs(entries), np.ones(len(entries))))
+    k, size = nodes.shape[1], len(mesh.points) * nodes.shape[1] // mesh.cells.shape[1]
+    entries = nearest(local(shapes)).reshape(-1, k, k)[shapes.of_cell]
+    each = (entries, np.abs(entries), np.ones_like(entries))
+    middle, moduli, terms = (assemble(nodes, values, size) for values in each)
     middle = (sp.tril(middle) + sp.tril(middle, -1).T).tocsc()
     # one rounding of each entry, and one of each sum; of both triangles of the middle either may be meant
     return Enclosed(middle=middle, radius=2 * gamma(float(terms.max()) + 4) * moduli)

@@ -1,8 +1,8 @@
 """Schur complements and positive definiteness, proved in doubles: bounds in the order of symmetric matrices.
 
-X is at most Y where ``v' X v <= v' Y v`` for every v.  What is proved here rests on a factorisation in doubles, but not
-on the program that made it.  With its triangular part L, the pivots d > 0 of the unknowns I inside, and any symmetric
-matrix s on the interface B,
+X is at most Y where ``v' X v <= v' Y v`` for every v.  The proofs here use a factorisation in doubles, but need not
+trust the program that made it.  With its triangular part L, the pivots d > 0 of the unknowns I inside, and any
+symmetric matrix s on the interface B,
 
     M = L diag(d) L' + [0 0; 0 s]
 
@@ -13,10 +13,9 @@ shift of the diagonal by about twice the bound of the rounding errors: the matri
 diagonal a little smaller (for a lower bound) or larger (for an upper one).  Without an interface the lower bound says
 that A is positive definite.
 
-The bound of the errors is that of a product of the factors, ``gamma |L| diag(d) |L'|`` (as in Rump, Verification of
-positive definiteness, BIT 46, 2006, whose bound a priori, from the trace, is larger by the number of unknowns over the
-width of the rows), and the residual itself is evaluated.  A row of L with r entries needs ``gamma(r)`` alone, and most
-rows are short.
+The errors of a product of the factors are bounded by ``gamma |L| diag(d) |L'|``, and the residual itself is evaluated.
+(Rump, Verification of positive definiteness, BIT 46, 2006, has an a priori bound from the trace, which is larger by the
+number of unknowns over the width of the rows.)  A row of L with r entries needs only ``gamma(r)``, and most are short.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ from fem1d2d.mesh import Floats, Ints
 #: +1: a bound from below, -1: one from above.
 Side = Literal[1, -1]
 
-#: The shift is so many times the bound of the rounding errors; where that does not do, so many times more, and again.
+#: The shift is SHIFT times the bound of the rounding errors; if that does not suffice, MORE times as much, and so on.
 SHIFT, MORE, TRIES = 2.0, 8.0, 3
 
 #: What is added to the row sums of the radius in the shift, relatively, so that their own rounding does not count.
@@ -49,13 +48,13 @@ class Elimination:
     Parameters
     ----------
     matrix : Enclosed
-        Its middle is symmetric; what is proved holds for every symmetric matrix within the radius.
+        Its middle is symmetric; the proofs hold for every symmetric matrix within the radius.
     interface : int array, optional
         Positions of B, in the order wanted; none if left out.
     order : int array, optional
         An order of elimination that ends with the interface, for a sparse matrix.
     errors : array, shape (n,), optional
-        Those of a matrix that is nearly the same, so that they need not be found anew: see :attr:`errors`.
+        The :attr:`errors` of a nearly equal matrix, to save their computation.
     """
 
     def __init__(
@@ -90,12 +89,9 @@ class Elimination:
         return not isinstance(self.matrix.middle, np.ndarray)
 
     def factors(self, shift: Floats) -> tuple[Matrix, Floats, Any] | None:
-        """L with a column for each unknown inside, its pivots, and what solves; None unless all pivots are positive.
+        """L with a column for each unknown inside, its pivots, and a solver; None unless all pivots are positive.
 
-        Parameters
-        ----------
-        shift : array, shape (n,)
-            Added to the diagonal.  What is added on the interface changes nothing, and keeps it from being singular.
+        ``shift``, shape (n,), is added to the diagonal.  On the interface it changes no result, and avoids pivots of 0.
         """
         shifted = self.matrix.middle + diagonal(shift, self.matrix.middle)
         if self._sparse:
@@ -140,14 +136,14 @@ class Elimination:
 
     @cached_property
     def plain(self) -> tuple[Matrix, Floats, Any] | None:
-        """The factors of the matrix itself; what solves is right where there is no interface."""
+        """The factors of the matrix itself; the solver is correct only without an interface."""
         return self.factors(self._lifted(np.zeros(self.matrix.middle.shape[0])))
 
     @cached_property
     def errors(self) -> Floats:
         """The bound of the rounding errors in each row, for the factors of the matrix itself, shape (n,).
 
-        Those of a shifted one have nearly the same.  Infinite where there are no factors.
+        A shifted matrix has nearly the same.  Infinite without factors.
         """
         if self.plain is None:
             return np.full(self.matrix.middle.shape[0], np.inf)
@@ -159,11 +155,11 @@ class Elimination:
         return total(self.matrix.radius)
 
     def shift(self, factor: float = SHIFT) -> Floats:
-        """What the diagonal is moved by: the row sums of the radius, and a multiple of the errors, shape (n,)."""
+        """The shift of the diagonal: the row sums of the radius, and a multiple of the errors, shape (n,)."""
         return np.asarray((1 + SLACK) * self.radius + factor * self.errors)
 
     def _lifted(self, shift: Floats) -> Floats:
-        """The shift, and on the interface enough to keep it from being singular."""
+        """The shift, with an amount on the interface that keeps the matrix from being singular."""
         shift = shift.copy()
         shift[self.interface] = np.abs(self.matrix.middle.diagonal()).max(initial=0.0)
         return shift
@@ -180,11 +176,7 @@ class Elimination:
         """A matrix of doubles that is at most (+1) or at least (-1) the Schur complement on B, or None.
 
         Shape (b, b), symmetric.  A bound from below proves that the block of the unknowns inside is positive definite;
-        one from above takes that for granted.
-
-        Parameters
-        ----------
-        side : {+1, -1}
+        one from above assumes it.
         """
         if not len(self.inside):
             nothing = np.zeros(len(self.interface))
@@ -205,7 +197,7 @@ class Elimination:
         errors = upwards(self._errors(L, pivots) + self.radius, 2)
         own = np.asarray(residual.diagonal())
         beside = upwards(np.maximum(total(abs(residual)) - np.abs(own), 0.0) + errors, 8)
-        # written so that what is not a number fails
+        # written so that NaN fails
         if not (side * own * (1 - 8 * UNIT) >= beside)[self.inside].all():
             return None
         b = self.interface
@@ -214,16 +206,9 @@ class Elimination:
 
 
 def _remainder(block: Matrix, rest: Floats, errors: Floats, side: Side) -> Floats | None:
-    """The symmetric part of a block, its diagonal moved by all that may be wrong in its rows; None if not finite.
+    """The symmetric part of a block, its diagonal moved by all possible errors of its rows; None if not finite.
 
-    Parameters
-    ----------
-    block : array, shape (b, b)
-        Each entry rounded once where it was subtracted.
-    rest : array, shape (b,)
-        Row sums of what the same rows hold beside the block.
-    errors : array, shape (b,)
-    side : {+1, -1}
+    Each entry of the block was rounded once, when it was subtracted; ``rest`` has row sums of the entries beside it.
     """
     dense = block if isinstance(block, np.ndarray) else block.toarray()
     symmetric = np.tril(dense) + np.tril(dense, -1).T
@@ -235,9 +220,9 @@ def _remainder(block: Matrix, rest: Floats, errors: Floats, side: Side) -> Float
 
 
 def positive_definite(matrix: Enclosed, order: Ints | None = None) -> bool:
-    """Whether every symmetric matrix within the radius is proved to be positive definite; False says nothing.
+    """True if every symmetric matrix within the radius is proved to be positive definite; False proves nothing.
 
-    Rows and columns of a dense one are scaled first, so that what is large does not hide what is small.
+    Rows and columns of a dense one are scaled first, so that large entries do not hide small ones.
 
     Examples
     --------

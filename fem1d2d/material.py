@@ -35,14 +35,9 @@ def plane_strain(young: Any, poisson: Any) -> Material:
     Parameters
     ----------
     young : scalar
-        E > 0, in the unit of stress that the parameters are to have.
+        E in the unit of stress that the parameters are to have; ValueError unless E > 0.
     poisson : scalar
-        -1 < nu < 1/2.
-
-    Raises
-    ------
-    ValueError
-        Unless E > 0 and -1 < nu < 1/2.
+        nu; ValueError unless -1 < nu < 1/2.
 
     Examples
     --------
@@ -61,15 +56,7 @@ def plane_strain(young: Any, poisson: Any) -> Material:
 def bar(young: Any) -> Material:
     """A bar of unit cross-section: ``sigma = E eps``, that is lame_lambda = E and lame_mu = 0 in one dimension.
 
-    Parameters
-    ----------
-    young : scalar
-        E > 0, in the unit of stress that the parameters are to have.
-
-    Raises
-    ------
-    ValueError
-        Unless E > 0.
+    ``young`` is E in the unit of stress that the parameters are to have; ValueError unless E > 0.
     """
     if not young > 0:
         raise ValueError(f"Young modulus {young}: a positive number is needed")

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import pairwise
 from types import MappingProxyType
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fem1d2d import overlap
+from fem1d2d import outline
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -25,27 +26,24 @@ class MeshError(ValueError):
 LARGEST = 1e30
 
 
-class Cells(Protocol):
-    """What element matrices need of a mesh."""
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Cells:
+    """The part of a mesh that element matrices need: ``points`` of shape (n, d), and ``cells``, the nodes of each."""
 
-    @property
-    def points(self) -> NDArray[Any]:
-        """Coordinates of the nodes, shape (n, d)."""
-
-    @property
-    def cells(self) -> Ints:
-        """The nodes of each cell, shape (c, k)."""
+    points: NDArray[Any]
+    cells: Ints
 
     @property
     def dimension(self) -> int:
         """1 or 2."""
+        return int(self.points.shape[1])
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class Mesh:
-    """A mesh of intervals or convex polygons of one kind, whose cells meet in common facets and nowhere else.
+class Mesh(Cells):
+    """A mesh of intervals or convex polygons of one kind, whose cells meet only in common facets.
 
-    It may have holes, and pieces that share single nodes or nothing.
+    It may have holes, and pieces that share only single nodes or nothing.
 
     Parameters
     ----------
@@ -68,8 +66,6 @@ class Mesh:
         that lie on each other or touch without being joined, a side with a facet inside the body or listed twice.
     """
 
-    points: NDArray[Any]
-    cells: Ints
     sides: Mapping[str, Ints]
     boundary: Ints = field(init=False, repr=False)
 
@@ -105,7 +101,7 @@ class Mesh:
         if loose:
             raise MeshError(f"{loose} nodes belong to no cell")
         boundary = _boundary(points, cells)
-        why = overlap.fault(points, boundary) if points.shape[1] == 2 else _line_fault(points, cells)
+        why = outline.fault(points, boundary) if points.shape[1] == 2 else _line_fault(points, cells)
         if why:
             raise MeshError(why)
         on_boundary = undirected(boundary, len(points))
@@ -121,26 +117,15 @@ class Mesh:
                 raise MeshError(f"side {name!r} lists the facet {twice} {count.max()} times: once is needed")
         for array in (points, cells, boundary, *sides.values()):
             array.setflags(write=False)
-        object.__setattr__(self, "points", points)
-        object.__setattr__(self, "cells", cells)
-        object.__setattr__(self, "sides", MappingProxyType(sides))
-        object.__setattr__(self, "boundary", boundary)
+        kept = {"points": points, "cells": cells, "sides": MappingProxyType(sides), "boundary": boundary}
+        for name, value in kept.items():
+            object.__setattr__(self, name, value)
 
     def __repr__(self) -> str:
         return f"<Mesh: {len(self.points)} nodes, {len(self.cells)} cells, sides {', '.join(self.sides) or 'none'}>"
 
-    def __reduce__(self) -> tuple[Any, ...]:  # a mapping that nobody can write cannot travel as it is
-        return remade, (Mesh, {"points": self.points, "cells": self.cells, "sides": dict(self.sides)})
-
-    @property
-    def dimension(self) -> int:
-        """1 or 2."""
-        return int(self.points.shape[1])
-
-
-def remade(kind: type[Any], values: Mapping[str, Any]) -> Any:
-    """What was pickled, made anew: checked, and read-only as numpy does not give arrays back."""
-    return kind(**values)
+    def __reduce__(self) -> tuple[Any, ...]:  # a read-only mapping cannot be pickled, and numpy returns writable arrays
+        return partial(Mesh, points=self.points, cells=self.cells, sides=dict(self.sides)), ()
 
 
 def _whole(what: str, values: Any, columns: int) -> Ints:
@@ -157,24 +142,18 @@ def _whole(what: str, values: Any, columns: int) -> Ints:
 
 
 def _where(points: NDArray[Any], facet: Ints) -> str:
-    """Where a facet lies, for a message."""
+    """Place of a facet, for a message."""
     ends = [f"({', '.join(f'{float(c):.6g}' for c in points[node])})" for node in facet]
     return f"at {ends[0]}" if len(ends) == 1 else f"from {ends[0]} to {ends[1]}"
 
 
 def undirected(facets: Ints, nodes: int) -> Ints:
-    """One number for each facet, whatever its direction."""
+    """One number for each facet, the same for both directions."""
     return np.asarray(facets.min(axis=1) * nodes + facets.max(axis=1) if facets.shape[1] == 2 else facets[:, 0])
 
 
 def _boundary(points: NDArray[Any], cells: Ints) -> Ints:
-    """Facets that belong to one cell only, in order of their nodes.
-
-    Raises
-    ------
-    MeshError
-        Two cells on the same side of a facet.
-    """
+    """Facets that belong to one cell only, in order of their nodes; two cells on the same side of one are refused."""
     n = len(points)
     if points.shape[1] == 1:  # a node is the end of one cell and the beginning of another
         facets = np.concatenate([cells[:, 1:], cells[:, :1]])
@@ -182,9 +161,10 @@ def _boundary(points: NDArray[Any], cells: Ints) -> Ints:
     else:
         facets = edges(cells)
         forwards = (facets[:, 0] < facets[:, 1]).astype(np.int64)
-    directed = np.sort(2 * undirected(facets, n) + forwards)
+    numbers = 2 * undirected(facets, n) + forwards
+    directed = np.sort(numbers)
     if (directed[1:] == directed[:-1]).any():
-        _, inverse, count = np.unique(2 * undirected(facets, n) + forwards, return_inverse=True, return_counts=True)
+        _, inverse, count = np.unique(numbers, return_inverse=True, return_counts=True)
         facet = int(np.argmax((count > 1)[inverse]))
         one, other = np.flatnonzero(inverse == inverse[facet])[:2] % len(cells)
         if set(cells[one].tolist()) == set(cells[other].tolist()):
@@ -202,7 +182,7 @@ def _boundary(points: NDArray[Any], cells: Ints) -> Ints:
 
 
 def _line_fault(points: NDArray[Any], cells: Ints) -> str | None:
-    """Why cells of a line lie on each other or are not joined, or None."""
+    """The reason why cells of a line lie on each other or are not joined, or None."""
     order = np.argsort(points[cells[:, 0], 0], kind="stable")
     ends, starts = cells[order[:-1], 1], cells[order[1:], 0]
     wrong = (points[ends, 0] > points[starts, 0]) | ((points[ends, 0] == points[starts, 0]) & (ends != starts))
@@ -245,13 +225,9 @@ def interval(x: Sequence[Any], cells: int) -> Mesh:
     Parameters
     ----------
     x : pair of float or of Fraction
-        The ends, unit length; fractions stay exact.
+        The ends, unit length; fractions stay exact.  MeshError unless the first is the smaller one.
     cells : int
-
-    Raises
-    ------
-    MeshError
-        No cell, or ends in the wrong order.
+        MeshError unless there is one.
 
     Examples
     --------
@@ -282,14 +258,9 @@ def rectangle(x: Sequence[Any], y: Sequence[Any], cells: tuple[int, int]) -> Mes
     Parameters
     ----------
     x, y : pairs of float or of Fraction
-        The ends along x and along y, unit length; fractions stay exact.
+        The ends along x and along y, with units and errors as for :func:`interval`.
     cells : pair of int
         Cells along x and along y.
-
-    Raises
-    ------
-    MeshError
-        No cell, or ends in the wrong order.
 
     Examples
     --------
@@ -322,16 +293,16 @@ def sector(angles: Sequence[float], radii: Sequence[float], cells: int) -> Mesh:
     Parameters
     ----------
     angles : pair of float
-        In radians, the first the smaller, less than 2 pi apart.
+        In radians, the smaller one first, less than 2 pi apart.
     radii : sequence of float
         Growing, positive; unit length.
     cells : int
-        Cells along an arc.
+        Cells along an arc, at least 1.
 
     Raises
     ------
     MeshError
-        No cell, angles or radii in the wrong order, or a whole turn.
+        Angles, radii or cells that are none of this.
 
     Examples
     --------

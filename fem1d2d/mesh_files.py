@@ -25,7 +25,7 @@ MOST_BYTES = 200_000_000
 #: Seconds on the clock for each second of processor time: the machine may do other work.
 PATIENCE = 6
 
-#: Folders of modules follow its arguments: the isolated mode leaves out the folders of the user and PYTHONPATH.
+#: Folders of modules follow the arguments: the isolated mode leaves out the folders of the user and PYTHONPATH.
 START = (
     "import runpy, sys; sys.path += sys.argv[5:]; del sys.argv[5:]; "
     "runpy.run_path(sys.argv.pop(1), run_name='__main__')"
@@ -73,33 +73,19 @@ def read_in_process(path: Path) -> tuple[Floats, Ints, dict[str, Ints]]:
     """Points, triangles and named lines of a file, read in a separate process.
 
     The process ends when this one does: it waits for the end of its stdin.  Ctrl-C on a terminal does not reach it.
-
-    Raises
-    ------
-    MeshError
-        :func:`fem1d2d.mesh_reader.contents` refuses the file, or the process meets a limit or ends in another way.
+    MeshError if :func:`fem1d2d.mesh_reader.contents` refuses the file, or the process meets a limit or fails.
     """
     size = min(path.stat().st_size, MOST_BYTES)
     seconds, memory = int(SECONDS + SECONDS_PER_BYTE * size), int(MEMORY + MEMORY_PER_BYTE * size)
     folders = [folder for folder in sys.path if os.path.isdir(folder) and not os.path.samefile(folder, os.curdir)]
-    command = [
-        sys.executable,
-        "-I",
-        "-X",
-        "utf8",
-        "-c",
-        START,
-        mesh_reader.__file__,
-        str(path),
-        str(seconds),
-        str(memory),
-    ]
+    python = [sys.executable, "-I", "-X", "utf8", "-c", START]
+    arguments = [mesh_reader.__file__, str(path), str(seconds), str(memory), *folders]
     # one thread of BLAS: each would claim memory
     environment = os.environ | dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     stdin, held = os.pipe()
     try:
         ended = subprocess.run(
-            [*command, *folders],
+            [*python, *arguments],
             stdin=stdin,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

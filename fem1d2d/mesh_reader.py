@@ -1,6 +1,6 @@
 """Read a mesh file with meshio: a script for a process with limits on memory and time.
 
-:mod:`fem1d2d.mesh_files` runs it by its path, in isolated mode.  It therefore imports nothing of this package.
+:mod:`fem1d2d.mesh_files` runs it by its path, in isolated mode, so it imports nothing of this package.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from numpy.typing import NDArray
 
 Ints = NDArray[np.int64]
 
-#: Nodes of a file are not numbered beyond this: meshio fills a table as long, 80 MB here.
+#: Largest number of a node in a file: meshio fills a table of this length, 80 MB here.
 LARGEST_NUMBER = 10**7
 
-#: What meshio calls the formats that are read.
+#: meshio's names of the formats that are read.
 FORMATS = {".msh": "gmsh", ".inp": "abaqus"}
 
 #: Least bytes of an item that a section of a Gmsh file counts, as text and in the binary variants.
@@ -42,7 +42,7 @@ REFUSED = 3
 
 
 class NotRead(Exception):
-    """A file that is not read, with the reason."""
+    """A file is not read; the message is the reason."""
 
 
 def contents(path: Path) -> dict[str, Any]:
@@ -55,7 +55,7 @@ def contents(path: Path) -> dict[str, Any]:
 
     Raises
     ------
-    Refused
+    NotRead
         Unreadable, no triangles or other cells too, several materials, or no named lines.
     """
     kind = FORMATS[path.suffix.lower()]
@@ -80,11 +80,8 @@ def contents(path: Path) -> dict[str, Any]:
     others = sorted(set(read.cells_dict) - {"triangle", "line", "vertex"})
     if others:
         raise NotRead(f"needed only triangles, it has {', '.join(others)} too")
-    if materials:
-        split = sorted(materials) if len(materials) > 1 else []
-    else:
-        split = _split(read, groups, len(triangles))
-    if split:
+    split = sorted(materials) if materials else _split(read, groups, len(triangles))
+    if len(split) > 1:
         named = ", ".join(
             [json.dumps(name[:40], ensure_ascii=False) for name in split[:5]] + ["..."] * (len(split) > 5)
         )
@@ -140,10 +137,10 @@ def _groups(read: Any, kind: str, dimension: int) -> dict[str, Ints]:
 
 
 def _split(read: Any, groups: dict[str, Ints], count: int) -> list[str]:
-    """Names of the groups that split the triangles; none where one of them holds all.
+    """Names of the groups that share the triangles; none if one of them holds all.
 
     Named surfaces of a Gmsh file are materials.  Element sets of an Abaqus file may also be neighbours of a side: they
-    are taken for materials only if each triangle lies in one of them.
+    count as materials only if each triangle lies in one of them.
     """
     covered = np.zeros(count, dtype=bool)
     for members in groups.values():
@@ -158,11 +155,11 @@ def _split(read: Any, groups: dict[str, Ints], count: int) -> list[str]:
         names += [f"physical surface {tag}" for tag in sorted({*tags[~covered].tolist()} - {0})]
     elif not covered.all():
         return []
-    return names if len(names) > 1 else []
+    return names
 
 
 def _abaqus_materials(path: Path) -> set[str]:
-    """Materials of the sections of an Abaqus file; what meshio would read from elsewhere or mix up is refused."""
+    """Materials of the sections of an Abaqus file; refuses files that meshio would read from elsewhere or mix up."""
     materials, blocks, lists, keyword = set(), [], [], ""
     with path.open(encoding="utf-8") as file:
         for line in file:
@@ -299,35 +296,32 @@ def limit(seconds: int, memory: int) -> None:
 
 
 def _end_with_parent() -> None:
-    os.read(0, 1)  # nothing is ever written: this returns when the parent has ended
+    os.read(0, 1)  # nothing is ever written to it: this returns when the parent has ended
     os._exit(1)
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Write arrays of the mesh file to stdout, or the reason why it is refused.
+    """Write the arrays of a mesh file to stdout, or the reason why it is refused.
 
-    Parameters
-    ----------
-    arguments : sequence of str
-        Path, and limits as :func:`limit` takes them.
+    ``arguments`` are its path, and the limits of :func:`limit`.
     """
     path, seconds, memory = arguments
     limit(int(seconds), int(memory))
     threading.Thread(target=_end_with_parent, daemon=True).start()
+    out, status = io.BytesIO(), REFUSED
     try:
         found = contents(Path(path))
-        out = io.BytesIO()
         names = np.frombuffer(json.dumps(list(found["lines"])).encode(), dtype=np.uint8)
         sides = {f"side{i}": facets for i, facets in enumerate(found["lines"].values())}
         np.savez(out, points=found["points"], triangles=found["triangles"], names=names, **sides)
-        answer, status = out.getbuffer(), 0
+        status, reason = 0, ""
     except NotRead as error:
-        answer, status = memoryview(str(error).encode(errors="replace")), REFUSED
+        reason = str(error)
     except MemoryError:
-        answer, status = memoryview(f"reading it needs more than {int(memory) / 1e9:g} GB of memory".encode()), REFUSED
+        reason = f"reading it needs more than {int(memory) / 1e9:g} GB of memory"
     except OSError as error:
-        answer, status = memoryview(f"cannot be read: {error.strerror}".encode()), REFUSED
-    sys.stdout.buffer.write(answer)
+        reason = f"cannot be read: {error.strerror}"
+    sys.stdout.buffer.write(reason.encode(errors="replace") if status else out.getbuffer())
     sys.stdout.buffer.flush()
     return status
 

@@ -26,15 +26,15 @@ LANCZOS = 1e-10
 #: Vectors that Lanczos keeps; when they are full it restarts from what they have found.
 BASIS = 24
 
-#: Most steps of the Lanczos without restart that is tried first on sparse matrices; from this one on it looks how far
-#: it is.
+#: Most steps of the Lanczos without restart that is tried first on sparse matrices, and the step from which on it
+#: checks the residual.
 PLAIN, SOON = 40, 8
 
-#: Where one product and one solve are all that is known, they are dearer than memory: vectors kept then, and those of
+#: Where products and solves are given as functions, they cost more than memory: vectors kept then, and the numbers of
 #: them that a restart keeps from the lower and from the upper end.
 LONG_BASIS, KEPT = 120, (15, 30)
 
-#: So often the ends of the spectrum are looked at: it costs as much as a step with 10^4 unknowns.
+#: Steps from one look at the ends of the spectrum to the next: it costs as much as a step with 10^4 unknowns.
 LOOK = 5
 
 
@@ -48,8 +48,8 @@ class Eigenvalue:
     vector : array, shape (n,)
         With ``x' B x = 1``.
     residual : float
-        ``|A x - value B x|`` in the norm of ``B^-1``: some eigenvalue lies within it of ``value``, and the error
-        of an isolated one is of the order of its square.
+        ``|A x - value B x|`` in the norm of ``B^-1``: some eigenvalue lies within it of ``value``, and the error of an
+        isolated one is of the order of its square.
     """
 
     value: float
@@ -58,10 +58,7 @@ class Eigenvalue:
 
 
 def rayleigh_quotient(A: Any, B: Any, x: Floats, solve_B: Callable[[Floats], Floats]) -> Eigenvalue:
-    """The Rayleigh quotient of any vector x; some eigenvalue lies within its ``residual``.
-
-    A and B are whatever can be multiplied by a vector: arrays, sparse arrays, linear operators.
-    """
+    """The Rayleigh quotient of any vector x, for arrays, sparse arrays or linear operators A and B."""
     x = x / math.sqrt(float(x @ (B @ x)))
     value = float(x @ (A @ x))
     r: Floats = A @ x - value * (B @ x)
@@ -72,14 +69,8 @@ def rayleigh_quotient(A: Any, B: Any, x: Floats, solve_B: Callable[[Floats], Flo
 def largest(A: Floats, B: Floats) -> Eigenvalue:
     """Largest eigenvalue of a dense pencil, A symmetric, B symmetric positive definite, both of shape (n, n).
 
-    LAPACK is called directly: of a matrix of ten rows the checks on the way there take longer than the eigenvalue.
-
-    Raises
-    ------
-    ValueError
-        An entry is not finite.
-    numpy.linalg.LinAlgError
-        B is not positive definite.
+    LAPACK is called directly: for ten rows the checks of scipy take longer than the eigenvalue.  ValueError if an entry
+    is not finite, numpy.linalg.LinAlgError if B is not positive definite.
     """
     if not (np.isfinite(A).all() and np.isfinite(B).all()):
         raise ValueError("a pencil with entries that are not finite")
@@ -96,7 +87,7 @@ def largest(A: Floats, B: Floats) -> Eigenvalue:
 
 @lru_cache(maxsize=256)
 def _work(n: int) -> int:
-    """The workspace with which LAPACK works in blocks."""
+    """The workspace that LAPACK needs to work in blocks."""
     return int(dsygvx_lwork(n, uplo="L")[0])
 
 
@@ -110,13 +101,12 @@ def largest_of(
     tolerance: float = LANCZOS,
     progress: Callable[[int], None] = lambda steps: None,
 ) -> Eigenvalue:
-    """Largest eigenvalue of a pencil of which only products and solves are known.
+    """Largest eigenvalue of a pencil that is given by products and solves.
 
     Lanczos from a fixed start, so that it repeats to the digit.  A step costs one product with each matrix and one
-    solve.  The residual of the result says that some eigenvalue lies within it of the value, up to the error of the
-    products and solves.  It does not say that this eigenvalue is the largest: that is the word of Lanczos, which misses
-    a larger one where the start is all but orthogonal to its eigenvectors, or where the two are so near each other that
-    it has not told them apart when the residual is small enough.
+    solve.  Some eigenvalue lies within the residual of the value, up to the error of the products and solves.  That it
+    is the largest is not proved: Lanczos misses a larger one where the start is nearly orthogonal to its eigenvectors,
+    or where two are so close that they are not yet separated when the residual is small enough.
 
     Parameters
     ----------
@@ -126,13 +116,12 @@ def largest_of(
         ``r -> B^-1 r``.
     n : int
     above : tuple of float and callable, optional
-        An upper bound s of the spectrum and ``r -> (s B - A)^-1 r``: eigenvalues that crowd below it are told apart by
-        their distance to it, and a step takes this solve in place of that with B.  Without it many eigenvalues that
-        crowd at the top cost many steps.
+        An upper bound s of the spectrum and ``r -> (s B - A)^-1 r``, which a step then solves instead of B: it
+        separates eigenvalues that crowd below s by their distance to s.  Without it these cost many steps.
     tolerance : float
         The relative residual at which Lanczos stops.
     progress : callable
-        Told the number of steps after each.
+        Called after each step with the number of steps.
 
     Examples
     --------
@@ -171,15 +160,10 @@ def largest_of(
 
 @dataclass(frozen=True, kw_only=True)
 class Extremes:
-    """The ends of a spectrum, as Lanczos found them.
+    """The ends of a spectrum that Lanczos found in ``steps`` products with A.
 
-    Attributes
-    ----------
-    least, largest : Eigenvalue
-        Some eigenvalue lies within the residual of each.  The least eigenvalue is at most ``least.value``, the largest
-        one at least ``largest.value``, up to rounding: they are Rayleigh quotients.
-    steps : int
-        Products with A.
+    Some eigenvalue lies within the residual of each.  The least eigenvalue is at most ``least.value``, the largest one
+    at least ``largest.value``, up to rounding: they are Rayleigh quotients.
     """
 
     least: Eigenvalue
@@ -197,26 +181,22 @@ def extremes_by_solves(
     most: int = 1000,
     progress: Callable[[int, float, float], None] = lambda steps, value, residual: None,
 ) -> Extremes:
-    """Least and largest eigenvalue of a pencil of which a product with A and a solve with B are all that is known.
+    """Least and largest eigenvalue of a pencil that is given by products with A and solves with B.
 
     Lanczos for ``A B^-1`` on vectors y = B x, symmetric in the scalar product ``y' B^-1 z``, orthogonalised in full and
     restarted with the vectors of both ends.  A step costs one product and one solve.  It stops at the tolerances or
-    after ``most`` steps, and the residuals tell how far it came.  That no eigenvalue lies outside is its word alone, as
-    for :func:`largest_of`.
+    after ``most`` steps: see the residuals.  That no eigenvalue lies outside is not proved, as for :func:`largest_of`.
 
     Parameters
     ----------
-    apply_A : callable
-        ``x -> A x`` for vectors of shape (n,); A symmetric.
-    solve_B : callable
-        ``r -> B^-1 r``; B symmetric positive definite.
-    n : int
+    apply_A, solve_B, n
+        As for :func:`largest_of`.
     tolerance, least_tolerance : float
         Residuals of the largest and of the least eigenvalue at which it stops, as parts of the largest one.
     most : int
         The largest number of steps.
     progress : callable
-        Told steps, largest value and its residual after the first step and then every few.
+        Called with steps, largest value and its residual after the first step and then every few.
 
     Examples
     --------
@@ -235,7 +215,7 @@ def extremes_by_solves(
         Y[j], X[j] = y / beta, x / beta
         y = np.array(apply_A(X[j]), dtype=float)
         size = np.linalg.norm(y)
-        for _ in range(2):  # twice is enough
+        for _ in range(2):  # the second time removes what rounding left
             part = X[: j + 1] @ y
             y -= part @ Y[: j + 1]
             H[: j + 1, j] += part
@@ -283,16 +263,8 @@ def largest_sparse(
 ) -> Eigenvalue:
     """Largest eigenvalue of a large pencil of sparse matrices, as :func:`largest_of`.
 
-    Parameters
-    ----------
-    A, B : sparse array, shape (n, n)
-        A symmetric, B symmetric positive definite.
-    solve_B : callable
-        ``r -> B^-1 r``.
-    above : float, optional
-        An upper bound of the spectrum: eigenvalues that crowd below it are told apart by their distance to it.
-    order : int array, shape (n,), optional
-        An order of elimination for ``above * B - A``, see :func:`fem1d2d.condense.elimination_order`.
+    ``above`` is an upper bound of the spectrum, ``order`` an order of elimination for ``above * B - A``, see
+    :func:`fem1d2d.condense.elimination_order`.
     """
     n = A.shape[0]
     if n <= DENSE:
@@ -309,10 +281,10 @@ def largest_sparse(
 
 
 def _plain_lanczos(A: sp.csc_array, solve_B: Callable[[Floats], Floats]) -> Floats:
-    """About an eigenvector of the largest eigenvalue of (A, B): Lanczos for ``B^-1 A`` that never restarts.
+    """Approximate eigenvector of the largest eigenvalue of (A, B), by Lanczos for ``B^-1 A`` without restart.
 
-    It costs one product and one solve a step, where ARPACK costs three products, and it ends at the step at which the
-    residual is small enough, which ARPACK sees only where its basis is full.
+    A step costs one product and one solve, with ARPACK three products, and it ends as soon as the residual is small
+    enough, which ARPACK checks only when its basis is full.
     """
     n = A.shape[0]
     room = min(n, PLAIN)

@@ -2,8 +2,8 @@
 
 ``X <= r Y`` in the order of symmetric matrices bounds the largest eigenvalue of ``X x = value Y x`` by r, and a
 Rayleigh quotient of any vector bounds it from below.  The first is a proof of positive definiteness
-(:mod:`fem1d2d.loewner`), the second an evaluation with its rounding errors; the eigenvector and the value that a solver
-returned are taken as guesses.
+(:mod:`fem1d2d.loewner`), the second an evaluation with its rounding errors; the eigenvector and the value of a solver
+only serve as guesses.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from fem1d2d.mesh import Floats, Ints
 #: X and Y of a pencil.
 Pencil = tuple[Enclosed, Enclosed]
 
-#: The vector is found by so many solves with ``(1 + NEAR) value Y - X``.
+#: The vector comes from SOLVES solves with ``(1 + NEAR) value Y - X``.
 NEAR, SOLVES = 1e-7, 6
 
-#: The first bound lies above the value by this many times what the errors make of it, each later one by FARTHER times
-#: more than the last.
+#: The first bound that is tried exceeds the value by ABOVE times the effect of the errors, each later one by FARTHER
+#: times as much as the one before.
 ABOVE, FARTHER, TRIES = 3.0, 8.0, 12
 
 #: Least relative distance of the first bound from the value.
@@ -41,11 +41,11 @@ def enclose_largest(
     Parameters
     ----------
     above : pair of Enclosed
-        An X that is at least, and a Y that is at most what is meant, in the order of symmetric matrices.
+        An X at least as large, and a Y at most as large as the true ones, in the order of symmetric matrices.
     below : pair of Enclosed, optional
-        An X at most and a Y at least what is meant; the same pair if left out.
+        An X at most, and a Y at least as large; the same pair if left out.
     guess : float, optional
-        About the value, which is positive; needed for sparse matrices.
+        An approximation of the value, which is positive; needed for sparse matrices.
     order : int array, optional
         An order of elimination for sparse matrices.
 

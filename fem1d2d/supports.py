@@ -1,9 +1,10 @@
-"""Fixed and prescribed sides: which unknowns are known, and what is left to move rigidly."""
+"""Fixed and prescribed sides: which unknowns are known, and the rigid motions that are left."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from fem1d2d.mesh import Floats, Mesh, MeshError, edges, remade, undirected
+from fem1d2d.mesh import Floats, Mesh, MeshError, edges, undirected
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,21 +34,14 @@ class Supports:
             array.setflags(write=False)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return remade, (Supports, {"known": self.known, "values": self.values})
+        return partial(Supports, known=self.known, values=self.values), ()
 
 
 def supports(mesh: Mesh, sides: Mapping[str, Sequence[float | None]]) -> Supports:
     """Collect the displacements that sides prescribe.
 
-    Parameters
-    ----------
-    sides : mapping from side name to d numbers
-        Displacements in the mesh's unit of length; None leaves a component free.  The names are those of the mesh.
-
-    Raises
-    ------
-    MeshError
-        Two sides prescribe different values at a common node.
+    ``sides`` maps names of sides to d displacements in the mesh's unit of length; None leaves a component free.
+    MeshError if two sides prescribe different values at a common node.
 
     Examples
     --------
@@ -77,16 +71,8 @@ def supports(mesh: Mesh, sides: Mapping[str, Sequence[float | None]]) -> Support
 def rigid_motions(mesh: Mesh, known: NDArray[np.bool_]) -> Floats:
     """The rigid motions that supports leave: a basis of the kernel of the stiffness matrix of the free unknowns.
 
-    Cells that share a facet move as one piece; pieces that share a node only, hinge on it.
-
-    Parameters
-    ----------
-    known : bool array, shape (n, d)
-
-    Returns
-    -------
-    array, shape (n, d, k)
-        k orthonormal motions, 0 where the supports hold; k = 3 for an unsupported plane body.
+    Shape (n, d, k): k orthonormal motions, 0 where ``known``, of shape (n, d), holds; k = 3 for an unsupported plane
+    body.  Cells that share a facet move as one piece; pieces that share only a node hinge on it.
     """
     n, d = mesh.points.shape
     piece = _pieces(mesh)
@@ -129,7 +115,7 @@ def _pieces(mesh: Mesh) -> NDArray[np.int64]:
     c = len(mesh.cells)
     facets = mesh.cells.T.reshape(-1, 1) if mesh.dimension == 1 else edges(mesh.cells)
     facet = undirected(facets, len(mesh.points))
-    order = np.argsort(facet, kind="stable")  # cells that share a facet come to stand side by side
+    order = np.argsort(facet, kind="stable")  # cells that share a facet become neighbours
     shared = facet[order[1:]] == facet[order[:-1]]
     one, other = order[:-1][shared] % c, order[1:][shared] % c
     touches = sp.coo_array((np.ones(len(one)), (one, other)), shape=(c, c))

@@ -1,7 +1,7 @@
 """The convergence theorem of Bayada, Sabil and Sassi (2008), on paper.
 
-Constants in, contraction interval out: the theorem as printed, as repaired, and in energy norms.  This package knows no
-finite elements and needs the standard library alone.
+Constants in, contraction interval out: the theorem as printed, as repaired, and in energy norms.  This package contains
+no finite elements and needs only the standard library.
 
 >>> from ndtheory import Constants, REPAIRED, evaluate
 >>> c = Constants(m=1, M=2, C_R="3/2", C_K=0)
@@ -10,10 +10,8 @@ finite elements and needs the standard library alone.
 """
 
 from ndtheory.bounds import EDITIONS, PRINTED, REPAIRED, Bounds, Edition, evaluate
-from ndtheory.constants import Constants, relaxation_factor
-from ndtheory.energy import EnergyConstants
-from ndtheory.energy_bounds import EnergyBounds
-from ndtheory.energy_norms import evaluate_energy
+from ndtheory.constants import Constants, EnergyConstants, relaxation_factor
+from ndtheory.energy_norms import EnergyBounds, evaluate_energy
 from ndtheory.errors import HypothesisError
 from ndtheory.number import Number, exact
 

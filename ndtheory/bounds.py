@@ -1,31 +1,32 @@
 """C_0, .., C_6, G, h_1, h_2 and the contraction interval (Section 5), printed and repaired.
 
-Every formula is written over any scalar (float, Decimal, Fraction where roots are rational, sympy, mpmath, an interval,
-an object that records the operations made with it) and free of the cancellation that the printed form suffers; branches
-go through :func:`ndtheory.scalar.where`.  Docstrings give the equation, ``tests/ndtheory`` a second derivation.  With
-u = m all m, M, u and x = C_K are stresses and G is a stress cubed; C_R, theta, C_T, P, D, Q, C_0, C_1, C_6 are numbers.
+Every formula applies to any scalar (float, Decimal, Fraction where roots are rational, sympy, mpmath, an interval, an
+object that records its operations), avoids the cancellation of the printed form, and branches by
+:func:`ndtheory.scalar.where`.  Docstrings give the equation, ``tests/ndtheory`` a second derivation.  With u = m all m,
+M, u and x = C_K are stresses and G is a stress cubed; C_R, theta, C_T, P, D, Q, C_0, C_1, C_6 are numbers.
 
 The two editions are one set of formulas.  The paper's bracket ``M C_R + C_K + sqrt(C_K m) + 1`` in (5.30)
-adds a stress to the number 1: from (5.11), (5.13), (5.19) and (5.23) it is a *stress* ``u = m`` that stands there, and
-an overall factor 1/u with it.  The printed edition is ``u = 1`` with ``m~ = min(m, 1)`` for m; the repaired one is
+adds a stress to the number 1: (5.11), (5.13), (5.19) and (5.23) give a *stress* ``u = m`` in place of the 1, and an
+overall factor 1/u.  The printed edition is ``u = 1`` with ``m~ = min(m, 1)`` for m; the repaired one is
 ``u = m`` with m itself.  They agree in the unit of stress in which m = 1.
 
-In both editions every number but C1 is monotone in m, M, C_R and x = C_K, so an enclosure of the constants gives one
-of the results: their values where m is largest and the others least, and the other way round.  Beyond C2, where C1 need
-not be monotone, D and Q at opposite ends enclose it.  ``docs/verified.md`` has the proof.
+In both editions every number but C1 is monotone in m, M, C_R and x = C_K, so enclosed constants give enclosed results:
+their values where m is largest and the others least, and the other way round.  Beyond C2, where C1 need not be
+monotone, D and Q at opposite ends enclose it.  ``docs/verified.md`` has the proof.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from decimal import Decimal
+from fractions import Fraction
 from typing import Any, Literal
 
-from ndtheory.constants import Constants, Corner, inside, relaxation_factor
+from ndtheory.constants import Constants, Corner, relaxation_factor
 from ndtheory.errors import HypothesisError
-from ndtheory.number import DIGITS, SLACK, Number, Numeric, decimal, rounded, weakest, working_precision
+from ndtheory.number import DIGITS, SLACK, Level, Number, Numeric, decimal, rounded, weakest, working_precision
 from ndtheory.scalar import Scalar, maximum, minimum, sqrt, where
 
 Conclusion = Literal["contraction", "no conclusion"]
@@ -33,7 +34,7 @@ Conclusion = Literal["contraction", "no conclusion"]
 #: Why there is no ``interval_proved``.
 NO_PROVED_INTERVAL = "the constants have no enclosures, or some of those enclosed have no interval"
 
-#: The ends of the open intervals count as outside, decided with a margin far above the rounding of the evaluation.
+#: The ends of the open intervals count as outside, with a margin far above the rounding of the evaluation.
 MARGIN = Decimal(10) ** -(DIGITS // 2)
 
 #: Newton's steps in :func:`inverse_G`: the start exceeds the root by a factor of at most sqrt(3), and the excess falls
@@ -43,7 +44,7 @@ NEWTON_STEPS = 12
 
 @dataclass(frozen=True, kw_only=True)
 class Edition:
-    """How an edition of the theorem reads m and the stress u of (5.30).
+    """A reading of the theorem: its m and the stress u of (5.30).
 
     Attributes
     ----------
@@ -53,10 +54,9 @@ class Edition:
     unit : callable
         m -> u: 1 as printed, m as repaired.
     proved : callable
-        m -> whether the edition's own proof, the chain of estimates as it stands, holds: everywhere when repaired, for
-        m >= 1 as printed.  The flag says nothing of what is true beside that proof: (5.30) holds as printed exactly
-        where M^2 >= m, and Proposition 5.6 for every m with M >= 2 m and C_tr into L2(Gamma_c), by other estimates
-        (``x-printed-border`` and ``x-printed-rescued`` of the ledger).
+        m -> True if the edition's own proof, its chain of estimates, holds: everywhere when repaired, for m >= 1 as
+        printed.  Other estimates prove more: (5.30) holds as printed exactly where M^2 >= m, and Proposition 5.6 for
+        every m with M >= 2 m and C_tr into L2(Gamma_c) (``x-printed-border`` and ``x-printed-rescued`` of the ledger).
     """
 
     name: Literal["printed", "repaired"]
@@ -89,7 +89,7 @@ def lipschitz(m: Scalar, M: Scalar, C_R: Scalar, x: Scalar) -> Scalar:
 
 
 def C0(m: Scalar, M: Scalar, C_R: Scalar) -> Scalar:
-    """C_0 (5.37): from here on the coefficient of |||T psi - T psi~||| squared is non-negative."""
+    """C_0 (5.37): from this theta on the coefficient of |||T psi - T psi~|||^2 is non-negative."""
     return 2 * m**2 / ((M * C_R) ** 2 + 2 * m**2)
 
 
@@ -132,7 +132,7 @@ def P(x: Scalar, m: Scalar, M: Scalar, C_R: Scalar, u: Scalar) -> Scalar:
 
 
 def D(x: Scalar, m: Scalar, M: Scalar, C_R: Scalar, u: Scalar) -> Scalar:
-    """``C_T^2/C_R^2 - P >= 0``: what the proof of a >= 1, b <= -2 after (5.39) needs, without subtracting.
+    """``C_T^2/C_R^2 - P >= 0``, which proves a >= 1, b <= -2 after (5.39), without subtracting.
 
     With ``A = M C_R``, ``s = sqrt(m x)`` and ``r = m/u <= 1`` the term m x of the square cancels that of P.
     """
@@ -187,13 +187,80 @@ def factor_and_rest(gain: Scalar) -> tuple[Scalar, Scalar]:
     return q, gain / (1 + q)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Answer:
+    """The values that the answers of both theorems share, in the norms of the paper and in energy norms.
+
+    Attributes
+    ----------
+    interval : tuple of float or None
+        Contraction is proved for lo < theta < hi <= 1; None where it is proved for no theta.
+    interval_proved : tuple of float or None
+        Thetas that contract whichever of the constants enclosed are the true ones; None if there are none, or no
+        enclosures.
+    theta : float or None
+        The theta of the question; None where none was given.
+    factor, one_minus_factor : Number or None
+        The bound of the Lipschitz constant of T_theta in the norm (5.21), below 1, and 1 minus it without cancellation.
+        None outside the interval: nothing is bounded there.
+    verdict : {'contraction', 'no conclusion'} or None
+        Whether theta lies in the interval; None without theta.
+    """
+
+    interval: tuple[float, float] | None
+    interval_proved: tuple[float, float] | None
+    theta: float | None
+    factor: Number | None
+    one_minus_factor: Number | None
+    verdict: Conclusion | None
+
+    @staticmethod
+    def shared(
+        found: dict[str, Any], corners: list[dict[str, Any]], level: Level, theta: Fraction | None
+    ) -> dict[str, Any]:
+        """The intervals, theta and the verdict by name, from the ``low``, ``high`` and ``factor`` that a theorem found.
+
+        ``corners`` has them where the theorem gives most and where it gives least, or is empty without enclosures.
+        """
+        proved = None
+        if corners and all(corner["high"] is not None for corner in corners):
+            first, last = [rounded(corners[-1][end], [corners[-1][end]], level) for end in ("low", "high")]
+            if first and last and first.hi is not None and last.lo is not None and first.hi < last.lo:
+                proved = first.hi, last.lo  # each end moved inwards to a double
+        return {
+            "interval": None if found["high"] is None else (float(found["low"]), float(found["high"])),
+            "interval_proved": proved,
+            "theta": None if theta is None else float(theta),
+            "verdict": None if theta is None else "no conclusion" if found["factor"] is None else "contraction",
+        }
+
+    @property
+    def reason(self) -> dict[str, str]:
+        """Why a value is None, by its name."""
+        reasons: dict[str, str] = {}
+        if self.interval_proved is None:
+            reasons["interval_proved"] = NO_PROVED_INTERVAL
+        if self.theta is None:
+            reasons |= dict.fromkeys(("theta", "factor", "one_minus_factor", "verdict"), "no theta given")
+        elif self.factor is None:
+            reasons |= dict.fromkeys(("factor", "one_minus_factor"), "theta outside the interval: no conclusion")
+        return reasons
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object ``editions.<name>`` of ``ndtheory.bounds/1``; what is null has a reason beside it."""
+        values = {field.name: getattr(self, field.name) for field in fields(self) if field.name != "edition"}
+        plain = lambda value: list(value) if isinstance(value, tuple) else value
+        numbers = {name: value.to_dict() for name, value in values.items() if isinstance(value, Number)}
+        return {name: plain(value) for name, value in values.items()} | numbers | {"reason": self.reason}
+
+
 #: The numbers of an edition.
 NAMES = ("C_K", "C_T", "C_T_tilde", "C0", "C1", "C2", "C3", "C4", "C5", "C6", "factor", "one_minus_factor")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Bounds:
-    """What one edition of the theorem says.
+class Bounds(Answer):
+    """The answer of an edition: ``factor`` is K(theta), ``interval`` has all cases of Proposition 5.6, None from C2 on.
 
     Attributes
     ----------
@@ -207,22 +274,10 @@ class Bounds:
         None: C_s C_tr = 0, any k is below.
     C6 : Number or None
         None unless a' < -1.
-    interval : tuple of float or None
-        Contraction for lo < theta < hi, the four cases of Proposition 5.6 in one; None when k is at or above C2.
-    interval_proved : tuple of float or None
-        Thetas that contract whichever of the constants enclosed are the true ones; None where there are none, or no
-        enclosures.
-    theta : float or None
-        The one asked about; None where none was given.
-    factor, one_minus_factor : Number or None
-        K(theta) < 1 in the norm (5.21), and 1 - K computed without cancellation.
-        None outside the interval: nothing is bounded there.
-    verdict : {'contraction', 'no conclusion'} or None
-        Whether theta lies in the interval; None without theta.
     proved : bool
         Whether the proof behind this edition holds for these constants, all that are enclosed.
     threshold_on : {'k', 'C_K'}
-        What C2 to C5 are thresholds of.
+        The constant to which C2 to C5 apply.
     """
 
     edition: Edition
@@ -236,42 +291,20 @@ class Bounds:
     C4: Number | None
     C5: Number | None
     C6: Number | None
-    interval: tuple[float, float] | None
-    interval_proved: tuple[float, float] | None
-    theta: float | None
-    factor: Number | None
-    one_minus_factor: Number | None
-    verdict: Conclusion | None
     proved: bool
     threshold_on: Literal["k", "C_K"]
 
-    def to_dict(self) -> dict[str, Any]:
-        """The object ``editions.<name>`` of ``ndtheory.bounds/1``; what is null has a reason beside it."""
-        numbers: dict[str, Number | None] = {name: getattr(self, name) for name in NAMES}
-        reasons: dict[str, str] = {}
+    @property
+    def reason(self) -> dict[str, str]:
+        """Why a value is None, by its name."""
+        reasons = super().reason
         if self.C2 is None:
-            reasons |= dict.fromkeys(["C2", "C3", "C4", "C5"], "C_s C_tr = 0: every friction coefficient is below")
+            reasons |= dict.fromkeys(("C2", "C3", "C4", "C5"), "C_s C_tr = 0: every friction coefficient is below")
         if self.C6 is None:
             reasons["C6"] = "a' >= -1: no lower end but 0"
         if self.interval is None:
             reasons["interval"] = "friction at or above C2"
-        if self.interval_proved is None:
-            reasons["interval_proved"] = NO_PROVED_INTERVAL
-        if self.factor is None:
-            why = "no theta given" if self.theta is None else "theta outside the interval: no conclusion"
-            reasons |= dict.fromkeys(["factor", "one_minus_factor"], why)
-        if self.theta is None:
-            reasons |= dict.fromkeys(["theta", "verdict"], "no theta given")
-        return {
-            **{name: None if number is None else number.to_dict() for name, number in numbers.items()},
-            "interval": None if self.interval is None else list(self.interval),
-            "interval_proved": None if self.interval_proved is None else list(self.interval_proved),
-            "theta": self.theta,
-            "verdict": self.verdict,
-            "proved": self.proved,
-            "threshold_on": self.threshold_on,
-            "reason": reasons,
-        }
+        return reasons
 
 
 def evaluate(edition: Edition, constants: Constants, theta: Numeric | None = None) -> Bounds:
@@ -293,9 +326,9 @@ def evaluate(edition: Edition, constants: Constants, theta: Numeric | None = Non
     Bounds
         Right to the last place of a double: evaluated with 200 decimal digits, comparisons included.  Where a constant
         was given as an enclosure, and the others as one or exactly, the numbers have enclosures too, at the weakest
-        level (``verified`` at best).  Not those that some of the constants enclosed do not have: ``factor`` and
+        level (``verified`` at best), if all of the constants enclosed have such a number: ``factor`` and
         ``one_minus_factor`` have one only if there is a contraction interval, with theta inside it, throughout.
-        ``interval`` and ``verdict`` are those of the values.
+        ``interval`` and ``verdict`` come from the values, not from the enclosures.
 
     Raises
     ------
@@ -328,25 +361,18 @@ def evaluate(edition: Edition, constants: Constants, theta: Numeric | None = Non
             ends = _ends_of_C1(corners) if name == "C1" else [corner[name] for corner in corners]
             return rounded(found[name], ends, level)
 
-        interval = None if found["high"] is None else (float(found["low"]), float(found["high"]))
-        verdict: Conclusion | None = None
-        if chosen is not None:
-            verdict = "no conclusion" if found["factor"] is None else "contraction"
         least = constants.ends("m")
         return Bounds(
             edition=edition,
             **{name: number(name) for name in NAMES},
-            interval=interval,
-            interval_proved=inside(corners, level, "low", "high"),
-            theta=None if chosen is None else float(chosen),
-            verdict=verdict,
+            **Answer.shared(found, corners, level, chosen),
             proved=edition.proved(constants.m if least is None else least[0]),
             threshold_on="C_K" if scale is None else "k",
         )
 
 
 def _ends_of_C1(corners: list[dict[str, Any]]) -> list[Decimal | None]:
-    """Ends of an enclosure of C1: those of the intervals; where there are none, from D and Q at opposite ends."""
+    """Ends of an enclosure of C1: ends of the intervals; where there are none, C1 of D and Q at opposite ends."""
     if all(corner["high"] is not None for corner in corners):
         return [corner["high"] for corner in corners]
     pairs = zip(corners, reversed(corners), strict=True)
@@ -354,7 +380,7 @@ def _ends_of_C1(corners: list[dict[str, Any]]) -> list[Decimal | None]:
 
 
 def _figures(edition: Edition, at: Corner, theta: Decimal | None, margin: Decimal) -> dict[str, Any]:
-    """What an edition says for m, M, C_R, C_K and C_s C_tr: decimals by name, None where there is none.
+    """The values of an edition for m, M, C_R, C_K and C_s C_tr: decimals by name, None where there is none.
 
     ``low`` and ``high`` are the ends of the interval; an end within the ``margin``, relatively, counts as met.
     """

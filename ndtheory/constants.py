@@ -1,46 +1,42 @@
-"""The constants that enter the theorem, with their hypotheses."""
+"""The constants that enter the theorem, in the norms of the paper and in energy norms, with their hypotheses."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeAlias
 
 from ndtheory.errors import HypothesisError
-from ndtheory.number import Level, Number, Numeric, exact, rounded, weakest
+from ndtheory.number import Level, Number, Numeric, exact, weakest
 
-#: m, M, C_R, C_K and C_s C_tr, the last None where C_K alone is known.
+#: m, M, C_R, C_K and C_s C_tr, the last None where only C_K is known.
 Corner = tuple[Fraction, Fraction, Fraction, Fraction, Fraction | None]
 
 #: Sizes between which enclosures are given; beyond them the cancellation in the bounds was not studied.
 ORDINARY = Fraction(1, 10**30), Fraction(10**30)
 
+#: Sizes of rho, kappa_1 and kappa_2 whose squares and quotients fit into a double.
+SMALLEST, LARGEST = Fraction(1, 10**75), Fraction(10**75)
+
+
+#: What a constant may be given as.
+Given: TypeAlias = Numeric | Number
+
 
 def take(key: str, value: Numeric, needed: str, holds: Callable[[Fraction], bool]) -> Fraction:
-    """Read a number exactly and hold it against its hypothesis.
-
-    Raises
-    ------
-    HypothesisError
-        Not a number, or the hypothesis fails; ``needed`` says what was asked.
-    """
-    try:
+    """Read a number exactly; HypothesisError, quoting ``needed``, if it is none or the hypothesis does not hold."""
+    with suppress(ValueError):
         number = exact(value)
-    except ValueError:
-        raise HypothesisError(key, value, needed) from None
-    if not holds(number):
-        raise HypothesisError(key, value, needed)
-    return number
+        if holds(number):
+            return number
+    raise HypothesisError(key, value, needed)
 
 
 def relaxation_factor(value: Numeric) -> Fraction:
-    """Read theta exactly; Section 3 needs 0 < theta < 1.
-
-    Raises
-    ------
-    HypothesisError
+    """Read theta exactly; HypothesisError unless 0 < theta < 1, as Section 3 needs.
 
     Examples
     --------
@@ -52,7 +48,7 @@ def relaxation_factor(value: Numeric) -> Fraction:
 
 @dataclass(frozen=True, kw_only=True)
 class GivenConstants:
-    """Constants as exact rationals, with what was given in their place.
+    """Constants as exact rationals, with the numbers that were given for them.
 
     A :class:`~ndtheory.number.Number` enters the formulas as its value, read like any float; its level and its ends
     are kept here.
@@ -68,23 +64,24 @@ class GivenConstants:
 
     numbers: tuple[tuple[str, Number], ...] = field(init=False, repr=False, default=())
 
-    def _keep(self, key: str, value: Numeric | Number, needed: str, holds: Callable[[Fraction], bool]) -> Fraction:
+    def _keep(
+        self, key: str, value: Any, needed: str, holds: Callable[[Fraction], bool], *, optional: bool = False
+    ) -> None:
         given = Number.of_float(value) if isinstance(value, float) else value
-        kept = take(key, plain(value), needed, holds)
+        kept = None if optional and value is None else take(key, plain(value), needed, holds)
         if isinstance(given, Number):
             object.__setattr__(self, "numbers", (*self.numbers, (key, given)))
         object.__setattr__(self, key, kept)
-        return kept
 
     def factors(self, key: str) -> tuple[str, ...]:
-        """The constants given whose product a constant is: itself alone, where it was not computed from others."""
+        """The given constants whose product is this one: itself, unless it was computed from others."""
         return (key,)
 
     def number(self, key: str) -> Number | None:
         """A constant with its level and its ends; None where there is none.
 
-        What was written exactly is ``exact`` where a double is that number; elsewhere it is ``verified``, between the
-        two doubles next to it.
+        A constant that was written exactly is ``exact`` if a double is that number; otherwise it is ``verified``,
+        between the two doubles next to it.
 
         Examples
         --------
@@ -117,9 +114,9 @@ class GivenConstants:
         return low, high
 
     def enclosures(self, *keys: str) -> list[tuple[Fraction, Fraction]] | None:
-        """The ends of some constants; None unless one of all was given as an enclosure and these are of ordinary size.
+        """The ends of some constants; None unless a Number was given and all of these have ends of ordinary size.
 
-        Friction may be as small as it likes: nothing cancels more for it.
+        Friction may be arbitrarily small: that makes no cancellation worse.
         """
         if not self.numbers:
             return None
@@ -137,34 +134,14 @@ class GivenConstants:
         return weakest(number.level for _, number in self.numbers)
 
 
-def inside(corners: Sequence[Mapping[str, Any]], level: Level, low: str, high: str) -> tuple[float, float] | None:
-    """The interval where a theorem says least, each end moved inward to a double; None where there is none.
-
-    Parameters
-    ----------
-    corners : sequence of mapping
-        What the theorem says for the constants with which it says most, and with which it says least; or nothing.
-    level : {'exact', 'verified', 'guaranteed', 'float'}
-        Of the constants.
-    low, high : str
-        Names of the ends.
-    """
-    if not corners or any(corner[high] is None for corner in corners):
-        return None
-    first, last = (rounded(corners[-1][end], [corners[-1][end]], level) for end in (low, high))
-    if first is None or last is None or first.hi is None or last.lo is None or not first.hi < last.lo:
-        return None
-    return first.hi, last.lo
-
-
-def plain(value: Numeric | Number) -> Numeric:
-    """What is read of a constant: the value of a Number, else the constant itself."""
+def plain(value: Given) -> Numeric:
+    """The value of a Number; any other constant as it was given."""
     return value.value if isinstance(value, Number) else value
 
 
 @dataclass(frozen=True, kw_only=True)
 class Constants(GivenConstants):
-    """m, M, C_R and C_K: all that Section 5 knows of the two bodies and of friction.
+    """m, M, C_R and C_K: the only numbers of the two bodies and of friction that enter Section 5.
 
     Numbers are kept exactly as written (see :func:`ndtheory.number.exact`).  Each may be a
     :class:`~ndtheory.number.Number` too: its level and its ends are kept (:meth:`number`) and enter the bounds.
@@ -208,25 +185,22 @@ class Constants(GivenConstants):
     def __init__(
         self,
         *,
-        m: Numeric | Number,
-        M: Numeric | Number,
-        C_R: Numeric | Number,
-        C_K: Numeric | Number | None = None,
-        C_s: Numeric | Number | None = None,
-        C_tr: Numeric | Number | None = None,
-        k: Numeric | Number | None = None,
+        m: Given,
+        M: Given,
+        C_R: Given,
+        C_K: Given | None = None,
+        C_s: Given | None = None,
+        C_tr: Given | None = None,
+        k: Given | None = None,
     ) -> None:
         keep = self._keep
-        smallest = keep("m", m, "a number m > 0", lambda v: v > 0)
-        keep("M", M, f"a number M >= m = {plain(m)}", lambda v: v >= smallest)
+        keep("m", m, "a number m > 0", lambda v: v > 0)
+        keep("M", M, f"a number M >= m = {plain(m)}", lambda v: v >= self.m)
         keep("C_R", C_R, "a number C_R >= 1", lambda v: v >= 1)
         friction = {"C_s": C_s, "C_tr": C_tr, "k": k}
-        given = [key for key, value in friction.items() if value is not None]
         for key, value in friction.items():
-            if value is None:
-                object.__setattr__(self, key, None)
-            else:
-                keep(key, value, f"a number {key} >= 0", lambda v: v >= 0)
+            keep(key, value, f"a number {key} >= 0", lambda v: v >= 0, optional=True)
+        given = [key for key, value in friction.items() if value is not None]
         if C_K is not None:
             if given:
                 raise HypothesisError("C_K", C_K, f"either C_K or C_s, C_tr and k, not C_K with {', '.join(given)}")
@@ -257,4 +231,76 @@ class Constants(GivenConstants):
             return None
         m, M, C_R, C_K, *scale = ends
         best, worst = ((m[1 - i], M[i], C_R[i], C_K[i], scale[0][i] * scale[1][i] if scale else None) for i in (0, 1))
+        return best, worst
+
+
+@dataclass(frozen=True, kw_only=True)
+class EnergyConstants(GivenConstants):
+    """rho, kappa_1 and kappa_2: the only numbers of the bodies and of friction in the theorem in energy norms.
+
+    Numbers are kept exactly as written (see :func:`ndtheory.number.exact`).  Each may be a
+    :class:`~ndtheory.number.Number` too: its level and its ends are kept (:meth:`number`) and enter the bound.
+
+    Parameters
+    ----------
+    rho : dimensionless
+        Largest eigenvalue of ``S_1 phi = rho S_2 phi``, contact body over Neumann body.  Hypothesis: rho > 0;
+        from 1e-75 to 1e75, so that its square fits into a double.
+    kappa_1, kappa_2 : dimensionless, optional
+        ``k C_s C_t1`` and ``k C_s C_t2`` with ``C_s = sup |S sigma_N(w)|_L2 / |w|_a2`` and
+        ``C_ta = sup |v_T|_L2 / |v|_aa``; 0 by default.  Hypothesis: both >= 0, of
+        sizes as rho where they are not 0.
+    rho_normal : dimensionless, optional
+        rho with the tangential components condensed out; takes the place of rho where kappa_1 = kappa_2 = 0.
+        Hypothesis: 0 < rho_normal <= rho.
+
+    Raises
+    ------
+    HypothesisError
+        Naming the constant, the value received and what was needed.
+
+    Examples
+    --------
+    >>> EnergyConstants(rho="3/2").at_work
+    Fraction(3, 2)
+    """
+
+    floor = {"kappa_1": 0, "kappa_2": 0}
+
+    rho: Fraction
+    kappa_1: Fraction
+    kappa_2: Fraction
+    rho_normal: Fraction | None
+
+    def __init__(self, *, rho: Given, kappa_1: Given = 0, kappa_2: Given = 0, rho_normal: Given | None = None) -> None:
+        ordinary = lambda v: SMALLEST <= v <= LARGEST
+        self._keep("rho", rho, "a number rho > 0 (1e-75 to 1e75)", ordinary)
+        needed = f"a number 0 < rho_normal <= rho = {plain(rho)}"
+        self._keep("rho_normal", rho_normal, needed, lambda v: 0 < v <= self.rho, optional=True)
+        for key, kappa in {"kappa_1": kappa_1, "kappa_2": kappa_2}.items():
+            self._keep(key, kappa, f"a number {key} >= 0 (0, or 1e-75 to 1e75)", lambda v: v == 0 or ordinary(v))
+
+    @property
+    def frictionless(self) -> bool:
+        """True if kappa_1 = kappa_2 = 0: no node sticks, and tangential components carry no force."""
+        return self.kappa_1 == 0 == self.kappa_2
+
+    @property
+    def at_work(self) -> Fraction:
+        """The rho that enters q: rho_normal without friction (where it is known), else rho."""
+        return self.rho_normal if self.frictionless and self.rho_normal is not None else self.rho
+
+    @property
+    def corners(self) -> tuple[tuple[Fraction, ...], tuple[Fraction, ...]] | None:
+        """rho at work, kappa_1 and kappa_2 at their lower ends, where the theorem says most, and at their upper ends.
+
+        None unless a constant was given as an enclosure, and all others as one or exactly.
+        """
+        normal = () if self.rho_normal is None else ("rho_normal",)
+        ends = self.enclosures("kappa_1", "kappa_2", "rho", *normal)
+        if ends is None:
+            return None
+        low, high = zip(*ends, strict=True)
+        # the last is rho_normal where it is known
+        best, worst = ((at[-1] if at[0] == 0 == at[1] else at[2], at[0], at[1]) for at in (low, high))
         return best, worst

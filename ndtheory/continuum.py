@@ -1,15 +1,15 @@
-r"""The theorem in energy norms for two rectangles in the continuum: its constants bounded with no finite element.
+r"""The theorem in energy norms for two rectangles in the continuum: bounds of its constants without finite elements.
 
-Two rectangles touch along the interval Gamma_c of a straight line; of each the side opposite Gamma_c is clamped, or
-moved as given, and no other one is held.  S is the convolution with the hat kernel of radius r on Gamma_c.  Then
+Two rectangles touch along the interval Gamma_c of a straight line; the side of each opposite Gamma_c is clamped, or
+moved as given, and no other side is held.  S is the convolution with the hat kernel of radius r on Gamma_c.  Then
 
 * ``C_s^2 <= sup over xi of S_NN(xi) sinc^4(r xi/2)`` with the strip of the Neumann body (:mod:`ndtheory.strip`),
 * ``C_ta^2 <= (d/G) K`` with a rational K (:mod:`ndtheory.segments`),
 * ``rho <= (1 + eps) R`` with R the largest ratio of both strips' forms, and eps the energy of a cut-off,
-* ``rho`` is at least what the wedges at both ends of Gamma_c dictate (:mod:`ndtheory.wedges`),
+* ``rho`` is at least the bounds from the wedges at both ends of Gamma_c (:mod:`ndtheory.wedges`),
 * ``rho_normal <= s`` where the mirror image of the contact body fits (:func:`ndtheory.moduli.mirror`).
 
-The proofs are in ``docs/continuum.md``.  Every number here is exact or rounded outward, so what follows from them is
+The proofs are in ``docs/continuum.md``.  Every number here is exact or rounded outward, so conclusions from them are
 guaranteed for the continuum.
 """
 
@@ -18,9 +18,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 
-from ndtheory.energy import EnergyConstants
-from ndtheory.energy_bounds import EnergyBounds
-from ndtheory.energy_norms import evaluate_energy
+from ndtheory.constants import EnergyConstants
+from ndtheory.energy_norms import EnergyBounds, evaluate_energy
 from ndtheory.errors import HypothesisError
 from ndtheory.intervals import Interval
 from ndtheory.moduli import Moduli, mirror
@@ -35,20 +34,16 @@ FOUR_OVER_PI_SQUARE = Fraction(40529, 100000)
 
 @dataclass(frozen=True, kw_only=True)
 class Rectangle:
-    """A body whose side opposite Gamma_c is clamped and no other one held.
+    """A body whose side opposite Gamma_c is clamped, and no other side held; HypothesisError for other values.
 
     Attributes
     ----------
     left, right : Fraction
-        Its ends along Gamma_c, unit length.
+        Its ends along Gamma_c, left < right, unit length.
     thickness : Fraction
-        d, from Gamma_c to the clamped side.
+        d > 0, from Gamma_c to the clamped side.
     body : Moduli
         Not incompressible, kappa > 1.
-
-    Raises
-    ------
-    HypothesisError
     """
 
     left: Fraction
@@ -72,7 +67,7 @@ class Rectangle:
 
 @dataclass(frozen=True, kw_only=True)
 class TwoRectangles:
-    """Two rectangles in contact.
+    """Two rectangles in contact; HypothesisError for other values.
 
     Attributes
     ----------
@@ -82,10 +77,6 @@ class TwoRectangles:
         Ends of Gamma_c, inside both.
     radius : Fraction
         r > 0 of the hat kernel.
-
-    Raises
-    ------
-    HypothesisError
 
     Examples
     --------
@@ -119,7 +110,7 @@ class TwoRectangles:
 
     @property
     def margins(self) -> tuple[Fraction, Fraction]:
-        """How far the Neumann body goes on beyond both ends of Gamma_c."""
+        """Lengths of the Neumann body beyond both ends of Gamma_c."""
         return self.interval[0] - self.neumann.left, self.neumann.right - self.interval[1]
 
 
@@ -142,7 +133,7 @@ class ContinuumConstants:
     rho : Fraction or None
         ``(1 + eps) R``; None where eps is.
     rho_ends : Fraction
-        What the wedges at the ends of Gamma_c dictate: rho is at least this.
+        A lower bound of rho, from the wedges at the ends of Gamma_c.
     rho_normal : Fraction or None
         s; None where the mirror image does not fit.
     reason : dict
@@ -171,7 +162,7 @@ class ContinuumConstants:
 def cut_off(model: TwoRectangles) -> Fraction | None:
     """eps with ``a(chi v) <= (1 + eps) a(v)`` for lifts v into the Neumann body, chi falling to 0 beside Gamma_c.
 
-    None where Gamma_c reaches an end of the Neumann body.
+    None if Gamma_c reaches an end of the Neumann body.
     """
     body, (lo, hi) = model.neumann, model.interval
     if min(model.margins) <= 0:
@@ -186,9 +177,9 @@ def cut_off(model: TwoRectangles) -> Fraction | None:
 
 
 def ends(model: TwoRectangles) -> Fraction:
-    """The larger one of the lower bounds of rho from both ends of Gamma_c.
+    """The larger lower bound of rho from both ends of Gamma_c.
 
-    There a rectangle is a wedge of 90 degrees where it ends with Gamma_c, and of 180 degrees where it goes on; the side
+    A rectangle is a wedge of 90 degrees where it ends with Gamma_c, and of 180 degrees where it goes on; the side
     beyond Gamma_c is free.
     """
     lo, hi = model.interval
@@ -257,32 +248,21 @@ def lower(value: Fraction) -> Number:
 
 
 def friction_threshold(constants: ContinuumConstants) -> Number:
-    """A friction below which every small theta contracts; rho enters only how small."""
+    """A friction below which every small theta contracts; only how small depends on rho."""
     first, second = (Interval.of(value) for value in constants.kappa(Fraction(1)))
     return lower(Fraction((2 / (second + (second.square() + first.square()).sqrt())).lo))
 
 
 def statement(constants: ContinuumConstants, *, friction: Numeric, theta: Numeric | None = None) -> EnergyBounds | None:
-    """What the theorem in energy norms says of the continuum; None where rho is not bounded.
+    """The answer of the theorem in energy norms for the continuum and k <= ``friction``; None if rho is not bounded.
 
     q grows with its constants, so the values for upper bounds are bounds: ``factor`` and ``factor_proved`` from above,
     ``theta_max_proved`` and both multiples of friction from below.
-
-    Parameters
-    ----------
-    constants : ContinuumConstants
-    friction : number
-        An upper bound of k, >= 0.
-    theta : number, optional
     """
     k = Fraction(friction)
     rho = constants.rho_normal if k == 0 and constants.rho_normal is not None else constants.rho
     if rho is None:
         return None
-
-    def proved(value: Fraction) -> Number:
-        hi = above(value)
-        return Number(value=hi, lo=hi, hi=hi, level="guaranteed")
-
-    kappa_1, kappa_2 = map(proved, constants.kappa(k))
-    return evaluate_energy(EnergyConstants(rho=proved(rho), kappa_1=kappa_1, kappa_2=kappa_2), theta)
+    bounds = map(above, (rho, *constants.kappa(k)))
+    rho_, kappa_1, kappa_2 = (Number(value=hi, lo=hi, hi=hi, level="guaranteed") for hi in bounds)
+    return evaluate_energy(EnergyConstants(rho=rho_, kappa_1=kappa_1, kappa_2=kappa_2), theta)

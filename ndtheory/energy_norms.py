@@ -1,37 +1,34 @@
-"""The theorem in energy norms: the same proof as Section 5, with no constant larger than it must be.
+"""The theorem in energy norms: the proof of Section 5 with the least possible constants.
 
 For two forces psi, psi~ let d_1, d_2 be the differences of the traces of the contact body and of the Neumann body, with
 ``|d_a|^2 = a^a(R d_a, R d_a)``, and ``x = |d_1| / |d_2|``; ``|d_2|`` is the norm (5.21) of psi - psi~.  Then
 
-* ``|||T psi - T psi~|||^2 <= rho x^2 |d_2|^2`` takes the place of (5.18), (5.22), (5.38),
-* ``x <= r``, with ``r^2 = (sqrt(rho) + kappa_1) r + kappa_2``, that of (5.11),
-* ``<T psi - T psi~, d_2> <= f(x) |d_2|^2``, with ``f(x) = kappa_2 + kappa_1 x - x^2``, that of (5.29) and (5.30).
+* ``|||T psi - T psi~|||^2 <= rho x^2 |d_2|^2`` replaces (5.18), (5.22), (5.38),
+* ``x <= r``, with ``r^2 = (sqrt(rho) + kappa_1) r + kappa_2``, replaces (5.11),
+* ``<T psi - T psi~, d_2> <= f(x) |d_2|^2``, with ``f(x) = kappa_2 + kappa_1 x - x^2``, replaces (5.29) and (5.30).
 
 So by (5.24) ``q(theta)^2``, the largest ``(1-theta)^2 + 2 theta (1-theta) f(x) + theta^2 rho x^2`` over 0 <= x <= r,
 bounds the square of the Lipschitz constant of T_theta.  The proof, step by step, is in ``docs/energy.md``.
 
-Every formula is written over any scalar (float, Decimal, Fraction where roots are rational, sympy, mpmath, an interval,
-an object that records the operations made with it); branches go through :func:`ndtheory.scalar.where`.  All arguments
-and results are numbers without unit.
+Every formula applies to any scalar, as in :mod:`ndtheory.bounds`.  All arguments and results are numbers without unit.
 
-r grows with rho, kappa_1 and kappa_2, and at each x in [0, r] the expression above does, as 0 < theta <= 1: so does q.
+r grows with rho, kappa_1 and kappa_2, and so does the expression above at each x in [0, r], as 0 < theta <= 1: q grows.
 As q grows, the thetas with q < 1, an interval, become fewer: its upper end does not grow, the least q does not fall,
 and neither multiple of friction grows, up to which every small theta and some theta has q < 1.  So an enclosure of the
-three (rho_normal in the place of rho where there is no friction) gives one of each result: its values at both ends.
+three (rho_normal in place of rho without friction) gives one of each result: its values at both ends.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
 from typing import Any
 
-from ndtheory.bounds import MARGIN, Conclusion, factor_and_rest
-from ndtheory.constants import inside, relaxation_factor
-from ndtheory.energy import EnergyConstants
-from ndtheory.energy_bounds import EnergyBounds
-from ndtheory.number import SLACK, Numeric, decimal, rounded, weakest, working_precision
+from ndtheory.bounds import MARGIN, Answer, factor_and_rest
+from ndtheory.constants import EnergyConstants, relaxation_factor
+from ndtheory.number import SLACK, Number, Numeric, decimal, rounded, weakest, working_precision
 from ndtheory.scalar import Scalar, absolute, maximum, minimum, sqrt, where
 
 #: Halvings of an interval inside (0, 1) until theta is known to far below a double.
@@ -157,7 +154,7 @@ def predicted_rate(rho: Scalar) -> Scalar:
 def tied_theta(rho_min: Scalar, rho: Scalar) -> Scalar:
     """``2/(2 + rho_min + rho)``: the best theta where nothing opens or slips, so that every step is linear.
 
-    Below 2/(1 + rho), and so safe without friction where something opens after all.
+    Below 2/(1 + rho), and so safe without friction even if something opens.
 
     Examples
     --------
@@ -188,14 +185,8 @@ def tied_factor(theta: Scalar, rho_min: Scalar, rho: Scalar) -> Scalar:
 def predicted_factor(theta: Scalar, rho: Scalar) -> Scalar:
     """``max(|1 - theta|, |1 - theta (1 + rho)|)``: q(theta) without friction, and a prediction with it.
 
-    The first is the factor of a node that stays open, the second that of the stiffest mode in contact.  Without
-    friction it is attained, with friction q is never less (theta <= 1).
-
-    Parameters
-    ----------
-    theta : dimensionless, 0 < theta <= 1
-    rho : dimensionless
-        rho_normal without friction.
+    The first is the factor of a node that stays open, the second the factor of the stiffest mode in contact.  Without
+    friction (rho is rho_normal then) it is attained, with friction q is never less; 0 < theta <= 1.
 
     Examples
     --------
@@ -225,7 +216,7 @@ def end_quadratic(rho: Scalar, kappa_1: Scalar, kappa_2: Scalar) -> tuple[Scalar
 def contraction_ends(
     rho: Scalar, kappa_1: Scalar, kappa_2: Scalar, margin: Scalar = 0
 ) -> tuple[Scalar, Scalar, Scalar]:
-    """Both ends of the interval of the thetas with q < 1, and the condition that there is one.
+    """Both ends of the interval of the thetas with q < 1, and the condition that it exists.
 
     ``q < 1`` means ``2 (f - 1) + theta (1 - 2 f + rho x^2) < 0`` for every x in [0, r].  Each is linear in theta, so
     their maximum h is convex, and ``h < 0`` on one interval.  Its ends are 0, 1, ``2/(1 + sqrt(rho) r)`` or roots of
@@ -276,7 +267,7 @@ def best_theta(rho: Scalar, kappa_1: Scalar, kappa_2: Scalar, margin: Scalar = 0
 
 
 def best_between(low: Scalar, high: Scalar, rho: Scalar, kappa_1: Scalar, kappa_2: Scalar) -> Scalar:
-    """The theta of least q, where the interval in which q < 1 is known.
+    """The theta of least q, given the interval in which q < 1.
 
     q grows above :func:`turning_theta`; below it, where q < 1, it has one minimum, since ``q <= c`` holds on one
     interval for each c <= 1.
@@ -299,23 +290,68 @@ def _last_where(holds: Callable[[Scalar], bool], low: Scalar, high: Scalar) -> S
     return where(holds(high), high, halved)
 
 
-def evaluate_energy(constants: EnergyConstants, theta: Numeric | None = None) -> EnergyBounds:
-    """Evaluate the theorem in energy norms.
+@dataclass(frozen=True, kw_only=True)
+class EnergyBounds(Answer):
+    """The answer of the theorem in energy norms: ``factor`` is q(theta), ``interval`` is None where q >= 1 everywhere.
 
-    Parameters
+    Attributes
     ----------
-    constants : EnergyConstants
-    theta : number, optional
-        Relaxation factor, 0 < theta < 1, read exactly.
+    rho : Number
+        The one that enters q: rho_normal without friction, where it is known.
+    kappa_1, kappa_2 : Number
+    ratio : Number
+        r, the largest ``|d_1|/|d_2|``.
+    friction_multiple : Number or None
+        The factor by which friction may grow until no small theta is proved: times k it is the threshold k_s.  None
+        without friction.
+    friction_limit_multiple : Number or None
+        The factor by which it may grow until no theta at all is proved: times k it is k_e >= k_s.  None without
+        friction.
+    theta_proved : float or None
+        The theta of least q; None where q >= 1 everywhere.
+    factor_proved : Number or None
+        q there.
+    theta_max_proved : Number or None
+        The upper end of the interval.
+    theta_predicted, rate_predicted : float
+        ``2/(2 + rho)`` and ``rho/(2 + rho)``: proved without friction, a prediction with it.
+    """
+
+    rho: Number
+    kappa_1: Number
+    kappa_2: Number
+    ratio: Number
+    friction_multiple: Number | None
+    friction_limit_multiple: Number | None
+    theta_proved: float | None
+    factor_proved: Number | None
+    theta_max_proved: Number | None
+    theta_predicted: float
+    rate_predicted: float
+
+    @property
+    def reason(self) -> dict[str, str]:
+        """Why a value is None, by its name."""
+        reasons = super().reason
+        if self.friction_multiple is None:
+            reasons |= dict.fromkeys(("friction_multiple", "friction_limit_multiple"), "no friction")
+        if self.interval is None:
+            names = ("interval", "theta_proved", "factor_proved", "theta_max_proved")
+            reasons |= dict.fromkeys(names, "q >= 1 for every theta")
+        return reasons
+
+
+def evaluate_energy(constants: EnergyConstants, theta: Numeric | None = None) -> EnergyBounds:
+    """Evaluate the theorem in energy norms, at a relaxation factor 0 < theta < 1 if one is given, read exactly.
 
     Returns
     -------
     EnergyBounds
         Right to the last place of a double.  Where a constant was given as an enclosure, and the others as one or
-        exactly, the numbers have enclosures too, at the weakest level (``verified`` at best).  Not those that some of
-        the constants enclosed do not have: ``factor_proved``, ``theta_max_proved`` have one only if there is a
-        contraction interval throughout, ``factor`` and ``one_minus_factor`` if theta is inside it.
-        ``interval``, ``verdict`` and what is a plain number are those of the values.
+        exactly, the numbers have enclosures too, at the weakest level (``verified`` at best), if all of the constants
+        enclosed have such a number: ``factor_proved``, ``theta_max_proved`` have one only if there is a contraction
+        interval throughout, ``factor`` and ``one_minus_factor`` if theta is inside it.  ``interval``, ``verdict`` and
+        plain numbers come from the values, not from the enclosures.
 
     Raises
     ------
@@ -344,28 +380,19 @@ def evaluate_energy(constants: EnergyConstants, theta: Numeric | None = None) ->
         def number(name: str) -> Scalar:
             return rounded(found[name], [corner[name] for corner in corners], level)
 
-        def nearest(name: str) -> float | None:
-            return None if found[name] is None else float(found[name])
-
         names = ("rho", "kappa_1", "kappa_2", "ratio", "friction_multiple", "friction_limit_multiple")
         proved = ("factor_proved", "theta_max_proved", "factor", "one_minus_factor")
-        verdict: Conclusion | None = None
-        if chosen is not None:
-            verdict = "no conclusion" if found["factor"] is None else "contraction"
         return EnergyBounds(
             **{name: number(name) for name in (*names, *proved)},
-            interval=None if found["low"] is None else (float(found["low"]), float(found["theta_max_proved"])),
-            interval_proved=inside(corners, level, "low", "theta_max_proved"),
-            theta_proved=nearest("theta_proved"),
-            theta_predicted=float(predicted_theta(decimal(constants.at_work))),
-            rate_predicted=float(predicted_rate(decimal(constants.at_work))),
-            theta=None if chosen is None else float(chosen),
-            verdict=verdict,
+            **Answer.shared(found, corners, level, chosen),
+            theta_proved=None if found["theta_proved"] is None else float(found["theta_proved"]),
+            theta_predicted=float(predicted_theta(found["rho"])),
+            rate_predicted=float(predicted_rate(found["rho"])),
         )
 
 
 def _figures(at: tuple[Fraction, ...], theta: Decimal | None, margin: Decimal) -> dict[str, Any]:
-    """What the theorem says for rho, kappa_1 and kappa_2: decimals by name, None where there is none."""
+    """The values of the theorem for rho, kappa_1 and kappa_2: decimals by name, None where there is none."""
     rho, kappa_1, kappa_2 = data = decimal(at[0]), decimal(at[1]), decimal(at[2])
     rubs = any(at[1:])
     interval = contraction_interval(*data, margin)
@@ -387,6 +414,7 @@ def _figures(at: tuple[Fraction, ...], theta: Decimal | None, margin: Decimal) -
         "friction_multiple": friction_multiple(kappa_1, kappa_2) if rubs else None,
         "friction_limit_multiple": friction_limit(*data) if rubs else None,
         "low": low,
+        "high": high,
         "theta_proved": best,
         "factor_proved": None if best is None else factor_and_rest(one_minus_square(best, *data))[0],
         "theta_max_proved": high,

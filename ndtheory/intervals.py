@@ -2,7 +2,7 @@
 
 The operations of :mod:`decimal` are correctly rounded.  Sums, products and quotients are rounded down for the lower end
 and up for the upper one; ``exp`` and ``sqrt``, which round to the nearest decimal, are moved by one unit of the last
-place.  Nothing but the standard library is needed.
+place.
 """
 
 from __future__ import annotations
@@ -41,18 +41,12 @@ class Interval:
 
     @classmethod
     def of(cls, value: Any) -> Interval:
-        """The smallest enclosure of a number that is known exactly: int, Fraction, Decimal."""
+        """The smallest enclosure of an exact number: int, Fraction, Decimal."""
         return value if isinstance(value, Interval) else cls(_rounded(value, _down), _rounded(value, _up))
 
     @classmethod
     def between(cls, lo: Any, hi: Any) -> Interval:
-        """The enclosure of all numbers between two exact ones.
-
-        Raises
-        ------
-        ValueError
-            Unless lo <= hi.
-        """
+        """The enclosure of all numbers between two exact ones; ValueError unless lo <= hi."""
         if not lo <= hi:
             raise ValueError(f"interval from {lo} to {hi}: the first end must be the smaller one")
         return cls(_rounded(lo, _down), _rounded(hi, _up))
@@ -92,6 +86,12 @@ class Interval:
         """The squares of its numbers; sharper than a product where it contains 0."""
         size = self.modulus()
         return size * size
+
+    def __pow__(self, exponent: Any) -> Interval:
+        """``x**2`` and ``x**0.5``, as formulas write them for numbers of any type."""
+        if exponent not in (2, 0.5):
+            raise ValueError(f"interval to the power {exponent}: needed 2 or 0.5")
+        return self.square() if exponent == 2 else self.sqrt()
 
     def modulus(self) -> Interval:
         """The moduli of its numbers."""
@@ -151,7 +151,7 @@ def _sinc(t: Interval) -> Interval:
 #: Each term of the series over ``t^2`` times the one before: 25 of them reach all digits at t = 3.
 _RATIOS = [Interval.of(Fraction(1, 2 * j * (2 * j + 1))) for j in range(1, 26)]
 
-#: An interval of this length is all but a number: one evaluation encloses a function well.
+#: Up to this length of an interval one evaluation encloses a function well.
 _NARROW = Decimal(10) ** (4 - DIGITS)
 
 #: A term that adds no digit to sinc, which is at least 0.04 up to t = 3.

@@ -1,19 +1,17 @@
-"""What the moduli of two bodies alone say of rho: the spectrum of their stiffnesses on a fine mesh.
+"""Lower bounds of rho from the moduli of two bodies: the spectrum of their stiffnesses on a fine mesh.
 
-On a flat patch of Gamma_c both bodies look like half-planes.  At the wave number xi a half-plane of shear modulus G
-resists its two circularly polarised surface displacements with the stiffnesses ``2 G |xi|`` and ``2 G |xi|/kappa``,
-where ``kappa = 3 - 4 nu`` in plane strain and ``(3 - nu)/(1 + nu)`` in plane stress, and bodies on opposite sides
-exchange the two.  A patch that sticks therefore has waves whose ratio of stiffnesses, contact body over Neumann body,
-is ``(G_c/G_n) kappa_n``, and others with ``(G_c/G_n)/kappa_c``; one that slides freely has ``E*_c/E*_n``.  Cut off,
-such a wave of ever shorter length is an approximate eigenvector of the continuous problem with an error that tends to
-0: the three values lie in the essential spectrum whatever the geometry, if the bodies are homogeneous and isotropic
-near one point inside Gamma_c.  An end of Gamma_c adds values of its own.
+On a flat patch of Gamma_c both bodies behave like half-planes.  At the wave number xi a half-plane of shear modulus G
+resists its two circularly polarised surface displacements with the stiffnesses ``2 G |xi|`` and ``2 G |xi|/kappa``
+(kappa: :attr:`Moduli.kappa`), and bodies on opposite sides exchange the two.  So waves on a patch that sticks have the
+ratios of stiffnesses, contact body over Neumann body, ``(G_c/G_n) kappa_n`` and ``(G_c/G_n)/kappa_c``; a patch that
+slides freely has ``E*_c/E*_n``.  These three values lie in the essential spectrum for every geometry, if the bodies are
+homogeneous and isotropic near one point inside Gamma_c (``docs/continuum.md``).  An end of Gamma_c adds other values.
 
 So each value is a *lower* bound of rho in the continuum, and of rho on fine meshes up to what they do not resolve yet.
 None is an upper bound: other thicknesses, supports or unequal Poisson ratios may make rho larger.
 
-In space a wave along a flat patch moves a half-space in the plane of the wave as in plane strain, and besides across
-it (antiplane) with the stiffness ``G |xi|``.  The ratio of these, ``G_c/G_n``, lies between the two of a patch that
+In space a wave along a flat patch moves a half-space in the plane of the wave as in plane strain, and also across it
+(antiplane) with the stiffness ``G |xi|``.  The ratio of these, ``G_c/G_n``, lies between the two of a patch that
 sticks, because kappa >= 1.
 """
 
@@ -28,13 +26,13 @@ from ndtheory.constants import take
 from ndtheory.errors import HypothesisError
 from ndtheory.number import Numeric
 
-#: In a plane, of strain or of stress, or in space.
+#: Plane strain, plane stress, or a body in space.
 Plane = Literal["strain", "stress", "3d"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Moduli:
-    """A homogeneous isotropic body, in the plane or in space.
+    """A homogeneous isotropic body, in the plane or in space; HypothesisError for values outside these ranges.
 
     Attributes
     ----------
@@ -43,11 +41,7 @@ class Moduli:
     poisson : Fraction
         -1 < nu <= 1/2.
     plane : {'strain', 'stress', '3d'}
-        ``'3d'`` is a body in space, whose plane waves are those of plane strain.
-
-    Raises
-    ------
-    HypothesisError
+        ``'3d'`` is a body in space, whose plane waves are waves of plane strain.
 
     Examples
     --------
@@ -102,7 +96,7 @@ class HalfPlanes:
 
 
 def half_planes(contact: Moduli, neumann: Moduli) -> HalfPlanes:
-    """What a flat patch of Gamma_c has in its essential spectrum.
+    """The values that a flat patch of Gamma_c has in its essential spectrum.
 
     Examples
     --------
@@ -131,14 +125,7 @@ def wedge(opening: float) -> tuple[float, float]:
     ``K/E* = (alpha + sin alpha)/2`` along the bisector and ``(alpha - sin alpha)/2`` across it.  A flat surface has
     ``pi/2`` for both.
 
-    Parameters
-    ----------
-    opening : float
-        alpha in radians, 0 < alpha < 2 pi.
-
-    Raises
-    ------
-    HypothesisError
+    ``opening`` is alpha in radians; HypothesisError unless 0 < alpha < 2 pi.
 
     Examples
     --------
@@ -150,29 +137,25 @@ def wedge(opening: float) -> tuple[float, float]:
 
 
 def end(contact: Moduli, neumann: Moduli, openings: tuple[float, float]) -> tuple[float, float]:
-    """What an end of Gamma_c adds: the smaller and the larger ratio of the stiffnesses of both wedges there.
+    """The smaller and the larger ratio that an end of Gamma_c adds, of the stiffnesses of both wedges there.
 
     A unit force in a direction d, spread over a short piece of Gamma_c of length e at its end, does the work
-    ``d' K^-1 d log(1/e) + O(1)`` on each body.  For every force rho is at least the work on the Neumann body over that
-    on the contact body: as e tends to 0, at least the largest eigenvalue of ``(K_c, K_n)``.  The mesh approaches the
+    ``d' K^-1 d log(1/e) + O(1)`` on each body.  For every force rho is at least the work on the Neumann body over the
+    work on the contact body: as e tends to 0, at least the largest eigenvalue of ``(K_c, K_n)``.  Meshes approach the
     values like ``1/log^2 h``, from inside.  In space an end is an edge, and forces along it add
-    ``(G_c alpha_c)/(G_n alpha_n)``.  In the plane :func:`ndtheory.wedges.end_bound` looks at every power of r, of
-    which a force at the apex is a limit, and may find a larger ratio; ``docs/continuum.md`` has the proof of both.
+    ``(G_c alpha_c)/(G_n alpha_n)``.  In the plane :func:`ndtheory.wedges.end_bound` uses every power of r, of which a
+    force at the apex is a limit, and may find a larger ratio; ``docs/continuum.md`` has the proof of both.
 
     Parameters
     ----------
     contact, neumann : Moduli
     openings : pair of float
-        The angles of the contact body and of the Neumann body at that end, in radians; pi where the surface goes on.
-
-    Raises
-    ------
-    HypothesisError
+        The angles of the contact body and of the Neumann body at that end, in radians, pi where the surface goes on;
+        HypothesisError unless they lie between 0 and 2 pi.
 
     Examples
     --------
-    The upper body of Section 6, with corners of 90 degrees, on the flat lower one: the upper body has the Neumann
-    problem.
+    The upper body of Section 6 as Neumann body, with corners of 90 degrees, on the flat lower one.
 
     >>> hard, soft = Moduli(young=70000, poisson="0.3"), Moduli(young=20000, poisson="0.3")
     >>> [round(value, 3) for value in end(hard, soft, (math.pi, math.pi / 2))]
@@ -199,21 +182,11 @@ def end(contact: Moduli, neumann: Moduli, openings: tuple[float, float]) -> tupl
 
 
 def free_end(contact: Moduli, neumann: Moduli, openings: tuple[float, float]) -> float:
-    """What an end of Gamma_c adds where both bodies slide freely: the ratio of the stiffnesses against a normal force.
+    """The ratio of stiffnesses against a normal force at an end of Gamma_c where both bodies slide freely.
 
-    It bounds rho_normal from below by the argument of :func:`end`, with normal forces alone.  A normal force at the
-    apex displaces the face of a wedge along its normal by ``sin^2(alpha/2)/K_along + cos^2(alpha/2)/K_across`` times
-    the logarithm, with the stiffnesses of :func:`wedge`.
-
-    Parameters
-    ----------
-    contact, neumann : Moduli
-    openings : pair of float
-        As of :func:`end`.
-
-    Raises
-    ------
-    HypothesisError
+    It bounds rho_normal from below by the argument of :func:`end` for normal forces, with the same parameters and
+    errors.  A normal force at the apex displaces the face of a wedge along its normal by
+    ``sin^2(alpha/2)/K_along + cos^2(alpha/2)/K_across`` times the logarithm, with the stiffnesses of :func:`wedge`.
 
     Examples
     --------
@@ -232,14 +205,13 @@ def free_end(contact: Moduli, neumann: Moduli, openings: tuple[float, float]) ->
 
 
 def layer(body: Moduli) -> float:
-    """The largest stiffness of the mirror image of a layer over that of the layer, whatever its thickness.
+    """The largest ratio of stiffnesses of a layer's mirror image and of the layer, for every thickness.
 
     The layer is infinitely long and held along its other side.  At x = (wave number times thickness) its surface has
-    the stiffnesses ``S_TT, S_NN ~ (kappa + 1) (kappa sinh 2x -+ 2x)/2`` and
-    ``S_NT ~ kappa (kappa - 1) sinh^2 x - 2 x^2``, and the mirror image has another sign of S_NT: the ratio is
-    ``(1 + q)/(1 - q)`` with ``q = |S_NT|/sqrt(S_TT S_NN)``.  Short waves have kappa, as a half-plane; in a layer that
-    is nearly incompressible long ones have more.  The maximum is looked for among waves a hundredth apart in log10 x,
-    and is good to three figures.
+    the stiffnesses of :func:`ndtheory.strip.symbols`, and its mirror image the same with NT of opposite sign: the ratio
+    is ``(1 + q)/(1 - q)`` with ``q = |NT|/sqrt(TT NN)``.  Short waves have kappa, like a half-plane; in a nearly
+    incompressible layer long ones have more.  The maximum is sought among waves a hundredth apart in log10 x, and is
+    good to three figures.
 
     Examples
     --------
@@ -258,10 +230,10 @@ def layer(body: Moduli) -> float:
 
 
 def column() -> float:
-    """The largest stiffness of the mirror image of a slender column over that of the column, for its end.
+    """The largest ratio of stiffnesses of a slender column's mirror image and of the column, at its end.
 
-    The end of a beam that is held at the other end has, for a unit force and a unit moment, flexibilities in the ratio
-    of ``((1/3, 1/2), (1/2, 1))``, and the mirror image turns to the other side: the ratio is ``(1 + q)/(1 - q)`` with
+    The end of a beam that is held at the other end has, for a unit force and a unit moment, flexibilities proportional
+    to ``((1/3, 1/2), (1/2, 1))``, and the mirror image turns to the other side: the ratio is ``(1 + q)/(1 - q)`` with
     ``q = (1/2)/sqrt(1/3)``, which is ``(2 + sqrt 3)^2`` for every material and section.
 
     Examples
@@ -276,11 +248,10 @@ def column() -> float:
 def mirror(contact: Moduli, neumann: Moduli) -> Fraction | None:
     """The least s with ``C_c <= s C_n`` between energies of strains.
 
-    It is the larger one of the ratio of G and of that of ``lambda + mu``, in space ``lambda + 2 mu/3``.
-
-    Where Gamma_c is flat, the mirror image of the contact body lies in the Neumann body, and its supports on the image
-    of Gamma_u too, that proves ``rho_normal <= s`` on nested meshes and in the continuum.  None where the contact body
-    is incompressible and the Neumann body is not: no s is large enough.
+    It is the larger of two ratios, of G and of ``lambda + mu``, in space ``lambda + 2 mu/3``.  If Gamma_c is flat, the
+    mirror image of the contact body lies in the Neumann body, and mirrored supports lie on supports, that proves
+    ``rho_normal <= s`` on nested meshes and in the continuum.  None if the contact body is incompressible and the
+    Neumann body is not: no s is large enough.
 
     Examples
     --------

@@ -24,8 +24,8 @@ LEVELS: tuple[Level, ...] = get_args(Level)
 #: (C6 just below C1) costs some 75 digits, so the double that comes out is right in its last place.
 DIGITS = 200
 
-#: What an end of an enclosure evaluated with ``DIGITS`` digits is moved outward by, relatively: far above its rounding
-#: (see ``DIGITS``; an end where more cancels is given up) and far below the last place of a double.
+#: Relative outward move of an end of an enclosure evaluated with ``DIGITS`` digits: far above its rounding (an end
+#: where more cancels is omitted, see ``DIGITS``) and far below the last place of a double.
 SLACK = Decimal(10) ** -60
 
 #: Sizes accepted from a user; beyond them a double overflows.
@@ -72,19 +72,19 @@ def directed(x: float | Decimal | Fraction, digits: int, *, up: bool) -> Decimal
 
 @dataclass(frozen=True, kw_only=True)
 class Number:
-    """A value with what is known of it.
+    """A value with its enclosure and level of proof.
 
     Attributes
     ----------
     value : float
         The nearest double.
     lo, hi : float or None
-        Ends of an enclosure: the number meant is at least ``lo``, at most ``hi``.  One side alone may be known;
-        at level ``float`` neither is, at the others one at least.
+        Ends of an enclosure: the true number is at least ``lo``, at most ``hi``.  Only one may be known; at level
+        ``float`` none is, at the other levels at least one.
     level : {'exact', 'verified', 'guaranteed', 'float'}
-        How the enclosure was obtained, from the strongest: the double is the number; arithmetic that bounds all its
-        rounding errors; that and a proved estimate of what is not computed; not at all.  What is derived has the
-        weakest level of its inputs (:func:`weakest`), and ``float`` where a rounding error was not bounded.
+        The origin of the enclosure, from the strongest: the double is the number; arithmetic that bounds all its
+        rounding errors; such arithmetic and a proved estimate of the rest; none.  A derived number has the weakest
+        level of its inputs (:func:`weakest`), and ``float`` where a rounding error was not bounded.
 
     Raises
     ------
@@ -125,7 +125,7 @@ class Number:
     def enclosed(cls, value: Scalar, lo: Scalar, hi: Scalar, level: Level) -> Number:
         """Round a rational or decimal to the nearest double and its ends outward.
 
-        What was ``exact`` remains so where the double is the number, and is ``verified`` elsewhere.
+        The level ``exact`` remains if the double is the number, and becomes ``verified`` otherwise.
 
         Examples
         --------
@@ -146,12 +146,7 @@ class Number:
 
 
 def exact(value: Numeric) -> Fraction:
-    """Read a number exactly as it was written.
-
-    Parameters
-    ----------
-    value : int, float, str, Decimal or Fraction
-        ``"1/3"``, ``"0.4"`` and ``0.4`` are one third and twice two fifths: a float means its shortest decimal.
+    """Read a number exactly as it was written; a float means its shortest decimal, so that 0.4 is two fifths.
 
     Raises
     ------
@@ -172,16 +167,15 @@ def exact(value: Numeric) -> Fraction:
     text = str(value).strip()
     if "_" in text or not text.isascii():
         raise ValueError(f"{text!r} is not a number")
-    numerator, slash, denominator = text.partition("/")
     try:
-        parts = [Decimal(numerator), Decimal(denominator)] if slash else [Decimal(text)]
+        parts = [Decimal(part) for part in text.split("/", maxsplit=1)]
     except InvalidOperation:
         raise ValueError(f"{text!r} is not a number") from None
     if not all(part.is_finite() and abs(part.adjusted()) <= LARGEST_EXPONENT for part in parts):
         raise ValueError(f"{text!r} is not a finite number of ordinary size")
-    if slash and parts[1] == 0:
+    if 0 in parts[1:]:
         raise ValueError(f"{text!r} divides by zero")
-    result = Fraction(parts[0]) / Fraction(parts[1]) if slash else Fraction(parts[0])
+    result = Fraction(parts[0]) / Fraction(parts[-1] if len(parts) > 1 else 1)
     if result and not SMALLEST <= abs(result) <= LARGEST:
         raise ValueError(f"{text!r} is not of ordinary size")
     return result
@@ -197,14 +191,9 @@ def working_precision(digits: int = DIGITS) -> Iterator[None]:
 def rounded(value: Decimal | None, ends: Sequence[Decimal | None], level: Level) -> Number | None:
     """A result of ``DIGITS`` digits as a Number, inside :func:`working_precision`.
 
-    Parameters
-    ----------
-    value : Decimal or None
-        None remains None.
-    ends : sequence of Decimal or None
-        The same result at both ends of an enclosure in which it is monotone, in any order.  The result has no enclosure
-        where one of them is missing, or smaller than ``SLACK`` but not 0: what is left may be the rounding error.
-    level : {'exact', 'verified', 'guaranteed', 'float'}
+    ``ends`` are the same result at both ends of an enclosure in which it is monotone, in any order.  The Number has no
+    enclosure if one of them is missing, or smaller than ``SLACK`` but not 0: it may be pure rounding error.  None
+    remains None.
     """
     if value is None:
         return None

@@ -7,8 +7,7 @@ from decimal import Decimal
 from fractions import Fraction
 from typing import Any, TypeAlias
 
-#: A number of any type on which formulas are written: float, Decimal, Fraction, a symbol, an interval.  These have no
-#: common class.
+#: A number of any type to which formulas apply: float, Decimal, Fraction, a symbol, an interval.  They share no class.
 Scalar: TypeAlias = Any
 
 
@@ -46,16 +45,16 @@ def sqrt(x: Scalar) -> Scalar:
 def where(condition: Scalar, a: Scalar, b: Scalar) -> Scalar:
     """``a`` where a condition holds, else ``b``: the branch of a formula, beside :func:`sqrt`.
 
-    A formula takes no ``if`` on a scalar, so that it serves scalars whose comparisons are not decided at once.  Such a
-    comparison returns an object with a method ``where(a, b)``: that of a scalar that records its operations records
-    the choice, that of an interval or ball the hull of both branches.  Conditions are joined by ``&``.
+    Formulas use no ``if`` on a scalar, so that they apply to scalars whose comparisons are not decided at once.  Such a
+    comparison returns an object with a method ``where(a, b)``: for a scalar that records its operations it records the
+    choice, for an interval or ball it returns the hull of both branches.  Conditions are joined by ``&``.
 
     Parameters
     ----------
     condition : bool, or an object with a method ``where(a, b)``
-        Any other (numpy, sympy) is asked for its truth.
+        Any other object (numpy, sympy) is converted to bool.
     a, b : scalar, or a function without arguments that returns one
-        A function is called where its branch is taken: it may divide by what vanishes in the other one.
+        A function is called only where its branch is taken: it may divide by what vanishes in the other one.
 
     Examples
     --------

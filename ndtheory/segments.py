@@ -1,4 +1,4 @@
-r"""How large a displacement along Gamma_c can be for its energy, read off straight segments to the clamped side.
+r"""An upper bound of displacements along Gamma_c by their energy, from straight segments to the clamped side.
 
 Let body a be a rectangle of thickness d whose side opposite Gamma_c is clamped.  Along a segment from the point x of
 Gamma_c to the clamped side, with the direction (s, 1) in coordinates along Gamma_c and into the body, the strain
@@ -6,14 +6,11 @@ Gamma_c to the clamped side, with the direction (s, 1) in coordinates along Gamm
 
     v_T(x) = 1/(t - s) * integral over 0 < y < d of  (s, 1) e (s, 1) at x + s y  -  (t, 1) e (t, 1) at x + t y.
 
-That holds for every v in V^a, as far as both segments lie in the body.  Slopes are chosen zone by zone.  By duality the
-square of the norm of ``e -> v_T`` from the energy to L2(Gamma_c) is that of an integral operator on Gamma_c, whose
-kernel is known exactly: pairs of segments meet where they cross, with the weight (:func:`meeting`)
-
-    G C^-1 (s,1)(s,1) : (t,1)(t,1) = ((1 + s t)^2 - n (1 + s^2)(1 + t^2))/2,   n = (3 - kappa)/4.
-
-The largest integral of the modulus of the kernel over one variable (Schur's test) bounds it.  These integrals are
-piecewise linear with known breakpoints, so the bound is a rational number.
+That holds for every v in V^a, as long as both segments lie in the body.  Slopes are chosen zone by zone.  By duality
+the square of the norm of ``e -> v_T`` from the energy to L2(Gamma_c) is the norm of an integral operator on Gamma_c
+with a known kernel: segments contribute where they cross, with the weight :func:`meeting`.  The largest integral of the
+modulus of the kernel over one variable bounds it (Schur's test, ``docs/continuum.md``).  These integrals are piecewise
+linear with known breakpoints, so the bound is a rational number.
 """
 
 from __future__ import annotations
@@ -25,7 +22,7 @@ from fractions import Fraction
 from ndtheory.errors import HypothesisError
 from ndtheory.scalar import Scalar
 
-#: Steps in which slopes and zones are sought, in thicknesses, from coarse to fine.
+#: Steps of the search for slopes and zones, in thicknesses, from coarse to fine.
 STEPS = [Fraction(1, 2**j) for j in (1, 2, 3, 4, 5, 6)]
 
 #: Slope of a segment that no side stops: two of +-1 give v_T with the best constant, 1.
@@ -50,16 +47,16 @@ class Zone:
     right: Scalar
 
     def in_doubles(self) -> Zone:
-        """The same in doubles, in which the search goes on."""
+        """The same in doubles, for the search."""
         return Zone(lo=float(self.lo), hi=float(self.hi), left=float(self.left), right=float(self.right))
 
     def inside(self, length: Scalar) -> bool:
-        """Whether all segments lie in a body of that length."""
+        """True if all segments lie in a body of that length."""
         return bool(self.left < self.right and self.lo + min(self.left, 0) >= 0 and self.hi + self.right <= length)
 
 
 def meeting(s: Scalar, t: Scalar, kappa: Scalar) -> Scalar:
-    """What two segments of slopes s and t have in common: ``G C^-1 (s,1)(s,1) : (t,1)(t,1)``.
+    """The weight ``G C^-1 (s,1)(s,1) : (t,1)(t,1)`` of a crossing of segments with slopes s and t.
 
     Examples
     --------
@@ -72,13 +69,8 @@ def meeting(s: Scalar, t: Scalar, kappa: Scalar) -> Scalar:
 def bound(zones: Sequence[Zone], kappa: Scalar) -> Scalar:
     """An upper bound of ``G |v_T|^2 / (d a(v))``, the norm over the zones.
 
-    Exact where zones and kappa are rational; the search for zones calls it with doubles.
-
-    Parameters
-    ----------
-    zones : sequence of Zone
-        Without common inner points, their segments inside the body.
-    kappa : dimensionless
+    Exact where zones and kappa are rational; the search for zones calls it with doubles.  The zones have no common
+    inner points, and their segments lie inside the body.
 
     Examples
     --------
@@ -121,14 +113,10 @@ def _largest_sum(zone: Zone, zones: Sequence[Zone], kappa: Scalar) -> Scalar:
 def zones(length: Fraction, lo: Fraction, hi: Fraction, kappa: Fraction) -> list[Zone]:
     """Zones with a small :func:`bound`, for Gamma_c from lo to hi on a body, lengths in thicknesses.
 
-    Every choice is a proof; the one made here is the best of a search in doubles.  Where a side is nearer than one
-    thickness, a zone at that side has one segment along that side or as far towards it as there is room, and one into
-    the body.
+    Every choice gives a proof; this one is the best of a search in doubles.  Where a side is nearer than one thickness,
+    a zone at that side has one segment along that side or as far towards it as there is room, and one into the body.
 
-    Raises
-    ------
-    HypothesisError
-        Unless 0 <= lo < hi <= length.
+    HypothesisError unless 0 <= lo < hi <= length.
 
     Examples
     --------
@@ -184,13 +172,13 @@ def zones(length: Fraction, lo: Fraction, hi: Fraction, kappa: Fraction) -> list
 def bound_at_end(room: Fraction, kappa: Fraction) -> Fraction:
     """An upper bound of :func:`bound` for points beside a side that all have the slopes 0 and t, t at most ``room``.
 
-    Two families of parallel segments: every point has the same sum, so that the bound serves for any part of a body
-    below a line parallel to Gamma_c, with the distance of that line from the clamped side in the place of d.
+    Two families of parallel segments: every point has the same sum, so that the bound also holds for any part of a body
+    below a line parallel to Gamma_c, with the distance of that line from the clamped side in place of d.
 
     Parameters
     ----------
     room : Fraction
-        How far segments may go into the body, in thicknesses, > 0.
+        Largest reach of segments into the body, in thicknesses, > 0.
     kappa : Fraction
 
     Examples

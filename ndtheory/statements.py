@@ -1,7 +1,7 @@
 """The numbered statements of the paper, and facts of ours: what each claims, and what is wrong with it if anything is.
 
-The texts are data, in ``statements.toml`` beside this module.  Verdicts are not among them: those are earned
-(:mod:`verification.ledger`).
+The texts are data, in ``statements.toml`` beside this module.  So are the recorded verdicts; each must be earned by
+evidence (:mod:`verification.ledger`).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ Fault = Literal["false as printed", "does not follow", "gap", "typo"]
 
 @dataclass(frozen=True, kw_only=True)
 class Statement:
-    """A statement, told in our own words with formulas in TeX.
+    """A statement in our own words, with formulas in TeX.
 
     Attributes
     ----------
@@ -28,6 +28,8 @@ class Statement:
     kind : str
         definition, law, algorithm, equation, inequality, constant, case, lemma, proposition, theorem, remark,
         experiment or own.
+    verdict : str
+        The recorded one; empty where none is recorded.
     title, claims : str
         What it is about, in a few words; what it says.
     leans_on : tuple of str
@@ -58,6 +60,7 @@ class Statement:
     proof: str = ""
     reading: str = ""
     note: str = ""
+    verdict: str = ""
 
 
 @lru_cache(maxsize=1)

@@ -1,4 +1,4 @@
-r"""An elastic strip clamped on one side: its stiffness at each wave number, and what is proved of it for all of them.
+r"""An elastic strip clamped on one side: its stiffness at each wave number, and bounds for all wave numbers.
 
 The strip ``0 < y < d`` is clamped at y = 0.  Surface displacements ``(i T, N) e^(i xi x)`` at y = d, T along and N
 across the surface, cost for each wave number the energy ``G xi`` times a quadratic form in (T, N) with
@@ -7,7 +7,7 @@ across the surface, cost for each wave number the energy ``G xi`` times a quadra
     D = kappa^2 sinh^2 x - x^2,   x = xi d,
 
 where kappa is Kolosov's constant.  For a body on the other side of the surface NT has the other sign.  As x grows the
-form tends to that of a half-plane, with the eigenvalues 2 and 2/kappa.
+form tends to the form of a half-plane, with the eigenvalues 2 and 2/kappa.
 """
 
 from __future__ import annotations
@@ -37,19 +37,15 @@ MOST_PARTS = 100_000
 
 
 class Unproved(ArithmeticError):
-    """A search among intervals came to its end without an answer."""
+    """A search among intervals ended without an answer."""
 
 
 def symbols(
     kappa: Scalar, sinh_double: Scalar, square: Scalar, x: Scalar, x_square: Scalar
 ) -> tuple[Scalar, Scalar, Scalar]:
-    """TT, NN and NT of the strip, over ``G xi``; any common factor of the last four arguments cancels.
+    """TT, NN and NT of the strip, over ``G xi``, of kappa > 1, ``sinh 2x``, ``sinh^2 x``, x and ``x^2``.
 
-    Parameters
-    ----------
-    kappa : dimensionless, > 1
-    sinh_double, square, x, x_square : dimensionless
-        ``sinh 2x``, ``sinh^2 x``, x and ``x^2``.
+    Any common factor of the last four arguments cancels.
 
     Examples
     --------
@@ -80,10 +76,7 @@ class Strip:
     def form(self, part: Part) -> tuple[Interval, ...]:
         """TT, NN and NT enclosed for all wave numbers of a part, unit stress/length.
 
-        Raises
-        ------
-        ValueError
-            A part without end: :meth:`over_wave_number` serves there.
+        ValueError for a part without end: use :meth:`over_wave_number`.
 
         Examples
         --------
@@ -101,12 +94,7 @@ class Strip:
         return along * scale, across * scale, x * mixed * scale
 
     def over_wave_number(self, part: Part) -> tuple[Interval, ...]:
-        """The same over xi, unit stress, for xi d >= 1: on a long part, one without end too, it is far sharper.
-
-        Raises
-        ------
-        ValueError
-            A part that begins below 1/d.
+        """The same over xi, unit stress, for xi d >= 1 (else ValueError): far sharper on a long or endless part.
 
         Examples
         --------
@@ -140,7 +128,7 @@ def largest_smoothed(strip: Strip, radius: Fraction) -> Interval:
     """The supremum over xi of ``S_NN(xi) sinc^4(r xi/2)``, unit stress/length, enclosed.
 
     ``sinc^2(r xi/2)`` is the Fourier transform of the hat kernel of radius r.  Intervals of wave numbers are halved,
-    the one with the largest upper bound first, until this bound is met by a value up to ``WIDTH``.
+    the one with the largest upper bound first, until some value reaches this bound up to ``WIDTH``.
 
     Examples
     --------
@@ -187,9 +175,10 @@ def largest_smoothed(strip: Strip, radius: Fraction) -> Interval:
 def largest_ratio_of_strips(contact: Strip, neumann: Strip) -> Fraction:
     """An upper bound of the largest eigenvalue of the contact strip's form against the Neumann strip's, for every xi.
 
-    A number t is one if ``t S_n - S_c``, with S_c seen from the other side, is positive definite for every xi: if both
-    diagonal entries are positive and their product exceeds the square of the other entry.  That is shown on intervals
-    of wave numbers which are halved until it holds.  The t tried first is 1/4096 above the largest value seen.
+    A number t is a bound if ``t S_n - S_c``, S_c as seen from the other side, is positive definite for every xi: if
+    both diagonal entries are positive and their product exceeds the square of the other entry.  That is shown on
+    intervals of wave numbers which are halved until it holds.  The first t that is tried is 1/4096 above the largest
+    value seen.
 
     Examples
     --------
@@ -209,7 +198,7 @@ def largest_ratio_of_strips(contact: Strip, neumann: Strip) -> Fraction:
 
 
 def _eigenvalue(contact: tuple[Interval, ...], neumann: tuple[Interval, ...]) -> float:
-    """The largest eigenvalue in doubles: what to try."""
+    """The largest eigenvalue in doubles, for a first guess."""
     (a, c, b), (p, r, q) = ([float(entry.lo) for entry in form] for form in (contact, neumann))
     determinant, trace = p * r - q * q, a * r + c * p + 2 * b * q
     return (trace + math.sqrt(max(trace**2 - 4 * determinant * (a * c - b * b), 0.0))) / (2 * determinant)

@@ -1,21 +1,13 @@
-r"""What an end of Gamma_c dictates to rho: the stiffness of a wedge against traces on one of its sides.
+r"""Lower bounds of rho from an end of Gamma_c: the stiffness of a wedge against traces on one of its sides.
 
-A wedge ``0 < phi < omega`` has its side phi = 0 on Gamma_c; the side phi = omega is free, or clamped.  Dilations leave
-plane energies as they are, so a displacement ``r^(i xi) h`` of the side costs ``h* S(xi) h`` for each real xi, and
-fields with different xi do not meet.  In the components ``u_x + i u_y`` and ``u_x - i u_y``, x along Gamma_c away from
-the apex and y into the wedge, Kolosov's potentials ``a z^(i xi)`` and ``b z^(i xi)`` give
-
-    S_11 = G xi ((kappa + 1) (kappa + c e^(2 xi omega))/D - 1),
-    S_22 = G xi (1 - (kappa + 1) (kappa + c e^(-2 xi omega))/D),
-    S_12 = 2 G xi^2 (kappa + 1) sin(omega) e^(i omega)/D,
-    D = (kappa + c e^(2 xi omega)) (kappa + c e^(-2 xi omega)) + 4 xi^2 sin^2(omega),
-
-with ``c = 1`` where the other side is free and ``c = -kappa`` where it is clamped.  For large xi, S is that of the
-half-plane; for small xi, that of a free wedge has ``E* xi^2/2`` times the eigenvalues of :func:`ndtheory.moduli.wedge`.
+A wedge ``0 < phi < omega`` has its side phi = 0 on Gamma_c; the side phi = omega is free, or clamped.  A displacement
+``r^(i xi) h`` of the side on Gamma_c costs the energy ``h* S(xi) h`` for each real xi (:meth:`Wedge.symbol`), and
+displacements with different xi are orthogonal.  For large xi, S is the form of a half-plane; for small xi the
+eigenvalues of a free wedge are ``E* xi^2/2`` times the stiffnesses of :func:`ndtheory.moduli.wedge`.
 
 For two wedges that share the side on Gamma_c the largest eigenvalue of ``(S_contact, S_neumann)`` is a lower bound of
 rho in the continuum, at every xi.  The proof is in ``docs/continuum.md``.  Numbers are enclosed in decimals that are
-rounded outward, so what follows from them is guaranteed.
+rounded outward, so these bounds are guaranteed.
 """
 
 from __future__ import annotations
@@ -35,16 +27,16 @@ from ndtheory.number import Numeric
 _CUT = Decimal("3.141592653589793238462643383279502884197")
 PI = Interval(_CUT, _CUT.next_plus(Context(DIGITS)))
 
-#: Least and largest xi that are tried: the symbols have come within 1e-9 of their limits there.
+#: Least and largest xi that are tried: there the symbols are within 1e-9 of their limits.
 SMALLEST, LARGEST = 1e-6, 20.0
 
-#: Ratio of two neighbours among the xi that are tried first, and how often the steps beside the best are halved then.
+#: Ratio of two neighbours among the xi that are tried first, and how often the steps beside the best are then halved.
 STEP, HALVINGS = 1.4, 10
 
 
 @dataclass(frozen=True, kw_only=True)
 class Wedge:
-    """A body near an end of Gamma_c.
+    """A body near an end of Gamma_c; HypothesisError for other values.
 
     Attributes
     ----------
@@ -53,11 +45,7 @@ class Wedge:
     degrees : Fraction
         Its opening there, 0 < degrees < 360; 180 where the surface goes on.
     clamped : bool
-        Whether the side beyond Gamma_c is clamped; it is free otherwise.
-
-    Raises
-    ------
-    HypothesisError
+        True if the side beyond Gamma_c is clamped; it is free otherwise.
     """
 
     body: Moduli
@@ -73,12 +61,17 @@ class Wedge:
             raise HypothesisError("nu", self.body.poisson, "a compressible body, kappa > 1")
 
     def symbol(self, xi: Numeric) -> tuple[Interval, Interval, Interval, Interval]:
-        """S_11, S_22 and the real and the imaginary part of S_12, enclosed; unit stress.
+        """S_11, S_22 and the real and the imaginary part of S_12 at xi > 0, enclosed; unit stress.
 
-        Parameters
-        ----------
-        xi : number
-            Positive; S(-xi) has S_11 and S_22 exchanged, and the same S_12.
+        S belongs to the components ``u_x + i u_y`` and ``u_x - i u_y``, x along Gamma_c away from the apex and y into
+        the wedge.  With ``c = 1`` for a free other side and ``c = -kappa`` for a clamped one
+
+            S_11 = G xi ((kappa + 1) (kappa + c e^(2 xi omega))/D - 1),
+            S_22 = G xi (1 - (kappa + 1) (kappa + c e^(-2 xi omega))/D),
+            S_12 = 2 G xi^2 (kappa + 1) sin(omega) e^(i omega)/D,
+            D = (kappa + c e^(2 xi omega)) (kappa + c e^(-2 xi omega)) + 4 xi^2 sin^2(omega).
+
+        S(-xi) has S_11 and S_22 exchanged, and the same S_12.
 
         Examples
         --------
@@ -102,7 +95,7 @@ class Wedge:
 
 @lru_cache(maxsize=64)
 def _angle(degrees: Fraction) -> tuple[Interval, Interval, Interval]:
-    """An angle, its sine and its cosine; those of its half and its quarter, at most pi/2, come first."""
+    """An angle, its sine and its cosine, by doubling the angle twice from a quarter, at most pi/2."""
     eighth, quarter = PI * (degrees / 1440), PI * (degrees / 720)
     sine = quarter * sinc(quarter)
     cosine = 1 - 2 * (eighth * sinc(eighth)).square()
@@ -120,7 +113,7 @@ def ratio(contact: Wedge, neumann: Wedge, xi: Numeric, *, normal: bool = False) 
     xi : number
         Positive; -xi gives the same.
     normal : bool
-        Whether tangential displacements are condensed out: that bounds rho_normal from below.
+        True to condense tangential displacements out: that bounds rho_normal from below.
 
     Examples
     --------
@@ -133,7 +126,7 @@ def ratio(contact: Wedge, neumann: Wedge, xi: Numeric, *, normal: bool = False) 
     n_1, n_2, n_re, n_im = neumann.symbol(xi)
     c_2, c_1, c_re, minus_c_im = contact.symbol(xi)  # the mirror image exchanges both components
     det_c, det_n = c_1 * c_2 - c_re.square() - minus_c_im.square(), n_1 * n_2 - n_re.square() - n_im.square()
-    if normal:  # what is left of a form without its tangential part is det S over S_xx
+    if normal:  # a form without its tangential part is det S over S_xx
         return det_c / det_n * (n_1 + n_2 + 2 * n_re) / (c_1 + c_2 + 2 * c_re)
     trace = c_1 * n_2 + c_2 * n_1 - 2 * (c_re * n_re - minus_c_im * n_im)
     square = trace.square() - 4 * det_c * det_n  # the eigenvalues are real, hence >= 0
@@ -149,7 +142,7 @@ class EndBound:
     least : Fraction
         rho is proved to be at least this.
     xi : Fraction or None
-        Where the symbols give it; None in the limit of large xi, where both bodies are as half-planes.
+        Where the symbols give it; None in the limit of large xi, where both bodies are like half-planes.
     """
 
     least: Fraction
@@ -157,11 +150,9 @@ class EndBound:
 
 
 def end_bound(contact: Wedge, neumann: Wedge, *, normal: bool = False) -> EndBound:
-    """The largest ratio of both symbols that a search among the xi finds; each xi proves its own.
+    """The largest :func:`ratio` that a search among the xi finds; each one is a bound.
 
-    That the supremum over all xi was found is not proved: it plays no part in the proof of the bound.
-
-    The parameters are those of :func:`ratio`.
+    That the search found the supremum over all xi is not proved: the bound does not need it.
 
     Raises
     ------

@@ -9,7 +9,7 @@ import numpy as np
 import verification as vf
 from ndtheory import Number
 from verification.bounds.bound import Bound, BoundResult
-from verification.bounds.energy import Energy
+from verification.bounds.table import Energy
 
 
 class Halfway(Bound):

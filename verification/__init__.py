@@ -1,6 +1,6 @@
-"""The theorem held against the finite elements: problem files, constants, the iteration, verdicts.
+"""The theorem compared with finite elements: problem files, constants, the iteration, verdicts.
 
-Everything is imported when first asked for: ``ndtheory bounds`` starts without numpy.
+Each name is imported at its first use: ``ndtheory bounds`` starts without numpy.
 
 >>> import verification as vf
 >>> bars = vf.Problem.from_dict({
@@ -24,32 +24,40 @@ __version__ = "0.1.0"
 if TYPE_CHECKING:
     from typing import Any
 
-    from verification.advice.from_logs import advise_logs
-    from verification.advice.from_matrices import advise_matrices
-    from verification.advice.from_moduli import advise_moduli
-    from verification.advice.from_runs import advise_run
-    from verification.advice.roles import Advice, advise
-    from verification.algorithm.iterate import Iterate
-    from verification.algorithm.relaxation import Rule
-    from verification.algorithm.runs import Run, run
-    from verification.algorithm.start import iterate
-    from verification.certificate.contraction import certify, check_again
-    from verification.comparison import Comparison, compare
-    from verification.constants.measured import Measured
-    from verification.constants.measuring import measure
-    from verification.contact import ContactError
-    from verification.interface.build import build
-    from verification.interface.interface import Law
-    from verification.interface.pair import ContactPair
-    from verification.ledger import Ledger, verify
-    from verification.monolithic import Solution, SolveError, solve
-    from verification.problem.examples import example
-    from verification.problem.files import load
-    from verification.problem.specification import Problem
-    from verification.problem.tables import ProblemError
-    from verification.sweeps.sweep import Sweep, sweep
+    from verification.advice.from_logs import advise_logs as advise_logs
+    from verification.advice.from_matrices import advise_matrices as advise_matrices
+    from verification.advice.from_moduli import advise_moduli as advise_moduli
+    from verification.advice.from_runs import advise_run as advise_run
+    from verification.advice.roles import Advice as Advice
+    from verification.advice.roles import advise as advise
+    from verification.algorithm.iterate import Iterate as Iterate
+    from verification.algorithm.relaxation import Rule as Rule
+    from verification.algorithm.runs import Run as Run
+    from verification.algorithm.runs import run as run
+    from verification.algorithm.start import iterate as iterate
+    from verification.certificate.contraction import certify as certify
+    from verification.certificate.contraction import check_again as check_again
+    from verification.comparison import Comparison as Comparison
+    from verification.comparison import compare as compare
+    from verification.constants.measured import Measured as Measured
+    from verification.constants.measuring import measure as measure
+    from verification.contact import ContactError as ContactError
+    from verification.interface.build import build as build
+    from verification.interface.interface import Law as Law
+    from verification.interface.pair import ContactPair as ContactPair
+    from verification.ledger import Ledger as Ledger
+    from verification.ledger import verify as verify
+    from verification.monolithic import Solution as Solution
+    from verification.monolithic import SolveError as SolveError
+    from verification.monolithic import solve as solve
+    from verification.problem.examples import example as example
+    from verification.problem.files import load as load
+    from verification.problem.specification import Problem as Problem
+    from verification.problem.tables import ProblemError as ProblemError
+    from verification.sweeps.sweep import Sweep as Sweep
+    from verification.sweeps.sweep import sweep as sweep
 
-#: Where each public name lives.  No module at this level bears the name of a public function: it would hide it.
+#: The module of each public name.  No module at this level has the name of a public function: it would hide it.
 _HOME = {
     "Advice": "advice.roles",
     "Comparison": "comparison",
@@ -85,40 +93,7 @@ _HOME = {
     "verify": "ledger",
 }
 
-__all__ = [
-    "Advice",
-    "Comparison",
-    "ContactError",
-    "ContactPair",
-    "Iterate",
-    "Law",
-    "Ledger",
-    "Measured",
-    "Problem",
-    "ProblemError",
-    "Rule",
-    "Run",
-    "Solution",
-    "SolveError",
-    "Sweep",
-    "advise",
-    "advise_logs",
-    "advise_matrices",
-    "advise_moduli",
-    "advise_run",
-    "build",
-    "certify",
-    "check_again",
-    "compare",
-    "example",
-    "iterate",
-    "load",
-    "measure",
-    "run",
-    "solve",
-    "sweep",
-    "verify",
-]
+__all__ = sorted(_HOME)
 
 
 def __getattr__(name: str) -> Any:
@@ -130,4 +105,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted(__all__)
+    return __all__

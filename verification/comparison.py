@@ -1,4 +1,4 @@
-"""Bounds against observation: a verdict on each bound, with its reason."""
+"""Comparison of bounds with observation: a verdict on each bound, with its reason."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ T = TypeVar("T")
 
 
 class Listener:
-    """Hears each part of a comparison as soon as it is known, in the order of these methods.
+    """A receiver of each part of a comparison as soon as it is known, in the order of these methods.
 
-    Here nothing is done with them; a screen shows them.  A part that was not asked for is not told.  Ctrl-C in a method
-    leaves out what is still to come.
+    This one ignores them; a screen shows them.  A part that was not asked for is left out.  Ctrl-C in a method leaves
+    out all later parts.
     """
 
     def constants(self, measured: Measured, choice: Choice) -> None:
@@ -48,18 +48,18 @@ class Listener:
         """The run, linearised."""
 
     def cvxpy(self, reference: Reference | None, why: str) -> None:
-        """The run by cvxpy alone, or why there is none."""
+        """The run by cvxpy only, or why there is none."""
 
     def losses(self, losses: Losses | None, why: str) -> None:
-        """What each inequality of the proof gives away, or why that is not known."""
+        """The factor that each inequality of the proof loses, or why that is not known."""
 
     def programs(self, results: Sequence[BoundResult]) -> None:
-        """The bounds that take the matrices of the pair."""
+        """The bounds that need the matrices of the pair."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Comparison(Document):
-    """Constants, bounds, a run, and what the run says of each bound.
+    """Constants, bounds, a run, and a verdict of the run on each bound.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class Comparison(Document):
     bounds : mapping from name to BoundResult
         From the weakest to the strongest.
     losses : Losses or None
-        What each inequality of the proof gives away.
+        The factor that each inequality of the proof loses.
     run : Run
     step_ratio : StepRatio or None
         The largest Lipschitz quotient seen.
@@ -76,7 +76,7 @@ class Comparison(Document):
     verdicts : mapping from the name of a bound to Judgement
         And of ``linearised``, the forecast made half way.
     reason : mapping
-        Why a bound, losses, step_ratio or cvxpy is missing; losses and cvxpy come with bounds that take the matrices.
+        Why a bound, losses, step_ratio or cvxpy is missing; losses and cvxpy come with bounds that need the matrices.
     """
 
     schema: ClassVar[str] = "ndtheory.compare/1"
@@ -96,7 +96,7 @@ class Comparison(Document):
 
     @property
     def problem(self) -> Problem | None:  # type: ignore[override]
-        """What was compared."""
+        """The problem of the run."""
         return self.run.problem
 
     @property
@@ -105,7 +105,7 @@ class Comparison(Document):
         return f"{self.run.pair.title}, {self.run.outcome}; {verdicts}"
 
     def tell(self, listener: Listener) -> None:
-        """Tell each part, as it was told when it was worked out."""
+        """Pass each part to a listener, in the order in which they were computed."""
         listener.constants(self.measured, self.run.choice)
         if calculated := self._asked(calculated=True):
             listener.bounds(calculated, self.measured)
@@ -120,18 +120,18 @@ class Comparison(Document):
 
     @property
     def computed(self) -> list[BoundResult]:
-        """The bounds that were worked out."""
+        """The bounds that were computed."""
         return [result for result in self.bounds.values() if result.worked_out]
 
     @property
     def proved_violated(self) -> bool:
-        """Whether a proved claim was violated: a bug, or an error in a proof.  A printed one violated is a finding."""
+        """True if a proved claim was violated: a bug, or an error in a proof.  A violated printed one is a finding."""
         violated = {name for name, judgement in self.verdicts.items() if judgement.verdict == "VIOLATED"}
         return any(not named(name).finding for name in violated & set(self.bounds))
 
     @property
     def inconclusive(self) -> bool:
-        """Whether rounding hides an answer."""
+        """True if rounding hides an answer."""
         return any(judgement.verdict == "INCONCLUSIVE" for judgement in self.verdicts.values())
 
     def content(self) -> dict[str, Any]:
@@ -156,7 +156,7 @@ class Comparison(Document):
         }
 
     def _objects(self) -> dict[str, Any]:
-        """Objects of single bounds, beside ``bounds``."""
+        """Return objects of single bounds, which are beside ``bounds``."""
         own = [named(name).objects(result, self.measured) for name, result in self.bounds.items()]
         return {key: value for objects in own for key, value in objects.items()}
 
@@ -175,8 +175,8 @@ def compare(
 ) -> Comparison:
     """Measure the constants, evaluate the bounds, run the algorithm, and judge.
 
-    Ctrl-C after the first iterate of the run leaves out what was still to come: ``run.interrupted`` is true, ``reason``
-    says what is missing.
+    Ctrl-C after the first iterate of the run leaves out all later parts: ``run.interrupted`` is true, ``reason`` names
+    what is missing.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def compare(
     theta : number or 'auto', optional
         Relaxation factor, 0 < theta < 1; the problem's by default.
     solver : {'auto', 'cvxpy', 'active-set'}
-        Who takes step II.
+        Solver of step II.
     exact : bool
         Bring the semidefinite bound to within 0.1 % of a factor that occurs, however many programs that takes.
     verified : bool
@@ -192,14 +192,14 @@ def compare(
         one semidefinite program gives.  What could not be proved keeps the level ``float``.
     bounds : sequence of str, optional
         Names of :data:`verification.bounds.table.BOUNDS`; all by default.  The others are ``NOT_COMPUTED``.  Unless one
-        of the names takes the matrices of the bodies, as the semidefinite bound does, a comparison costs little more
-        than its run: what else takes long, ``losses`` and ``cvxpy``, is left out, too.
+        of the names needs the matrices of the bodies, as the semidefinite bound does, a comparison costs little more
+        than its run: the other slow parts, ``losses`` and ``cvxpy``, are left out, too.
     watch : callable
         Called with every iterate.
     progress : callable
-        Told what is being done.
+        Called with the name of each part when it begins.
     listener : Listener, optional
-        Told each part when it is known, what takes long last.
+        Receives each part when it is known, slow parts last.
 
     Returns
     -------
@@ -226,7 +226,7 @@ def compare(
     """
     asked, listener = chosen(bounds), listener or Listener()
     pair = pair_of(problem)
-    check_memory(pair)  # nothing is told of a run that would be refused
+    check_memory(pair)  # before anything is shown of a run that would be refused
     measured = measure(pair, verified=verified, progress=progress)
     choice, subject = begin(pair, theta, None, measured)[1], Subject.of(pair, measured, exact=exact)
     calculated = [name for name in asked if BOUNDS[name].calculated]
@@ -264,11 +264,11 @@ def compare(
     reason = {name: why for name, why in missing.items() if why}
     seen = largest_step_ratio(pair, finished.iterates)
     if seen is None:
-        reason["step_ratio"] = "no step stands clear of rounding"
+        reason["step_ratio"] = "no step is clear of rounding"
 
     outside = "outside the theorem: " + "; ".join(finished.outside) if finished.outside else ""
     if not isinstance(finished.rule, Constant) and not outside:
-        outside = f"the bounds speak of a constant theta, not of {finished.relaxation}"
+        outside = f"the bounds hold for a constant theta, not for {finished.relaxation}"
     verdicts = {name: judge_bound(result, seen, outside) for name, result in results.items()}
     verdicts["linearised"] = judge_forecast(finished)
     return Comparison(
@@ -284,19 +284,13 @@ def compare(
 
 
 class _UntilCtrlC:
-    """Run the remaining steps.  After Ctrl-C no further step starts, but each is still reported.
-
-    Parameters
-    ----------
-    interrupted : bool
-        Whether there was a Ctrl-C before.
-    """
+    """The remaining parts of a comparison.  After Ctrl-C no further one is computed, but each is still reported."""
 
     def __init__(self, interrupted: bool) -> None:
         self.interrupted = interrupted
 
     def work(self, compute: Callable[[], T], missing: T) -> T:
-        """What is computed; what is given instead where Ctrl-C came first."""
+        """Compute a part; return ``missing`` instead where Ctrl-C comes first."""
         if not self.interrupted:
             try:
                 return compute()
@@ -305,7 +299,7 @@ class _UntilCtrlC:
         return missing
 
     def tell(self, method: Callable[..., None], *parts: Any) -> None:
-        """Tell one part."""
+        """Report one part."""
         try:
             method(*parts)
         except KeyboardInterrupt:
@@ -313,12 +307,12 @@ class _UntilCtrlC:
 
 
 def _comes_with_programs() -> str:
-    """The reason for leaving out a slow part that belongs to bounds that were not asked for."""
+    """Return the reason for leaving out a slow part that belongs to bounds that were not asked for."""
     return f"{NOT_ASKED}: it comes with {' or '.join(name for name, bound in BOUNDS.items() if not bound.calculated)}"
 
 
 def _reference(finished: Run) -> tuple[Reference | None, str]:
-    """The run by cvxpy alone, or why there is none."""
+    """Run by cvxpy only, or return why that failed."""
     try:
         return by_cvxpy_alone(finished), ""
     except ContactError as error:
@@ -326,7 +320,7 @@ def _reference(finished: Run) -> tuple[Reference | None, str]:
 
 
 def _losses(pair: ContactPair, measured: Measured, progress: Progress) -> tuple[Losses | None, str]:
-    """What each inequality gives away, or why that was not worked out."""
+    """Locate the losses of each inequality, or return why that was not done."""
     if pair.contact.grid.n > LARGEST:
         return None, f"{pair.contact.grid.n} contact nodes: worked out up to {LARGEST}"
     found = locate(pair, measured, progress=progress)

@@ -1,7 +1,7 @@
-"""Products and solves with dense symmetric matrices by BLAS itself, for what is done at every step of the iteration.
+"""Products and solves with dense symmetric matrices by BLAS itself, for each step of the iteration.
 
-The checks at the doors of numpy and scipy cost more than a product of a hundred rows.  Matrices and vectors are checked
-where they come in; here nothing is.
+The input checks of numpy and scipy cost more than a product of a hundred rows.  Matrices and vectors are checked where
+they come in; here nothing is.
 """
 
 from __future__ import annotations
@@ -18,19 +18,13 @@ STILL = 1e-9
 
 
 def times(S: Floats, v: Floats) -> Floats:
-    """``S v`` for a symmetric S, of which one triangle is read: half the memory of a general product."""
-    product: Floats = dsymv(1.0, S if S.flags.f_contiguous else S.T, v)  # a transpose is no copy
+    """Return ``S v`` for a symmetric S, of which one triangle is read: half the memory of a general product."""
+    product: Floats = dsymv(1.0, S if S.flags.f_contiguous else S.T, v)  # a transpose copies nothing
     return product
 
 
 def vanishing(motions: Floats, rows: Ints) -> Floats:
-    """Combinations of orthonormal columns that vanish on some rows, orthonormal too, shape (n, as many as there are).
-
-    Parameters
-    ----------
-    motions : array, shape (n, k)
-    rows : int array
-    """
+    """Return combinations of orthonormal columns, shape (n, k), that vanish on some rows, orthonormal too."""
     k = motions.shape[1]
     if not k or not len(rows):
         return motions
@@ -40,42 +34,33 @@ def vanishing(motions: Floats, rows: Ints) -> Floats:
 
 
 def pinned(S: Floats, rows: Ints, motions: Floats) -> Floats:
-    """The block of some rows and columns of S, made definite where motions of its kernel move these rows alone.
+    """Return the block of some rows and columns of S, made definite where motions of its kernel move only these rows.
 
     With N these motions it is ``S + c N N'``: a solution for a right-hand side orthogonal to N is one of S, exactly.
-
-    Parameters
-    ----------
-    S : array, shape (n, n)
-        Symmetric, positive semidefinite.
-    rows : int array
-    motions : array, shape (n, k)
-        An orthonormal basis of the kernel.
+    S, shape (n, n), is symmetric positive semidefinite, and ``motions``, shape (n, k), an orthonormal basis of its
+    kernel.
     """
     N = vanishing(motions, np.setdiff1d(np.arange(len(S)), rows))[rows]
     return np.asarray(S[np.ix_(rows, rows)] + float(np.diag(S).max()) * N @ N.T)
 
 
 def worst(values: Floats) -> float:
-    """The largest of some numbers and 0; not a number where one is none."""
+    """Return the largest of some numbers and 0; NaN where one is NaN."""
     return float(np.maximum.reduce(values, initial=0.0))
 
 
 def _block(S: Floats, rows: Ints, motions: Floats | None) -> Floats:
-    """Some rows and columns of S, its kernel pinned."""
+    """Return some rows and columns of S, its kernel pinned."""
     if motions is not None and motions.shape[1]:
         return pinned(S, rows, motions)
     return S if len(rows) == len(S) else S[np.ix_(rows, rows)]
 
 
 def reciprocal_condition(S: Floats, rows: Ints, motions: Floats | None = None) -> float:
-    """Estimate ``1 / (|S| |S^-1|)`` in the norm of the largest column sum, for what :class:`Cholesky` solves with.
+    """Estimate ``1 / (|S| |S^-1|)`` in the norm of the largest column sum, for the matrix of :class:`Cholesky`.
 
-    Returns
-    -------
-    float
-        LAPACK's estimate, seldom more than three times too large; 0 where S is not positive definite in doubles, 1
-        without rows.
+    LAPACK's estimate is seldom more than three times too large; it is 0 where S is not positive definite in doubles, 1
+    without rows.
     """
     if not len(rows):
         return 1.0
@@ -85,15 +70,9 @@ def reciprocal_condition(S: Floats, rows: Ints, motions: Floats | None = None) -
 
 
 class Cholesky:
-    """``S^-1`` on some rows of a symmetric S that is positive definite there, 0 on the others.
+    """``S^-1`` on some rows of a symmetric S, shape (n, n), that is positive definite there, 0 on the others.
 
-    Parameters
-    ----------
-    S : array, shape (n, n)
-    rows : int array
-        May be all, or none.
-    motions : array, shape (n, k), optional
-        The kernel of S, where S is semidefinite; see :func:`pinned`.
+    There may be all rows, or none; ``motions``, shape (n, k), is the kernel of a semidefinite S, see :func:`pinned`.
     """
 
     def __init__(self, S: Floats, rows: Ints, motions: Floats | None = None) -> None:
@@ -105,7 +84,7 @@ class Cholesky:
                 raise np.linalg.LinAlgError(f"the leading minor {minor} is not positive: needed a definite matrix")
 
     def solve(self, right: Floats) -> Floats:
-        """``S^-1 right`` for a vector, shape (n,), or columns, shape (n, m)."""
+        """Return ``S^-1 right`` for a vector, shape (n,), or columns, shape (n, m)."""
         if self._all:
             return self._back(right)
         result = np.zeros(right.shape)

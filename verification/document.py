@@ -1,7 +1,7 @@
 """Results as JSON documents, as one line, as sections and as figures.
 
-The modules that show a result are imported by name, and only here: they depend on the types of results, not the
-other way round.
+The modules that show a result are imported by name, and only here: they depend on the types of results, and not
+conversely.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 class Document(Value, ABC):
     """A frozen result that can be written as one JSON document; subclasses name their schema.
 
-    Showing a document computes nothing: what was not asked for is null, with its reason.
+    Showing a document computes nothing: a part that was not asked for is null, with its reason.
     """
 
     schema: ClassVar[str]
@@ -35,20 +35,20 @@ class Document(Value, ABC):
     #: Labels ``length`` and ``stress``.
     units: Mapping[str, str]
 
-    #: What the result comes from; None where that is no problem.
+    #: The problem of the result; None where there is none.
     problem: Problem | None = None
 
     @abstractmethod
     def content(self) -> dict[str, Any]:
-        """What the document holds besides schema, version, units and problem."""
+        """Return the values of the document besides schema, version, units and problem."""
 
     def to_dict(self) -> dict[str, Any]:
-        """The document as plain dictionaries, lists and numbers."""
+        """Return the document as plain dictionaries, lists and numbers."""
         origin = {} if self.problem is None else {"problem": self.problem.to_dict()}
         return {"schema": self.schema, "version": __version__, "units": dict(self.units), **origin, **self.content()}
 
     def to_json(self) -> str:
-        """The document as JSON text; every number is finite."""
+        """Return the document as JSON text; every number is finite."""
         return json.dumps(self.to_dict(), indent=2, allow_nan=False)
 
     @property
@@ -56,27 +56,21 @@ class Document(Value, ABC):
         return self.schema
 
     def sections(self) -> tuple[Section, ...]:
-        """The parts of the result that the command and the written report show, as data.
+        """Return the parts of the result that the command and the written report show, as data.
 
-        Returns
-        -------
-        tuple of Section
-            Titles, sentences, tables whose cells are words or numbers with unit and level.  A part that belongs to one
-            place says so in ``only``.  Empty where nothing is shown but the document, as of matrices without a problem.
+        They have titles, sentences, and tables whose cells are words or numbers with unit and level.  A part for only
+        one place has that in ``only``.  There are none where only the document is shown, as for matrices without a
+        problem.
         """
         found: tuple[Section, ...] = importlib.import_module("verification.sections.of_results").of(self)
         return found
 
     def _repr_html_(self) -> str:
-        """Notebook view: its sections, or the document where there are none."""
+        """Return the notebook view: its sections, or the document where there are none."""
         return f"<pre>{html.escape(text(self.sections()) or self.to_json())}</pre>"
 
     def plot(self) -> Figure:
-        """The main figure of the result.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
+        """Draw the main figure of the result.
 
         Raises
         ------
@@ -86,6 +80,6 @@ class Document(Value, ABC):
         return self.drawn()
 
     def drawn(self, **options: Any) -> Figure:
-        """The main figure, with the options that the figure of this type takes."""
+        """Draw the main figure, with the options that the figure of this type takes."""
         figure: Figure = importlib.import_module("verification.figures.of_results").draw(self, **options)
         return figure

@@ -1,4 +1,4 @@
-"""Libraries that a plain installation goes without, by the extra that installs them."""
+"""Optional libraries, by the extra of the package that installs them."""
 
 from __future__ import annotations
 
@@ -6,17 +6,12 @@ import importlib.util
 
 from verification.problem.tables import ProblemError
 
-#: The extra of each option of a command that needs one, and the modules that it needs.
+#: For each option of a command that needs an extra: its name and the modules in it.
 EXTRAS = {"--export": ("dataset", ("xarray", "netCDF4")), "--dask": ("cluster", ("distributed",))}
 
 
 def require(option: str) -> None:
-    """Refuse an option whose libraries are not installed, before any work is done for it.
-
-    Raises
-    ------
-    ProblemError
-    """
+    """Raise ProblemError for an option whose libraries are not installed, before any work is done for it."""
     extra, modules = EXTRAS[option]
     if missing := [name for name in modules if importlib.util.find_spec(name) is None]:
         verb = "is" if len(missing) == 1 else "are"

@@ -1,4 +1,4 @@
-"""Ctrl-C while something runs that must not see it, and processes that end with the one that started them."""
+"""Ctrl-C that waits while it would do harm, and processes that end with the one that started them."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import threading
 from collections.abc import Iterator
 from multiprocessing.connection import Connection
 
-#: Why something is missing that was not worked out after Ctrl-C.
+#: The reason for a part that is missing after Ctrl-C.
 INTERRUPTED = "interrupted before it was worked out"
 
 
 @contextlib.contextmanager
 def undisturbed() -> Iterator[None]:
-    """A context in which Ctrl-C waits: it is raised at the end.
+    """Return a context in which Ctrl-C waits: it is raised at the end.
 
     A signal that is blocked reaches no handler, Python's or another one.  No other thread may take it instead: the
     command keeps BLAS from starting any.
@@ -33,13 +33,8 @@ def undisturbed() -> Iterator[None]:
 def begin_child(life: Connection) -> None:
     """Begin a process that works for another one: it leaves Ctrl-C to its parent, and ends when that does.
 
-    It stands in a module that imports no arrays: the parent may end while they are still imported.
-
-    Parameters
-    ----------
-    life : Connection
-        The reading end of a pipe on which nothing is sent.  Only the parent has the other end, which whatever ends the
-        parent closes, SIGKILL too.
+    ``life`` is the reading end of a pipe on which nothing is sent.  Only the parent has the other end, which is closed
+    however the parent ends, by SIGKILL too.  The module imports no arrays: the parent may end while they are imported.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 

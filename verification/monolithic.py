@@ -1,6 +1,6 @@
 """The global method: both bodies at once, without decomposition.
 
-It shares the problem, the meshes and the assembled matrices with the iteration and nothing else.  The unknown is the
+It shares only the problem, the meshes and the assembled matrices with the iteration.  The unknown is the
 contact force lambda (on body 2; compressive in the normal direction).  With the flexibilities F_a of the bodies on
 Gamma_c the jump is
 
@@ -26,12 +26,11 @@ import numpy as np
 from fem1d2d.mesh import Floats
 from verification.contact.system import ContactSystem, SolveError
 from verification.document import Document
-from verification.interface.assembly import discretise
+from verification.interface.assembly import TwoBodies, discretise
 from verification.interface.body import Body
 from verification.interface.checks import Checks, check_state
 from verification.interface.fields import ContactFields
 from verification.interface.pair import ContactPair
-from verification.interface.two_bodies import TwoBodies
 from verification.problem import Problem, load
 from verification.threads import one_thread
 
@@ -71,7 +70,7 @@ class Solution(Document):
 
     @property
     def problem(self) -> Problem:  # type: ignore[override]
-        """What was solved."""
+        """The problem that was solved."""
         return self.bodies.problem
 
     @property
@@ -86,22 +85,23 @@ class Solution(Document):
         for i, (body, sign) in enumerate(((self.bodies.body1, -1.0), (self.bodies.body2, 1.0))):
             if body is not None:
                 load = body.load.copy()
-                load[body.interface] += sign * self.bodies.force_on(body, self.force)[body.unknown]
+                force = self.force if body is not self.bodies.neumann else self.bodies.interface.carry_back(self.force)
+                load[body.interface] += sign * force[body.unknown]
                 full = body.known.values.ravel().copy()
                 k = body.motions.shape[1]
-                full[body.free] = body.solve(load) + body.motions @ self.motion[used : used + k]
+                full[body.positions] = body.solve(load) + body.motions @ self.motion[used : used + k]
                 used += k
                 fields[i] = full.reshape(body.mesh.points.shape)
         return fields[0], fields[1]
 
     @cached_property
     def checks(self) -> Checks:
-        """The bodies outside Gamma_c, and their strains."""
+        """Checks of the bodies outside Gamma_c, and of their strains."""
         return check_state(self.bodies, lambda: self.displacements)
 
     @property
     def warnings(self) -> list[str]:
-        """Why the numbers may be wrong."""
+        """Reasons why the numbers may be wrong."""
         return [*self.bodies.warnings, *self.checks.warnings]
 
     def content(self) -> dict[str, Any]:
@@ -144,35 +144,29 @@ def solve(problem: Problem | TwoBodies | ContactPair | Path | str) -> Solution:
     >>> round(float(solve(example("two-bars")).contact.pressure[0]), 12)
     0.075
     """
-    bodies = _bodies(problem)
+    if isinstance(problem, ContactPair):
+        bodies = problem.on_meshes()
+    elif isinstance(problem, TwoBodies):
+        bodies = problem
+    else:
+        bodies = discretise(problem if isinstance(problem, Problem) else load(problem))
     with one_thread():
         system = contact_system(bodies)
         found = system.solve()
         jump = system.jump(found.force, found.motion)
         residual = system.residual(found.force, found.motion)
-    branches = found.branches
     return Solution(
         bodies=bodies,
         force=found.force,
         motion=found.motion,
-        contact=ContactFields.of(
-            bodies.interface.contact, force=found.force, jump=jump, touching=branches.touching, sliding=branches.sliding
-        ),
+        contact=ContactFields.of(bodies.interface.contact, force=found.force, jump=jump, state=found.branches),
         kkt_residual=residual,
         linear_solves=system.linear_solves,
     )
 
 
-def _bodies(problem: Problem | TwoBodies | ContactPair | Path | str) -> TwoBodies:
-    if isinstance(problem, TwoBodies):
-        return problem
-    if isinstance(problem, ContactPair):
-        return problem.on_meshes()
-    return discretise(problem if isinstance(problem, Problem) else load(problem))
-
-
 def solution_force(pair: ContactPair) -> Floats:
-    """g at the solution of the global method, as the iteration of the pair has it.
+    """Return g of the iteration at the solution of the global method.
 
     Raises
     ------
@@ -212,8 +206,8 @@ def contact_system(bodies: TwoBodies) -> ContactSystem:
 
 
 def _flexibility(body: Body) -> tuple[Floats, Floats]:
-    """``(A^-1)_BB`` and the trace of the solution without contact, on all interface components."""
-    columns = np.zeros((len(body.free), len(body.interface)))
+    """Return ``(A^-1)_BB`` and the trace of the solution without contact, on all interface components."""
+    columns = np.zeros((len(body.positions), len(body.interface)))
     columns[body.interface, np.arange(len(body.interface))] = 1.0
     inverse = body.solve(columns)[body.interface]
     rows = np.flatnonzero(body.unknown)

@@ -11,7 +11,7 @@ from typing import Any
 #: Guards the two below.  The thread that holds it may take it again, as the handler of a signal does.
 _lock = threading.RLock()
 
-#: One entry for everybody who is inside :func:`one_thread`.
+#: One entry for each caller inside :func:`one_thread`.
 _inside: set[object] = set()
 
 #: The numbers of threads that the last one to leave sets again, by library.
@@ -20,7 +20,7 @@ _before: dict[Any, int] = {}
 
 @cache
 def libraries() -> tuple[list[Any], list[Any]]:
-    """The BLAS libraries with one number of threads for the process, and those with one for each thread of Python."""
+    """Return the BLAS libraries with one number of threads for the process, and those with one a Python thread."""
     from threadpoolctl import ThreadpoolController  # the calculator starts without it
 
     found = ThreadpoolController().select(user_api="blas").lib_controllers
@@ -29,7 +29,7 @@ def libraries() -> tuple[list[Any], list[Any]]:
 
 
 def _set(numbers: Sequence[tuple[Any, int]]) -> None:
-    """Set numbers of threads from whichever thread this is.
+    """Set numbers of threads from any thread.
 
     Newer versions of threadpoolctl obey the first thread that sets a number, and ignore all others while it lives.
     """
@@ -44,10 +44,10 @@ def _set(numbers: Sequence[tuple[Any, int]]) -> None:
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """A context in which BLAS uses one thread; what was set before returns after it.
+    """Return a context in which BLAS uses one thread; the former numbers return after it.
 
     Most libraries have one number of threads for the whole process: it stays 1 until the last of all threads that are
-    in such a context has left.  On matrices of a few hundred rows a second BLAS thread costs more than it gives, ten
+    in such a context has left.  On matrices of a few hundred rows a second BLAS thread costs more than it gains, ten
     times more on a busy machine.
     """
     shared, apart = libraries()

@@ -1,25 +1,27 @@
-"""Values that are handed on: nobody changes them, and they travel."""
+"""Values that are handed on: immutable, and they can be pickled and copied."""
 
 from __future__ import annotations
 
 from dataclasses import fields
-from typing import Any
+from typing import Any, TypeVar
+
+T = TypeVar("T")
 
 
 class Value:
     """Base of a frozen dataclass that holds arrays, declared with ``repr=False``.
 
-    Its arrays are read-only, its repr is one line, and it is pickled and copied without what was worked out from it and
-    kept: that is worked out anew when asked for.
+    Its arrays are read-only and its repr is one line.  It is pickled and copied without its cached values, which are
+    computed again when they are needed.
     """
 
     def __post_init__(self) -> None:
-        for value in vars(self).values():  # the fields: nothing else is set yet
+        for value in vars(self).values():  # only the fields: nothing else is set yet
             freeze(value)
 
     @property
     def summary(self) -> str:
-        """What it is, in a few words."""
+        """A description in a few words."""
         return ""
 
     def __repr__(self) -> str:
@@ -35,13 +37,21 @@ class Value:
             freeze(value)  # numpy gives back arrays that can be written
 
 
-def freeze(value: Any) -> Any:
-    """Make an array, the arrays of a sparse matrix, or those of a tuple read-only; the same object."""
-    if hasattr(value, "setflags"):  # without numpy: the calculator starts without it
-        value.setflags(write=False)
-    elif isinstance(value, tuple):
-        for member in value:
+def freeze(value: T) -> T:
+    """Make an array, or all arrays of a sparse matrix or a tuple, read-only, and return the same object."""
+    held: Any = value
+    if hasattr(held, "setflags"):  # numpy is not imported: the calculator starts without it
+        held.setflags(write=False)
+    elif isinstance(held, tuple):
+        for member in held:
             freeze(member)
-    elif hasattr(value, "indptr"):  # a sparse matrix
-        freeze((value.data, value.indices, value.indptr))
+    elif hasattr(held, "indptr"):  # a sparse matrix
+        freeze((held.data, held.indices, held.indptr))
     return value
+
+
+def to_plain(value: Any) -> Any:
+    """A value, or a tuple of values, as documents hold it: by its ``to_dict`` where it has one."""
+    if isinstance(value, tuple):
+        return [to_plain(member) for member in value]
+    return value.to_dict() if hasattr(value, "to_dict") else value

@@ -1,4 +1,4 @@
-"""A verdict on each bound and forecast, with its reason, from what a run shows."""
+"""A verdict on each bound and forecast, with its reason, from a run."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from verification.algorithm.rates import StepRatio
 from verification.algorithm.runs import Run
 from verification.bounds.bound import NOT_ASKED, BoundResult
 
-#: A bound may be attained: a ratio above it by less than this share of 1 - bound is equal to it.
+#: A bound may be attained: a ratio above it by less than this share of 1 - bound counts as equal.
 TIGHT = 1e-6
 
-#: A forecast comes true where its rate is the observed one to this, and its steps to one.
+#: A forecast is right if its rate differs from the observed one by at most this, and its steps by one.
 AGREES = 1e-3
 
 RunVerdict = Literal["CONSISTENT", "VIOLATED", "INCONCLUSIVE", "HYPOTHESES_NOT_MET", "NOT_COMPUTED"]
@@ -28,18 +28,18 @@ class Judgement:
 
 
 def judge(bound: float | None, seen: StepRatio | None, why_none: str, *, proved: bool = False) -> Judgement:
-    """Hold a bound on the factor of one step against the largest factor seen.
+    """Compare a bound on the factor of one step with the largest factor seen.
 
-    A bound may be attained: what lies above it by less than :data:`TIGHT` of ``1 - bound`` is not told from it.
+    A bound may be attained: an excess below :data:`TIGHT` of ``1 - bound`` counts as equality.
 
     Parameters
     ----------
     bound : float or None
         None: the bound draws no conclusion; ``why_none`` says why.
     seen : StepRatio or None
-        None: no step stands clear of rounding.
+        None: no step is clear of rounding.
     proved : bool
-        Whether the bound is the upper end of an enclosure; then it is told as proved, and rounded upwards.
+        Whether the bound is the upper end of an enclosure; then it is called proved, and rounded upwards.
 
     Examples
     --------
@@ -49,7 +49,7 @@ def judge(bound: float | None, seen: StepRatio | None, why_none: str, *, proved:
     if bound is None:
         return Judgement(verdict="HYPOTHESES_NOT_MET", reason=why_none)
     if seen is None:
-        return Judgement(verdict="INCONCLUSIVE", reason="no step stands clear of rounding")
+        return Judgement(verdict="INCONCLUSIVE", reason="no step is clear of rounding")
     if seen.steps == 0:
         return Judgement(verdict="NOT_COMPUTED", reason="no step was taken")
     digits = 4 if seen.hi <= bound else 6  # six where the bound is attained or violated
@@ -68,7 +68,7 @@ def judge(bound: float | None, seen: StepRatio | None, why_none: str, *, proved:
 
 
 def judge_forecast(run: Run) -> Judgement:
-    """Hold what was said half way against what the run then did."""
+    """Compare the forecast made half way with the rest of the run."""
     made, seen = run.forecast, run.observed_rate
     if made is None:
         return Judgement(verdict="NOT_COMPUTED", reason=run.why_no_forecast)
@@ -85,7 +85,7 @@ def judge_forecast(run: Run) -> Judgement:
 
 
 def judge_bound(result: BoundResult, seen: StepRatio | None, outside: str) -> Judgement:
-    """What the run says of one bound."""
+    """Judge one bound by the run; ``outside`` is why the theorem does not apply to the run."""
     if not result.asked:
         return Judgement(verdict="NOT_COMPUTED", reason=NOT_ASKED)
     if outside:
@@ -93,8 +93,6 @@ def judge_bound(result: BoundResult, seen: StepRatio | None, outside: str) -> Ju
     if result.not_computed:
         return Judgement(verdict="NOT_COMPUTED", reason=result.not_computed)
     factor = result.factor
-    if factor is None:
-        return judge(None, seen, result.why)
-    if factor.hi is None or not result.proved:
-        return judge(factor.value, seen, result.why)
-    return judge(factor.hi, seen, result.why, proved=True)
+    if factor is not None and factor.hi is not None and result.proved:
+        return judge(factor.hi, seen, result.why, proved=True)
+    return judge(None if factor is None else factor.value, seen, result.why)

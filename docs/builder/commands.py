@@ -16,13 +16,20 @@ What each command says with `--help`. With `--json` it writes one document, whic
 WRITTEN_BY = re.compile(r"^Written by .*", re.MULTILINE)
 
 
-def commands(group: click.Group, name: str) -> Iterator[tuple[str, click.Command, click.Context]]:
-    """Every command with its words as they are typed, those of groups within too, and a context to ask it in."""
+def commands(
+    group: click.Group, name: str, parent: click.Context | None = None
+) -> Iterator[tuple[str, click.Command, click.Context]]:
+    """Every command with its words as they are typed, those of groups within too, and a context to ask it in.
+
+    The context has its parent: a command keeps the help option that it was first asked for.
+    """
+    settings = {"max_content_width": 80, "terminal_width": 80}
+    above = parent or click.Context(group, info_name=name, **{**group.context_settings, **settings})
     for word, command in group.commands.items():
-        typed = f"{name} {word}"
-        yield typed, command, click.Context(command, info_name=typed, max_content_width=80, terminal_width=80)
+        context = click.Context(command, info_name=word, parent=above, **settings)
+        yield f"{name} {word}", command, context
         if isinstance(command, click.Group):
-            yield from commands(command, typed)
+            yield from commands(command, f"{name} {word}", context)
 
 
 def page(group: click.Group, name: str) -> str:

@@ -1,13 +1,12 @@
 """Units on both sides: an equation whose sides scale differently under a change of unit is wrong.
 
-Stress and length are independent.  Norms are those of the project: the norm of V^a carries the length L of the problem
+Stress and length are independent.  The norms are the project's: the norm of V^a contains the length L of the problem
 file, so that it is a length, and a force per unit thickness times a displacement is an energy, stress times length^2.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import sympy as sp
@@ -20,17 +19,8 @@ Dimension = tuple[Any, Any]
 NONE: Dimension = (sp.Integer(0), sp.Integer(0))
 
 
-@dataclass(frozen=True)
 class UnitsDiffer(Exception):
-    """Two things were added or compared whose units differ."""
-
-    one: Any
-    other: Any
-    units: tuple[Dimension, Dimension]
-
-    def __str__(self) -> str:
-        (one, other), (first, second) = (self.one, self.other), map(unit, self.units)
-        return f"{one} is {first}, {other} is {second}"
+    """Two things were added or compared whose units differ; the message names both."""
 
 
 def unit(dimension: Dimension) -> str:
@@ -71,7 +61,7 @@ def of(expression: Any, table: Mapping[str, Dimension]) -> Dimension:
 def _same(one: Any, other: Any, table: Mapping[str, Dimension]) -> None:
     first, second = of(one, table), of(other, table)
     if first != second and 0 not in (one, other):
-        raise UnitsDiffer(one, other, (first, second))
+        raise UnitsDiffer(f"{one} is {unit(first)}, {other} is {unit(second)}")
 
 
 def consistent(relations: Relation | Sequence[Relation], table: Mapping[str, Dimension]) -> str | None:

@@ -1,12 +1,12 @@
 """Deciding an algebraic statement over all admissible values: a proof, or an exact counterexample.
 
-A statement is an equation or inequality between sympy expressions.  What its symbols may be is told by charts:
-substitutions by expressions in parameters that run freely over p > 0 or p >= 0 and reach every admissible value, so
-that roots disappear and both sides become rational.  Then
+A statement is an equation or inequality between sympy expressions.  Charts give the values of its symbols: they insert
+expressions in parameters that run freely over p > 0 or p >= 0 and reach every admissible value, so that roots disappear
+and both sides become rational.  Then
 
 * an equation holds if the numerator of the difference of its sides expands to 0,
-* an inequality holds if its difference is a product of powers of polynomials without a negative coefficient, squares
-  taken off first where that is needed,
+* an inequality holds if its difference, less some squares where these are given, is a product of powers of polynomials
+  without a negative coefficient,
 * it fails if it fails at one point with rational coordinates.
 
 Nothing here is rounded.  Both sides must be defined wherever the charts lead: common factors of numerator and
@@ -16,6 +16,7 @@ denominator may be cancelled.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import product
 from random import Random
@@ -52,20 +53,17 @@ class Relation:
     sign: Literal["=", "<=", "<"]
     right: Any
 
-    def __str__(self) -> str:
-        return f"{self.left} {self.sign} {self.right}"
-
 
 @dataclass(frozen=True, kw_only=True)
 class Decision:
-    """What was decided.
+    """The result of :func:`decide`.
 
     Attributes
     ----------
     holds : bool or None
         None where neither a proof nor a counterexample was found.
     counterexample : mapping
-        Symbol -> exact value, where it fails.
+        Symbol -> exact value, where a relation fails.
     """
 
     holds: bool | None
@@ -82,8 +80,8 @@ class Goal:
     charts : sequence of mapping
         Symbol -> expression in free parameters; one empty chart where the symbols are free already.
     squares : sequence of expressions
-        Non-negative by sight (coefficients >= 0 times squares), taken off the difference before its coefficients are
-        looked at.
+        Subtracted from the difference before its coefficients are read; each is visibly non-negative (coefficients >= 0
+        times squares).
     """
 
     relation: Relation
@@ -155,58 +153,48 @@ def _in_chart(goal: Goal, chart: Mapping[Any, Any]) -> Decision:
         value_there = difference.xreplace(point)
         if value_there.is_finite and fails(value_there):  # at a pole nothing is compared
             names = sorted(sp.sympify(relation.left).free_symbols | sp.sympify(relation.right).free_symbols, key=str)
-            value = lambda symbol, at=point: rational(_rest_1(sp.sympify(chart.get(symbol, symbol)).subs(at)))
+            value = lambda symbol, at=point: rational(_at_1(sp.sympify(chart.get(symbol, symbol)).subs(at)))
             return Decision(holds=False, counterexample={str(symbol): str(value(symbol)) for symbol in names})
     return Decision(holds=None)
 
 
-def _rest_1(expression: Any) -> Any:
-    """An expression with 1 for every symbol that is left: those that do not matter."""
+def _at_1(expression: Any) -> Any:
+    """Insert 1 for every symbol that is left: their values do not matter."""
     return expression.subs(dict.fromkeys(expression.free_symbols, sp.Integer(1)))
 
 
 def _square(term: Any) -> bool:
-    """Whether a term is, by sight, a product of even powers and of what is certified."""
+    """True if a term is visibly a product of even powers and of factors with a certified sign."""
     factors = sp.Mul.make_args(sp.factor(term))
     return all((f.is_Pow and f.exp.is_even) or _certified(f, strict=False) for f in factors)
 
 
-def _quotient(difference: Any) -> Quotient:
-    """A difference as a quotient; roots may cancel, which sympy sees where they do."""
-    try:
-        return Quotient.of(difference)
-    except NotRational:
-        return Quotient.of(sp.cancel(sp.together(difference)))
+def _quotient(difference: Any) -> Quotient | None:
+    """A difference as a quotient, if it is one; roots may cancel, and sympy finds those that do."""
+    for read in (lambda: difference, lambda: sp.cancel(sp.together(difference))):
+        with suppress(NotRational):
+            return Quotient.of(read())
+    return None
 
 
 def _vanishes(difference: Any) -> bool:
-    """Whether the numerator expands to 0."""
-    try:
-        return not _quotient(difference).polynomial
-    except NotRational:
-        return False
+    """True if the numerator expands to 0."""
+    quotient = _quotient(difference)
+    return quotient is not None and not quotient.polynomial
 
 
 def _certified(difference: Any, *, strict: bool) -> bool:
-    """Whether its factors show the sign, or numerator and denominator do once a common factor is cancelled."""
-    try:
-        quotient = _quotient(difference)
-    except NotRational:
-        return False
-    return quotient.is_certified(strict=strict) or quotient.cancelled().is_certified(strict=strict)
+    """True if its factors show the sign, or numerator and denominator do once common factors are cancelled."""
+    quotient = _quotient(difference)
+    return quotient is not None and (
+        quotient.is_certified(strict=strict) or quotient.cancelled().is_certified(strict=strict)
+    )
 
 
 def _points(parameters: Sequence[Any]) -> Iterable[dict[Any, Any]]:
     """Rational points in a fixed order, those with a parameter 0 among them where that is admissible."""
-    free = lambda symbol: symbol.is_nonnegative is None
-    values = [
-        TRIED
-        if symbol.is_positive
-        else [sp.Integer(0), *TRIED]
-        if not free(symbol)
-        else [*TRIED[:1], -TRIED[0], *TRIED]
-        for symbol in parameters
-    ]
+    first = lambda symbol: [sp.Integer(0)] if symbol.is_nonnegative else [TRIED[0], -TRIED[0]]
+    values = [TRIED if symbol.is_positive else [*first(symbol), *TRIED] for symbol in parameters]
     if len(parameters) <= 8:
         for choice in product(*(value[:2] for value in values)):
             yield dict(zip(parameters, choice, strict=True))
@@ -215,7 +203,7 @@ def _points(parameters: Sequence[Any]) -> Iterable[dict[Any, Any]]:
         yield {symbol: random.choice(value) for symbol, value in zip(parameters, values, strict=True)}
 
 
-# --- vectors and bilinear forms, with nothing known of them but linearity ------------------------------------------
+# --- vectors and bilinear forms, of which only linearity is known ----------------------------------------------------
 
 
 class Vector(sp.Symbol):  # type: ignore[misc]
@@ -232,17 +220,17 @@ def _terms(combination: Any) -> dict[Any, Any]:
 
 
 def linear(name: str) -> Callable[[Any], Any]:
-    """A linear map that nothing else is known of."""
+    """A linear map of which nothing else is known."""
     return lambda u: sum((c * Vector(f"{name} {v}") for v, c in _terms(u).items()), sp.Integer(0))
 
 
 def functional(name: str) -> Callable[[Any], Any]:
-    """A linear functional that nothing else is known of."""
+    """A linear functional of which nothing else is known."""
     return lambda u: sum((c * sp.Symbol(f"{name}({v})", real=True) for v, c in _terms(u).items()), sp.Integer(0))
 
 
 def bilinear(name: str) -> Callable[[Any, Any], Any]:
-    """A symmetric bilinear form that nothing else is known of.
+    """A symmetric bilinear form of which nothing else is known.
 
     Examples
     --------
@@ -265,14 +253,14 @@ def bilinear(name: str) -> Callable[[Any, Any], Any]:
 
 @dataclass(frozen=True, kw_only=True)
 class Check:
-    """How a statement is decided, what it is as printed and as repaired, and mutants that must fail.
+    """The decision of a statement, as printed and as repaired, with mutants that must fail.
 
     Attributes
     ----------
     id : str
-        Of the statement.
+        The id of the statement.
     text : str
-        What is shown.
+        What the check shows.
     goals : callable
         A form of the statement (a formula, a sign, ..) -> goals.
     forms : mapping
@@ -282,7 +270,7 @@ class Check:
     units : mapping
         'printed', 'repaired' -> relations whose units are compared.
     one_case : bool
-        Whether only one case is computed, such as a bar: it may refute a form and cannot prove one.
+        True if only one case is computed, such as a bar: it may refute a form and cannot prove one.
     """
 
     id: str

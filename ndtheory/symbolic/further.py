@@ -1,4 +1,8 @@
-"""What the paper does not state, proved: how its constants hang together, and the theorem in energy norms."""
+"""Proofs of facts that the paper does not state.
+
+They say where the printed (5.30) holds, how the constants are connected, what the theorem in energy norms claims, and
+what it is without friction: gradient descent.
+"""
 
 from __future__ import annotations
 
@@ -6,42 +10,238 @@ from typing import Any
 
 import sympy as sp
 
-from ndtheory import bounds
-from ndtheory.symbolic.contraction import above_C6, any_theta, inside
-from ndtheory.symbolic.engine import CheckList, at_most, equal, less, nonnegative, positive
-from ndtheory.symbolic.intervals import C0, P_, Q_, end_of_43
+from ndtheory import bounds, energy_norms
+from ndtheory.symbolic.engine import CheckList, Goal, Vector, at_most, equal, less, linear, nonnegative, positive
+from ndtheory.symbolic.section5 import (
+    AT_THE_NODE,
+    C0,
+    LARGE_M,
+    P_,
+    Q_,
+    SMALL_M,
+    WITH_THETA,
+    P,
+    Q,
+    W,
+    X,
+    above_C6,
+    any_theta,
+    end_of_43,
+    expanded,
+    inside,
+    kappa,
+    m_tilde,
+    of_31,
+    of_36,
+    of_h1,
+    of_h2,
+    one_node,
+    printed_P,
+    s,
+    with_theta,
+)
 from ndtheory.symbolic.symbols import (
     C_R,
     CONSTANTS,
-    M_1,
+    L1,
+    L2,
     A,
+    C_s,
     M,
-    P,
-    Q,
-    exx,
-    exy,
-    eyy,
-    lame_mu,
+    a1,
+    a2,
+    b,
+    c,
+    d1,
+    d2,
+    e,
+    k,
     m,
+    mu,
     o,
-    of_h1,
-    of_h2,
     p,
-    printed_P,
+    psi,
     q,
     r,
-    strain_energy,
     theta,
-    u_1,
-    u_2,
-    v_1,
-    v_2,
     x,
+    xi,
     y,
 )
 
 CHECKS = CheckList()
 check = CHECKS.add
+
+# --- (5.39) and (5.44) at the one sliding node: there C_0 = 1/3 ------------------------------------------------------
+
+CHECKS += [
+    one_node(
+        "5.39",
+        expanded,
+        of_h1(m, printed_P(m), Q) * e**2,
+        of_h1(m, P, Q) * e**2,
+        {**AT_THE_NODE, theta: (1 + p) / (3 + p)},
+        "  For m <= 1 C_T is C~_T.  theta from C_0 = 1/3 on: near C_0 the coefficient of t^2, and with it C_T, hardly"
+        " counts.",
+    ),
+    one_node(
+        "5.44",
+        expanded,
+        of_h2(printed_P(m)) * e**2,
+        of_h2(P) * e**2,
+        {**AT_THE_NODE, theta: 1 / (3 + y)},
+        "  theta below C_0 = 1/3.  At kappa = 400, m = 1e-6 and theta = 0.33 the left side is 17424, the right 708.",
+    ),
+]
+
+# --- where (5.30) holds as printed, and where it fails ---------------------------------------------------------------
+
+
+def _border(root: Any) -> list[Goal]:
+    """(5.30) holds for M >= root sqrt(m), and for each m and M >= 2 m below that some friction breaks it."""
+    ratio = root / (1 + y)  # M/sqrt(m)
+    below = {m: (ratio / (2 * (1 + q))) ** 2, M: ratio**2 / (2 * (1 + q))}  # M >= 2 m
+    many = (1 + y) ** 2 / (y * (2 + y)) * (1 + ratio**2 + ratio**2 * (M + 1) / m).subs(below)  # sqrt(kappa)
+    direct = x * (X + 1) * d2**2  # (5.13), (5.11)
+    return [
+        *(
+            at_most(printed_P(m) * e**2, direct.subs(d2, e / sp.sqrt(m * (1 + p))), chart)
+            for chart in (
+                {m: (root / (1 + o)) ** 2, M: root**2 / (1 + o) * (1 + b), C_R: 1 + c, x: xi**2},
+                {m: (root + o) ** 2, M: (root + o) ** 2 * (1 + b), C_R: 1 + c, x: xi**2},
+            )
+        ),
+        less((printed_P(m).subs({C_R: 1, x: xi**2 * m}) / xi**2).subs(below).subs(xi, many), many**2),
+    ]
+
+
+check(
+    id="x-printed-border",
+    text="With m d_2^2 <= e^2 directly for (5.19), (5.23), F <= C_K (X + 1) e^2/m; the printed bound exceeds that by"
+    " C_K/m^3 ((M^2 - m)(A + C_K + s) + M^2 - m^2) e^2.  For M^2 < m, M >= 2 m: the one open node that slides,"
+    " F = kappa^2 e^2, body 1 with one more unknown that is not on Gamma_c and has the stiffness M - m; it breaks"
+    " (5.30) as soon as sqrt(kappa) >= (1 + v + v (M + 1)/m)/(1 - v), v = M^2/m.",
+    goals=_border,
+    forms={"repaired": sp.Integer(1)},
+    mutants={"true from M^2 = m/4 on": sp.Rational(1, 2), "false below M^2 = 4 m": sp.Integer(2)},
+)
+
+unit, slips, stretch, pull, bound = positive("lambda alpha beta gamma delta")
+weights = positive("w_1 w_2")
+zeta, along = sp.symbols("zeta_1 zeta_2", real=True), sp.symbols("d_2T1 d_2T2", real=True)
+
+
+def _flexibility(name: str) -> Any:
+    """``(S^-1)_TT`` at two nodes."""
+    return sp.Matrix(2, 2, lambda i, j: sp.Symbol(f"{name}_{min(i, j) + 1}{max(i, j) + 1}", real=True))
+
+
+def _all_slide(form: Any) -> list[Goal]:
+    """Two nodes, open and sliding one way, for two forces; and the printed bound in a unit of stress."""
+    factor, of_k = form
+    k = positive("k")
+    one, two, d_2 = _flexibility("f"), _flexibility("g"), sp.Matrix(along)
+    load = sp.Matrix([w * z for w, z in zip(weights, zeta, strict=True)])
+    p_T = k * load  # p_N = 0
+    bounds_ = k * load  # differences of the friction bounds, S sigma_N > 0
+    slide = -one * p_T - d_2  # of the slips, which have one sign
+    large = (of_k * bound + pull + y) / slips
+    in_unit = printed_P(m).subs({m: unit * m, M: unit * M, x: unit * x}, simultaneous=True)
+    return [
+        equal(-(bounds_.T * slide)[0], factor * k**2 * (load.T * one * load)[0] + k * (load.T * d_2)[0]),  # F
+        equal((p_T.T * two * p_T)[0], factor * k**2 * (load.T * two * load)[0]),  # t^2
+        equal((p_T.T * d_2)[0], k * (load.T * d_2)[0]),  # W
+        equal(in_unit, x * M**2 / m**3 * (1 + unit * (A + x + s)), {**CONSTANTS, unit: o + 1}),
+        less(large * bound * (1 + unit * stretch), slips * large**2 - pull * large, {unit: 1 / (stretch * (1 + p))}),
+    ]
+
+
+check(
+    id="x-printed-false-everywhere",
+    text="Loads make every node open and slide one way with S sigma_N > 0, for any pair of bodies and no gap.  Then"
+    " p_N = 0, p_T = k W zeta, d_1 = -S_1^-1 p and F = k^2 <W zeta, (S_1^-1)_TT W zeta> + k <W zeta, d_2T>: of"
+    " e^2, alpha k^2 - gamma k at least, alpha > 0.  In a unit of stress in which all stresses are lambda times as"
+    " large the printed bound is delta k (1 + lambda beta) e^2 with delta = C_s C_tr M^2/m^3, beta = A + C_K + s; it"
+    " is exceeded for k > (2 delta + gamma)/alpha, lambda <= 1/beta.  Likewise W + (m/A)^2 t^2 of (5.31), and so"
+    " (5.32), (5.33), (5.36), and theta t^2 + 2 (1-theta) W of (5.44), and of (5.39) at C_0, against the same term:"
+    " t^2 = k^2 <W zeta, (S_2^-1)_TT W zeta>, W = k <W zeta, d_2T>.",
+    goals=_all_slide,
+    forms={"repaired": (1, 2)},
+    mutants={
+        "half of the quadratic term": (sp.Rational(1, 2), 2),
+        "from k = delta/(2 alpha) on": (1, sp.Rational(1, 2)),
+    },
+)
+
+# --- Proposition 5.6 with the printed constants ----------------------------------------------------------------------
+
+M_sum = {M: (2 + o) * m}
+
+check(
+    id="x-printed-rescued",
+    text="Split a_11: half of it bounds t^2, as Cauchy-Schwarz in a_1 gives a_11 >= m t^2/(M^1 C_R^2), and"
+    " M^2 >= 2 m M^1 for M >= 2 m and M >= M^1; by Young -m d_1^2/2 + C_K d_1 d_2 <= C_K^2 d_2^2/(2m).  With"
+    " kappa = C_K/m and m d_2^2 <= e^2 friction adds at most (kappa + kappa^2/2) e^2, for kappa <= 6 below 4 kappa e^2"
+    " and so below the printed bound; and k < C_2 implies kappa < 4.  C_K is k C_s C_tr with C_tr into L2(Gamma_c)"
+    " throughout, in (5.13) as in C_2.",
+    goals=lambda form: [
+        at_most(x**2 * d2**2 / (2 * m), x * d1 * d2 - m * d1**2 / 2, squares=[(m * d1 - x * d2) ** 2 / (2 * m)]),
+        at_most(M**2, 2 * m * M / (1 + p), M_sum),
+        at_most(4 * kappa, kappa + kappa**2 / 2, {kappa: form[0] * q / (1 + q)}),
+        at_most(of_36(m_tilde, printed_P(m_tilde)), of_36(m, P), with_theta(LARGE_M)),
+        at_most(
+            of_36(m, 4 * kappa),
+            expanded.subs(W, of_31(kappa + kappa**2 / 2) - r),
+            {**WITH_THETA, kappa: form[0] * q / (1 + q)},
+        ),
+        at_most(printed_P(m).subs(M_sum), 4 * x / m, {**CONSTANTS, m: mu**2}),
+        *(
+            at_most(
+                bounds.G(x, m_tilde, M, C_R, sp.Integer(1)).subs(x, form[1] * m),
+                m_tilde**3 + m_tilde**5 / A**2,
+                {**chart, x: sp.Integer(0), M: chart[m] * (2 + q)},
+            )
+            for chart in (SMALL_M, LARGE_M)
+        ),
+    ],
+    forms={"repaired": (6, 4)},
+    mutants={"for C_K <= 17 m": (17, 4), "k < C_2 implies C_K < m/100": (6, sp.Rational(1, 100))},
+)
+
+more, true_kappa = positive("c kappa_2")  # C_tr(L2)/C_tr(H^1/2), and kappa with C_tr into L2
+
+
+def _literal(reach: Any) -> list[Goal]:
+    """With x = k C_s C_tr, C_tr into H^1/2, and c x the constant of friction that (5.13) needs: c <= reach (M/m)^2."""
+    at_end = lambda m_tilde, M: (1 + m_tilde**2 / M**2) * m_tilde**3 / M**2 / (1 + q)  # k < C_2 leaves x below
+    goals, cap = [], sp.Rational(5, 4) * reach
+    for chart in (SMALL_M, LARGE_M):
+        ratio = {more: reach * (chart[M] / chart[m]) ** 2 / (1 + p), m: chart[m], M: chart[M], m_tilde: chart[m_tilde]}
+        goals += [
+            at_most(printed_P(m_tilde), x * M**2 / m_tilde**3, chart),
+            at_most(1 + m_tilde**2 / M**2, 1 + m_tilde**2 / A**2, chart),
+            at_most(cap, more * x / m, {**ratio, x: at_end(chart[m_tilde], chart[M])}),  # kappa
+            at_most(M**2 / m_tilde**3, more / m * (1 + cap / 2), ratio),  # times x: friction
+            at_most(1 + true_kappa, 2 * sp.sqrt(true_kappa), {true_kappa: y**2}, squares=[(y - 1) ** 2]),
+            # t <= A/m X e with X of the true kappa; C_T M/m~ >= (A/m) (A M/m^2)
+            at_most(A * M / m**2, A / m + cap + (1 + cap) / 2, {**chart, x: sp.Integer(0)}),
+        ]
+    return goals
+
+
+check(
+    id="x-printed-literal",
+    text="x = k C_s C_tr with C_tr into H^1/2, c = C_tr(L2)/C_tr(H^1/2), kappa = c x/m: friction adds at most"
+    " (kappa + kappa^2/2) e^2 as in x-printed-rescued.  k < C_2 says that the printed term P(x) is below"
+    " 1 + m~^2/A^2, and P(x) >= x M^2/m~^3.  For c <= 2/3 (M/m)^2 that leaves kappa <= 5/6, hence"
+    " kappa + kappa^2/2 <= x M^2/m~^3 <= P(x), and t^2 <= C_T^2 M^2/m~^2 e^2 with the C_T of x, as"
+    " sqrt(kappa) <= (1 + kappa)/2.",
+    goals=_literal,
+    forms={"repaired": sp.Rational(2, 3)},
+    mutants={"c <= 3/4 (M/m)^2": sp.Rational(3, 4), "c <= (M/m)^2": sp.Integer(1)},
+)
+
+# --- how the constants hang together ----------------------------------------------------------------------------------
 
 check(
     id="x-c5-is-c2",
@@ -114,49 +314,6 @@ check(
     mutants={"1 dropped from the bracket": printed_P(m) - x * M**2 / m**3},
 )
 
-check(
-    id="x-max-suffices",
-    text="|a(u, v)| <= M_1 u_1 v_1 + M_2 u_2 v_2 <= max(M_1, M_2) |u| |v|: (4.2) could take the maximum for M.",
-    goals=lambda form: [
-        at_most(
-            form(big, less_) ** 2 * (u_1**2 + u_2**2) * (v_1**2 + v_2**2),
-            (first * u_1 * v_1 + second * u_2 * v_2) ** 2,
-            squares=[big**2 * (u_1 * v_2 - u_2 * v_1) ** 2],
-        )
-        for first, second, big, less_ in ((M_1, M_1 + o, M_1 + o, M_1), (M_1 + o, M_1, M_1 + o, M_1))
-    ],
-    forms={"repaired": lambda large, small: large},
-    mutants={"the minimum": lambda large, small: small},
-)
-
-check(
-    id="x-lift-bound",
-    text="m |R phi|^2 <= a(R phi, R phi) <= a(v, v) <= M |v|^2 for every v with the trace phi: into the norm of its own"
-    " body the lift has a constant of at most sqrt(M/m), and no theorem of Banach is needed.",
-    goals=lambda form: at_most(form, M * y**2 / (m * (1 + p) * (1 + q) * (1 + r)), CONSTANTS),
-    forms={"repaired": M / m * y**2},
-    mutants={"m/M": m / M * y**2, "1": y**2},
-)
-
-w = sp.Symbol("omega", real=True)
-gradient = exx**2 + eyy**2 + 2 * exy**2 + 2 * w**2
-
-check(
-    id="x-continuity",
-    text="sigma : e = 2 mu |e|^2 + lambda (tr e)^2 with |grad v|^2 = |e|^2 + 2 omega^2 and (tr e)^2 <= 2 |e|^2, in"
-    " plane strain: M^a <= max(2 mu, 2 mu + 2 lambda) for the norm of the gradient, hence for that of V^a.",
-    goals=lambda form: [
-        at_most(
-            (2 * lame_mu + form * o) * gradient,
-            strain_energy(o),
-            squares=[o * (exx - eyy) ** 2, 4 * o * exy**2, (4 * lame_mu + 4 * o) * w**2],
-        ),
-        at_most(2 * lame_mu * gradient, strain_energy(-o), squares=[o * (exx + eyy) ** 2, 4 * lame_mu * w**2]),
-    ],
-    forms={"repaired": sp.Integer(2)},
-    mutants={"lambda for 2 lambda": sp.Integer(1)},
-)
-
 # --- what the interval can reach -------------------------------------------------------------------------------------
 
 square, Q_more, D_share = 1 + p, nonnegative("Q_more"), nonnegative("D_share")
@@ -200,4 +357,295 @@ check(
     goals=lambda form: less(0, (1 - form) / y),
     forms={"repaired": q / (1 + p + q)},
     mutants={"at the distance r": sp.Integer(1), "beyond r": 1 + q},
+)
+
+# --- the theorem in energy norms: its premises ------------------------------------------------------------------------
+
+# D is |d_1|^2 in the energy of body 1 and d1 its root, e = |d_2| the norm (5.21) of psi - psi~, t the norm of
+# p = T psi - T psi~.  The Cauchy-Schwarz inequality of an inner product is used freely; its slack is a parameter.
+rho, size = positive("rho E")
+D, work = nonnegative("D Y")
+kappa_1, kappa_2, root_rho, extra = nonnegative("kappa_1 kappa_2 s e_")
+ratio = positive("x")
+
+check(
+    id="x-reaction",
+    text="With v = R2 p: t^2 = a_2(v, v) = <p, v> = -a_1(d_1, v), so t^4 <= D a_1(v, v) <= D rho t^2: with slack"
+    " t^2 = rho D/((1+p)(1+q)).  Least: where S_1 d_1 = rho S_2 d_1, p = -rho S_2 d_1, with E = a_2(d_1, d_1) D is"
+    " rho E and t^2 = rho^2 E.",
+    goals=lambda form: [
+        equal((rho * D / ((1 + p) * (1 + q))) ** 2, D / (1 + p) * rho / (1 + q) * (rho * D / ((1 + p) * (1 + q)))),
+        at_most(form * D, rho * D / ((1 + p) * (1 + q))),
+        equal(rho**2 * size, form * rho * size),
+    ],
+    forms={"repaired": rho},
+    mutants={"half of rho": rho / 2, "twice rho": 2 * rho, "rho^2": rho**2},
+)
+
+tt, tn, nn = sp.symbols("s_TT s_TN s_NN", positive=True)
+
+check(
+    id="x-reaction-normal",
+    text="Without friction p_T = 0.  With v = R2 p: t^2 = <p, v> = <p, w> = -a_1(d_1, w) for every w with w_N = v_N;"
+    " for the w of least energy t^4 <= D a_1(w, w), a_1(w, w) = v_N' S_1N v_N <= rho_N v_N' S_2N v_N and"
+    " v_N' S_2N v_N <= a_2(v, v) = t^2.  Least: S_1N y = rho_N S_2N y, p_N = -S_1N y, where with E = y' S_2N y"
+    " D = p_N' S_1N^-1 p_N = rho_N E and t^2 = p_N' S_2N^-1 p_N = rho_N^2 E; (S^-1)_NN = S_N^-1, shown at one node."
+    "  And rho_N <= rho, as v_N' S_1N v_N <= a_1(v, v) <= rho a_2(v, v) for the v of least energy in body 2.",
+    goals=lambda form: [
+        at_most(form * D, rho * D / ((1 + p) * (1 + q) * (1 + r))),
+        equal(rho**2 * size, form * rho * size),
+        equal(sp.Matrix([[tt, tn], [tn, nn]]).inv()[1, 1], 1 / (nn - tn**2 / tt)),
+        at_most(form * size, rho * size / ((1 + p) * (1 + q))),
+    ],
+    forms={"repaired": rho},
+    mutants={"half of rho_N": rho / 2, "twice rho_N": 2 * rho},
+)
+
+C_t1, C_t2 = nonnegative("C_t1 C_t2")
+
+check(
+    id="x-friction-energy",
+    text="Cauchy-Schwarz: F <= k |zeta| |(d_1 - d_2)_T| in L2(Gamma_c), with |zeta| <= C_s e and"
+    " |(d_1 - d_2)_T| <= C_t1 |d_1| + C_t2 e; kappa_a = k C_s C_ta.",
+    goals=lambda form: at_most(
+        form[0] * d1 * e + form[1] * e**2, k * (C_s * e / (1 + p)) * (C_t1 * d1 / (1 + q) + C_t2 * e / (1 + r)) - o
+    ),
+    forms={"repaired": (k * C_s * C_t1, k * C_s * C_t2)},
+    mutants={"without kappa_2": (k * C_s * C_t1, 0), "without kappa_1": (0, k * C_s * C_t2)},
+)
+
+largest = root_rho + kappa_1 + extra  # r, with kappa_2 = e_ (s + kappa_1 + e_): every kappa_2 >= 0 once
+ENERGY = (root_rho**2, kappa_1, extra * largest)
+f = lambda x: energy_norms.work(x, *ENERGY[1:])
+
+check(
+    id="x-ratio",
+    text="With |d_1| = x e: W <= -D + F <= (kappa_2 + kappa_1 x - x^2) e^2 = f(x) e^2 by (5.28), and W >= -t e >="
+    " -sqrt(rho) x e^2.  So x^2 <= (sqrt(rho) + kappa_1) x + kappa_2, which no x above its positive root r satisfies;"
+    " f(r) = -sqrt(rho) r.",
+    goals=lambda form: [
+        at_most(f(ratio) * e**2, -(ratio**2) * e**2 + kappa_1 * ratio * e**2 + ENERGY[2] * e**2 - q - p),
+        equal(f(ratio) + root_rho * ratio, (root_rho + kappa_1) * ratio + ENERGY[2] - ratio**2),
+        equal(energy_norms.largest_ratio(*ENERGY), form),
+        less((root_rho + kappa_1) * (form + y) + ENERGY[2], (form + y) ** 2),
+        equal(f(form), -root_rho * form),
+    ],
+    forms={"repaired": largest},
+    mutants={"without kappa_2": root_rho + kappa_1, "half as large": largest / 2},
+)
+
+# --- the theorem ------------------------------------------------------------------------------------------------------
+
+at = lambda x, theta: energy_norms.square_at(x, theta, *ENERGY)
+
+check(
+    id="x-energy",
+    text="(5.24) with t^2 = rho x^2 e^2/(1+p) by x-reaction and W = (f(x) - q) e^2 by x-ratio, for any x: its square is"
+    " at most phi(x) e^2, as 2 theta (1-theta) >= 0; and x is in [0, r] by x-ratio, where q(theta)^2 is the largest"
+    " phi(x).",
+    goals=lambda form: [
+        at_most(
+            form(ratio, value) * e**2,
+            (1 - value) ** 2 * e**2
+            + 2 * value * (1 - value) * (f(ratio) - q) * e**2
+            + value**2 * ENERGY[0] * ratio**2 * e**2 / (1 + p),
+        )
+        for value in (any_theta, sp.Integer(1))
+    ],
+    forms={"repaired": at},
+    mutants={
+        "half of rho": lambda x, theta: energy_norms.square_at(x, theta, ENERGY[0] / 2, *ENERGY[1:]),
+        "without friction": lambda x, theta: energy_norms.square_at(x, theta, ENERGY[0], 0, 0),
+        "the factor 2 dropped": lambda x, theta: (at(x, theta) + (1 - theta) ** 2 + (theta * root_rho * x) ** 2) / 2,
+    },
+)
+
+s_ = positive("s_")  # sqrt(rho) > 0
+r_ = s_ + kappa_1 + extra
+WHERE = (s_**2, kappa_1, extra * r_)
+turn = (2 * r_ - kappa_1) / ((2 + s_**2) * r_ - kappa_1)
+vertex = lambda theta: (1 - theta) * kappa_1 / (2 - (2 + s_**2) * theta)
+
+
+def _branches(turning: Any) -> list[Goal]:
+    """phi is largest at the vertex, in [0, r), before the turning theta, and at r from there on."""
+    phi = lambda x, theta: energy_norms.square_at(x, theta, *WHERE)
+    early = turning / (1 + y)
+    late = turning + (1 - turning) * o / (1 + o)
+    bend = lambda theta: theta * (2 - (2 + s_**2) * theta)
+    return [
+        equal(phi(vertex(theta), theta) - phi(ratio, theta), bend(theta) * (ratio - vertex(theta)) ** 2),
+        less(0, 2 - (2 + s_**2) * early),
+        at_most(vertex(early), 0),
+        less(vertex(early), r_),
+        equal(1 - phi(vertex(theta), theta), energy_norms.one_minus_inside(theta, *WHERE)),
+        # phi(r) - phi(x) = (r - x) (2 theta (1-theta) kappa_1 - bend (r + x)), the last factor least at x = 0 or r
+        equal(
+            phi(r_, theta) - phi(ratio, theta),
+            (r_ - ratio) * (2 * theta * (1 - theta) * kappa_1 - bend(theta) * (r_ + ratio)),
+        ),
+        *(at_most(2 * (1 - late) * kappa_1, (2 - (2 + s_**2) * late) * (r_ + end)) for end in (0, r_)),
+        equal(1 - phi(r_, theta), energy_norms.one_minus_end(theta, *WHERE)),
+    ]
+
+
+check(
+    id="x-energy-branches",
+    text="phi is a parabola in x, concave before 2/(2+rho).  Before theta_s its vertex lies in [0, r) and gives the"
+    " largest value; from theta_s on r does, as phi(r) - phi(x) is (r - x) times a factor that is linear in x and not"
+    " negative at x = 0 and x = r.  The two forms of 1 - q^2 that are computed are those values.",
+    goals=_branches,
+    forms={"repaired": turn},
+    mutants={"2/(2+rho)": 2 / (2 + s_**2) * (1 + kappa_1), "half of theta_s": turn / 2},
+)
+
+work_there = energy_norms.work(ratio, kappa_1, kappa_2)
+
+check(
+    id="x-energy-interval",
+    text="The square at x is below 1 exactly where 2 (f - 1) + theta (1 - 2 f + rho x^2) < 0: linear in theta for each"
+    " x, so that the good thetas form one interval.",
+    goals=lambda form: equal(
+        energy_norms.square_at(ratio, theta, root_rho**2, kappa_1, kappa_2) - 1, theta * form, {theta: any_theta}
+    ),
+    forms={"repaired": 2 * (work_there - 1) + theta * (1 - 2 * work_there + root_rho**2 * ratio**2)},
+    mutants={"the factor 2 dropped": work_there - 1 + theta * root_rho**2 * ratio**2},
+)
+
+check(
+    id="x-threshold-uniqueness",
+    text="Two solutions: x^2 + 1 <= kappa_1 x + kappa_2 for x = |d_1|/|d_2| by the energy argument; impossible for"
+    " every x exactly where kappa_2 + kappa_1^2/4 < 1, as 1 - f(x) = (x - kappa_1/2)^2 + 1 - kappa_2 - kappa_1^2/4.",
+    goals=lambda form: equal(
+        1 + ratio**2 - kappa_1 * ratio - kappa_2, (ratio - kappa_1 / 2) ** 2 + 1 - form(kappa_1, kappa_2)
+    ),
+    forms={"repaired": energy_norms.friction_number},
+    mutants={"kappa_1^2/2": lambda k1, k2: k2 + k1**2 / 2, "kappa_1/4": lambda k1, k2: k2 + k1 / 4},
+)
+
+# --- without friction -------------------------------------------------------------------------------------------------
+
+u, v, u_1, v_1 = Vector("u2"), Vector("u~2"), Vector("u1"), Vector("u~1")
+image, loads = Vector("T psi"), Vector("l2")
+solve = linear("S2^-1")
+c_N = nonnegative("c_N")
+gap_, u_N, below = sp.symbols("gap u_2N u~_2N", real=True)
+
+
+def _descent(form: Any) -> list[Goal]:
+    """e, E, their slope and step III, in as many unknowns as there are."""
+    step, convex, smooth, sign = form
+    reaction = lambda w: L1(w) - a1(u_1, w)  # c = T psi
+    half = sp.Rational(1, 2)
+    energy_1, energy_2 = (lambda w: half * a1(w, w) - L1(w)), (lambda w: half * a2(w, w) - L2(w))
+    touching = {"u_1N": u_N + gap_, "u~_1N": below + gap_ - p}
+    return [
+        # the energy of body 1 at an admissible u~1, about u1
+        equal(energy_1(v_1) - energy_1(u_1), half * a1(v_1 - u_1, v_1 - u_1) - reaction(v_1 - u_1)),
+        # -c (u~1 - u1)_N >= -c (u~2 - u2)_N at a node that touches, c >= 0, and at one that is open, c = 0; c_T = 0
+        at_most(-sign * c_N * (touching["u~_1N"] - touching["u_1N"]), -sign * c_N * (below - u_N)),
+        # the energy of body 2, about u2, where a_2(u2, .) = L2 + psi by step I
+        equal(energy_2(v) - energy_2(u) - (a2(u, v - u) - L2(v - u)), half * a2(v - u, v - u)),
+        # E(u~2) >= E(u2) + <psi - T psi, d> + e^2/2 + D/2, and the same from u~2 to u2: E above and below its tangent
+        at_most(e**2 / 2 + D / 2 + q, convex * e**2 / 2),
+        at_most(
+            smooth * e**2 / 2,
+            e**2 / 2 + s_ * d1 * e / (1 + p) - d1**2 / 2,
+            {rho: s_**2},
+            squares=[(s_ * e - d1) ** 2 / 2],
+        ),
+        # -<p, d_2> >= D >= t^2/rho_N
+        at_most(D + q, (smooth - 1) * D / ((1 + p) * rho)),
+        # step I of the new force less step I of the old one
+        equal(
+            solve(theta * image + (1 - theta) * psi + loads) - solve(psi + loads),
+            step * solve(psi - image),
+            {theta: any_theta},
+        ),
+    ]
+
+
+check(
+    id="x-gradient-descent",
+    text="e(u2), the least energy of body 1 over u_N <= u2_N + gap: at an admissible u~1 it is e(u2) - c (u~1 - u1) +"
+    " |u~1 - u1|^2/2, c = T psi >= 0, c_T = 0, and c (u~1 - u1) <= c_N (u~2 - u2)_N node by node; so e(u~2) >= e(u2) -"
+    " c_N (u~2 - u2)_N + D/2.  With step I, E(u~2) >= E(u2) + <psi - T psi, d> + e^2/2: E is 1-strongly convex."
+    "  Exchanged, E(u~2) <= E(u2) + <psi - T psi, d> + e^2/2 - <p, d> - D/2, at most (1+rho_N) e^2/2 more than the"
+    " tangent, as |<p, d>| <= t e <= sqrt(rho_N D) e: psi - T psi is the gradient, (1+rho_N)-Lipschitz.  -T is"
+    " cocoercive, -<p, d> >= D >= t^2/rho_N.  Step III moves u2 by -theta S_2^-1 times the gradient.",
+    goals=_descent,
+    forms={"repaired": (-theta, 1, 1 + rho, 1)},
+    mutants={
+        "uphill": (theta, 1, 1 + rho, 1),
+        "theta squared": (-(theta**2), 1, 1 + rho, 1),
+        "2-strongly convex": (-theta, 2, 1 + rho, 1),
+        "rho_N-smooth": (-theta, 1, rho, 1),
+        "(1 + 2 rho_N)-cocoercive": (-theta, 1, 1 + 2 * rho, 1),
+        "a reaction that pulls": (-theta, 1, 1 + rho, -1),
+    },
+)
+
+
+def _attained(form: Any) -> list[Goal]:
+    """The square of (1-theta) g + theta p with e = 1, Y = -<p, g> between t^2/rho and what Cauchy-Schwarz leaves."""
+    square = lambda theta, t2, Y: (1 - theta) ** 2 - 2 * theta * (1 - theta) * Y + theta**2 * t2
+    least = 2 / (2 + rho)
+    t2 = rho**2 / (1 + p)
+    low, high, beyond = least / (1 + o), (least + o) / (1 + o), 1 + o
+    first, second = form(rho)
+    return [
+        at_most(first(low) ** 2, square(low, t2, t2 / rho + q)),
+        at_most(second(high) ** 2, square(high, t2, t2 / rho + q)),
+        at_most(second(beyond) ** 2, square(beyond, rho * work / (1 + q), work), {work: rho / (1 + p)}),
+        equal(square(theta, 0, 0), first(theta) ** 2),  # all open, p = 0
+        equal(square(theta, rho**2, rho), second(theta) ** 2),  # all touch, p = -rho_N g
+    ]
+
+
+check(
+    id="x-attained",
+    text="-<p, g> = D + .. >= t^2/rho_N and t <= rho_N e: for theta <= 1 the square is linear in t^2 and below the"
+    " larger of its values at t = 0 and t = rho_N e, for theta > 1 at most (theta (1+rho_N) - 1)^2 e^2.  Both values"
+    " occur: where all nodes are open T is constant, p = 0; where all touch, p = -rho_N g for g_N = S_2N y,"
+    " S_1N y = rho_N S_2N y.",
+    goals=_attained,
+    forms={"repaired": lambda rho: (lambda theta: 1 - theta, lambda theta: theta * (1 + rho) - 1)},
+    mutants={
+        "half of rho_N": lambda rho: (lambda theta: 1 - theta, lambda theta: theta * (1 + rho / 2) - 1),
+        "without the open nodes": lambda rho: (lambda theta: 1 - 2 * theta, lambda theta: theta * (1 + rho) - 1),
+    },
+)
+
+check(
+    id="x-best-theta",
+    text="1 - theta and theta (1+rho_N) - 1 are both rho_N/(2+rho_N) at theta = 2/(2+rho_N); below it the first is"
+    " larger, above it the second: no other theta has a factor as small.  C_0 is this theta with rho_N replaced by"
+    " (M C_R/m)^2, which is at least rho: with E = phi' E_2 phi, phi' S_1 phi <= M C_R^2 E and phi' S_2 phi >= m E.",
+    goals=lambda form: [
+        equal(1 - form, form * (1 + rho) - 1),
+        equal(1 - form, energy_norms.predicted_rate(rho)),
+        less(energy_norms.predicted_rate(rho), 1 - form / (1 + y)),
+        less(energy_norms.predicted_rate(rho), form * (1 + y) * (1 + rho) - 1),
+        equal(C0, form.subs(rho, A**2 / m**2), CONSTANTS),
+        at_most(A**2 / m**2, M * C_R**2 * size / (1 + p) / (m * size * (1 + q)), CONSTANTS),
+    ],
+    forms={"repaired": energy_norms.predicted_theta(rho)},
+    mutants={"1/(1+rho_N)": 1 / (1 + rho), "2/(1+rho_N)": 2 / (1 + rho)},
+)
+
+check(
+    id="x-no-theta-for-all-moduli",
+    text="S_1 is proportional to E_1, so that E_1 c times as large makes rho_N c times as large.  With"
+    " c = (2/theta - 1)/rho_N the factor theta (1 + c rho_N) - 1 is 1, and larger c make it larger.  With"
+    " c = 2 (1/theta - 1)/rho_N the best theta 2/(2 + c rho_N) is theta, any number in (0, 1).",
+    goals=lambda form: [
+        equal(theta * (1 + form[0] * rho) - 1, 1),
+        less(1, theta * (1 + (1 + y) * form[0] * rho) - 1, {theta: any_theta}),
+        equal(energy_norms.predicted_theta(form[1] * rho), theta),
+    ],
+    forms={"repaired": ((2 / theta - 1) / rho, 2 * (1 / theta - 1) / rho)},
+    mutants={
+        "half of the first": ((2 / theta - 1) / (2 * rho), 2 * (1 / theta - 1) / rho),
+        "half of the second": ((2 / theta - 1) / rho, (1 / theta - 1) / rho),
+    },
 )

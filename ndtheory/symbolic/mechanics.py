@@ -11,37 +11,16 @@ from typing import Any
 import sympy as sp
 
 from ndtheory.symbolic.engine import CheckList, Goal, Vector, at_most, equal, less, nonnegative, positive
-from ndtheory.symbolic.symbols import (
-    CONSTANTS,
-    M_1,
-    C,
-    M,
-    a2,
-    exx,
-    exy,
-    eyy,
-    lame_mu,
-    m,
-    o,
-    p,
-    q,
-    r,
-    strain_energy,
-    test,
-    theta,
-    u_1,
-    u_2,
-    v_1,
-    v_2,
-    y,
-)
+from ndtheory.symbolic.symbols import CONSTANTS, C, M, a2, m, o, p, q, r, test, theta, y
 
 CHECKS = CheckList()
 check = CHECKS.add
 
 # --- Section 2 ------------------------------------------------------------------------------------------------------
 
-lame_lambda = positive("lame_lambda")
+lame_lambda, lame_mu = positive("lame_lambda lame_mu")
+exx, eyy, exy = sp.symbols("e_xx e_yy e_xy", real=True)
+strain_energy = lambda lam: 2 * lame_mu * (exx**2 + eyy**2 + 2 * exy**2) + lam * (exx + eyy) ** 2  # sigma : e
 
 check(
     id="2.2",
@@ -97,23 +76,13 @@ X, f, young, length = sp.symbols("X f E L", positive=True)
 c1, c2 = sp.symbols("c_1 c_2", real=True)
 
 
-def _bar(sign: Any) -> tuple[Any, Any, Any]:
-    """int E u' v', int f v and E u'(L) v(L), for E u'' = sign f and v = c_1 X + c_2 X^2."""
+def _bar(sign: Any) -> tuple[Any, Any]:
+    """int E u' v' - f v, and E u'(L) v(L), for E u'' = sign f and v = c_1 X + c_2 X^2."""
     u = sign * f * X**2 / (2 * young) + c1 * X
     v = c1 * X + c2 * X**2
     over = lambda expression: sp.integrate(sp.expand(expression), (X, 0, length))
     end = young * sp.diff(u, X).subs(X, length) * v.subs(X, length)
-    return over(young * sp.diff(u, X) * sp.diff(v, X)), over(f * v), end
-
-
-def _weak(sign: Any) -> Goal:
-    elastic, load, end = _bar(sign)
-    return equal(elastic, load + end)
-
-
-def _green(sign: Any) -> Goal:
-    elastic, load, end = _bar(-1)
-    return equal(sign * end, -elastic + load)
+    return over(young * sp.diff(u, X) * sp.diff(v, X)) - over(f * v), end
 
 
 for number, body in ((1, "2"), (2, "1")):
@@ -122,7 +91,7 @@ for number, body in ((1, "2"), (2, "1")):
         text=f"A bar with E u'' = -f has the weak form (4.9), int E u' v' = int f v + (end force) v; with div sigma = f"
         f" for body {body} the load has the other sign than in (2.1).",
         one_case=True,
-        goals=_weak,
+        goals=lambda sign: equal(*_bar(sign)),
         forms={"printed": 1, "repaired": -1},
         mutants={"no load": sp.Integer(0), "twice": -2},
     )
@@ -132,8 +101,7 @@ load_1, load_2, g = sp.symbols("l_1 l_2 g", real=True)
 
 
 def _bars(sign: Any) -> list[Goal]:
-    """Two bars in contact: the solution must be a fixed point, and a step multiplies errors by 1 - theta - theta"
-    " rho."""
+    """Two bars in contact: the solution must be a fixed point; a step multiplies errors by 1 - theta - theta rho."""
     end = lambda g: (g + load_2) / S_2  # displacement of the end of body 2 under the force g
     step = lambda g: sign * theta * (S_1 * end(g) - load_1) + (1 - theta) * g  # sigma^1 n^1 = S_1 u - l_1
     solution = S_2 * (load_1 + load_2) / (S_1 + S_2) - load_2
@@ -169,7 +137,8 @@ check(
     mutants={"half the larger one": lambda: at_most((p + r) / 2 + (q + o) / 2, (p + q) / (1 + y))},
 )
 
-m_1 = positive("m_1")
+m_1, M_1 = positive("m_1 M_1")
+u_1, u_2, v_1, v_2 = nonnegative("u_1 u_2 v_1 v_2")  # norms of two fields on body 1 and on body 2
 
 check(
     id="4.3",
@@ -199,6 +168,40 @@ check(
 )
 
 check(
+    id="x-max-suffices",
+    text="|a(u, v)| <= M_1 u_1 v_1 + M_2 u_2 v_2 <= max(M_1, M_2) |u| |v|: (4.2) could take the maximum for M.",
+    goals=lambda form: [
+        at_most(
+            form(big, less_) ** 2 * (u_1**2 + u_2**2) * (v_1**2 + v_2**2),
+            (first * u_1 * v_1 + second * u_2 * v_2) ** 2,
+            squares=[big**2 * (u_1 * v_2 - u_2 * v_1) ** 2],
+        )
+        for first, second, big, less_ in ((M_1, M_1 + o, M_1 + o, M_1), (M_1 + o, M_1, M_1 + o, M_1))
+    ],
+    forms={"repaired": lambda large, small: large},
+    mutants={"the minimum": lambda large, small: small},
+)
+
+w = sp.Symbol("omega", real=True)
+gradient = exx**2 + eyy**2 + 2 * exy**2 + 2 * w**2
+
+check(
+    id="x-continuity",
+    text="sigma : e = 2 mu |e|^2 + lambda (tr e)^2 with |grad v|^2 = |e|^2 + 2 omega^2 and (tr e)^2 <= 2 |e|^2, in"
+    " plane strain: M^a <= max(2 mu, 2 mu + 2 lambda) for the norm of the gradient, hence for that of V^a.",
+    goals=lambda form: [
+        at_most(
+            (2 * lame_mu + form * o) * gradient,
+            strain_energy(o),
+            squares=[o * (exx - eyy) ** 2, 4 * o * exy**2, (4 * lame_mu + 4 * o) * w**2],
+        ),
+        at_most(2 * lame_mu * gradient, strain_energy(-o), squares=[o * (exx + eyy) ** 2, 4 * lame_mu * w**2]),
+    ],
+    forms={"repaired": sp.Integer(2)},
+    mutants={"lambda for 2 lambda": sp.Integer(1)},
+)
+
+check(
     id="4.7",
     text="Two bars, |phi|^2 = coth(L_2) >= 1/L_2 in the norm of the one, |R phi|^2 = L_1/3 + 1/L_1 in the other:"
     " measured in another body the norm of a trace exceeds that of its lift.  In the same body the infimum is at most"
@@ -220,6 +223,14 @@ check(
     mutants={"1": sp.Integer(1), "m/M": sp.sqrt(m / M)},
 )
 
+check(
+    id="x-lift-bound",
+    text="m |R phi|^2 <= a(R phi, R phi) <= a(v, v) <= M |v|^2 for every v with the trace phi: into the norm of its own"
+    " body the lift has a constant of at most sqrt(M/m), and no theorem of Banach is needed.",
+    goals=lambda form: at_most(form, M * y**2 / (m * (1 + p) * (1 + q) * (1 + r)), CONSTANTS),
+    forms={"repaired": M / m * y**2},
+    mutants={"m/M": m / M * y**2, "1": y**2},
+)
 
 check(
     id="prop-4.1.2",
@@ -255,7 +266,7 @@ check(
     id="4.9.3",
     text="Bar 1 with E u'' = -f: minus the end force on v is -a_1(u, v) + L_1(v), so that (III) is -theta sigma^1 n^1.",
     one_case=True,
-    goals=_green,
+    goals=lambda sign: equal(sign * _bar(-1)[1], -_bar(-1)[0]),
     forms={"printed": -1},
     mutants={"the sign": 1, "twice": -2},
 )

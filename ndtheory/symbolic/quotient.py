@@ -1,7 +1,7 @@
-"""A rational expression as a polynomial times powers of polynomials, and what its coefficients say of its sign.
+"""A rational expression as a polynomial times powers of polynomials, and its sign as far as the coefficients show it.
 
 Factors stay factors: a sum takes the common ones out, so that no common denominator is expanded, and no common divisor
-is looked for where the signs can be read off without one.
+is sought where the signs can be read off without one.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Quotient:
         Raises
         ------
         NotRational
-            It is none.
+            The expression is not such a quotient.
 
         Examples
         --------
@@ -78,7 +78,7 @@ class Quotient:
         return Quotient(sum(rest), {base: power for base, power in common.items() if power})
 
     def __pow__(self, exponent: int) -> Quotient:
-        if not self.polynomial:  # and so 0 is no base
+        if not self.polynomial:  # so that 0 never becomes a base
             if exponent < 0:
                 raise NotRational("a division by 0")
             return self
@@ -87,7 +87,7 @@ class Quotient:
         return Quotient(one, powers) * Quotient(one, {self.polynomial: exponent})
 
     def power(self, base: PolyElement) -> int:
-        """Of a base, 0 where it is no factor."""
+        """The power of a base, 0 if the base is not a factor."""
         return self.powers.get(base, 0)
 
     def cancelled(self) -> Quotient:
@@ -100,18 +100,18 @@ class Quotient:
         return Quotient(numerator, {denominator: -1})
 
     def is_certified(self, *, strict: bool) -> bool:
-        """Whether the signs of all factors show that it is at least 0, or above 0 if strict.
+        """True if the signs of all factors show that it is at least 0, or above 0 if strict.
 
-        What stands below the line must be other than 0 in any case.
+        Factors below the line must be shown to differ from 0 in any case.
         """
         signs = [sign(base, nonzero=strict or power < 0) ** abs(power) for base, power in self.powers.items()]
         return reduce(mul, signs, sign(self.polynomial, nonzero=strict)) == 1
 
 
 def sign(polynomial: PolyElement, *, nonzero: bool) -> int:
-    """1 or -1 where coefficients of one sign show it for parameters >= 0, else 0.
+    """Return 1 or -1 where coefficients of one sign show it for parameters >= 0, else 0.
 
-    That the polynomial is never 0, if asked, is shown by a term of parameters > 0 alone.
+    With ``nonzero`` the polynomial must also have a term in which all parameters are > 0: it is never 0 then.
     """
     symbols = polynomial.ring.symbols
     terms = [[s for s, power in zip(symbols, powers, strict=True) if power] for powers in polynomial.monoms()]

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from strategies import contact_problems
 
 import verification as vf
-from verification.advice.role import steps
+from verification.advice.roles import steps
 from verification.cli.problems import examples
 from verification.sections.layout import text
 

@@ -8,12 +8,12 @@ import scipy.sparse as sp
 from advice_calls import GOOD, ROLE, by_body, saved
 
 import verification as vf
-from verification.interface.pair import build
+from verification.interface.pair import pair_from
 
 
 @pytest.fixture
 def matrices(write):
-    pair = build(vf.load(write("wrong roles")))
+    pair = pair_from(vf.load(write("wrong roles")))
     return pair.contact.stiffness, pair.neumann.stiffness  # bodies 1 and 2
 
 

@@ -10,12 +10,12 @@ from advice_calls import GOOD, by_body, saved
 
 import verification as vf
 from verification.advice.matrix_files import read_matrix
-from verification.interface.pair import build
+from verification.interface.pair import pair_from
 
 
 @pytest.fixture
 def matrices(write):
-    pair = build(vf.load(write("wrong roles")))
+    pair = pair_from(vf.load(write("wrong roles")))
     return pair.contact.stiffness, pair.neumann.stiffness  # bodies 1 and 2
 
 
@@ -168,8 +168,8 @@ def test_an_asymmetry_is_rounded_told_or_refused(call, tmp_path, skew):
 
 def test_an_assembled_matrix_is_told_from_a_condensed_one(call, tmp_path):
     """Both are positive definite: nothing but the zeros speaks."""
-    body = build(vf.example("section6")).body1.mesh_body
-    S = build(vf.example("section6")).body1.stiffness
+    body = pair_from(vf.example("section6")).body1.mesh_body
+    S = pair_from(vf.example("section6")).body1.stiffness
     sp.save_npz(tmp_path / "K.npz", body.stiffness)
     whole = call("advise", "matrices", "--S1", tmp_path / "K.npz", "--S2", tmp_path / "K.npz")
     assert whole.status == 0
@@ -222,7 +222,7 @@ def test_an_interface_file_is_read_whole_wherever_it_is_given(call, run_folder):
 def test_matrices_with_friction_give_the_advice_of_the_problem(call, run_folder, tmp_path):
     file, results = run_folder
     expected = call("advise", file, "--json").document
-    pair = build(vf.load(file))
+    pair = pair_from(vf.load(file))
     radius = str(vf.load(file).contact.radius)
     with np.load(results / "interface.npz") as arrays:
         parts = {name: arrays[name] for name in ("S1", "S2", "x", "weights", "kernel")}

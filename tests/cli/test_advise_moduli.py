@@ -7,7 +7,7 @@ import pytest
 from advice_calls import ROLE, pasted
 from complaints import assert_names
 
-from verification.advice.role import TIED
+from verification.advice.roles import TIED
 
 GIVEN = ("--young", "7e4,2e4", "--poisson", "0.3,0.3")
 OPTIONS = [
@@ -41,6 +41,8 @@ def test_the_document_has_both_roles_with_a_bound_from_below_and_nothing_predict
         assert role["rho"] == {"value": pytest.approx(bound), "lo": role["rho"]["value"], "hi": None, "level": "exact"}
         assert {name for name in ROLE if role[name] is None} == set(role["reason"]) - {"theta_auto", *TIED}
         assert role["theta_predicted"] is role["theta_proved"] is None
+        why = {role["reason"][name] for name in TIED}  # no run was made, so that no residual is the reason
+        assert why == {"moduli bound rho from below, and no other end of the spectrum"}
     assert found["moduli"]["young"] == [70000, 20000]
     assert found["moduli"]["poisson"] == [0.3, 0.3]
 

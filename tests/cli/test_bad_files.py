@@ -248,7 +248,7 @@ def test_a_mesh_that_does_not_fit_is_refused_by_name(call, write, tmp_path, chan
 
 def test_a_mesh_file_cannot_be_halved_and_that_is_said_before_anything_is_measured(call, write, tmp_path, monkeypatch):
     mesh_file(tmp_path / "body1.msh")
-    monkeypatch.setattr("verification.constants.of_body.largest_sparse", None)
+    monkeypatch.setattr("verification.constants.measuring.largest_sparse", None)
     line = call("constants", write(MESHED), "--refine", "1").complaint
     assert_names(line, "problem.toml", "body1.mesh", "body1.msh", "halved")
 

@@ -148,7 +148,7 @@ def test_without_friction_the_mirror_image_proves_the_classical_rate(call, write
     ("edits", "key", "needed"),
     [
         ({"contact.law": '"local"', "contact.radius": None}, "contact.law", '"nonlocal"'),
-        ({"body1.fixed": '["bottom", "left"]'}, "body1.fixed", '"bottom" alone'),
+        ({"body1.fixed": '["bottom", "left"]'}, "body1.fixed", '"bottom" only'),
         ({"body2.prescribed": '{ top = ["free", -0.015] }'}, "body2.prescribed.top", "both components"),
     ],
 )

@@ -39,7 +39,7 @@ HEADINGS = {
     "run": ["WHAT HAPPENED"],
     "solve": ["WHAT IS THE SOLUTION?"],
     "compare": [
-        "HOW LARGE ARE THE CONSTANTS?",
+        "DOES IT CONVERGE, AND HOW FAST?",
         "DOES ONE STEP CONTRACT?",
         "WHAT HAPPENED",
         "WHAT DO SEMIDEFINITE PROGRAMS PROVE OF ONE STEP?",

@@ -287,15 +287,15 @@ def test_an_import_that_ctrl_c_breaks_is_no_bug(write, tmp_path, module):
 def test_constants_keep_the_meshes_that_were_measured(call, write, monkeypatch):
     from verification.interface import pair
 
-    build, built = pair.build, []
+    pair_from, built = pair.pair_from, []
 
     def interrupt(problem, law=None):
         built.append(problem)
         if len(built) == 3:
             signal.raise_signal(signal.SIGINT)
-        return build(problem)
+        return pair_from(problem)
 
-    monkeypatch.setattr(pair, "build", interrupt)
+    monkeypatch.setattr(pair, "pair_from", interrupt)
     answer = call("constants", write(), "--refine", "4", "--json")
     assert answer.status == 130
     assert len(answer.document["levels"]) == 2
@@ -309,7 +309,7 @@ def test_region_draws_the_runs_that_were_made(call, quick, write, tmp_path, monk
 
     monkeypatch.setattr(plane, "THETAS", (0.2, 0.4))
     monkeypatch.setattr(plane, "FRICTIONS", (0.1, 0.3))
-    monkeypatch.setattr("verification.bounds.semidefinite.LARGEST", 0)  # without the semidefinite bound
+    monkeypatch.setattr("verification.bounds.table.LARGEST", 0)  # without the semidefinite bound
     row, rows = workers.row, []
 
     def interrupt(*args):

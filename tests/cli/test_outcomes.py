@@ -12,6 +12,7 @@ from verification import comparison, figures, verdicts
 from verification.cli.problems import examples
 from verification.contact import ContactError
 from verification.monolithic import SolveError
+from verification.sections.comparison import WORDS
 from verification.verdicts import Judgement
 
 DONE, NOT_MET, BAD_INPUT, INCONCLUSIVE, INTERRUPTED, CRASH = 0, 1, 2, 3, 130, 70
@@ -41,7 +42,8 @@ def test_a_command_ends_with_its_status_in_words_and_as_a_document(call, write, 
     assert (run["outcome"], answer.status) == (outcome, status)
     screen = call(command, file)
     assert screen.status == status
-    assert re.search(rf"^  observed .* {outcome}$", screen.out, flags=re.M)
+    line = rf"^  seen +{outcome} after " if command == "compare" else rf"^  observed .* {outcome}$"
+    assert re.search(line, screen.out, flags=re.M)
     assert answer.err == screen.err
 
 
@@ -70,7 +72,7 @@ def test_the_worst_verdict_decides(call, write, monkeypatch, judged, edits, stat
     answer = call("compare", write(edits))
     assert answer.status == status
     for name, verdict in judged.items():
-        assert re.search(rf"^  {name} +{verdict} +made up$", answer.out, flags=re.M)
+        assert re.search(rf"^  {name} +{WORDS[verdict]} +made up$", answer.out, flags=re.M)
 
 
 def test_bad_input_wins_over_everything(call, write, monkeypatch):
@@ -86,7 +88,7 @@ def test_a_crash_says_that_it_is_one_and_is_no_status_of_the_interface(call, wri
     def fail(problem, law=None):
         raise error
 
-    monkeypatch.setattr("verification.interface.pair.build", fail)
+    monkeypatch.setattr("verification.interface.pair.pair_from", fail)
     answer = call(command, write())
     assert answer.status == CRASH
     assert answer.out == ""
@@ -175,7 +177,7 @@ def test_ctrl_c_before_anything_was_computed_says_so(call, write, monkeypatch, c
     def interrupt(problem, law=None):
         signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr("verification.interface.pair.build", interrupt)
+    monkeypatch.setattr("verification.interface.pair.pair_from", interrupt)
     answer = call(command, write())
     assert (answer.status, answer.out) == (INTERRUPTED, "")
     assert answer.err.strip() == "interrupted before anything was computed"

@@ -14,7 +14,7 @@ from ndtheory import PRINTED, REPAIRED, evaluate, evaluate_energy
 from verification.bounds import bound
 from verification.bounds import region as plane
 from verification.bounds.bound import NotComputed
-from verification.bounds.semidefinite import SemidefiniteBound
+from verification.bounds.table import SemidefiniteBound
 from verification.cli.problems import examples
 from verification.sweeps import workers
 

@@ -10,7 +10,7 @@ from verification.interface.friction import LAWS
 
 @pytest.mark.parametrize(
     ("bound", "status", "verdict"),
-    [(Halfway(), 0, "CONSISTENT"), (TooGood(), 1, "VIOLATED"), (Finding(), 0, "VIOLATED")],
+    [(Halfway(), 0, "consistent"), (TooGood(), 1, "violated"), (Finding(), 0, "violated")],
     ids=["true", "violated", "a finding"],
 )
 def test_a_registered_bound_has_its_verdict_on_the_screen_and_its_exit_status(

@@ -5,7 +5,7 @@ import sys
 import pytest
 
 from verification.cli import problems
-from verification.cli.shell import unreached
+from verification.cli.problems import unreached
 
 
 @pytest.fixture

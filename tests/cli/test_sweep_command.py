@@ -14,8 +14,8 @@ from strategies import AT_NIGHT
 import verification as vf
 from verification.cli.sweeping import every
 from verification.sweeps import workers
-from verification.sweeps.keeping import plan
-from verification.sweeps.sweep_file import read_sweep
+from verification.sweeps.grid import read_sweep
+from verification.sweeps.store import plan
 
 GRID = "theta = [0.4, 0.6]\nfriction = [0.1, 0.2]"
 

@@ -154,18 +154,9 @@ def energy(*, rho, kappa_1=0, kappa_2=0, rho_normal=None) -> Energy:
 # --- comparisons ---------------------------------------------------------------------------------------------------
 
 FIELDS = [
-    *("rho", "kappa_1", "kappa_2", "ratio", "friction_multiple", "friction_limit_multiple", "interval"),
-    *(
-        "theta_proved",
-        "factor_proved",
-        "theta_max_proved",
-        "theta_predicted",
-        "rate_predicted",
-        "theta",
-        "factor",
-        "one_minus_factor",
-        "verdict",
-    ),
+    *("interval", "theta", "factor", "one_minus_factor", "verdict"),
+    *("rho", "kappa_1", "kappa_2", "ratio", "friction_multiple", "friction_limit_multiple"),
+    *("theta_proved", "factor_proved", "theta_max_proved", "theta_predicted", "rate_predicted"),
 ]
 
 

@@ -10,8 +10,8 @@ from problem_list import blocks, small
 
 import verification as vf
 from verification.bounds import interior_point
+from verification.bounds.interior_point import LMIError
 from verification.bounds.multipliers import NARROW, QuadraticForms, friction_threshold
-from verification.bounds.program import LMIError
 
 THETAS = np.linspace(0.1, 0.9, 9)
 

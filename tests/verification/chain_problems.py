@@ -17,7 +17,7 @@ from verification.algorithm.runs import Run, run
 from verification.constants import Measured, measure
 from verification.contact import ContactError, ContactSolution
 from verification.contact.active_set import Pattern
-from verification.interface.pair import ContactPair, build
+from verification.interface.pair import ContactPair, pair_from
 from verification.ledger.cases import problem, three_digits
 from verification.ledger.large_friction import loaded
 
@@ -40,7 +40,7 @@ def _drawn(
     seed: int, friction: Any, matching: bool, iteration: tuple[tuple[str, Any], ...]
 ) -> tuple[ContactPair, Measured, float, np.random.Generator]:
     random = np.random.default_rng(seed)
-    pair = build(problem(random, friction, matching=matching, **dict(iteration)))
+    pair = pair_from(problem(random, friction, matching=matching, **dict(iteration)))
     measured = measure(pair)
     return pair, measured, relaxation_factor(random, measured.rho_max.value), random
 

@@ -17,7 +17,7 @@ def comparison():
 def written(comparison, tmp_path_factory):
     """A folder with everything in it."""
     folder = tmp_path_factory.mktemp("written")
-    Folder(folder, "compare").write_comparison(comparison)
+    Folder(folder, "compare").write(comparison)
     return folder
 
 

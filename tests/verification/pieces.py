@@ -15,7 +15,7 @@ from verification.algorithm.affine_piece import Piece, piece_of
 from verification.algorithm.fixed_point import FixedPointMap, iterate_at
 from verification.algorithm.iterate import Iterate
 from verification.contact import ContactError
-from verification.interface.pair import ContactPair, build
+from verification.interface.pair import ContactPair, pair_from
 
 seeds = st.integers(0, 2**32 - 1).map(np.random.default_rng)
 
@@ -131,7 +131,7 @@ def held(neumann: bool) -> ContactPair:
         contact={"friction": "1/2", "radius": "1/3"},
         iteration={"neumann_body": 1 if neumann else 2},
     )
-    pair = build(vf.Problem.from_dict(data))
+    pair = pair_from(vf.Problem.from_dict(data))
     assert not pair.body1.free[0]
     return pair
 

@@ -72,7 +72,7 @@ class PreciseBody:
         spec = getattr(problem, body.name)
         points = points_of(spec)
         A, H = whole_matrices(points, body.mesh.cells.tolist(), spec.young, spec.poisson, problem.length)
-        free = body.free
+        free = body.positions
         self.A, self.H = (precise(matrix[np.ix_(free, free)]) for matrix in (A, H))
         self.x = [points[node][0] for node in body.nodes]
         B = body.interface.tolist()

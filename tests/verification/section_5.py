@@ -17,7 +17,7 @@ import verification as vf
 from ndtheory import REPAIRED, evaluate
 from verification.algorithm.fixed_point import FixedPointMap
 from verification.contact import ContactError
-from verification.interface.pair import build
+from verification.interface.pair import pair_from
 
 EPS = np.finfo(float).eps
 
@@ -83,7 +83,7 @@ class Case:
     """A problem with its dense matrices, its measured constants and T."""
 
     def __init__(self, problem: vf.Problem) -> None:
-        self.pair = build(problem)
+        self.pair = pair_from(problem)
         self.dense = DensePair.of(self.pair)
         self.measured = vf.measure(self.pair)
         one, two = self.dense.contact, self.dense.neumann

@@ -16,7 +16,7 @@ from verification.advice.from_runs import advise_run
 from verification.advice.readings import same_run
 from verification.algorithm.fixed_point import FixedPointMap, iterates
 from verification.algorithm.relaxation import Constant
-from verification.interface.pair import build
+from verification.interface.pair import pair_from
 
 #: A residual fallen to this share of its largest has converged.
 FALLEN = 1e-6
@@ -141,7 +141,7 @@ def plates(E1, E2, neumann_body, friction, poisson="0.3", cells=((10, 2), (6, 2)
         contact={"friction": friction},
         iteration={"neumann_body": neumann_body},
     )
-    return build(vf.Problem.from_dict(data))
+    return pair_from(vf.Problem.from_dict(data))
 
 
 def contact_run(pair, theta, norm="energy"):

@@ -15,7 +15,7 @@ from verification.advice.from_matrices import advise_matrices
 from verification.algorithm.relaxation import RULES, Constant
 from verification.algorithm.theta import automatic, choose, energy_bounds
 from verification.cli.problems import examples, load_problem
-from verification.interface.pair import build
+from verification.interface.pair import pair_from
 from verification.problem import ProblemError
 
 
@@ -71,7 +71,7 @@ def section6():
 
 def test_the_flagship_keeps_its_proved_theta_though_its_bound_asks_for_many_steps(section6):
     energy = energy_bounds(vf.measure(section6))
-    chosen = choose(build(section6), "auto")
+    chosen = choose(pair_from(section6), "auto")
     assert chosen.source == "proved"
     assert float(chosen.theta) == pytest.approx(0.7012, abs=1e-4)
     bound = math.log(1e-9) / math.log(energy.factor_proved.value)
@@ -105,12 +105,12 @@ def test_where_there_is_no_file_there_is_no_automatic_theta():
 @pytest.mark.parametrize("relaxation", ["constant", "aitken", "anderson", "newton"])
 def test_the_other_rules_take_a_theta_without_a_word(relaxation):
     problem = vf.Problem.from_dict(changed(iteration={"relaxation": relaxation}))
-    choice = choose(build(problem), "0.3")
+    choice = choose(pair_from(problem), "0.3")
     assert (choice.theta, choice.warnings) == (F(3, 10), [])
 
 
 def test_the_step_of_momentum_is_that_of_rho_whatever_theta_is():
-    pair = build(vf.Problem.from_dict(changed(contact={"friction": 0}, iteration={"relaxation": "momentum"})))
+    pair = pair_from(vf.Problem.from_dict(changed(contact={"friction": 0}, iteration={"relaxation": "momentum"})))
     choices = [choose(pair, theta) for theta in (0.5, "auto", None)]
     assert len({(choice.theta, choice.rho, choice.source) for choice in choices}) == 1
     assert choices[0].source == "momentum"

@@ -10,7 +10,7 @@ from verification.bounds.bound import Subject
 from verification.bounds.multipliers import QuadraticForms
 from verification.bounds.table import BOUNDS
 from verification.figures.best_theta import Panel, draw_best_theta
-from verification.figures.rules import draw_rules
+from verification.figures.sweep import draw_rules
 
 SMALL = vf.example("section6-60").changed(max_iterations=400)
 

@@ -198,7 +198,7 @@ def test_a_run_across_unlike_grids_ends_at_the_fixed_point():
 
 
 def test_roles_across_unlike_grids_are_not_exchanged():
-    with pytest.raises(ValueError, match="transfer of its own"):
+    with pytest.raises(ValueError, match="its own transfer"):
         unlike(0, 0.1).pair.swapped()
 
 

@@ -16,13 +16,12 @@ from problem_list import blocks, changed, plates, small
 
 import verification as vf
 from verification.bounds.bound import Subject
-from verification.bounds.exact import enclose
+from verification.bounds.lipschitz import enclose
 from verification.bounds.multipliers import QuadraticForms
 from verification.bounds.table import BOUNDS
 from verification.certificate import check
-from verification.certificate.claims import NoCertificate
+from verification.certificate.claims import NoCertificate, describe
 from verification.certificate.contraction import certify, check_again
-from verification.certificate.description import describe
 
 GRIDS_DIFFER = changed(small(), body2={"cells": [5, 2]})
 PROBLEMS = {

@@ -20,7 +20,7 @@ import verification as vf
 from fem1d2d import Condensation
 from ndtheory import PRINTED, REPAIRED, evaluate
 from verification.interface.body import Body
-from verification.interface.pair import build
+from verification.interface.pair import pair_from
 
 CONSTANTS = ("m", "M", "C_R", "C_s", "C_tr", "C_tr_half", "C_K", "rho_max", "rho_min", "rho_normal")
 
@@ -93,7 +93,7 @@ def dense_values(dense: DensePair) -> dict[str, float]:
 @given(data=strategies.contact_problems(most_cells=8))
 def test_measured_constants_are_the_extremal_eigenvalues_of_dense_pencils(data):
     """The least eigenvalue of A loses as many digits as the condition of A has."""
-    dense = DensePair.of(build(vf.Problem.from_dict(data)))
+    dense = DensePair.of(pair_from(vf.Problem.from_dict(data)))
     found, expected = values(data), dense_values(dense)
     if data["dimension"] == 1:
         assert [found.pop(name) for name in ("C_s", "C_tr", "C_tr_half", "C_K")] == [0.0] * 4
@@ -106,7 +106,7 @@ def test_measured_constants_are_the_extremal_eigenvalues_of_dense_pencils(data):
 def test_the_sparse_eigensolver_finds_the_same_ends_as_the_dense_one(data):
     for name in ("body1", "body2"):
         data[name]["cells"][1] += 3
-    found, dense = values(data), DensePair.of(build(vf.Problem.from_dict(data)))
+    found, dense = values(data), DensePair.of(pair_from(vf.Problem.from_dict(data)))
     for i, body in enumerate((dense.body1, dense.body2), 1):
         low, high = 1 / eigh(body.H, body.A, eigvals_only=True)[-1], eigh(body.A, body.H, eigvals_only=True)[-1]
         close(found, {f"m{i}": low, f"M{i}": high}, rounding(body))
@@ -116,7 +116,7 @@ def test_the_sparse_eigensolver_finds_the_same_ends_as_the_dense_one(data):
 @given(data=strategies.plane_problems(), seed=st.integers(0, 2**32 - 1))
 def test_each_constant_bounds_every_vector_and_is_attained(data, seed):
     """By its eigenvector, to 1e-9: nine tenths of it would not do."""
-    dense, found = DensePair.of(build(vf.Problem.from_dict(data))), values(data)
+    dense, found = DensePair.of(pair_from(vf.Problem.from_dict(data))), values(data)
     square = {"m": 1 / found["m"], "M1": found["M1"], "M2": found["M2"]}
     square |= {name: found[name] ** 2 for name in ("C_R", "C_s", "C_tr")}
     random = np.random.default_rng(seed)
@@ -159,7 +159,7 @@ def test_constants_and_displacements_need_no_dense_lift(monkeypatch):
 
 def by_lifts(body: Body, form: Any) -> np.ndarray:
     """``R' X R`` from the dense lift."""
-    fields = np.zeros((len(body.free), len(body.interface)))
+    fields = np.zeros((len(body.positions), len(body.interface)))
     fields[body.interface] = np.eye(len(body.interface))
     fields[body.elastic.inside] = body.elastic.lift
     return fields.T @ (form @ fields)
@@ -167,7 +167,7 @@ def by_lifts(body: Body, form: Any) -> np.ndarray:
 
 def test_the_matrices_of_a_fine_mesh_are_those_of_dense_lifts():
     """About 4,000 unknowns, 73 contact nodes, to 1e-12 of their norm; the constants by them, too."""
-    pair = build(vf.example("section6").changed(cells=((120, 10), (72, 10))))
+    pair = pair_from(vf.example("section6").changed(cells=((120, 10), (72, 10))))
     for side in (pair.body1, pair.body2):
         body = side.mesh_body
         for found, form in ((body.elastic.schur, body.stiffness), (body.lift_gram, body.gram_matrix)):
@@ -198,7 +198,7 @@ def test_another_unit_of_stress_leaves_the_repaired_thresholds_and_moves_the_pri
     small = with_moduli(data, Fraction(1e-3 / values(data)["m"]))
     large = with_moduli(small, Fraction(10**6))
     before, after = values(small), values(large)
-    dense = DensePair.of(build(vf.Problem.from_dict(data)))
+    dense = DensePair.of(pair_from(vf.Problem.from_dict(data)))
     near = 10 * rounding(dense.body1, dense.body2)  # thresholds are of degree up to 7 in m, M and C_R
     stresses = ("m", "M", "C_s", "C_K")
     close(after, {name: before[name] * (1e6 if name in stresses else 1) for name in CONSTANTS}, near)
@@ -212,7 +212,7 @@ def test_another_unit_of_stress_leaves_the_repaired_thresholds_and_moves_the_pri
 def test_the_editions_agree_in_the_unit_of_stress_in_which_m_is_1(data):
     """As nearly as m is 1 there: it is measured anew, and thresholds are of degree up to 7 in m, M and C_R."""
     unit = with_moduli(data, 1 / Fraction(values(data)["m"]))
-    dense = DensePair.of(build(vf.Problem.from_dict(unit)))
+    dense = DensePair.of(pair_from(vf.Problem.from_dict(unit)))
     close(thresholds(PRINTED, unit), thresholds(REPAIRED, unit), 10 * rounding(dense.body1, dense.body2))
 
 

@@ -12,8 +12,9 @@ import strategies
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from verification.contact import KKT, TOLERANCE, ContactError, ContactStep, certify
+from verification.contact import KKT, TOLERANCE, ContactError, ContactStep
 from verification.contact.active_set import ActiveSet, Pattern
+from verification.contact.kkt import KKTCertificate
 
 CONDITIONS = ("equilibrium", "non_penetration", "compression", "complementarity", "bound", "slip")
 
@@ -85,7 +86,7 @@ def test_the_active_set_closes_on_the_minimiser_or_says_that_it_does_not(random)
             step = ContactStep(S, everywhere(S), len(bound), "auto")
             found = step.solve(q, bound)
             assert found.solver == "cvxpy"
-        assert found.kkt == certify(S, q, bound, found.v, found.force)
+        assert found.kkt == KKTCertificate(S).measure(q, bound, found.v, found.force)
         assert found.kkt.residual <= TOLERANCE
         assert violations(S, q, bound, found.v, found.force) == []
         least = energy(S, q, bound, found.v)
@@ -122,7 +123,7 @@ def test_signs_that_turn_for_ever_below_the_tolerance_do_not_keep_a_step_from_it
         ContactStep(program[0], everywhere(program[0]), len(program[2]), "active-set").solve(*program[1:])
     S, q, bound = beside_a_large_force(*program, 1e12)
     found = ContactStep(S, everywhere(S), len(bound), solver).solve(q, bound)
-    assert found.kkt == certify(S, q, bound, found.v, found.force)
+    assert found.kkt == KKTCertificate(S).measure(q, bound, found.v, found.force)
     assert found.kkt.residual <= TOLERANCE
 
 
@@ -326,6 +327,10 @@ def broken(case: dict[str, np.ndarray], condition: str, size: float) -> dict[str
     if condition != "equilibrium":
         q = case["S"] @ v + force
     return case | {"v": v, "force": force, "q": q}
+
+
+def certify(S, **rest):
+    return KKTCertificate(S).measure(**rest)
 
 
 def test_a_solved_program_is_certified():

@@ -16,7 +16,7 @@ from sticking import Sticking, condensed, fixed_point
 from strategies import AT_NIGHT
 
 import verification as vf
-from verification.interface.pair import ContactPair, build
+from verification.interface.pair import ContactPair, pair_from
 
 DRAWS = 300 if AT_NIGHT else 30
 
@@ -33,7 +33,7 @@ def bodies(random: np.random.Generator, friction: str) -> ContactPair:
         contact={"friction": friction, "radius": str(random.choice(["1/8", "1/4", "1/2", "1", "2"]))},
         iteration={"neumann_body": int(random.integers(1, 3))},
     )
-    return build(vf.Problem.from_dict(data))
+    return pair_from(vf.Problem.from_dict(data))
 
 
 @cache
@@ -211,7 +211,7 @@ LONG_WAVE = changed(
 
 
 def refined(data: Any, halvings: int) -> ContactPair:
-    return build(vf.Problem.from_dict(data).refined(halvings))
+    return pair_from(vf.Problem.from_dict(data).refined(halvings))
 
 
 def sticking_on(pair: ContactPair, lo: float, hi: float, random: np.random.Generator, way: int = 0) -> Sticking:

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 import verification as vf
-from verification.certificate import contraction, description
-from verification.problem import changes, digest, reading, specification
+from verification.certificate import claims, contraction
+from verification.problem import reading, specification
 from verification.problem.specification import Problem
 from verification.problem.specs import ContactSpec, Settings
 from verification.problem.tables import non_negative
@@ -45,21 +45,21 @@ def later_contact(monkeypatch):
         found = read({**data, "contact": contact}, *given)
         return replace(found, contact=LaterContact(**vars(found.contact), adhesion=adhesion))
 
-    for module in (reading, changes, digest, specification):
+    for module in (reading, specification):
         monkeypatch.setattr(module, "read_problem", read_later)
 
 
 def later_table(monkeypatch):
     """Put a table `step` into what a digest reads and writes, empty by default."""
-    read, tables = digest.read_problem, digest.tables
+    read, tables = specification.read_problem, specification.tables
 
     def read_later(data, *given):
         found = read({key: value for key, value in data.items() if key != "step"}, *given)
         values = {field.name: getattr(found, field.name) for field in fields(found)}
         return LaterProblem(**values, steps=data.get("step", ()))
 
-    monkeypatch.setattr(digest, "read_problem", read_later)
-    monkeypatch.setattr(digest, "tables", lambda problem: tables(problem) | {"step": getattr(problem, "steps", ())})
+    monkeypatch.setattr(specification, "read_problem", read_later)
+    monkeypatch.setattr(specification, "tables", lambda it: tables(it) | {"step": getattr(it, "steps", ())})
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -92,14 +92,14 @@ def test_a_key_that_the_file_must_have_counts(monkeypatch):
     before = vf.example("two-bars").digest
     later_contact(monkeypatch)
     problem = vf.Problem.from_dict(vf.example("two-bars").to_dict())
-    read = digest.read_problem
+    read = specification.read_problem
 
     def demanding(data, *given):
         if "adhesion" not in data["contact"]:
             raise vf.ProblemError(given[0], "contact.adhesion", None, "this key is missing")
         return read(data, *given)
 
-    monkeypatch.setattr(digest, "read_problem", demanding)
+    monkeypatch.setattr(specification, "read_problem", demanding)
     assert problem.digest != before
 
 
@@ -115,10 +115,10 @@ OF_0_1_0 = [
 @pytest.mark.parametrize(("table", "key"), OF_0_1_0)
 def test_keys_of_0_1_0_count_with_their_defaults_too(monkeypatch, table, key):
     """A release that changes a default leaves digests as they are, and tells its problems from those before."""
-    problem, tables = vf.example("section6"), digest.tables
+    problem, tables = vf.example("section6"), specification.tables
     before = problem.digest
     less = lambda data: {name: value for name, value in data.items() if name != key}
-    monkeypatch.setattr(digest, "tables", lambda p: tables(p) | {table: less(tables(p)[table])})
+    monkeypatch.setattr(specification, "tables", lambda p: tables(p) | {table: less(tables(p)[table])})
     assert problem.digest != before
 
 
@@ -146,7 +146,7 @@ def certified():
 
 def describing(monkeypatch, more):
     """Let descriptions have more keys."""
-    describe = description.describe
+    describe = claims.describe
     monkeypatch.setattr(contraction, "describe", lambda *given: describe(*given) | more)
 
 

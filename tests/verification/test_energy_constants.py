@@ -16,7 +16,7 @@ from scipy.linalg import eigh
 
 import verification as vf
 from verification.constants import Measured
-from verification.interface.pair import build
+from verification.interface.pair import pair_from
 
 NAMES = ("rho_max", "rho_min", "rho_normal", "C_s_energy", "C_t1", "C_t2", "kappa_1", "kappa_2")
 
@@ -98,7 +98,7 @@ def dense_values(dense: DensePair) -> dict[str, float]:
 @strategies.fewer(6, at_night=3)
 @given(data=strategies.contact_problems(most_cells=8))
 def test_the_energy_constants_are_the_extremal_eigenvalues_of_pencils_of_whole_bodies(data):
-    found, dense = values(measured_of(data)), DensePair.of(build(vf.Problem.from_dict(data)))
+    found, dense = values(measured_of(data)), DensePair.of(pair_from(vf.Problem.from_dict(data)))
     expected = dense_values(dense)
     if data["dimension"] == 1:
         assert [found[name] for name in ("C_s_energy", "C_t1", "C_t2", "kappa_1", "kappa_2")] == [0.0] * 5
@@ -110,7 +110,7 @@ def test_the_energy_constants_are_the_extremal_eigenvalues_of_pencils_of_whole_b
 @given(data=strategies.plane_problems(), seed=seeds)
 def test_each_energy_constant_bounds_every_vector_and_is_attained(data, seed):
     """By its eigenvector, to rounding: 0.99 of it would not do."""
-    dense, found = DensePair.of(build(vf.Problem.from_dict(data))), values(measured_of(data))
+    dense, found = DensePair.of(pair_from(vf.Problem.from_dict(data))), values(measured_of(data))
     near, random = rounding(dense), np.random.default_rng(seed)
     for name, (X, Y) in quotients(dense).items():
         square = found[name] if name.startswith("rho") else found[name] ** 2
@@ -126,7 +126,7 @@ def test_each_energy_constant_bounds_every_vector_and_is_attained(data, seed):
 @given(data=strategies.plane_problems(), seed=seeds)
 def test_rho_bounds_the_reaction_by_the_energy_of_the_contact_body(data, seed):
     """``|||S_1 d_1|||^2 <= rho |d_1|^2``; without friction, where only normal forces act, with rho_normal."""
-    dense, found = DensePair.of(build(vf.Problem.from_dict(data))), values(measured_of(data))
+    dense, found = DensePair.of(pair_from(vf.Problem.from_dict(data))), values(measured_of(data))
     S_1, F_2, t = dense.contact.S, flexibility(dense.neumann), dense.t
     near, random = rounding(dense), np.random.default_rng(seed)
     for force in random.standard_normal((5, len(S_1))):
@@ -142,7 +142,7 @@ def test_rho_bounds_the_reaction_by_the_energy_of_the_contact_body(data, seed):
 @given(data=strategies.plane_problems(), seed=seeds)
 def test_the_kappas_bound_the_friction_term(data, seed):
     """``sum_j w_j k |zeta_j| |(d_1 - d_2)_Tj| <= kappa_1 |d_1| |d_2| + kappa_2 |d_2|^2``, zeta = R (S_2 d_2)_N."""
-    dense, found = DensePair.of(build(vf.Problem.from_dict(data))), values(measured_of(data))
+    dense, found = DensePair.of(pair_from(vf.Problem.from_dict(data))), values(measured_of(data))
     S_1, S_2, t = dense.contact.S, dense.neumann.S, dense.t
     random = np.random.default_rng(seed)
     for _ in range(5):
@@ -183,7 +183,7 @@ CHANGES: dict[str, tuple[Callable[[Mapping[str, Any], Fraction], dict[str, Any]]
 def test_rho_and_the_kappas_know_no_units(unit, data, c):
     """C_s goes with the root of stress over length, C_t1 and C_t2 with its inverse."""
     change, powers = CHANGES[unit]
-    dense = DensePair.of(build(vf.Problem.from_dict(data)))
+    dense = DensePair.of(pair_from(vf.Problem.from_dict(data)))
     before, after = values(measured_of(data)), values(measured_of(change(data, c)))
     expected = {name: before[name] * float(c) ** powers.get(name, 0) for name in NAMES}
     close(after, expected, 10 * rounding(dense))
@@ -193,7 +193,7 @@ def test_rho_and_the_kappas_know_no_units(unit, data, c):
 @given(data=strategies.contact_problems(), c=st.sampled_from([Fraction(1, 50), Fraction(1, 3), Fraction(40)]))
 def test_rho_goes_with_the_ratio_of_the_moduli(data, c):
     """One body c times as stiff: rho c times as large or small, C_s and C_t of that body by its root."""
-    dense = DensePair.of(build(vf.Problem.from_dict(data)))
+    dense = DensePair.of(pair_from(vf.Problem.from_dict(data)))
     stiffer = data | {"body1": data["body1"] | {"young": c * data["body1"]["young"]}}
     before, after = values(measured_of(data)), values(measured_of(stiffer))
     root, contact = float(c) ** 0.5, data["iteration"]["neumann_body"] == 2
@@ -209,7 +209,7 @@ def test_swapped_roles_turn_rho_over_and_exchange_the_traces(data):
     """C_s becomes that of the other body: from its own pencil."""
     problem = vf.Problem.from_dict(data)
     here, there = values(vf.measure(problem)), values(vf.measure(problem.swapped()))
-    dense = DensePair.of(build(problem.swapped()))
+    dense = DensePair.of(pair_from(problem.swapped()))
     near = rounding(dense)
     exchanged = {"rho_max": 1 / here["rho_min"], "rho_min": 1 / here["rho_max"]}
     close(there, exchanged | {"C_t1": here["C_t2"], "C_t2": here["C_t1"]}, near)

@@ -12,9 +12,9 @@ from strategies import AT_NIGHT
 import verification as vf
 from verification.bounds import interior_point
 from verification.bounds.conditions import Pieces
-from verification.bounds.exact import budget, enclose
+from verification.bounds.interior_point import Stop
+from verification.bounds.lipschitz import budget, enclose
 from verification.bounds.multipliers import QuadraticForms
-from verification.bounds.program import Stop
 
 THETA = 0.7
 

@@ -12,12 +12,11 @@ from coupling_logs import linear_run, precice
 import verification as vf
 from ndtheory import HypothesisError
 from verification.advice import from_logs
-from verification.advice.columns import seen_column
 from verification.advice.ends import SWIFT, Box
-from verification.advice.log import Column, Log
+from verification.advice.log_files import Column, Log
 from verification.advice.pace import Pace
 from verification.advice.readings import NextRun, Observed, read_observed, read_plateau
-from verification.advice.seen import LogBound, RhoInterval, SeenColumn, SeenLog
+from verification.advice.seen import LogBound, RhoInterval, SeenColumn, SeenLog, seen_column
 from verification.problem.tables import ProblemError
 
 
@@ -39,7 +38,7 @@ def log(theta, ratio=None, *, kinds=("steady",), plateau=None, residual="absolut
     if ratio is not None:
         readings, following, rho = read_observed(F(theta), ratio)
     given = {"readings": readings, "next": following, "rho": rho} | more
-    return SeenLog(file=file, form="columns", theta=F(theta), steps=50, columns=(column,), notes=(), **given)
+    return SeenLog(file=file, form="columns", theta=F(theta), columns=(column,), notes=(), **given)
 
 
 def bound(value, file="a.log", theta="0.5"):
@@ -145,7 +144,7 @@ def test_of_a_log_that_shows_no_ratio_the_next_run_follows_its_end():
     column = lambda *paces: (
         SeenColumn(name="r", residual="absolute", paces=paces, windows=1, ratio=None, plateau=None),
     )
-    longer = lambda *paces: from_logs.longer(column(*paces), F(3, 10), 17)
+    longer = lambda *paces: from_logs.longer(column(*paces), F(3, 10))
     arrived = Pace(kind="unsteady", steps=20, height=1e-7)
     short = Pace(kind="short", steps=5, height=0.5)
     assert longer(arrived, Pace(kind="unsteady", steps=30, height=1e-8)).why.startswith(
@@ -323,7 +322,7 @@ def test_what_logs_leave_together_decides_within_1_4_and_else_names_a_run_below_
 
 def test_rho_is_taken_at_the_upper_end_of_all_that_is_left(monkeypatch):
     left = [Box(a=(1.0, 1.0), b=(1.3, 1.4)), Box(a=(1.0, 1.0), b=(1.1, 1.2))]
-    monkeypatch.setattr(from_logs, "common", lambda each: left)
+    monkeypatch.setattr("verification.advice.ends.common", lambda each: left)
     falls = log("0.9", "0.2")
     assert float(from_logs.by_ends((falls,), falls, None, True)[2]) == pytest.approx(0.4)
 

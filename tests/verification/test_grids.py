@@ -283,7 +283,7 @@ def test_a_traction_acts_on_what_gamma_c_leaves_of_a_side(ends):
     without = discretise(vf.Problem.from_dict(changed(data, body1={"traction": None}))).body1
     a, b = map(float, ends)
     load = np.zeros(body.mesh.points.shape)
-    load.ravel()[body.free] = body.load - without.load
+    load.ravel()[body.positions] = body.load - without.load
     assert load.sum(axis=0) == pytest.approx([3 * (2 - (b - a)), -5 * (2 - (b - a))], rel=1e-12)
     moment = -5 * (2**2 - (b**2 - a**2)) / 2
     assert load[:, 1] @ body.mesh.points[:, 0] == pytest.approx(moment, rel=1e-12)

@@ -15,12 +15,10 @@ from dense_oracle import DenseBody, DensePair, symmetric, top
 from section_5 import PAIRS, assert_all_hold, draw_pair, ratios, thetas_for
 
 from verification.interface.interface import Interface
-from verification.ledger.cases import NAMED, problem
+from verification.ledger.cases import NAMED, PROBLEMS, problem
 from verification.ledger.convergence import RunsOfLevel, there_and_back
 from verification.ledger.differences import Difference
-from verification.ledger.field_problems import PROBLEMS
-from verification.ledger.inequalities import ALLOWANCE, INEQUALITIES
-from verification.ledger.reading import Reading
+from verification.ledger.inequalities import ALLOWANCE, INEQUALITIES, Reading
 from verification.ledger.solutions import CHECKS
 from verification.ledger.weak_forms import Case, Weak
 from verification.ledger.worst import Trial, draw_cases, pairs_of

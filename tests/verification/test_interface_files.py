@@ -152,7 +152,7 @@ def test_a_folder_holds_the_problem_the_tables_and_the_interface(arrays, tmp_pat
     problem = vf.Problem.from_dict(plates())
     problem = problem.with_keys({"body1.cells": "[10, 2]", "body2.cells": "[6, 2]"})
     run = vf.run(problem)
-    Folder(tmp_path / "run", "run").write_run(run)
+    Folder(tmp_path / "run", "run").write(run)
     folder = tmp_path / "run"
     assert vf.load(folder / "problem.toml") == problem
     contact, history = rows(folder / "contact.csv"), rows(folder / "history.csv")
@@ -169,11 +169,11 @@ def test_a_problem_file_of_a_user_stays_as_it_is_and_ours_is_replaced(tmp_path):
     there = tmp_path / "problem.toml"
     there.write_text("# mine\n" + problem.to_toml(), encoding="utf-8")
     solution = vf.solve(problem.changed(friction="1/3"))
-    Folder(tmp_path, "solve").write_solution(solution)
+    Folder(tmp_path, "solve").write(solution)
     assert there.read_text("utf-8").startswith("# mine")
     there.unlink()
     for k in ("1/3", "1/4"):
-        Folder(tmp_path, "solve").write_solution(vf.solve(problem.changed(friction=k)))
+        Folder(tmp_path, "solve").write(vf.solve(problem.changed(friction=k)))
         assert (
             vf.load(there).contact.friction
             == vf.Problem.from_dict(problem.to_dict()).changed(friction=k).contact.friction

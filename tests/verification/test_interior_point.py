@@ -9,8 +9,8 @@ from chain_problems import case
 
 import verification as vf
 from verification.bounds import interior_point, model
+from verification.bounds.interior_point import LMIError, Optimum, Program, Stop
 from verification.bounds.multipliers import QuadraticForms
-from verification.bounds.program import LMIError, Optimum, Program, Stop
 
 SEEDS = list(islice((seed for seed in count() if case(seed)[0].contact.grid.n <= 4), 10))
 

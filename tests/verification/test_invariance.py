@@ -21,12 +21,12 @@ from verification.algorithm.runs import Run
 from verification.algorithm.start import Start
 from verification.algorithm.theta import Choice
 from verification.contact import ContactError
-from verification.interface.pair import build
+from verification.interface.pair import pair_from
 
 
 def few_steps(data: Mapping[str, Any], count: int = 4) -> list[Run]:
     """The first evaluations of T, each to be read as a finished run."""
-    pair = build(vf.Problem.from_dict(data))
+    pair = pair_from(vf.Problem.from_dict(data))
     try:
         states = list(islice(vf.iterate(pair, solver="active-set"), count))
     except ContactError:  # the guess cycled: slower, but sure

@@ -22,7 +22,7 @@ from verification.algorithm.ending import PATIENCE, RUNAWAY
 from verification.algorithm.fixed_point import FixedPointMap, Iterate
 from verification.algorithm.runs import MOST_BYTES, Run
 from verification.contact import TOLERANCE, ContactError
-from verification.interface.pair import build
+from verification.interface.pair import pair_from
 
 # --- two bars: everything in closed form ------------------------------------------------------------------------------
 
@@ -75,7 +75,7 @@ class ExactBars:
 def test_T_of_two_bars_is_a_broken_line(data, multiple):
     T = ExactBars(data)
     g = multiple * (abs(T.l1) + abs(T.l2) + T.S2 * T.gap)
-    u, solution = FixedPointMap(build(vf.Problem.from_dict(data)), "active-set")(np.array([float(g)]))
+    u, solution = FixedPointMap(pair_from(vf.Problem.from_dict(data)), "active-set")(np.array([float(g)]))
     assert solution.force[0] == pytest.approx(float(T(g)), rel=0, abs=1e-13 * T.size(g))
     assert u[0] == pytest.approx(float((g + T.l2) / T.S2), rel=0, abs=1e-13 * T.size(g) / float(T.S1))
 
@@ -86,7 +86,7 @@ def test_the_fixed_point_of_two_bars_is_where_the_broken_line_meets_the_diagonal
     T = ExactBars(data)
     exact = T.fixed_point
     assert T(exact) == exact
-    _, solution = FixedPointMap(build(vf.Problem.from_dict(data)), "active-set")(np.array([float(exact)]))
+    _, solution = FixedPointMap(pair_from(vf.Problem.from_dict(data)), "active-set")(np.array([float(exact)]))
     assert solution.force[0] == pytest.approx(float(exact), rel=0, abs=1e-13 * T.size(exact))
 
 
@@ -166,7 +166,7 @@ def test_all_solvers_give_the_same_iterates_and_certify_each(name):
 @given(data=strategies.contact_problems())
 def test_each_state_follows_from_the_one_before(data):
     """(III), and the residual and the size in the norm (5.21)."""
-    pair = build(vf.Problem.from_dict(data))
+    pair = pair_from(vf.Problem.from_dict(data))
     theta, S2 = float(data["iteration"]["theta"]), pair.neumann.stiffness
     try:
         states = list(islice(vf.iterate(pair, solver="active-set"), 4))

@@ -17,13 +17,13 @@ from problem_list import PROBLEMS, bars
 import verification as vf
 from verification.algorithm.affine_piece import Piece, piece_of
 from verification.algorithm.linearisation import NotLinear, linearise
-from verification.interface.pair import build
+from verification.interface.pair import pair_from
 
 
 @strategies.fewer(1)
 @given(data=strategies.contact_problems(), random=seeds)
 def test_the_derivatives_of_a_piece_are_differences_of_T_over_a_step_inside_it(data, random):
-    pair = build(vf.Problem.from_dict(data))
+    pair = pair_from(vf.Problem.from_dict(data))
     assume(assert_affine(pair, forces(pair, random), random))
 
 
@@ -31,7 +31,7 @@ def test_the_derivatives_of_a_piece_are_differences_of_T_over_a_step_inside_it(d
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_T_is_affine_around_the_iterates_of_a_run(name, count):
     """With the local law, with contact nodes held, at a kernel that sees single nodes, for bars."""
-    pair = build(vf.Problem.from_dict(PROBLEMS[name]))
+    pair = pair_from(vf.Problem.from_dict(PROBLEMS[name]))
     g, random = along_a_run(pair, count), np.random.default_rng(count)
     assert assert_affine(pair, g, random) or count == 0  # 0 itself lies on an edge: no friction bound is smooth there
 
@@ -53,7 +53,7 @@ MUTANTS: dict[str, Callable[[Piece], Piece]] = {
 
 @pytest.mark.parametrize("mutant", MUTANTS)
 def test_the_derivative_on_another_piece_is_found_out(mutant):
-    pair = build(vf.Problem.from_dict(PROBLEMS["sheared until it slips"]))
+    pair = pair_from(vf.Problem.from_dict(PROBLEMS["sheared until it slips"]))
     g, random = along_a_run(pair, 5), np.random.default_rng(0)
     assert assert_affine(pair, g, random)
     with pytest.raises(AssertionError):
@@ -88,7 +88,7 @@ def test_a_force_on_a_held_node_of_the_neumann_body_moves_nothing():
 @given(data=strategies.contact_problems(), random=seeds, theta=st.floats(0.01, 0.99))
 def test_J_theta_is_theta_times_the_derivative_and_1_minus_theta_times_the_identity(data, random, theta):
     """In coordinates in which (5.21) is Euclidean, and |J| is its largest ratio, attained by two forces."""
-    pair = build(vf.Problem.from_dict(data))
+    pair = pair_from(vf.Problem.from_dict(data))
     state = Evaluated(pair)(forces(pair, random))
     piece, norm = piece_of(pair, state.g, state.contact.pattern), pair.neumann.dual_norm
     J, basis = piece.relaxed(theta), piece.basis
@@ -112,7 +112,7 @@ def test_J_theta_is_theta_times_the_derivative_and_1_minus_theta_times_the_ident
 @given(data=strategies.bar_problems(), theta=st.floats(0.01, 0.99))
 def test_between_two_bars_the_derivative_is_minus_rho_in_contact_and_0_apart(data, theta):
     """In contact the force vanishes after a step of g*/rho; |J| = rho(J) = |1 - theta - theta rho|."""
-    pair = build(vf.Problem.from_dict(data))
+    pair = pair_from(vf.Problem.from_dict(data))
     rho = pair.contact.stiffness[0, 0] / pair.neumann.stiffness[0, 0]
     state = at_solution(pair)
     assume(state is not None)  # the loads may be equal to the last digit, and T g mere rounding
@@ -137,6 +137,6 @@ def test_between_two_bars_the_derivative_is_minus_rho_in_contact_and_0_apart(dat
 
 def test_bars_that_just_touch_are_not_linearised():
     data = bars((1, 1), (2, 1), (1, 1), body2={"prescribed": {"right": 0}})
-    pair = build(vf.Problem.from_dict(data))
+    pair = pair_from(vf.Problem.from_dict(data))
     with pytest.raises(NotLinear, match="the node at x = 1 is about to change its state"):
         linearise(pair, Evaluated(pair)(np.zeros(1)), 0.5)

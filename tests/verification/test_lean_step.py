@@ -17,8 +17,9 @@ import verification as vf
 from verification.algorithm.fixed_point import RENEWED, FixedPointMap, iterate_at, iterates
 from verification.algorithm.rates import noise
 from verification.algorithm.relaxation import RULES, Constant
-from verification.contact import ContactError, active_set, certify
+from verification.contact import ContactError, active_set
 from verification.contact.active_set import ActiveSet, Pattern
+from verification.contact.kkt import KKTCertificate
 from verification.dense import Cholesky, times, worst
 from verification.interface import body
 from verification.interface.body import Condensed
@@ -124,7 +125,7 @@ def test_every_step_keeps_a_certificate_of_its_own(name):
         solved, bound = state.contact, pair.bound(state.g)
         assert solved.kkt.residual <= 1e-11
         if pair.contact.free.all():
-            found = certify(pair.contact.stiffness, q, bound, solved.v, solved.force)
+            found = KKTCertificate(pair.contact.stiffness).measure(q, bound, solved.v, solved.force)
             assert found.residual <= 1e-11
             assert abs(found.residual - solved.kkt.residual) <= 1e-13
 

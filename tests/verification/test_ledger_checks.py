@@ -9,8 +9,8 @@ import pytest
 from ledger_evidence import HOLDS, PRINTED, REPAIRED, STEP, holds
 
 from fem1d2d import Condensation
-from verification.interface.pair import build
-from verification.ledger import convergence, field_problems, moves, weak_forms
+from verification.interface.pair import pair_from
+from verification.ledger import cases, convergence, weak_forms
 from verification.ledger import solutions as ledger
 from verification.ledger.convergence import RunsOfLevel
 from verification.ledger.weak_forms import EXACT, Case, Fields, Weak
@@ -20,7 +20,7 @@ from verification.problem.specification import Problem
 
 
 def pressed(name="sheared, body 2 Neumann"):
-    return Case(name=name, problem=Problem.from_dict(field_problems.PROBLEMS[name]))
+    return Case(name=name, problem=Problem.from_dict(cases.PROBLEMS[name]))
 
 
 def loaded(case, force):
@@ -28,7 +28,7 @@ def loaded(case, force):
     weak, fields = case.weak, []
     for body, own in zip((weak.one, weak.two), force, strict=True):
         load = body.load.copy()
-        load[body.interface] += weak.pair.orient(own)
+        load[body.interface] += weak.pair.contact.orient(own)
         fields.append(body.solve(load))
     return Fields(one=fields[0], two=fields[1])
 
@@ -112,7 +112,7 @@ class OtherBody(Weak):
 @pytest.mark.parametrize("statement", ["2.6", "4.4", "4.9.2", "5.2", "5.3", "5.5"])
 def test_a_friction_bound_one_per_mille_too_small_is_found_out(statement):
     case = pressed()
-    wrong = given(case, weak=Slippery(pair=build(case.problem)))
+    wrong = given(case, weak=Slippery(pair=pair_from(case.problem)))
     assert holds(asked(statement, wrong))[-1][1] is False
 
 
@@ -123,7 +123,7 @@ def test_the_friction_bound_is_that_of_the_neumann_body():
     for state in case.arbitrary:
         weak = OtherBody(pair=case.weak.pair)
         object.__setattr__(weak, "u", weak.at(state))
-        d = moves.moves_of_one(weak, weak.u, rng, 10)
+        d = weak_forms.moves_of_one(weak, weak.u, rng, 10)
         assert weak_forms.contact_inequality(case.weak, weak.u, d).min() >= -EXACT
         worst.append(weak_forms.contact_inequality(weak, weak.u, d).min())
     assert max(worst) < -1e-6
@@ -133,7 +133,7 @@ def test_the_friction_bound_is_that_of_the_neumann_body():
 def test_the_sign_of_step_III_is_found_out(sign):
     case = pressed()
     state, _ = case.steps[1]
-    v = moves.directions(np.random.default_rng(0), case.weak.two, 5)
+    v = weak_forms.directions(np.random.default_rng(0), case.weak.two, 5)
     off = weak_forms.transfer(case.weak, case.weak.at(state), sign * state.image, v)
     assert (off.max() <= EXACT) == (sign == 1)
     assert sign == 1 or off.min() > 1e-6
@@ -173,9 +173,7 @@ def test_the_printed_friction_term_fails_where_a_sticking_node_moves():
 
 
 def test_on_two_bars_the_printed_sign_gives_the_factor_of_the_cobweb():
-    bars = Case(
-        name="bars", problem=Problem.from_dict(field_problems.CONVERGENT["two bars"] | {"iteration": {"theta": "0.3"}})
-    )
+    bars = Case(name="bars", problem=Problem.from_dict(cases.CONVERGENT["two bars"] | {"iteration": {"theta": "0.3"}}))
     distance = convergence.distances(bars, -1, 4)
     rho, theta = 1.0, 0.3
     # an error e gives T an error -rho e, so that the printed step is e (1 - theta + theta rho) - 2 theta g
@@ -187,7 +185,8 @@ def test_on_two_bars_the_printed_sign_gives_the_factor_of_the_cobweb():
 
 @pytest.mark.parametrize("of", [PRINTED, REPAIRED])
 def test_a_contraction_factor_one_per_cent_too_small_is_found_out(of):
-    runs = {PRINTED: convergence.inside("quick"), REPAIRED: convergence.energy("quick")}
+    quick = RunsOfLevel(level="quick")
+    runs = {PRINTED: quick.inside, REPAIRED: quick.energy}
     verdict = lambda: holds(convergence.forces_converge(SimpleNamespace(inside=runs[PRINTED], energy=runs[REPAIRED])))
     assert verdict() == [(PRINTED, True), (REPAIRED, True)]
     runs[of] = [replace(run, factor=0.99 * run.factor) for run in runs[of]]

@@ -6,7 +6,7 @@ from fractions import Fraction
 import pytest
 from ledger_evidence import HOLDS, PRINTED, REPAIRED, STEP, holds
 
-from verification.interface.pair import build
+from verification.interface.pair import pair_from
 from verification.ledger import experiments as section_6
 from verification.ledger import solutions as ledger
 from verification.ledger.evidence import settle
@@ -283,7 +283,7 @@ def test_a_figure_that_no_reading_shows_is_told_with_the_zones_of_the_nearest():
 
 
 def test_runs_that_stop_early_do_not_give_the_same_results():
-    pair, contact = build(READINGS[0].problem(190)), solve(READINGS[0].problem(190)).contact
+    pair, contact = pair_from(READINGS[0].problem(190)), solve(READINGS[0].problem(190)).contact
     loose, tight = (section_6.finished(pair, section_6.PRINTED, bound).contact for bound in (1e-5, section_6.TIGHT))
     assert section_6.difference(loose, contact) > section_6.SAME
     assert section_6.difference(tight, contact) < 1e-10
@@ -335,7 +335,7 @@ def test_a_test_measures_the_error_if_neither_theta_nor_the_unit_matters(runs, v
 
 
 def test_both_tests_stop_where_the_residuals_of_a_run_say():
-    pair = build(READINGS[0].problem(190))
+    pair = pair_from(READINGS[0].problem(190))
     printed, residual = section_6.stopped(pair, Fraction(3, 5), solution_force(pair))
     (row,) = sweep(READINGS[0].problem(190), theta=["3/5"]).rows
     assert printed.steps == row["iterations_paper"]

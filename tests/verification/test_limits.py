@@ -82,7 +82,7 @@ class Coupled:
     def __init__(self, run: Run) -> None:
         self.pair = pair = run.pair
         self.bodies = [dense_body(pair, name) for name in ("body1", "body2")]
-        force = pair.orient(run.last.image)
+        force = pair.contact.orient(run.last.image)
         self.force = force if pair.neumann_body == 2 else -force
         self.u = [self.displacement(body, f) for body, f in zip(self.bodies, (-self.force, self.force), strict=True)]
 

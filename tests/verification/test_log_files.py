@@ -8,7 +8,7 @@ from strategies import AT_NIGHT
 
 from ndtheory import HypothesisError
 from verification.advice.from_logs import advise_logs
-from verification.advice.logs import read_log
+from verification.advice.log_files import read_log
 from verification.problem import ProblemError
 
 MODES = (0.2, 0.5, 1.1, 3.0)  # tied; rho = 3

@@ -12,7 +12,7 @@ from strategies import AT_NIGHT
 
 import verification as vf
 from verification.advice.from_logs import advise_logs
-from verification.interface.pair import build
+from verification.interface.pair import pair_from
 
 MODES = (0.2, 0.5, 1.1, 3.0)  # tied; rho = 3
 
@@ -92,7 +92,7 @@ def test_a_relative_residual_that_is_not_flat_or_too_high_is_no_plateau(tmp_path
 
 def test_a_residual_that_stays_at_a_level_is_a_cycle_and_bounds_rho_at_k_0_alone(tmp_path):
     """Section 6 with the roles exchanged, without friction, at twice the theta that contracts."""
-    pair = build(vf.Problem.from_dict(changed(contact={"friction": "0"}, iteration={"neumann_body": 2})))
+    pair = pair_from(vf.Problem.from_dict(changed(contact={"friction": "0"}, iteration={"neumann_body": 2})))
     rho = vf.measure(pair).rho_normal.value
     theta = round(4 / (1 + rho), 3)
     absolute, relative = contact_run(pair, theta, 80)
@@ -114,7 +114,7 @@ def nearly_incompressible():
         contact={"friction": "0"},
         iteration={"neumann_body": 1},
     )
-    return build(vf.Problem.from_dict(data))
+    return pair_from(vf.Problem.from_dict(data))
 
 
 @pytest.mark.slow
@@ -282,7 +282,7 @@ def test_following_the_logs_of_two_bodies_in_contact_ends_in_a_theta_that_conver
         body1={"young": E1}, body2={"young": E2},
         contact={"friction": friction}, iteration={"neumann_body": neumann_body},
     )  # fmt: skip
-    pair = build(vf.Problem.from_dict(data))
+    pair = pair_from(vf.Problem.from_dict(data))
     noises = (0, 0.01) if friction == "0" else (0.01, 0)
     for start, noise in itertools.product((0.9, 0.3), noises) if AT_NIGHT else zip((0.9, 0.3), noises, strict=True):
         logs, theta = [], start

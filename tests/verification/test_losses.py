@@ -25,8 +25,8 @@ from verification.bounds.losses import Losses, locate
 from verification.bounds.neighbours import squared
 from verification.bounds.pattern_search import FoundFactor, worst_piece
 from verification.constants import Measured, measure
-from verification.interface.pair import ContactPair, build
-from verification.ledger.draws import uniform_piece
+from verification.interface.pair import ContactPair, pair_from
+from verification.ledger.differences import uniform_piece
 
 #: Labels whose worst pair is an eigenvector; of the others it is searched.
 EIGENVALUES = ("(5.18)", "(5.19)", "(5.22)", "(5.23)", "(5.29)")
@@ -191,7 +191,7 @@ def test_no_inequality_gives_away_less_than_nothing(seed):
 @strategies.fewer(4)
 @given(data=strategies.contact_problems())
 def test_a_link_without_T_gives_away_what_the_eigenvalue_of_a_dense_pencil_says(data):
-    pair = build(vf.Problem.from_dict(data))
+    pair = pair_from(vf.Problem.from_dict(data))
     case = Case(pair, measure(pair))
     m, M, A = case.m, case.M, case.M * case.C_R
     reaction = lambda gram: symmetric(case.S_1 @ gram @ case.S_1)
@@ -294,7 +294,7 @@ def in_unit(pair: ContactPair, factor: Fraction) -> ContactPair:
     """Moduli times a factor."""
     stiffer = lambda body: replace(body, young=body.young * factor)
     problem = pair.problem
-    return build(replace(problem, body1=stiffer(problem.body1), body2=stiffer(problem.body2)))
+    return pair_from(replace(problem, body1=stiffer(problem.body1), body2=stiffer(problem.body2)))
 
 
 @pytest.mark.parametrize("factor", [Fraction(10) ** 6, Fraction(10) ** -6], ids=["10^6", "10^-6"])
@@ -324,7 +324,7 @@ def test_without_friction_nothing_is_lost_on_friction():
 
 def test_between_two_bars_only_the_constants_lose():
     """T is ``-rho`` times g: every quotient in closed form, and d_1 = d_2 in contact."""
-    pair = build(vf.Problem.from_dict(loaded_bars((1, 2), (3, 2), "0.2")))
+    pair = pair_from(vf.Problem.from_dict(loaded_bars((1, 2), (3, 2), "0.2")))
     found = Case(pair, measure(pair))
     rho = float(found.S_1[0, 0] / found.S_2[0, 0])
     C_T = found.M * found.C_R / found.m * found.X
@@ -334,5 +334,5 @@ def test_between_two_bars_only_the_constants_lose():
 
 
 def test_where_a_contact_node_is_held_no_losses_are_located():
-    pair = build(vf.Problem.from_dict(PROBLEMS["contact nodes held tangentially"]))
+    pair = pair_from(vf.Problem.from_dict(PROBLEMS["contact nodes held tangentially"]))
     assert locate(pair, measure(pair)) is None

@@ -18,7 +18,7 @@ from verification.algorithm.affine_piece import Piece, piece_of
 from verification.algorithm.iterate import Iterate
 from verification.algorithm.linearisation import NotLinear, linearise
 from verification.contact.active_set import Pattern
-from verification.interface.pair import ContactPair, build
+from verification.interface.pair import ContactPair, pair_from
 
 
 def nearest_change(T: Evaluated, state: Iterate, piece: Piece) -> tuple[float, np.ndarray]:
@@ -87,7 +87,7 @@ def test_within_the_margin_no_node_changes_its_state_and_just_beyond_it_one_does
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_the_margin_is_that_of_the_sample_problems_too(name):
     """With the local law, with contact nodes held, for bars."""
-    assert assert_margin(build(vf.Problem.from_dict(PROBLEMS[name])), np.random.default_rng(0))
+    assert assert_margin(pair_from(vf.Problem.from_dict(PROBLEMS[name])), np.random.default_rng(0))
 
 
 # --- solutions that were chosen ---------------------------------------------------------------------------------------
@@ -113,7 +113,7 @@ def chosen(pair: ContactPair, touching: list[bool], sliding: list[int], random: 
 def four_nodes(**contact: Any) -> ContactPair:
     contact = {"friction": "1/2", "radius": "3/2"} | contact
     data = blocks(3, (1, 2), ((3, 2), (3, 1)), body2={"prescribed": None, "fixed": ["top"]}, contact=contact)
-    return build(vf.Problem.from_dict(data))
+    return pair_from(vf.Problem.from_dict(data))
 
 
 PATTERN = ([True, True, True, False], [0, 1, -1, 1])

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import verification as vf
-from verification.bounds.exact import enclose
-from verification.bounds.mirror import Mirror
+from verification.bounds.lipschitz import Mirror, enclose
 from verification.bounds.multipliers import QuadraticForms
 
 THETA = 0.7

@@ -12,8 +12,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import verification as vf
-from verification.advice.next_run import Made, anew, kept, pasted_or_not
-from verification.advice.readings import NextRun
+from verification.advice.readings import Made, NextRun, anew, kept, pasted_or_not
 
 
 def level(steps):

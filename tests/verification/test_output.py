@@ -30,7 +30,7 @@ def results(comparison):
 
 
 def write(folder: Path, kind: str, result) -> None:
-    getattr(Folder(folder, "compare" if kind == "comparison" else "run"), f"write_{kind}")(result)
+    Folder(folder, "compare" if kind == "comparison" else "run").write(result)
 
 
 def contents(folder: Path) -> dict[str, bytes]:

@@ -43,7 +43,7 @@ def test_parts_of_upright_sides_and_tractions_on_parts():
         discretise(vf.Problem.from_dict(d)).body2 for d in (data, changed(data, body2={"traction": None}))
     )
     load = np.zeros(with_it.mesh.points.shape)
-    load.ravel()[with_it.free] = with_it.load - without.load
+    load.ravel()[with_it.positions] = with_it.load - without.load
     on_top = with_it.known.known.any(axis=1)  # half of the uppermost edge's load acts on a node that is held
     assert load[~on_top].sum(axis=0) == pytest.approx([2 * 0.15, -3 * 0.15])
 

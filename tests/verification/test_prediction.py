@@ -19,7 +19,7 @@ from verification.algorithm.iterate import Iterate
 from verification.algorithm.linearisation import Linearisation, NotLinear, linearise
 from verification.algorithm.runs import Run, run
 from verification.algorithm.start import iterate
-from verification.interface.pair import ContactPair, build
+from verification.interface.pair import ContactPair, pair_from
 
 #: Random problems, the same ones each time, and the batches that they are tried in.
 most = settings.default.max_examples
@@ -128,7 +128,7 @@ def symmetric_blocks(shift: str = "0", cells: int = 4) -> ContactPair:
         contact={"friction": 1, "radius": "3/4"},
         iteration={"neumann_body": 2, "tolerance": 1e-13},
     )
-    return build(vf.Problem.from_dict(data))
+    return pair_from(vf.Problem.from_dict(data))
 
 
 def linearised(pair: ContactPair, theta: float) -> tuple[Run, Linearisation]:

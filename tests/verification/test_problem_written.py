@@ -19,10 +19,8 @@ from written_problems import BUILT_IN, MESH, documents, problems, texts
 import verification as vf
 from ndtheory import exact
 from verification.cli.problems import examples
-from verification.problem.read_only import ReadOnly
-from verification.problem.specs import BodySpec
-from verification.problem.toml import document
-from verification.problem.writing import written_number
+from verification.problem.specs import BodySpec, ReadOnly
+from verification.problem.writing import toml, written_number
 
 
 @pytest.fixture(scope="module")
@@ -220,7 +218,7 @@ trees = st.recursive(
 
 @given(st.dictionaries(texts, trees, max_size=5))
 def test_toml_is_read_back_as_what_was_written(data):
-    written = document(data)
+    written = toml(data)
     assert tomllib.loads(written) == data
     assert json.dumps(tomllib.loads(written), sort_keys=True) == json.dumps(data, sort_keys=True)  # 1 is not 1.0
     assert tomllib.loads(written.replace("\n", "\r\n")) == data
@@ -229,14 +227,14 @@ def test_toml_is_read_back_as_what_was_written(data):
 @pytest.mark.parametrize("code", [*range(0x21), 0x22, 0x5C, 0x7F, 0x80, 0x85, 0xA0, 0x2028, 0xFEFF, 0xFFFF, 0x1F600])
 def test_every_character_keeps_its_place_in_a_text_and_in_a_key(code):
     text = f"a{chr(code)}b"
-    assert tomllib.loads(document({text: {text: text}})) == {text: {text: text}}
-    assert all(c.isprintable() or ord(c) >= 0x80 for c in document({"x": text}).rstrip("\n"))
+    assert tomllib.loads(toml({text: {text: text}})) == {text: {text: text}}
+    assert all(c.isprintable() or ord(c) >= 0x80 for c in toml({"x": text}).rstrip("\n"))
 
 
 @pytest.mark.parametrize("value", [None, {1}, F(1, 2), b"a"])
 def test_what_toml_does_not_know_is_refused(value):
     with pytest.raises(TypeError, match=f"{type(value).__name__} is no value of TOML"):
-        document({"x": [value]})
+        toml({"x": [value]})
 
 
 # --- keys ---

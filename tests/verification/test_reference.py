@@ -102,6 +102,15 @@ def test_every_rule_is_repeated_from_its_beginning(run, relaxation):
     assert found.largest_difference < 1e-6
 
 
+def test_a_run_is_repeated_from_its_own_start():
+    """At g = 0 nothing holds this block and the program has no answer: its run starts from the tied bodies."""
+    pushed = plates(body2={"prescribed": None, "traction": {"top": [0, -3000]}, "body_force": [2, 0]})
+    done = vf.run(vf.Problem.from_dict(pushed))
+    found = by_cvxpy_alone(done)
+    assert (done.start.source, found.whole, found.steps) == ("tied", True, done.evaluations)
+    assert found.observed_rate == pytest.approx(done.observed_rate.value, abs=1e-2)
+
+
 def test_auto_asks_the_program_only_where_the_active_set_does_not_close(run, monkeypatch):
     monkeypatch.setattr("verification.contact.model.ContactModel", None)
     again = vf.run(run.pair)

@@ -87,7 +87,7 @@ def test_a_registered_bound_that_is_violated_is_a_fault_unless_it_is_a_finding(r
 
 def test_it_is_drawn_beside_the_residuals_and_stands_in_the_report(compared, tmp_path):
     assert {"halfway bound", "slow bound", "energy bound"} <= set(legend(compared.plot()))
-    Folder(tmp_path, "compare").write_comparison(compared)
+    Folder(tmp_path, "compare").write(compared)
     page = (tmp_path / "report.html").read_text("utf-8")
     assert all(f'<th scope="row">{name}</th>' in page for name in ("halfway", "silent", "slow"))
 

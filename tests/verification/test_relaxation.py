@@ -25,7 +25,7 @@ from verification.algorithm.relaxation import RULES, Momentum, momentum_rate, mo
 from verification.algorithm.runs import Run, run
 from verification.constants import Measured, measure
 from verification.contact import ContactError
-from verification.interface.pair import ContactPair, build
+from verification.interface.pair import ContactPair, pair_from
 
 #: Who has the Neumann problem, E1, E2, and the left end of the upper body.
 COMBINATIONS = {
@@ -59,7 +59,7 @@ def section_6(name: str, finer: int = 1, friction: str = "0.2") -> tuple[Contact
         contact=replace(problem.contact, friction=Fraction(friction)),
         iteration=replace(problem.iteration, neumann_body=neumann_body),
     )
-    pair = build(problem)
+    pair = pair_from(problem)
     measured = measure(pair)
     return pair, measured, 2 / (2 + measured.rho_max.value)
 
@@ -242,7 +242,7 @@ def test_the_step_of_momentum_is_1_plus_p_over_1_plus_rho(rho):
 @given(data=strategies.bar_problems(), theta=st.integers(1, 99).map(lambda n: Fraction(n, 100)))
 def test_aitken_finds_the_force_between_two_bars_from_two_residuals_without_a_change_of_state(data, theta):
     """T is a broken line, and the step from two points of one piece leads to where the residual of that piece is 0."""
-    pair = build(vf.Problem.from_dict(data))
+    pair = pair_from(vf.Problem.from_dict(data))
     step = RULES["aitken"].begin(pair, float(theta), None)
     seen = list(islice(iterates(FixedPointMap(pair, "active-set"), step), 6))
     touching = [bool(state.contact.pattern.touching[0]) for state in seen]
@@ -257,7 +257,7 @@ def test_aitken_finds_the_force_between_two_bars_from_two_residuals_without_a_ch
 
 def pressed(rho: int) -> ContactPair:
     """Two bars pressed together."""
-    return build(vf.Problem.from_dict(bars((1, 1), (rho, 1))))
+    return pair_from(vf.Problem.from_dict(bars((1, 1), (rho, 1))))
 
 
 @pytest.mark.parametrize("share", ["1/100", "2/5", "9/10"])
@@ -300,7 +300,7 @@ def in_units(problem: vf.Problem, stress: Fraction, length: Fraction) -> vf.Prob
 @cache
 def elsewhere(seed: int, stress: Fraction, length: Fraction) -> ContactPair:
     """The problem of a seed in other units."""
-    return build(in_units(case(seed)[0].problem, stress, length))
+    return pair_from(in_units(case(seed)[0].problem, stress, length))
 
 
 UNITS = [(Fraction(4) ** 9, Fraction(1)), (Fraction(1), Fraction(4) ** -5), (Fraction(10) ** 6, Fraction(254, 10))]
@@ -333,7 +333,7 @@ def test_no_rule_knows_the_units(relaxation, stress, length):
 def test_in_other_units_every_rule_needs_as_many_evaluations(name):
     """A power of 4 for stress: every number is the same to the last digit but for the exponent."""
     pair, measured, theta = section_6(name)
-    other = build(in_units(pair.problem, Fraction(4) ** -8, Fraction(1)))
+    other = pair_from(in_units(pair.problem, Fraction(4) ** -8, Fraction(1)))
     assert measure(other).rho_max.value == pytest.approx(measured.rho_max.value, rel=1e-12)
     for relaxation in RULES:
         done = run(with_rule(other, relaxation), theta=theta, measured=measured)

@@ -259,7 +259,7 @@ def test_the_literal_reading_is_closed_everywhere_and_its_best_theta_is_not_the_
 
 
 def test_rows_figures_and_the_document_are_written_and_known_as_ours(found, tmp_path):
-    Folder(tmp_path, "reproduce").write_reproduction(found)
+    Folder(tmp_path, "reproduce").write(found)
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {"reproduce.json", "reproduce.svg", "reproduce.png", "fig5.csv", "fig11.csv"}
     lines = (tmp_path / "fig11.csv").read_text("utf-8").splitlines()
@@ -267,7 +267,7 @@ def test_rows_figures_and_the_document_are_written_and_known_as_ours(found, tmp_
     assert len(rows) == 3 * 19
     assert {row["reading"] for row in rows} == {CLAMPED.name}
     assert "MPa" in lines[0]
-    Folder(tmp_path, "reproduce").write_reproduction(found)  # over its own files
+    Folder(tmp_path, "reproduce").write(found)  # over its own files
 
 
 def test_unknown_figures_are_refused_and_every_claim_says_when_it_holds():

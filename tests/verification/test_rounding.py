@@ -13,10 +13,10 @@ from strategies import AT_NIGHT
 import verification as vf
 from fem1d2d.enclosed import UNIT, Enclosed
 from fem1d2d.loewner import positive_definite
+from verification.bounds.interior_point import LMIError
 from verification.bounds.multipliers import QuadraticForms
-from verification.bounds.program import LMIError
 from verification.constants import measure
-from verification.interface.pair import build
+from verification.interface.pair import pair_from
 
 Exact = list[list[Fraction]]
 
@@ -171,7 +171,7 @@ def test_the_multipliers_prove_the_factor_in_rationals(seed):
 @pytest.mark.parametrize(("length", "condition"), [(10**2, 1e7), (10**3, 1e9), (10**4, 1e11), (5 * 10**4, 1e12)])
 def test_near_singular_stiffness_makes_the_factor_larger_never_too_small(length, condition):
     """The value that is given is proved in rationals; it gives away at most a thousandth for it."""
-    pair = build(slender(length))
+    pair = pair_from(slender(length))
     assert np.linalg.cond(pair.contact.stiffness) > condition
     found = QuadraticForms(pair, measure(pair)).factor(0.5)
     assert found.evaluated < found.value < 1.001 * found.evaluated
@@ -181,6 +181,6 @@ def test_near_singular_stiffness_makes_the_factor_larger_never_too_small(length,
 def test_where_rounding_hides_what_the_multipliers_leave_nothing_is_claimed(monkeypatch):
     """A tower 1e6 times as high as wide: condition 4e15."""
     monkeypatch.setattr("verification.interface.pair.LEAST_RCOND", 0.0)  # such bodies are refused
-    pair = build(slender(10**6))
+    pair = pair_from(slender(10**6))
     with pytest.raises(LMIError):
         QuadraticForms(pair, measure(pair)).factor(0.5)

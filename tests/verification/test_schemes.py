@@ -77,7 +77,7 @@ DENSITY = {"body1": 2.7e-9, "body2": 11.3e-9}
 def lumped(body):
     """The masses of the unknowns: two Gram matrices of the H1 norm differ by the mass."""
     consistent = (gram(body.mesh, 1.0) - gram(body.mesh, 2.0)) / (1 - 1 / 4)
-    return DENSITY[body.name] * consistent.sum(axis=1)[body.free]
+    return DENSITY[body.name] * consistent.sum(axis=1)[body.positions]
 
 
 @pytest.fixture(scope="module")

@@ -263,7 +263,7 @@ def test_a_bound_that_is_registered_is_shown_everywhere(monkeypatch, capsys, tmp
         for name in ("made-up", "by-programs"):
             assert f"{name} 0.432 0.876 (0, 0.625) 0.875 contracts" in said
             assert f"{name}: of no theorem, in MPa" in said
-            assert f"{name} CONSISTENT" in said
+            assert f"{name} consistent" in said
 
 
 class Weather(Document):

@@ -17,9 +17,8 @@ from verification.algorithm.relaxation import RULES
 from verification.contact import ContactError, active_set
 from verification.interface import body
 from verification.sweeps import course, grid, workers
-from verification.sweeps.bodies import SharedBodies
-from verification.sweeps.lean import KnownPieces
-from verification.sweeps.row import RESULTS, row
+from verification.sweeps.course import KnownPieces
+from verification.sweeps.row import RESULTS, SharedBodies, row
 
 SMALL = vf.example("section6").changed(cells=((10, 2), (8, 2)), radius="0.2", max_iterations=200)
 BARS = vf.Problem.from_dict(

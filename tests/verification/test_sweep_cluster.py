@@ -12,7 +12,7 @@ from strategies import AT_NIGHT
 
 import verification as vf
 from verification.sweeps.grid import SweepGrid
-from verification.sweeps.keeping import plan
+from verification.sweeps.store import plan
 from verification.sweeps.workers import NoWorkers
 
 pytest.importorskip("distributed", reason="the extra `cluster` is not installed: there is no dask to sweep on")

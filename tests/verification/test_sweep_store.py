@@ -20,8 +20,7 @@ from verification.sweeps import identity, store
 from verification.sweeps import row as row_module
 from verification.sweeps.grid import SweepGrid
 from verification.sweeps.identity import Identity
-from verification.sweeps.keeping import plan
-from verification.sweeps.store import Store
+from verification.sweeps.store import Store, plan
 
 SMALL = vf.example("section6").changed(cells=((10, 2), (8, 2)), radius="0.2", max_iterations=200)
 

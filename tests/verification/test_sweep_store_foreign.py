@@ -10,7 +10,7 @@ import pytest
 import verification as vf
 from verification.sweeps import store
 from verification.sweeps.grid import SweepGrid
-from verification.sweeps.keeping import plan
+from verification.sweeps.store import plan
 
 SMALL = vf.example("section6").changed(cells=((10, 2), (8, 2)), radius="0.2", max_iterations=200)
 

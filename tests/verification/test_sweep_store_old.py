@@ -14,8 +14,8 @@ import verification as vf
 from verification.sweeps import identity, store
 from verification.sweeps.grid import SweepGrid
 from verification.sweeps.identity import Identity
-from verification.sweeps.keeping import plan
 from verification.sweeps.row import is_row, renamed
+from verification.sweeps.store import plan
 
 SMALL = vf.example("section6").changed(cells=((10, 2), (8, 2)), radius="0.2", max_iterations=200)
 MATRICES = {"S1": np.diag([3.0, 2.0]), "S2": np.eye(2), "x": np.zeros(1), "load2": np.array([0.0, -1.0])}

@@ -14,8 +14,8 @@ from ndtheory import Number
 from verification.algorithm.linearisation import NotLinear, forecast
 from verification.algorithm.rates import StepRatio
 from verification.bounds import LARGEST
+from verification.bounds.interior_point import LMIError
 from verification.bounds.multipliers import QuadraticForms
-from verification.bounds.program import LMIError
 from verification.bounds.table import BOUNDS
 from verification.comparison import compare
 from verification.verdicts import TIGHT, judge, judge_forecast

@@ -13,13 +13,12 @@ from verification.algorithm.rates import StepRatio
 from verification.bounds.bound import BoundResult
 from verification.bounds.lipschitz import work_out
 from verification.bounds.multipliers import QuadraticForms
-from verification.certificate.claims import Claims, Confirmation, NoCertificate
+from verification.certificate.claims import Claims, Confirmation, NoCertificate, describe
 from verification.certificate.contraction import certify
-from verification.certificate.description import describe
 from verification.constants import measure
 from verification.constants.proved import verify
 from verification.interface.exact_bodies import NotExact
-from verification.interface.pair import build
+from verification.interface.pair import pair_from
 from verification.verdicts import judge, judge_bound
 
 SMALL = vf.Problem.from_dict(small())
@@ -96,7 +95,7 @@ def test_the_largest_theta_and_the_friction_threshold_are_proved_from_below(whol
 
 
 def semidefinite(problem, theta):
-    pair = build(problem)
+    pair = pair_from(problem)
     measured = measure(pair)
     return pair, measured, work_out(pair, measured, theta)
 
@@ -165,7 +164,7 @@ def test_the_documents_of_both_differ_in_what_is_proved_alone(whole, plain):
 
 NOT_PROVED = {
     "bars": (bars(iteration={"theta": "0.2"}), "plane problem"),
-    "beyond what one program proves": (changed(small(), contact={"friction": "3"}), "no contraction"),
+    "beyond what one program proves": (changed(small(), contact={"friction": "3"}), "does not contract"),
 }
 
 

@@ -12,9 +12,8 @@ from problem_list import SHEARED, changed, plates
 import verification as vf
 from fem1d2d import rectangle
 from verification.cli.problems import examples
-from verification.interface.assembly import discretise
+from verification.interface.assembly import LOCKING, discretise
 from verification.interface.friction import SHARE
-from verification.interface.two_bodies import LOCKING
 from verification.monolithic import contact_system
 
 

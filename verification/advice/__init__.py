@@ -1,4 +1,4 @@
-"""Which body gets the Neumann problem, and which theta."""
+"""Advice on the roles of two bodies and on theta."""
 
 from typing import Literal
 

@@ -20,15 +20,15 @@ from scipy.optimize import minimize_scalar
 from ndtheory import EnergyBounds
 from verification.algorithm.linearisation import NotLinear
 from verification.algorithm.theta import energy_bounds
+from verification.bounds.interior_point import LMIError
 from verification.bounds.multipliers import QuadraticForms
-from verification.bounds.program import LMIError
 from verification.constants import Measured, measure
 from verification.contact import ContactError
 from verification.interface.build import pair_of
 from verification.interface.pair import ContactPair
 from verification.monolithic import SolveError
 from verification.problem.specification import Problem
-from verification.sweeps.lean import KnownPieces
+from verification.sweeps.course import KnownPieces
 from verification.sweeps.row import Row
 from verification.sweeps.sweep import sweep
 
@@ -48,14 +48,8 @@ MOST = 12
 class Fewest:
     """The thetas of fewest steps among those that were run.
 
-    Attributes
-    ----------
-    steps : int
-    low, high : float
-        The smallest and the largest theta that took so many steps.
-    below, above : float or None
-        The next thetas that were run on either side, which took more steps or did not arrive; None where there are
-        none: fewer steps may lie beyond.
+    From ``low`` to ``high`` they took so many ``steps``; ``below`` and ``above`` are the next thetas that were run,
+    which took more steps or did not arrive; None where there are none: fewer steps may lie beyond.
     """
 
     steps: int
@@ -71,13 +65,9 @@ class Fewest:
 
     @classmethod
     def of(cls, rows: Sequence[Row], column: str = "iterations") -> Fewest | None:
-        """From rows of a sweep that differ in theta alone; None where no run arrived.
+        """From rows of a sweep that differ only in theta; None where no run arrived.
 
-        Parameters
-        ----------
-        rows : sequence of row
-        column : {'iterations', 'iterations_paper'}
-            The test that ends the count.
+        ``column`` is 'iterations' or 'iterations_paper', the test that ends the count.
 
         Examples
         --------
@@ -89,15 +79,10 @@ class Fewest:
         least = min((steps for _, steps in counts if steps is not None), default=None)
         if least is None:
             return None
-        thetas = [theta for theta, _ in counts]
-        best = [i for i, (_, steps) in enumerate(counts) if steps == least]
-        return cls(
-            steps=least,
-            low=thetas[best[0]],
-            high=thetas[best[-1]],
-            below=thetas[best[0] - 1] if best[0] else None,
-            above=thetas[best[-1] + 1] if best[-1] + 1 < len(thetas) else None,
-        )
+        thetas = [None, *(theta for theta, _ in counts), None]
+        best = [i for i, (_, steps) in enumerate(counts, 1) if steps == least]
+        low, high = best[0], best[-1]
+        return cls(steps=least, low=thetas[low], high=thetas[high], below=thetas[low - 1], above=thetas[high + 1])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,10 +99,8 @@ class BestTheta:
 
     Attributes
     ----------
-    rho : float
-        rho_normal without friction, rho with it.
-    predicted : float
-        ``2/(2 + rho)``.
+    rho, predicted : float
+        rho_normal without friction, rho with it; and ``2/(2 + rho)``.
     seen : Fewest or None
         None where no run arrived, or none was made.
     linearised : Least or None
@@ -146,9 +129,9 @@ def best_theta(
     ----------
     problem : Problem, ContactPair or path
     runs : bool
-        Whether to look for the theta of fewest steps, by runs at the predicted theta and at eight around it.
+        True to find the theta of fewest steps, by runs at the predicted theta and at eight around it.
     semidefinite : bool
-        Whether to look for the least factor that the semidefinite bound proves: some five programs.
+        True to find the least factor that the semidefinite bound proves: some five programs.
 
     Raises
     ------
@@ -163,7 +146,7 @@ def best_theta(
     >>> round(found.predicted, 12), round(found.energy.theta, 12), round(found.energy.factor, 12)
     (0.5, 0.5, 0.5)
 
-    One bar in contact has one mode, which theta = 1/3 removes in one step; the proof speaks of open bars too.
+    One bar in contact has one mode, which theta = 1/3 removes in one step; the proof covers open bars, too.
 
     >>> round(found.linearised.theta, 3), abs(found.seen.theta - 1/3) < 0.03
     (0.333, True)
@@ -178,7 +161,7 @@ def best_theta(
     reason: dict[str, str] = {}
 
     def found(name: str, why_not: str, work: Callable[[], Any], none: str = "") -> Any:
-        """What is asked for and can be worked out; else None, with the reason."""
+        """The result of some work; None, with the reason, where it was not asked for or cannot be worked out."""
         value = None
         try:
             value = None if why_not else work()

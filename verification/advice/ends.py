@@ -1,9 +1,9 @@
-"""Where the ends of the spectrum may lie that logs of linear runs leave, and the theta that serves all of it.
+"""Limits of the ends of the spectrum from logs of linear runs, and the theta that serves all of them.
 
 A linear run multiplies each mode by ``1 - theta z`` with ``z = 1 + lambda`` between ``a = 1 + lambda_min`` and
 ``b = 1 + rho``.  Its steady ratio r is the larger one of ``|1 - theta a|`` and ``|1 - theta b|``, so that either
 ``1 - theta a = r`` and ``b <= (1 + r)/theta``, or ``theta b - 1 = r`` and ``a >= (1 - r)/theta``.  One log leaves two
-boxes in the plane of a and b, and several logs leave what is common to them.  With a and b, no theta has fewer steps
+boxes in the plane of a and b, and several logs leave their intersections.  With a and b, no theta has fewer steps
 than ``2/(a + b)``, which takes ``q = (b - a)/(b + a)`` a step.
 """
 
@@ -44,13 +44,13 @@ class Box:
     b: tuple[float, float]
 
     def meets(self, other: Box) -> Box | None:
-        """What both boxes allow, with a <= b; None where there is nothing."""
+        """The intersection of both boxes, with a <= b; None where it is empty."""
         a = max(self.a[0], other.a[0]), min(self.a[1], other.a[1], self.b[1], other.b[1])
         b = max(self.b[0], other.b[0], a[0]), min(self.b[1], other.b[1])
         return Box(a=a, b=b) if a[0] <= a[1] and b[0] <= b[1] else None
 
     def holds(self, other: Box) -> bool:
-        """Whether all of another box lies in this one."""
+        """True if all of another box lies in this one."""
         return all(
             mine[0] <= theirs[0] and theirs[1] <= mine[1] for mine, theirs in ((self.a, other.a), (self.b, other.b))
         )
@@ -65,7 +65,7 @@ class Box:
 
     @property
     def best(self) -> tuple[float, float]:
-        """Between which values the best theta lies."""
+        """The limits of the best theta."""
         return 2 / (self.a[1] + self.b[1]), 2 / (self.a[0] + self.b[0])
 
     def softened(self) -> Box:
@@ -78,7 +78,7 @@ EVERYTHING = Box(a=(1.0, math.inf), b=(1.0, math.inf))
 
 
 def of_ratio(theta: float, least: float, most: float) -> tuple[Box, Box]:
-    """What the steady ratio of a linear run leaves: the softest mode is the slowest, or the stiffest one is."""
+    """Boxes of the steady ratio of a linear run: the softest mode is the slowest, or the stiffest one is."""
     unsettled = SETTLED * (abs(1 - least) if most < 1 else 1 + most)
     low, high = least - unsettled, most + unsettled
     softest, stiffest = ((1 - high) / theta, (1 - low) / theta), ((1 + low) / theta, (1 + high) / theta)
@@ -87,12 +87,12 @@ def of_ratio(theta: float, least: float, most: float) -> tuple[Box, Box]:
 
 
 def of_stiffest(least: float, most: float = math.inf) -> tuple[Box]:
-    """What is known of ``b`` alone."""
+    """The box of limits of ``b``."""
     return (Box(a=EVERYTHING.a, b=(least, most)),)
 
 
 def common(each: Iterable[Sequence[Box]]) -> list[Box]:
-    """What logs leave together, each of which leaves some boxes; empty where they exclude each other."""
+    """Boxes that logs leave together, each of which leaves some; empty where they exclude each other."""
     left = [EVERYTHING]
     for boxes in each:
         met = [found for one in left for other in boxes if (found := one.meets(other)) is not None]
@@ -105,7 +105,7 @@ def common(each: Iterable[Sequence[Box]]) -> list[Box]:
 
 
 def dearest(theta: float, boxes: Sequence[Box]) -> float:
-    """How many times the fewest steps theta takes at worst; inf where it may not converge."""
+    """Steps that theta takes at worst, over the fewest steps; inf where it may not converge."""
     return max(
         (
             _steps(max(abs(1 - theta * a), abs(theta * b - 1))) / _steps((b - a) / (b + a))
@@ -120,7 +120,7 @@ def _steps(q: float) -> float:
 
 
 def cheapest(boxes: Sequence[Box], most: float) -> tuple[float, float]:
-    """The theta up to ``most`` that is least dear, and how dear it is."""
+    """The theta up to ``most`` with the fewest steps at worst, and these over the fewest steps."""
     low, high = min(box.best[0] for box in boxes), max(box.best[1] for box in boxes)
     low, high = min(max(low, 1e-9), most), min(high, most)
     count = math.ceil(math.log(high / low) / math.log(FINE)) + 1 if high > low else 1

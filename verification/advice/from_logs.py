@@ -1,4 +1,4 @@
-"""Advice from the convergence logs of other runs: what they say of rho, alone and together."""
+"""Advice from the convergence logs of other runs: readings of each log, and bounds of rho from all of them."""
 
 from __future__ import annotations
 
@@ -9,35 +9,23 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from ndtheory.constants import take
-from ndtheory.energy import SMALLEST
+from ndtheory.constants import SMALLEST, take
 from ndtheory.energy_norms import predicted_rate, predicted_theta
 from ndtheory.number import below
-from verification.advice.columns import seen_column
-from verification.advice.ends import (
-    DEAR,
-    FEWEST_MODES,
-    SETTLED,
-    SWIFT,
-    Box,
-    cheapest,
-    common,
-    of_ratio,
-    of_stiffest,
-    telling,
-)
+from verification.advice import ends
+from verification.advice.ends import DEAR, SETTLED, Box
 from verification.advice.from_runs import advice_of_runs
-from verification.advice.log import Log
-from verification.advice.logs import read_log
-from verification.advice.next_run import kept
-from verification.advice.pace import CONVERGED
+from verification.advice.log_files import Log, read_log
+from verification.advice.pace import CONVERGED, Pace
 from verification.advice.readings import (
     LARGEST_TO_PASTE,
     SHORTEST_STEP,
     NextRun,
     Observed,
     RunReading,
-    check_assumed,
+    assumed,
+    few,
+    kept,
     level,
     read_observed,
     read_plateau,
@@ -46,8 +34,11 @@ from verification.advice.readings import (
 )
 from verification.advice.roles import Advice
 from verification.advice.runs_with_friction import by_kind, friction_bounds, readings_with_friction, with_friction
-from verification.advice.seen import LogBound, RhoInterval, SeenColumn, SeenLog, bounds
+from verification.advice.seen import LogBound, RhoInterval, SeenColumn, SeenLog, bounds, seen_column
 from verification.problem.tables import ProblemError
+
+#: Readings that are left, the run to make next, and rho where the logs decide it.
+Decision = tuple[tuple[RunReading, ...], NextRun, Fraction | None]
 
 #: Bounds of 1 + rho that differ by less do not contradict each other: a ratio has not wholly settled.
 AGREE = Fraction(103, 100)
@@ -65,16 +56,16 @@ def advise_logs(logs: Iterable[tuple[Path | str, Any]], *, tied: bool = False, f
     A log whose residual changes by a steady ratio r a step is read as
     :func:`verification.advice.from_runs.advise_run` reads r.  A residual that stays at a level belongs to a run that
     does not converge; a *relative* residual ``|T g - g|/|T g|`` that stays at P > 1 to a tied run that diverges with
-    ``rho = 1/(P - 1)``.  What is neither steady nor at a level tells nothing.
+    ``rho = 1/(P - 1)``.  A residual that is neither steady nor at a level shows nothing.
 
-    Without friction, or tied, ``rho >= (1 + r)/theta - 1`` wherever ``r > 1 - theta``, and ``rho >= 2/theta - 1`` of a
-    run that does not converge.  If near the solution all of Gamma_c is closed and nothing slides, a run that converges
-    has ``rho <= (1 + r)/theta - 1`` besides.  Logs whose bounds exclude each other are reported as contradictory.
-    With friction no theta is pasted, and what is proved is in :mod:`verification.advice.runs_with_friction`.
+    Without friction, or tied, ``rho >= (1 + r)/theta - 1`` wherever ``r > 1 - theta``, and ``rho >= 2/theta - 1`` if a
+    run does not converge.  If near the solution all of Gamma_c is closed and nothing slides, a run that converges also
+    has ``rho <= (1 + r)/theta - 1``.  Logs whose bounds exclude each other are reported as contradictory.
+    With friction no theta is pasted; :mod:`verification.advice.runs_with_friction` has the bounds that are proved then.
 
-    A theta is pasted that is predicted to take at most 1.4 times the fewest steps wherever the smallest and the largest
-    eigenvalue may lie by the logs (:mod:`verification.advice.ends`); in contact none above that of a run that
-    converged.  Where one log alone decides rho, the smallest eigenvalue is taken to be at most half of the largest.
+    The theta to paste is predicted to take at most 1.4 times the fewest steps wherever the smallest and the largest
+    eigenvalue may lie by the logs (:mod:`verification.advice.ends`); in contact it is not above the theta of a run that
+    converged.  Where a single log decides rho, the smallest eigenvalue is taken to be at most half of the largest.
     The prediction is for couplings of about five modes and more: one or two modes may need fewer steps.
 
     The run to make next has a theta that no log has, unless its reason begins with "keep it" or "the same again".
@@ -84,11 +75,11 @@ def advise_logs(logs: Iterable[tuple[Path | str, Any]], *, tied: bool = False, f
     logs : iterable of tuple
         Logs of one coupling with the same roles: the path and the relaxation factor of each, 0 < theta <= 1.
     tied : bool
-        Whether the interface is tied, so that nothing opens or slips.  A run is linear then, and its steady ratio is
-        that of the softest or of the stiffest mode: two logs mostly tell both, and with them the best theta,
+        True if the interface is tied, so that nothing opens or slips.  A run is linear then, and the softest or the
+        stiffest mode sets its steady ratio: two logs mostly show both, and so the best theta,
         ``2/(2 + lambda_min + rho)``.
     friction : bool
-        Whether there is friction.  Without it the advice assumes that there is none, or that the interface is tied.
+        True if there is friction.  Otherwise the advice assumes that there is none, or that the interface is tied.
 
     Returns
     -------
@@ -119,30 +110,36 @@ def advise_logs(logs: Iterable[tuple[Path | str, Any]], *, tied: bool = False, f
     given = [(Path(path), take("theta", theta, needed, allowed)) for path, theta in logs]
     if not given:
         raise ValueError("needed one log or more")
-    check_assumed(tied, friction)
+    assumes = assumed(tied, friction)
     seen = tuple(seen_log(read_log(path), theta, friction) for path, theta in given)
     interval = interval_of(*(([], []) if friction else bounds(seen)))
     readings, following, rho = with_friction(seen) if friction else decide(seen, interval, tied)
-    proved = friction_bounds(*by_kind(seen)) if friction else None
-    made = [log.made for log in seen]
-    return advice_of_runs(made, readings, following, rho, tied=tied, bounds=proved, logs=seen, interval=interval)
+    return advice_of_runs(
+        [log.made for log in seen],
+        readings,
+        following,
+        rho,
+        tied=tied,
+        assumes=assumes,
+        friction_bounds=friction_bounds(*by_kind(seen)) if friction else None,
+        logs=seen,
+        interval=interval,
+    )
 
 
 def seen_log(log: Log, theta: Fraction, friction: bool = False) -> SeenLog:
-    """One log as it was seen, and its readings."""
+    """One log as it was seen, with its readings."""
     if log.theta is not None and abs(log.theta - float(theta)) > 1e-3 * float(theta):
         named = f"the log names a relaxation factor of {log.theta:g}: needed the same theta, received {float(theta):g}"
         raise ProblemError(str(log.path), "", None, named)
     columns = tuple(seen_column(column, theta) for column in log.columns)
-    steps = steps_needed(theta)
     bare = SeenLog(
         file=str(log.path),
         form=log.form,
         theta=theta,
-        steps=steps,
         columns=columns,
         readings=(),
-        next=longer(columns, theta, steps),
+        next=longer(columns, theta),
         rho=None,
         notes=log.notes,
     )
@@ -172,9 +169,10 @@ def seen_log(log: Log, theta: Fraction, friction: bool = False) -> SeenLog:
 
 def of_pooled(theta: Fraction, ratio: Observed) -> NextRun:
     """The run to make where the windows of a transient are too short one by one."""
-    pace = f"{float(ratio.value):.4g} ({float(ratio.least):.4g} to {float(ratio.most):.4g})"
-    why = f"windows are too short one by one; their second halves have a ratio of {pace} together, which bounds nothing"
-    if ratio.most <= SWIFT:
+    why = (
+        f"windows are too short one by one; their second halves have a ratio of {ratio} together, which bounds nothing"
+    )
+    if ratio.most <= ends.SWIFT:
         return kept(theta, f"{why}, and none much faster is to be found")
     following = read_observed(theta, ratio)[1]
     return replace(following, why=f"{why}: {following.why}")
@@ -186,21 +184,26 @@ def one_mode(theta: Fraction, ratio: Observed, plateau: Observed) -> bool:
     return (1 + ratio.least) / theta <= AGREE * (1 + high) and 1 + low <= AGREE * (1 + ratio.most) / theta
 
 
-def longer(columns: tuple[SeenColumn, ...], theta: Fraction, steps: int) -> NextRun:
+def longer(columns: tuple[SeenColumn, ...], theta: Fraction) -> NextRun:
     """The run to make where a log shows nothing steady."""
     paces = [one for column in columns for one in column.paces]
     if all(one.height < CONVERGED for one in paces):
-        most = max(one.steps for one in paces)
-        return kept(theta, f"the run converges within {most} step{'s' * (most > 1)}, and shows no ratio")
+        return kept(theta, f"{_within(paces)}, and shows no ratio")
     if any(one.lost for one in paces):
         why = "half of it, as the log ends in inf or nan before a ratio shows"
         return NextRun(theta=rounded_down(theta / 2), why=why)
-    again = f"the same again, constant and without Aitken or quasi-Newton, {steps} steps or more in one time window"
+    steps = f"{steps_needed(theta)} steps or more in one time window"
+    again = f"the same again, constant and without Aitken or quasi-Newton, {steps}"
     if all(one.kind == "short" for one in paces):
         why = f"{again}: smaller limits of convergence and a larger number of iterations"
     else:
         why = f"{again}, until the residual falls or grows steadily; a relative one must fall below 0.1 first"
     return NextRun(theta=float(theta), why=why, again=True)
+
+
+def _within(paces: Sequence[Pace]) -> str:
+    most = max(one.steps for one in paces)
+    return f"the run converges within {most} step{'s' * (most > 1)}"
 
 
 def interval_of(lower: list[LogBound], upper: list[LogBound]) -> RhoInterval:
@@ -209,18 +212,16 @@ def interval_of(lower: list[LogBound], upper: list[LogBound]) -> RhoInterval:
     hi = min(upper, key=lambda bound: bound.value, default=None)
     contradiction = None
     if lo is not None and hi is not None and 1 + lo.value > AGREE * (1 + hi.value):
-        one, other = (f"{bound.log.file} with theta = {float(bound.log.theta):.4g}" for bound in (hi, lo))
+        one, other = (f"{bound.log.file} with theta = {few(bound.log.theta)}" for bound in (hi, lo))
         contradiction = (
-            f"by {one} rho is at most {float(hi.value):.4g}, by {other} at least {float(lo.value):.4g}: there is "
+            f"by {one} rho is at most {few(hi.value)}, by {other} at least {few(lo.value)}: there is "
             "friction, contact changes between the runs, a theta was not constant, or they are not runs of one problem "
             "in the same roles"
         )
     return RhoInterval(lo=lo, hi=hi, contradiction=contradiction)
 
 
-def decide(
-    logs: tuple[SeenLog, ...], interval: RhoInterval, tied: bool
-) -> tuple[tuple[RunReading, ...], NextRun, Fraction | None]:
+def decide(logs: tuple[SeenLog, ...], interval: RhoInterval, tied: bool) -> Decision:
     """The readings that are left, the run to make next, and rho where the logs decide."""
     falling = [log for log in logs if log.converges]
     rising = [log for log in logs if log.diverges]
@@ -235,27 +236,27 @@ def decide(
         return base.readings, NextRun(theta=_half(logs), why=why), None
     lo, hi = interval.lo, interval.hi
     if (swift := next((log for log in logs if log.swift), None)) is not None and base.rho is None:
-        most = max(pace.steps for column in swift.columns for pace in column.paces)
-        why = f"the run converges within {most} step{'s' * (most > 1)}, and none much faster is to be found"
+        why = f"{_within(swift.paces)}, and none much faster is to be found"
         return swift.readings, kept(swift.theta, why), None
-    if tied and (found := by_ends(logs, base, None if lo is None else lo.value, tied)) is not None:
+    by_all = lambda: by_ends(logs, base, None if lo is None else lo.value, tied)
+    if tied and (found := by_all()) is not None:
         return found
     if base.rho is not None:
         return base.readings, fastest(falling, base.rho) or robust(logs, base.next), base.rho
     if lo is not None and hi is not None and hi.value <= NARROW * lo.value:
         rho = max(lo.value, hi.value)  # they may overlap a little
         best = min(predicted_theta(rho), LARGEST_TO_PASTE)
-        why = f"the best one if rho is {float(rho):.4g}, the upper end of what the logs leave"
+        why = f"the best one if rho is {few(rho)}, the upper end of what the logs leave"
         if best > SHORTEST_STEP * base.theta:
             return base.readings, NextRun(theta=rounded_down(best), why=why), None
         if best > base.theta:
-            why = f"close to {float(best):.4g}, {why}, and known to converge"
-        left = f"between {float(min(lo.value, hi.value)):.4g} and {float(rho):.4g}"
+            why = f"close to {few(best)}, {why}, and known to converge"
+        left = f"between {few(min(lo.value, hi.value))} and {few(rho)}"
         says = f"the logs leave rho {left} if all of Gamma_c stays closed"
         only = RunReading(kind="mode-high", value=float(rho), lo=below(lo.value), says=says)
         following = NextRun(theta=rounded_down(min(best, base.theta)), why=why)
         return (only,), fastest(falling, rho) or robust(logs, following), rho
-    if (found := by_ends(logs, base, None if lo is None else lo.value, tied)) is not None:
+    if (found := by_all()) is not None:
         return found
     if not falling and len(rising) > 1:
         why = "a quarter of the smallest theta so far, as none converges; come back with the log of that run, too"
@@ -264,24 +265,22 @@ def decide(
 
 
 def boxes_of(log: SeenLog, tied: bool) -> list[Box]:
-    """Where the ends of the spectrum may lie by a log; in contact of the modes that are left near the solution."""
+    """Limits of the ends of the spectrum by a log; in contact of the modes that are left near the solution."""
     ratio, plateau, theta = log.slowest, log.plateau, float(log.theta)
     left: list[Sequence[Box]] = []
     if ratio is not None and (log.converges or (tied and ratio.least > 1)):
-        left.append(of_ratio(theta, float(ratio.least), float(ratio.most)))
+        left.append(ends.of_ratio(theta, float(ratio.least), float(ratio.most)))
     if tied and log.diverges:
-        left.append(of_stiffest(2 * (1 - SETTLED) / theta))
+        left.append(ends.of_stiffest(2 * (1 - SETTLED) / theta))
     if tied and plateau is not None:
         low, high = float(1 / (plateau.most - 1)), float(1 / (plateau.least - 1))
-        left.append(of_stiffest(1 + low * (1 - SETTLED), 1 + high * (1 + SETTLED)))
-    return common(left)
+        left.append(ends.of_stiffest(1 + low * (1 - SETTLED), 1 + high * (1 + SETTLED)))
+    return ends.common(left)
 
 
-def by_ends(
-    logs: tuple[SeenLog, ...], base: SeenLog, lo: Fraction | None, tied: bool
-) -> tuple[tuple[RunReading, ...], NextRun, Fraction | None] | None:
-    """The same by what all logs leave of the ends of the spectrum; None where that is no limit of rho."""
-    boxes = common([boxes_of(log, tied) for log in logs])
+def by_ends(logs: tuple[SeenLog, ...], base: SeenLog, lo: Fraction | None, tied: bool) -> Decision | None:
+    """The same by the limits that all logs give the ends of the spectrum; None where these do not limit rho."""
+    boxes = ends.common([boxes_of(log, tied) for log in logs])
     known, most = [float(log.theta) for log in logs], float(LARGEST_TO_PASTE)
     if not boxes:
         if not tied:
@@ -290,14 +289,14 @@ def by_ends(
         return base.readings, NextRun(theta=_half(logs), why=why), None
     if math.isinf(stiffest := max(box.b[1] for box in boxes)):
         return None
-    theta, dear = cheapest(boxes, most if tied else float(base.theta))
+    theta, dear = ends.cheapest(boxes, most if tied else float(base.theta))
     if dear <= DEAR:
         says = f"the logs together leave one reading: {ends_in_words(boxes)}; rho is taken at its upper end"
         only = RunReading(kind="mode-high", value=stiffest - 1, lo=None if lo is None else below(lo), says=says)
-        following = NextRun(theta=rounded_down(Fraction(theta)), why=cost_in_words(boxes, dear))
+        following = NextRun(theta=rounded_down(theta), why=cost_in_words(boxes, dear))
         return (only,), following, Fraction(stiffest) - 1
     rising = [float(log.theta) for log in logs if log.diverges]
-    theta = rounded_down(Fraction(telling(boxes, known, most if tied else min([most, *rising]))))
+    theta = rounded_down(ends.telling(boxes, known, most if tied else min([most, *rising])))
     why = f"it tells more: if {ends_in_words(boxes)}, no theta is sure to be within {DEAR:g} times the fewest steps"
     return base.readings, NextRun(theta=theta, why=why), None
 
@@ -316,7 +315,7 @@ def cost_in_words(boxes: Sequence[Box], dear: float) -> str:
     times = (
         "the fewest steps" if dear < 1.05 else f"at most {math.ceil(10 * dear - 1e-9) / 10:g} times the fewest steps"
     )
-    where = f"as the logs leave them where contact does not change, with {FEWEST_MODES} modes or more"
+    where = f"as the logs leave them where contact does not change, with {ends.FEWEST_MODES} modes or more"
     return f"{times} if {ends_in_words(boxes)}, {where}"
 
 
@@ -327,11 +326,11 @@ def _half(logs: Sequence[SeenLog]) -> float:
 
 def robust(logs: tuple[SeenLog, ...], best: NextRun) -> NextRun:
     """The theta where rho is known and the softest mode is not: at most ``2/(2 + rho)``, best where nodes are open."""
-    boxes = [box.softened() for box in common([boxes_of(log, False) for log in logs])]
+    boxes = [box.softened() for box in ends.common([boxes_of(log, False) for log in logs])]
     if not boxes:
         return best
-    theta, dear = cheapest(boxes, best.theta)
-    smaller = rounded_down(Fraction(theta))
+    theta, dear = ends.cheapest(boxes, best.theta)
+    smaller = rounded_down(theta)
     return best if smaller >= best.theta else NextRun(theta=smaller, why=cost_in_words(boxes, dear))
 
 
@@ -344,8 +343,8 @@ def fastest(falling: list[SeenLog], rho: Fraction) -> NextRun | None:
     ratio, theta = min(found)
     if ratio >= predicted_rate(rho):
         return None
-    predicted = f"{float(predicted_rate(rho)):.4g} is predicted of 2/(2 + rho) with rho = {float(rho):.4g}"
-    return kept(theta, f"its log falls by {float(ratio):.4g} a step or faster, where {predicted}")
+    predicted = f"{few(predicted_rate(rho))} is predicted of 2/(2 + rho) with rho = {few(rho)}"
+    return kept(theta, f"its log falls by {few(ratio)} a step or faster, where {predicted}")
 
 
 def between(base: SeenLog, rising: list[SeenLog]) -> NextRun:
@@ -356,5 +355,5 @@ def between(base: SeenLog, rising: list[SeenLog]) -> NextRun:
     low, high = float(base.theta), float(least)
     if high <= low * float(SHORTEST_STEP):
         return kept(base.theta, f"it converges and {high:.4g} does not: no larger one is worth a run")
-    theta = rounded_down(Fraction((low * high) ** 0.5))
+    theta = rounded_down((low * high) ** 0.5)
     return NextRun(theta=theta, why=f"between {low:.4g}, which converges, and {high:.4g}, which does not")

@@ -1,4 +1,4 @@
-"""Advice from the interface matrices of any code, or from what its solvers do with a vector."""
+"""Advice from the interface matrices of any code, or from products and solves of its solvers."""
 
 from __future__ import annotations
 
@@ -15,11 +15,21 @@ from fem1d2d import extremes_by_solves, largest
 from fem1d2d.mesh import Floats
 from ndtheory import Number
 from verification.advice import BodyNumber
-from verification.advice.role import Role, with_both_ends
-from verification.advice.roles import Advice, advise, plain_role
-from verification.advice.seen_matrices import ORDERING, SeenLanczos, SeenMatrices
-from verification.advice.sides import BODIES, Side, is_operator, of_matrix, of_solver, other, rows_of
-from verification.advice.transfer import Transfer, read_transfer
+from verification.advice.roles import Advice, Role, advise, plain_role, with_both_ends
+from verification.advice.sides import (
+    BODIES,
+    ORDERING,
+    SeenLanczos,
+    SeenMatrices,
+    Side,
+    Transfer,
+    is_operator,
+    of_matrix,
+    of_solver,
+    other,
+    read_transfer,
+    rows_of,
+)
 from verification.interface.build import build
 from verification.interface.friction import Nonlocal, hat
 from verification.interface.matrices import ASYMMETRY, real_array, size
@@ -57,8 +67,8 @@ def advise_matrices(
     """Advice from the interface stiffness of both bodies: matrices, or operators for interfaces of any size.
 
     ``rho = lambda_max(P' S_c P, S_n)``, c the contact body and n the body with the Neumann problem.  Each assignment of
-    the roles is refused alone: where the Neumann body can move rigidly, where P leads the other way, where an operator
-    is missing.
+    the roles is refused separately: where the Neumann body can move rigidly, where P leads the other way, where an
+    operator is missing.
 
     Without friction rho does not depend on the ordering of the unknowns, so long as both bodies have the same.  With
     friction, or a transfer of values at nodes, vectors list all tangential components from left to right, then all
@@ -73,11 +83,11 @@ def advise_matrices(
         ``f -> S1^-1 f`` and ``f -> S2^-1 f``, as a solver with the Neumann problem of that body does them: S1 and
         solve2 suffice for the role in which body 2 has the Neumann problem.  A matrix S needs none.
     unknowns : int, optional
-        The size of the vectors, where functions alone are given.
+        The size of the vectors, where only functions are given.
     transfer : array, sparse array or LinearOperator, optional
-        P: from the unknowns of the Neumann body to those of the contact body, or from one component at its nodes.
+        P: from the unknowns of the Neumann body to the unknowns of the contact body, or for one component at nodes.
     neumann_body : {1, 2}, optional
-        From whose unknowns P leads; without it the shape of P decides, and 2 where both bodies have as many.
+        The body from whose unknowns P leads; by default the shape of P decides, and body 2 where both have as many.
     friction : number, optional
         k >= 0; needs matrices of two components at each node, and ``radius`` with ``x`` or ``kernel``.
     x : array, optional
@@ -85,15 +95,15 @@ def advise_matrices(
     x_neumann : array, optional
         Those of the Neumann body, where a transfer joins the grids and ``radius`` is given.
     weights : array, optional
-        Of the quadrature on ``x``; those of the trapezoid rule by default.
+        Of the quadrature on ``x``; of the trapezoid rule by default.
     radius : number, optional
         Of the hat kernel.
     kernel : array, optional
         The operator S of the law of friction as :func:`verification.build` takes it, in place of ``radius``.
     tied : bool
-        Whether to advise by what holds where nothing opens or slips.
+        True to advise for an interface where nothing opens or slips.
     progress : callable
-        Told steps, value and residual of Lanczos.
+        Called with steps, value and residual of Lanczos.
 
     Returns
     -------
@@ -102,7 +112,7 @@ def advise_matrices(
     Raises
     ------
     ValueError
-        Matrices or operators that are no stiffness, that do not fit, or leave no role.
+        Matrices or operators that are not a stiffness, do not fit, or leave no role.
 
     Examples
     --------
@@ -137,19 +147,15 @@ def advise_matrices(
     refused = _refused(sides, P, functions)
     lanczos: list[SeenLanczos] = []
     if friction is None:
-        roles = []
+        roles = {body: _by_eigenvalues(body, sides, P) for body in BODIES if body not in refused and not functions}
         for body in BODIES:
-            if body in refused:
-                roles.append(refused[body])
-            elif functions:
-                role, seen = _by_lanczos(body, sides, P, progress)
-                roles.append(role)
+            if functions and body not in refused:
+                roles[body], seen = _by_lanczos(body, sides, P, progress)
                 lanczos.append(seen)
-            else:
-                roles.append(_by_eigenvalues(body, sides, P))
+        both = [(refused | roles)[body] for body in BODIES]
         if not functions and P is None and not refused:
-            roles = list(with_both_ends(roles))
-        found = Advice.between(roles, tied=tied, units=UNITS)
+            both = list(with_both_ends(both))
+        found = Advice.between(both, tied=tied, units=UNITS)
     else:
         found = _with_friction(sides, P, 1 if 2 in refused else 2, friction, beside, tied)
         found = replace(found, roles=tuple(refused.get(role.neumann_body or 2, role) for role in found.roles))
@@ -168,7 +174,7 @@ def advise_matrices(
 
 
 def _refused(sides: Sides, P: Transfer | None, functions: bool) -> dict[BodyNumber, Role]:
-    """The role to which P does not belong, and those in which a body can move or a product or solve is missing.
+    """Refused roles: P does not belong to them, the Neumann body can move, or a product or solve is missing.
 
     Raises
     ------
@@ -219,9 +225,9 @@ def _by_lanczos(body: BodyNumber, sides: Sides, P: Transfer | None, progress: Pr
     assert solve is not None
     felt = apply if P is None else lambda u: P.carry_back(apply(P.carry(u)))
 
-    def tell(steps: int, value: float, residual: float) -> None:
-        progress(f"rho, Neumann body {body}: {value:.6g} up to {residual:.1e}, step {steps} of Lanczos", None)
-
+    tell = lambda steps, value, residual: progress(
+        f"rho, Neumann body {body}: {value:.6g} up to {residual:.1e}, step {steps} of Lanczos", None
+    )
     with one_thread():
         ends = extremes_by_solves(felt, solve, sides[body].seen.rows, tolerance=ENOUGH, progress=tell)
     rho = Fraction(ends.largest.value)
@@ -264,7 +270,7 @@ def _with_friction(
     elif radius is not None and matrix is not None:
         if x_neumann is None:
             raise ValueError("friction with a transfer: needed a kernel, or x_neumann beside the radius")
-        Nonlocal(radius=radius)  # refuses what is no radius
+        Nonlocal(radius=radius)  # refuses a number that cannot be a radius
         x_n = real_array("x_neumann", x_neumann, (matrix.shape[1],))
         kernel = hat(real_array("x", x, (n,))[:, None] - x_n[None, :], radius)
     pair = build(
@@ -278,10 +284,8 @@ def _with_friction(
         friction=friction,
         neumann_body=neumann_body,
     )
-    found = advise(pair, tied=tied)
-    return replace(
-        found, roles=tuple(replace(role, theta_auto=None) for role in found.roles)
-    )  # there is no problem file
+    found = advise(pair, tied=tied)  # without a problem file "auto" has no meaning
+    return replace(found, roles=tuple(replace(role, theta_auto=None) for role in found.roles))
 
 
 def _plain(matrix: Any) -> Any:

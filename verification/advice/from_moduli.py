@@ -1,4 +1,4 @@
-"""Advice from the moduli of two bodies alone: lower bounds of rho, and a theta where a mirror image fits."""
+"""Advice from the moduli of two bodies: lower bounds of rho, and a theta where a mirror image fits."""
 
 from __future__ import annotations
 
@@ -14,16 +14,18 @@ from ndtheory.moduli import Moduli, Plane, column, end, free_end, half_planes, l
 from ndtheory.number import below
 from verification.advice import BodyNumber
 from verification.advice.readings import NextRun, rounded_down
-from verification.advice.role import Role
-from verification.advice.roles import Advice
+from verification.advice.roles import PROVED, Advice, Role
 from verification.advice.seen_moduli import Corners, LowerBounds, ModuliRole, SeenModuli, StartTheta, exactly
 from verification.interface.pair import UNITS
 
 #: Sizes of E, and how close nu may come to -1 and to 1/2: bounds of rho then stay between 1e-75 and 1e75.
 LARGEST_YOUNG, CLOSEST = 10**24, Fraction(1, 10**12)
 
-#: Of the bounds that are proved for k = 0.
+#: Reason for a missing friction threshold beside the values that are proved for k = 0.
 NO_FRICTION = "a mirror image proves nothing of friction: the proved values are for k = 0"
+
+#: Reason for a missing theta for a tied interface.
+ONE_END = "moduli bound rho from below, and no other end of the spectrum"
 
 
 def advise_moduli(
@@ -35,21 +37,21 @@ def advise_moduli(
     mirror: Collection[int] = (),
     flat: bool = False,
 ) -> Advice:
-    """What the moduli of two bodies say of rho before there is a mesh.
+    """Advice from the moduli of two bodies, before there is a mesh.
 
     For each role the advice has the bounds of rho from below that every geometry has in the continuum:
     ``(G_c/G_n) kappa_n`` where a piece of Gamma_c may stick, ``E*_c/E*_n`` without friction, with c for the contact
-    body and n for the Neumann body; besides what corners of 90 degrees at the ends of Gamma_c add.  In the continuum no
+    body and n for the Neumann body; corners of 90 degrees at the ends of Gamma_c have larger ones.  In the continuum no
     theta from ``2/(1 + bound)`` on contracts, and no larger one on matching meshes that are fine enough.  The role with
     the smaller bound is worth trying first: two lower bounds prove no order.
 
-    A bound from below gives no theta.  One to start with is there only where Gamma_c is flat, the mirror image of the
-    contact body lies in the Neumann body, and wherever the contact body is held its image is held too.  Then
+    A bound from below gives no theta.  There is a theta to start with only where Gamma_c is flat, the mirror image of
+    the contact body lies in the Neumann body, and wherever the contact body is held its image is held too.  Then
     ``rho_normal <= s`` with the s of :func:`ndtheory.moduli.mirror`, in the continuum and on meshes whose mirror image
-    refines that of the Neumann body, and ``theta = 2/(2 + s)`` contracts by ``s/(2 + s)`` in each step without
+    refines the mesh of the Neumann body, and ``theta = 2/(2 + s)`` contracts by ``s/(2 + s)`` in each step without
     friction: the factor is ``max(1 - theta, |1 - theta (1 + rho_normal)|)``.  With friction
     ``rho <= s lambda_max(J S_n J, S_n)``, with the reflection J.  The second factor is guessed: from a slender column,
-    which has more than any layer, or from a layer and its ends where the Neumann body is told to be flat
+    whose factor exceeds any layer's, or from a layer and its ends where the Neumann body is ``flat``
     (:func:`ndtheory.moduli.column`, :func:`ndtheory.moduli.layer`, :func:`ndtheory.moduli.end`).
 
     Parameters
@@ -58,11 +60,11 @@ def advise_moduli(
         E and nu of bodies 1 and 2; E in one unit of stress.
     plane : {'strain', 'stress', '3d'}
     corners : {'none', '1', '2', 'both'}, optional
-        Which body ends in corners of 90 degrees at the ends of Gamma_c, where that is known.
+        The body that ends in corners of 90 degrees at the ends of Gamma_c, where that is known.
     mirror : collection of {1, 2}
         The bodies whose mirror image fits into the other one, with the supports.
     flat : bool
-        Whether a body into which such an image fits is at least twice as wide as high, and held along its other side.
+        True if a body into which such an image fits is at least twice as wide as high, and held along its other side.
 
     Returns
     -------
@@ -133,22 +135,20 @@ def _role(
 ) -> ModuliRole:
     contact_body = 3 - neumann_body
     neumann, contact = bodies[neumann_body - 1], bodies[contact_body - 1]
-    patch = half_planes(contact, neumann)
+    patch, s = half_planes(contact, neumann), mirror(contact, neumann)
     bounds: dict[Corners, LowerBounds] = {}
     for name in get_args(Corners):
         openings = _opening(contact_body, name), _opening(neumann_body, name)
         stick, slide = end(contact, neumann, openings)[1], free_end(contact, neumann, openings)
         bounds[name] = LowerBounds(stick=_larger(patch.high, stick), slide=_larger(patch.free, slide))
-    if contact_body not in fits:
-        why = f"needed: the mirror image of body {contact_body} fits into body {neumann_body} (option --mirror)"
-        return ModuliRole(neumann_body=neumann_body, corners=bounds, start=None, why_no_start=why)
-    s = mirror(contact, neumann)
-    if s is None:
+    if contact_body not in fits or s is None:
         why = (
             f"body {contact_body} is incompressible and body {neumann_body} is not: no multiple of its energy is enough"
         )
+        if contact_body not in fits:
+            why = f"needed: the mirror image of body {contact_body} fits into body {neumann_body} (option --mirror)"
         return ModuliRole(neumann_body=neumann_body, corners=bounds, start=None, why_no_start=why)
-    # an image that fits has no wider angle than the Neumann body, which may end in a corner unless told otherwise
+    # the angle of an image that fits is at most the Neumann body's, which may be a corner unless `corners` excludes it
     angle = math.pi / 2 if corners is None else _opening(neumann_body, corners)
     reflected = max(layer(neumann), end(neumann, neumann, (angle, angle))[1])
     words = "a layer and its ends"
@@ -175,27 +175,20 @@ def _as_role(role: ModuliRole, bounds: LowerBounds) -> Role:
     reason = {
         "theta_predicted": "moduli bound rho from below, which predicts no theta",
         "rate_predicted": "moduli bound rho from below, which predicts no rate",
-        "friction_threshold": NO_FRICTION if role.start else "moduli alone say nothing of friction",
+        "friction_threshold": NO_FRICTION if role.start else "moduli say nothing about friction",
+        "rho_min": ONE_END,
     }
-    proved: dict[str, Any] = dict.fromkeys(("theta_proved", "factor_proved", "theta_max_proved"))
     if role.start is None:
-        reason |= dict.fromkeys(proved, role.why_no_start)
-    else:
-        s = role.start.s
-        most = min(2 / (1 + s), Fraction(1))
-        proved = {
-            "theta_proved": float(predicted_theta(s)),
-            "factor_proved": exactly(predicted_rate(s)),
-            "theta_max_proved": exactly(most),
-        }
+        reason |= dict.fromkeys(PROVED, role.why_no_start)
+        return Role(neumann_body=role.neumann_body, rho=bounds.stick, reason=reason)
+    s = role.start.s
     return Role(
         neumann_body=role.neumann_body,
         rho=bounds.stick,
-        theta_predicted=None,
-        rate_predicted=None,
-        friction_threshold=None,
+        theta_proved=float(predicted_theta(s)),
+        factor_proved=exactly(predicted_rate(s)),
+        theta_max_proved=exactly(min(2 / (1 + s), Fraction(1))),
         reason=reason,
-        **proved,
     )
 
 

@@ -1,4 +1,4 @@
-"""Advice from one run of any code: what its ratio of residuals says of rho."""
+"""Advice from one run of any code, by its ratio of residuals."""
 
 from __future__ import annotations
 
@@ -6,37 +6,35 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
-from ndtheory import Number
-from ndtheory.constants import take
-from ndtheory.energy import LARGEST, SMALLEST
+from ndtheory.constants import LARGEST, SMALLEST, take
 from ndtheory.energy_norms import predicted_theta
 from ndtheory.number import Numeric
-from verification.advice.next_run import Made, anew, pasted_or_not
 from verification.advice.readings import (
     LARGEST_TO_PASTE,
     OF_OPEN_NODES,
+    Made,
     NextRun,
     Observed,
     RunReading,
+    SeenRun,
+    anew,
     assumed,
-    check_assumed,
-    read_ratio,
+    few,
+    pasted_or_not,
+    read_observed,
     rounded_down,
     spread,
 )
-from verification.advice.role import role_of
-from verification.advice.roles import Advice
-from verification.advice.runs_with_friction import (
-    FrictionBounds,
-    friction_bounds,
-    next_with_friction,
-    readings_with_friction,
-)
+from verification.advice.roles import Advice, role_of
+from verification.advice.runs_with_friction import friction_bounds, next_with_friction, readings_with_friction
 from verification.interface.pair import UNITS
+
+#: Reason for a missing theta for a tied interface.
+ONE_END = "residuals show one end of the spectrum"
 
 
 def advise_run(theta: Numeric, ratio: Numeric, *, tied: bool = False, friction: bool = False) -> Advice:
-    """Advice from one run of any code with constant theta: what it says of rho, and the run to make next.
+    """Advice from one run of any code with constant theta: bounds of rho, and the run to make next.
 
     While contact does not change, a mode is multiplied by ``1 - theta (1 + lambda)`` in a step, with lambda at most
     rho, and an open node by ``1 - theta``.  A residual has no sign, so that a ratio r of residuals can mean
@@ -44,26 +42,26 @@ def advise_run(theta: Numeric, ratio: Numeric, *, tied: bool = False, friction: 
     * ``mode-high``: ``lambda = (1 + r)/theta - 1``.  Without friction or tied, rho is at least that wherever
       ``r > 1 - theta``, since no step is longer than ``max(1 - theta, |1 - theta - theta rho|)``;
     * ``mode-low``: ``lambda = (1 - r)/theta - 1``, where ``r <= 1 - theta``;
-    * ``open``: nothing of rho, where r is about ``1 - theta``;
-    * ``level``: contact opens and closes in turn, where r is about 1 or the growth does not last.  Without friction
+    * ``open``: no bound of rho, where r is about ``1 - theta``;
+    * ``level``: contact opens and closes alternately, where r is about 1 or the growth does not last.  Without friction
       theta does not contract, so that rho is at least ``2/theta - 1``.
 
     With friction these bounds are false: a coupling with rho = 0.97 had a ratio of 0.9022 at theta = 0.1, where the
-    first one is 18.  What is proved then is in :mod:`verification.advice.runs_with_friction`.
+    first one is 18.  :mod:`verification.advice.runs_with_friction` has the bounds that are proved then.
 
     Parameters
     ----------
     theta : number
         The run's relaxation factor, 0 < theta <= 1.
     ratio : number
-        r > 0, that of the absolute unrelaxed residual ``|T g - g|`` from one step to the next, steady over the last ten
-        steps or more, and over ``5/theta`` where these are more; above 1 where the run diverged, and 1 where the
+        r > 0: ratio of the absolute unrelaxed residual ``|T g - g|`` from one step to the next, steady over the last
+        ten steps or more, and over ``5/theta`` where these are more; above 1 where the run diverged, and 1 where the
         residual rises and falls and has no steady ratio.
     tied : bool
-        Whether nothing opens or slips.  A step is linear then: ``open`` and ``level`` are no readings, and a run that
-        grows goes on at the pace of the stiffest mode, which tells rho.
+        True if nothing opens or slips.  A step is linear then: ``open`` and ``level`` are excluded, and a run that
+        grows goes on at the pace of the stiffest mode, which determines rho.
     friction : bool
-        Whether there is friction: then no theta is pasted.  Without it the advice assumes that there is none, or that
+        True if there is friction: then no theta is pasted.  Otherwise the advice assumes that there is none, or that
         the interface is tied.
 
     Returns
@@ -74,7 +72,7 @@ def advise_run(theta: Numeric, ratio: Numeric, *, tied: bool = False, friction: 
     Raises
     ------
     HypothesisError
-        theta or the ratio is no number of its range.
+        theta or the ratio is not a number in its range.
     ValueError
         Friction of a tied interface.
 
@@ -91,12 +89,12 @@ def advise_run(theta: Numeric, ratio: Numeric, *, tied: bool = False, friction: 
     >>> found.roles, round(found.friction_bounds.image, 6), found.next.theta
     ((), 0.022, 0.3146)
     """
-    check_assumed(tied, friction)
+    assumes = assumed(tied, friction)
     t = take("theta", theta, "the theta of a run, 0 < theta <= 1 (1e-75 or more)", lambda v: SMALLEST <= v <= 1)
     needed = "the ratio of consecutive residuals, a number > 0 (1e-75 to 1e75)"
     r = take("ratio", ratio, needed, lambda v: SMALLEST <= v <= LARGEST)
-    run, readings, following, rho = read_ratio(t, r)
     observed, falls = Observed.known(r), r < 1 - spread(t)
+    readings, following, rho = read_observed(t, observed)
     bounds = None
     if friction:
         falling, rising = ([(t, observed)], []) if falls else ([], [(t, observed)])
@@ -104,11 +102,11 @@ def advise_run(theta: Numeric, ratio: Numeric, *, tied: bool = False, friction: 
         following = next_with_friction(falling, [at for at, _ in rising])
     elif tied and rho is None and r > 1 + spread(t):
         rho = (1 + r) / t - 1
-        best = rounded_down(min(predicted_theta(rho), LARGEST_TO_PASTE))
-        why = f"2/(2 + rho) with rho = {float(rho):.4g}, the pace at which a tied run grows"
-        following = NextRun(theta=best, why=why)
-    made = [Made(theta=t, falls=r < 1, rises=r >= 1, ratio=r)]
-    return advice_of_runs(made, readings, following, rho, tied=tied, bounds=bounds, run=run)
+        why = f"2/(2 + rho) with rho = {few(rho)}, the pace at which a tied run grows"
+        following = NextRun(theta=rounded_down(min(predicted_theta(rho), LARGEST_TO_PASTE)), why=why)
+    made, run = [Made(theta=t, falls=r < 1, rises=r >= 1, ratio=r)], SeenRun(theta=t, ratio=r)
+    known = {"assumes": assumes, "friction_bounds": bounds, "run": run}
+    return advice_of_runs(made, readings, following, rho, tied=tied, **known)
 
 
 def advice_of_runs(
@@ -118,25 +116,13 @@ def advice_of_runs(
     rho: Fraction | None,
     *,
     tied: bool,
-    bounds: FrictionBounds | None,
-    **seen: Any,
+    **known: Any,
 ) -> Advice:
-    """The advice from what runs show: a theta to paste where they decide rho, else a run that was not made yet.
+    """The advice from runs: a theta to paste where they decide rho, else a run that was not made yet.
 
-    Parameters
-    ----------
-    made : sequence of Made
-    readings : sequence of RunReading
-        What they can mean; of these a tied interface has none that needs nodes that open.
-    following : NextRun
-        The theta to paste, or the run that is proposed.
-    rho : Fraction or None
-        None while several readings are left.
-    tied : bool
-    bounds : FrictionBounds or None
-        What is proved with friction; None without friction.
-    **seen
-        Attributes of the advice: what was given.
+    ``following`` is the theta to paste, or the run that is proposed; ``rho`` is None while several readings are left;
+    readings that need nodes that open are left out where the interface is tied; ``known`` are other attributes of the
+    advice.
     """
     if rho is not None and (paste := pasted_or_not(following, made)) is not None:
         following = paste
@@ -144,9 +130,8 @@ def advice_of_runs(
         following, rho = anew(following, made), None
     roles = []
     if rho is not None:
-        nothing = "an observed ratio proves nothing"
-        who = {"neumann_body": "whichever body had the Neumann problem in that run"}
-        roles.append(role_of(None, Number.of_float(rho), ratio=rho, nothing=nothing, reason=who))
+        reason = {"neumann_body": "whichever body had the Neumann problem in that run", "rho_min": ONE_END}
+        roles.append(role_of(None, rho, nothing="an observed ratio proves nothing", reason=reason))
     return Advice(
         neumann_body=None,
         roles=tuple(roles),
@@ -154,7 +139,5 @@ def advice_of_runs(
         readings=tuple(one for one in readings if not (tied and one.kind in OF_OPEN_NODES)),
         next=following,
         tied=tied,
-        assumes=assumed(tied, bounds is not None),
-        friction_bounds=bounds,
-        **seen,
+        **known,
     )

@@ -15,9 +15,8 @@ import scipy.sparse as sp
 from scipy.io.matlab import MatReadError
 
 from fem1d2d.mesh import Floats
-from verification.interface.array_headers import headers
 from verification.interface.files import NEEDED
-from verification.interface.matrices import MOST_ROWS, UNREADABLE
+from verification.interface.matrices import MOST_ROWS, UNREADABLE, headers
 from verification.problem.tables import ProblemError, short, unreadable
 
 #: Largest size of a matrix file: a full matrix of MOST_ROWS rows, with the two indices of each entry.
@@ -26,13 +25,13 @@ MOST_BYTES = 24 * MOST_ROWS**2
 #: The same of a text: numbers of 17 digits take so many characters.
 MOST_CHARACTERS = 32 * MOST_ROWS**2
 
-#: What the readers raise on a file that is no matrix.
+#: Errors of the readers on a file that is not a matrix.
 DAMAGED = (*UNREADABLE, MatReadError)
 
 #: The first bytes of an HDF5 file, which MATLAB writes as version 7.3 behind a header of 512 bytes.
 HDF5 = b"\x89HDF\r\n\x1a\n"
 
-#: What a file is that none of the readers knows.
+#: The endings of files that can be read.
 KNOWN = ".npy, .npz, .mtx, .mat, .csv or .txt"
 
 
@@ -41,26 +40,19 @@ class _Refusal(Exception):
 
 
 def read_matrix(path: Path, name: str = "") -> Floats:
-    """A matrix or a vector from a file, by its ending.
+    """Read a matrix or a vector from a file, by its ending.
 
     ``.npy``; ``.npz`` (scipy.sparse.save_npz, or numpy.savez); ``.mtx`` (Matrix Market); ``.mat`` (MATLAB, not 7.3);
     ``.csv`` and ``.txt`` (rows of numbers, separated by commas, semicolons or blanks).  Shapes are read first: a small
-    file may unpack to more than the memory holds.
-
-    Parameters
-    ----------
-    path : Path
-    name : str
-        Which of several arrays; where there is one only, its name does not matter.
+    file may unpack to more than the memory holds.  Of several arrays it is the one called ``name``.
 
     Raises
     ------
     ProblemError
     """
     refuse = lambda needed: ProblemError(str(path), "", None, needed)
-    read = _READERS.get(path.suffix.lower())
-    text = read is _text
-    why = unreadable(path, MOST_CHARACTERS if text else MOST_BYTES)
+    read, writer = _READERS.get(path.suffix.lower(), (None, ""))
+    why = unreadable(path, MOST_CHARACTERS if read is _text else MOST_BYTES)
     if why:
         raise refuse(why if "folder" not in why else f"a matrix file ({KNOWN}) is needed, this is a folder")
     if read is None:
@@ -72,7 +64,7 @@ def read_matrix(path: Path, name: str = "") -> Floats:
     except _Refusal as error:
         raise refuse(str(error)) from None
     except DAMAGED:
-        raise refuse(f"not a matrix that {_WRITERS[path.suffix.lower()]} saved") from None
+        raise refuse(f"not a matrix that {writer} saved") from None
 
 
 def read_array(path: Path, name: str) -> Floats:
@@ -109,7 +101,7 @@ def names_in(path: Path) -> tuple[str, ...]:
 
 
 def is_interface(path: Path) -> bool:
-    """Whether a file has all arrays of an ``interface.npz``."""
+    """True if a file has all arrays of an ``interface.npz``."""
     return set(NEEDED) <= set(names_in(path))
 
 
@@ -126,16 +118,13 @@ def _real(matrix: np.ndarray) -> Floats:
 
 
 def _chosen(names: list[str], name: str) -> str:
-    """Which of several arrays."""
+    """The name of the array to read among several."""
     if name in names:
         return name
     if len(names) != 1:
         wanted = f"one array, or one named {name}" if name else "one array"
         raise _Refusal(f"needed {wanted}, received {short(', '.join(names), 200) or 'none'}")
     return names[0]
-
-
-# --- numpy and scipy --------------------------------------------------------------------------------------------------
 
 
 def _numpy(path: Path, name: str) -> np.ndarray:
@@ -159,14 +148,11 @@ def _dense(sparse: sp.sparray) -> np.ndarray:
 
 
 def _rows(file: BinaryIO) -> Iterator[int]:
-    """For each array of a file how many rows a square matrix of as many entries has, from its header alone."""
+    """For each array of a file the rows of a square matrix with as many entries, read only from its header."""
     for header in headers(file):
         if header.entry_bytes > np.dtype(np.clongdouble).itemsize and header.entries > MOST_ROWS:
             raise ValueError("needed real numbers")
         yield math.isqrt(header.entries)
-
-
-# --- Matrix Market ----------------------------------------------------------------------------------------------------
 
 
 def _market(path: Path, name: str) -> np.ndarray:
@@ -176,9 +162,6 @@ def _market(path: Path, name: str) -> np.ndarray:
     _within(max(rows, columns, math.isqrt(entries)))
     found = scipy.io.mmread(path, spmatrix=False)
     return _dense(found) if sp.issparse(found) else np.asarray(found)
-
-
-# --- MATLAB -----------------------------------------------------------------------------------------------------------
 
 
 def _matlab(path: Path, name: str) -> np.ndarray:
@@ -221,9 +204,6 @@ def _unpacked(file: BinaryIO) -> int:
     return total
 
 
-# --- texts ------------------------------------------------------------------------------------------------------------
-
-
 def _text(path: Path, name: str) -> np.ndarray:
     """Rows of numbers; what begins with # or % is a comment."""
     rows: list[Floats] = []
@@ -257,7 +237,7 @@ def _numbers(cells: list[str], line: int, *, first: bool) -> Floats:
     if "," in bad and _is_number(bad.replace(",", ".")):
         raise _Refusal(f"{shown}, a decimal comma: needed a decimal point")
     if first and not any(map(_is_number, cells)):
-        raise _Refusal(f"{shown}, so that it looks like a header: needed numbers alone, delete it")
+        raise _Refusal(f"{shown}, so that it looks like a header: needed only numbers, delete it")
     raise _Refusal(f"{shown}: needed a number")
 
 
@@ -269,21 +249,12 @@ def _is_number(cell: str) -> bool:
     return True
 
 
-_READERS: dict[str, Callable[[Path, str], np.ndarray]] = {
-    ".npy": _numpy,
-    ".npz": _numpy,
-    ".mtx": _market,
-    ".mat": _matlab,
-    ".csv": _text,
-    ".txt": _text,
-}
-
-#: Who writes files of these endings.
-_WRITERS = {
-    ".npy": "numpy or scipy",
-    ".npz": "numpy or scipy",
-    ".mtx": "a Matrix Market writer",
-    ".mat": "MATLAB or scipy",
-    ".csv": "any program as text",
-    ".txt": "any program as text",
+#: Readers by the ending of a file, and the programs that write such files.
+_READERS: dict[str, tuple[Callable[[Path, str], np.ndarray], str]] = {
+    ".npy": (_numpy, "numpy or scipy"),
+    ".npz": (_numpy, "numpy or scipy"),
+    ".mtx": (_market, "a Matrix Market writer"),
+    ".mat": (_matlab, "MATLAB or scipy"),
+    ".csv": (_text, "any program as text"),
+    ".txt": (_text, "any program as text"),
 }

@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from typing import Any, Literal
 
 import numpy as np
 
 from fem1d2d.mesh import Floats
 from verification.advice.ends import SWIFT
-from verification.advice.readings import FEWEST_STEPS
+from verification.advice.log_files import Column
+from verification.advice.readings import FEWEST_STEPS, Observed, spread, steps_needed
 
 #: Logarithms of ratios that scatter and drift by less, or by a fifth of theta, are steady.
 STEADY = 0.03
@@ -45,33 +47,33 @@ TRIES = 12
 #: Of more windows the last ones are read.
 MOST_WINDOWS = 300
 
-
 #: Windows that are too short one by one are pooled where there are so many.
 FEWEST_WINDOWS = 5
+
+Kind = Literal["steady", "level", "floor", "plateau", "unsteady", "short"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Pace:
-    """How one series of residuals goes on.
+    """The course of one series of residuals.
 
     Attributes
     ----------
     kind : {'steady', 'level', 'floor', 'plateau', 'unsteady', 'short'}
-        ``floor`` is a level so low that the accuracy of the participants' solvers may set it; its ratio is that of the
+        ``floor`` is a level so low that the accuracy of the participants' solvers may set it; its ratio comes from the
         steady steps before.
     value, least, most : float or None
-        The ratio of consecutive residuals, or P of a plateau, and between which values it lies.
+        The ratio of consecutive residuals, or P of a plateau, and its limits.
     steps : int
-        How many steps the series has that can be read.
+        Number of steps of the series that can be read.
     height : float
         The last residual as a share of the largest one; where it is lost in rounding or zero, the share of rounding.
-    lost : bool
-        Whether the series ends in inf or nan.
-    arrived : bool
-        True if it ends in rounding or in zero, a step after those that can be read.
+    lost, arrived : bool
+        True if the series ends in inf or nan; True if it ends in rounding or in zero, a step after those that can be
+        read.
     """
 
-    kind: Literal["steady", "level", "floor", "plateau", "unsteady", "short"]
+    kind: Kind
     value: float | None = None
     least: float | None = None
     most: float | None = None
@@ -85,28 +87,26 @@ class Pace:
         """True if the series falls by SWIFT a step or faster in the mean."""
         return not self.lost and math.log(self.height) <= (self.steps + self.arrived) * math.log(SWIFT)
 
+    @property
+    def grows(self) -> bool:
+        """True if the ratio is above 1."""
+        return self.least is not None and self.least > 1
 
-def pace(
-    residuals: Floats, *, relative: bool, steps: int, theta: float, spread: float, digits: float, decimals: float
-) -> Pace:
-    """How a series of residuals goes on.
+    @property
+    def falls(self) -> bool:
+        """True if the ratio is below 1."""
+        return self.most is not None and self.most < 1
+
+
+def pace(residuals: Floats, column: Column, theta: Fraction) -> Pace:
+    """The course of the residuals of one time window.
 
     The ratio is the median over the last ``steps`` steps of geometric means over an even number of consecutive ones, a
-    fifth of the steps: contact that lies open and closed in turn makes them alternate, and noise is smaller in a mean.
-    It is steady where these means scatter little between their deciles, and their medians in both halves agree.
-
-    Parameters
-    ----------
-    residuals : array
-    relative : bool
-        Whether they are ``|T x - x|/|T x|``.
-    steps : int
-        Over how many steps the ratio must be steady; fewer where the residual has fallen to CONVERGED.
-    theta, spread : float
-        The relaxation factor; how far from 1 the ratio of a level may come out.
-    digits, decimals : float
-        Rounding of the numbers, relative and absolute.
+    fifth of the steps: contact that is open and closed alternately makes them alternate, and noise is smaller in a
+    mean.  It is steady where these means scatter little between their deciles, and their medians in both halves agree.
+    It must be steady over the steps that theta needs; over fewer where the residual has fallen to CONVERGED.
     """
+    relative, steps = column.residual == "relative", steps_needed(theta)
     usable = np.flatnonzero(np.isfinite(residuals) & (residuals > 0))
     end = int(usable[-1]) + 1 if usable.size else 0
     lost = end < len(residuals) and not math.isfinite(float(residuals[end]))
@@ -116,7 +116,7 @@ def pace(
     share = ROUNDING
     if values.size:
         peak = int(np.argmax(values))
-        share = max(ROUNDING, 100 * decimals / float(values[peak]))
+        share = max(ROUNDING, 100 * column.decimals / float(values[peak]))
         under = np.flatnonzero(values[peak:] < (ROUNDING if relative else share * values[peak]))
         arrived = arrived or bool(under.size)
         values = values[: peak + int(under[0])] if under.size else values
@@ -129,7 +129,7 @@ def pace(
     if taken < steps:
         return Pace(kind="short", steps=max(taken, int(arrived)), height=height, lost=lost, arrived=arrived)
     logs = np.log(values)
-    limit = min(STEADY, theta / 5)
+    limit = min(STEADY, float(theta) / 5)
 
     known: dict[str, Any] = {"steps": taken, "height": height, "arrived": arrived}
 
@@ -145,7 +145,7 @@ def pace(
         scatter, drift = _scatter(means), abs(float(np.median(means[:half]) - np.median(means[half:])))
         before = 0.0 if relative else float(logs[: end - steps].max())  # the size of what was subtracted
         unit = ROUNDED * math.exp(before - float(stretch.min()))
-        written = digits + decimals * math.exp(-float(stretch.min())) + unit
+        written = column.digits + column.decimals * math.exp(-float(stretch.min())) + unit
         if (
             2 * written / lag > limit
             or max(scatter, drift) > limit + written
@@ -161,32 +161,31 @@ def pace(
 
     last = ratio(len(values))
     tail = values[-steps - 1 :]
-    flat = last is not None and _least(last) <= 1 and not _falls(last)
+    flat = last is not None and not last.grows and not last.falls
     if last is not None and not flat:
         return last
-    if relative and (plateau := _plateau(tail, digits)) is not None:
-        return Pace(kind="plateau", value=plateau[1], least=plateau[0], most=plateau[2], **known)
+    if relative and (plateau := _plateau(tail, column.digits)) is not None:
+        return Pace(kind="plateau", **plateau, **known)
     ends = range(len(values), steps, -max(1, steps // 2))[1 : TRIES + 1]
     earlier = (found for end in ends if (found := ratio(end)) is not None)
-    before = next((found for found in earlier if _falls(found) or _grows(found)), None)  # no part of the level itself
+    before = next((found for found in earlier if found.falls or found.grows), None)  # no part of the level itself
     lengths = [n for n in (steps, 2 * steps, 4 * steps) if n <= taken]  # a rough level shows over a longer stretch
-    if flat or any(_level(logs[-n - 1 :], spread, limit) for n in lengths):
-        kind: Literal["level", "floor"] = "floor" if height < FLOOR else "level"
-        if height < CONVERGED and before is not None and _falls(before):
+    if flat or any(_level(logs[-n - 1 :], float(spread(theta)), limit) for n in lengths):
+        kind: Kind = "floor" if height < FLOOR else "level"
+        if height < CONVERGED and before is not None and before.falls:
             return before
-        if before is not None and (kind == "floor" or _grows(before)):
+        if before is not None and (kind == "floor" or before.grows):
             return replace(before, kind=kind)
         return Pace(kind=kind, **known)
-    if before is not None and _grows(before):
+    if before is not None and before.grows:
         return before
     if height < CONVERGED and (settles := _settling(tail, relative, limit, steps)) is not None:
-        least, value, most = settles
-        return Pace(kind="steady", value=value, least=least, most=most, **known)
+        return Pace(kind="steady", **settles, **known)
     return Pace(kind="unsteady", lost=lost, **known)
 
 
-def _settling(tail: Floats, relative: bool, limit: float, steps: int) -> tuple[float, float, float] | None:
-    """Least, last and largest ratio of a run that has arrived while its ratios still rise to that of its slowest mode.
+def _settling(tail: Floats, relative: bool, limit: float, steps: int) -> dict[str, Any] | None:
+    """Last ratio, and its limits, of a run that has arrived while its ratios still rise to the slowest mode's.
 
     The ratios of a linear run rise, since faster modes die out first.  Their logarithms lie on a line up to what is
     allowed of a steady ratio; by as much as they have risen over the stretch they may still rise.
@@ -201,7 +200,7 @@ def _settling(tail: Floats, relative: bool, limit: float, steps: int) -> tuple[f
     middle, last = float(means.mean()), float(means.mean()) + rise / 2
     if not (0 < rise <= RISE and scatter <= limit and last + rise + scatter < 0):
         return None
-    return math.exp(middle - scatter), math.exp(last), math.exp(last + rise + scatter)
+    return {"least": math.exp(middle - scatter), "value": math.exp(last), "most": math.exp(last + rise + scatter)}
 
 
 def _slopes(logs: Floats, lag: int) -> Floats:
@@ -214,28 +213,16 @@ def _scatter(values: Floats) -> float:
     return float(np.quantile(values, 0.9) - np.quantile(values, 0.1)) / 2
 
 
-def _grows(found: Pace) -> bool:
-    return _least(found) > 1
-
-
-def _least(found: Pace) -> float:
-    return -math.inf if found.least is None else found.least
-
-
-def _falls(found: Pace) -> bool:
-    return found.most is not None and found.most < 1
-
-
-def _plateau(tail: Floats, digits: float) -> tuple[float, float, float] | None:
-    """Least, median and largest value of a flat stretch above 1."""
+def _plateau(tail: Floats, digits: float) -> dict[str, Any] | None:
+    """Median, least and largest value of a flat stretch above 1."""
     least, most = float(tail.min()) * (1 - digits), float(tail.max()) * (1 + digits)
     middle = float(np.median(tail))
     flat = float(tail.max() - tail.min()) <= FLAT * (middle - 1) + 2 * digits * middle
-    return (least, middle, most) if least > 1 and flat else None
+    return {"least": least, "value": middle, "most": most} if least > 1 and flat else None
 
 
 def _level(logs: Floats, spread: float, limit: float) -> bool:
-    """Whether residuals stay as they are, or rise and fall, without a trend."""
+    """True if residuals stay as they are, or rise and fall, without a trend."""
     ratios, half = np.diff(logs), len(logs) // 2
     trend = abs(float(np.mean(logs[half:]) - np.mean(logs[:half]))) / half
     turns = min(np.count_nonzero(ratios > 0), np.count_nonzero(ratios < 0)) >= len(ratios) // 5
@@ -243,19 +230,15 @@ def _level(logs: Floats, spread: float, limit: float) -> bool:
     return trend <= (limit if still else spread) and bool(turns or still)
 
 
-def pooled(windows: Sequence[Floats], *, relative: bool, steps: int) -> tuple[float, float, float] | None:
-    """Median, least and largest ratio of many time windows that are too short to be read one by one.
+# --- several windows --------------------------------------------------------------------------------------------------
 
-    Of each window the second half of its steps counts, where the slowest mode leads.  A mode
-    that is slower than a window is long does not show, so that this is a pace and no bound.
 
-    Parameters
-    ----------
-    windows : sequence of array
-    relative : bool
-        Whether residuals are ``|T x - x|/|T x|``; they count below SMALL then.
-    steps : int
-        So many steps must count in all.
+def pooled(windows: Sequence[Floats], *, relative: bool, steps: int) -> Observed | None:
+    """Median ratio of many time windows that are too short to be read one by one, and its limits.
+
+    Only the second half of the steps of each window counts, where the slowest mode leads.  A mode that is slower than a
+    window is long does not show, so that this is a pace and no bound.  Relative residuals ``|T x - x|/|T x|`` count
+    below SMALL; so many ``steps`` must count in all.
     """
     ratios, count = [], 0
     for window in windows:
@@ -268,13 +251,20 @@ def pooled(windows: Sequence[Floats], *, relative: bool, steps: int) -> tuple[fl
     if len(ratios) < FEWEST_WINDOWS or count < steps:
         return None
     least, middle, most = np.exp(np.quantile(ratios, [0.1, 0.5, 0.9]))
-    return float(middle), float(least), float(most)
+    return Observed.of(float(middle), float(least), float(most))
 
 
-def together(paces: Sequence[Pace]) -> tuple[float, float, float]:
-    """Median, least and largest ratio of several windows; of ten and more without the outer tenths."""
+def together(paces: Sequence[Pace]) -> Observed | None:
+    """Median ratio or plateau of several windows, and its limits; of ten and more without the outer tenths.
+
+    A run that grows in some windows does so.
+    """
+    if not paces:
+        return None
+    paces = [one for one in paces if one.kind != "plateau" and one.grows] or paces
     least, most = (np.array([getattr(one, name) for one in paces]) for name in ("least", "most"))
     middle = float(np.median([one.value for one in paces if one.value is not None]))
     if len(paces) < 10:
-        return middle, float(least.min()), float(most.max())
-    return middle, min(middle, float(np.quantile(least, 0.1))), max(middle, float(np.quantile(most, 0.9)))
+        return Observed.of(middle, float(least.min()), float(most.max()))
+    low, high = float(np.quantile(least, 0.1)), float(np.quantile(most, 0.9))
+    return Observed.of(middle, min(middle, low), max(middle, high))

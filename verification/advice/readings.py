@@ -1,8 +1,9 @@
-"""What the ratio of a run of any code can mean for rho, and the run that decides."""
+"""Meanings that the ratio of a run of any code can have for rho, and the run to make next, which is never one made."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, Literal
@@ -17,8 +18,8 @@ LARGEST_TO_PASTE = Fraction(99, 100)
 FEWEST_STEPS = 10
 
 #: How far from 1 the ratio of a residual that stays at a level may come out, at most and at least.  In 52 runs of the
-#: model of Section 6 whose contact opened and closed in turn, averages over ten steps lay between 0.92 and 1.11, over
-#: twenty between 0.96 and 1.06.
+#: model of Section 6 whose contact opened and closed alternately, averages over ten steps lay between 0.92 and 1.11,
+#: over twenty between 0.96 and 1.06.
 WIDEST, NARROWEST = Fraction(1, 10), Fraction(3, 100)
 
 #: Beyond this theta four figures would lead back to a smaller one.
@@ -27,7 +28,7 @@ NEXT_TO_1 = Fraction(999, 1000)
 #: A run to make next has a theta larger by this factor at least, unless that would come too close to 1.
 SHORTEST_STEP = Fraction(9, 8)
 
-#: The readings that need nodes that open: none of a tied interface.
+#: The readings that need nodes that open, which a tied interface does not have.
 OF_OPEN_NODES = ("open", "level")
 
 #: A run shows nothing new if its theta and another one differ by less than this share, also of 1 - theta.
@@ -37,25 +38,19 @@ ANEW = Fraction(1, 100)
 SAME = Fraction(1, 20)
 
 
-def steps_needed(theta: Fraction) -> int:
-    """Over how many steps at least a ratio must be steady, for a level to be told from a decay."""
-    return max(FEWEST_STEPS, math.ceil(5 / theta))
-
-
 @dataclass(frozen=True, kw_only=True)
 class RunReading:
-    """One thing that the ratio of a run can mean.
+    """One possible meaning of the ratio of a run.
 
     Attributes
     ----------
     kind : {'mode-high', 'mode-low', 'level', 'plateau', 'open'}
-        What sets the pace: the stiffest mode in contact, which changes sign in every step; the softest one, which keeps
-        its sign; contact that opens and closes in turn, so that the residual stays at a level; a tied run that
-        diverges, so that its relative residual stays at a plateau; nodes that are open.
-    value : float or None
-        rho where all of Gamma_c is closed and nothing slides; None where the reading gives a bound at most.
-    lo : float or None
-        If this reading is right, rho is at least this without friction, or tied.
+        The cause of the pace: the stiffest mode in contact, which changes sign in every step; the softest one, which
+        keeps its sign; contact that opens and closes alternately, so that the residual stays at a level; a tied run
+        that diverges, so that its relative residual stays at a plateau; nodes that are open.
+    value, lo : float or None
+        rho where all of Gamma_c is closed and nothing slides, None where the reading gives a bound at most; if this
+        reading is right, rho is at least ``lo`` without friction, or tied.
     says : str
         The same in words.
     """
@@ -66,7 +61,7 @@ class RunReading:
     says: str
 
     def to_dict(self) -> dict[str, Any]:
-        """A member of ``readings``; the level is that of the arithmetic."""
+        """A member of ``readings``; its level is the one of the arithmetic."""
         reason = {"rho.hi": "a run bounds rho from below at most"}
         if self.value is None:
             reason["rho.value"] = "this reading does not tell rho itself"
@@ -78,16 +73,10 @@ class RunReading:
 
 @dataclass(frozen=True, kw_only=True)
 class NextRun:
-    """The run to make next: its theta, and what it will show.
+    """The run to make next: its theta, and why.
 
-    Attributes
-    ----------
-    theta : float
-    why : str
-    kept : bool
-        True if a run with this theta was made and is to be kept.
-    again : bool
-        True if that run is to be made again because its log was too short or not steady.
+    ``kept`` is True if a run with this theta was made and is to be kept, ``again`` if it is to be made again because
+    its log was too short or not steady.
     """
 
     theta: float
@@ -102,21 +91,14 @@ class NextRun:
 
 @dataclass(frozen=True, kw_only=True)
 class SeenRun:
-    """What was given of a run of any code with constant theta.
-
-    Attributes
-    ----------
-    theta : Fraction
-    ratio : Fraction
-        Of the residual ``|T g - g|``, absolute and before relaxation, from one step to the next.
-    """
+    """A run of any code with constant theta, and the ratio of its absolute unrelaxed residual from step to step."""
 
     theta: Fraction
     ratio: Fraction
 
     @property
     def steps(self) -> int:
-        """Over how many steps at least the ratio must be steady."""
+        """Number of steps over which the ratio must be steady, at least."""
         return steps_needed(self.theta)
 
     def to_dict(self) -> dict[str, Any]:
@@ -131,38 +113,90 @@ class SeenRun:
 
 @dataclass(frozen=True, kw_only=True)
 class Observed:
-    """A number that was read from a run, and between which values it lies.
-
-    Attributes
-    ----------
-    value, least, most : Fraction
-    """
+    """A number that was read from a run, and its limits."""
 
     value: Fraction
     least: Fraction
     most: Fraction
 
     @classmethod
+    def of(cls, value: float | Fraction, least: float | Fraction, most: float | Fraction) -> Observed:
+        """The exact values of some numbers."""
+        return cls(value=Fraction(value), least=Fraction(least), most=Fraction(most))
+
+    @classmethod
     def known(cls, value: Fraction) -> Observed:
         """A number that was given."""
         return cls(value=value, least=value, most=value)
 
+    def __str__(self) -> str:
+        return f"{few(self.value)} ({few(self.least)} to {few(self.most)})"
 
-def read_ratio(theta: Fraction, r: Fraction) -> tuple[SeenRun, tuple[RunReading, ...], NextRun, Fraction | None]:
-    """Every reading of a ratio r of residuals at theta, and the run to make next.
+    def to_dict(self) -> dict[str, float]:
+        """The objects ``ratio``, ``plateau`` and ``pooled`` of a column."""
+        return {"value": float(self.value), "least": float(self.least), "most": float(self.most)}
 
-    :func:`verification.advice.from_runs.advise_run` says what the readings are.
 
-    Returns
-    -------
-    run, readings, next, rho
-        rho of the only reading that is left; None where there are several.
+@dataclass(frozen=True, kw_only=True)
+class Made:
+    """A run that was made: its residual ``falls`` to the end of the log, or it ``rises``: it does not converge.
+
+    ``ratio`` is the ratio by which it falls or grows at most, None where it is not steady.
     """
-    return SeenRun(theta=theta, ratio=r), *read_observed(theta, Observed.known(r))
+
+    theta: Fraction
+    falls: bool
+    rises: bool = False
+    ratio: Fraction | None = None
+
+
+def few(value: float | Fraction) -> str:
+    """A number in four figures."""
+    return f"{float(value):.4g}"
+
+
+def rounded_down(theta: float | Fraction) -> float:
+    """A theta in four figures, not above the one meant; next to 1 in four figures of ``1 - theta``."""
+    theta = Fraction(theta)
+    if theta > NEXT_TO_1:
+        return float(1 - directed(1 - theta, 4, up=True))
+    return float(directed(theta, 4, up=False))
+
+
+def steps_needed(theta: Fraction) -> int:
+    """Number of steps over which a ratio must be steady, so that a level differs from a decay."""
+    return max(FEWEST_STEPS, math.ceil(5 / theta))
+
+
+def spread(theta: Fraction) -> Fraction:
+    """Largest distance from 1 of the ratio of a residual at a level, averaged over the steps needed."""
+    return min(WIDEST, max(NARROWEST, theta / 2))
+
+
+def assumed(tied: bool, friction: bool) -> str:
+    """The assumption under which runs are read.
+
+    Raises
+    ------
+    ValueError
+        An interface that is tied, with friction.
+    """
+    if tied and friction:
+        raise ValueError("tied with friction: needed one of them, as nothing slips on a tied interface")
+    if friction:
+        return "there is friction, with which no ratio of residuals bounds rho"
+    return "nothing opens or slips" if tied else "no friction, or a tied interface"
+
+
+# --- readings ---------------------------------------------------------------------------------------------------------
 
 
 def read_observed(theta: Fraction, ratio: Observed) -> tuple[tuple[RunReading, ...], NextRun, Fraction | None]:
-    """The same of a ratio known within limits: bounds hold for all of it, and no reading of a part is left out."""
+    """Every reading of a ratio of residuals at theta, the run to make next, and rho of the only reading.
+
+    :func:`verification.advice.from_runs.advise_run` explains the readings.  Bounds hold for the ratio within its
+    limits, and no reading of a part is left out.  rho is None where there are several readings.
+    """
     r = ratio.value
     high = (1 + r) / theta - 1
     readings = _readings(theta, ratio, high)
@@ -171,93 +205,37 @@ def read_observed(theta: Fraction, ratio: Observed) -> tuple[tuple[RunReading, .
     between = 2 / (high + Fraction(7, 4))  # above the best theta of mode-high, below the one at which it diverges
     if kinds == ["mode-high"]:
         following = min(best, LARGEST_TO_PASTE)
-        why = f"the best one if rho is {_few(high)}, and smaller than that of this run, which converges"
+        why = f"the best one if rho is {few(high)}, and smaller than that of this run, which converges"
     elif r > 1 + spread(theta):
         following = between
-        confirmed = f"a ratio of {_few(following * (1 + high) - 1)} there confirms mode-high"
+        confirmed = f"a ratio of {few(following * (1 + high) - 1)} there confirms mode-high"
         why = f"smaller, as this run does not converge; {confirmed}, and else come back with what you see"
     elif "level" in kinds:
         following = theta / 2
-        why = f"half of {_few(theta)}, which does not converge, or hardly; come back with the ratio that you see there"
+        why = f"half of {few(theta)}, which does not converge, or hardly; come back with the ratio that you see there"
     else:
         following = min(between if between >= SHORTEST_STEP * theta else 3 * theta / 2, (1 + theta) / 2)
-        confirmed = f"a ratio of {_few(following * (1 + high) - 1)} there confirms mode-high"
+        confirmed = f"a ratio of {few(following * (1 + high) - 1)} there confirms mode-high"
         why = f"larger; {confirmed}, a smaller one rules it out"
         if following * (1 + high) >= 2:
-            why += f"; if the residual does not fall there, keep {_few(theta)}, which converges"
+            why += f"; if the residual does not fall there, keep {few(theta)}, which converges"
     rho = high if kinds == ["mode-high"] else None
     return readings, NextRun(theta=rounded_down(following), why=why), rho
 
 
-def read_plateau(theta: Fraction, plateau: Observed) -> tuple[tuple[RunReading, ...], NextRun]:
-    """The readings of a relative residual ``|T g - g|/|T g|`` that stays at P > 1, and the run to make next.
-
-    In a tied run that diverges the stiffest mode remains of g, of which ``T g`` is ``-rho`` times, so that
-    ``P = (1 + rho)/rho``.  It diverges where ``theta (1 + rho) > 2`` alone: a larger P is none of these plateaus.
-    """
-    least = 2 / theta - 1
-    rho = 1 / (plateau.value - 1)
-    found = []
-    following, why = theta / 2, f"half of {_few(theta)}, which does not converge; come back with its log"
-    if rho > least:
-        says = (
-            f"a tied run diverges, its relative residual at {_few(plateau.value)} = 1 + 1/rho: nothing opens or slides"
-        )
-        lo = max(1 / (plateau.most - 1), least)
-        found.append(RunReading(kind="plateau", value=float(rho), lo=below(lo), says=says))
-        following = 2 / (rho + Fraction(7, 4))
-        why = f"smaller; a ratio of {_few(following * (1 + rho) - 1)} there confirms plateau"
-    found.append(level(theta))
-    return tuple(found), NextRun(theta=rounded_down(following), why=why)
-
-
-def check_assumed(tied: bool, friction: bool) -> None:
-    """Raise ValueError where an interface is both tied and with friction."""
-    if tied and friction:
-        raise ValueError("tied with friction: needed one of them, as nothing slips on a tied interface")
-
-
-def assumed(tied: bool, friction: bool) -> str:
-    """The assumption under which runs are read."""
-    if friction:
-        return "there is friction, with which no ratio of residuals bounds rho"
-    return "nothing opens or slips" if tied else "no friction, or a tied interface"
-
-
-def same_run(theta: Fraction | float, other: Fraction) -> bool:
-    """True if a run with this theta shows nothing that one with the other does not."""
-    near = abs(Fraction(theta) - other) < ANEW * min(other, 1 - other)
-    return near or f"{float(theta):g}" == f"{float(other):g}"
-
-
-def level(theta: Fraction, bounds: bool = True) -> RunReading:
-    """A residual that stays at a level, or grows for a while only; whether that tells of rho."""
-    least = 2 / theta - 1
-    says = "contact opens and closes in turn, and the residual stays at a level or grows for a while only"
-    if bounds:
-        says += (
-            f": without friction rho is at least {_at_least(least)}, nothing more; "
-            "with friction this does not bound rho"
-        )
-    else:
-        says += ", or the solvers of both sides are no more accurate: this says nothing of rho"
-    return RunReading(kind="level", lo=below(least) if bounds else None, says=says)
-
-
 def _readings(theta: Fraction, ratio: Observed, value: Fraction) -> tuple[RunReading, ...]:
-    """What a ratio can mean; ``value`` is the lambda of a mode that changes its sign."""
+    """The readings of a ratio; ``value`` is the lambda of a mode that changes its sign."""
     r, high, low = ratio.value, (1 + ratio.least) / theta - 1, (1 - ratio.most) / theta - 1
-    fastest = f"the stiffest mode in this run has lambda = {_few((1 + ratio.most) / theta - 1)} at most"
+    fastest = f"the stiffest mode in this run has lambda = {few((1 + ratio.most) / theta - 1)} at most"
     about = "and about that if all of Gamma_c stays closed"
     proved = f"without friction, or tied, rho is at least {_at_least(high)}, {about}"
-    found = []
     if ratio.least > 1:
         says = f"the residual grows by this ratio in every step: {proved}"
     elif ratio.least > 1 - theta:
         says = f"the stiffest mode changes its sign in every step: {proved}"
     else:
         says = f"the stiffest mode changes its sign in every step and is the slowest: {proved}"
-    found.append(RunReading(kind="mode-high", value=float(value), lo=below(high), says=says))
+    found = [RunReading(kind="mode-high", value=float(value), lo=below(high), says=says)]
     if ratio.least <= 1 - theta:
         low = max(low, Fraction(0))
         bound = f"without friction, or tied, rho is at least {_at_least(low)}"
@@ -273,22 +251,91 @@ def _readings(theta: Fraction, ratio: Observed, value: Fraction) -> tuple[RunRea
     return tuple(found)
 
 
-def spread(theta: Fraction) -> Fraction:
-    """How far from 1 the ratio of a residual that stays at a level may come out, averaged over the steps asked for."""
-    return min(WIDEST, max(NARROWEST, theta / 2))
+def read_plateau(theta: Fraction, plateau: Observed) -> tuple[tuple[RunReading, ...], NextRun]:
+    """The readings of a relative residual ``|T g - g|/|T g|`` that stays at P > 1, and the run to make next.
+
+    In a tied run that diverges the stiffest mode remains of g, of which ``T g`` is ``-rho`` times, so that
+    ``P = (1 + rho)/rho``.  It diverges only where ``theta (1 + rho) > 2``: a larger P is none of these plateaus.
+    """
+    least = 2 / theta - 1
+    rho = 1 / (plateau.value - 1)
+    found = []
+    following, why = theta / 2, f"half of {few(theta)}, which does not converge; come back with its log"
+    if rho > least:
+        says = (
+            f"a tied run diverges, its relative residual at {few(plateau.value)} = 1 + 1/rho: nothing opens or slides"
+        )
+        lo = max(1 / (plateau.most - 1), least)
+        found.append(RunReading(kind="plateau", value=float(rho), lo=below(lo), says=says))
+        following = 2 / (rho + Fraction(7, 4))
+        why = f"smaller; a ratio of {few(following * (1 + rho) - 1)} there confirms plateau"
+    return (*found, level(theta)), NextRun(theta=rounded_down(following), why=why)
 
 
-def _few(value: Fraction) -> str:
-    return f"{float(value):.4g}"
+def level(theta: Fraction, bounds: bool = True) -> RunReading:
+    """A residual that stays at a level, or grows only for a while; with ``bounds`` it bounds rho without friction."""
+    least = 2 / theta - 1
+    says = "contact opens and closes alternately, and the residual stays at a level or grows for a while only"
+    if bounds:
+        says += f": without friction rho is at least {_at_least(least)}, nothing more"
+        says += "; with friction this does not bound rho"
+    else:
+        says += ", or the solvers of both sides are not more accurate: this says nothing about rho"
+    return RunReading(kind="level", lo=below(least) if bounds else None, says=says)
 
 
 def _at_least(value: Fraction) -> str:
     """A bound from below in four figures, not above it."""
-    return f"{float(directed(value, 4, up=False)):.4g}"
+    return few(Fraction(directed(value, 4, up=False)))
 
 
-def rounded_down(theta: Fraction) -> float:
-    """A theta in four figures, not above the one meant; next to 1 in four figures of ``1 - theta``."""
-    if theta > NEXT_TO_1:
-        return float(1 - directed(1 - theta, 4, up=True))
-    return float(directed(theta, 4, up=False))
+# --- the run to make next ---------------------------------------------------------------------------------------------
+
+
+def same_run(theta: Fraction | float, other: Fraction) -> bool:
+    """True if a run with this theta shows nothing that one with the other does not."""
+    near = abs(Fraction(theta) - other) < ANEW * min(other, 1 - other)
+    return near or f"{float(theta):g}" == f"{float(other):g}"
+
+
+def kept(theta: Fraction, why: str) -> NextRun:
+    """The theta of a run that is to be kept."""
+    return NextRun(theta=float(theta), why=why if why.startswith("keep it") else f"keep it: {why}", kept=True)
+
+
+def pasted_or_not(following: NextRun, made: Sequence[Made]) -> NextRun | None:
+    """The theta to paste: kept where a run with it falls; None where it is not below all that do not converge."""
+    low = min((one.theta for one in made if one.rises), default=None)
+    if low is not None and (following.theta > low or same_run(following.theta, low)):
+        return None
+    twin = next((one for one in made if same_run(following.theta, one.theta)), None)
+    return following if twin is None or following.kept else kept(twin.theta, following.why)
+
+
+def anew(following: NextRun, made: Sequence[Made]) -> NextRun:
+    """The run that was proposed, or another one where a run with that theta was made.
+
+    Between the largest theta that falls and the next one above it, or above all of them, or below all where none falls;
+    the fastest run is kept where that leaves no other theta.  A log that is too short is asked for again where there
+    are none at another theta.
+    """
+    thetas = [one.theta for one in made]
+    again = following.again and all(same_run(thetas[0], theta) for theta in thetas)
+    if following.kept or again or not any(same_run(following.theta, theta) for theta in thetas):
+        return following
+    falling = [one for one in made if one.falls]
+    low = max((one.theta for one in falling), default=None)
+    if low is None:
+        theta, why = min(thetas) / 2, "half of the smallest theta so far, as no run is seen to converge"
+    elif beyond := [theta for theta in thetas if theta > low]:
+        high = min(beyond)
+        theta = Fraction(math.sqrt(low * high)) if high > SHORTEST_STEP * low else low
+        why = f"between {few(low)}, which falls, and {few(high)}, which does not or shows no ratio"
+    else:
+        theta = min(3 * low / 2, (1 + low) / 2) if SHORTEST_STEP * low < 1 else low
+        why = f"larger than {few(low)}, which falls"
+    if theta == low:
+        best = min(falling, key=lambda one: (one.ratio is None, one.ratio or 0, one.theta))
+        return kept(best.theta, "it falls, and no other theta is worth a run")
+    steps = f"{steps_needed(theta)} steps or more in one time window"
+    return NextRun(theta=rounded_down(theta), why=f"{why}; come back with all logs, with {steps}")

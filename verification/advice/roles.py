@@ -1,31 +1,269 @@
-"""Which body gets the Neumann problem, and which theta: advice from the theorem and from rho."""
+"""Roles of the two bodies and theta: the advice, from the theorem and from rho."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
-from ndtheory import EnergyConstants, Number, evaluate_energy
+from ndtheory import EnergyBounds, EnergyConstants, Number, evaluate_energy
+from ndtheory.energy_norms import predicted_rate, predicted_theta, tied_factor, tied_rate, tied_theta
+from verification.advice import BodyNumber
 from verification.advice.readings import LARGEST_TO_PASTE, NextRun, RunReading, SeenRun, rounded_down
-from verification.advice.role import Role, best_of, fewer, in_steps, role_of, steps, with_both_ends
 from verification.advice.runs_with_friction import FrictionBounds
 from verification.advice.seen import RhoInterval, SeenLog
-from verification.advice.seen_matrices import SeenMatrices
 from verification.advice.seen_moduli import SeenModuli
+from verification.advice.sides import SeenMatrices
 from verification.advice.snippets import Coupling, snippet
-from verification.algorithm.theta import automatic, by_prediction, energy_bounds
+from verification.algorithm.theta import Choice, automatic, by_prediction, energy_bounds
 from verification.constants import measure
 from verification.constants.operators import Pencils, needs_matrices, pair_or_bodies
 from verification.document import Document
+from verification.interface.assembly import SingularRole, TwoBodies
 from verification.interface.build import build
 from verification.interface.pair import UNITS, ContactPair
-from verification.interface.two_bodies import SingularRole, TwoBodies
 from verification.problem import Problem, load
 from verification.problem.tables import ProblemError
 from verification.progress import Progress, silent
+from verification.value import to_plain
+
+#: Exchanging the roles makes no difference where it changes the number of steps by no more than this share of it.
+SAME = 0.02
+
+#: The entries of a role that rest on an upper bound of rho.
+PROVED = ("theta_proved", "factor_proved", "theta_max_proved")
+
+#: The entries of a role for a tied interface, in this order.
+TIED = ("rho_min", "rho_tied", "theta_tied", "rate_tied")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Role:
+    """Prediction and proofs for the iteration when one body gets the Neumann problem.
+
+    Attributes
+    ----------
+    neumann_body : {1, 2} or None
+        None where the number of that body is not known.
+    rho : Number or None
+        Largest ratio of the contact body's stiffness to the Neumann body's on the interface; with rho_normal without
+        friction.  From moduli a bound from below.  None, as all that rests on it, where the role is refused.
+    theta_proved : float or None
+        The theta of least proved factor.
+    factor_proved, theta_max_proved : Number or None
+    theta_predicted, rate_predicted : float or None
+        ``2/(2 + rho)`` and ``rho/(2 + rho)``: a prediction, proved without friction; None of a bound from below.
+    friction_threshold : Number or None
+        Friction below which every small theta is proved.
+    singular : bool
+        True if the Neumann problem has no unique solution, as contact alone holds that body; such a role is refused.
+    reason : mapping
+        Why a value is None.
+    theta_auto : Choice or None
+        The choice of ``theta = "auto"`` in these roles; None without a problem file.
+    energy : EnergyConstants or None
+        The constants behind the proved values; None where nothing is proved.
+    rho_min, rho_tied : Number or None
+        Both ends of the spectrum of (S of the contact body, S of the Neumann body): rho_tied is rho, except where rho
+        is rho_normal.  None where they are not known, and ``reason["rho_min"]`` says why.
+    """
+
+    neumann_body: BodyNumber | None
+    rho: Number | None
+    theta_proved: float | None = None
+    factor_proved: Number | None = None
+    theta_max_proved: Number | None = None
+    theta_predicted: float | None = None
+    rate_predicted: float | None = None
+    friction_threshold: Number | None = None
+    reason: Mapping[str, str]
+    singular: bool = False
+    theta_auto: Choice | None = None
+    energy: EnergyConstants | None = None
+    rho_min: Number | None = None
+    rho_tied: Number | None = None
+
+    @property
+    def ends(self) -> tuple[Fraction, Fraction] | None:
+        """rho_min and rho_tied; None where they are not known."""
+        if self.rho_min is None or self.rho_tied is None:
+            return None
+        largest = Fraction(self.rho_tied.value)
+        return min(max(Fraction(self.rho_min.value), Fraction(0)), largest), largest  # both may be rounded past
+
+    @property
+    def theta_tied(self) -> float | None:
+        """``2/(2 + rho_min + rho_tied)``: the best theta where nothing opens or slips."""
+        return None if self.ends is None else float(tied_theta(*self.ends))
+
+    @property
+    def rate_tied(self) -> float | None:
+        """``(rho_tied - rho_min)/(2 + rho_min + rho_tied)``: at that theta no step has a larger factor there."""
+        return None if self.ends is None else float(tied_rate(*self.ends))
+
+    def factor_where_tied(self, theta: float) -> float | None:
+        """The factor of another theta where nothing opens or slips; above 1 where it diverges."""
+        return None if self.ends is None else float(tied_factor(Fraction(theta), *self.ends))
+
+    @property
+    def why_not_tied(self) -> str:
+        """Why the ends of the spectrum are not known."""
+        return self.reason.get("rho_min", "")
+
+    @property
+    def predicted(self) -> tuple[float, float]:
+        """``theta_predicted`` and ``rate_predicted``.
+
+        Raises
+        ------
+        ValueError
+            The role is refused, or rho is bounded only from below.
+        """
+        if self.theta_predicted is None or self.rate_predicted is None:
+            raise ValueError(self.reason["theta_predicted"])
+        return self.theta_predicted, self.rate_predicted
+
+    def advised(self, *, tied: bool = False) -> tuple[float, float]:
+        """theta and the rate by which it is chosen: the predicted ones, or those for a tied interface.
+
+        Raises
+        ------
+        ValueError
+            The role is refused, or the ends of its spectrum are not known.
+        """
+        if not tied:
+            return self.predicted
+        if self.theta_tied is None or self.rate_tied is None:
+            raise ValueError(self.reason["rho"] if self.rho is None else self.why_not_tied)
+        return self.theta_tied, self.rate_tied
+
+    @property
+    def proved(self) -> bool:
+        """True if the predicted rate is proved, as it is without friction."""
+        bound = self.factor_proved
+        return bound is not None and self.rate_predicted is not None and bound.value <= (1 + 1e-9) * self.rate_predicted
+
+    def to_dict(self) -> dict[str, Any]:
+        """A member of ``roles``."""
+        names = dict.fromkeys((*(field.name for field in fields(self) if field.name != "energy"), *TIED))
+        values = {name: to_plain(getattr(self, name)) for name in names}
+        values["reason"] = dict(self.reason)
+        if self.theta_auto is None:
+            values["reason"].setdefault("theta_auto", "no problem file")
+        if self.ends is None:
+            values["reason"] |= dict.fromkeys(TIED, self.why_not_tied)
+        return values
+
+    @classmethod
+    def refused(cls, neumann_body: BodyNumber, error: ValueError) -> Role:
+        """A role that is refused: no value but the reason."""
+        why = error.needed if isinstance(error, ProblemError) else str(error)
+        given = ("neumann_body", "reason", "singular", "energy")
+        values = [field.name for field in fields(cls) if field.name not in given]
+        return cls(
+            neumann_body=neumann_body,
+            **dict.fromkeys(values),
+            reason=dict.fromkeys(values, f"these roles are refused: {why}"),
+            singular=isinstance(error, SingularRole),
+        )
+
+
+def role_of(
+    neumann_body: BodyNumber | None,
+    rho: Number | Fraction,
+    *,
+    bounds: EnergyBounds | None = None,
+    nothing: str = "",
+    threshold: Number | None = None,
+    no_threshold: str = "",
+    reason: Mapping[str, str] | None = None,
+    **known: Any,
+) -> Role:
+    """The role for a known rho: its prediction, and the proofs of the theorem in energy norms.
+
+    Parameters
+    ----------
+    neumann_body : {1, 2} or None
+    rho : Number or Fraction
+    bounds, nothing : EnergyBounds, optional, and str
+        The theorem for this rho, and for the friction there is; why nothing is proved, empty where the bounds are.
+    threshold, no_threshold : Number, optional, and str
+        Friction below which every small theta is proved; why there is none, if it is not for want of a proof.
+    reason : mapping, optional
+        Why other values are None.
+    **known
+        Other attributes of :class:`Role`.
+    """
+    ratio = Fraction(rho.value) if isinstance(rho, Number) else rho
+    theta, rate = float(predicted_theta(ratio)), float(predicted_rate(ratio))
+    proved: dict[str, Any] = {}
+    because = dict.fromkeys(PROVED, nothing)
+    if bounds is not None:
+        theta, rate = bounds.theta_predicted, bounds.rate_predicted
+        if not nothing:
+            proved = {name: getattr(bounds, name) for name in PROVED}
+            because = {name: why for name, why in bounds.reason.items() if name in PROVED}
+    if threshold is None:
+        because["friction_threshold"] = no_threshold or nothing
+    return Role(
+        neumann_body=neumann_body,
+        rho=rho if isinstance(rho, Number) else Number.of_float(rho),
+        theta_predicted=theta,
+        rate_predicted=rate,
+        friction_threshold=threshold,
+        reason={**(reason or {}), **because},
+        **proved,
+        **known,
+    )
+
+
+def plain_role(neumann_body: BodyNumber, rho: Fraction, **settings: Any) -> Role:
+    """The role without friction, from rho; ``settings`` are parameters of :func:`role_of`."""
+    bounds = evaluate_energy(EnergyConstants(rho=rho))
+    settings.setdefault("no_threshold", "matrices say nothing about friction: the proved values are for k = 0")
+    return role_of(neumann_body, bounds.rho, bounds=bounds, **settings)
+
+
+def with_both_ends(roles: Sequence[Role], rho: Sequence[Number | None] = ()) -> tuple[Role, ...]:
+    """Both roles of a pair on the same unknowns, with the ends of the spectrum where neither is refused.
+
+    The eigenvalues of (S_n, S_c) and (S_c, S_n) are reciprocal: ``rho_min`` of one role is one over rho of the other.
+    Both ``rho`` are given where the roles have rho_normal.
+    """
+    one, other = rho or [role.rho for role in roles]
+    if one is None or other is None:
+        return tuple(roles)
+    least = [Number.of_float(1 / Fraction(number.value)) for number in (other, one)]
+    ends = zip(roles, least, (one, other), strict=True)
+    return tuple(replace(role, rho_min=low, rho_tied=high) for role, low, high in ends)
+
+
+def steps(rate: float, tolerance: float = 1e-9) -> int | None:
+    """Number of steps of a rate to a tolerance; None where no number is enough."""
+    if not 0 < rate < 1:
+        return 1 if rate == 0 else None
+    return math.ceil(math.log(tolerance) / math.log(rate))
+
+
+def best_of(roles: Iterable[Role], *, tied: bool = False) -> Role:
+    """The role that takes fewer steps; the first one where it makes no difference, or where the other is refused."""
+    first, *rest = (role for role in roles if role.rho is not None)
+    return next((role for role in rest if fewer(role.advised(tied=tied)[1], first.advised(tied=tied)[1])), first)
+
+
+def in_steps(rate: float) -> str:
+    """The steps to 1e-9 in words."""
+    count = steps(rate)
+    return "no end of steps" if count is None else f"{count} step{'s' * (count != 1)}"
+
+
+def fewer(rate: float, other: float, *, either: bool = False) -> bool:
+    """True if a rate takes fewer steps than another one, or with ``either`` more, by more than SAME of them."""
+    one, two = (math.inf if count is None else count for count in map(steps, (rate, other)))
+    return one < (1 - SAME) * two or (either and two < (1 - SAME) * one)
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -35,38 +273,38 @@ class Advice(Document):
     Attributes
     ----------
     neumann_body : {1, 2} or None
-        Who should get the Neumann problem; None where one run tells nothing of the other assignment.
+        The body that should get the Neumann problem; None where one run does not show the other assignment.
     roles : tuple of Role
-        The file's assignment first; of a run the one that it had, and none while its ratio has several readings.
+        The file's assignment first; of a run only its own, and none while its ratio has several readings.
     friction : float or None
         None where it is not known.
     outside : tuple of str
-        Why the theorem does not speak of the problem.
+        Why the theorem does not apply to the problem.
     run : SeenRun or None
-        What was given of a run; None where the advice comes from a problem or from matrices.
+        The run that was given as its ratio.
     readings : tuple of RunReading
-        What that run can mean.
+        Possible meanings of the run or of the logs.
     next : NextRun or None
         The run to make next.
     logs : tuple of SeenLog
-        What was seen in the logs of other runs.
+        The logs of other runs as they were read.
     interval : RhoInterval or None
-        What these logs say of rho together.
+        Bounds of rho from these logs together.
     moduli : SeenModuli or None
-        What was given of two bodies, and bounds of rho from below.
+        The moduli of two bodies, and bounds of rho from below.
     matrices : SeenMatrices or None
-        What was seen of the matrices that were given; None where none were.
+        The matrices or operators that were given.
     tied : bool
-        Whether the advice is for an interface of which nothing opens or slips.
+        True if the advice is for an interface where nothing opens or slips.
     assumes : str or None
         The assumption under which runs were read; None where none were given.
     friction_bounds : FrictionBounds or None
-        What runs prove with friction; None unless friction was given.
+        Bounds that runs prove with friction; None unless friction was given.
     """
 
     schema: ClassVar[str] = "ndtheory.advice/1"
 
-    neumann_body: Literal[1, 2] | None
+    neumann_body: BodyNumber | None
     roles: tuple[Role, ...]
     units: Mapping[str, str]
     friction: float | None = None
@@ -85,7 +323,7 @@ class Advice(Document):
 
     @classmethod
     def between(cls, roles: Sequence[Role], *, tied: bool, **known: Any) -> Advice:
-        """The advice for the role that takes fewer steps; one of them at least is not refused."""
+        """The advice for the role that takes fewer steps; one of them at least must not be refused."""
         return cls(neumann_body=best_of(roles, tied=tied).neumann_body, roles=tuple(roles), tied=tied, **known)
 
     @property
@@ -100,12 +338,12 @@ class Advice(Document):
         return f"{who}theta = {theta:.4g} {'if tied' if self.tied else 'predicted'}, rate {rate:.4g}"
 
     def chosen(self, role: Role) -> tuple[float, float]:
-        """theta and rate by which a role is judged here."""
+        """theta and rate by which this advice judges a role."""
         return role.advised(tied=self.tied and role.ends is not None)
 
     @property
     def theta(self) -> float | None:
-        """The theta to paste, not above the one that is meant; None while several readings are left, or of moduli."""
+        """The theta to paste, rounded down; None while several readings are left, or of moduli."""
         if not self.roles or self.moduli is not None:
             return None
         if self.next is not None:
@@ -114,7 +352,7 @@ class Advice(Document):
 
     @property
     def why_no_theta(self) -> str:
-        """Why there is no theta to paste; empty where there is one."""
+        """Why the advice has no theta to paste; empty where it has one."""
         if self.theta is not None:
             return ""
         if self.moduli is not None:
@@ -131,15 +369,12 @@ class Advice(Document):
 
     @property
     def no_difference(self) -> bool:
-        """Whether both roles take the same number of steps, but for SAME of it."""
+        """True if the numbers of steps of both roles differ by at most SAME of them."""
         return self.other is not None and not fewer(self.chosen(self.other)[1], self.chosen(self.best)[1], either=True)
 
     @property
     def quote(self) -> str | None:
-        """The reason for the advice in two sentences, to be quoted; None where there is no theta to paste.
-
-        They have rho in both roles, the theta that follows from it, and the steps of both.
-        """
+        """The reason for the advice in two sentences, to be quoted: rho, theta and steps; None without a theta."""
         if self.theta is None:
             return None
         best, other = self.best, self.other
@@ -164,7 +399,7 @@ class Advice(Document):
         return f"{first}. {then}."
 
     def snippet(self, library: str) -> str:
-        """What to paste into the configuration of a coupling library: preCICE, Kratos or Norma.
+        """Lines for the configuration of a coupling library: preCICE, Kratos or Norma.
 
         Raises
         ------
@@ -178,7 +413,7 @@ class Advice(Document):
 
     @property
     def best(self) -> Role:
-        """The role that is advised; the only one where there is no choice.
+        """The role that is advised, or the only one.
 
         Raises
         ------
@@ -186,47 +421,28 @@ class Advice(Document):
             The ratio of a run has several readings: ``next`` is the run to make.
         """
         if not self.roles:
-            raise ValueError("no reading is left alone: make the run that `next` names")
+            raise ValueError("several readings are left: make the run that `next` names")
         return next((r for r in self.roles if r.neumann_body == self.neumann_body), self.roles[0])
 
     def content(self) -> dict[str, Any]:
-        reason = {} if self.neumann_body else {"neumann_body": "one run tells nothing of the other assignment"}
-        if self.run is None:
-            reason["run"] = "logs were given" if self.logs else "no run was given"
-        if self.next is None:
-            reason["next"] = "no run was given"
-        if self.interval is None:
-            reason["interval"] = "no logs were given"
-        if self.moduli is None:
-            reason["moduli"] = "no moduli were given"
-        elif not self.neumann_body:
-            reason["neumann_body"] = "both roles have the same bounds"
-        if self.assumes is None:
-            reason["assumes"] = "no run was given"
-        if self.friction_bounds is None:
-            reason["friction_bounds"] = "no run with friction was given"
-        if self.matrices is None:
-            reason["matrices"] = "no matrices were given"
-        if self.theta is None:
-            reason |= dict.fromkeys(("theta", "quote"), self.why_no_theta)
-        return {
-            "neumann_body": self.neumann_body,
-            "theta": self.theta,
-            "tied": self.tied,
-            "assumes": self.assumes,
-            "quote": self.quote,
-            "roles": [role.to_dict() for role in self.roles],
-            "run": None if self.run is None else self.run.to_dict(),
-            "readings": [reading.to_dict() for reading in self.readings],
-            "next": None if self.next is None else self.next.to_dict(),
-            "logs": [log.to_dict() for log in self.logs],
-            "interval": None if self.interval is None else self.interval.to_dict(),
-            "friction_bounds": None if self.friction_bounds is None else self.friction_bounds.to_dict(),
-            "moduli": None if self.moduli is None else self.moduli.to_dict(),
-            "matrices": None if self.matrices is None else self.matrices.to_dict(),
-            "outside_theorem": list(self.outside),
-            "reason": reason,
+        origins = ("run", "readings", "next", "logs", "interval", "friction_bounds", "moduli", "matrices")
+        names = ("neumann_body", "theta", "tied", "assumes", "quote", "roles", *origins)
+        found = {name: to_plain(getattr(self, name)) for name in names}
+        same = "both roles have the same bounds"
+        missing = {
+            "neumann_body": same if self.moduli else "one run tells nothing of the other assignment",
+            "run": "logs were given" if self.logs else "no run was given",
+            "next": "no run was given",
+            "interval": "no logs were given",
+            "moduli": "no moduli were given",
+            "assumes": "no run was given",
+            "friction_bounds": "no run with friction was given",
+            "matrices": "no matrices were given",
+            "theta": self.why_no_theta,
+            "quote": self.why_no_theta,
         }
+        reason = {name: why for name, why in missing.items() if found[name] is None}
+        return {**found, "outside_theorem": list(self.outside), "reason": reason}
 
 
 def advise(problem: Problem | ContactPair | Path | str, *, tied: bool = False, progress: Progress = silent) -> Advice:
@@ -239,9 +455,9 @@ def advise(problem: Problem | ContactPair | Path | str, *, tied: bool = False, p
     ----------
     problem : Problem, ContactPair or path
     tied : bool
-        Whether to advise by what holds where nothing opens or slips.
+        True to advise for an interface where nothing opens or slips.
     progress : callable
-        Called with the steps that rho takes where there are too many contact nodes for matrices.
+        Called with the steps of Lanczos where there are too many contact nodes for matrices.
 
     Returns
     -------
@@ -262,11 +478,10 @@ def advise(problem: Problem | ContactPair | Path | str, *, tied: bool = False, p
     pair: ContactPair | TwoBodies
     try:
         pair = pair_or_bodies(problem)
-        roles = (
-            _roles_without_matrices(pair, tied, progress)
-            if isinstance(pair, TwoBodies)
-            else (_role(pair), _exchanged(pair))
-        )
+        if isinstance(pair, TwoBodies):
+            roles = _roles_without_matrices(pair, tied, progress)
+        else:
+            roles = (_role(pair), _exchanged(pair))
     except SingularRole as error:
         assert not isinstance(problem, ContactPair)  # made with roles that are not singular
         given = problem if isinstance(problem, Problem) else load(problem)
@@ -316,43 +531,25 @@ def _role(pair: ContactPair) -> Role:
 
 
 def _roles_without_matrices(bodies: TwoBodies, tied: bool, progress: Progress) -> tuple[Role, ...]:
-    """Both roles, the file's first: rho alone, and what it proves without friction.
+    """Both roles, the file's first, from rho, which is rho_normal in frictionless contact.
 
-    Of frictionless contact rho is rho_normal, and a tied interface needs two eigenvalues more.
+    A tied interface then needs two eigenvalues more.
     """
     pencils, problem = Pencils(bodies, progress), bodies.problem
     for why in pencils.reason.values():
         raise ProblemError(problem.source, "contact", None, f"no advice: {why}")
     needed, rubs, outside = needs_matrices(bodies), bool(bodies.friction), bodies.outside
-    roles = []
-    for neumann in (problem.iteration.neumann_body, problem.swapped().iteration.neumann_body):
-        rho = pencils.largest(neumann_body=neumann, normal=not rubs).value
-        nothing = f"outside the theorem: {outside[0]}" if outside else needed if rubs else ""
-        role = plain_role(
-            neumann, Fraction(rho), nothing=nothing, no_threshold=nothing or needed, reason={"theta_auto": needed}
-        )
-        roles.append(role)
+    nothing = f"outside the theorem: {outside[0]}" if outside else needed if rubs else ""
+    reason, order = {"theta_auto": needed}, (problem.iteration.neumann_body, problem.contact_body)
+    if not (rubs or tied):
+        more = "without friction rho is rho_normal, and a tied interface needs two more eigenvalues: ask for tied"
+        reason["rho_min"] = more
+    settings = {"nothing": nothing, "no_threshold": nothing or needed, "reason": reason}
+    largest = lambda body, normal: pencils.largest(neumann_body=body, normal=normal).value
+    roles = [plain_role(body, Fraction(largest(body, not rubs)), **settings) for body in order]
     if rubs:
         return with_both_ends(roles)
-    if not tied:
-        more = "without friction rho is rho_normal, and a tied interface needs two more eigenvalues: ask for tied"
-        return tuple(replace(role, reason={**role.reason, "rho_min": more}) for role in roles)
-    bodies_of = (problem.iteration.neumann_body, problem.contact_body)
-    ends = with_both_ends(
-        [
-            replace(role, rho=Number.of_float(pencils.largest(neumann_body=neumann).value))
-            for role, neumann in zip(roles, bodies_of, strict=True)
-        ]
-    )
-    pairs = zip(roles, ends, strict=True)
-    return tuple(replace(role, rho_min=end.rho_min, rho_tied=end.rho_tied) for role, end in pairs)
-
-
-def plain_role(neumann_body: Any, rho: Fraction, **settings: Any) -> Role:
-    """The role without friction, from rho; ``settings`` are those of :func:`role_of`."""
-    bounds = evaluate_energy(EnergyConstants(rho=rho))
-    settings.setdefault("no_threshold", "matrices alone say nothing of friction: the proved values are for k = 0")
-    return role_of(neumann_body, bounds.rho, bounds=bounds, **settings)
+    return with_both_ends(roles, [Number.of_float(largest(body, False)) for body in order]) if tied else tuple(roles)
 
 
 def _rho(role: Role, tied: bool) -> str:

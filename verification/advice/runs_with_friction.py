@@ -1,4 +1,4 @@
-"""Advice from runs with friction: what their residuals prove, and the run to make next.
+"""Advice from runs with friction: bounds that their residuals prove, and the run to make next.
 
 With friction no ratio of residuals bounds rho.  The theorem in energy norms bounds one step by a factor q of rho,
 kappa_1 and kappa_2 together, and a mode that slides has a complex eigenvalue.  Three things are left:
@@ -23,7 +23,6 @@ from typing import Any
 
 from ndtheory.number import above, below
 from verification.advice.ends import DEAR, SWIFT
-from verification.advice.next_run import kept
 from verification.advice.readings import (
     LARGEST_TO_PASTE,
     SAME,
@@ -31,6 +30,8 @@ from verification.advice.readings import (
     NextRun,
     Observed,
     RunReading,
+    few,
+    kept,
     rounded_down,
 )
 from verification.advice.seen import SeenLog
@@ -48,17 +49,16 @@ _SAYS = {
 
 @dataclass(frozen=True, kw_only=True)
 class FrictionBounds:
-    """Proofs from runs with friction.
+    """Bounds that runs with friction prove.
 
     Attributes
     ----------
     image : float or None
         The Lipschitz constant of T in the norm (5.21) is at least this, and so is ``sqrt(rho) R``; None where the runs
         are too fast for a bound above 0.
-    theta, rate : float or None
-        The largest theta whose residual falls, and its ratio at most; None where none falls.
-    eigenvalue : tuple of float or None
-        Limits of ``|1 + lambda|`` of the slowest mode of that run.
+    theta, rate, eigenvalue : float or None, and tuple of float or None
+        The largest theta whose residual falls, its ratio at most, and limits of ``|1 + lambda|`` of its slowest mode;
+        None where no residual falls.
     """
 
     image: float | None
@@ -71,14 +71,8 @@ class FrictionBounds:
         reason = {} if self.image is not None else {"image": "every run is as fast as with open nodes alone"}
         if self.eigenvalue is None:
             reason |= dict.fromkeys(("theta", "rate", "eigenvalue"), "no residual falls steadily")
-        low, high = self.eigenvalue or (None, None)
-        return {
-            "image": self.image,
-            "theta": self.theta,
-            "rate": self.rate,
-            "eigenvalue": None if self.eigenvalue is None else {"least": low, "most": high},
-            "reason": reason,
-        }
+        modes = None if self.eigenvalue is None else dict(zip(("least", "most"), self.eigenvalue, strict=True))
+        return {**vars(self), "eigenvalue": modes, "reason": reason}
 
 
 Runs = list[tuple[Fraction, Observed]]
@@ -107,10 +101,7 @@ def friction_bounds(
 ) -> FrictionBounds:
     """Bounds from runs whose residual falls by a ratio, and from those that do not converge.
 
-    Parameters
-    ----------
-    falling, rising : sequences of tuple
-        theta and the steady ratio of each; None for a residual that stays at a level.
+    Both are sequences of theta and its steady ratio; None for a residual that stays at a level.
     """
     known = [(theta, ratio.least) for theta, ratio in (*falling, *rising) if ratio is not None]
     image = max([1 - (1 - least) / theta for theta, least in known] + [Fraction(1)] * bool(rising), default=Fraction(0))
@@ -127,27 +118,23 @@ def friction_bounds(
 
 
 def readings_with_friction(readings: Sequence[RunReading]) -> tuple[RunReading, ...]:
-    """The readings of a run without what they say of rho; a plateau needs a tied interface."""
+    """The readings of a run without bounds of rho; a plateau needs a tied interface."""
     return tuple(RunReading(kind=one.kind, says=_SAYS[one.kind]) for one in readings if one.kind in _SAYS)
 
 
 def next_with_friction(falling: Sequence[tuple[Fraction, Observed]], rising: Sequence[Fraction]) -> NextRun:
     """The run to make next, or the theta of the fastest run where no other one is much faster.
 
-    Parameters
-    ----------
-    falling : sequence of tuple
-        theta and ratio of the runs whose residual falls.
-    rising : sequence of Fraction
-        The thetas that do not converge; at least one run of either kind.
+    ``falling`` are theta and ratio of the runs whose residual falls, ``rising`` the thetas that do not converge; at
+    least one run of either kind is given.
     """
     if not falling:
         parts = 2 if len(rising) == 1 else 4
         share = "half" if parts == 2 else "a quarter"
-        why = f"{share} of {float(min(rising)):.4g}, which does not converge; come back with what you see there"
+        why = f"{share} of {few(min(rising))}, which does not converge; come back with what you see there"
         return NextRun(theta=rounded_down(min(rising) / parts), why=why)
     theta, ratio = min(falling, key=lambda run: (run[1].value, run[0]))
-    pace = f"its residual changes by {float(ratio.value):.4g} a step"
+    pace = f"its residual changes by {few(ratio.value)} a step"
     if ratio.most <= SWIFT:
         return kept(theta, f"{pace}, and none much faster is to be found")
     made = [other for other, _ in falling] + list(rising)
@@ -162,21 +149,14 @@ def next_with_friction(falling: Sequence[tuple[Fraction, Observed]], rising: Seq
         return kept(theta, f"{pace}, and between {low:.4g} and {high:.4g} none takes less than 1/{DEAR:g} of its steps")
     if max(middle / low, high / middle) < SHORTEST_STEP:
         return kept(theta, f"{pace}, and the runs next to it leave no room for a faster one")
-    below_it = middle / low > high / middle
-    next_theta = math.sqrt(middle * (low if below_it else high))
-    where = "smaller" if below_it else "larger"
+    where, end = ("smaller", low) if middle / low > high / middle else ("larger", high)
+    next_theta = math.sqrt(middle * end)
     why = f"{where} than {middle:.4g}, the fastest so far: {pace}; come back with what you see there"
-    return NextRun(theta=rounded_down(Fraction(next_theta)), why=why)
+    return NextRun(theta=rounded_down(next_theta), why=why)
 
 
 def least_rate(points: Sequence[tuple[float, float, float]], theta: float) -> float:
-    """Least ratio that a theta can have by convexity.
-
-    Parameters
-    ----------
-    points : sequence of tuple
-        theta, least and largest ratio.
-    theta : float
+    """Least ratio that a theta can have by convexity, from points (theta, least and largest ratio).
 
     Examples
     --------

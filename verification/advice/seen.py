@@ -1,4 +1,4 @@
-"""What was seen in the logs of other runs, and what these bound together."""
+"""Logs of other runs as they were seen, and the bounds of rho that they give together."""
 
 from __future__ import annotations
 
@@ -8,23 +8,33 @@ from fractions import Fraction
 from typing import Any
 
 from ndtheory.number import above, below
-from verification.advice.next_run import Made
-from verification.advice.pace import Pace
-from verification.advice.readings import NextRun, Observed, RunReading
+from verification.advice.log_files import Column
+from verification.advice.pace import MOST_WINDOWS, Pace, pace, pooled, together
+from verification.advice.readings import FEWEST_STEPS, Made, NextRun, Observed, RunReading, few, steps_needed
+from verification.value import to_plain
 
 #: A residual below this share of its largest value has fallen, although the log is too short for a ratio.
 FALLEN = 0.1
 
-#: What a ratio assumes to bound rho from below, and what from above.
+#: Assumption under which a ratio bounds rho from below, and from above.
 FROM_BELOW = "no friction, or a tied interface"
 TIED = "a tied interface"
 FROM_ABOVE = "a tied interface, or near the solution all of Gamma_c closed and nothing sliding"
-
 
 _WHY_NOT = {
     "ratio": "no window shows one",
     "plateau": "no window shows one",
     "pooled": "windows are read one by one, or are too few or too short to be pooled",
+}
+
+#: The kinds of a pace, in words.
+_WORDS = {
+    "steady": "steady",
+    "level": "at a level",
+    "floor": "at a low level",
+    "plateau": "at a plateau",
+    "unsteady": "not steady",
+    "short": "too short",
 }
 
 
@@ -34,13 +44,11 @@ class SeenColumn:
 
     Attributes
     ----------
-    name : str
-    residual : str
-        ``absolute``, ``relative``, ``drop``, or ``assumed``: taken as absolute.
-    paces : tuple of Pace
-        Those of the time windows that were read.
-    windows : int
-        How many time windows the log has; too short ones are not read where there are others, of many the last ones.
+    name, residual : str
+        The kind is ``absolute``, ``relative``, ``drop``, or ``assumed``: taken as absolute.
+    paces, windows : tuple of Pace, int
+        Of the time windows that were read, and the number of all; short ones are not read where there are others, of
+        many the last ones.
     ratio, plateau : Observed or None
         Of the windows put together.
     pooled : Observed or None
@@ -56,45 +64,56 @@ class SeenColumn:
     pooled: Observed | None = None
 
     def count(self, *kinds: str) -> int:
-        """How many of the windows that were read are of these kinds."""
+        """Number of windows that were read and are of these kinds."""
         return sum(pace.kind in kinds for pace in self.paces)
 
     @property
     def says(self) -> str:
-        """What was seen, in words."""
-        words = {
-            "steady": "steady", "level": "at a level", "floor": "at a low level", "plateau": "at a plateau",
-            "unsteady": "not steady", "short": "too short",
-        }  # fmt: skip
-        counts = {kind: self.count(kind) for kind in words}
-        found = ", ".join(f"{n} {words[kind]}" for kind, n in counts.items() if n)
+        """The column in words."""
         if len(self.paces) == 1:
-            found = next(words[kind] for kind, n in counts.items() if n)
+            found = _WORDS[self.paces[0].kind]
         else:
-            found = f"of {self.windows} windows {found}"
+            counts = ((self.count(kind), words) for kind, words in _WORDS.items())
+            found = f"of {self.windows} windows {', '.join(f'{n} {words}' for n, words in counts if n)}"
         if self.ratio is not None:
-            found += f"; ratio {_within(self.ratio)}"
+            found += f"; ratio {self.ratio}"
         if self.plateau is not None:
-            found += f"; plateau {_within(self.plateau)}"
+            found += f"; plateau {self.plateau}"
         if self.count("short") == len(self.paces):
             found += f", {max(pace.steps for pace in self.paces)} steps at most"
         if self.pooled is not None:
-            found += f"; pooled, the second half of each: ratio {_within(self.pooled)}"
+            found += f"; pooled, the second half of each: ratio {self.pooled}"
         return found
 
     def to_dict(self) -> dict[str, Any]:
         """A member of ``logs.columns``."""
+        numbers: dict[str, Observed | None] = {name: getattr(self, name) for name in _WHY_NOT}
         return {
             "name": self.name,
             "residual": self.residual,
             "windows": self.windows,
-            "read": {kind: self.count(kind) for kind in ("steady", "level", "floor", "plateau", "unsteady", "short")},
-            "ratio": _three(self.ratio),
-            "plateau": _three(self.plateau),
-            "pooled": _three(self.pooled),
+            "read": {kind: self.count(kind) for kind in _WORDS},
+            **{name: to_plain(number) for name, number in numbers.items()},
             "says": self.says,
-            "reason": {name: why for name, why in _WHY_NOT.items() if getattr(self, name) is None},
+            "reason": {name: why for name, why in _WHY_NOT.items() if numbers[name] is None},
         }
+
+
+def seen_column(column: Column, theta: Fraction) -> SeenColumn:
+    """Read the windows of one field one by one and put them together; pool them where all are too short."""
+    windows = ([window for window in column.windows if len(window) > FEWEST_STEPS] or column.windows)[-MOST_WINDOWS:]
+    paces = tuple(pace(window, column, theta) for window in windows)
+    short = all(one.kind == "short" for one in paces)
+    relative, steps = column.residual == "relative", steps_needed(theta)
+    return SeenColumn(
+        name=column.name,
+        residual=column.residual,
+        paces=paces,
+        windows=len(column.windows),
+        ratio=together([one for one in paces if one.kind != "plateau" and one.value is not None]),
+        plateau=together([one for one in paces if one.kind == "plateau"]),
+        pooled=pooled(windows, relative=relative, steps=steps) if short else None,
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,30 +122,33 @@ class SeenLog:
 
     Attributes
     ----------
-    file : str
-    form : str
-    theta : Fraction
-    steps : int
-        Over how many steps a ratio had to be steady.
+    file, form, theta : str, str, Fraction
     columns : tuple of SeenColumn
-    readings : tuple of RunReading
-        What this log can mean; empty where nothing in it is steady.
+    readings, rho : tuple of RunReading, Fraction or None
+        Possible meanings of this log, none where nothing in it is steady; rho of the only reading.
     next : NextRun
-        The run to make next if there were no other log.
-    rho : Fraction or None
-        That of its only reading.
+        The run to make next if this were the only log.
     notes : tuple of str
     """
 
     file: str
     form: str
     theta: Fraction
-    steps: int
     columns: tuple[SeenColumn, ...]
     readings: tuple[RunReading, ...]
     next: NextRun
     rho: Fraction | None
     notes: tuple[str, ...]
+
+    @property
+    def steps(self) -> int:
+        """Number of steps over which a ratio had to be steady."""
+        return steps_needed(self.theta)
+
+    @property
+    def paces(self) -> list[Pace]:
+        """The paces of all columns."""
+        return [pace for column in self.columns for pace in column.paces]
 
     @property
     def slowest(self) -> Observed | None:
@@ -141,27 +163,27 @@ class SeenLog:
 
     @property
     def stays(self) -> bool:
-        """Whether a residual of the run stays at a level or a plateau."""
+        """True if a residual of the run stays at a level or a plateau."""
         return any(column.count("level", "plateau") for column in self.columns)
 
     @property
     def converges(self) -> bool:
-        """Whether every field that shows a ratio falls, and none stays at a level, however low."""
+        """True if every field that shows a ratio falls, and none stays at a level, however low."""
         ratio = self.slowest
         return (
-            ratio is not None and ratio.most < 1 and not any(c.count("level", "plateau", "floor") for c in self.columns)
+            ratio is not None and ratio.most < 1 and not self.stays and not any(c.count("floor") for c in self.columns)
         )
 
     @property
     def diverges(self) -> bool:
-        """Whether the run does not converge as far as the log goes."""
+        """True if the run does not converge as far as the log goes."""
         ratio = self.slowest
         return self.stays or (ratio is not None and ratio.least > 1)
 
     @property
     def swift(self) -> bool:
         """True if the residual falls so fast, in the mean of every window, that no faster run is looked for."""
-        paces = [pace for column in self.columns for pace in column.paces if pace.steps]
+        paces = [pace for pace in self.paces if pace.steps]
         return bool(paces) and all(pace.swift for pace in paces)
 
     @property
@@ -173,7 +195,7 @@ class SeenLog:
     @property
     def falls(self) -> bool:
         """True if the run converges, or is too short to be read and ends below a tenth of its largest residual."""
-        paces = [pace for column in self.columns for pace in column.paces if pace.steps]
+        paces = [pace for pace in self.paces if pace.steps]
         unread = self.slowest is None and not self.stays and bool(paces)
         return self.converges or (unread and all(not p.lost and p.height < FALLEN for p in paces))
 
@@ -190,23 +212,15 @@ class SeenLog:
             "form": self.form,
             "theta": float(self.theta),
             "steady_over": self.steps,
-            "columns": [column.to_dict() for column in self.columns],
-            "readings": [reading.to_dict() for reading in self.readings],
+            "columns": to_plain(self.columns),
+            "readings": to_plain(self.readings),
             "notes": list(self.notes),
         }
 
 
 @dataclass(frozen=True, kw_only=True)
 class LogBound:
-    """A bound of rho, the log that it comes from, and what it assumes.
-
-    Attributes
-    ----------
-    value : Fraction
-    log : SeenLog
-    says : str
-    assumes : str
-    """
+    """A bound of rho, the log that it comes from, the reason in words, and its assumption."""
 
     value: Fraction
     log: SeenLog
@@ -226,14 +240,7 @@ class LogBound:
 
 @dataclass(frozen=True, kw_only=True)
 class RhoInterval:
-    """What logs of one coupling say of rho together.
-
-    Attributes
-    ----------
-    lo, hi : LogBound or None
-    contradiction : str or None
-        Why there is no rho between them.
-    """
+    """Bounds of rho from the logs of one coupling together; ``contradiction`` says why no rho lies between them."""
 
     lo: LogBound | None
     hi: LogBound | None
@@ -241,18 +248,13 @@ class RhoInterval:
 
     def to_dict(self) -> dict[str, Any]:
         """The object ``interval``."""
-        reason = {}
-        if self.lo is None:
-            reason["lo"] = "no log bounds rho from below without a reading"
-        if self.hi is None:
-            reason["hi"] = "no log converges"
-        if self.contradiction is None:
-            reason["contradiction"] = "the logs agree" if self.lo and self.hi else "one bound alone contradicts nothing"
+        agree = "the logs agree" if self.lo and self.hi else "one bound alone contradicts nothing"
+        why = {"lo": "no log bounds rho from below without a reading", "hi": "no log converges", "contradiction": agree}
         return {
             "lo": None if self.lo is None else self.lo.to_dict(up=False),
             "hi": None if self.hi is None else self.hi.to_dict(up=True),
             "contradiction": self.contradiction,
-            "reason": reason,
+            "reason": {name: words for name, words in why.items() if getattr(self, name) is None},
         }
 
 
@@ -262,26 +264,14 @@ def bounds(logs: Sequence[SeenLog]) -> tuple[list[LogBound], list[LogBound]]:
     for log in logs:
         ratio, plateau, theta = log.slowest, log.plateau, log.theta
         if ratio is not None and not {"mode-low", "open"} & {reading.kind for reading in log.readings}:
-            says = f"its residual changes by {_few(ratio.least)} a step or more, beyond 1 - theta"
+            says = f"its residual changes by {few(ratio.least)} a step or more, beyond 1 - theta"
             lower.append(LogBound(value=(1 + ratio.least) / theta - 1, log=log, says=says, assumes=FROM_BELOW))
         if log.diverges:
             lower.append(LogBound(value=2 / theta - 1, log=log, says="it does not converge", assumes=FROM_BELOW))
         if plateau is not None and any(reading.kind == "plateau" for reading in log.readings):
-            says = f"its relative residual stays at {_few(plateau.value)}"
+            says = f"its relative residual stays at {few(plateau.value)}"
             lower.append(LogBound(value=1 / (plateau.most - 1), log=log, says=says, assumes=TIED))
         if ratio is not None and log.converges:
-            says = f"its residual changes by {_few(ratio.most)} a step at most"
+            says = f"its residual changes by {few(ratio.most)} a step at most"
             upper.append(LogBound(value=(1 + ratio.most) / theta - 1, log=log, says=says, assumes=FROM_ABOVE))
     return lower, upper
-
-
-def _three(seen: Observed | None) -> dict[str, float] | None:
-    return None if seen is None else {name: float(getattr(seen, name)) for name in ("value", "least", "most")}
-
-
-def _within(seen: Observed) -> str:
-    return f"{_few(seen.value)} ({_few(seen.least)} to {_few(seen.most)})"
-
-
-def _few(value: Fraction) -> str:
-    return f"{float(value):.4g}"

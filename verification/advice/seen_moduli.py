@@ -15,21 +15,14 @@ from ndtheory.number import above
 from verification.advice import BodyNumber
 from verification.advice.readings import LARGEST_TO_PASTE, rounded_down
 from verification.problem.writing import written_number
+from verification.value import to_plain
 
 Corners = Literal["none", "1", "2", "both"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class LowerBounds:
-    """What rho is at least in the continuum.
-
-    Attributes
-    ----------
-    stick : Number
-        Where a piece of Gamma_c may stick.
-    slide : Number
-        Of rho_normal, where both bodies slide freely.
-    """
+    """Lower bounds of rho in the continuum: where a piece of Gamma_c may stick, and where both bodies slide freely."""
 
     stick: Number
     slide: Number
@@ -56,14 +49,8 @@ def excluded_from(bound: Number) -> float | None:
 class StartTheta:
     """A theta to start with, where the mirror image of the contact body fits into the Neumann body.
 
-    Attributes
-    ----------
-    s : Fraction
-        ``C_c <= s C_n``: rho_normal is at most s.
-    guess : float
-        What rho is at most with friction, by the likes of the Neumann body: a guess.
-    guessed_from : str
-        Which bodies these are.
+    ``C_c <= s C_n``, so that rho_normal is at most s.  With friction rho is guessed to be at most ``guess``, as with
+    bodies like the Neumann body, which ``guessed_from`` names.
     """
 
     s: Fraction
@@ -81,7 +68,7 @@ class StartTheta:
         return min(rounded_down(min(predicted_theta(Fraction(self.guess)), LARGEST_TO_PASTE)), self.theta_free)
 
     def factor_free(self, theta: float) -> Number:
-        """``1 - theta``, the factor proved without friction for a theta up to ``2/(2 + s)``: that of an open node."""
+        """``1 - theta``, the factor proved without friction for a theta up to ``2/(2 + s)``, as of an open node."""
         return exactly(1 - Fraction(theta))
 
     def to_dict(self) -> dict[str, Any]:
@@ -100,16 +87,15 @@ class StartTheta:
 
 @dataclass(frozen=True, kw_only=True)
 class ModuliRole:
-    """What moduli say when one body gets the Neumann problem.
+    """Bounds from moduli when one body gets the Neumann problem.
 
     Attributes
     ----------
     neumann_body : {1, 2}
     corners : mapping
         The bounds by the body that ends in corners of 90 degrees at the ends of Gamma_c: ``'none'`` holds for every
-        geometry, ``'1'``, ``'2'``, ``'both'`` add what such ends do.
-    start : Start or None
-    why_no_start : str
+        geometry, ``'1'``, ``'2'``, ``'both'`` add the effect of such ends.
+    start, why_no_start : StartTheta or None, str
     """
 
     neumann_body: BodyNumber
@@ -122,25 +108,24 @@ class ModuliRole:
         return {
             "neumann_body": self.neumann_body,
             "bounds": [{"corners": name} | bounds.to_dict() for name, bounds in self.corners.items()],
-            "start": None if self.start is None else self.start.to_dict(),
+            "start": to_plain(self.start),
             "reason": {"start": self.why_no_start} if self.start is None else {},
         }
 
 
 @dataclass(frozen=True, kw_only=True)
 class SeenModuli:
-    """What was given of two bodies, and what it says of both roles.
+    """The moduli of two bodies, and bounds for both roles.
 
     Attributes
     ----------
     bodies : pair of Moduli
         Bodies 1 and 2.
     corners : {'none', '1', '2', 'both'} or None
-        Which body ends in corners of 90 degrees at the ends of Gamma_c; None where that was not told.
-    mirror : tuple of {1, 2}
-        The bodies whose mirror image fits into the other one, as the user confirms.
-    flat : bool
-        Whether the other one is a flat layer, as the user confirms.
+        The body that ends in corners of 90 degrees at the ends of Gamma_c; None where that was not given.
+    mirror, flat : tuple of {1, 2}, bool
+        The bodies whose mirror image fits into the other one, and True if the other one is a flat layer, as the user
+        confirms.
     roles : pair of ModuliRole
         With the Neumann problem on body 1 and on body 2.
     """
@@ -152,7 +137,7 @@ class SeenModuli:
     roles: tuple[ModuliRole, ModuliRole]
 
     def bounds(self, role: ModuliRole) -> LowerBounds:
-        """What is sure of a role for the ends that were told, or for every geometry."""
+        """The bounds of a role for the ends that were given, or for every geometry."""
         return role.corners[self.corners or "none"]
 
     def largest(self, role: ModuliRole) -> float:
@@ -183,7 +168,7 @@ class SeenModuli:
             "mirror": list(self.mirror),
             "flat": self.flat,
             "neumann_body_frictionless": self.smaller("slide"),
-            "roles": [role.to_dict() for role in self.roles],
+            "roles": to_plain(self.roles),
             "reason": ({} if self.corners else {"corners": "not told"})
             | ({} if self.smaller("slide") else {"neumann_body_frictionless": "both roles have the same bound"}),
         }

@@ -1,10 +1,10 @@
-"""One body by its interface stiffness: a matrix, or what its solver does with a vector."""
+"""Both bodies by the interface stiffness that was given, as matrices or operators, and the transfer between them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
 import scipy.sparse as sp
@@ -14,19 +14,127 @@ from scipy.sparse.linalg import LinearOperator
 from fem1d2d import solver_with_inertia
 from fem1d2d.mesh import Floats
 from verification.advice import BodyNumber
-from verification.advice.seen_matrices import SeenMatrix
-from verification.interface.matrices import MOST_ROWS, Stiffness, real_array, stiffness
+from verification.interface.matrices import MOST_ROWS, Stiffness, real_array, size, stiffness
+from verification.value import to_plain
 
-#: Up to this asymmetry the symmetric part of a matrix is taken, and that is told.
+#: Up to this asymmetry the symmetric part of a matrix is taken, with a note.
 TOLD = 1e-3
 
 #: How far a solve may be from the inverse of the product beside it.
 INVERSE = 1e-3
 
+#: From this share of zeros off the diagonal on a matrix looks assembled.  A Schur complement on an interface of which
+#: the components do not act on each other has up to 2/3; linear triangles at 60 unknowns have 3/4 and more.
+SPARSE = 0.75
+
+#: The ordering that is assumed where it matters.
+ORDERING = "all first components of the nodes (tangential, from left to right), then all second ones (normal)"
+
 #: The Neumann bodies of the roles, in their order.
 BODIES: tuple[BodyNumber, BodyNumber] = (2, 1)
 
 Apply = Callable[[Floats], Floats]
+
+
+# --- in documents -----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeenMatrix:
+    """One matrix or operator.
+
+    Attributes
+    ----------
+    rows, form : int, {'matrix', 'operator'}
+    asymmetry : float or None
+        ``max |A - A'| / max |A|``; of an operator ``|x'Ay - y'Ax|`` over the size of its terms for two random vectors;
+        None where only its solves are known.
+    zeros, free_motions : float or None, int or None
+        The share of zeros off the diagonal, and the number of rigid motions that its supports leave; None of an
+        operator.
+    """
+
+    rows: int
+    form: Literal["matrix", "operator"]
+    asymmetry: float | None = None
+    zeros: float | None = None
+    free_motions: int | None = None
+
+    def notes(self, name: str, rounding: float) -> list[str]:
+        """Warnings for the user; an asymmetry up to ``rounding`` is rounding."""
+        found = []
+        if self.asymmetry is not None and self.asymmetry > rounding:
+            taken = "its symmetric part is taken" if self.form == "matrix" else "no residual means less than that"
+            found.append(f"{name} is asymmetric by {self.asymmetry:.2g} of its largest entry: {taken}")
+        if self.zeros is not None and self.zeros >= SPARSE:
+            found.append(
+                f"{100 * self.zeros:.0f} % of the entries of {name} off the diagonal are 0, as in an assembled"
+                f" stiffness matrix ({100 * SPARSE:.0f} % or more); a Schur complement on the interface is dense."
+                "  If it is the matrix of a whole body, condense it first: rho below is not the coupling's"
+            )
+        return found
+
+    def to_dict(self) -> dict[str, Any]:
+        """A member of ``matrices``."""
+        why = {"asymmetry": "known by its solves alone"} | dict.fromkeys(
+            ("zeros", "free_motions"), "an operator tells no entries"
+        )
+        return {**asdict(self), "reason": {name: words for name, words in why.items() if getattr(self, name) is None}}
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeenLanczos:
+    """The ends of the spectrum of (S_c, S_n) for one role, by Lanczos.
+
+    ``rho`` and ``rho_min`` are Rayleigh quotients, so that the largest eigenvalue is at least ``rho`` and the least one
+    at most ``rho_min``; some eigenvalue lies within each residual.
+    """
+
+    neumann_body: BodyNumber
+    rho: float
+    residual: float
+    rho_min: float
+    residual_min: float
+    steps: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeenMatrices:
+    """The matrices or operators that were given.
+
+    Attributes
+    ----------
+    S1, S2 : SeenMatrix
+    transfer, neumann_body : tuple of int or None, {1, 2} or None
+        Rows and columns of P as given, and the body from whose unknowns it leads; None without P.
+    ordering : str or None
+        The ordering that is assumed; None where rho does not depend on it.
+    lanczos : tuple of SeenLanczos
+        Empty where matrices gave the whole spectrum.
+    notes : tuple of str
+        Warnings for the user.
+    """
+
+    S1: SeenMatrix
+    S2: SeenMatrix
+    transfer: tuple[int, int] | None = None
+    neumann_body: BodyNumber | None = None
+    ordering: str | None = None
+    lanczos: tuple[SeenLanczos, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object ``matrices``."""
+        why = dict.fromkeys(("transfer", "neumann_body"), "no transfer was given")
+        why["ordering"] = "rho does not depend on it, so long as both have the same"
+        return {
+            **{name: to_plain(value) for name, value in vars(self).items()},
+            "lanczos": [asdict(found) for found in self.lanczos],
+            "reason": {name: words for name, words in why.items() if getattr(self, name) is None},
+        }
+
+
+# --- one body ---------------------------------------------------------------------------------------------------------
 
 
 def other(body: BodyNumber) -> BodyNumber:
@@ -42,12 +150,7 @@ def is_operator(S: Any) -> bool:
 
 
 def dense(name: str, matrix: Any) -> Floats:
-    """A matrix of real numbers, dense.
-
-    Raises
-    ------
-    ValueError
-    """
+    """A matrix of real numbers, dense."""
     if matrix is None:
         raise ValueError(f"no {name}: needed S1 and S2, or an operator for each")
     array = np.asarray(matrix.toarray() if sp.issparse(matrix) else matrix)
@@ -58,16 +161,7 @@ def dense(name: str, matrix: Any) -> Floats:
 
 @dataclass(frozen=True, kw_only=True)
 class Side:
-    """One body.
-
-    Attributes
-    ----------
-    seen : SeenMatrix
-    matrix : Stiffness or None
-        None of an operator.
-    apply, solve : callable or None
-        ``u -> S u`` and ``f -> S^-1 f``; None where that is not known.
-    """
+    """One body: its matrix, None of an operator, and ``u -> S u`` and ``f -> S^-1 f``, None if not known."""
 
     seen: SeenMatrix
     matrix: Stiffness | None = None
@@ -97,7 +191,7 @@ def of_matrix(body: BodyNumber, S: Any) -> Side:
 
 
 def rows_of(given: dict[BodyNumber, tuple[Any, Any]], unknowns: Any, transfer: Any) -> dict[int, int]:
-    """Number of unknowns of each body on the interface, by what is given of (S, solve).
+    """Number of unknowns of each body on the interface, by the sizes of (S, solve) that were given.
 
     Raises
     ------
@@ -210,3 +304,71 @@ def _function(name: str, given: Any, n: int) -> Apply | None:
         return real_array(f"what {name} returns", np.asarray(function(vector)), (n,))
 
     return checked
+
+
+# --- the transfer -----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class Transfer:
+    """The transfer P between two grids as it was given, from the unknowns of ``neumann_body``.
+
+    It applies to each of the ``components`` at the nodes; ``chosen`` is True if its shape fits both ways.
+    """
+
+    P: Any
+    neumann_body: BodyNumber
+    components: int
+    chosen: bool
+
+    def carry(self, u: Floats) -> Floats:
+        """``P u``."""
+        return np.concatenate([self.P @ part for part in u.reshape(self.components, -1, *u.shape[1:])])
+
+    def carry_back(self, f: Floats) -> Floats:
+        """``P' f``."""
+        back = self.P.rmatvec if isinstance(self.P, LinearOperator) else self.P.T.__matmul__
+        return np.concatenate([back(part) for part in f.reshape(self.components, -1, *f.shape[1:])])
+
+    @property
+    def notes(self) -> list[str]:
+        """Warnings for the user."""
+        if not self.chosen:
+            return []
+        n = self.neumann_body
+        return [f"P is read as leading from body {n} to body {3 - n}: its shape fits both ways"]
+
+
+def read_transfer(given: Any, rows: dict[int, int], neumann_body: BodyNumber | None) -> Transfer | None:
+    """The transfer P, whose direction its shape decides; None without one.
+
+    Raises
+    ------
+    ValueError
+        It does not fit, or there is none and the bodies have not as many unknowns.
+    """
+    if given is None:
+        if rows[1] != rows[2]:
+            sizes = ", ".join(f"S{body} is {n} x {n}" for body, n in rows.items())
+            raise ValueError(f"{sizes}: needed matrices on the same interface unknowns, or a transfer")
+        return None
+    P = given if isinstance(given, LinearOperator) or sp.issparse(given) else dense("the transfer", given)
+    if len(P.shape) != 2 or min(P.shape) == 0:
+        raise ValueError(f"the transfer is {size(P)}: needed a matrix")
+    entries = None if isinstance(P, LinearOperator) else P.data if sp.issparse(P) else P
+    if entries is not None and (np.asarray(entries).dtype.kind not in "fiu" or not np.isfinite(entries).all()):
+        raise ValueError("the transfer has entries that are not finite numbers: needed real ones")
+    bodies: tuple[BodyNumber, ...] = BODIES if neumann_body is None else (neumann_body,)
+    fits = [
+        (body, components)
+        for body in bodies
+        for components in (1, 2, 3)
+        if (P.shape[0] * components, P.shape[1] * components) == (rows[3 - body], rows[body])
+    ]
+    if not fits:
+        needed = (
+            "needed a row for each unknown of the contact body, a column for each of the Neumann body, or for nodes"
+        )
+        raise ValueError(f"the transfer is {P.shape[0]} x {P.shape[1]}, S1 has {rows[1]} rows, S2 {rows[2]}: {needed}")
+    body, components = fits[0]
+    return Transfer(P=P, neumann_body=body, components=components, chosen=len({body for body, _ in fits}) > 1)

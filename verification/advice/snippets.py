@@ -1,7 +1,7 @@
-"""What to paste into the configuration of a coupling library: the roles, theta, and who reads what.
+"""Lines for the configuration of a coupling library: the roles, theta, and which solver reads which field.
 
 The keys are those of preCICE 3.4.1, of the CoSimulationApplication of Kratos Multiphysics and of Norma.jl 0.1.0;
-``docs/coupling.md`` names the files of their sources in which they stand.
+``docs/coupling.md`` names the files of their sources that have them.
 """
 
 from __future__ import annotations
@@ -20,18 +20,16 @@ ROOM, UNKNOWN = 2, 200
 
 @dataclass(frozen=True, kw_only=True)
 class Coupling:
-    """What a snippet says.
+    """Content of a snippet.
 
     Attributes
     ----------
     neumann_body : {1, 2} or None
-        Whose solver reads forces and writes displacements; None where advice is for the roles that a run had.
-    theta : float
-        The relaxation factor.
+        Its solver reads forces and writes displacements; None where advice is for the roles that a run had.
+    theta, tied : float, bool
+        The relaxation factor; True if nothing opens or slips.
     steps : int or None
         To 1e-9 of the first error, by the rate of the advice.
-    tied : bool
-        Whether nothing opens or slips.
     """
 
     neumann_body: Literal[1, 2] | None
@@ -110,6 +108,10 @@ def kratos(c: Coupling) -> str:
     """The members of ``solver_settings`` beside ``solvers``, in which each body has the data displacement and force."""
     one, other = c.neumann, c.contact
     force: dict[str, Any] = {"solver": one, "data_name": "force"}
+    mapped: dict[str, Any] = {"data_transfer_operator": "mapper"}
+    reads = {"data": "displacement", "from_solver": one, "from_solver_data": "displacement", **mapped}
+    writes = {"data": "force", "to_solver": one, "to_solver_data": "force", **mapped}
+    writes["data_transfer_operator_options"] = ["use_transpose", "swap_sign"]
     settings = {
         "type": "coupled_solvers.gauss_seidel_strong",
         "num_coupling_iterations": c.iterations,
@@ -122,26 +124,7 @@ def kratos(c: Coupling) -> str:
         },
         "coupling_sequence": [
             {"name": one, "input_data_list": [], "output_data_list": []},
-            {
-                "name": other,
-                "input_data_list": [
-                    {
-                        "data": "displacement",
-                        "from_solver": one,
-                        "from_solver_data": "displacement",
-                        "data_transfer_operator": "mapper",
-                    }
-                ],
-                "output_data_list": [
-                    {
-                        "data": "force",
-                        "to_solver": one,
-                        "to_solver_data": "force",
-                        "data_transfer_operator": "mapper",
-                        "data_transfer_operator_options": ["use_transpose", "swap_sign"],
-                    }
-                ],
-            },
+            {"name": other, "input_data_list": [reads], "output_data_list": [writes]},
         ],
     }
     return json.dumps({"solver_settings": settings}, indent=2)

@@ -1,7 +1,7 @@
 """T near an iterate: the affine piece of a contact pattern, and its Jacobian there.
 
-T is piecewise affine.  While each node keeps what it does (sticks, slips one way, is open) and S sigma_N keeps its
-sign, steps I and II are linear systems, and the derivatives of their results by g are matrices.
+T is piecewise affine.  While each node keeps its state (sticks, slips one way, is open) and S sigma_N keeps its sign,
+steps I and II are linear systems, and the derivatives of their results by g are matrices.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from verification.value import Value, freeze
 class Changes:
     """The conditions that hold on an affine piece.
 
-    First every contact node keeps touching or stays open; then, in this order, what slips goes on, what sticks stays
-    below its bound on either side, and S sigma_N keeps its sign.
+    First every contact node keeps touching or stays open; then, in this order, slipping nodes keep their direction,
+    sticking nodes stay below their bound on either side, and S sigma_N keeps its sign.
 
     Attributes
     ----------
     speed : array
-        By how much a condition changes at most for a change of g of size 1 in the norm (5.21).
+        Largest change of a condition for a change of g of size 1 in the norm (5.21).
     nodes : int array
         The contact node of each condition.
     slips, sticks, rubs : int array
@@ -50,10 +50,8 @@ class Piece(Value):
 
     Attributes
     ----------
-    pair : ContactPair
-        The bodies and the law of friction.
     pattern : Pattern
-        What each contact node does.
+        The state of each contact node.
     sign : int array, shape (t,)
         Signs of S sigma_N at the nodes; 0 where the friction bound is 0.
     still : bool array, shape (n,)
@@ -77,12 +75,11 @@ class Piece(Value):
         result = np.zeros((len(self.sign), neumann.size))
         if pair.rubs and kernel is not None:
             result[:, neumann.normal] = (float(pair.friction) * contact.weights * self.sign)[:, None] * kernel
-        freeze(result)
-        return result
+        return freeze(result)
 
     @cached_property
     def _carried(self) -> Floats:
-        """Derivative of the trace of the Neumann body by g, as the contact grid sees it."""
+        """Derivative by g of the trace of the Neumann body, on the contact grid."""
         return self.pair.interface.carry(self.pair.neumann.inverse)
 
     @cached_property
@@ -98,14 +95,13 @@ class Piece(Value):
             result[rows] = Cholesky(contact.stiffness, rows, contact.motions).solve(load)[rows]
         held = np.flatnonzero(~contact.free)
         result[held] = -carried[held]
-        freeze(result)
-        return result
+        return freeze(result)
 
     @property
     def balanced(self) -> bool:
-        """Whether friction on this piece does no work in a rigid motion that it leaves free.
+        """True if friction on this piece does no work in a rigid motion that it leaves free.
 
-        Where it does, the piece is none: a change of the bound sets the contact body in motion, or stops it.
+        Otherwise T is not affine here: a change of the bound sets the contact body in motion, or stops it.
         """
         moves = np.concatenate([self.pattern.sliding != 0, ~self.pattern.touching])
         free = vanishing(self.pair.contact.motions, np.flatnonzero(~moves))
@@ -120,8 +116,7 @@ class Piece(Value):
         slides = np.flatnonzero(sliding)
         result[slides] = sliding[slides, None] * self.bound[slides]
         result[t:][~self.pattern.touching] = 0.0
-        freeze(result)
-        return result
+        return freeze(result)
 
     @property
     def force(self) -> Floats:
@@ -130,7 +125,7 @@ class Piece(Value):
 
     @cached_property
     def basis(self) -> Floats:
-        """Orthonormal forces in the norm (5.21), as columns, that span the changes of g the piece speaks of.
+        """Orthonormal forces in the norm (5.21), as columns: they span the changes of g on which T is affine.
 
         A node out of reach of any contact force has the friction bound ``w k |S sigma_N| = 0``, which is not smooth.
         But T_theta keeps ``g_N = 0`` at the open nodes around it, and on that subspace T is affine.
@@ -139,28 +134,26 @@ class Piece(Value):
         if not self.still.any():
             return root
         kept = null_space(root[self.pair.neumann.grid.normal][self.still])
-        basis: Floats = freeze(root @ kept)
-        return basis
+        return freeze(root @ kept)
 
     @cached_property
     def jacobian(self) -> Floats:
         """T' in the coordinates of ``basis``: there (5.21) is the Euclidean norm."""
-        jacobian: Floats = freeze(self.basis.T @ self.pair.neumann.flexibility(self.force @ self.basis))
-        return jacobian
+        return freeze(self.basis.T @ self.pair.neumann.flexibility(self.force @ self.basis))
 
     def relaxed(self, theta: float) -> Floats:
-        """The Jacobian J of T_theta in those coordinates."""
+        """Return the Jacobian J of T_theta in those coordinates."""
         return np.asarray(theta * self.jacobian + (1 - theta) * np.eye(len(self.jacobian)))
 
     @cached_property
     def modes(self) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
         """A Schur form of the transpose of ``jacobian`` and its vectors, which serve the J of every theta."""
         form, vectors = schur(self.jacobian.T, output="complex")
-        return freeze((np.asfortranarray(form), np.asfortranarray(vectors)))  # type: ignore[no-any-return]
+        return freeze((np.asfortranarray(form), np.asfortranarray(vectors)))
 
     @cached_property
     def changes(self) -> Changes:
-        """How fast each condition of the piece comes nearer to its end."""
+        """The speed with which each condition of the piece can approach its end."""
         contact, neumann = self.pair.contact.grid, self.pair.neumann.grid
         t, touching, basis, kernel = contact.t, self.pattern.touching, self.basis, self.pair.interface.kernel
         jump, reaction = self.jump @ basis, self.reaction @ basis
@@ -177,12 +170,12 @@ class Piece(Value):
         return Changes(speed=speed, nodes=np.concatenate(nodes), slips=slips, sticks=sticks, rubs=rubs)
 
     def factor(self, theta: float) -> float:
-        """``|J|``: the Lipschitz constant of T_theta on this piece in the norm (5.21)."""
+        """Return ``|J|``: the Lipschitz constant of T_theta on this piece in the norm (5.21)."""
         return float(np.linalg.norm(self.relaxed(theta), 2))
 
 
 def piece_of(pair: ContactPair, g: Floats, pattern: Pattern) -> Piece:
-    """The affine piece around g, whose contact pattern is known."""
+    """Return the affine piece around g, whose contact pattern is known."""
     neumann = pair.neumann.grid
     sign, still = np.zeros(pair.contact.grid.t, dtype=np.int8), np.zeros(neumann.n, dtype=bool)
     if pair.rubs:

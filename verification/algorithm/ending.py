@@ -1,8 +1,9 @@
 """End of a run: its outcome, and the distance of its joined state from contact, measured in its own traction.
 
-The joined state at g is made of both displacements, u2 from step I and u1 from step II, and of g itself as the traction
-between the bodies.  A residual ``|||T g - g|||`` that is small beside the first step does not bound it: with a contact
-body much stiffer than the other one the first step throws the bodies apart, and g then decays with every node open.
+The joined state at g consists of both displacements, u2 from step I and u1 from step II, and of g itself as the
+traction between the bodies.  A residual ``|||T g - g|||`` that is small beside the first step does not bound it: with
+a contact body much stiffer than the other one the first step throws the bodies apart, and g then decays with every
+node open.
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ PATIENCE = 50
 #: A residual grown by this factor over the first one has diverged.
 RUNAWAY = 1e8
 
-#: A run has not arrived while its coupled residual is above this, or above so many times its tolerance: a tenth of the
-#: traction is more than the step ratios of a converging run leave in any one condition.
+#: A run has not arrived while its coupled residual is above both the first number and its tolerance times the second:
+#: a tenth of the traction is more than the step ratios of a converging run leave in any one condition.
 MOST, TOLERANCES = 0.1, 10.0
 
 #: The reason for a missing coupled residual.
@@ -34,17 +35,12 @@ NO_FORCE = "no force acts between the bodies at the end"
 
 
 def coupled_residual(pair: ContactPair, iterate: Iterate) -> float | None:
-    """Largest violation of a condition of contact by the joined state at g, relative to g, in the norm (5.21).
+    """Return the largest violation of a contact condition by the joined state at g, relative to g, in the norm (5.21).
 
-    The conditions are those of (2.4) and (2.6) on the contact nodes, with the pattern of step II: a node that is open
-    carries no pressure, none pulls, friction stays within its bound; and the equilibrium of the contact body under g.
-    The rest hold by construction: step I balances the Neumann body with g, and step II lets nothing penetrate.  What
-    violates a condition is a nodal force, of which the norm is taken.
-
-    Parameters
-    ----------
-    pair : ContactPair
-    iterate : Iterate
+    The conditions are those of (2.4) and (2.6) on the contact nodes, with the pattern of step II (an open node carries
+    no pressure, no node pulls, friction stays within its bound), and the equilibrium of the contact body under g.  The
+    others hold by construction: step I balances the Neumann body with g, and step II lets nothing penetrate.  Each
+    violation is a nodal force, of which the norm is taken.
 
     Returns
     -------
@@ -76,33 +72,23 @@ def coupled_residual(pair: ContactPair, iterate: Iterate) -> float | None:
 
 
 def arrived(pair: ContactPair, iterate: Iterate) -> bool:
-    """True if the joined state at g meets the conditions of contact as closely as a run must end."""
+    """Return True if the joined state at g meets the conditions of contact as closely as a run must end."""
     found = coupled_residual(pair, iterate)
     return found is None or found <= max(MOST, TOLERANCES * pair.settings.tolerance)
 
 
 class Ending:
-    """The end of a run, from its residuals one by one.
-
-    Parameters
-    ----------
-    settings : Settings
-    """
+    """The rule that ends a run, from its residuals one by one."""
 
     def __init__(self, settings: Settings) -> None:
         self._tolerance, self._most = settings.tolerance, settings.max_iterations
         self._least, self._since, self._first = math.inf, 0, math.inf
 
     def at(self, iteration: int, residual: float, scale: float, joined: Callable[[], bool]) -> Outcome | None:
-        """The outcome where the run ends at this iterate.
+        """Return the outcome if the run ends at this iterate, of these numbers, else None.
 
-        Parameters
-        ----------
-        iteration : int
-        residual, scale : float
-            Those of the iterate.
-        joined : callable
-            True if the iterate has :func:`arrived`; called where the residual meets the tolerance.
+        ``joined`` returns True if the iterate has :func:`arrived`; it is called where the residual meets the
+        tolerance.
         """
         self._first = residual if iteration == 0 else self._first
         self._least, self._since = (residual, 0) if residual < self._least else (self._least, self._since + 1)
@@ -111,7 +97,7 @@ class Ending:
         return self.given_up(iteration, residual)
 
     def given_up(self, iteration: int, residual: float) -> Outcome | None:
-        """The outcome where it would end here, converged or not."""
+        """Return the outcome if the run ends here without convergence, else None."""
         if not residual <= RUNAWAY * self._first:
             return "diverged"
         if self._since >= PATIENCE:

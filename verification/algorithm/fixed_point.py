@@ -17,7 +17,7 @@ from verification.dense import times
 from verification.interface.pair import ContactPair
 from verification.threads import one_thread
 
-#: After so many steps (I) is solved anew.  On the sample problems of the tests, 400 steps each, its displacement then
+#: Steps after which (I) is solved anew.  On the sample problems of the tests, 400 steps each, its displacement then
 #: stays within 35 units in the last place of the solved one in the energy norm; never solved anew, within 530.  T then
 #: differs by 0.2 of the rounding of one evaluation (``rates.noise``) at most.
 RENEWED = 8
@@ -29,12 +29,12 @@ class FixedPointMap:
     Parameters
     ----------
     pair : ContactPair
-        The bodies with their loads; its roles say who has step I and who has step II.
+        The bodies with their loads and roles.
     solver : {'auto', 'cvxpy', 'active-set'}
     step : type, optional
-        Who takes step II.
+        The class that solves step II.
     systems : Systems, optional
-        What maps of pairs with this contact body may share; no digit of T depends on it.
+        Linear systems to share with maps of pairs with this contact body; no digit of T depends on it.
     """
 
     def __init__(
@@ -53,27 +53,17 @@ class FixedPointMap:
         self._all_free = bool(contact.free.all())
 
     def __call__(self, g: Floats) -> tuple[Floats, ContactSolution]:
-        """Steps I and II: the displacement of the Neumann body and the solved contact step.
-
-        Raises
-        ------
-        ContactError
-        """
+        """Solve steps I and II: the displacement of the Neumann body and the contact step; may raise ContactError."""
         u = self.displacement(g)
         return u, self.contact(g, u)
 
     def displacement(self, g: Floats) -> Floats:
-        """(I): ``S2 u2 = g + l2``."""
+        """Solve (I): ``S2 u2 = g + l2``."""
         neumann = self.pair.neumann
         return neumann.known + neumann.flexibility(g + neumann.load)
 
     def contact(self, g: Floats, u: Floats) -> ContactSolution:
-        """(II): minimise over ``phi = P u2 + v``, ``phi_N <= (P u2)_N + gap``.
-
-        Raises
-        ------
-        ContactError
-        """
+        """Solve (II): minimise over ``phi = P u2 + v``, ``phi_N <= (P u2)_N + gap``; may raise ContactError."""
         contact, interface = self.pair.contact, self.pair.interface
         obstacle = interface.carry(u).copy()
         obstacle[contact.grid.normal] += interface.gap
@@ -82,7 +72,7 @@ class FixedPointMap:
         return solution if self._all_free else self._held(solution, obstacle, bound)
 
     def _held(self, solution: ContactSolution, obstacle: Floats, bound: Floats) -> ContactSolution:
-        """Where the contact body is held tangentially its support takes any force: friction follows the slip alone."""
+        """Correct held nodes: their support takes any tangential force, and friction follows only the slip."""
         v, force = solution.v.copy(), solution.force.copy()
         rows = np.flatnonzero(~self.pair.contact.free)
         v[rows] = self.pair.contact.known[rows] - obstacle[rows]
@@ -102,7 +92,7 @@ def iterate_at(T: FixedPointMap, g: Floats) -> Iterate:
 def _evaluate(
     T: FixedPointMap, g: Floats, u: Floats, before: Iterate | None = None, least: float = 0.0
 ) -> tuple[Iterate, Floats]:
-    """T at g, which displaces the Neumann body by u, and ``S2^-1 (T g - g)``."""
+    """Evaluate T at g, which displaces the Neumann body by u; also return ``S2^-1 (T g - g)``."""
     neumann = T.pair.neumann
     solution = T.contact(g, u)
     image = T.pair.interface.carry_back(solution.force)
@@ -125,9 +115,9 @@ def _evaluate(
 
 
 def iterates(T: FixedPointMap, step: Step, start: Floats | None = None, least: float = 0.0) -> Iterator[Iterate]:
-    """The iterates that a rule passes through, without end; ``least`` is a scale that none falls below.
+    """Yield the iterates of a rule without end; ``least`` is a scale that none falls below.
 
-    Where (III) has one factor, what g displaces follows from what the residual needs, as
+    Where (III) has one factor, the displacement of the next g follows from the solve that the residual needs, as
     ``S2^-1 g+ = S2^-1 g + theta S2^-1 (T g - g)``: a step takes one solve with S2.  Every :data:`RENEWED` steps, and
     after any other rule, (I) is solved for g itself.
     """

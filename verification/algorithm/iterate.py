@@ -1,4 +1,4 @@
-"""What one evaluation of T shows."""
+"""The values of one evaluation of T."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from verification.value import Value
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Iterate(Value):
-    """What one evaluation of T shows.
+    """The values of one evaluation of T.
 
     Interface vectors list tangential components, then normal ones along n of the contact body; g and T g are nodal
     forces on the Neumann body.
@@ -23,7 +23,7 @@ class Iterate(Value):
     g : array
         Nodal forces before the step.
     image : array
-        T g: what step II returns, on the Neumann grid.
+        T g: the result of step II, on the Neumann grid.
     displacement : array
         Interface displacement of the Neumann body, from step I, on its own grid.
     contact : ContactSolution
@@ -33,9 +33,9 @@ class Iterate(Value):
     size : float
         ``|||T g|||``.
     scale : float
-        ``max(|||g|||, |||T g|||)``, the present size of the forces, which the residual is compared with.  A size that
-        the forces had earlier says nothing: a stiff contact body may throw the bodies apart in the first step, and g
-        then decays without contact.  A run whose loads give no force has a fixed scale instead, that of
+        ``max(|||g|||, |||T g|||)``, the present size of the forces, with which the residual is compared.  An earlier
+        size would mislead: a stiff contact body may throw the bodies apart in the first step, and g then decays
+        without contact.  A run whose loads give no force has a fixed scale instead, see
         :func:`verification.algorithm.start.least_scale`.
     """
 

@@ -11,11 +11,13 @@ from scipy.linalg.lapack import ztrexc
 
 from fem1d2d.mesh import Floats
 from verification.algorithm.affine_piece import Piece, piece_of
+from verification.algorithm.fixed_point import FixedPointMap, iterate_at
 from verification.algorithm.iterate import Iterate
 from verification.algorithm.rates import CLEAR_OF_NOISE, noise, noises, observed_rate, rate_at_the_end, settled
 from verification.interface.pair import ContactPair
+from verification.monolithic import solution_force
 
-#: Contact nodes up to which T is linearised: eigenvalues of larger Jacobians take minutes.
+#: Largest number of contact nodes for a linearisation: eigenvalues of larger Jacobians take minutes.
 MOST_NODES = 300
 
 #: A mode whose share of the error is below this is not excited: rounding alone does not count.
@@ -34,15 +36,15 @@ class Linearisation:
     radius : float
         rho(J).
     excited : float or None
-        The spectral radius of J on what the run excites; None where the run did not reach the solution.
+        The spectral radius of J on the modes that the run excites; None where the run did not reach the solution.
     norm : float
         ``|J|``.
     margin : float
-        How far g may move until a node changes state, ``|||g - g*||| / |||g*|||``.
+        Distance that g may move until a node changes state, ``|||g - g*||| / |||g*|||``.
     predicted : float or None
-        What J makes of the run's own error over the very steps that the observed rate compares; None where they lie
-        elsewhere.  It tests J, not the future: :class:`Forecast` is what could be said before.  It differs from
-        ``excited`` as long as no single mode dominates.
+        The rate that J gives for the run's own error over the very steps that the observed rate compares; None where
+        they lie elsewhere.  It tests J, not the future: :class:`Forecast` is what could be said before.  It differs
+        from ``excited`` as long as no single mode dominates.
     """
 
     radius: float
@@ -58,22 +60,22 @@ class Linearisation:
 
 
 class NotLinear(ValueError):
-    """Why linearisation does not apply."""
+    """Linearisation does not apply, for the reason in the message."""
+
+
+def at_solution(T: FixedPointMap) -> Iterate:
+    """Evaluate T at the solution of the global method; NotLinear for a pair made from matrices."""
+    if T.pair.problem is None:
+        raise NotLinear("the run did not arrive, and without meshes the global method has nothing to solve")
+    return iterate_at(T, solution_force(T.pair))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Near:
-    """T_theta on the affine piece of an iterate: its Jacobian, and how far the iterate lies from its fixed point.
+    """T_theta on the affine piece of an iterate: its Jacobian J in the coordinates of ``piece.basis``.
 
-    Attributes
-    ----------
-    piece : Piece
-    J : array
-        In the coordinates of ``piece.basis``.
-    error : array
-        ``g - g*`` there, by one Newton step.
-    margin : float
-        How far g may move, in the norm (5.21), until a node changes state.
+    ``error`` is ``g - g*`` there, by one Newton step; ``margin`` is the distance that g may move, in the norm (5.21),
+    until a node changes state.
     """
 
     piece: Piece
@@ -82,17 +84,12 @@ class _Near:
     margin: float
 
     def step(self, error: Floats) -> float:
-        """The size of a relaxation step from an error, in the norm (5.21): theta times the residual."""
+        """Return the size of a relaxation step from an error, in the norm (5.21): theta times the residual."""
         return float(np.linalg.norm(self.J @ error - error))
 
 
 def _near(pair: ContactPair, iterate: Iterate, theta: float, piece: Piece | None = None) -> _Near:
-    """Linearise T_theta at an iterate close to the solution: no node may change its state in between.
-
-    Raises
-    ------
-    NotLinear
-    """
+    """Linearise T_theta at an iterate close to the solution: no node may change its state in between."""
     if pair.contact.grid.n > MOST_NODES:
         raise NotLinear(f"{pair.contact.grid.n} contact nodes: T is linearised up to {MOST_NODES}")
     piece = piece or piece_of(pair, iterate.g, iterate.contact.pattern)
@@ -117,11 +114,8 @@ def linearise(pair: ContactPair, iterate: Iterate, theta: float, history: Sequen
 
     Parameters
     ----------
-    pair : ContactPair
-        What was run.
     iterate : Iterate
         Close to the solution: no node may change its state in between.
-    theta : float
     history : sequence of Iterate
         The run that led there; its error decides what is excited.
 
@@ -156,17 +150,9 @@ def linearise(pair: ContactPair, iterate: Iterate, theta: float, history: Sequen
 
 
 def linearised_rate(piece: Piece, iterate: Iterate, theta: float, first: Floats | None = None) -> float:
-    """The rate alone that :func:`linearise` gives, on a piece whose matrices other runs may have asked for.
+    """Return only the rate of :func:`linearise`, on the piece of an iterate close to the solution.
 
-    Parameters
-    ----------
-    piece : Piece
-        That of the iterate.
-    iterate : Iterate
-        Close to the solution.
-    theta : float
-    first : array, optional
-        The g with which a run came onto this piece for good; its error decides what is excited.
+    ``first`` is the g with which a run came onto this piece for good: its error decides what is excited.
 
     Raises
     ------
@@ -182,7 +168,7 @@ def linearised_rate(piece: Piece, iterate: Iterate, theta: float, first: Floats 
 
 @dataclass(frozen=True, kw_only=True)
 class Forecast:
-    """What could be said of the rest of a run half way, from the iterates up to there alone.
+    """Prediction of the rest of a run, made half way from the iterates up to there.
 
     Attributes
     ----------
@@ -191,9 +177,9 @@ class Forecast:
     rate : float
         The rate that the run should show at its end, by the definition of the observed rate.
     iterations : int
-        After how many the run should have converged.
+        Number of iterations after which the run should have converged.
     tolerance : float
-        What "converged" means.
+        Of the relative residual, at convergence.
     """
 
     made_at_iteration: int
@@ -203,18 +189,15 @@ class Forecast:
 
 
 def forecast(pair: ContactPair, iterates: Sequence[Iterate], theta: float, tolerance: float, most: int) -> Forecast:
-    """Say of a run, half way to its tolerance, how it will end.
+    """Predict, half way to the tolerance of a run, how it will end.
 
-    From there on the error is taken to obey ``e <- J e`` with the Jacobian of the piece that the run is on: right if no
-    node changes its state any more.
+    From there on the error is taken to obey ``e <- J e`` with the Jacobian of the piece that the run is on: right if
+    no node changes its state any more.
 
     Parameters
     ----------
-    pair : ContactPair
-        What was run.
     iterates : sequence of Iterate
-        The run; those after the one half way are not looked at.
-    theta : float
+        The run; those after the one half way are not used.
     tolerance : float
         Of the relative residual.
     most : int
@@ -223,7 +206,7 @@ def forecast(pair: ContactPair, iterates: Sequence[Iterate], theta: float, toler
     Raises
     ------
     NotLinear
-        Why nothing can be said.
+        Why nothing can be predicted.
     """
     half = next((i for i, s in enumerate(iterates) if s.residual <= math.sqrt(tolerance) * s.scale), None)
     if half is None:
@@ -247,7 +230,7 @@ def forecast(pair: ContactPair, iterates: Sequence[Iterate], theta: float, toler
         raise NotLinear("the run is too short for a rate")
     return Forecast(
         made_at_iteration=half,
-        rate=rate_at_the_end(residuals, floors, settled(seen)).value,
+        rate=rate_at_the_end(residuals, floors, settled([s.contact.pattern for s in seen])).value,
         iterations=len(residuals) - 1,
         tolerance=tolerance,
     )
@@ -258,7 +241,7 @@ def _same(a: Piece, b: Piece) -> bool:
 
 
 def _margin(piece: Piece, iterate: Iterate) -> tuple[float, int]:
-    """Distance in the norm (5.21) from g to the next change of state, and the contact node it happens at."""
+    """Return the distance in the norm (5.21) from g to the next change of state, and its contact node."""
     pair, t, changes = piece.pair, piece.pair.contact.grid.t, piece.changes
     v, force = iterate.contact.v, iterate.contact.force
     slack = [np.where(piece.pattern.touching, force[t:], -v[t:])]
@@ -274,11 +257,11 @@ def _margin(piece: Piece, iterate: Iterate) -> tuple[float, int]:
 
 
 def _excited(piece: Piece, theta: float, error: Floats) -> float:
-    """The largest modulus of an eigenvalue of J whose modes have a share of the error.
+    """Return the largest modulus of an eigenvalue of J whose modes have a share of the error.
 
     The modes of modulus >= r have no share if and only if the error is orthogonal to the left invariant subspace of
-    those eigenvalues.  The first columns of a Schur form of J' whose eigenvalues fall in modulus span one after the
-    other; they are brought forward one by one until one shows.
+    those eigenvalues.  This subspace is spanned by the first columns of a Schur form of J' whose eigenvalues fall in
+    modulus; they are brought forward one by one until one shows.
     """
     size = float(np.linalg.norm(error))
     if size == 0.0:
@@ -300,11 +283,11 @@ def _excited(piece: Piece, theta: float, error: Floats) -> float:
 
 
 def _moduli(piece: Piece, theta: float) -> Floats:
-    """Moduli of the eigenvalues of J in the order of ``piece.modes``."""
+    """Return the moduli of the eigenvalues of J in the order of ``piece.modes``."""
     moduli: Floats = np.abs(1 - theta + theta * np.diagonal(piece.modes[0]))
     return moduli
 
 
 def _radius(piece: Piece, theta: float) -> float:
-    """rho(J), from the same eigenvalues as what is excited: that is one of them, and never above the largest."""
+    """Return rho(J), from the same eigenvalues as the excited one, so that it is never below that one."""
     return float(_moduli(piece, theta).max(initial=0.0))

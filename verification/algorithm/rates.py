@@ -1,4 +1,4 @@
-"""The rate a run shows in the norm (5.21), and the largest factor of a single step, with the noise of each iterate."""
+"""The rate of a run in the norm (5.21), and the largest factor of a single step, with the noise of each iterate."""
 
 from __future__ import annotations
 
@@ -14,21 +14,17 @@ from verification.interface.pair import ContactPair
 #: Residuals below this multiple of their noise are not used.
 CLEAR_OF_NOISE = 100.0
 
-#: Above this multiple of its noise a step ratio has eight digits.
+#: A residual above this multiple of its noise gives a step ratio with eight digits.
 FAR_FROM_NOISE = 1e8
 
 
 class Noise:
-    """Rounding error of one evaluation of T, as a residual in the norm (5.21).
+    """Rounding error of one evaluation of T for a pair, as a residual in the norm (5.21).
 
-    Each product and each sum has a relative error of some units in the last place of what it adds.  Step I solves
+    Each product and each sum has a relative error of some units in the last place of its terms.  Step I solves
     ``S2 u = g + l2``, which leaves an error of that size in each equation, ``|S2| |u| + |g| + |l2|``, and ``|S2^-1|``
-    times that in u: far more than u has of its own where the body is as slender as a cantilever.  Step II adds
+    times that in u: far more than the rounding of u itself where the body is as slender as a cantilever.  Step II adds
     ``|S1|`` times u and the loads.
-
-    Parameters
-    ----------
-    pair : ContactPair
     """
 
     def __init__(self, pair: ContactPair) -> None:
@@ -41,11 +37,9 @@ class Noise:
         self._load, self._neumann_load = (np.abs(side.load)[:, None] for side in (pair.contact, pair.neumann))
 
     def of(self, g: Floats, u: Floats) -> Floats:
-        """The error at each column of g, shape (2 n, m), with its displacement in u."""
+        """Return the error at each column of g, shape (2 n, m), with its displacement in u."""
         g, u = np.abs(g), np.abs(u)
-        with np.errstate(
-            over="ignore", invalid="ignore"
-        ):  # of a run that diverges; none of its residuals is clear then
+        with np.errstate(over="ignore", invalid="ignore"):  # in a run that diverges, which has no clear residual then
             off = self._flexibility @ (self._neumann_stiffness @ u + g + self._neumann_load)
             added = g + self._interface.carry_back(self._stiffness @ self._interface.carry(u + off) + self._load)
             # no sum of errors of these sizes, of whatever signs, is longer
@@ -54,12 +48,12 @@ class Noise:
 
 
 def noise(pair: ContactPair, iterate: Iterate) -> float:
-    """The :class:`Noise` of one iterate."""
+    """Return the :class:`Noise` of one iterate."""
     return noises(pair, [iterate])[0]
 
 
 def noises(pair: ContactPair, iterates: Sequence[Iterate]) -> list[float]:
-    """The :class:`Noise` of each of some iterates."""
+    """Return the :class:`Noise` of each of some iterates."""
     if not iterates:
         return []
     g = np.stack([iterate.g for iterate in iterates], axis=1)
@@ -90,10 +84,10 @@ class ObservedRate:
 
 
 def observed_rate(pair: ContactPair, iterates: Sequence[Iterate]) -> ObservedRate | None:
-    """The rate that a run shows at its end, or None where fewer than two step ratios stand clear of the noise.
+    """Return the rate that a run shows at its end, or None where fewer than two step ratios are clear of the noise.
 
-    Every residual is held against the noise of its own iterate; after the first one that is not clear of it
-    nothing counts.
+    Every residual is compared with the noise of the same iterate; nothing after the first one that is not clear of it
+    counts.
     """
     return rate_of(
         [iterate.residual for iterate in iterates], noises(pair, iterates), [each.contact.pattern for each in iterates]
@@ -101,20 +95,16 @@ def observed_rate(pair: ContactPair, iterates: Sequence[Iterate]) -> ObservedRat
 
 
 def rate_of(residuals: Sequence[float], floors: Sequence[float], patterns: Sequence[object]) -> ObservedRate | None:
-    """As :func:`observed_rate`, from the residuals, the noise of each and what can be compared of the patterns."""
+    """Do the same from the residuals, the noise of each, and contact patterns in any form that can be compared."""
     clear = [residual > CLEAR_OF_NOISE * floor for residual, floor in zip(residuals, floors, strict=True)]
     count = clear.index(False) if False in clear else len(clear)
     if count < 3:
         return None
-    return rate_at_the_end(residuals[:count], floors[:count], _settled(patterns[:count]))
+    return rate_at_the_end(residuals[:count], floors[:count], settled(patterns[:count]))
 
 
-def settled(iterates: Sequence[Iterate]) -> int:
-    """From which iterate on the contact pattern is the last one."""
-    return _settled([iterate.contact.pattern for iterate in iterates])
-
-
-def _settled(patterns: Sequence[object]) -> int:
+def settled(patterns: Sequence[object]) -> int:
+    """Return the number of the first iterate from which on the contact pattern is the last one."""
     first = len(patterns) - 1
     while first > 0 and patterns[first - 1] == patterns[-1]:
         first -= 1
@@ -122,7 +112,7 @@ def _settled(patterns: Sequence[object]) -> int:
 
 
 def rate_at_the_end(residuals: Sequence[float], floors: Sequence[float], since: int) -> ObservedRate:
-    """The rate over the last quarter of the steps since the contact pattern settled.
+    """Return the rate over the last quarter of the steps since the contact pattern settled.
 
     Parameters
     ----------
@@ -163,7 +153,7 @@ class StepRatio:
     value, lo, hi : float
         0 where no step was taken.
     steps : int
-        How many steps it was taken over; 0 where the start is the solution.
+        Number of steps it was taken over; 0 where the start is the solution.
     """
 
     value: float
@@ -173,10 +163,10 @@ class StepRatio:
 
 
 def largest_step_ratio(pair: ContactPair, iterates: Sequence[Iterate]) -> StepRatio | None:
-    """The largest step ratio clear of the noise, or None where there is none.
+    """Return the largest step ratio clear of the noise, or None where there is none.
 
-    A step is judged by the noise of its own two iterates; it may end below the noise, not begin there.  Steps far above
-    it count alone, where there are any.
+    A step is judged by the noise of its two iterates; it may end below the noise, not begin there.  Where steps
+    begin far above it, only these count.
     """
     if not iterates:
         return None

@@ -1,7 +1,7 @@
-"""The algorithm as cvxpy alone runs it: every step II taken from the program's own answer.
+"""The algorithm by cvxpy only: every step II is the program's own answer.
 
 The active set solves step II to rounding, so that two runs with its digits agree to the last one and test nothing.
-Here each T g is what the convex program answers, and the certified T at the same g says how far it is off.
+Here each T g is the answer of the convex program, and its error is the distance from the certified T at the same g.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from itertools import islice
 
 from verification.algorithm.fixed_point import FixedPointMap, iterate_at, iterates
 from verification.algorithm.iterate import Iterate
-from verification.algorithm.rates import CLEAR_OF_NOISE, ObservedRate, rate_at_the_end, settled
+from verification.algorithm.rates import rate_of
 from verification.algorithm.runs import Run
 from verification.contact.step import ProgramStep
 
@@ -30,9 +30,9 @@ class Reference:
     steps : int
         Evaluations of T by the program's own answer.
     whole : bool
-        Whether the run was repeated; else its first and last step alone were.
+        Whether the run was repeated; else only its first and last step were.
     observed_rate : float or None
-        The rate that they show; None where too few stand clear of the program's errors, or the run was not repeated.
+        The rate of these steps; None where too few are clear of the program's errors, or the run was not repeated.
     largest_difference : float
         The largest ``|||T_cvxpy g - T g|||``, relative to the largest ``|||T g|||`` so far.
     why : str
@@ -46,7 +46,7 @@ class Reference:
     why: str = ""
 
     def to_dict(self) -> dict[str, object]:
-        """The object ``cvxpy`` of ``ndtheory.compare/1``."""
+        """Return the object ``cvxpy`` of ``ndtheory.compare/1``."""
         return {
             "steps": self.steps,
             "whole": self.whole,
@@ -57,7 +57,7 @@ class Reference:
 
 
 def by_cvxpy_alone(run: Run) -> Reference:
-    """Repeat a run with every step II taken from cvxpy's own answer.
+    """Repeat a run from its start with every step II taken from cvxpy's own answer.
 
     A run of more than :data:`MOST_STEPS` evaluations, or one whose steps give the program more than
     :data:`MOST_PAIRS` pairs of contact nodes, is compared only at its first and last iterate.
@@ -76,16 +76,16 @@ def by_cvxpy_alone(run: Run) -> Reference:
     step = run.rule.begin(pair, float(run.theta), run.choice.rho)
     seen: list[Iterate] = []
     errors: list[float] = []
-    for found in islice(iterates(program, step), run.evaluations):
+    for found in islice(iterates(program, step, run.start.g, run.start.scale), run.evaluations):
         seen.append(found)
         errors.append(pair.neumann.dual_norm(found.image - iterate_at(exact, found.g).image))
-    rate = _rate(seen, errors)
+    rate = rate_of([found.residual for found in seen], errors, [found.contact.pattern for found in seen])
     return Reference(
         steps=len(seen),
         whole=True,
         observed_rate=None if rate is None else rate.value,
         largest_difference=max(_over(error, found.scale) for error, found in zip(errors, seen, strict=True)),
-        why="" if rate is not None else "fewer than two step ratios stand clear of the program's errors",
+        why="" if rate is not None else "fewer than two step ratios are clear of the program's errors",
     )
 
 
@@ -98,12 +98,3 @@ def _at_the_ends(run: Run, program: FixedPointMap, why: str) -> Reference:
 
 def _over(error: float, scale: float) -> float:
     return error / scale if scale > 0 else error
-
-
-def _rate(seen: list[Iterate], errors: list[float]) -> ObservedRate | None:
-    """The rate over the iterates whose residual stands clear of the error of their own T."""
-    clear = [found.residual > CLEAR_OF_NOISE * error for found, error in zip(seen, errors, strict=True)]
-    count = clear.index(False) if False in clear else len(clear)
-    if count < 3:
-        return None
-    return rate_at_the_end([found.residual for found in seen[:count]], errors[:count], settled(seen[:count]))

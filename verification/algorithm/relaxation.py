@@ -1,8 +1,8 @@
-"""How the next g is chosen: constant relaxation and what may take its place.
+"""Relaxation rules, which choose the next g: a constant theta and its alternatives.
 
-A rule sees the iterates one by one and answers with the next g at which T is evaluated.  Only the constant factor is
-inside the theorem; momentum has a proved rate without friction; the others have none.  Inner products are those of the
-norm (5.21), so that no rule knows the units.
+A rule gets the iterates one by one and returns the next g at which T is evaluated.  Only the constant factor is
+covered by the theorem; momentum has a proved rate without friction; the others have none.  Inner products are those of
+the norm (5.21), so that no rule depends on the units.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from verification.algorithm.iterate import Iterate
 from verification.contact.active_set import SLACK
 from verification.interface.pair import ContactPair
 
-#: How many earlier steps Anderson mixing remembers.
+#: Number of earlier steps that Anderson mixing uses.
 DEPTH = 10
 
 #: Columns of the least-squares problem of Anderson mixing are dropped below this share of the largest.
@@ -32,21 +32,20 @@ RANK = 1e-8
 #: The line search of the Newton rule shortens a step by a factor in this range, and gives up below the last length.
 SHORTEST, LONGEST, TOO_SHORT = 0.1, 0.7, 1e-2
 
-
-#: What a rule does in one run: from an iterate to the next g.
+#: A rule within one run: from an iterate to the next g.
 Step = Callable[[Iterate], Floats]
 
 
 class Rule(ABC):
     """A relaxation rule: a description without memory, which begins any number of runs.
 
-    A rule of one's own derives from it, and is handed to :func:`verification.run` as ``rule=``.
+    A user's own rule derives from it, and is handed to :func:`verification.run` as ``rule=``.
 
     Attributes
     ----------
     name : str
     words : str
-        What it is called in a sentence.
+        Its name in a sentence.
     needs_rho : bool
         Whether :meth:`begin` needs rho; it is measured then.
     takes_theta : bool
@@ -79,27 +78,27 @@ class Rule(ABC):
         """
 
     def own_step(self, rho: float) -> float | None:
-        """The step length that takes the place of theta; None where the rule takes the theta it is given."""
+        """Return the step length that takes the place of theta; None where the rule takes the given theta."""
         return None
 
     def proved_rate(self, rho: float) -> float | None:
-        """The rate that is proved of the rule where the theorem covers it; None where none is."""
+        """Return the proved rate of the rule where the theorem covers it; None without one."""
         return None
 
     def outside(self, friction: Fraction) -> str:
-        """Why no theorem speaks of this rule; empty where one does."""
+        """Return why no theorem covers this rule; empty where one does."""
         return f"the {self.name} relaxation: the theorem is about a constant theta"
 
 
 def inner(pair: ContactPair, a: Floats, b: Floats) -> float:
-    """The inner product of the norm (5.21)."""
+    """Return the inner product of the norm (5.21)."""
     return float(a @ pair.neumann.flexibility(b))
 
 
 @final
 @dataclass(frozen=True)
 class Relaxation:
-    """(III) with one factor; what is linear in g, as its displacement, goes on by the same factor."""
+    """(III) with one factor, which any linear function of g, as its displacement, follows too."""
 
     theta: float
 
@@ -260,10 +259,8 @@ class Momentum(Rule):
 
 
 def momentum_rate(rho: float) -> float:
-    """``1 - 1/sqrt(1 + rho)``, the proved rate of the triple momentum method without friction.
+    """Return ``1 - 1/sqrt(1 + rho)``, the proved rate of the triple momentum method without friction.
 
-    Examples
-    --------
     >>> momentum_rate(3.0)
     0.5
     """
@@ -271,7 +268,7 @@ def momentum_rate(rho: float) -> float:
 
 
 def momentum_step(rho: float) -> float:
-    """The length of its gradient step, which takes the place of theta."""
+    """Return the length of its gradient step, which takes the place of theta."""
     return (1 + momentum_rate(rho)) / (1 + rho)
 
 
@@ -280,13 +277,7 @@ RULES: dict[str, Rule] = {rule.name: rule for rule in (Constant(), Aitken(), And
 
 
 def rule_of(rule: Rule | str) -> Rule:
-    """A rule, or the one of a name.
-
-    Raises
-    ------
-    ValueError
-        No rule has that name.
-    """
+    """Return a rule, or the one of a name; ValueError where no rule has that name."""
     if isinstance(rule, Rule):
         return rule
     if rule not in RULES:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,9 +16,9 @@ from fem1d2d.mesh import Floats
 from ndtheory import Number
 from ndtheory.number import Numeric
 from verification.algorithm.ending import NO_FORCE, Ending, Outcome, arrived, coupled_residual
-from verification.algorithm.fixed_point import FixedPointMap, iterate_at, iterates
+from verification.algorithm.fixed_point import FixedPointMap, iterates
 from verification.algorithm.iterate import Iterate
-from verification.algorithm.linearisation import Forecast, Linearisation, NotLinear, forecast, linearise
+from verification.algorithm.linearisation import Forecast, Linearisation, NotLinear, at_solution, forecast, linearise
 from verification.algorithm.rates import ObservedRate, observed_rate
 from verification.algorithm.relaxation import Constant, Rule
 from verification.algorithm.start import Start, begin_at
@@ -26,21 +26,26 @@ from verification.algorithm.theta import Choice, begin
 from verification.constants import Measured
 from verification.contact import ContactError, Solver
 from verification.document import Document
+from verification.interface.assembly import TwoBodies
 from verification.interface.build import pair_of
 from verification.interface.checks import Checks, check_state
 from verification.interface.fields import ContactFields
 from verification.interface.pair import ContactPair
-from verification.interface.two_bodies import TwoBodies
 from verification.interrupts import INTERRUPTED
-from verification.monolithic import SolveError, solution_force
+from verification.monolithic import SolveError
 from verification.problem import Problem
 from verification.problem.tables import ProblemError
 from verification.threads import one_thread
 
-#: Linearising takes longer than a run, and is asked for.
+R = TypeVar("R")
+
+#: Why a run is not linearised: that takes longer than the run, and is done only on request.
 NOT_ASKED = "not worked out: linearise() does"
 
-#: What the iterates of a run may fill, in bytes, and what each takes beside its four arrays, as measured.
+#: The values that a linearisation adds to the document of a run.
+LINEARISED = ("linearised_rate", "linearised_norm", "linearised_radius", "linearised_margin", "predicted_rate")
+
+#: Bytes that the iterates of a run may fill, and the measured size of each without its four arrays.
 MOST_BYTES, ITERATE_BYTES = 2_000_000_000, 1600
 
 
@@ -51,9 +56,9 @@ class Run(Document):
     Attributes
     ----------
     pair : ContactPair
-        What was run, with the settings that ended it.
+        The bodies that were run, with the settings that ended the run.
     rule : Rule
-        How each next g was chosen.
+        The relaxation rule, which chose each next g.
     choice : Choice
         theta and where it comes from.
     start : Start
@@ -62,11 +67,11 @@ class Run(Document):
         At least one.
     outcome : {'converged', 'stalled', 'limit', 'diverged', 'interrupted'}
     interrupted : bool
-        Whether Ctrl-C ended the run, or what was to be worked out after it: nothing is linearised then.
+        True if Ctrl-C ended the run, or what was to be worked out after it: nothing is linearised then.
     linearised : Linearisation or None
         The linearisation at the solution; None where ``why_not_linearised`` says why.
     forecast : Forecast or None
-        What could be said of the run half way; None where ``why_no_forecast`` says why.
+        The prediction made half way; None where ``why_no_forecast`` says why.
     """
 
     schema: ClassVar[str] = "ndtheory.run/1"
@@ -95,13 +100,13 @@ class Run(Document):
 
     @property
     def outside(self) -> list[str]:
-        """Why the theorem does not speak of this run; empty where it does."""
+        """The reasons why the theorem does not apply to this run; empty where it does."""
         rule = self.rule.outside(self.pair.friction)
         return self.pair.outside + ([rule] if rule else [])
 
     @property
     def proved_rate(self) -> Number | None:
-        """The rate that is proved of the rule itself: momentum without friction has one; None otherwise."""
+        """The proved rate of the rule itself: momentum without friction has one; None otherwise."""
         rate = None if self.outside or self.choice.rho is None else self.rule.proved_rate(self.choice.rho)
         return None if rate is None else Number.of_float(rate)
 
@@ -112,7 +117,7 @@ class Run(Document):
 
     @cached_property
     def coupled_residual(self) -> float | None:
-        """Largest violation of a condition of contact by the joined state at the end, relative to its own traction.
+        """Largest violation of a contact condition by the joined state at the end, relative to its own traction.
 
         In the norm (5.21), :func:`verification.algorithm.ending.coupled_residual`; None without a force.
         """
@@ -139,90 +144,67 @@ class Run(Document):
 
     @property
     def observed_rate(self) -> ObservedRate | None:
-        """The rate at the end of the run; None where too few steps stand clear of the noise, or the run diverged."""
+        """The rate at the end of the run; None where too few steps are clear of the noise, or the run diverged."""
         return None if self.outcome == "diverged" else self._at_the_end
 
     @property
     def observed_growth(self) -> float | None:
-        """By what factor a step the residual of a run that diverged grew at its end; None of any other run."""
+        """The factor by which the residual of a run that diverged grew in a step at its end; None of any other run."""
         grown = self._at_the_end if self.outcome == "diverged" else None
         return None if grown is None else grown.value
 
     def linearise(self) -> Run:
-        """The same run with its linearisation at the solution, and the forecast that could be made half way.
+        """Return the same run with its linearisation at the solution, and the forecast that could be made half way.
 
         A run that did not arrive is linearised at the solution of the global method.
         """
-        linearised, why = self._linearisation()
-        made, why_none = self._forecast()
+        settings, theta = self.pair.settings, float(self.theta)
+
+        def at_the_end() -> Linearisation:
+            if self.converged:
+                return linearise(self.pair, self.last, theta, self.iterates)
+            return linearise(self.pair, at_solution(FixedPointMap(self.pair)), theta)
+
+        linearised, why = self._tried(at_the_end)
+        made, why_none = self._tried(
+            lambda: forecast(self.pair, self.iterates, theta, settings.tolerance, settings.max_iterations)
+        )
         return replace(self, linearised=linearised, why_not_linearised=why, forecast=made, why_no_forecast=why_none)
 
-    def _no_constant_theta(self) -> str:
+    def _tried(self, compute: Callable[[], R]) -> tuple[R | None, str]:
+        """Compute something for a constant theta, or return why there is nothing."""
         if self.interrupted:
-            return INTERRUPTED
-        return "" if isinstance(self.rule, Constant) else f"the {self.relaxation} relaxation is no constant theta"
-
-    def _linearisation(self) -> tuple[Linearisation | None, str]:
-        if why := self._no_constant_theta():
-            return None, why
+            return None, INTERRUPTED
+        if not isinstance(self.rule, Constant):
+            return None, f"the {self.relaxation} relaxation is no constant theta"
         try:
             with one_thread():
-                if self.converged:
-                    return linearise(self.pair, self.last, float(self.theta), self.iterates), ""
-                return linearise(self.pair, self._solution(), float(self.theta)), ""
+                return compute(), ""
         except (NotLinear, SolveError, ContactError) as error:
             return None, str(error)
 
-    def _forecast(self) -> tuple[Forecast | None, str]:
-        if why := self._no_constant_theta():
-            return None, why
-        settings = self.pair.settings
-        try:
-            with one_thread():
-                most = settings.max_iterations
-                return forecast(self.pair, self.iterates, float(self.theta), settings.tolerance, most), ""
-        except NotLinear as error:
-            return None, str(error)
-
-    def _solution(self) -> Iterate:
-        """T at the solution of the global method."""
-        if self.pair.problem is None:
-            raise NotLinear("the run did not arrive, and without meshes the global method has nothing to solve")
-        return iterate_at(FixedPointMap(self.pair), solution_force(self.pair))
-
     @cached_property
     def contact(self) -> ContactFields:
-        """Gamma_c at the last iterate."""
+        """Stresses and motions along Gamma_c at the last iterate."""
         return self._fields(self.last)
 
     def _fields(self, iterate: Iterate) -> ContactFields:
         pair, solved = self.pair, iterate.contact
         turned = np.ones(len(solved.v))
         turned[pair.contact.grid.tangential] = pair.upward  # to body 1 against body 2
-        pattern, force, jump = solved.pattern, turned * solved.force, turned * solved.v
-        return ContactFields.of(
-            pair.contact.grid, force=force, jump=jump, touching=pattern.touching, sliding=pattern.sliding
-        )
+        force, jump = turned * solved.force, turned * solved.v
+        return ContactFields.of(pair.contact.grid, force=force, jump=jump, state=solved.pattern)
 
     @property
     def bodies(self) -> TwoBodies:
-        """The bodies on their meshes.
-
-        Raises
-        ------
-        ValueError
-            The pair is made from matrices.
-        """
+        """The bodies on their meshes; ValueError where the pair is made from matrices."""
         return self.pair.on_meshes()
 
     @cached_property
     def displacements(self) -> tuple[Floats, Floats]:
         """Displacement of all nodes of body 1 and body 2 at the last iterate, shape (nodes, d), unit of length.
 
-        Raises
-        ------
-        ValueError
-            The pair is made from matrices.
+        ValueError where the pair is made from matrices.
         """
         contact, neumann = self.pair.contact, self.pair.neumann
         moved = self.pair.interface.carry(self.last.displacement) + self.last.contact.v
@@ -233,7 +215,7 @@ class Run(Document):
 
     @cached_property
     def checks(self) -> Checks:
-        """The bodies outside Gamma_c and their strains, at the last iterate."""
+        """Checks of the bodies outside Gamma_c and of their strains, at the last iterate."""
         why = "the run diverged" if self.outcome == "diverged" else ""
         return check_state(self.pair, lambda: self.displacements, why)
 
@@ -248,7 +230,7 @@ class Run(Document):
 
     @property
     def problem(self) -> Problem | None:  # type: ignore[override]
-        """What the pair was made from."""
+        """The problem of the pair."""
         return self.pair.problem
 
     @property
@@ -257,10 +239,10 @@ class Run(Document):
         return f"{self.pair.title}, {self.outcome} after {self.iterations} steps at theta {float(self.theta):.4g}{rate}"
 
     def table(self) -> dict[str, list[Any]]:
-        """The history as plain columns, one row for each evaluation of T: ``pandas.DataFrame(run.table())`` reads it.
+        """Return the history as columns, one row for each evaluation of T: ``pandas.DataFrame(run.table())`` reads it.
 
         Columns: iteration; residual (force, in the norm (5.21)) and relative_residual; kkt_residual and solver of step
-        II; how many nodes stick, slip and are open.
+        II; the numbers of nodes that stick, slip and are open.
         """
         rows = self.iterates
         patterns = [self._fields(iterate).pattern for iterate in rows]
@@ -275,32 +257,32 @@ class Run(Document):
 
     @property
     def warnings(self) -> list[str]:
-        """What a user should know before trusting the numbers."""
+        """Facts that a user should know before trusting the numbers."""
         tied = [self.start.why] if self.start.source == "tied" else []
         return self.pair.warnings + self.choice.warnings + tied + (list(self.checks.warnings) if self.converged else [])
 
     def content(self) -> dict[str, Any]:
-        """The values of ``ndtheory.run/1``; what is null has a reason beside it."""
+        """Return the values of ``ndtheory.run/1``; each null has a reason beside it."""
         rate = self.observed_rate
         solvers = [iterate.contact.solver for iterate in self.iterates]
         linear = self.linearised
         proved = self.proved_rate
-        reason: dict[str, str] = {}
+        reason: dict[str, str] = {"start": self.start.why} if self.start.why else {}
         if proved is None:
             reason["proved_rate"] = "momentum without friction has one; for a constant theta see the bounds"
+        linearised: dict[str, float | None] = dict.fromkeys(LINEARISED)
         if linear is None:
-            names = ("linearised_rate", "linearised_norm", "linearised_radius", "linearised_margin", "predicted_rate")
-            reason |= dict.fromkeys(names, self.why_not_linearised)
+            reason |= dict.fromkeys(LINEARISED, self.why_not_linearised)
         else:
+            found = (linear.rate, linear.norm, linear.radius, _finite(linear.margin), linear.predicted)
+            linearised = dict(zip(LINEARISED, found, strict=True))
             if linear.predicted is None:
                 reason["predicted_rate"] = "the run did not end in a stretch of steps without a change of state"
-            if not np.isfinite(linear.margin):
+            if linearised["linearised_margin"] is None:
                 reason["linearised_margin"] = "no change of g changes a state"
         if self.coupled_residual is None:
             reason["coupled_residual"] = NO_FORCE
-        if self.start.why:
-            reason["start"] = self.start.why
-        few = "fewer than two step ratios stand clear of rounding"
+        few = "fewer than two step ratios are clear of rounding"
         if rate is None:
             why = "the run diverged: it shows growth, not a rate" if self.outcome == "diverged" else few
             reason |= {"observed_rate": why, "observed_rate_interval": why}
@@ -326,11 +308,7 @@ class Run(Document):
             "observed_rate_interval": None if rate is None else [rate.lo, rate.hi],
             "observed_growth": self.observed_growth,
             "forecast": None if self.forecast is None else vars(self.forecast),
-            "linearised_rate": None if linear is None else linear.rate,
-            "linearised_norm": None if linear is None else linear.norm,
-            "linearised_radius": None if linear is None else linear.radius,
-            "linearised_margin": None if linear is None or not np.isfinite(linear.margin) else linear.margin,
-            "predicted_rate": None if linear is None else linear.predicted,
+            **linearised,
             "unrelaxed_residual": _finite(self.last.relative_residual),
             "coupled_residual": None if self.coupled_residual is None else _finite(self.coupled_residual),
             "kkt_residual": self.last.contact.kkt.residual,
@@ -349,12 +327,7 @@ def _finite(value: float) -> float | None:
 
 
 def check_memory(pair: ContactPair) -> None:
-    """Refuse a run whose iterates would not fit into memory: every one is kept.
-
-    Raises
-    ------
-    ProblemError
-    """
+    """Refuse, by a ProblemError, a run whose iterates would not fit into memory: every one is kept."""
     most, asked = MOST_BYTES // (ITERATE_BYTES + 4 * 8 * pair.neumann.grid.size), pair.settings.max_iterations
     if asked > most:
         n = pair.contact.grid.n
@@ -388,7 +361,7 @@ def run(
         g_0: nodal forces on the Neumann grid, tangential ones first, as ``run.last.g`` of an earlier run.  By default
         0, or the solution of the tied bodies where step II has no minimiser at 0.
     solver : {'auto', 'cvxpy', 'active-set'}
-        Who solves step II.
+        Solver of step II.
     watch : callable
         Called with each iterate, for live progress.
     measured : Measured, optional
@@ -435,7 +408,7 @@ def run(
         if not seen:
             raise
         outcome = "interrupted"
-    assert outcome is not None  # the iterates have no end of their own
+    assert outcome is not None  # the iterates do not end
     return Run(
         pair=pair,
         rule=relaxation,

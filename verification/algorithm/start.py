@@ -1,4 +1,4 @@
-"""The forces with which a run starts, and its iterates from there on."""
+"""The forces with which a run starts, and the iterates from there."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Start(Value):
     why : str
         Why the run does not start from g = 0; empty where it does.
     scale : float
-        Least size that the residual is compared with, in the norm (5.21): 0, or from :func:`least_scale`.
+        Least size with which the residual is compared, in the norm (5.21): 0, or from :func:`least_scale`.
     """
 
     g: Floats
@@ -61,14 +61,8 @@ def iterate(
 
     Parameters
     ----------
-    problem : Problem, ContactPair or path
-    theta : number or 'auto', optional
-        Relaxation factor, 0 < theta < 1; the problem's by default.
-    rule : Rule or str, optional
-        The relaxation rule, or the name of one; the problem's by default.
-    solver : {'auto', 'cvxpy', 'active-set'}
-    start : array, optional
-        g_0, as :func:`verification.run` takes it.
+    problem, theta, rule, solver, start
+        As :func:`verification.run` takes them.
 
     Yields
     ------
@@ -97,16 +91,10 @@ def iterate(
 
 
 def begin_at(T: FixedPointMap, given: ArrayLike | None = None) -> Start:
-    """g_0 of a run: the given one, else 0; the tied solution where step II has no minimiser at g = 0.
+    """Return g_0 of a run: the given one, shape (2 n,), else 0, or the tied solution if step II has no minimiser at 0.
 
     Where only contact holds the contact body, friction has to resist tangential loads, and at g = 0 the bound
     of friction is 0.
-
-    Parameters
-    ----------
-    T : FixedPointMap
-    given : array, shape (2 n,), optional
-        Nodal forces on the Neumann grid.
 
     Raises
     ------
@@ -136,14 +124,7 @@ def begin_at(T: FixedPointMap, given: ArrayLike | None = None) -> Start:
 
 
 def forces(given: ArrayLike, pair: ContactPair, source: str = "") -> Floats:
-    """A given g_0 as an array, shape (2 n,).
-
-    Parameters
-    ----------
-    given : array
-    pair : ContactPair
-    source : str
-        The file that an error names; the source of the pair by default.
+    """Return a given g_0 as an array, shape (2 n,); errors name ``source``, by default the pair's.
 
     Raises
     ------
@@ -165,7 +146,7 @@ def forces(given: ArrayLike, pair: ContactPair, source: str = "") -> Floats:
 
 
 def tied_force(pair: ContactPair) -> Floats:
-    """g of the bodies tied together along Gamma_c, gap closed: ``(S2 + P' S1 P) u2 = l2 + P' (l1 - S1 gap n)``.
+    """Solve for g of the bodies tied along Gamma_c, gap closed: ``(S2 + P' S1 P) u2 = l2 + P' (l1 - S1 gap n)``.
 
     Linear, without contact and friction, so that it exists wherever the supports hold the two bodies as one.
     """
@@ -182,7 +163,7 @@ def tied_force(pair: ContactPair) -> Floats:
 
 
 def least_scale(T: FixedPointMap, g: Floats) -> float:
-    """Size of the forces that a residual is compared with at least, in the norm (5.21).
+    """Return the least size of the forces with which a residual is compared, in the norm (5.21).
 
     It is 0 where the loads press the bodies together: the present forces are the measure then.  Where T 0 = 0 the
     solution has no force at all, a run from another start decays towards it, and the measure is the reaction of the

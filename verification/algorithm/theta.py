@@ -1,4 +1,4 @@
-"""The theta of a run: given, or chosen by theory."""
+"""The theta of a run: given, or chosen by the theory."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from verification.problem.tables import ProblemError
 #: A theta chosen for the user stays below 1 by this much, however soft the contact body.
 CLOSEST_TO_ONE = 1 - 1e-6
 
-#: An automatic theta need not be a proved one that takes more than so many times the steps of the predicted one.
+#: An automatic theta is the predicted one if the proved one takes more than so many times its steps.
 TOO_SLOW = 2
 
 
 def energy_bounds(measured: Measured, theta: Numeric | None = None) -> EnergyBounds | None:
-    """The theorem in energy norms for measured constants; None where they do not exist."""
+    """Evaluate the theorem in energy norms for measured constants; None where they do not exist."""
     constants = measured.energy_constants()
     return None if constants is None else evaluate_energy(constants, theta)
 
@@ -36,7 +36,6 @@ class Choice:
 
     Attributes
     ----------
-    theta : Fraction
     source : {'given', 'proved', 'predicted'} or str
         The name of a rule that takes its own step for this rho, as 'momentum' does.
     rho : float or None
@@ -55,30 +54,21 @@ class Choice:
 
     @property
     def warnings(self) -> list[str]:
-        """What is set and has no effect."""
+        """A setting that has no effect."""
         return [f"{self.unused} is not used: {self.source} takes its step from rho"] if self.unused else []
 
     def to_dict(self) -> dict[str, Any]:
-        """The object ``theta_auto`` of a role."""
+        """Return the object ``theta_auto`` of a role."""
         return {"theta": float(self.theta), "source": self.source, "why": self.why}
 
 
 def choose(
     pair: ContactPair, theta: Numeric | None = None, measured: Measured | None = None, *, rule: Rule | str | None = None
 ) -> Choice:
-    """The theta of a run: the given one, else the problem's; for "auto" that of :func:`automatic`.
+    """Choose the theta of a run: the given one, else the problem's; for "auto" that of :func:`automatic`.
 
-    A rule that takes its step from rho does so whatever theta is.
-
-    Parameters
-    ----------
-    pair : ContactPair
-        Its settings hold the theta and the rule of the problem.
-    theta : number or 'auto', optional
-    measured : Measured, optional
-        The constants, where they are known already.
-    rule : Rule or str, optional
-        The pair's by default.
+    A rule that takes its step from rho does so whatever theta is.  The constants of ``measured`` are not measured
+    again; the rule is the pair's by default.
 
     Raises
     ------
@@ -109,17 +99,15 @@ def choose(
         return Choice(theta=below_one(own), source=relaxation.name, rho=rho, why=why, unused=unused)
     if wanted != "auto":
         return Choice(theta=wanted, source="given", rho=rho)
-    return (
-        by_prediction(rho, measured.why_no_energy)
-        if energy is None
-        else automatic(energy, pair.outside, pair.settings.tolerance)
-    )
+    if energy is None:
+        return by_prediction(rho, measured.why_no_energy)
+    return automatic(energy, pair.outside, pair.settings.tolerance)
 
 
 def begin(
     pair: ContactPair, theta: Numeric | None = None, rule: Rule | str | None = None, measured: Measured | None = None
 ) -> tuple[Rule, Choice, Step]:
-    """The rule and the theta of a run, as :func:`choose` has them, and what the rule does in it.
+    """Return the rule and the theta of a run, as :func:`choose` has them, and the rule's steps in it.
 
     Raises
     ------
@@ -134,18 +122,11 @@ def begin(
 
 
 def automatic(energy: EnergyBounds, outside: Sequence[str] = (), tolerance: float = 1e-9) -> Choice:
-    """The theta that theory chooses: the proved one, unless it is predicted to need more than twice as many steps.
+    """Choose the proved theta, unless it is predicted to need more than twice as many steps as the predicted one.
 
     Both thetas are judged by one formula, :func:`ndtheory.energy_norms.predicted_factor`.  The proved factor would be
-    no fair judge: with friction it is far from attained.
-
-    Parameters
-    ----------
-    energy : EnergyBounds
-    outside : sequence of str
-        Why the theorem does not speak of the problem; empty where it does.
-    tolerance : float
-        What the steps lead to.
+    no fair judge: with friction it is far from attained.  ``outside`` says why the theorem does not apply to the
+    problem, and ``tolerance`` is the one to which steps are counted.
 
     Examples
     --------
@@ -171,18 +152,18 @@ def automatic(energy: EnergyBounds, outside: Sequence[str] = (), tolerance: floa
 
 
 def by_prediction(rho: float, why: str) -> Choice:
-    """The predicted theta, where no theorem speaks of the problem."""
+    """Choose the predicted theta, where no theorem applies to the problem."""
     theta = below_one(float(predicted_theta(Fraction(rho))))
     return Choice(theta=theta, source="predicted", rho=rho, why=f"no theta is proved: {why}")
 
 
 def below_one(theta: float) -> Fraction:
-    """A theta chosen for the user, below 1."""
+    """Return a theta chosen for the user, below 1."""
     return exact(min(theta, CLOSEST_TO_ONE))
 
 
 def predicted_steps(theta: Fraction, rho: float, tolerance: float) -> int:
-    """Steps that the predicted factor needs from 1 down to a tolerance."""
+    """Return the number of steps that the predicted factor needs from 1 down to a tolerance."""
     # of 1 - factor, as a small theta is lost in the factor itself
     gain = float(1 - predicted_factor(theta, Fraction(rho)))
     return math.ceil(math.log(tolerance) / math.log1p(-gain))

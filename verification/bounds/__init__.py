@@ -1,4 +1,4 @@
-"""What is proved of one step, bound by bound, and how much each of them gives away."""
+"""Proved bounds of one step, and the loss of each inequality behind them."""
 
 #: The semidefinite bound and the losses are worked out up to this many contact nodes: some seconds.
 LARGEST = 100

@@ -1,4 +1,4 @@
-"""What a bound on the factor of one step is, and what it answers.
+"""Base of every bound on the factor of one step, and its result.
 
 Every bound, from the printed theorem to the semidefinite program, derives from :class:`Bound` and answers with a
 :class:`BoundResult`; tables, verdicts, regions, figures and reports loop over :data:`verification.bounds.table.BOUNDS`.
@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from ndtheory import Constants, EnergyConstants, Number
 from ndtheory.number import Level, Numeric
 from verification.progress import Progress, silent
+from verification.value import to_plain
 
 if TYPE_CHECKING:
-    from verification.bounds.exact import Enclosure
+    from verification.bounds.lipschitz import Enclosure
     from verification.bounds.multipliers import QuadraticForms
     from verification.constants import Measured
     from verification.interface.pair import ContactPair
@@ -30,17 +31,14 @@ NOT_ASKED = "not asked for"
 
 @dataclass(frozen=True, kw_only=True)
 class Thresholds:
-    """How much friction a bound allows.
+    """Friction that a bound allows.
 
     Attributes
     ----------
-    every : Number or None
-        Below it every small theta contracts; None where that was not worked out.
-    some : Number or None
-        Below it some theta contracts; None where that was not worked out.
+    every, some : Number or None
+        Below it every small theta contracts, or some theta; None where that was not worked out.
     on : {'k', 'C_K', 'multiple', 'any'}
-        What they bound; ``multiple``: the friction that was given may grow by this factor; ``any``: without a law of
-        friction there is nothing to bound.
+        The bounded quantity; ``multiple``: the given friction may grow by this factor; ``any``: no law of friction.
     """
 
     every: Number | None = None
@@ -50,22 +48,18 @@ class Thresholds:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Subject:
-    """What a bound is asked about: constants that were given, or measured of a pair.
+    """Constants that were given, or measured of a pair, for which a bound is evaluated.
 
     Attributes
     ----------
-    constants : Constants or None
-        What enters Section 5.
-    energy : EnergyConstants or None
-        What enters the theorem in energy norms.
-    pair : ContactPair or None
-        The bodies; None where constants alone were given.
-    measured : Measured or None
-        The constants of the pair.
+    constants, energy : Constants or None, EnergyConstants or None
+        The constants of Section 5, and of the theorem in energy norms.
+    pair, measured : ContactPair or None, Measured or None
+        The bodies and their constants; None where only constants were given.
     why, why_energy : str
         Why the constants of Section 5, and those in energy norms, do not exist.
     exact : bool
-        Whether a bound that can be brought closer to the Lipschitz constant is, however long that takes.
+        True if a bound that can be brought closer to the Lipschitz constant is, however long that takes.
     """
 
     constants: Constants | None = None
@@ -93,41 +87,29 @@ class Subject:
         """The same bodies at another friction."""
         assert self.measured is not None
         assert self.pair is not None
-        measured = self.measured.with_friction(k)
-        return Subject(
-            constants=measured.constants(),
-            energy=measured.energy_constants(),
-            pair=self.pair.at(friction=k),
-            measured=measured,
-            why=self.why,
-            why_energy=self.why_energy,
-        )
+        return Subject.of(self.pair.at(friction=k), self.measured.with_friction(k))
 
 
 @dataclass(frozen=True, kw_only=True)
 class BoundResult:
-    """What a bound says.
+    """Result of a bound.
 
     Attributes
     ----------
     name : str
     proved : bool
-        Whether what it says is proved; the printed theorem is, where m >= 1.
-    theta : float or None
-        Where ``factor`` holds.
-    factor, one_minus_factor : Number or None
-        No step changes the distance of two forces by more; None where there is no conclusion.
+        True if the result is proved; the printed theorem is, where m >= 1.
+    theta, factor, one_minus_factor : float or None, Number or None
+        At theta no step changes the distance of two forces by more than the factor; None without a conclusion.
     interval : pair of float or None
         The thetas that contract.
     interval_level : {'exact', 'verified', 'guaranteed', 'float'}
         Of the interval: at any level but ``float`` each theta in it is proved to contract.
     friction : Thresholds
-    why : str
-        Why there is no factor.
-    not_computed : str
-        Why nothing was worked out; empty where it was.
+    why, not_computed : str
+        Why the factor is missing; why nothing was worked out.
     detail : object, optional
-        All that this bound knows beyond these attributes; its ``to_dict`` is the document then.
+        Full result of this bound beyond these attributes; its ``to_dict`` is the document then.
     """
 
     name: str
@@ -149,23 +131,23 @@ class BoundResult:
 
     @property
     def worked_out(self) -> bool:
-        """True if there is something to show of the bound, be it only why it has no conclusion."""
+        """True if the bound has something to show, be it only why it has no conclusion."""
         return self.detail is not None or not self.not_computed
 
     @property
     def level(self) -> Level:
-        """That of the factor; ``float`` where there is none."""
+        """Level of the factor; ``float`` where there is none."""
         return "float" if self.factor is None else self.factor.level
 
     @property
     def marked(self) -> bool:
-        """Whether some number is more than one in doubles."""
+        """True if some number is more than one in doubles."""
         numbers = (self.factor, self.friction.every, self.friction.some)
         levels = [self.interval_level, *(number.level for number in numbers if number is not None)]
         return any(level != "float" for level in levels)
 
     def in_doubles(self) -> BoundResult:
-        """The same without enclosures: what an edition says whose own proof does not hold is not proved by them."""
+        """The same without enclosures, which prove nothing for an edition whose own proof does not hold."""
         plain = lambda number: None if number is None else Number.of_float(number.value)
         friction = replace(self.friction, every=plain(self.friction.every), some=plain(self.friction.some))
         factor, rest = plain(self.factor), plain(self.one_minus_factor)
@@ -178,16 +160,15 @@ class BoundResult:
         if self.detail is not None:
             document: dict[str, Any] = self.detail.to_dict()
             return document
-        number = lambda value: None if value is None else value.to_dict()
         concludes = "contraction" if self.factor is not None else "no conclusion"
         found = {
             "theta": self.theta,
             "verdict": None if self.theta is None else concludes,
-            "factor": number(self.factor),
-            "one_minus_factor": number(self.one_minus_factor),
-            "interval": None if self.interval is None else list(self.interval),
-            "every_small_theta": number(self.friction.every),
-            "some_theta": number(self.friction.some),
+            "factor": to_plain(self.factor),
+            "one_minus_factor": to_plain(self.one_minus_factor),
+            "interval": to_plain(self.interval),
+            "every_small_theta": to_plain(self.friction.every),
+            "some_theta": to_plain(self.friction.some),
             "threshold_on": self.friction.on,
         }
         why = dict.fromkeys(found, "not worked out")
@@ -198,7 +179,7 @@ class BoundResult:
 
 @dataclass(frozen=True, kw_only=True)
 class Region:
-    """Where a bound proves contraction.
+    """The (theta, k) for which a bound proves contraction.
 
     Attributes
     ----------
@@ -206,10 +187,8 @@ class Region:
         Friction, increasing; below the first value the region does not shrink.
     theta : tuple of pairs of float
         Contraction for lo < theta < hi.
-    every : float
-        Friction below which every small theta contracts.
-    some : float or None
-        Friction below which some theta contracts; None where that was not worked out.
+    every, some : float, float or None
+        Friction below which every small theta contracts, or some theta; None where that was not worked out.
     """
 
     k: tuple[float, ...]
@@ -227,27 +206,23 @@ class Bound(ABC):
 
     Attributes
     ----------
-    name : str
-        In documents and tables.
-    words : str
-        What it is, for a reader.
-    colour, dashes : str or tuple
-        Colour and style of its line in figures, on white.
-    fill, hatch : str
-        Colour and pattern of its region; ``colour`` where there is no ``fill``.
+    name, words : str
+        Its name in documents and tables; a description for a reader.
+    colour, dashes, fill, hatch : str or tuple
+        Colour and style of its line in figures, on white; colour (``colour`` by default) and pattern of its region.
     finding : bool
-        Whether a step beyond it is a finding about the paper's text, not a fault: true of the printed theorem alone.
+        True if a step beyond it is a finding about the paper's text, not a fault: only for the printed theorem.
     calculated : bool
-        Whether it follows from a few constants, without the matrices of a pair.
+        True if it follows from a few constants, without the matrices of a pair.
     attained : bool
-        Whether there are pairs with a step as long as it says: :mod:`verification.testing` then looks for one.
+        True if some pairs have a step as long as the bound: :mod:`verification.testing` then looks for one.
     of_unit : bool
-        Whether its numbers depend on the unit of stress, which is then shown beside them.
+        True if its numbers depend on the unit of stress, which is then shown beside them.
     apart : bool
-        Whether the document of a comparison has it under its name, not among ``bounds.editions``.
+        True if the document of a comparison has it under its name, not among ``bounds.editions``.
     certifies : bool
-        Whether :func:`verification.certify` takes its factor: it is proved by multipliers that :meth:`enclose` returns,
-        or by those of the theorem in energy norms.
+        True if :func:`verification.certify` takes its factor: it is proved by multipliers that :meth:`enclose` returns,
+        or by the multipliers of the theorem in energy norms.
     """
 
     name: ClassVar[str]
@@ -265,15 +240,7 @@ class Bound(ABC):
 
     @abstractmethod
     def evaluate(self, subject: Subject, theta: Numeric | None = None, *, progress: Progress = silent) -> BoundResult:
-        """Evaluate the bound at one theta.
-
-        Parameters
-        ----------
-        subject : Subject
-        theta : number, optional
-            Relaxation factor, 0 < theta < 1.
-        progress : callable
-            Told what is being done.
+        """Evaluate the bound for a subject, at one theta if it is given, 0 < theta < 1.
 
         Raises
         ------
@@ -295,15 +262,7 @@ class Bound(ABC):
         return trace(interval, every=found.friction.every.value, some=found.friction.some.value)
 
     def remarks(self, result: BoundResult | None, unit: str) -> tuple[str, ...]:
-        """Remarks that belong beside figures of this bound.
-
-        Parameters
-        ----------
-        result : BoundResult or None
-            None beside a region.
-        unit : str
-            That of stress.
-        """
+        """Remarks to print beside figures of this bound (beside a region ``result`` is None), in a unit of stress."""
         return ()
 
     def enclose(self, pair: ContactPair, forms: QuadraticForms, theta: float) -> Enclosure | None:
@@ -327,18 +286,8 @@ class Bound(ABC):
         return BoundResult(name=self.name, proved=False, not_computed=why)
 
 
-def why_not(
-    interval: tuple[float, float] | None, threshold: Number | None, friction: float, theta: float | None
-) -> str:
-    """Why a bound draws no conclusion at a theta."""
-    if interval is not None and theta is not None:
-        return f"theta = {theta:g} is outside ({interval[0]:.2g}, {interval[1]:.2g})"
-    scale = threshold.value if threshold is not None else float("inf")
-    return f"friction {friction:g} is not below {scale:.2g}"
-
-
 def bounded(results: Iterable[BoundResult]) -> str:
-    """What the thresholds of a table bound, ``k`` or ``C_K``."""
+    """The quantity that the thresholds of a table bound, ``k`` or ``C_K``."""
     return next((result.friction.on for result in results if result.friction.on in ("k", "C_K")), "k")
 
 
@@ -354,12 +303,7 @@ def trace(interval: Callable[[float], tuple[float, float] | None], *, every: flo
 
 
 class Removed(Bound):
-    """A bound that is no longer registered, of which older results may hold something.
-
-    Parameters
-    ----------
-    name : str
-    """
+    """A bound that is no longer registered, of which older results may hold something."""
 
     name = words = "removed"
     colour = "#555555"
@@ -369,8 +313,3 @@ class Removed(Bound):
 
     def evaluate(self, subject: Subject, theta: Numeric | None = None, *, progress: Progress = silent) -> BoundResult:
         return self.absent("it is not registered")
-
-
-def by_name(bounds: Iterable[Bound]) -> dict[str, Bound]:
-    """Bounds by name, in their order."""
-    return {bound.name: bound for bound in bounds}

@@ -12,8 +12,8 @@ from scipy.linalg import block_diag, cho_factor, cho_solve, solve_triangular
 from fem1d2d.mesh import Floats
 from ndtheory.energy_norms import turning_theta, worst_ratio
 from verification.bounds import LARGEST
-from verification.bounds.program import Optimum, Program, Weights
-from verification.bounds.trace_forms import TraceForms
+from verification.bounds.interior_point import Optimum, Program, Weights
+from verification.bounds.trace_forms import TraceForms, families
 from verification.constants import Measured
 from verification.interface.pair import ContactPair
 
@@ -24,15 +24,10 @@ Cones = NDArray[np.intp]
 #: How much the square of a form of length 1 may weigh that is 0: the more, the nearer to leaving it out.
 LARGE = 1e2
 
-#: Why no multipliers are sought where a rigid motion lifts the contact body off: without friction, and with it.
-LIFTS_SMOOTHLY = (
-    "the contact body can be lifted rigidly, which only multipliers of (2.4) that are equal at all nodes allow; without"
-    " friction these prove the bound in energy norms, and none prove less"
-)
-LIFTS = (
-    "the contact body can be lifted rigidly, which only multipliers of (2.4) that are equal at all nodes allow, as"
-    " those of the bound in energy norms are; others are not sought"
-)
+#: Why no multipliers are sought where a rigid motion lifts the contact body off; with friction and without.
+LIFTS = "the contact body can be lifted rigidly, which only multipliers of (2.4) that are equal at all nodes allow"
+OTHERS = ", like the multipliers of the bound in energy norms; others are not sought"
+SMOOTHLY = "; without friction these prove the bound in energy norms, and none prove less"
 
 #: Lengths and squares smaller than this are 0.
 TINY = 1e-300
@@ -40,16 +35,11 @@ TINY = 1e-300
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Pieces:
-    """Affine pieces of T that have something in common at some nodes.
+    """Affine pieces of T with fixed states at some nodes; 0 where nothing is fixed.
 
-    Attributes
-    ----------
-    signs : int array, shape (t,)
-        eps where ``p_T v_T = eps w k zeta v_T``: the sign of slip against S sigma_N; 0 where it may be either.
-    normal : int array, shape (n,)
-        1 where the node touches, -1 where it is open, 0 where it may be either.
-    slip : int array, shape (t,)
-        1 where it slides (its sign is fixed, too), -1 where it sticks, 0 where it may do either.
+    ``signs``, shape (t,), is eps where ``p_T v_T = eps w k zeta v_T``: the sign of slip against S sigma_N.  ``normal``,
+    shape (n,), is 1 where the node touches, -1 where it is open.  ``slip``, shape (t,), is 1 where the node slides
+    (then its sign is fixed, too), -1 where it sticks.
     """
 
     signs: Signs
@@ -63,17 +53,17 @@ class Pieces:
 
     @property
     def any(self) -> bool:
-        """Whether anything is fixed."""
+        """True if anything is fixed."""
         return bool(self.signs.any() or self.normal.any() or self.slip.any())
 
     @property
     def zeros(self) -> tuple[NDArray[np.bool_], ...]:
-        """Where the jump, the normal force, the slip and ``p_T - eps w k zeta`` are 0."""
+        """The nodes at which the jump, the normal force, the slip and ``p_T - eps w k zeta`` are 0."""
         return self.normal > 0, self.normal < 0, self.slip < 0, self.slip > 0
 
     @property
     def key(self) -> bytes:
-        """What tells them from others of the same bodies."""
+        """A key by which they differ from others of the same bodies."""
         return self.signs.tobytes() + self.normal.tobytes() + self.slip.tobytes()
 
     def where(self, name: str, node: int, value: int) -> Pieces:
@@ -86,18 +76,8 @@ class Pieces:
 class Conditions:
     """The quadratic forms of a pair of bodies, in coordinates in which ``|g|`` and ``|d_1|`` are Euclidean norms.
 
-    ``carried`` takes those of d_1 to forces p on the contact grid.
-
-    What the solver proposes in them is checked in traces (:class:`verification.bounds.trace_forms.TraceForms`).
-
-    Parameters
-    ----------
-    pair : ContactPair
-        The bodies whose conditions of step II are multiplied.
-    measured : Measured
-        Their constants.
-    friction : float, optional
-        k; the problem's by default.
+    ``carried`` takes the coordinates of d_1 to forces p on the contact grid.  Proposals of a solver are checked in
+    traces (:class:`verification.bounds.trace_forms.TraceForms`).  ``friction`` is k, the pair's by default.
 
     Raises
     ------
@@ -115,9 +95,9 @@ class Conditions:
         measured = measured.with_friction(k)
         constants = measured.energy_constants()
         if constants is None:
-            raise ValueError("the theorem in energy norms does not speak of it: " + measured.why_no_energy)
+            raise ValueError("the theorem in energy norms does not apply to it: " + measured.why_no_energy)
         if pair.contact.lifts:
-            raise ValueError(LIFTS if k else LIFTS_SMOOTHLY)
+            raise ValueError(LIFTS + (OTHERS if k else SMOOTHLY))
         self._measured = measured
         self.energy_bounds = float(constants.at_work), float(constants.kappa_1), float(constants.kappa_2)
         contact, neumann, interface = pair.contact.grid, pair.neumann.grid, pair.interface
@@ -137,29 +117,20 @@ class Conditions:
         self.p = np.hstack([np.zeros((neumann.size, neumann.size)), back])
         force = np.hstack([np.zeros((contact.size, neumann.size)), B])
         jump = np.hstack([-interface.carry(pair.neumann.flexibility(L_2)), -flexible @ B])
-        normal = contact.normal
-        families = [(force[normal], jump[normal])]
+        weight = zeta = None
         if k:
             assert interface.kernel is not None
-            zeta = interface.kernel @ np.hstack([L_2[neumann.normal], np.zeros((neumann.n, B.shape[1]))])
             weight = np.sqrt(k * contact.weights)[:, None]
-            slide = contact.tangential
-            slip = weight * jump[slide]
-            zeta = weight * zeta
-            shear = force[slide]
-            families += [(shear, jump[slide]), (zeta, zeta), (slip, slip), (zeta, slip)]  # from here on for Pieces
-            families += [(jump[normal], jump[normal]), (force[normal], force[normal]), (shear, shear), (shear, zeta)]
+            zeta = weight * (interface.kernel @ np.hstack([L_2[neumann.normal], np.zeros((neumann.n, B.shape[1]))]))
             self.weight = weight[:, 0]
             self.reach = weight * zeta  # w k zeta
-        self.families = families
+        self.families = families(contact, force, jump, weight, zeta)
         self.carried = B
 
     def conditions(self, multipliers: Weights) -> Floats:
         """The sum over the nodes of the multiplied conditions, a symmetric matrix."""
         total = np.zeros((self.g.shape[1],) * 2)
-        for values, (a, b) in zip(
-            multipliers, self.families, strict=False
-        ):  # the last families are there for Pieces alone
+        for values, (a, b) in zip(multipliers, self.families, strict=False):  # the last families are only for Pieces
             total += a.T @ (values[:, None] * b)
         return (total + total.T) / 2
 
@@ -175,10 +146,10 @@ class Conditions:
         return np.asarray(cross + cross.T) / 2
 
     def square_from_below(self, found: Optimum) -> np.polynomial.Polynomial:
-        """What a program at one theta says of all others: a parabola in theta below the square of what each can prove.
+        """A parabola in theta below the square of the factor that a program at any theta can prove, from one program.
 
-        Its moments satisfy the dual constraints, in which theta does not stand.  At its own theta the parabola gives
-        what the solver found, up to its accuracy.
+        Its moments satisfy the dual constraints, which do not depend on theta.  At its own theta the parabola has the
+        value that the solver found, up to its accuracy.
         """
         move = self.p - self.g
         inner = lambda a, b: float(np.vdot(a @ found.moments, b))
@@ -186,10 +157,10 @@ class Conditions:
         return np.polynomial.Polynomial(coefficients) / float(np.vdot(found.moments, self.free))
 
     def rows(self, multipliers: Weights, pieces: Pieces) -> tuple[Floats, Floats, Cones, Floats, Floats]:
-        """The rows of the products, what of their multipliers lies in cones, these, and the most they may be.
+        """Left and right rows of the products, positions of multipliers in cones, the multipliers, and their limits.
 
-        Where a sign is fixed the two sums of friction are one product, ``tau (p_T - eps w k zeta) v_T``; what is 0 at a
-        node enters by its square, with a multiplier up to :data:`LARGE`.
+        Where a sign is fixed the two sums of friction are one product, ``tau (p_T - eps w k zeta) v_T``; a form that is
+        0 at a node enters by its square, with a multiplier up to :data:`LARGE`.
         """
         (force, jump), *friction = self.families[:4]
         if not friction:
@@ -209,7 +180,7 @@ class Conditions:
         return left, right, cones, y, np.concatenate([np.full(len(y) - len(squares), np.inf), LARGE * squares])
 
     def by_node(self, y: Floats, pieces: Pieces) -> Weights:
-        """The multipliers of :meth:`rows` as those of the families, node by node; those below 0 become 0."""
+        """The multipliers of :meth:`rows` as multipliers of the families, node by node; 0 in place of negative ones."""
         y, n = np.maximum(y, 0.0), len(self.families[0][0])
         if len(self.families) == 1:
             return (y,)
@@ -241,7 +212,7 @@ class Conditions:
         return (lam, tau, a, b), rest
 
     def started(self, fixed: Floats, early: tuple[float, Floats], parent: Pieces, pieces: Pieces) -> Program:
-        """The program of the least s for those of some pieces with more signs fixed, from where theirs has been.
+        """The program of the least s for pieces with more signs fixed than ``parent``, from an early point of that.
 
         The matrix stays positive definite there: the equation of a sign takes the place of an inequality, with the same
         multiplier, and takes less.

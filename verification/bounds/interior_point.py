@@ -1,4 +1,4 @@
-"""A primal-dual interior-point method for the semidefinite bound.
+"""The semidefinite program of the bound, and a primal-dual interior-point method for it.
 
 Each multiplier weighs a product of two rows, so in the direction of Helmberg, Rendl, Vanderbei and Wolkowicz, Kojima,
 Shindoh and Hara, and Monteiro (HKM) the Schur complement is a sum of elementwise products of six Gram matrices::
@@ -21,13 +21,12 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.linalg.lapack import dstev, dtrtri
 
 from fem1d2d.mesh import Floats
-from verification.bounds.program import LMIError, Optimum, Program
 from verification.threads import one_thread
 
 #: Steps after which it ends anyway; 10 to 15 are usual.
 MOST_STEPS = 60
 
-#: Added to the diagonal of the scaled Schur complement, in turn, until it can be factorised.
+#: Added to the diagonal of the scaled Schur complement, one after the other, until it can be factorised.
 SHIFTS = (0.0, 1e-14, 1e-12, 1e-10, 1e-8)
 
 #: Steps of the method of Lanczos; a matrix of no more rows is decomposed.
@@ -47,6 +46,84 @@ SMALL = 1e-3
 EARLY = 0.1
 
 Indices = NDArray[np.intp]
+
+#: lambda, tau, a, b by node; lambda alone without friction.  Where something is fixed at nodes, also what multiplies
+#: w k zeta v_T, v_N^2, p_N^2, p_T^2 and p_T sqrt(w k) zeta.
+Weights = tuple[Floats, ...]
+
+
+class LMIError(RuntimeError):
+    """No multipliers that certify anything were found."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stop:
+    """End of a solver: where it knows s up to ``accuracy``, relatively, or at any s below ``enough``."""
+
+    accuracy: float = 1e-7
+    enough: float = -math.inf
+
+
+#: The stop of a solver that is asked only for the least s.
+USUAL = Stop()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Program:
+    """The least s for which ``fixed + s free - sum_i y_i (a_i b_i' + b_i a_i')/2`` is positive semidefinite.
+
+    The multipliers are ``y >= 0``, with ``4 y_a y_b >= y_tau^2`` in each row of ``cones``.
+
+    Attributes
+    ----------
+    fixed, free : array, shape (d, d)
+        Symmetric.
+    left, right : array, shape (K, d)
+        Their rows are a_i and b_i.
+    cones : int array, shape (n, 3)
+        Positions of (tau, a, b) among the multipliers.
+    most : array, shape (K,)
+        Largest multipliers; inf without a limit.
+    s, y : float, array of shape (K,)
+        A start of a search: the matrix is positive definite there, and every inequality strict.
+    highest : float or None
+        Where given, the largest s up to it is wanted instead of the least.
+    """
+
+    fixed: Floats
+    free: Floats
+    left: Floats
+    right: Floats
+    cones: Indices
+    most: Floats
+    s: float
+    y: Floats
+    highest: float | None = None
+    stop: Stop = USUAL
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Optimum:
+    """A solver's answer.
+
+    Attributes
+    ----------
+    s, y : float, array of shape (K,)
+        The value and the multipliers.
+    moments : array, shape (d, d)
+        The dual variable of the matrix: the second moments of the pairs of forces that are worst for it.
+    steps, converged : int, bool
+        Number of steps; True if the gap to the dual value is below the accuracy asked for.
+    early : (float, array of shape (K,)), optional
+        s and y close to the central path and far from its end: a program with more conditions may start there.
+    """
+
+    s: float
+    y: Floats
+    moments: Floats
+    steps: int
+    converged: bool
+    early: tuple[float, Floats] | None = None
 
 
 class Form:
@@ -86,11 +163,8 @@ class Form:
 class Cones:
     """Small blocks of one size: ``fixed_j + sum_k y_{j,k} E_{j,k}``, symmetric of 1 or 2 rows.
 
-    Parameters
-    ----------
-    fixed : array, shape (n, r, r)
-    terms : sequence of (int array of shape (n,), array of shape (n, r, r))
-        Positions in (s, y), and the coefficients E of what stands there.
+    ``fixed`` has the shape (n, r, r); ``terms`` are positions in (s, y), shape (n,), with their coefficients E, (n, r,
+    r).
     """
 
     def __init__(self, fixed: Floats, terms: Sequence[tuple[Indices, Floats]]) -> None:
@@ -116,7 +190,7 @@ class Cones:
 
 @one_thread()
 def solve(program: Program) -> Optimum:
-    """The least s (or the largest), with the multipliers and moments that belong to it.
+    """The least s (or the largest), with its multipliers and moments.
 
     Raises
     ------
@@ -141,7 +215,7 @@ def solve(program: Program) -> Optimum:
     except np.linalg.LinAlgError:
         raise LMIError("no multipliers to start from: what the known ones leave is lost in rounding") from None
     inverse = [_turned(root) @ root for root in roots]
-    mu = abs(1 / np.vdot(program.free, inverse[0]))  # on the central path, but for the one equation that s stands in
+    mu = abs(1 / np.vdot(program.free, inverse[0]))  # on the central path, except for the equation of s
     X = [mu * z for z in inverse]
 
     steps, converged, early = 0, False, None
@@ -275,7 +349,7 @@ def _moved(matrices: list[Floats], along: float, steps: list[Floats]) -> list[Fl
 
 
 def _longest(roots: list[Floats], steps: list[Floats]) -> float:
-    """How far matrices with these inverse roots stay positive semidefinite along steps, at most."""
+    """Largest step, at most, along which matrices with these inverse roots stay positive semidefinite."""
     low = min(
         _least(root[0], d[0]) if d.shape[1] > LANCZOS else float(np.linalg.eigvalsh(root @ d @ _turned(root)).min())
         for root, d in zip(roots, steps, strict=True)
@@ -291,7 +365,7 @@ def _least(root: Floats, step: Floats) -> float:
     """
     C = root @ step @ root.T
     diagonal, beside = np.empty(LANCZOS), np.empty(LANCZOS)
-    v = np.cos(np.arange(len(C)) ** 2)  # no direction of its own
+    v = np.cos(np.arange(len(C)) ** 2)  # no special direction
     v, before, length = v / math.sqrt(v @ v), np.zeros(len(C)), 0.0
     for k in range(LANCZOS):
         image = C @ v - length * before

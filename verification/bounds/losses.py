@@ -1,4 +1,4 @@
-"""What each inequality of Section 5 gives away, in decades: where a threshold of 1e-21 comes from.
+"""Loss of each inequality of Section 5, in decades: where a threshold of 1e-21 comes from.
 
 An inequality ``left <= right`` loses ``log10(right/left)`` at the pair of forces that comes closest to equality.  Where
 both sides are linear in one unknown that pair is an eigenvector; where T is involved it is the best one of a search
@@ -27,16 +27,13 @@ from verification.interface.pair import ContactPair
 from verification.progress import Progress, silent
 from verification.threads import one_thread
 
-#: How often the patterns are searched for the losses of one problem.
-SEARCHES = 6
-
-#: Where each of them starts.
-STARTS = 2
+#: Number of searches of patterns for the losses of one problem, and of starts of each.
+SEARCHES, STARTS = 6, 2
 
 
 @dataclass(frozen=True, kw_only=True)
 class Loss:
-    """What one inequality gives away.
+    """Loss of one inequality.
 
     Attributes
     ----------
@@ -45,9 +42,9 @@ class Loss:
     decades : float
         ``log10(right/left)`` at the worst pair, >= 0; of an inequality between squares it counts the squares.
     searched : bool
-        Whether that pair was found by search (the loss may then be smaller), not as an eigenvector.
+        True if that pair was found by search (the loss may then be smaller), not as an eigenvector.
     only_unit : bool
-        Whether nothing is given away: what a change of the unit of stress alone would do.
+        True if nothing is lost: the effect of a change of the unit of stress.
     """
 
     label: str
@@ -58,16 +55,10 @@ class Loss:
 
 @dataclass(frozen=True, kw_only=True)
 class Losses:
-    """The losses link by link.
+    """The losses of each inequality, ``links``, and of two chains, whose steps add up.
 
-    Attributes
-    ----------
-    links : tuple of Loss
-        Each inequality by itself.
-    friction : tuple of Loss
-        The steps from the largest friction term found to its bound (5.30), repaired and then printed; they add up.
-    lipschitz : tuple of Loss
-        The steps from the largest ``|||T psi - T psi~||| / |||psi - psi~|||`` found to its bound (5.38); they add up.
+    ``friction`` leads from the largest friction term found to its bound (5.30), repaired and then printed,
+    ``lipschitz`` from the largest ``|||T psi - T psi~||| / |||psi - psi~|||`` found to its bound (5.38).
     """
 
     links: tuple[Loss, ...]
@@ -76,21 +67,13 @@ class Losses:
 
     def to_dict(self) -> dict[str, Any]:
         """The object ``losses`` of ``ndtheory.compare/1``."""
-        return {
-            name: [vars(loss) for loss in losses]
-            for name, losses in (("links", self.links), ("friction", self.friction), ("lipschitz", self.lipschitz))
-        }
+        return {name: [vars(loss) for loss in losses] for name, losses in vars(self).items()}
 
 
 class LossForms:
     """The quadratic forms of Section 5 in y with ``psi - psi~ = L_2 y``, so that the length of y is the norm (5.21).
 
-    "1" is the contact body and "2" the Neumann body, whatever their numbers in the file.
-
-    Parameters
-    ----------
-    pair : ContactPair
-        A problem in which no contact node is held.
+    "1" is the contact body and "2" the Neumann body, whatever their numbers in the file; no contact node is held.
     """
 
     def __init__(self, pair: ContactPair) -> None:
@@ -130,23 +113,9 @@ def square(rows: Floats, gram: Floats) -> Floats:
 
 
 def locate(pair: ContactPair, measured: Measured, *, seed: int = 0, progress: Progress = silent) -> Losses | None:
-    """Find what each inequality gives away at the problem's friction.
+    """Find the loss of each inequality at the problem's friction; None if a constant does not exist or a node is held.
 
-    Parameters
-    ----------
-    pair : ContactPair
-        The bodies on whose forces the inequalities are tried.
-    measured : Measured
-        Their constants.
-    seed : int
-        Of the search.
-    progress : callable
-        Told how many of the searches are done.
-
-    Returns
-    -------
-    Losses or None
-        None where a constant does not exist or a contact node is held.
+    ``seed`` is for the search, ``progress`` is called with the share of the searches that are done.
     """
     constants = measured.constants()
     if constants is None or pair.held:

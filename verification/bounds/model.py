@@ -8,20 +8,12 @@ from typing import Any
 import cvxpy as cp
 import numpy as np
 
-from verification.bounds.program import LMIError, Optimum, Program
+from verification.bounds.interior_point import LMIError, Optimum, Program
 from verification.threads import one_thread
 
 
 def solve(program: Program, *, solver: str = cp.CLARABEL, **options: Any) -> Optimum:
-    """What a conic solver of cvxpy answers; its work grows with the sixth power of the rows.
-
-    Parameters
-    ----------
-    program : Program
-    solver : str
-        Its name in cvxpy.
-    **options
-        Handed to it.
+    """The answer of a conic solver of cvxpy, by its name there; its work grows with the sixth power of the rows.
 
     Raises
     ------

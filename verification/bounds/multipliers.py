@@ -1,6 +1,6 @@
 """The semidefinite bound: nearly the exact Lipschitz constant of T_theta, by a program whose answer is checked.
 
-For a pair of forces let g, p be the differences of psi and of T psi, v that of the jump and zeta that of S sigma_N.
+For a pair of forces let g, p, v and zeta be the differences of psi, T psi, the jump and S sigma_N.
 Step II gives, node by node::
 
     p_N v_N >= 0                                             (2.4)
@@ -31,7 +31,7 @@ from fem1d2d.mesh import Floats
 from ndtheory.energy_norms import contraction_interval
 from verification.bounds import interior_point
 from verification.bounds.conditions import Conditions, Pieces, inside, mixed, times
-from verification.bounds.program import USUAL, LMIError, Optimum, Program, Stop, Weights
+from verification.bounds.interior_point import USUAL, LMIError, Optimum, Program, Stop, Weights
 from verification.constants import Measured
 from verification.interface.pair import ContactPair
 from verification.progress import Progress, silent
@@ -43,10 +43,10 @@ NARROW = 1e-2
 #: It is given up below this share of the threshold of the theorem in energy norms, which it should exceed.
 LEAST = 1e-2
 
-#: So many of them are tried in turn, before the rest is bisected.
+#: So many of them are tried one by one, before the rest is bisected.
 ENOUGH = 3
 
-#: Shares of what a solver proposes, the rest known multipliers, that are tried in turn.
+#: Shares of a solver's proposal, the rest known multipliers, that are tried one after the other.
 DRAWN = (1.0, 0.9999, 0.999, 0.99, 0.9)
 
 #: By how much a is larger and b smaller than known, from one start to the next, until one is inside.
@@ -68,14 +68,11 @@ class Certified:
 
     Attributes
     ----------
-    value : float
-        What the multipliers prove, on the safe side of ``evaluated`` by a bound on the rounding of the check.
-    evaluated : float
-        The eigenvalue that these multipliers give in doubles.
-    proposed : float
-        What the solver believed to be optimal; nan where the multipliers are the known ones.
+    value, evaluated, proposed : float
+        Proved by the multipliers, on the safe side of ``evaluated`` by a bound on the rounding of the check; the
+        eigenvalue that they give in doubles; the solver's optimum, nan where the multipliers are the known ones.
     multipliers : tuple of arrays
-        lambda, tau, a, b by node; lambda alone without friction.
+        lambda, tau, a, b by node; only lambda without friction.
     gave_up : str
         Why the solver proposed nothing; empty where it did.
     """
@@ -88,7 +85,7 @@ class Certified:
 
 
 class QuadraticForms(Conditions):
-    """What multipliers prove of a pair of bodies: see the head of this module.
+    """Proofs by multipliers for a pair of bodies: see the head of this module.
 
     Parameters
     ----------
@@ -96,11 +93,6 @@ class QuadraticForms(Conditions):
         As for :class:`verification.bounds.conditions.Conditions`.
     solver : callable, optional
         Program -> Optimum, whose proposals are checked; :func:`verification.bounds.interior_point.solve` by default.
-
-    Raises
-    ------
-    ValueError
-        A contact node is held, or there are too many.
     """
 
     def __init__(
@@ -132,22 +124,10 @@ class QuadraticForms(Conditions):
     def on(
         self, pieces: Pieces, theta: float, *, stop: Stop = USUAL, parent: tuple[Pieces, Optimum] | None = None
     ) -> tuple[Certified, Optimum | None]:
-        """The same for some of the affine pieces of T.
+        """The same for some of the affine pieces of T, with the solver's proposal; None where it gave up.
 
-        Parameters
-        ----------
-        pieces : Pieces
-        theta : float
-        stop : Stop
-            Of the program, whose s is the square of the constant.
-        parent : (Pieces, Optimum), optional
-            A set of which these are the pieces with more signs fixed, and what the solver found for it: a start that
-            saves half of its steps on Section 6.
-
-        Returns
-        -------
-        (Certified, Optimum or None)
-            The second is what the solver proposed; None where it gave up.
+        ``stop`` is for the program, whose s is the square of the constant.  ``parent`` is a set of which these are the
+        pieces with more signs fixed, and its proposal: a start that saves half of the steps on Section 6.
 
         Raises
         ------
@@ -283,7 +263,7 @@ class QuadraticForms(Conditions):
         stop: Stop,
         parent: tuple[Pieces, Optimum] | None,
     ) -> Optimum:
-        """What the solver proposes, from where it has been for a parent or, where that leads nowhere, from known ones.
+        """The solver's proposal, started from an early point of a parent, else from known multipliers.
 
         Raises
         ------
@@ -353,16 +333,7 @@ def _least_share(holds: Callable[[float], bool]) -> float | None:
 def friction_threshold(pair: ContactPair, measured: Measured, start: float, *, progress: Progress = silent) -> float:
     """The friction below which every small theta is certified to contract: a bound from below, close to ``NARROW``.
 
-    Parameters
-    ----------
-    pair : ContactPair
-        The bodies, at any friction.
-    measured : Measured
-        Their constants.
-    start : float
-        The threshold of the theorem in energy norms, which is below it.
-    progress : callable
-        Told which friction is tried.
+    ``start`` is the threshold of the theorem in energy norms, which is below it.
 
     Raises
     ------

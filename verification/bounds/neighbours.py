@@ -27,13 +27,7 @@ NEAR = 1e-3
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Patterns:
-    """What the contact nodes do on several pieces; one row each.
-
-    Attributes
-    ----------
-    touching : bool array, shape (c, n)
-    sliding : int array, shape (c, t)
-    """
+    """States of the contact nodes on several pieces: ``touching``, shape (c, n), and ``sliding``, shape (c, t)."""
 
     touching: NDArray[np.bool_]
     sliding: NDArray[np.int8]
@@ -41,17 +35,10 @@ class Patterns:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Responses:
-    """What T makes of changes of force: of one on several pieces, or of several on one; a row each.
+    """Answers of T to changes of force: to one on several pieces, or to several on one; a row each.
 
-    Attributes
-    ----------
-    pair : ContactPair
-    g : array, shape (c, 2 n)
-        The changes of the force on the Neumann grid.
-    jump : array, shape (c, 2 n)
-        Those of v.
-    reaction : array, shape (c, 2 n)
-        Those of the forces on the contact grid.
+    ``g``, shape (c, 2 n), are the changes of the force on the Neumann grid, ``jump`` the changes of v and ``reaction``
+    those of the forces on the contact grid.
     """
 
     pair: ContactPair
@@ -91,17 +78,9 @@ def values(factors: tuple[Floats, Floats]) -> Floats:
 
 
 def responses(pair: ContactPair, g: Floats, patterns: Patterns, sign: NDArray[np.int8]) -> Responses:
-    """What T makes of a change of force on several pieces.
+    """Answers of T to a change of force g, shape (2 n,), on several pieces; ``sign`` is the one of S sigma_N.
 
     :class:`verification.algorithm.affine_piece.Piece` has the same by all forces.
-
-    Parameters
-    ----------
-    pair : ContactPair
-    g : array, shape (2 n,)
-    patterns : Patterns
-    sign : int array, shape (t,)
-        Of S sigma_N.
     """
     contact, t = pair.contact, pair.contact.grid.t
     carried = pair.interface.carry(pair.neumann.flexibility(g))
@@ -111,7 +90,7 @@ def responses(pair: ContactPair, g: Floats, patterns: Patterns, sign: NDArray[np
     systems = contact.stiffness * (moves[:, :, None] & moves[:, None, :])
     diagonal = np.einsum("cii->ci", systems)
     diagonal[~moves] = 1.0
-    if contact.loose:  # motions that a pattern leaves free are pinned: its reaction does not know of them
+    if contact.loose:  # motions that a pattern leaves free are pinned, without effect on its reaction
         for system, still in zip(systems, ~moves, strict=True):
             free = vanishing(contact.motions, np.flatnonzero(still))
             system += float(np.diag(contact.stiffness).max()) * free @ free.T
@@ -125,18 +104,7 @@ def responses(pair: ContactPair, g: Floats, patterns: Patterns, sign: NDArray[np
 class Neighbours:
     """A quadratic form on the pieces of patterns that differ from one at one node each.
 
-    Parameters
-    ----------
-    pair : ContactPair
-    pattern : Pattern
-        The one that they differ from.
-    patterns : Patterns
-    node : int array, shape (c,)
-        Where.
-    sign : int array, shape (t,)
-        Of S sigma_N.
-    factors : callable
-        Of the form.
+    ``node``, shape (c,), are these nodes, ``sign``, shape (t,), is the sign of S sigma_N, ``factors`` the form.
     """
 
     def __init__(
@@ -160,7 +128,7 @@ class Neighbours:
         block = transform[self._at[:, :, None], self._at[:, None, :]]
         self._systems = np.where(self._swapped[..., None], block, np.eye(each.shape[1]))
         self._unknown = np.zeros(len(node), dtype=bool)
-        if contact.loose:  # what leaves a motion free has an answer of its own
+        if contact.loose:  # a pattern that leaves a motion free has a separate answer
             self._unknown |= _leave_free(contact, ~self._moves[None])[0] | _leave_free(contact, ~_moves(pair, patterns))
             self._systems[self._unknown] = np.eye(each.shape[1])
         # what a unit of each component adds to the answers
@@ -176,7 +144,7 @@ class Neighbours:
         return self._factors(Responses(pair=self._pair, g=forces.T, jump=(d - carried).T, reaction=-f.T))
 
     def _changes(self, forces: Floats) -> tuple[Floats, Floats, tuple[Floats, Floats]]:
-        """What a node that changes its mind changes for columns of forces, shape (c, k, m), and what that is worth.
+        """Change of the answers when one node switches state, for columns of forces, shape (c, k, m), and of the form.
 
         The third are the factors on the pattern itself, shape (m, ..).
         """
@@ -194,26 +162,19 @@ class Neighbours:
         return change, ((self._left @ two.T + self._right @ one.T) / 2)[at], (one, two)
 
     def values(self, g: Floats) -> Floats:
-        """The form at one change of the force, shape (c,); ``-inf`` where it would have to be worked out alone."""
+        """The form at one change of the force, shape (c,); ``-inf`` where it would have to be worked out separately."""
         change, mixed, here = self._changes(g[:, None])
         added = change * (2 * mixed + self._squares @ change)
         return np.where(self._unknown, -np.inf, values(here) + added.sum(axis=(1, 2)))
 
     def exceed(self, level: float, eigenvalues: Floats, eigenvectors: Floats) -> NDArray[np.bool_]:
-        """Whose largest eigenvalue is above a level, or may be, shape (c,); borderline cases fall either way.
+        """True for neighbours whose largest eigenvalue is above a level, or may be; borderline cases fall either way.
 
         On a neighbour the form is ``form + W K W'``, and it has as many eigenvalues above the level as
         ``K^-1 - W' (level - form)^-1 W`` has negative ones beyond those of K; proof in ``docs/energy.md``.  Modes whose
-        eigenvalue is close to the level are not eliminated: to divide by what is left would cost all digits.
-
-        Parameters
-        ----------
-        level : float
-            Above the eigenvalues.
-        eigenvalues : array, shape (2 n,)
-            Of the form on the pattern itself, against any form whose value is to be 1.
-        eigenvectors : array, shape (2 n, 2 n)
-            Changes of the force, as columns of length 1 in that form.
+        eigenvalue is close to the level are not eliminated: to divide by what is left would cost all digits.  The
+        eigenvalues of the form on the pattern itself, against any form whose value is to be 1, are below the level; the
+        eigenvectors, changes of the force as columns, have length 1 in that form.
         """
         if not level > eigenvalues[-1]:  # the form is 0 on the pattern itself
             return np.ones(len(self._node), dtype=bool)
@@ -245,12 +206,12 @@ def _bound(pair: ContactPair, forces: Floats, sign: NDArray[np.int8]) -> Floats:
 
 
 def _moves(pair: ContactPair, patterns: Patterns) -> NDArray[np.bool_]:
-    """Where step II leaves the jump free, shape (c, 2 n)."""
+    """True where step II leaves the jump free, shape (c, 2 n)."""
     return np.concatenate([patterns.sliding != 0, ~patterns.touching], axis=1) & pair.contact.free
 
 
 def _leave_free(contact: Condensed, still: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Whether a rigid motion of the body leaves all components where they are that are still, shape (c,)."""
+    """True if a rigid motion of the body leaves all ``still`` components where they are, shape (c,)."""
     return np.array([vanishing(contact.motions, np.flatnonzero(row)).shape[1] > 0 for row in still])
 
 

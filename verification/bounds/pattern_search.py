@@ -29,7 +29,7 @@ from verification.threads import one_thread
 #: A sum of forces that cancels up to this share of their sizes may be 0.
 CANCELLED = 1e-6
 
-#: Digits by which values are told apart: the way uphill is the same however a processor rounds.
+#: Digits in which values differ: the way uphill is the same however a processor rounds.
 DIGITS = 9
 
 Form = Callable[[Piece], Floats]
@@ -37,16 +37,7 @@ Form = Callable[[Piece], Floats]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FoundFactor:
-    """A piece that a search came to.
-
-    Attributes
-    ----------
-    value : float
-        The largest value of the quadratic form on it.
-    piece : Piece
-    eigenvalues, eigenvectors : array
-        Of the form, the largest last.
-    """
+    """A piece that a search came to, the largest ``value`` of the form on it, and its eigenvalues, the largest last."""
 
     value: float
     piece: Piece
@@ -55,7 +46,7 @@ class FoundFactor:
 
     @property
     def size(self) -> float:
-        """Of its eigenvalues, the largest one: rounding is a share of it."""
+        """The largest modulus of the eigenvalues: rounding is a share of it."""
         return float(np.abs(self.eigenvalues).max())
 
 
@@ -75,10 +66,10 @@ def signs(pair: ContactPair) -> NDArray[np.int8]:
 class Search:
     """The affine pieces of T, and the way uphill among them to a large value of a quadratic form.
 
+    The loads of ``pair`` do not matter, as each piece occurs for suitable ones.
+
     Parameters
     ----------
-    pair : ContactPair
-        The bodies; their loads do not matter, as each piece occurs for suitable ones.
     form : callable
         Piece -> symmetric matrix, in y with ``g = L y`` (:attr:`verification.interface.body.Condensed.root`).
     against : array, optional
@@ -195,15 +186,9 @@ def worst_piece(
     factors: Factors | None = None,
     starts: int = 4,
 ) -> FoundFactor:
-    """Search the affine pieces of T for the largest value of a quadratic form.
+    """Search the affine pieces of T for the largest value of a quadratic form; parameters as in :class:`Search`.
 
-    Parameters
-    ----------
-    pair, form, against, factors
-        As in :class:`Search`.
-    random : Generator
-    starts : int
-        The starts are: all nodes stick that can, all are open and slide one way, and random patterns.
+    The starts are: all nodes stick that can, all are open and slide one way, and random patterns.
     """
     return _from_starts(Search(pair, form, against=against, factors=factors), random=random, starts=starts)
 

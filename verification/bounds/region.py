@@ -17,7 +17,7 @@ from verification.constants.measured import SLIDES
 from verification.contact import ContactError
 from verification.document import Document
 from verification.interface.friction import LAWS
-from verification.interface.pair import build
+from verification.interface.pair import pair_from
 from verification.interrupts import INTERRUPTED
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
@@ -45,16 +45,7 @@ class Point:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Plane(Document):
-    """Regions by bound, and runs.
-
-    Attributes
-    ----------
-    title : str
-    regions : mapping from the name of a bound to Region
-    points : tuple of Point
-    reason : mapping
-        Why a bound has no region; ``points`` where Ctrl-C left some out.
-    """
+    """Regions by bound, and runs; ``reason`` says why a bound has no region, or that Ctrl-C left ``points`` out."""
 
     schema: ClassVar[str] = "ndtheory.region/1"
 
@@ -71,7 +62,7 @@ class Plane(Document):
 
     @property
     def interrupted(self) -> bool:
-        """Whether Ctrl-C left something out."""
+        """True if Ctrl-C left something out."""
         return "points" in self.reason
 
     def content(self) -> dict[str, Any]:
@@ -94,13 +85,7 @@ class Plane(Document):
 def chart(problem: Problem, *, store: Path | None = None, progress: Progress = silent) -> Plane:
     """Trace the regions of all bounds for a problem's bodies, and run a grid of theta and k.
 
-    Parameters
-    ----------
-    problem : Problem
-    store : path, optional
-        A file that keeps the runs, and has those that were made before.
-    progress : callable
-        Told what is being done.
+    ``store`` is a file that keeps the runs, and has those that were made before.
 
     Raises
     ------
@@ -110,7 +95,7 @@ def chart(problem: Problem, *, store: Path | None = None, progress: Progress = s
         Before the first region was traced; later it leaves out what was still to come.
     """
     progress("tracing the regions", None)
-    pair = build(problem)
+    pair = pair_from(problem)
     law = problem.contact.law
     if LAWS[law].outside:
         raise ProblemError(problem.source, "contact.law", law, 'no region is proved of it; needed "nonlocal"')
@@ -125,11 +110,10 @@ def chart(problem: Problem, *, store: Path | None = None, progress: Progress = s
         raise ProblemError(problem.source, "contact.radius", None, "needed a law of friction to vary k")
     subject = Subject.of(pair, measured)
     regions: dict[str, Region] = {}
-    reason: dict[str, str] = {}
+    reason = dict.fromkeys((*BOUNDS, "points"), INTERRUPTED)
     points: list[Point] = []
     limited = replace(pair.settings, relaxation="constant", max_iterations=MOST_STEPS)
     grid = SweepGrid.of({"theta": THETAS, "friction": FRICTIONS})
-    reason |= dict.fromkeys((*BOUNDS, "points"), INTERRUPTED)
     try:
         for bound in BOUNDS.values():
             try:
@@ -153,13 +137,7 @@ def chart(problem: Problem, *, store: Path | None = None, progress: Progress = s
 
 
 def _point(row: Row) -> Point:
-    """What a run did, of its row in a sweep.
-
-    Raises
-    ------
-    ContactError
-        Step II did not reach its certificate.
-    """
+    """Outcome of a run, from its row in a sweep; ContactError where step II did not reach its certificate."""
     if row["steps"] is None:
         raise ContactError(row["reason"])
     return Point(

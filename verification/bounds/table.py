@@ -1,17 +1,231 @@
-"""All bounds, from the weakest to the strongest: what tables, verdicts, regions and reports loop over."""
+"""All bounds, from the weakest to the strongest: tables, verdicts, regions and reports loop over :data:`BOUNDS`."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any, ClassVar
 
+from ndtheory import PRINTED, REPAIRED, Constants, EnergyConstants, Number, evaluate, evaluate_energy
+from ndtheory.bounds import Edition
+from ndtheory.constants import relaxation_factor
+from ndtheory.number import Numeric, below, weakest
 from ndtheory.texts import did_you_mean
-from verification.bounds.bound import Bound, Removed, by_name
-from verification.bounds.energy import Energy
-from verification.bounds.section5 import Printed, Repaired
-from verification.bounds.semidefinite import SemidefiniteBound
+from verification.bounds import LARGEST
+from verification.bounds.bound import Bound, BoundResult, NotComputed, Region, Removed, Subject, Thresholds
+from verification.document import Document
+from verification.progress import Progress, silent
+from verification.value import to_plain
+
+if TYPE_CHECKING:
+    from verification.bounds.lipschitz import Enclosure
+    from verification.bounds.multipliers import QuadraticForms
+    from verification.constants import Measured
+    from verification.interface.pair import ContactPair
+
+#: Number of friction values that trace the border of the region of the semidefinite bound.
+TRACED = 12
+
+#: The constants that may be given to the calculator, for Section 5 and for the theorem in energy norms.
+SECTION_5, ENERGY = ("m", "M", "C_R", "C_s", "C_tr", "k", "C_K"), ("rho", "kappa_1", "kappa_2")
+
+
+class Section5(Bound):
+    """An edition of Proposition 5.6."""
+
+    edition: Edition
+
+    def evaluate(self, subject: Subject, theta: Numeric | None = None, *, progress: Progress = silent) -> BoundResult:
+        if subject.constants is None:
+            return self.absent(subject.why)
+        found = evaluate(self.edition, subject.constants, theta)
+        why = ""
+        if theta is not None and found.factor is None:
+            friction = float(subject.constants.C_K if subject.constants.k is None else subject.constants.k)
+            why = _why_not(found.interval, found.C2, friction, found.theta)
+            if self.of_unit and subject.measured is not None:
+                why += f" (in {subject.measured.units['stress']})"
+        return BoundResult(
+            name=self.name,
+            proved=found.proved,
+            theta=found.theta,
+            factor=found.factor,
+            one_minus_factor=found.one_minus_factor,
+            interval=found.interval_proved or found.interval,
+            interval_level=weakest([subject.constants.level, "verified"]) if found.interval_proved else "float",
+            friction=Thresholds(every=found.C4, some=found.C2, on="any" if found.C2 is None else found.threshold_on),
+            why=why,
+            detail=found,
+        )
+
+
+class Printed(Section5):
+    """As the paper prints it: in a unit of stress in which m >= 1."""
+
+    name, words, edition = "printed", "the theorem as printed", PRINTED
+    colour, dashes, fill, hatch = "#555555", ":", "#555555", "xx"
+    finding = of_unit = True
+
+    def remarks(self, result: BoundResult | None, unit: str) -> tuple[str, ...]:
+        return (f"{self.name}: with stresses in {unit}; in another unit its figures are others",)
+
+
+class Repaired(Section5):
+    """With the lost power of m put back: the same in every unit."""
+
+    name, words, edition = "repaired", "the theorem repaired", REPAIRED
+    colour, dashes, fill, hatch = "#0B5A94", (0, (5, 1, 1, 1, 1, 1)), "#4A90C4", "//"
+    certifies = True
+
+
+class Energy(Bound):
+    """The same proof as Section 5, with no constant larger than it must be; see ``docs/energy.md``."""
+
+    name, words = "energy", "the theorem in energy norms"
+    colour, dashes, fill, hatch = "#00724F", (0, (7, 2)), "#8FD3B6", ".."
+    attained = True  # without friction
+    certifies = True
+
+    def evaluate(self, subject: Subject, theta: Numeric | None = None, *, progress: Progress = silent) -> BoundResult:
+        if subject.energy is None:
+            return self.absent(subject.why_energy)
+        found = evaluate_energy(subject.energy, theta)
+        friction = Thresholds(every=found.friction_multiple, some=found.friction_limit_multiple, on="multiple")
+        why, without = "", False
+        if subject.measured is not None:  # then they are known on k
+            measured = subject.measured
+            friction = Thresholds(every=measured.friction_threshold, some=measured.friction_limit, on="k")
+            without = measured.C_t1 is None  # no friction is allowed
+            if theta is not None and found.factor is None:
+                why = _why_not(found.interval, friction.some, measured.friction, found.theta)
+        return BoundResult(
+            name=self.name,
+            proved=True,
+            theta=found.theta,
+            factor=found.factor,
+            one_minus_factor=found.one_minus_factor,
+            interval=found.interval_proved or found.interval,
+            interval_level=weakest([subject.energy.level, "verified"]) if found.interval_proved else "float",
+            friction=Thresholds(on="any") if friction.every is None and not without else friction,
+            why=why,
+            detail=found,
+        )
+
+    def objects(self, result: BoundResult, measured: Measured) -> dict[str, dict[str, Any] | None]:
+        """Its document with both rho and both thresholds on k."""
+        document = result.to_dict()
+        if document is None:
+            return {self.name: None}
+        if measured.friction_threshold is None:
+            document["reason"] |= dict.fromkeys(("friction_threshold", "friction_limit"), measured.why_no_threshold)
+        document |= {
+            "rho": to_plain(measured.rho_max),
+            "rho_normal": to_plain(measured.rho_normal),
+            "rho_at_work": document["rho"],
+            "friction_threshold": to_plain(measured.friction_threshold),
+            "friction_limit": to_plain(measured.friction_limit),
+        }
+        return {self.name: document}
+
+
+class SemidefiniteBound(Bound):
+    """The factor proved by multipliers of the conditions of step II, up to LARGEST nodes; see ``docs/energy.md``."""
+
+    name, words = "lmi", "the semidefinite bound"
+    colour, dashes, fill = "#8A5A00", "-.", "#FFF3B0"
+    calculated = False
+    attained = True  # without friction
+    apart = certifies = True
+
+    def evaluate(self, subject: Subject, theta: Numeric | None = None, *, progress: Progress = silent) -> BoundResult:
+        if theta is None or subject.pair is None or subject.measured is None:
+            return self.absent("needed a pair of bodies and a theta")
+        if subject.pair.contact.grid.n > LARGEST:
+            return self.absent(f"{subject.pair.contact.grid.n} contact nodes: worked out up to {LARGEST}")
+        from verification.bounds.interior_point import LMIError
+        from verification.bounds.lipschitz import work_out
+
+        chosen = relaxation_factor(theta)
+        theta = float(chosen)
+        try:
+            found = work_out(subject.pair, subject.measured, theta, exact=subject.exact, progress=progress)
+        except (LMIError, ValueError) as error:
+            return self.absent(str(error))
+        if subject.measured.unverified is not None:  # proofs were asked for
+            found = found.proved(subject.pair, subject.measured, chosen, progress=progress)
+        factor, allowed, largest = found.factor, found.friction_threshold, found.theta_max
+        on = "k" if allowed is not None or subject.measured.C_t1 is None else "any"
+        return BoundResult(
+            name=self.name,
+            proved=True,
+            theta=theta,
+            factor=factor,
+            one_minus_factor=None if factor is None else _rest(factor),
+            interval=None if largest is None else (0.0, largest.value if largest.lo is None else largest.lo),
+            interval_level="float" if largest is None else largest.level,
+            friction=Thresholds(every=allowed, on=on),
+            why=found.why_no_factor,
+            not_computed=found.gave_up if factor is None else "",
+            detail=found,
+        )
+
+    def remarks(self, result: BoundResult | None, unit: str) -> tuple[str, ...]:
+        found = None if result is None else result.detail
+        if found is None:
+            return ()
+        said = [f"{self.name}: {found.lower:.3f} occurs for some loads, {found.gap:.2%} less"]
+        if found.divided is not None:
+            divided = f"dividing the pieces of T gives {found.divided.value:#.4g} in doubles"
+            said.append(f"{self.name}: proved is the factor of one program; {divided}")
+        if found.unverified is not None and not found.certified:
+            said.append(f"{self.name} is not proved: {found.not_proved}")
+        return tuple(said)
+
+    def enclose(self, pair: ContactPair, forms: QuadraticForms, theta: float) -> Enclosure:
+        from verification.bounds.lipschitz import enclose
+
+        return enclose(pair, forms, theta, gap=float("inf"), programs=1)
+
+    def region(self, subject: Subject, *, progress: Progress = silent) -> Region:
+        from verification.bounds.interior_point import LMIError
+        from verification.bounds.lipschitz import thetas
+
+        pair, measured = subject.pair, subject.measured
+        if pair is None or measured is None or measured.friction_threshold is None:
+            raise NotComputed("needed a pair of bodies with a law of friction")
+        if pair.contact.grid.n > LARGEST:
+            raise NotComputed(f"{pair.contact.grid.n} contact nodes: worked out up to {LARGEST}")
+        try:
+            last, kept = thetas(pair, measured, TRACED, progress=progress)
+        except (LMIError, ValueError) as error:
+            raise NotComputed(str(error)) from None
+        return Region(k=tuple(k for k, _ in kept), theta=tuple((0.0, end) for _, end in kept), every=last, some=None)
+
+
+def _why_not(
+    interval: tuple[float, float] | None, threshold: Number | None, friction: float, theta: float | None
+) -> str:
+    """Why a bound has no conclusion at a theta."""
+    if interval is not None and theta is not None:
+        return f"theta = {theta:g} is outside ({interval[0]:.2g}, {interval[1]:.2g})"
+    scale = threshold.value if threshold is not None else float("inf")
+    return f"friction {friction:g} is not below {scale:.2g}"
+
+
+def _rest(factor: Number) -> Number:
+    """1 minus a factor."""
+    if factor.hi is None:
+        return Number.of_float(1 - factor.value)
+    least = below(1 - Fraction(factor.hi))
+    return Number(value=max(1 - factor.value, least), lo=least, level=factor.level)
+
 
 #: The bounds by name.  A bound that is put in here at any time is worked out, judged, shown and drawn with the others.
-BOUNDS = by_name((Printed(), Repaired(), Energy(), SemidefiniteBound()))
+BOUNDS: dict[str, Bound] = {bound.name: bound for bound in (Printed(), Repaired(), Energy(), SemidefiniteBound())}
+
+#: The bounds that this library brings along.
+OURS = tuple(BOUNDS)
 
 
 def named(name: str) -> Bound:
@@ -24,10 +238,6 @@ def certifying() -> tuple[str, ...]:
     return tuple(name for name, bound in BOUNDS.items() if bound.certifies)
 
 
-#: The bounds that this library brings along.
-OURS = tuple(BOUNDS)
-
-
 def strongest() -> str:
     """The bound that proposes a certificate where none is named: the last of our own, whatever is registered beside."""
     certify = certifying()
@@ -35,12 +245,7 @@ def strongest() -> str:
 
 
 def chosen(names: Sequence[str] | str | None) -> tuple[str, ...]:
-    """The names of some bounds, in the order of :data:`BOUNDS`.
-
-    Parameters
-    ----------
-    names : sequence of str, str or None
-        A text has commas between the names; None stands for all bounds.
+    """The names of some bounds, of a sequence or of a text with commas, in the order of :data:`BOUNDS`; None for all.
 
     Raises
     ------
@@ -62,3 +267,28 @@ def chosen(names: Sequence[str] | str | None) -> tuple[str, ...]:
         if name not in BOUNDS:
             raise ValueError(f"no bound {str(name)!r}, there are {known}{did_you_mean(str(name), BOUNDS)}")
     return tuple(name for name in BOUNDS if name in listed)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Calculated(Document):
+    """The document of the calculator, ``ndtheory.bounds/1``: results by bound for constants that were given."""
+
+    schema: ClassVar[str] = "ndtheory.bounds/1"
+    units: ClassVar[Mapping[str, str]] = {"length": "any", "stress": "that of m"}  # type: ignore[misc]
+
+    constants: Constants | None
+    energy: EnergyConstants | None
+    theta: Any
+    results: Mapping[str, BoundResult]
+
+    def content(self) -> dict[str, Any]:
+        given: dict[str, Any] = {key: getattr(self.constants, key, None) for key in SECTION_5}
+        given |= {key: getattr(self.energy, key, None) for key in ENERGY}
+        given["theta"] = None if self.theta is None else relaxation_factor(self.theta)
+        absent = {key: "not given" for key, value in given.items() if value is None}
+        inputs = {key: None if value is None else float(value) for key, value in given.items()}
+        return {
+            "inputs": inputs | {"reason": absent},
+            "editions": {name: result.to_dict() for name, result in self.results.items()},
+            "reason": {name: result.not_computed for name, result in self.results.items() if result.not_computed},
+        }

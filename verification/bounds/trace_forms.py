@@ -2,8 +2,8 @@
 
 With ``g = S_2 d`` and ``p = P c`` every term but ``|a p + b g|^2`` is a product of the interface matrices themselves.
 That term has an inverse, ``|.|^2 = .' S_2^-1 .``, which a Schur complement takes away: ``Q - weight M' S_2^-1 M`` is
-positive definite if and only if ``[[S_2 / weight, M], [M', Q]]`` is.  So rounding enters by sums and products alone,
-and has a bound.
+positive definite if and only if ``[[S_2 / weight, M], [M', Q]]`` is.  So rounding enters only by sums and products, and
+has a bound.
 """
 
 from __future__ import annotations
@@ -17,25 +17,37 @@ from scipy.linalg import block_diag
 from fem1d2d.enclosed import Enclosed, gamma, upwards
 from fem1d2d.loewner import positive_definite
 from fem1d2d.mesh import Floats
+from verification.interface.interface import Grid
 from verification.interface.pair import ContactPair
 
 
+def families(
+    contact: Grid, force: Floats, jump: Floats, weight: Floats | None, zeta: Floats | None
+) -> list[tuple[Floats, Floats]]:
+    """Factors of the multiplied conditions, a row for each node; only of (2.4) without friction.
+
+    Those behind the fourth are for :class:`verification.bounds.conditions.Pieces`.  ``force`` and ``jump`` are the
+    forms p and v, ``weight`` is ``sqrt(w k)`` as a column and ``zeta`` the form zeta times it.
+    """
+    press, gap = force[contact.normal], jump[contact.normal]
+    if weight is None or zeta is None:
+        return [(press, gap)]
+    shear, slip = force[contact.tangential], jump[contact.tangential]
+    slide = weight * slip
+    found = [(press, gap), (shear, slip), (zeta, zeta), (slide, slide)]
+    return [*found, (zeta, slide), (gap, gap), (press, press), (shear, shear), (shear, zeta)]
+
+
 class TraceForms:
-    """The forms of a pair of bodies at a friction k > 0, or at 0.
+    """The forms of a pair of bodies at a friction k > 0, or at 0, in place of the pair's.
 
     Without friction p has no tangential part: c is then the normal part of a trace and P has S_1 with the tangential
     components condensed out.
 
     Parameters
     ----------
-    pair : ContactPair
-        The bodies.
-    k : float
-        Friction, in place of the pair's.
-    S_1 : array, shape (m, m)
-        From c to the components of p that are not 0.
-    carries : slice
-        Which components of p these are.
+    S_1, carries : array of shape (m, m), slice
+        From c to the components of p that are not 0, and these components.
     near : array, shape (N + m, N + m)
         Changes of (d, c), as columns, in which the forms are of size 1: the nearer, the less is lost to rounding.
     """
@@ -55,22 +67,14 @@ class TraceForms:
         self._p_size = np.hstack([np.zeros((size, size)), moduli.carry_back(np.abs(pressed))])
         force = np.hstack([np.zeros((contact.size, size)), pressed])
         jump = -np.hstack([interface.carry(np.eye(size)), moved])
-        families = [(force[contact.normal], jump[contact.normal])]
-        sizes = [(np.abs(a), np.abs(b)) for a, b in families]
+        weight = zeta = zeta_size = None
         if k:
             assert interface.kernel is not None
             weight = np.sqrt(k * contact.weights)[:, None]
-            shear, slip = force[contact.tangential], jump[contact.tangential]
             zeta = weight * (interface.kernel @ self._g[neumann.normal])
             zeta_size = weight * (np.abs(interface.kernel) @ np.abs(self._g[neumann.normal]))
-            of = np.abs
-            slide = weight * slip
-            (press, open_), *_ = families
-            families += [(shear, slip), (zeta, zeta), (slide, slide), (zeta, slide)]
-            families += [(open_, open_), (press, press), (shear, shear), (shear, zeta)]
-            sizes += [(of(shear), of(slip)), (zeta_size, zeta_size), (of(slide), of(slide)), (zeta_size, of(slide))]
-            sizes += [(of(open_),) * 2, (of(press),) * 2, (of(shear),) * 2, (of(shear), zeta_size)]
-        self._families, self._sizes = families, sizes
+        self._families = families(contact, force, jump, weight, zeta)
+        self._sizes = families(contact, np.abs(force), np.abs(jump), weight, zeta_size)
         # inner products over nodes (a transfer has them too), over traces twice, and the scalars and sums
         self._terms = 4 * (2 * size + len(S_1)) + (2 if interface.transfer is None else 4) * contact.n + 20
         self._free = _changed(S_2, self._near_2)
@@ -88,20 +92,9 @@ class TraceForms:
         step: tuple[float, float] | None = None,
         weight: float = 1.0,
     ) -> Callable[[float], bool]:
-        """What of ``square |g|^2 - cross <g, p> - weight |a p + b g|^2 - conditions`` does not depend on the square.
+        """Test of ``square |g|^2 - cross <g, p> - weight |a p + b g|^2 - conditions``, ``step`` being (a, b) if any.
 
-        Parameters
-        ----------
-        multipliers : sequence of arrays
-            As :data:`verification.bounds.program.Weights`.
-        cross, weight : float
-        step : (a, b), optional
-            None: without that term.
-
-        Returns
-        -------
-        callable
-            square -> whether the form is positive definite for sure.
+        The result takes the square, and is True if the form is positive definite for sure.
         """
         form = -cross * self._d.T @ self._p - _conditions(multipliers, self._families)
         size = abs(cross) * self._d.T @ self._p_size + _conditions([np.abs(m) for m in multipliers], self._sizes)

@@ -1,1 +1,1 @@
-"""What is proved of a mesh from the exact data of a problem: constants, and certificates that others can check."""
+"""Proofs from the exact data of a problem: certificates that others can check."""

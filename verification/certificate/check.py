@@ -1,4 +1,4 @@
-"""Check a certificate of contraction; needs the standard library and python-flint alone: ``python check.py FILE``.
+"""Check a certificate of contraction; needs only the standard library and python-flint: ``python check.py FILE``.
 
 A certificate describes two elastic bodies on meshes of triangles in rational numbers and claims that the map T_theta of
 the Neumann-Dirichlet iteration between them has a Lipschitz constant, whatever the loads and the gap.  S_a are the
@@ -56,7 +56,7 @@ def check(discrete, claim, eliminated=None):
     demand(all(x >= 0 for x in lam + tau + a + b), "multipliers that are not negative")
     demand(all(4 * x * y >= z * z for x, y, z in zip(a, b, tau, strict=True)), "4 a b >= tau^2")
 
-    # rows: forms in (d, c).  Without friction p_T = 0, and c stands for the normal trace alone
+    # rows: forms in (d, c).  Without friction p_T = 0, and c is only the normal trace
     still = lambda rows, columns: arb_mat(rows, columns)
     across = stacked([[P, still(n, m)], [still(n, m), P]]) if k else stacked([[still(n, m), P]])
     force = stacked([[still(t + n, 2 * m), S_c]])
@@ -81,7 +81,7 @@ def check(discrete, claim, eliminated=None):
 
 
 def surface_stiffness(body, both):
-    """The Schur complement on the contact nodes: tangential components first, then normal ones; or these alone."""
+    """The Schur complement on the contact nodes: tangential components first, then normal ones; or only these."""
     points = [[rational(x) for x in point] for point in body["points"]]
     young, nu = rational(body["young"]), rational(body["poisson"])
     demand(young > 0 and -1 < nu < fmpq(1, 2), "E > 0 and -1 < nu < 1/2")
@@ -124,7 +124,7 @@ def surface_stiffness(body, both):
 
 
 def definite(form):
-    """Whether every symmetric matrix in these balls is positive definite: by halves and their Schur complement."""
+    """True if every symmetric matrix in these balls is positive definite: by halves and their Schur complement."""
     n = form.nrows()
     if n == 1:
         return bool(form[0, 0] > 0)
@@ -183,7 +183,7 @@ def digest(discrete):
 
 
 def words(document):
-    """What is checked, for a reader."""
+    """The claim and its bodies, for a reader."""
     discrete, claim = document["discrete"], document["claim"]
     bodies = [
         f"{name}: {len(body['points'])} nodes, {len(body['cells'])} triangles, E {body['young']}, nu {body['poisson']}"

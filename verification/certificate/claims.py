@@ -1,4 +1,4 @@
-"""What the checker of certificates accepts of the rational data of two bodies: factors, thetas and frictions.
+"""Factors, thetas and frictions that the checker of certificates accepts for the rational data of two bodies.
 
 Multipliers come in doubles from the semidefinite bound and are rounded to decimals; a number that they prove in doubles
 is made worse by a small share until :mod:`verification.certificate.check` accepts it.
@@ -7,35 +7,38 @@ is made worse by a small share until :mod:`verification.certificate.check` accep
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from decimal import ROUND_DOWN, ROUND_UP, Context, Decimal
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from verification.bounds.program import Weights
+from verification.bounds.interior_point import Weights
 from verification.certificate.check import check, surface_stiffness
-from verification.certificate.description import describe
 from verification.constants.measured import FROM_MATRICES
-from verification.interface.exact_bodies import NotExact
-from verification.interface.pair import ContactPair
+from verification.interface.body import Body
+from verification.interface.exact_bodies import ExactInterface, NotExact, exact_points
+from verification.interface.pair import ContactPair, pair_from
+from verification.problem import Problem
+from verification.problem.specs import BodySpec
 from verification.progress import Progress, silent
 
-#: By which share what a factor is below 1 is made smaller, until the multipliers prove it for the rational bodies.
+#: Shares by which 1 minus a factor is made smaller, until the multipliers prove it for the rational bodies.
 MARGINS = (1e-10, 1e-8, 1e-6, 1e-4, 1e-2)
 
-#: Bits of the balls, tried in turn: radii grow by some twelve digits for every forty columns of a mesh.
+#: Bits of the balls, tried one after the other: radii grow by some twelve digits for every forty columns of a mesh.
 BITS = (320, 640, 1280)
 
 #: Digits of a multiplier and of a factor.
 DIGITS = 12
 
-#: By which share a theta or a friction is smaller than in doubles, in turn, until the checker accepts it.
+#: Shares by which a theta or a friction is made smaller than in doubles, until the checker accepts it.
 LESS = (0.0, 1e-9, 1e-6, 1e-4, 1e-3, 1e-2)
 
-#: Thetas at which a friction is tried that every small theta is to bear, in turn.
+#: Thetas at which a friction is tried that every small theta is to bear.
 SMALL = (Fraction(1, 10**3), Fraction(1, 10**6), Fraction(1, 10**9))
 
 NOT_CONFIRMED = "gives 1 - {:.3g} in doubles, which is not confirmed in rationals"
@@ -47,22 +50,11 @@ class NoCertificate(RuntimeError):
 
 
 class Claims:
-    """The checker for some bodies, each of which is eliminated once for all claims.
-
-    Parameters
-    ----------
-    discrete : dict
-        The bodies as :func:`describe` gives them.
-    progress : callable
-    """
+    """The checker for the bodies that :func:`describe` gives, each of which is eliminated once for all claims."""
 
     def __init__(self, discrete: dict[str, Any], progress: Progress, known: dict[Any, Any] | None = None) -> None:
         self.discrete, self.progress = discrete, progress
-        self._known: dict[Any, Any] = {} if known is None else known
-
-    def at(self, discrete: dict[str, Any]) -> Claims:
-        """Claims about the same bodies, joined otherwise."""
-        return Claims(discrete, self.progress, self._known)
+        self.known: dict[Any, Any] = {} if known is None else known
 
     def accepted(self, theta: Fraction, factor: Fraction, multipliers: dict[str, Any]) -> dict[str, Any] | None:
         """The claim of a factor with the bits in which the checker accepts it; None where it does not."""
@@ -73,9 +65,9 @@ class Claims:
 
             def eliminated(body: dict[str, Any], both: bool, bits: int = bits) -> Any:
                 key = (json.dumps(body), both, bits)
-                if key not in self._known:
-                    self._known[key] = surface_stiffness(body, both=both)
-                return self._known[key]
+                if key not in self.known:
+                    self.known[key] = surface_stiffness(body, both=both)
+                return self.known[key]
 
             try:
                 check(self.discrete, claim, eliminated)
@@ -92,11 +84,6 @@ class Claims:
 
 class Confirmation:
     """Claims about the rational data of one pair of bodies, decided as a certificate's would be.
-
-    Parameters
-    ----------
-    pair : ContactPair
-    progress : callable
 
     Raises
     ------
@@ -115,42 +102,27 @@ class Confirmation:
             claims = Claims(describe(pair.problem, pair), progress)
         except NotExact as error:
             raise NoCertificate(str(error)) from None
-        self.pair, self.problem, self._claims = pair, pair.problem, claims
+        self.pair, self.problem, self.progress, self._claims = pair, pair.problem, progress, claims
 
     def factor(self, theta: Fraction, factor: float, multipliers: Weights) -> Fraction:
-        """A factor of one step, larger than the one in doubles by a small share of what that is below 1.
-
-        Parameters
-        ----------
-        theta : Fraction
-        factor : float
-            What the multipliers prove in doubles.
-        multipliers : tuple of arrays
-            lambda, tau, a, b by node; lambda alone without friction.
+        """A factor of one step that is confirmed, larger than the one that the multipliers prove in doubles.
 
         Raises
         ------
         NoCertificate
         """
         if not factor < 1:
-            raise NoCertificate(f"the factor of one program is {factor:.4g}, which is no contraction")
+            raise NoCertificate(f"the factor of one program is {factor:.4g}, which does not contract")
         claim = self._claims.confirmed(theta, 1 - factor, written(multipliers))
         if claim is None:
             raise NoCertificate(f"the factor of one program {NOT_CONFIRMED.format(1 - factor)}")
         return Fraction(claim["factor"])
 
     def theta_max(self, theta: float, multipliers: Weights) -> Fraction:
-        """A theta up to which every one contracts, a little below that in doubles.
+        """A theta up to which every one contracts, a little below the one in doubles, from its multipliers over theta.
 
         Over theta the form with q = 1 is ``2 |g|^2 - 2 <g, p> - theta |p - g|^2`` minus the multiplied conditions: it
         grows as theta falls, so that one certificate answers for all smaller ones.
-
-        Parameters
-        ----------
-        theta : float
-            What the multipliers prove in doubles.
-        multipliers : tuple of arrays
-            Over theta.
 
         Raises
         ------
@@ -163,17 +135,11 @@ class Confirmation:
         raise NoCertificate(f"theta = {theta:.6g} in doubles {NOT_BELOW}")
 
     def friction_threshold(self, k: float, propose: Callable[[float], Weights]) -> Fraction:
-        """A friction up to which every small theta contracts, a little below that in doubles.
+        """A friction up to which every small theta contracts, a little below the one in doubles.
 
-        The multiplied conditions grow with k, so that one certificate answers for all that is smaller, and with one
-        theta for all smaller ones: see :meth:`theta_max`.
-
-        Parameters
-        ----------
-        k : float
-            What was found in doubles.
-        propose : callable
-            Friction -> multipliers over theta, as of ``2 |g|^2 - 2 <g, p>``.
+        The multiplied conditions grow with k, so that one certificate answers for all smaller k, and with one theta for
+        all smaller ones: see :meth:`theta_max`.  ``propose`` takes a friction to multipliers over theta, as of ``2
+        |g|^2 - 2 <g, p>``.
 
         Raises
         ------
@@ -182,7 +148,9 @@ class Confirmation:
         """
         for share in LESS:
             found = _decimal(k * (1 - share), ROUND_DOWN)
-            claims = self._claims.at(describe(self.problem, replace(self.pair, friction=found)))
+            claims = Claims(
+                describe(self.problem, replace(self.pair, friction=found)), self.progress, self._claims.known
+            )
             multipliers = propose(float(found))
             for theta in SMALL:
                 if claims.accepted(theta, Fraction(1), written(_times(float(theta), multipliers))):
@@ -196,14 +164,11 @@ def _times(factor: float, multipliers: Weights) -> Weights:
 
 def written(multipliers: Weights) -> dict[str, Any]:
     """Multipliers as rationals, rounded so that ``4 a b >= tau^2`` stays; one for all nodes where they are equal."""
-    lam, tau, a, b = multipliers if len(multipliers) == 4 else (*multipliers, *(np.zeros(1),) * 3)
+    if len(multipliers) < 4:
+        multipliers = (*multipliers, *(np.zeros(1),) * 3)
+    rules = {"lambda": None, "tau": ROUND_DOWN, "a": ROUND_UP, "b": ROUND_UP}
     found = {}
-    for name, values, rounding in (
-        ("lambda", lam, None),
-        ("tau", tau, ROUND_DOWN),
-        ("a", a, ROUND_UP),
-        ("b", b, ROUND_UP),
-    ):
+    for (name, rounding), values in zip(rules.items(), multipliers, strict=True):
         texts = [str(_decimal(value, rounding)) for value in values.tolist()]
         found[name] = texts[0] if len(set(texts)) == 1 else texts
     return found
@@ -212,3 +177,57 @@ def written(multipliers: Weights) -> dict[str, Any]:
 def _decimal(value: float, rounding: str | None = None) -> Fraction:
     """A double as a decimal of some digits."""
     return Fraction(Context(prec=DIGITS, rounding=rounding).create_decimal(Decimal(value)))
+
+
+# --- the bodies -------------------------------------------------------------------------------------------------------
+
+
+def describe(problem: Problem, pair: ContactPair | None = None) -> dict[str, Any]:
+    """The bodies of a plane problem and how they are joined, in rationals as texts; see ``docs/json.md``.
+
+    Coordinates of a mesh file are the doubles that were read from it.
+    """
+    pair = pair_from(problem) if pair is None else pair
+    meshed = [side.mesh_body for side in (pair.body1, pair.body2)]
+    points = [exact_points(spec, body) for spec, body in zip((problem.body1, problem.body2), meshed, strict=True)]
+    along = [p[body.nodes, 0] for p, body in zip(points, meshed, strict=True)]
+    joined = ExactInterface(pair, *(along if pair.contact_body == 1 else along[::-1]))
+    rows = lambda matrix: None if matrix is None else [_texts(row) for row in matrix]
+    return {
+        "body1": _described(problem.body1, meshed[0], points[0]),
+        "body2": _described(problem.body2, meshed[1], points[1]),
+        "neumann_body": pair.neumann_body,
+        "friction": str(pair.friction),
+        "weights": _texts(joined.grid.weights),
+        "kernel": rows(joined.exact_kernel if pair.friction else None),
+        "transfer": rows(joined.exact_transfer),
+    }
+
+
+def same(one: Any, other: Any) -> bool:
+    """True if two descriptions are about the same bodies.
+
+    A key that is null counts as equal to one that is missing.  A later key is null at its default, as the transfer is
+    on one grid, so that certificates written before are still about their bodies.
+
+    >>> same({"transfer": None, "friction": "1/5"}, {"friction": "1/5"}), same({"friction": "1/5"}, {"friction": "0"})
+    (True, False)
+    """
+    if not (isinstance(one, Mapping) and isinstance(other, Mapping)):
+        return bool(one == other)
+    return all(same(one.get(key), other.get(key)) for key in one.keys() | other.keys())
+
+
+def _described(spec: BodySpec, body: Body, points: NDArray[Any]) -> dict[str, Any]:
+    return {
+        "points": [_texts(point) for point in points],
+        "cells": body.mesh.cells.tolist(),
+        "held": np.argwhere(body.known.known).tolist(),
+        "surface": body.nodes.tolist(),
+        "young": str(spec.young),
+        "poisson": str(spec.poisson),
+    }
+
+
+def _texts(values: Iterable[Any]) -> list[str]:
+    return [str(Fraction(value)) for value in values]

@@ -1,7 +1,8 @@
-"""What the theorem in energy norms says of the bodies of a problem file themselves, not of a mesh.
+"""The theorem in energy norms for the bodies of a problem file themselves, not for a mesh.
 
-The mesh of the file enters no bound; its rho is shown beside the continuum's.  What is needed of the file is checked
-here and told in one line; what the theory cannot prove for it is null, with its reason.
+The mesh of the file enters no bound; its rho is shown beside the continuum's.  The continuum does not have the waves
+that are as short as the cells.  Their ratio of stiffnesses may be larger, also on finer meshes of such cells, and then
+a theta that is proved to contract in the continuum does not contract on the mesh.
 """
 
 from __future__ import annotations
@@ -12,7 +13,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, ClassVar
 
-from ndtheory import EnergyBounds, Number
+import numpy as np
+
+from ndtheory import EnergyBounds, EnergyConstants, Number, evaluate_energy
 from ndtheory.continuum import (
     ContinuumConstants,
     Rectangle,
@@ -25,15 +28,17 @@ from ndtheory.continuum import (
 )
 from ndtheory.intervals import Interval
 from ndtheory.moduli import Moduli, half_planes
-from verification.certificate.file_mesh import FileMesh, file_mesh
+from verification.constants.measuring import of_energy
 from verification.document import Document
+from verification.interface.pair import pair_from
 from verification.problem import Problem, ProblemError
 from verification.progress import Progress, silent
+from verification.threads import one_thread
 
-#: Radius of the kernel where there is no friction, and C_s plays no part.
+#: Radius of the kernel without friction, where C_s plays no part.
 ANY_RADIUS = Fraction(1)
 
-#: What no number here speaks of.
+#: Claims that no number here makes.
 NOT_CLAIMED = (
     "contraction on a mesh, which may need a smaller theta for good, however fine it is; the local Coulomb law, other"
     " kernels than the hat, unloading, rounding and discretisation errors of a run; that the iteration diverges at a"
@@ -41,18 +46,62 @@ NOT_CLAIMED = (
 )
 
 
+#: Cells along Gamma_c, and of both bodies, up to which rho is computed: a few seconds.
+MOST_ALONG, MOST_CELLS = 320, 30_000
+
+#: Why no theta is judged on the mesh.
+NO_THETA = "the file gives no theta, and none is proved in the continuum"
+
+
+@dataclass(frozen=True, kw_only=True)
+class FileMesh:
+    """Contact nodes and constants in energy norms of the mesh of a file, in doubles; ``why`` they were not computed."""
+
+    interface_nodes: int | None
+    energy: EnergyConstants | None
+    why: str = ""
+
+    @property
+    def theta_limit(self) -> float | None:
+        """``2/(1 + rho)``, with rho_normal without friction: where all of Gamma_c sticks no larger theta contracts."""
+        return None if self.energy is None else float(2 / (1 + self.energy.at_work))
+
+    def contracts(self, theta: float | None) -> bool | None:
+        """True if one step contracts at a theta; None where neither the limit nor the bound in energy norms decides."""
+        if self.energy is None or self.theta_limit is None or theta is None:
+            return None
+        if theta >= self.theta_limit:
+            return False
+        return True if evaluate_energy(self.energy, theta).verdict == "contraction" else None
+
+    def to_dict(self, theta: float | None) -> dict[str, Any]:
+        """The object ``mesh`` of the document."""
+        contracts, numbers = self.contracts(theta), ("rho", "rho_normal")
+        reason = dict.fromkeys(("interface_nodes", *numbers, "theta_limit"), self.why) if self.energy is None else {}
+        if contracts is None:
+            undecided = "theta is below the limit, and the bound in energy norms does not prove contraction there"
+            reason["contracts"] = self.why or (undecided if theta is not None else NO_THETA)
+        return {
+            "interface_nodes": self.interface_nodes,
+            **{name: self.number(name) for name in numbers},
+            "theta_limit": self.theta_limit,
+            "theta": theta,
+            "contracts": contracts,
+            "reason": reason | ({} if theta is not None else {"theta": NO_THETA}),
+        }
+
+    def number(self, name: str) -> dict[str, Any] | None:
+        """``rho`` or ``rho_normal`` of the mesh with its level."""
+        value = None if self.energy is None else getattr(self.energy, name)
+        return None if value is None else Number.of_float(float(value)).to_dict()
+
+
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ContinuumCertificate(Document):
     """Bounds that are guaranteed for the continuum.
 
-    Attributes
-    ----------
-    problem : Problem
-    constants : ContinuumConstants
-    energy : EnergyBounds or None
-        The theorem for the upper bounds of the constants; None where rho is not bounded.
-    mesh : FileMesh
-        rho on the mesh of the file, in doubles, which may be larger than the continuum's.
+    ``energy`` is the theorem for the upper bounds of the constants, None where rho is not bounded; ``mesh`` is rho on
+    the mesh of the file, in doubles, which may be larger than the continuum's.
     """
 
     schema: ClassVar[str] = "ndtheory.certificate/1"
@@ -73,12 +122,10 @@ class ContinuumCertificate(Document):
 
     @property
     def contracts(self) -> bool:
-        """Whether contraction is proved at the theta of the file; with ``auto`` at some theta."""
+        """True if contraction is proved at the theta of the file; with ``auto`` at some theta."""
         if self.energy is None:
             return False
-        return (
-            self.energy.verdict == "contraction" if self.energy.theta is not None else self.energy.interval is not None
-        )
+        return self.energy.interval is not None if self.energy.theta is None else self.energy.verdict == "contraction"
 
     @property
     def theta_judged(self) -> float | None:
@@ -90,7 +137,7 @@ class ContinuumCertificate(Document):
 
     @property
     def solvable(self) -> bool:
-        """Whether every small theta is proved to contract, so that (P1) has exactly one solution."""
+        """True if every small theta is proved to contract, so that (P1) has exactly one solution."""
         threshold = friction_threshold(self.constants).lo
         assert threshold is not None
         return self.friction < Fraction(threshold)
@@ -109,7 +156,6 @@ class ContinuumCertificate(Document):
 
     def content(self) -> dict[str, Any]:
         c, k, energy = self.constants, self.friction, self.energy
-        kappas = c.kappa(k)
         limit = None if energy is None or energy.friction_limit_multiple is None else energy.friction_limit_multiple.lo
         reason = dict(c.reason)
         if energy is None:
@@ -117,45 +163,34 @@ class ContinuumCertificate(Document):
         else:
             none = {name: why for name, why in energy.reason.items() if name in OF_ENERGY}
             reason |= none | ({"friction_limit": "no friction"} if limit is None else {})
-        proved = {} if energy is None else {name: getattr(energy, name) for name in OF_ENERGY if hasattr(energy, name)}
-
-        def one(value: Fraction | None) -> dict[str, Any] | None:
-            return None if value is None else upper(value).to_dict()
-
-        def of(name: str, side: Any) -> dict[str, Any] | None:
-            number = proved.get(name)
-            if not isinstance(number, Number):
-                return None
-            end = number.hi if side is upper else number.lo
-            return side(Fraction(end)).to_dict() if end is not None else None
-
-        moduli = [Moduli(young=body.young, poisson=body.poisson) for body in bodies(self.problem)]
+        at_most = lambda value: None if value is None else upper(Fraction(value)).to_dict()
+        at_least = lambda value: None if value is None else lower(Fraction(value)).to_dict()
+        end = lambda name, side: getattr(getattr(energy, name, None), side, None)
+        uppers = {name: getattr(c, name) for name in ("strips", "cut_off", "rho", "rho_normal")}
+        for name in ("C_s", "C_t1", "C_t2"):
+            uppers[name] = Interval.of(getattr(c, f"{name}_square")).sqrt().hi
+        uppers["kappa_1"], uppers["kappa_2"] = c.kappa(k)
+        order = 1 if self.problem.contact_body == 1 else -1  # the contact body first
+        bodies = (self.problem.body1, self.problem.body2)[::order]
+        moduli = [Moduli(young=body.young, poisson=body.poisson) for body in bodies]
         return {
             "kind": "continuum",
             "constants": {
-                "C_s": upper(Fraction(Interval.of(c.C_s_square).sqrt().hi)).to_dict(),
-                "C_t1": upper(Fraction(Interval.of(c.C_t1_square).sqrt().hi)).to_dict(),
-                "C_t2": upper(Fraction(Interval.of(c.C_t2_square).sqrt().hi)).to_dict(),
+                **{name: at_most(value) for name, value in uppers.items()},
                 "segments": [str(value) for value in c.segments],
-                "strips": one(c.strips),
-                "cut_off": one(c.cut_off),
-                "rho": one(c.rho),
-                "rho_least": lower(half_planes(*moduli).high).to_dict(),
-                "rho_ends": lower(c.rho_ends).to_dict(),
-                "rho_normal": one(c.rho_normal),
-                "kappa_1": one(kappas[0]),
-                "kappa_2": one(kappas[1]),
+                "rho_least": at_least(half_planes(*moduli).high),
+                "rho_ends": at_least(c.rho_ends),
             },
             "friction": float(k),
             "friction_threshold": friction_threshold(c).to_dict(),
-            "friction_limit": None if limit is None else lower(k * Fraction(limit)).to_dict(),
-            "theta": proved.get("theta"),
+            "friction_limit": None if limit is None else at_least(k * Fraction(limit)),
+            "theta": None if energy is None else energy.theta,
             "solvable": self.solvable,
             "interval": self._interval,
-            "theta_max_proved": of("theta_max_proved", lower),
-            "theta_proved": proved.get("theta_proved"),
-            "factor_proved": of("factor_proved", upper),
-            "factor": of("factor", upper),
+            "theta_max_proved": at_least(end("theta_max_proved", "lo")),
+            "theta_proved": None if energy is None else energy.theta_proved,
+            "factor_proved": at_most(end("factor_proved", "hi")),
+            "factor": at_most(end("factor", "hi")),
             "verdict": "contraction" if self.contracts else "no conclusion",
             "mesh": self.mesh.to_dict(self.theta_judged),
             "not_claimed": NOT_CLAIMED,
@@ -163,25 +198,17 @@ class ContinuumCertificate(Document):
         }
 
 
-#: What of the theorem needs a bound of rho.
-OF_ENERGY = (
-    "interval", "theta_max_proved", "theta_proved", "factor_proved", "factor", "theta", "friction_limit"
-)  # fmt: skip
-
-
-def bodies(problem: Problem) -> tuple[Any, Any]:
-    """The contact body and the Neumann body of a problem."""
-    pair = (problem.body1, problem.body2)
-    return pair if problem.contact_body == 1 else (pair[1], pair[0])
+#: Keys of the document that need a bound of rho.
+OF_ENERGY = ("interval", "theta_max_proved", "theta_proved", "factor_proved", "factor", "theta", "friction_limit")
 
 
 def two_rectangles(problem: Problem) -> TwoRectangles:
-    """The bodies of a problem, where the theory of this page speaks of them.
+    """The bodies of a problem to which the theory of the continuum applies.
 
     Raises
     ------
     ProblemError
-        Naming what stands against it.
+        Naming the key to which it does not apply.
     """
 
     def refuse(key: str, value: Any, needed: str) -> ProblemError:
@@ -191,7 +218,7 @@ def two_rectangles(problem: Problem) -> TwoRectangles:
         raise refuse("dimension", problem.dimension, "needed 2")
     law, friction = problem.contact.law, problem.contact.friction
     if friction and law != "nonlocal":
-        raise refuse("contact.law", law, 'needed "nonlocal": the theorem does not speak of the local law')
+        raise refuse("contact.law", law, 'needed "nonlocal": the theorem does not apply to the local law')
     found = {}
     for name, outer in (("body1", "bottom"), ("body2", "top")):
         body = getattr(problem, name)
@@ -199,7 +226,7 @@ def two_rectangles(problem: Problem) -> TwoRectangles:
             raise refuse(f"{name}.shape", body.shape, 'needed "rectangle"')
         held = {*body.fixed, *body.prescribed}
         if held != {outer}:
-            raise refuse(f"{name}.fixed", sorted(held), f'needed a body held at "{outer}" alone, fixed or prescribed')
+            raise refuse(f"{name}.fixed", sorted(held), f'needed a body held at "{outer}" only, fixed or prescribed')
         if None in body.prescribed.get(outer, ()):
             raise refuse(f"{name}.prescribed.{outer}", "free", "needed both components")
         if not body.poisson < Fraction(1, 2):
@@ -222,7 +249,7 @@ def two_rectangles(problem: Problem) -> TwoRectangles:
 
 
 def certify_continuum(problem: Problem, progress: Progress = silent) -> ContinuumCertificate:
-    """What is proved of contraction for two rectangles in the continuum.
+    """Prove contraction for two rectangles in the continuum.
 
     Parameters
     ----------
@@ -238,13 +265,38 @@ def certify_continuum(problem: Problem, progress: Progress = silent) -> Continuu
     Raises
     ------
     ProblemError
-        The theory does not speak of these bodies.
+        The theory does not apply to these bodies.
     """
-    model = two_rectangles(problem)
+    model, theta = two_rectangles(problem), problem.iteration.theta
     progress("bounding the constants of the continuum", None)
     constants = continuum_constants(model)
-    theta = problem.iteration.theta
-    friction = problem.contact.friction
-    energy = statement(constants, friction=friction, theta=None if theta == "auto" else theta)
+    energy = statement(constants, friction=problem.contact.friction, theta=None if theta == "auto" else theta)
     mesh = file_mesh(problem, progress)
     return ContinuumCertificate(problem=problem, constants=constants, energy=energy, mesh=mesh)
+
+
+def file_mesh(problem: Problem, progress: Progress = silent) -> FileMesh:
+    """Condense the two rectangles of a problem on their meshes, each held only at its outer side, and find rho."""
+    cells = [body.cells or () for body in (problem.body1, problem.body2)]
+    if max(max(own) for own in cells) > MOST_ALONG or sum(int(np.prod(own)) for own in cells) > MOST_CELLS:
+        needed = f"up to {MOST_ALONG} cells along a side and {MOST_CELLS} in all"
+        why = f"not computed beside a bound for the continuum: {needed} are; `ndtheory constants` finds rho"
+        return FileMesh(interface_nodes=None, energy=None, why=why)
+    progress("measuring rho on the mesh of the file", None)
+    try:
+        with one_thread():
+            pair = pair_from(problem)
+            grid = pair.contact.grid
+            found = of_energy(pair, np.arange(grid.size) < grid.t)
+    except ProblemError as error:
+        return FileMesh(interface_nodes=None, energy=None, why=f"the meshes are refused: {error}")
+    rho, rho_normal, k = found["rho_max"], found["rho_normal"], pair.friction
+    assert rho is not None
+    assert rho_normal is not None
+    kappas = {}
+    if k:
+        C_s, C_t1, C_t2 = (Fraction(found[name] or 0.0) for name in ("C_s_energy", "C_t1", "C_t2"))
+        kappas = {"kappa_1": k * C_s * C_t1, "kappa_2": k * C_s * C_t2}
+    # equal up to rounding where nothing slides
+    energy = EnergyConstants(rho=rho, rho_normal=min(rho_normal, rho), **kappas)
+    return FileMesh(interface_nodes=grid.n, energy=energy)

@@ -1,7 +1,7 @@
 """A certificate that T_theta contracts on a mesh: rational data from which anyone can decide the claim again.
 
 The solver of the semidefinite bound proposes multipliers in doubles.  They are rounded to decimals, and the bodies are
-described in the rational numbers of the problem file; :mod:`verification.certificate.check`, which knows nothing of
+described in the rational numbers of the problem file; :mod:`verification.certificate.check`, which imports nothing of
 this library, then decides in balls whether these multipliers prove the factor for these bodies.
 """
 
@@ -15,35 +15,30 @@ from typing import Any, ClassVar
 from ndtheory.number import Numeric
 from verification.algorithm.theta import choose
 from verification.bounds.bound import Subject
+from verification.bounds.interior_point import LMIError
 from verification.bounds.multipliers import QuadraticForms
-from verification.bounds.program import LMIError
 from verification.bounds.table import BOUNDS, certifying, strongest
 from verification.certificate import check
-from verification.certificate.claims import NOT_CONFIRMED, Claims, NoCertificate, written
-from verification.certificate.description import describe, same
+from verification.certificate.claims import NOT_CONFIRMED, Claims, NoCertificate, describe, same, written
 from verification.constants import Measured, measure
 from verification.document import Document
-from verification.interface.pair import UNITS, ContactPair, build
+from verification.interface.pair import UNITS, ContactPair, pair_from
 from verification.problem import Problem, ProblemError
 from verification.progress import Progress, silent
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Checked(Document):
-    """What came of checking a certificate again.
+    """Result of checking a certificate again.
 
     Attributes
     ----------
-    accepted : bool
-        Whether its multipliers prove its claim for its bodies.
-    why : str
-        Why it is refused; empty where it is not.
-    words : str
-        What was checked.
-    sha256 : str
-        Of the bodies and what joins them.
+    accepted, why : bool, str
+        True if its multipliers prove its claim for its bodies; why it is refused.
+    words, sha256 : str
+        The claim that was checked, and the hash of the bodies and what joins them.
     same : bool or None
-        Whether these are the bodies of the problem it was held against; None without one.
+        True if these are the bodies of the problem that was given with it; None without one.
     """
 
     schema: ClassVar[str] = "ndtheory.certificate-check/1"
@@ -61,29 +56,22 @@ class Checked(Document):
         return f"accepted: {self.words}" if self.accepted else f"refused: {self.why}"
 
     def content(self) -> dict[str, Any]:
-        reason = {} if self.same is not None else {"same": "no problem was given to hold it against"}
-        return {
-            "accepted": self.accepted,
-            "why": self.why,
-            "words": self.words,
-            "sha256": self.sha256,
-            "same": self.same,
-            "reason": reason,
-        }
+        reason = {} if self.same is not None else {"same": "no problem was given to compare it with"}
+        names = ("accepted", "why", "words", "sha256", "same")
+        return {**{name: getattr(self, name) for name in names}, "reason": reason}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Certificate(Document):
-    """A claim about T_theta, the bodies that it is about, and what proves it.
+    """A claim about T_theta, the bodies that it is about, and its proof.
 
     Attributes
     ----------
     edition : str
         Name of the bound that proposed the factor.
-    discrete : dict
-        Bodies, transfer, weights, kernel and friction in rationals, as texts.
-    claim : dict
-        theta, the factor, the multipliers and the bits of the balls in which they prove it.
+    discrete, claim : dict
+        Bodies, transfer, weights, kernel and friction in rationals, as texts; theta, the factor, the multipliers and
+        the bits of the balls in which they prove it.
     lower : float or None
         The largest factor found of a pair of forces, in doubles: no certificate proves less.
     """
@@ -165,7 +153,7 @@ def certify(
         raise ValueError(f"edition {edition!r}: needed one of {', '.join(certifying())}")
     if problem.dimension != 2:
         raise refuse("dimension", "needed a plane problem: in 1D rho is a ratio of exact numbers")
-    pair = build(problem)
+    pair = pair_from(problem)
     measured = measure(pair)
     if pair.outside:
         raise refuse("contact", f"outside the theorem: {pair.outside[0]}")
@@ -181,14 +169,14 @@ def certify(
 
 
 def check_again(document: Any, problem: Problem | None = None) -> Checked:
-    """Decide the claim of a certificate anew, from its rational data alone.
+    """Decide the claim of a certificate anew, only from its rational data.
 
     Parameters
     ----------
     document : dict
         As ``certificate.json`` holds it.
     problem : Problem, optional
-        Whose bodies the certificate should be about.
+        The problem whose bodies the certificate should be about.
 
     Returns
     -------
@@ -236,7 +224,7 @@ def check_again(document: Any, problem: Problem | None = None) -> Checked:
 def _proposed(
     pair: ContactPair, measured: Measured, theta: Fraction, edition: str
 ) -> tuple[float, dict[str, Any], float | None]:
-    """What the factor of a bound is below 1, multipliers that should prove it, and the largest factor found."""
+    """1 minus the factor of a bound, multipliers that should prove it, and the largest factor found."""
 
     bound = BOUNDS[edition]
     try:

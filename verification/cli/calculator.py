@@ -9,17 +9,13 @@ import click
 from ndtheory import EDITIONS, Constants, EnergyConstants, HypothesisError
 from ndtheory.constants import take
 from verification.bounds.bound import NOT_ASKED, Subject
-from verification.bounds.calculated import Calculated
-from verification.bounds.energy import Energy
-from verification.bounds.section5 import Section5
-from verification.bounds.table import BOUNDS
+from verification.bounds.table import BOUNDS, ENERGY, SECTION_5, Calculated, Energy, Section5
 from verification.cli.console import deliver
 from verification.cli.options import OneOf
 from verification.sections.bounds import sections
 
-#: The constants of Section 5 by key, and the options that give them.
-CONSTANTS = {"m": "--m", "M": "--M", "C_R": "--CR", "C_s": "--Cs", "C_tr": "--Ctr", "k": "--k", "C_K": "--CK"}
-ENERGY = {"rho": "--rho", "kappa_1": "--kappa1", "kappa_2": "--kappa2"}
+#: The options by the constants that they give.
+OPTIONS = {key: f"--{key.replace('_', '')}" for key in (*SECTION_5, *ENERGY)}
 
 
 @click.command()
@@ -55,7 +51,7 @@ def bounds(edition: str, theta: str | None, check: bool, as_json: bool, **given:
       ndtheory bounds --m 3084 --M 153229 --CR 1.70 --CK 1e-8 --theta 1e-4
       ndtheory bounds --rho 0.475 --kappa1 0.986 --kappa2 0.427 --theta 0.7
     """
-    of_section_5 = {key: given[key] for key in CONSTANTS}
+    of_section_5 = {key: given[key] for key in SECTION_5}
     of_norms = {key: given[key] for key in ENERGY}
     if check and theta is None:
         raise click.UsageError("--check needs --theta", click.get_current_context())
@@ -91,13 +87,13 @@ def _constants(given: Mapping[str, str | None]) -> Constants:
     for key in ("m", "M", "C_R"):
         if given[key] is None:
             needed = "needed --m, --M, --CR and --CK, or --rho"
-            raise click.UsageError(f"{CONSTANTS[key]} is missing: {needed}", click.get_current_context())
+            raise click.UsageError(f"{OPTIONS[key]} is missing: {needed}", click.get_current_context())
     return Constants(**{key: value for key, value in given.items() if value is not None})
 
 
 def _energy(given: Mapping[str, str | None], rubs: bool) -> EnergyConstants | None:
     """The constants of the bound in energy norms; None where they were not given."""
-    missing = [ENERGY[key] for key in ENERGY if given[key] is None]
+    missing = [OPTIONS[key] for key in ENERGY if given[key] is None]
     if len(missing) == len(ENERGY):
         return None
     if given["rho"] is None or len(missing) == 1 or (rubs and missing):
@@ -106,4 +102,4 @@ def _energy(given: Mapping[str, str | None], rubs: bool) -> EnergyConstants | No
     try:
         return EnergyConstants(**{key: value for key, value in given.items() if value is not None})
     except HypothesisError as error:
-        raise HypothesisError(ENERGY[error.key], error.value, error.needed) from None
+        raise HypothesisError(OPTIONS[error.key], error.value, error.needed) from None

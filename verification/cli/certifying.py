@@ -1,4 +1,4 @@
-"""The command certify: a proof of contraction that a stranger can check again."""
+"""The command certify: a proof of contraction that anyone can check independently."""
 
 from __future__ import annotations
 
@@ -9,11 +9,9 @@ from typing import Any
 
 import click
 
-from verification.cli.console import deliver, stages
-from verification.cli.failing import fail
-from verification.cli.options import JSON, SET, SWAP, THETA, Registered, check_place, one_file
+from verification.cli.console import deliver, fail, stages
+from verification.cli.options import JSON, SET, SWAP, THETA, Registered, Typed, check_place, one_file
 from verification.cli.problems import load_problem
-from verification.cli.typed import Typed
 
 #: A certificate of a hundred contact nodes has a few megabytes.
 MOST_BYTES = 100_000_000
@@ -100,7 +98,7 @@ def certify(
         return fail(error, "not proved", "no certificate")
     typed = Typed(file=file, keys=keys, theta=theta, swap=swap)
     shown = lambda found: sections(found, target)
-    deliver(found, shown, as_json, writing(found, target), target, typing=typed.command)
+    deliver(found, shown, as_json, writing(target), target, typing=typed.command)
     return 0
 
 
@@ -111,7 +109,7 @@ def _prove_continuum(
     from ndtheory.strip import Unproved
     from verification.certificate.continuum import certify_continuum
     from verification.output.files import writing
-    from verification.sections.continuum import sections
+    from verification.sections.certificate import continuum
 
     problem = load_problem(file, keys, theta=theta, swap=swap)
     try:
@@ -120,7 +118,7 @@ def _prove_continuum(
     except Unproved as error:
         return fail(error, "not proved", "nothing is proved")
     typed = Typed(file=file, keys=keys, theta=theta, swap=swap)
-    deliver(found, sections, as_json, writing(found, target), target, typing=typed.command)
+    deliver(found, continuum, as_json, writing(target), target, typing=typed.command)
     return 0 if found.contracts else 1
 
 

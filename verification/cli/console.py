@@ -1,4 +1,4 @@
-"""One console for all output and progress: results to stdout, everything else to stderr."""
+"""One console for all output and progress: results to stdout, everything else to stderr; commands without a result."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ import functools
 import math
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TextIO, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, TextIO, TypeVar
 
 import click
 
 from ndtheory.texts import printable
+from verification.document import Document
 from verification.interrupts import undisturbed
 from verification.progress import Progress, silent
 from verification.sections.layout import Typing, lines, nothing_typed
@@ -25,9 +26,9 @@ if TYPE_CHECKING:
     from rich.progress import Progress as Live
 
     from verification.algorithm.iterate import Iterate
-    from verification.document import Document
+    from verification.problem.specification import Problem
 
-D = TypeVar("D", bound="Document")
+D = TypeVar("D", bound=Document)
 
 
 class ReaderGone(Exception):
@@ -35,10 +36,10 @@ class ReaderGone(Exception):
 
 
 class Interrupted(Exception):
-    """Ctrl-C, of which a line has told already."""
+    """Ctrl-C, which a line on stderr has reported already."""
 
 
-#: What a command says that Ctrl-C ended before and after something of its result was shown.
+#: Messages of a command that Ctrl-C ended before and after part of its result was shown.
 NOTHING, SHOWN = "interrupted before anything was computed", "interrupted; what was computed is shown above"
 
 
@@ -56,13 +57,7 @@ _stdout = _Stdout()
 
 
 def say(text: str, *, bold: bool = False) -> None:
-    """Lines of the result; characters of control but the ends of lines are shown as escapes.
-
-    Raises
-    ------
-    ReaderGone
-        The other end of a pipe was closed.
-    """
+    """Print lines of the result, control characters as escapes; ReaderGone if the other end of a pipe was closed."""
     if _stdout.unread:
         return
     text = "\n".join(map(printable, text.split("\n")))
@@ -74,24 +69,13 @@ def say(text: str, *, bold: bool = False) -> None:
 
 
 def show(sections: Sections, typing: Typing = nothing_typed, after: str = "") -> None:
-    """Sections, after the one with that id.
-
-    Raises
-    ------
-    ReaderGone
-    """
+    """Print sections after the one with that id."""
     for line, title in lines(sections, "terminal", typing=typing, after=after):
         say(line, bold=title)
 
 
 def one_by_one(*, needed: bool = False) -> Callable[[Sections], None]:
-    """A function that shows sections as soon as they are known, those of one id as one.
-
-    Parameters
-    ----------
-    needed : bool
-        As of :func:`part`, and so are the errors.
-    """
+    """A function that shows sections as soon as they are known, those of one id as one; ``needed`` as in ``part``."""
     last = ""
 
     def tell(sections: Sections) -> None:
@@ -105,17 +89,9 @@ def one_by_one(*, needed: bool = False) -> Callable[[Sections], None]:
 
 @contextlib.contextmanager
 def part(*, needed: bool = False) -> Iterator[None]:
-    """Show a part of a result whole, while the rest is still worked out.
+    """Show a part of a result without interruption, while the rest is still being computed.
 
-    Parameters
-    ----------
-    needed : bool
-        Whether the rest is wanted even where nobody reads it, as for files.
-
-    Raises
-    ------
-    ReaderGone
-        Nobody reads stdout, and the rest is not needed.
+    If nobody reads stdout, ReaderGone is raised, unless the rest is ``needed``, as for files.
     """
     with undisturbed():
         if _stdout.live is not None:
@@ -132,7 +108,7 @@ def part(*, needed: bool = False) -> Iterator[None]:
 
 @contextlib.contextmanager
 def alone() -> Iterator[None]:
-    """Let results alone reach stdout: what else is written there, by a C library too, goes to stderr."""
+    """Let only results reach stdout: what else is written there, by a C library too, goes to stderr."""
     out, _stdout.said = sys.stdout, False
     try:
         number = None if out is None else out.fileno()
@@ -167,7 +143,7 @@ def _restore(stream: TextIO, number: int) -> None:
 
     with contextlib.suppress(OSError, TypeError, AttributeError):  # Windows
         ctypes.CDLL(None).fflush(None)
-    with contextlib.suppress(OSError):  # a reader that has gone, a disk that is full: told already
+    with contextlib.suppress(OSError):  # a closed pipe or a full disk, which has been reported
         stream.flush()
     os.dup2(stream.fileno(), number)
     with contextlib.suppress(OSError):
@@ -175,7 +151,7 @@ def _restore(stream: TextIO, number: int) -> None:
 
 
 def interruptible(command: Callable[..., Any]) -> Callable[..., Any]:
-    """A command whose result alone reaches stdout, and that ends with one line after Ctrl-C."""
+    """Wrap a command: only its result reaches stdout, and it ends with one line after Ctrl-C."""
 
     @functools.wraps(command)
     def run(*args: Any, **options: Any) -> Any:
@@ -190,13 +166,13 @@ def interruptible(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def interruption() -> str:
-    """What to say of a Ctrl-C that ended the command."""
+    """The message on a Ctrl-C that ended the command."""
     return SHOWN if _stdout.said else NOTHING
 
 
 def complain(text: str) -> None:
-    """A line about the result, as errors, warnings and notes are; characters of control are shown as escapes."""
-    with contextlib.suppress(OSError):  # nowhere to complain to
+    """Print an error, a warning or a note to stderr, control characters as escapes."""
+    with contextlib.suppress(OSError):  # stderr is closed
         click.echo(printable(text), err=True)
 
 
@@ -204,26 +180,15 @@ def deliver(
     document: D,
     sections: Callable[[D], Sections],
     as_json: bool,
-    write: Callable[[], None] | None = None,
+    write: Callable[[D], None] | None = None,
     folder: Path | None = None,
     *,
     typing: Typing = nothing_typed,
 ) -> None:
-    """Show first, then write: what goes wrong while writing costs no result.
+    """Show a result, then write its files: an error while writing loses no result.
 
-    Parameters
-    ----------
-    document : Document
-    sections : callable
-        Gives what is shown of it; ``as_json`` shows the document itself.
-    write, folder : callable and path, optional
-        What writes, and where.
-    typing : callable, optional
-        Completes the command to type next.
-
-    Raises
-    ------
-    ReaderGone, Interrupted
+    ``as_json`` shows the document instead of its sections.  ``write`` writes into ``folder``, if given; ``typing``
+    completes the command to type next.
     """
     text = document.to_json() if as_json else ""
     with part(needed=write is not None):
@@ -236,7 +201,7 @@ def deliver(
     try:
         with stages() as tell:
             tell(f"drawing and writing {folder}", None)
-            write()
+            write(document)
     except KeyboardInterrupt:
         complain(f"interrupted while {folder} was written; the result is shown above")
         raise Interrupted from None
@@ -246,7 +211,7 @@ def deliver(
 
 @contextlib.contextmanager
 def stages() -> Iterator[Progress]:
-    """A live line on a terminal's stderr: what is being done, the share of it that is done, the time it takes."""
+    """A live line on a terminal's stderr: the current stage, its share that is done, the time."""
     if sys.stderr is None or not sys.stderr.isatty():
         yield silent
         return
@@ -272,7 +237,7 @@ def stages() -> Iterator[Progress]:
 
 @contextlib.contextmanager
 def progress(tell: Progress, tolerance: float) -> Iterator[Callable[[Iterate], None]]:
-    """Tell how far the residual has fallen towards its tolerance."""
+    """Report how far the residual has fallen towards its tolerance."""
 
     def watch(iterate: Iterate) -> None:
         residual = iterate.relative_residual
@@ -280,3 +245,72 @@ def progress(tell: Progress, tolerance: float) -> Iterator[Callable[[Iterate], N
         tell(f"iterating: step {iterate.iteration}, residual {residual:.2e}", min(fallen, 1.0))
 
     yield watch
+
+
+#: The key of the problem in the context of a command.
+PROBLEM = "ndtheory.problem"
+
+
+class Failure(Document):
+    """The document of a command that ends without a result: a solver failed, or nothing was proved."""
+
+    schema: ClassVar[str] = "ndtheory.failure/1"
+
+    def __init__(self, *, command: str, outcome: str, file: str | None, error: str, problem: Problem | None) -> None:
+        self.command, self.outcome, self.file, self.error, self.problem = command, outcome, file, error, problem
+        self.units: Mapping[str, str] = {"length": "any", "stress": "any"} if problem is None else problem.units
+
+    def content(self) -> dict[str, Any]:
+        reason = {} if self.file is not None else {"file": "the command was given none"}
+        return {
+            "command": self.command,
+            "outcome": self.outcome,
+            "file": self.file,
+            "error": self.error,
+            "reason": reason,
+        }
+
+
+def remember(problem: Problem) -> Problem:
+    """Keep the problem of a command for the document of a failure."""
+    context = click.get_current_context(silent=True)
+    if context is not None:
+        context.meta[PROBLEM] = problem
+    return problem
+
+
+def fail(error: Exception, outcome: str = "error", lead: str = "") -> int:
+    """Report in one line, after ``lead``, why the current command has no result; its document with --json; return 1."""
+    context = click.get_current_context()
+    problem: Problem | None = context.meta.get(PROBLEM)
+    given = context.params.get("file")
+    file = None if given is None else str(given)
+    complain(": ".join(part for part in ("ndtheory", file, lead, str(error)) if part))
+    if context.params.get("as_json"):
+        command = context.command_path.partition(" ")[2]
+        found = Failure(command=command, outcome=outcome, file=file, error=str(error), problem=problem)
+        say(found.to_json())
+    return 1
+
+
+def reported(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Wrap a command: a failure of a solver is reported with the file, and as a document."""
+
+    @functools.wraps(command)
+    def run(*args: Any, **options: Any) -> Any:
+        try:
+            return command(*args, **options)
+        except RuntimeError as error:
+            if not solver_failed(error):
+                raise
+            return fail(error)
+
+    return run
+
+
+def solver_failed(error: RuntimeError) -> bool:
+    """True for errors of the solvers of step II and of the global method."""
+    from verification.contact import ContactError  # numpy: only now
+    from verification.monolithic import SolveError
+
+    return isinstance(error, (ContactError, SolveError))

@@ -1,4 +1,4 @@
-"""Groups of commands: a name that is not known is answered with the nearest one, and one command may be the default."""
+"""Groups of commands: an unknown name gets the nearest one as a suggestion, and one command may be the default."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ndtheory.texts import did_you_mean
 
 
 class Commands(click.Group):
-    """A group that answers an unknown name with the one that resembles it."""
+    """A group that suggests the nearest name for an unknown one."""
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -25,7 +25,7 @@ class Commands(click.Group):
 
 
 class AdviseCommand(click.Command):
-    """One of several commands on one subject: an option of another one is refused with the name of that command."""
+    """One of several commands on one subject; the error for an option of another one names that command."""
 
     #: The group that the command belongs to; None until it is added to one.
     group: AdviseGroup | None = None
@@ -55,7 +55,7 @@ class AdviseCommand(click.Command):
 
 
 class Default(AdviseCommand):
-    """The command of a group that needs no name: its help is that of the group, and lists the other commands."""
+    """The command of a group that needs no name: its help serves the group, and lists the other commands."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Read the words of the command; without its argument, say which commands there are besides."""
@@ -89,15 +89,7 @@ class Default(AdviseCommand):
 
 
 class AdviseGroup(Commands):
-    """A group whose default is a command with an argument: a first word that names no command is that argument.
-
-    Parameters
-    ----------
-    default : Default
-        The command without a name.
-    forms : sequence of AdviseCommand
-        The commands with one.
-    """
+    """A group whose default is a command with an argument: a first word that names no command is that argument."""
 
     def __init__(self, default: Default, forms: Sequence[AdviseCommand]) -> None:
         super().__init__(default.name, help=default.help, commands=list(forms))
@@ -113,7 +105,7 @@ class AdviseGroup(Commands):
     def make_context(
         self, info_name: str | None, args: list[str], parent: click.Context | None = None, **extra: Any
     ) -> click.Context:
-        """The context of the group where a word names a command, else that of the default; options may come first."""
+        """The group's context if a word names a command, else the default's; options may come first."""
         first = _first_word(self.default, args)
         if first is None or args[first] not in self.commands:
             return self.default.make_context(info_name, args, parent, **extra)
@@ -131,7 +123,7 @@ def takes(command: click.Command, option: str) -> bool:
 
 
 def _first_word(command: click.Command, args: Sequence[str]) -> int | None:
-    """Place of the first word that is neither an option of a command nor the value of one."""
+    """Index of the first word that is neither an option of a command nor the value of one."""
     place = 0
     while place < len(args):
         word = args[place]

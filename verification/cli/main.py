@@ -18,9 +18,17 @@ import ndtheory
 import verification
 from ndtheory import HypothesisError
 from ndtheory.texts import printable
-from verification.cli import advising, calculator, certifying, drawing, ledger, problems, reproducing, sweeping
-from verification.cli.console import NOTHING, SHOWN, Interrupted, ReaderGone, complain, interruptible, interruption
-from verification.cli.failing import reported
+from verification.cli import advising, calculator, certifying, ledger, problems, sweeping
+from verification.cli.console import (
+    NOTHING,
+    SHOWN,
+    Interrupted,
+    ReaderGone,
+    complain,
+    interruptible,
+    interruption,
+    reported,
+)
 from verification.cli.forms import AdviseGroup, Commands
 
 #: Exit statuses of the interface.  A crash is none of them.
@@ -52,10 +60,10 @@ for command in (
     problems.solve,
     problems.compare,
     advising.advise,
-    drawing.region,
+    sweeping.region,
     sweeping.sweep,
     certifying.certify,
-    reproducing.reproduce,
+    ledger.reproduce,
     ledger.verify,
 ):
     for form in command.forms().values() if isinstance(command, AdviseGroup) else [command]:
@@ -68,11 +76,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit status.
 
     2 bad input (one line), 1 a run that did not converge or a proved claim violated, 3 inconclusive, 130 Ctrl-C.
-
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        Those of the process by default: it is then ours, and what it does at its end is not interrupted any more.
+    Without arguments the process's are taken; Ctrl-C is then ignored once the command has ended.
     """
     ours = arguments is None
     try:
@@ -88,15 +92,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 @contextlib.contextmanager
 def _interrupts(last: bool) -> Iterator[list[int]]:
-    """Take notice of Ctrl-C even where a library makes something else of it.
+    """Record each Ctrl-C, also one that a library swallows; with ``last`` none interrupts anything afterwards.
 
-    Python drops what is raised in a finaliser: such a Ctrl-C comes again by an alarm.  An extension module that is
+    Python drops what is raised in a finaliser: an alarm raises such a Ctrl-C again.  An extension module that is
     interrupted while it is imported raises an ImportError, or drops it: an alarm looks again until the import is over.
-
-    Parameters
-    ----------
-    last : bool
-        Nothing may be interrupted afterwards.
     """
     seen: list[int] = []
     first_thread = threading.current_thread() is threading.main_thread()
@@ -134,14 +133,14 @@ def _interrupts(last: bool) -> Iterator[list[int]]:
 
 
 def _importing(frame: FrameType | None) -> bool:
-    """Whether a module is being imported on this stack."""
+    """True if a module is being imported on this stack."""
     while frame is not None and frame.f_code.co_filename != "<frozen importlib._bootstrap>":
         frame = frame.f_back
     return frame is not None
 
 
 def _run(arguments: Sequence[str] | None, seen: Sequence[int]) -> int:
-    """The command, and what every error becomes."""
+    """Run the command and turn every error into an exit status."""
     found = getattr(verification, "__version__", "unknown")
     if found != ndtheory.__version__:
         complain(
@@ -174,9 +173,9 @@ def _run(arguments: Sequence[str] | None, seen: Sequence[int]) -> int:
     except Interrupted:
         return INTERRUPTED
     except (ReaderGone, BrokenPipeError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is still buffered has nowhere to go
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # drop what is still buffered
         return DONE
-    except SystemExit as error:  # click meets a closed pipe with an exit of its own
+    except SystemExit as error:  # click exits when a pipe is closed
         return error.code if isinstance(error.code, int) and error.code != NOT_MET else DONE
     except Exception as error:
         if seen:

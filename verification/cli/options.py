@@ -1,14 +1,18 @@
-"""Options that several commands share, and the types of their values."""
+"""Options that several commands share, the types of their values, and the problem as it was typed."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from shlex import quote
 from typing import Any, TypeVar
 
 import click
 
 from ndtheory.texts import did_you_mean
+from verification.sections.layout import nothing_typed
+from verification.sections.parts import Next
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -39,7 +43,7 @@ SET = click.option(
 
 
 class OneOf(click.Choice[str]):
-    """A word of a list; one that is not on it is answered with the list and the word that may be meant."""
+    """A word of a list; the error for another word has the list and the word that may be meant."""
 
     def get_invalid_choice_message(self, value: Any, ctx: click.Context | None) -> str:
         """The list, and the word that resembles the value."""
@@ -48,13 +52,7 @@ class OneOf(click.Choice[str]):
 
 
 class Registered(OneOf):
-    """A name of what is registered: its module is imported, and read, when the names are needed.
-
-    Parameters
-    ----------
-    names : callable
-        Gives the names there are.
-    """
+    """A registered name; ``names`` returns the names there are, and imports their module only when they are needed."""
 
     def __init__(self, names: Callable[[], Sequence[str]]) -> None:
         self.case_sensitive = True
@@ -125,12 +123,7 @@ def one_file(*endings: str, words: str, required: bool = False) -> Callable[[F],
 
 
 def check_place(target: Path) -> None:
-    """Refuse the name of a file that cannot be written, or that is not ours to write over.
-
-    Raises
-    ------
-    ProblemError
-    """
+    """Raise ProblemError for a file that cannot be written, or that another program has written."""
     from verification.output.files import check_ours
     from verification.problem.tables import ProblemError
 
@@ -147,3 +140,36 @@ JOBS = click.option(
 STORE = click.option(
     "--store", type=click.Path(path_type=Path), metavar="STORE", help="File that keeps the rows of runs (SQLite)."
 )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Typed:
+    """A problem file and the changes by options, for the command that is suggested next.
+
+    ``keys`` are those of ``--set``, in their order.
+    """
+
+    file: Path
+    keys: Mapping[str, str] = field(default_factory=dict)
+    theta: str | None = None
+    relaxation: str | None = None
+    swap: bool = False
+
+    def command(self, part: Next) -> str:
+        """The words of a command with the problem; empty if they could not be pasted."""
+        if not part.problem:
+            return nothing_typed(part)
+        first, *options = part.words
+        words = ["ndtheory", first, self._place()]
+        words += [word for key, value in self.keys.items() for word in ("--set", f"{key}={value}")]
+        if part.iteration:
+            given = {"--theta": self.theta, "--relaxation": self.relaxation}
+            words += [word for name, value in given.items() if value is not None for word in (name, value)]
+        words += ["--swap-roles"] * (self.swap != part.exchanged)
+        words += options
+        return " ".join(map(quote, words)) if all(word.isprintable() for word in words) else ""
+
+    def _place(self) -> str:
+        """The file, with ./ before what could be read as an option or as the name of a command."""
+        name = str(self.file)
+        return f"./{name}" if name.startswith("-") or (self.file.name == name and not self.file.suffix) else name

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import os
+import shutil
+import sys
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from verification.cli.console import Interrupted, complain, deliver, one_by_one, progress, say, stages
-from verification.cli.failing import remember
-from verification.cli.options import FILE, FOLDER, JSON, SET, SWAP, folder_name, of_a_run
-from verification.cli.remedies import remedy
-from verification.cli.typed import Typed
+from verification.cli.console import Interrupted, complain, deliver, one_by_one, progress, remember, say, stages
+from verification.cli.options import FILE, FOLDER, JSON, SET, SWAP, Typed, folder_name, of_a_run
 
 if TYPE_CHECKING:
     from verification.algorithm.runs import Run
     from verification.comparison import Comparison
+    from verification.interface.pair import ContactPair
     from verification.problem.specification import Problem
 
 
@@ -77,20 +80,15 @@ def _title(text: str) -> str:
 def load_problem(
     file: Path, keys: Mapping[str, str], *, theta: str | None = None, relaxation: str | None = None, swap: bool = False
 ) -> Problem:
-    """The problem of a file with what the options change: first --set, then the others.
-
-    Raises
-    ------
-    ProblemError, HypothesisError
-    """
+    """The problem of a file, changed by the options: first --set, then the others."""
     from verification.problem import ProblemError, load
-    from verification.problem.vocabulary import vocabulary
+    from verification.problem.reading import takes_theta
 
     chosen = {} if relaxation is None else {"iteration.relaxation": relaxation}
     problem = load(file).with_keys({**keys, **chosen})
     if theta is not None:
         rule = problem.iteration.relaxation
-        if not vocabulary().takes_theta(rule):
+        if not takes_theta(rule):
             needed = f'needed no theta beside relaxation = "{rule}", which takes its step from rho'
             raise ProblemError(str(file), "--theta", theta, needed)
         problem = problem.with_theta(theta)
@@ -147,12 +145,12 @@ def run(file: Path, solver: Any, start: Path | None, folder: Path | None, as_jso
     from verification.advice.matrix_files import read_matrix
     from verification.algorithm import runs
     from verification.algorithm.start import forces
-    from verification.interface.pair import build
+    from verification.interface.pair import pair_from
     from verification.output.folder import Folder
     from verification.sections.run import sections
 
-    target = None if folder is None else Folder(folder, "run")
-    pair = build(problem)
+    write = None if folder is None else Folder(folder, "run").write
+    pair = pair_from(problem)
     g = None if start is None else forces(read_matrix(start), pair, str(start))
     _warn(pair.warnings)
     with stages() as tell, progress(tell, problem.iteration.tolerance) as watch:
@@ -163,7 +161,6 @@ def run(file: Path, solver: Any, start: Path | None, folder: Path | None, as_jso
         except KeyboardInterrupt:  # costs no run
             finished = replace(finished, interrupted=True).linearise()
     _warn(finished.warnings[len(pair.warnings) :])
-    write = None if target is None else lambda: target.write_run(finished)
     deliver(finished, sections, as_json, write, folder, typing=Typed(file=file, **changes).command)
     return _status_of_run(finished, changes["swap"])
 
@@ -190,14 +187,13 @@ def solve(file: Path, keys: dict[str, str], folder: Path | None, as_json: bool) 
     from verification.sections import run
 
     problem = load_problem(file, keys)
-    target = None if folder is None else Folder(folder, "solve")
+    write = None if folder is None else Folder(folder, "solve").write
     bodies = discretise(problem)
     _warn(bodies.warnings)
     with stages() as tell:
         tell("solving both bodies at once", None)
         solution = monolithic.solve(bodies)
     _warn(list(solution.checks.warnings))
-    write = None if target is None else lambda: target.write_solution(solution)
     deliver(solution, run.solution, as_json, write, folder, typing=Typed(file=file, keys=keys).command)
     return 0
 
@@ -274,7 +270,6 @@ def demo(folder: Path, as_json: bool) -> int:
     Example:
       ndtheory demo -o section6
     """
-    from verification.cli.shell import unreached
     from verification.output.folder import Folder
     from verification.problem import load
 
@@ -287,19 +282,18 @@ def demo(folder: Path, as_json: bool) -> int:
 
 def _compare(problem: Problem, typed: Typed, folder: Path | None, solver: Any, as_json: bool, **asked: Any) -> int:
     from verification import comparison as verdicts
-    from verification.interface.pair import build
+    from verification.interface.pair import pair_from
     from verification.output.folder import Folder
     from verification.sections.comparison import Parts
     from verification.sections.comparison import verdicts as end
 
-    target = None if folder is None else Folder(folder, "compare")
-    pair = build(problem)
+    write = None if folder is None else Folder(folder, "compare").write
+    pair = pair_from(problem)
     _warn(pair.warnings)
-    parts = None if as_json else Parts(pair, one_by_one(needed=target is not None))
-    with stages() as tell, progress(tell, problem.iteration.tolerance) as watch:
+    parts = None if as_json else Parts(pair, one_by_one(needed=write is not None))
+    with stages() as tell, progress(tell, problem.iteration.tolerance) as watch, parts or nullcontext():
         comparison = verdicts.compare(pair, solver=solver, watch=watch, progress=tell, listener=parts, **asked)
     _warn(comparison.run.warnings[len(pair.warnings) :])
-    write = None if target is None else lambda: target.write_comparison(comparison)
     deliver(comparison, end, as_json, write, folder, typing=typed.command)
     return _status_of_comparison(comparison, typed.swap)
 
@@ -329,3 +323,66 @@ def _status_of_comparison(comparison: Comparison, swapped: bool) -> int:
     if outcome in ("stalled", "diverged"):
         return _status_of_run(comparison.run, swapped)
     return 3 if comparison.inconclusive else 0
+
+
+def remedy(finished: Run, swapped: bool) -> str:
+    """Advice after a run that did not converge, with ``--swap-roles`` or without, in one sentence."""
+    from verification.algorithm.ending import MOST
+    from verification.algorithm.rates import noise
+    from verification.constants import measure
+
+    pair, theta, last = finished.pair, float(finished.theta), finished.last
+    apart = finished.coupled_residual is not None and finished.coupled_residual > MOST
+    if finished.outcome == "limit" and not apart:
+        return "not converged: max_iterations was reached while the residual still fell; raise it, or change theta"
+    if last.residual <= 100 * noise(pair, last):
+        reached = f"{last.relative_residual:.1e}"
+        return f"{finished.outcome}: the residual fell to rounding, {reached}; the tolerance must be larger than that"
+    if theta < 1e-9:
+        return f"{finished.outcome}: a step of theta = {theta:g} is lost in rounding; try a larger theta"
+    rho = measure(pair)
+    here = f"{finished.outcome}: theta = {theta:g} does not contract here"
+    if finished.outcome == "limit":
+        here = "not converged: max_iterations was reached far from a state of contact"
+    roles = "without --swap-roles" if swapped else "--swap-roles"
+    exchanged = _exchanged(pair)
+    if rho.rho_max is None:
+        return f"{here}; try a smaller theta" + (f", or {roles}" if exchanged else "")
+    beside = None if exchanged is None else measure(exchanged).rho_max
+    good, other = _worth_trying(rho.rho_max.value), 0.0 if beside is None else _worth_trying(beside.value)
+    better = f", or {roles} with --theta {other:.2g}" if other > good else ""
+    if theta <= good:
+        return f"{here}; try --theta {theta / 2:.2g}{better}"
+    return f"{here}; try --theta {good:.2g} (2/(2 + rho), rho = {rho.rho_max.value:.3g}){better}"
+
+
+def _exchanged(pair: ContactPair) -> ContactPair | None:
+    """The pair with its roles exchanged; None if these roles are refused."""
+    try:
+        return pair.swapped()
+    except ValueError:  # problem errors are such
+        return None
+
+
+def _worth_trying(rho: float) -> float:
+    """2/(2 + rho), and below 1 when it is written with two figures."""
+    return min(2 / (2 + rho), 0.99)
+
+
+def unreached() -> list[str]:
+    """Messages for a user whose shell does not find the command that was started by the name ``ndtheory``.
+
+    Empty if it does, or if the program was started in another way.
+    """
+    started = Path(sys.argv[0])
+    if started.name != "ndtheory" or not started.exists():
+        return []
+    found = shutil.which("ndtheory")
+    if found is not None and os.path.samefile(found, started):
+        return []
+    near = os.path.relpath(started) if started.absolute().is_relative_to(Path.cwd()) else str(started)
+    activate = os.path.join(os.path.dirname(near), "activate")
+    said = [f"`ndtheory` is not on the PATH of this shell: type {quote(near)} for it"]
+    if os.path.exists(activate):
+        said.append(f"or, once in each shell: source {quote(activate)}")
+    return said

@@ -1,11 +1,10 @@
-"""The command sweep: a problem over a grid of values."""
+"""The commands on many runs: sweep, a problem over a grid of values, and region, the plane of theta and k."""
 
 from __future__ import annotations
 
 import contextlib
 import re
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -15,17 +14,18 @@ import click
 
 from ndtheory.texts import printable
 from verification.cli.console import Interrupted, complain, deliver, stages
-from verification.cli.options import FILE, FOLDER, JOBS, JSON, STORE
-from verification.cli.typed import Typed
+from verification.cli.options import FILE, FOLDER, JOBS, JSON, SET, STORE, SWAP, Typed, check_place, one_file
+from verification.cli.problems import load_problem
 
 if TYPE_CHECKING:
     from verification.progress import Progress
     from verification.sweeps.sweep import Sweep
 
-#: Seconds between two lines about progress: in a file of their own, and on a stderr that is no terminal.
+
+#: Seconds between two lines about progress: in a log file, and on a stderr that is not a terminal.
 IN_LOG, ON_STDERR = 10, 60
 
-#: How a log of a sweep begins, and how large it may become.
+#: The beginning of a log of a sweep, and its largest size.
 LOG = re.compile(rb"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d runs: \d+ done, ")
 MOST_LOG_BYTES = 1_000_000_000
 
@@ -96,11 +96,11 @@ def sweep(
       ndtheory sweep grid.toml --plot theta,iterations,friction --export results
     """
     from verification.extras import require
-    from verification.output.files import check_ours
+    from verification.output.files import check_folder, check_ours
     from verification.sections import sweep as shown
-    from verification.sweeps.keeping import plan
+    from verification.sweeps.grid import read_sweep
+    from verification.sweeps.store import plan
     from verification.sweeps.sweep import sweep_grid, work_of
-    from verification.sweeps.sweep_file import read_sweep
 
     if dask is not None and jobs is not None:
         raise click.UsageError("needed either --jobs, for this machine, or --dask, for a cluster")
@@ -117,7 +117,7 @@ def sweep(
     targets = _targets(file.stem, target, plots, export)
     _check_log(log, [kept, *targets])
     for one in targets:
-        _check_folder(one.parent, "--export" if one.parent == export else "-o")
+        check_folder(one.parent, " (--export)" if one.parent == export else " (-o)")
         check_ours(one)
     with _progress(log) as tell:
         work = work_of(jobs or -1, dask)
@@ -130,7 +130,7 @@ def sweep(
         found,
         sections,
         as_json,
-        lambda: _write(found, targets),
+        lambda found: _write(found, targets),
         target,
         typing=Typed(file=Path(problem.source)).command,
     )
@@ -142,7 +142,7 @@ def sweep(
 def _targets(
     stem: str, target: Path, plots: list[tuple[str, ...]], export: Path | None
 ) -> dict[Path, Callable[[Sweep, Path], None]]:
-    """What is written, and how."""
+    """The files to write, each with the function that writes it."""
 
     def csv(found: Sweep, path: Path) -> None:
         path.write_text(found.to_csv(), encoding="utf-8")
@@ -162,7 +162,7 @@ def _targets(
 
 
 def _write(found: Sweep, targets: dict[Path, Callable[[Sweep, Path], None]]) -> None:
-    """Write each file; what cannot be drawn is said, and costs no other file."""
+    """Write each file; a figure that cannot be drawn is reported, and the others are written."""
     from verification.output.files import staged
 
     for path, write in targets.items():
@@ -175,19 +175,8 @@ def _write(found: Sweep, targets: dict[Path, Callable[[Sweep, Path], None]]) -> 
                 complain(f"{path} is not drawn: {error}")
 
 
-def _check_folder(room: Path, option: str) -> None:
-    from verification.problem.tables import ProblemError
-
-    try:
-        room.mkdir(parents=True, exist_ok=True)
-        tempfile.TemporaryFile(dir=room).close()
-    except (OSError, ValueError) as error:
-        why = getattr(error, "strerror", None) or error
-        raise ProblemError(str(room), "", None, f"needed a folder to write to ({option}): {why}") from None
-
-
 def _check_log(log: Path | None, others: Sequence[Path]) -> None:
-    """Refuse to append to what is neither new, nor empty, nor a log of this command."""
+    """Raise ProblemError for a log that is neither new, nor empty, nor written by this command."""
     from verification.problem.tables import ProblemError, unreadable
 
     if log is None:
@@ -215,7 +204,7 @@ def _tell(notes: tuple[str, ...]) -> None:
 
 @contextlib.contextmanager
 def _progress(log: Path | None) -> Iterator[Progress]:
-    """Progress on a terminal as one live line, in a log and on another stderr as lines with the time."""
+    """Progress as one live line on a terminal, as lines with the time in a log and on another stderr."""
     from verification.problem.tables import ProblemError
 
     with contextlib.ExitStack() as stack:
@@ -248,7 +237,7 @@ def _progress(log: Path | None) -> Iterator[Progress]:
 def every(
     seconds: float, write: Callable[[str], None], *, at_once: bool = False, clock: Callable[[], float] = time.monotonic
 ) -> Progress:
-    """Progress as lines, one after so many seconds at the earliest; ``at_once``: the first and the last one too."""
+    """Progress as lines, at most one in so many seconds; with ``at_once`` the first and the last one too."""
     last = clock() - seconds if at_once else clock()
 
     def tell(what: str, share: float | None) -> None:
@@ -259,3 +248,39 @@ def every(
             write(f"{time.strftime('%Y-%m-%d %H:%M:%S')} {what}")
 
     return tell
+
+
+@click.command()
+@FILE
+@SET
+@SWAP
+@one_file(".svg", ".png", words="File to draw", required=True)
+@STORE
+@JSON
+def region(file: Path, keys: dict[str, str], swap: bool, target: Path, store: Path | None, as_json: bool) -> None:
+    """Draw the plane of theta and k: where one step is proved to contract, and what runs do there.
+
+    Both axes are logarithmic; theta and k have no unit.  The regions are those of all bounds for the bodies of FILE;
+    the points are runs, coloured by outcome.
+
+    \b
+    Example:
+      ndtheory region my.toml -o plane.svg
+      ndtheory region my.toml --set body2.young=7e4 -o stiff.svg
+    """
+    from verification import figures
+    from verification.bounds.region import chart
+    from verification.output.files import staged
+    from verification.sections.sweep import plane as sections
+
+    problem = load_problem(file, keys, swap=swap)
+    check_place(target)
+    with stages() as tell:
+        plane = chart(problem, store=store, progress=tell)
+    deliver(plane, lambda found: sections(found, target), as_json)
+    with stages() as tell, staged(target.parent, shown=target) as room:
+        tell("drawing", None)
+        figures.save(figures.draw_region(plane), room / target.name)
+    if plane.interrupted:
+        complain(f"{plane.reason['points']}: what was computed is drawn")
+        raise Interrupted

@@ -10,9 +10,9 @@ from typing import Any, ClassVar
 from ndtheory import Constants, EnergyConstants, Number, evaluate_energy, exact
 from ndtheory.energy_norms import friction_multiple
 from ndtheory.number import above, below, weakest
-from verification.constants.of_body import BodyConstants
 from verification.document import Document
 from verification.problem import Problem
+from verification.value import to_plain
 
 #: Why C_t1 is infinite, and m is 0.
 SLIDES = "infinite: the contact body can move rigidly along Gamma_c, and its energy does not bound how far"
@@ -21,10 +21,33 @@ NO_COERCIVITY = "m = 0: the contact body can move rigidly, held by contact alone
 #: The constants of both bodies together, as documents and screens list them.
 NAMES = ("m", "M", "C_R", "C_s", "C_tr", "C_tr_half", "C_K", "rho_max", "rho_min", "rho_normal")
 ENERGY_NAMES = ("C_s_energy", "C_t1", "C_t2", "kappa_1", "kappa_2")
+ALL_NAMES = (*NAMES, *ENERGY_NAMES)
+
+#: Constants of friction, each k times two others.
+PRODUCTS = (("C_K", "C_s", "C_tr"), ("kappa_1", "C_s_energy", "C_t1"), ("kappa_2", "C_s_energy", "C_t2"))
 
 #: Those that a pair made from matrices does not have, and why.
 OF_MESHES = ("body1", "body2", "m", "M", "C_R", "C_s", "C_tr", "C_tr_half", "C_K")
 FROM_MATRICES = "the pair is made from matrices: needed the meshes of both bodies"
+
+
+@dataclass(frozen=True, kw_only=True)
+class BodyConstants:
+    """Coercivity m^a and continuity M^a of one body (4.1), unit stress; m^a is exactly 0 if the body can move rigidly.
+
+    ``residual_m``, ``residual_M`` are relative residuals of the eigenvalues, whose errors are of the order of their
+    squares.
+    """
+
+    m: Number
+    M: Number
+    nodes: int
+    residual_m: float
+    residual_M: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """The objects ``body1``, ``body2`` of the document."""
+        return {"m": self.m.to_dict(), "M": self.M.to_dict(), "nodes": self.nodes}
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -52,7 +75,7 @@ class Measured(Document):
     rho_normal : Number or None
         The largest with the tangential components condensed out.
     C_s_energy : Number or None
-        ``sup |S sigma_N(w)|_L2 / |w|_a2`` over a2-harmonic w, a2 that of the Neumann body; sqrt(stress/length).
+        ``sup |S sigma_N(w)|_L2 / |w|_a2`` over a2-harmonic w, a2 being the Neumann body's; sqrt(stress/length).
     C_t1, C_t2 : Number or None
         ``sup |v_T|_L2 / |v|_aa`` of the contact body and of the Neumann body; sqrt(length/stress).
     kappa_1, kappa_2 : Number or None
@@ -111,11 +134,11 @@ class Measured(Document):
 
     @property
     def _exact_friction(self) -> Fraction:
-        """k as the problem has it; 1/3 is no decimal."""
+        """k as the problem has it, which may be 1/3."""
         return exact(self.friction) if self.problem is None else self.problem.contact.friction
 
     def constants(self) -> Constants | None:
-        """What enters the theorem; None where C_R or C_K does not exist, or m is 0."""
+        """The constants of Section 5; None where C_R or C_K does not exist, or m is 0."""
         if self.m is None or self.M is None or self.C_R is None or self.C_K is None or not self.m.value:
             return None
         friction: dict[str, Any] = {"C_K": 0}  # without a law of friction
@@ -126,7 +149,7 @@ class Measured(Document):
         return Constants(m=self.m, M=self.M, C_R=C_R, **friction)
 
     def energy_constants(self) -> EnergyConstants | None:
-        """What enters the theorem in energy norms; None where rho or the kappas do not exist."""
+        """The constants of the theorem in energy norms; None where rho or the kappas do not exist."""
         if self.rho_max is None or self.rho_normal is None or self.kappa_1 is None or self.kappa_2 is None:
             return None
         return EnergyConstants(
@@ -139,14 +162,14 @@ class Measured(Document):
 
     @property
     def why_no_constants(self) -> str:
-        """Why nothing enters the theorem of Section 5."""
+        """Why the theorem of Section 5 has no constants."""
         if self.m is not None and not self.m.value:
             return f"{NO_COERCIVITY}: needed m > 0"
         return next(iter(self.reason.values()), "")
 
     @property
     def why_no_energy(self) -> str:
-        """Why nothing enters the theorem in energy norms."""
+        """Why the theorem in energy norms has no constants."""
         return self.reason.get("kappa_1") or next(iter(self.reason.values()), "")
 
     @property
@@ -198,11 +221,11 @@ class Measured(Document):
         return replace(self, friction=k, problem=None, **values)
 
     def content(self) -> dict[str, Any]:
-        numbers = {name: getattr(self, name) for name in (*NAMES, *ENERGY_NAMES)}
+        numbers = {name: to_plain(getattr(self, name)) for name in ALL_NAMES}
         return {
-            "body1": None if self.body1 is None else self.body1.to_dict(),
-            "body2": None if self.body2 is None else self.body2.to_dict(),
-            **{name: None if number is None else number.to_dict() for name, number in numbers.items()},
+            "body1": to_plain(self.body1),
+            "body2": to_plain(self.body2),
+            **numbers,
             "interface_nodes": self.interface_nodes,
             "reason": dict(self.reason),
             **({} if self.unverified is None else {"unverified": dict(self.unverified)}),
@@ -211,7 +234,7 @@ class Measured(Document):
 
 
 def product(k: Fraction, a: Number, b: Number) -> Number:
-    """``k a b`` of numbers >= 0 with what is known of them: each end that both have, rounded outwards."""
+    """``k a b`` of numbers >= 0 with its enclosure: each end that both have, rounded outwards."""
     value = float(k) * a.value * b.value
     low = None if a.lo is None or b.lo is None else below(k * Fraction(a.lo) * Fraction(b.lo))
     high = None if a.hi is None or b.hi is None else above(k * Fraction(a.hi) * Fraction(b.hi))

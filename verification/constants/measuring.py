@@ -7,15 +7,26 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from fem1d2d import Eigenvalue, elimination_order, largest, largest_sparse, solver
+from fem1d2d.mesh import Floats
 from ndtheory import Number
-from verification.constants.measured import ENERGY_NAMES, FROM_MATRICES, NAMES, OF_MESHES, SLIDES, Measured
-from verification.constants.of_body import constants_of
-from verification.constants.operators import Pencils, needs_matrices, pair_or_bodies
-from verification.constants.pencils import of_energy, of_section_5
+from verification.constants.measured import (
+    ALL_NAMES,
+    FROM_MATRICES,
+    OF_MESHES,
+    PRODUCTS,
+    SLIDES,
+    BodyConstants,
+    Measured,
+)
+from verification.constants.operators import TRACES_DIFFER, Pencils, needs_matrices, pair_or_bodies
 from verification.constants.proved import verify
+from verification.dense import Cholesky, pinned
+from verification.interface.assembly import TwoBodies
+from verification.interface.body import Body, Condensed
 from verification.interface.pair import ContactPair
-from verification.interface.two_bodies import TwoBodies
 from verification.problem import Problem
 from verification.progress import Progress, silent
 from verification.threads import one_thread
@@ -32,9 +43,9 @@ def measure(
     refine : int
         With N > 0 the result lists the constants on meshes halved 0 to N times.
     verified : bool
-        Whether to prove bounds of each constant, for the exact data of the problem: then its level is ``verified``.
+        True to prove bounds of each constant, for the exact data of the problem: then its level is ``verified``.
     progress : callable
-        Told which mesh is measured.
+        Called with the mesh that is measured.
 
     Returns
     -------
@@ -58,8 +69,10 @@ def measure(
     """
     pair = pair_or_bodies(problem)
     progress("measuring the constants", None)
+    if refine and pair.problem is None:
+        raise ValueError("this pair is made from matrices: needed a problem whose meshes can be halved")
     with one_thread():
-        finer = [] if not refine else _halved(pair, refine)  # refused before any is measured
+        finer = [] if pair.problem is None else [pair.problem.refined(level) for level in range(1, refine + 1)]
         result = _measure(pair, progress, verified)
         if refine:
             levels, reason = [result], dict(result.reason)
@@ -73,22 +86,14 @@ def measure(
     return result
 
 
-def _halved(pair: ContactPair | TwoBodies, refine: int) -> list[Problem]:
-    if pair.problem is None:
-        raise ValueError("this pair is made from matrices: needed a problem whose meshes can be halved")
-    return [pair.problem.refined(level) for level in range(1, refine + 1)]
-
-
 def _measure(pair: ContactPair | TwoBodies, progress: Progress, verified: bool) -> Measured:
     plain = _without_matrices(pair, progress) if isinstance(pair, TwoBodies) else _with_matrices(pair)
-    if not verified:
-        return plain
-    return verify(plain, pair, progress=progress)
+    return verify(plain, pair, progress=progress) if verified else plain
 
 
 def _with_matrices(pair: ContactPair) -> Measured:
     friction = float(pair.friction)
-    values: dict[str, float | None] = dict.fromkeys((*NAMES, *ENERGY_NAMES))
+    values: dict[str, float | None] = dict.fromkeys(ALL_NAMES)
     reason: dict[str, str] = {}
     body1 = body2 = None
     meshes = pair.contact.body is not None
@@ -100,11 +105,11 @@ def _with_matrices(pair: ContactPair) -> Measured:
     if pair.interface.transfer is not None and pair.held:
         why = "a contact node is held tangentially and the grids differ: no trace space serves both bodies"
     elif not np.array_equal(pair.contact.free, pair.neumann.free) and pair.interface.transfer is None:
-        why = "the bodies hold different tangential components of Gamma_c: their traces differ"
+        why = TRACES_DIFFER
     else:
         why = ""
     if why:
-        reason |= dict.fromkeys((*NAMES[2:], *ENERGY_NAMES), why)
+        reason |= dict.fromkeys(ALL_NAMES[2:], why)
     else:
         free, grid = pair.contact.free, pair.contact.grid
         tangential = (np.arange(grid.size) < grid.t)[free]
@@ -120,12 +125,11 @@ def _with_matrices(pair: ContactPair) -> Measured:
                 reason["kappa_1"] = f"C_t1 is {SLIDES}"
             else:
                 values["kappa_1"] = 0.0
-    products = (("C_K", "C_s", "C_tr"), ("kappa_1", "C_s_energy", "C_t1"), ("kappa_2", "C_s_energy", "C_t2"))
-    for name, first, second in products:
+    for name, first, second in PRODUCTS:
         a, b = values[first], values[second]
         if a is not None and b is not None:
             values[name] = friction * a * b
-    numbers: dict[str, Any] = {name: None if v is None else Number.of_float(v) for name, v in values.items()}
+    numbers = _numbers(values)
     if body1 is not None and body2 is not None:
         numbers["m"] = min(body1.m, body2.m, key=lambda m: m.value)  # 0 is exact
     return Measured(
@@ -140,10 +144,14 @@ def _with_matrices(pair: ContactPair) -> Measured:
     )
 
 
+def _numbers(values: dict[str, float | None]) -> dict[str, Any]:
+    return {name: None if value is None else Number.of_float(value) for name, value in values.items()}
+
+
 def _without_matrices(bodies: TwoBodies, progress: Progress) -> Measured:
-    """What needs no interface matrices."""
+    """The constants that need no interface matrices."""
     pencils, problem = Pencils(bodies, progress), bodies.problem
-    values: dict[str, Any] = dict.fromkeys((*NAMES, *ENERGY_NAMES))
+    values: dict[str, float | None] = dict.fromkeys(ALL_NAMES)
     lower, upper = (constants_of(body, dense=False) for body in bodies.elastic)
     values |= {"m": min(lower.m.value, upper.m.value), "M": lower.M.value + upper.M.value}
     if not pencils.reason:
@@ -153,7 +161,7 @@ def _without_matrices(bodies: TwoBodies, progress: Progress) -> Measured:
         values["rho_normal"] = pencils.largest(neumann_body=neumann, normal=True).value
     if not bodies.friction:
         values |= dict.fromkeys(("C_K", "kappa_1", "kappa_2"), 0.0)
-    numbers: dict[str, Any] = {name: None if v is None else Number.of_float(v) for name, v in values.items()}
+    numbers = _numbers(values)
     missing = [name for name, value in numbers.items() if value is None]
     return Measured(
         body1=lower,
@@ -165,3 +173,138 @@ def _without_matrices(bodies: TwoBodies, progress: Progress) -> Measured:
         problem=problem,
         **numbers,
     )
+
+
+def constants_of(body: Body, *, dense: bool = True) -> BodyConstants:
+    """Measure m and M of a body by extremal eigenvalues of its stiffness matrix against the norm.
+
+    ``dense`` is True if the Schur complement of the norm is wanted too, which one factorisation gives with the solves;
+    False where there are too many contact nodes for it.
+    """
+    A, H, loose = body.stiffness, body.gram_matrix, body.motions.shape[1] > 0
+    if body.few:
+        A, H = A.toarray(), H.toarray()
+        return _of(body, None if loose else largest(H, A), largest(A, H))
+    # the interface need not come last here, which saves fill, and with it time at each solve of Lanczos
+    order = elimination_order(A, np.arange(0)) if dense else None
+    solve_H = body.gram.solver() if dense else solver(H)
+    # 1/m, so that products with A^-1 find it
+    smallest = None if loose else largest_sparse(H, A, solver(A, order) if dense else body.solve)
+    above = body.material.continuity(body.mesh.dimension)
+    return _of(body, smallest, largest_sparse(A, H, solve_H, above=above, order=order))
+
+
+def _of(body: Body, smallest: Eigenvalue | None, biggest: Eigenvalue) -> BodyConstants:
+    """From the eigenvalues 1/m, None where m is 0, and M."""
+    return BodyConstants(
+        m=Number(value=0.0, lo=0.0, hi=0.0, level="exact") if smallest is None else Number.of_float(1 / smallest.value),
+        M=Number.of_float(biggest.value),
+        nodes=len(body.mesh.points),
+        residual_m=0.0 if smallest is None else smallest.residual / smallest.value,
+        residual_M=biggest.residual / biggest.value,
+    )
+
+
+def of_section_5(pair: ContactPair, tangential: NDArray[np.bool_]) -> dict[str, float | None]:
+    """C_R, C_tr and C_s of Section 5: matrices on the components that both bodies leave free.
+
+    Where the grids differ P carries forms of the contact body to the Neumann grid.  Section 5 needs no way back: it
+    lifts only the Neumann body's traces into the contact body.
+    """
+    interface, grid, kernel = pair.interface, pair.contact.grid, pair.interface.kernel
+    one_grid = interface.transfer is None
+    contact, neumann = pair.contact.mesh_body, pair.neumann.mesh_body
+    # along y and by number, so that the constants do not depend on the roles, to the last digit
+    bodies = (pair.body1.mesh_body, pair.body2.mesh_body)
+    E = {body.name: body.gram.schur for body in bodies}
+    fits = [(a, b) for b in bodies for a in bodies if one_grid or a is b or b is neumann]  # a form of a, in norm b
+    felt = lambda form, a, b: form if a is b else interface.carry_form(form)
+    values: dict[str, float | None] = {
+        "C_R": float(np.sqrt(max(largest(felt(a.lift_gram, a, b), E[b.name]).value for a, b in fits)))
+    }
+    if not tangential.any():
+        return values | dict.fromkeys(("C_tr", "C_tr_half", "C_s"), 0.0)
+    B_T = _tangential_mass(pair, tangential)
+    values["C_tr"] = float(np.sqrt(max(largest(felt(B_T, contact, b), E[b.name]).value for b in bodies)))
+    halves: dict[str, list[float]] = {body.name: [] for body in bodies}
+    for a, b in fits:
+        slides = np.arange(len(a.interface)) < len(a.interface) - len(a.nodes)
+        kept = np.where(np.outer(slides, slides), E[a.name], 0.0)
+        halves[b.name].append(largest(felt(kept, a, b), E[b.name]).value)
+    values["C_tr_half"] = float(np.sqrt(max(map(min, halves.values()))))
+    if kernel is not None:
+        squares = {}
+        for body in bodies:
+            normal = body.elastic.schur[-len(body.nodes) :]
+            z = kernel @ (normal if body is neumann else interface.onto_neumann(normal))
+            squares[body.name] = z.T @ (grid.weights[:, None] * z)
+        values["C_s"] = float(np.sqrt(max(largest((z + z.T) / 2, E[name]).value for name, z in squares.items())))
+    return values
+
+
+def of_energy(pair: ContactPair, tangential: NDArray[np.bool_]) -> dict[str, float | None]:
+    """rho and the constants of friction in energy norms, with P between the grids."""
+    interface, grid, kernel = pair.interface, pair.contact.grid, pair.interface.kernel
+    contact, neumann = _free(pair.contact), _free(pair.neumann)
+    normal = ~tangential
+    carried = interface.carry_form(contact)
+    values: dict[str, float | None] = {
+        "rho_max": largest(carried, neumann).value,
+        "rho_min": _smallest(pair, carried, neumann, contact),
+    }
+    normal_contact = _condense_tangential(contact, normal, _motions(pair.contact))
+    if interface.transfer is not None:
+        normal_contact = interface.transfer.T @ normal_contact @ interface.transfer
+        normal = np.arange(pair.neumann.grid.size) >= pair.neumann.grid.t
+    values["rho_normal"] = largest(normal_contact, _condense_tangential(neumann, normal)).value
+    if not tangential.any():
+        return values | dict.fromkeys(("C_s_energy", "C_t1", "C_t2"), 0.0)
+    B_T = _tangential_mass(pair, tangential)
+    if kernel is not None:
+        # sup |S g_N|^2 / g' S_2^-1 g over g = S_2 phi is the largest eigenvalue of S (S_2)_NN S' in the weights
+        root = np.sqrt(grid.weights)[:, None] * kernel
+        stress = root @ neumann[np.ix_(normal, normal)] @ root.T
+        values["C_s_energy"] = float(np.sqrt(np.linalg.eigvalsh((stress + stress.T) / 2)[-1]))
+    if not pair.contact.slides:  # else it is infinite; motions that do not slide do not enter the maximum
+        motions = _motions(pair.contact)
+        definite = contact if motions is None else pinned(contact, np.arange(len(contact)), motions)
+        values["C_t1"] = float(np.sqrt(largest(B_T, definite).value))
+    values["C_t2"] = float(np.sqrt(largest(interface.carry_form(B_T), neumann).value))
+    return values
+
+
+def _smallest(pair: ContactPair, carried: Floats, neumann: Floats, contact: Floats) -> float:
+    """The smallest eigenvalue of (P' S_c P, S_n); where P is not the identity to rounding relative to the largest."""
+    if pair.contact.loose or pair.contact.grid.n < pair.neumann.grid.n:  # S_c or P has a kernel
+        return 0.0
+    if pair.interface.transfer is None:
+        return 1 / largest(neumann, contact).value
+    return max(-largest(-carried, neumann).value, 0.0)
+
+
+def _free(side: Condensed) -> Floats:
+    return side.stiffness[np.ix_(side.free, side.free)]
+
+
+def _motions(side: Condensed) -> Floats | None:
+    """The kernel of :func:`_free`; None where it is definite."""
+    return side.motions[side.free] if side.loose else None
+
+
+def _tangential_mass(pair: ContactPair, tangential: NDArray[np.bool_]) -> Floats:
+    """B_T: the quadrature of ``|v_T|^2`` on the free components of the contact grid."""
+    grid = pair.contact.grid
+    weights = np.zeros(len(tangential))
+    weights[tangential] = grid.weights[pair.contact.free[grid.tangential]]
+    return np.diag(weights)
+
+
+def _condense_tangential(S: Floats, normal: Any, motions: Floats | None = None) -> Floats:
+    """Schur complement of S on the normal components; S may be semidefinite, with motions as its kernel."""
+    slide = ~normal
+    if not slide.any():
+        return S
+    cross = S[np.ix_(slide, normal)]
+    inner = Cholesky(S, np.flatnonzero(slide), motions).solve(S[:, normal])[slide]
+    result = S[np.ix_(normal, normal)] - cross.T @ inner
+    return np.asarray((result + result.T) / 2)

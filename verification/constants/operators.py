@@ -5,8 +5,8 @@ finds the largest eigenvalue of (S_c, S_n), c the contact body and n the Neumann
 
 Its eigenvalues crowd: the stiff end of the spectrum belongs to short waves along Gamma_c, or to waves as long as the
 bodies are thick, and every long interface has many of them.  So Lanczos comes in two parts.  The first is short and
-says about where rho lies.  The second, repeated where that was too rough, tells apart what crowds below a shift s a
-little above, by solves with
+says about where rho lies.  The second, repeated where that was too rough, separates the eigenvalues that crowd below a
+shift s a little above, by solves with
 
     K = s A_n - A_c    (both bodies joined at their interface unknowns),
 
@@ -28,11 +28,10 @@ from fem1d2d import Condensation, Eigenvalue, largest_of, solver_with_inertia
 from fem1d2d.mesh import Floats, Ints
 from fem1d2d.pencil import LANCZOS
 from verification.interface import assembly
-from verification.interface.assembly import TooManyContactNodes, held_bodies
+from verification.interface.assembly import TooManyContactNodes, TwoBodies, held_bodies
 from verification.interface.body import Body
 from verification.interface.build import pair_of
 from verification.interface.pair import ContactPair
-from verification.interface.two_bodies import TwoBodies
 from verification.problem import Problem, ProblemError, load
 from verification.progress import Progress, silent
 from verification.threads import one_thread
@@ -43,7 +42,7 @@ ROUGH = 1e-3
 #: The first shift lies above the rough value by this part of it, each later one by so many times more than the last.
 SHIFT, FARTHER = 1e-5, 10
 
-#: Why there is no rho.
+#: Why rho does not exist.
 TRACES_DIFFER = "the bodies hold different tangential components of Gamma_c: their traces differ"
 
 
@@ -68,15 +67,7 @@ def needs_matrices(bodies: TwoBodies) -> str:
 
 
 class Traces:
-    """One body as its traces feel it: products with S and with ``S^-1``.
-
-    Parameters
-    ----------
-    body : Body
-        Held, so that its stiffness matrix is definite.
-    interface : int array
-        The unknowns that count as its trace; the others are condensed out.
-    """
+    """Products with S and ``S^-1`` of one body, which is held, on the ``interface`` unknowns."""
 
     def __init__(self, body: Body, interface: Ints) -> None:
         self.body, self.interface = body, interface
@@ -100,14 +91,8 @@ class Traces:
 class Pencils:
     """The pencils (S_c, S_n) of two bodies, in both roles, with all components of the trace and with the normal ones.
 
-    The factorisations for one choice of components are kept until the other one is asked for.
-
-    Parameters
-    ----------
-    bodies : TwoBodies
-        Both elastic and held, as :func:`verification.interface.assembly.held_bodies` returns them.
-    progress : callable
-        Told the number of Lanczos steps.
+    The factorisations for one choice of components are kept until the other one is asked for.  ``bodies`` are both
+    elastic and held, as :func:`verification.interface.assembly.held_bodies` returns them.
 
     Raises
     ------
@@ -128,7 +113,7 @@ class Pencils:
 
     @property
     def reason(self) -> dict[str, str]:
-        """Why there is no pencil, by the names of the constants; empty where there is one."""
+        """Why the pencil does not exist, by the names of the constants; empty where it does."""
         lower, upper = self.bodies.elastic
         if np.array_equal(lower.unknown, upper.unknown):
             return {}

@@ -27,26 +27,25 @@ from fem1d2d.loewner import Elimination, positive_definite
 from fem1d2d.mesh import Floats
 from fem1d2d.proved import Ends, enclose_largest, inverse, root
 from ndtheory import Number
-from verification.constants.measured import ENERGY_NAMES, FROM_MATRICES, NAMES, Measured, product
-from verification.constants.of_body import BodyConstants
+from verification.constants.measured import ALL_NAMES, FROM_MATRICES, PRODUCTS, BodyConstants, Measured, product
 from verification.constants.operators import needs_matrices
+from verification.interface.assembly import TwoBodies
 from verification.interface.body import Name
 from verification.interface.exact_bodies import ExactBody, ExactInterface, NotExact
 from verification.interface.pair import ContactPair
-from verification.interface.two_bodies import TwoBodies
 from verification.progress import Progress, silent
 from verification.threads import one_thread
 
 #: A form between two others in the order of symmetric matrices: from below and from above.
 Between = tuple[Enclosed, Enclosed]
 
-#: Why there is no proof where one was tried.
+#: Why a proof was tried and not found.
 NOT_PROVED = "rounding errors exceed what is to be proved"
 
 #: The lift of more entries than these is not made.
 MOST_OF_LIFT = 20_000_000
 
-#: How much of the square of a lift, relatively, is given to its error; whichever is larger, the error itself or this.
+#: Share of the square of a lift that its error gets; the larger one of this and the error itself.
 SHARE = 2.0**-40
 
 NOTHING: Ends = (None, None)
@@ -56,19 +55,8 @@ ZERO = Number(value=0.0, lo=0.0, hi=0.0, level="exact")
 def verify(measured: Measured, of: ContactPair | TwoBodies, *, progress: Progress = silent) -> Measured:
     """The same constants between proved bounds, for the exact data of the problem on its mesh.
 
-    Parameters
-    ----------
-    measured : Measured
-        Its values are taken as guesses, and kept where they lie between the bounds.
-    of : ContactPair or TwoBodies
-        What was measured.
-    progress : callable
-        Told what is proved.
-
-    Returns
-    -------
-    Measured
-        With numbers at level ``verified``; ``unverified`` says why where a number still is ``float``.
+    The values of ``measured`` are taken as guesses, and kept where they lie between the bounds.  Proved numbers have
+    the level ``verified``; ``unverified`` says why a number still is ``float``.
     """
     if of.problem is None:
         return replace(measured, unverified=dict.fromkeys(_known(measured), FROM_MATRICES))
@@ -77,7 +65,7 @@ def verify(measured: Measured, of: ContactPair | TwoBodies, *, progress: Progres
 
 
 def _known(measured: Measured) -> list[str]:
-    return [name for name in (*NAMES, *ENERGY_NAMES) if getattr(measured, name) is not None]
+    return [name for name in ALL_NAMES if getattr(measured, name) is not None]
 
 
 def _number(value: float, ends: Ends) -> Number:
@@ -94,18 +82,10 @@ def _join(ends: list[Ends], combine: Callable[[Any], float]) -> Ends:
 
 
 class Proof:
-    """One problem whose constants are proved one after the other.
+    """One problem whose constants are proved one after the other; parameters as for :func:`verify`.
 
-    Parameters
-    ----------
-    measured, of, progress
-        As for :func:`verify`; ``of.problem`` is not None.
-
-    Attributes
-    ----------
-    bodies : mapping from name to ExactBody
-    S, E : mapping from the name of a body to Between
-        Schur complements of its stiffness and of its Gram matrix on the interface, after :meth:`result`.
+    After :meth:`result` there are ``bodies``, the :class:`ExactBody` by name, and ``S`` and ``E``, the Schur
+    complements of their stiffness and of their Gram matrix on the interface, between others.
     """
 
     def __init__(self, measured: Measured, of: ContactPair | TwoBodies, progress: Progress) -> None:
@@ -330,8 +310,7 @@ class Proof:
     def _products(self) -> None:
         friction = self.pair.friction
         law = self.pair.interface.kernel is not None
-        products = (("C_K", "C_s", "C_tr"), ("kappa_1", "C_s_energy", "C_t1"), ("kappa_2", "C_s_energy", "C_t2"))
-        for name, *factors in products:
+        for name, *factors in PRODUCTS:
             if getattr(self.measured, name) is None:
                 continue
             if not (friction and law):

@@ -1,4 +1,4 @@
-"""Step II exactly: guess which nodes touch and slip, solve the linear system, mend the guess."""
+"""Step II exactly: guess which nodes touch and slip, solve the linear system, correct the guess."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from verification.value import Value
 #: Signs are read with this slack relative to the largest force, so that rounding does not flip a node for ever.
 SLACK = 1e-14
 
-#: A guess is mended at most so often; a few suffice unless it cycles.
+#: Corrections of a guess, at most; a few suffice unless it cycles.
 LIMIT = 60
 
-#: So many numbers of linear systems are kept, 32 MB: a run that comes back to a pattern finds its system there.
+#: Numbers (32 MB) of the linear systems that are kept: a run that comes back to a pattern finds its system there.
 KEPT = 4_000_000
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Pattern(Value):
-    """What each contact node does.
+    """Contact state of each node.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class Pattern(Value):
 
     @property
     def key(self) -> bytes:
-        """Equal for equal patterns."""
+        """Bytes that are equal for equal patterns."""
         return self.touching.tobytes() + self.sliding.tobytes()
 
     def __eq__(self, other: object) -> bool:
@@ -55,7 +55,7 @@ class Pattern(Value):
 
     @classmethod
     def sticking(cls, n: int, tangential: int) -> Pattern:
-        """Every node touches and sticks."""
+        """Return the pattern in which every node touches and sticks."""
         return cls(touching=np.ones(n, dtype=bool), sliding=np.zeros(tangential, dtype=np.int8))
 
     @classmethod
@@ -71,15 +71,8 @@ class System:
     """The linear system that a pattern makes of step II.
 
     v = 0 where a node touches or sticks, the force is 0 where it is open and the friction bound where it slides.
-
-    Parameters
-    ----------
-    S : array, shape (t + n, t + n)
-    free : bool array, shape (t + n,)
-    pattern : Pattern
-    motions : array, shape (t + n, k), optional
-        The kernel of S, where contact alone holds the body.  Motions that the pattern leaves free are pinned: the
-        force does not know of them, and where the loads work in one the equilibrium fails.
+    ``motions``, shape (t + n, k), is the kernel of S, where only contact holds the body.  Motions that the pattern
+    leaves free are pinned: the force does not depend on them, and where the loads work in one the equilibrium fails.
     """
 
     def __init__(self, S: Floats, free: NDArray[np.bool_], pattern: Pattern, motions: Floats | None = None) -> None:
@@ -90,26 +83,20 @@ class System:
         self._columns, self._factor = S[self._rows], Cholesky(S, self._rows, motions)
 
     def solve(self, q: Floats, bound: Floats) -> tuple[Floats, Floats]:
-        """v and force, shape (t + n,) each."""
+        """Return v and force, shape (t + n,) each."""
         t, friction = len(bound), bound * self.sign
         right = q.copy()
         right[:t] -= friction
         v = self._factor.solve(right)
         force: Floats = q - v[self._rows] @ self._columns
-        # what the pattern says holds exactly; the certificate sees the rest
+        # the conditions of the pattern hold exactly; the certificate checks the others
         np.putmask(force[t:], self._open, 0.0)
         np.putmask(force[:t], self._slides, friction)
         return v, force
 
 
 class Systems:
-    """The linear systems of the patterns of one stiffness matrix, each made once while it is in use.
-
-    Parameters
-    ----------
-    S, free, motions : array
-        As :class:`System` takes them.
-    """
+    """The linear systems of the patterns of one stiffness matrix (see :class:`System`), each made once while in use."""
 
     def __init__(self, S: Floats, free: NDArray[np.bool_], motions: Floats | None = None) -> None:
         made = lru_cache(maxsize=1 + KEPT // (2 * S.size + 1))
@@ -122,14 +109,14 @@ class ActiveSet:
     Parameters
     ----------
     S : array, shape (t + n, t + n)
-        Symmetric, positive definite on the free components but for the motions.
+        Symmetric, positive definite on the free components orthogonal to the motions.
     free : bool array, shape (t + n,)
     tangential : int
         t.
     motions : array, shape (t + n, k), optional
-        The kernel of S, where contact alone holds the body.
+        The kernel of S, where only contact holds the body.
     systems : Systems, optional
-        Of the same matrix; what solvers share that run one after the other.
+        Of the same matrix, to be shared by solvers that run one after the other.
     """
 
     def __init__(
@@ -145,7 +132,7 @@ class ActiveSet:
         self._stiffness = float(np.diag(S).max())
 
     def _begin(self, start: Pattern, smooth: NDArray[np.bool_]) -> Pattern:
-        """The first guess: no held node slides, every node whose bound is zero does."""
+        """Return the first guess: no held node slides, every node whose bound is zero does."""
         sliding = start.sliding
         if self._held is not None:
             sliding = np.where(self._held, 0, sliding)
@@ -154,14 +141,7 @@ class ActiveSet:
         return start if sliding is start.sliding else Pattern(touching=start.touching, sliding=sliding.astype(np.int8))
 
     def solve(self, q: Floats, bound: Floats, start: Pattern) -> tuple[Floats, Floats, Pattern] | None:
-        """Mend the pattern until every sign agrees.
-
-        Returns
-        -------
-        v, force : array, shape (t + n,)
-        pattern : Pattern
-            None instead of the three where the pattern does not settle.
-        """
+        """Correct the pattern until every sign agrees; None where it does not settle."""
         seen: set[bytes] = set()
         for v, force, pattern, agrees in islice(self._guesses(q, bound, start), LIMIT):
             if agrees:
@@ -172,7 +152,7 @@ class ActiveSet:
         return None
 
     def repeated(self, q: Floats, bound: Floats, start: Pattern) -> Iterator[tuple[Floats, Floats, Pattern]]:
-        """The guesses that come again and again where the pattern does not settle; none where it does."""
+        """Yield the guesses that come again and again where the pattern does not settle; none where it does."""
         seen: set[bytes] = set()
         for v, force, pattern, agrees in islice(self._guesses(q, bound, start), LIMIT, 2 * LIMIT):
             if agrees or pattern.key in seen:
@@ -195,7 +175,7 @@ class ActiveSet:
         while True:
             system = self._systems.of(pattern)
             v, force = system.solve(q, bound)
-            # v_N = 0 where a node touches and force_N = 0 where it is open, so that each sign speaks of the others
+            # v_N = 0 where a node touches and force_N = 0 where it is open, so that each sign is about the others
             pulls, enters = force[t:] < -force_slack, v[t:] > length_slack
             pushed, back = np.abs(force[:t]) > bound + force_slack, system.sign * v[:t] < -length_slack
             if np.count_nonzero(back):

@@ -39,7 +39,7 @@ class KKT:
 
     @property
     def residual(self) -> float:
-        """The largest of them; not a number where one is none."""
+        """The largest of them; NaN where one is NaN."""
         lengths = self.non_penetration, self.complementarity, self.slip
         return worst(np.array([self.equilibrium, self.compression, self.bound, *lengths]))
 
@@ -54,7 +54,7 @@ class KKTCertificate:
     S : array, shape (t + n, t + n)
         Stiffness, symmetric; t tangential components (0 in 1D) and then n normal ones.
     free : bool array, shape (t + n,), optional
-        Components that are unknown; equilibrium is asked of them alone.
+        Unknown components; equilibrium is checked only on these.
     """
 
     def __init__(self, S: Floats, free: NDArray[np.bool_] | None = None) -> None:
@@ -86,10 +86,3 @@ class KKTCertificate:
             bound=worst(size[:t] - bound) / forces,
             slip=worst(np.minimum(length[:t], np.abs(force[:t] - bound * np.sign(v[:t])))) / forces,
         )
-
-
-def certify(
-    S: Floats, q: Floats, bound: Floats, v: Floats, force: Floats, free: NDArray[np.bool_] | None = None
-) -> KKT:
-    """Measure how far (v, force) is from solving step II; see :class:`KKTCertificate`."""
-    return KKTCertificate(S, free).measure(q, bound, v, force)

@@ -28,7 +28,7 @@ class ContactModel:
     tangential : int
         t.
     motions : int
-        How many rigid motions contact alone holds: the dimension of the kernel of S.
+        Number of rigid motions that only contact holds: the dimension of the kernel of S.
     """
 
     def __init__(self, S: Floats, free: NDArray[np.bool_], tangential: int, motions: int = 0) -> None:
@@ -52,13 +52,7 @@ class ContactModel:
         self._problem = cp.Problem(cp.Minimize(energy), [self._v[presses] <= 0])
 
     def solve(self, q: Floats, bound: Floats) -> Floats | None:
-        """Approximate v on all components (0 where held), or None where the solver gives none.
-
-        Parameters
-        ----------
-        q : array, shape (t + n,)
-        bound : array, shape (t,)
-        """
+        """Return an approximate v on all components (0 where held), shape (t + n,), or None without an answer."""
         forces = float(np.abs(q[self._rows]).max(initial=0.0))
         v = np.zeros_like(q)
         if forces == 0.0:

@@ -1,4 +1,4 @@
-"""Who solves step II: the exact active set first, the convex program where it fails, one certificate for both."""
+"""Step II: the exact active set first, the convex program where it fails, one certificate for both."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from fem1d2d.mesh import Floats
 from verification.contact.active_set import ActiveSet, Pattern, Systems
-from verification.contact.existence import way_out
 from verification.contact.kkt import KKT, TOLERANCE, KKTCertificate
 from verification.interrupts import undisturbed
 from verification.value import Value
@@ -31,7 +30,7 @@ class NoMinimiser(ContactError):
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ContactSolution(Value):
-    """A solution of step II with its KKT residuals; but for :class:`ProgramStep` they are below the tolerance.
+    """A solution of step II with its KKT residuals, which are below the tolerance except those of :class:`ProgramStep`.
 
     Attributes
     ----------
@@ -39,10 +38,8 @@ class ContactSolution(Value):
         Tangential slip and normal penetration (<= 0: minus the gap), unit of length.
     force : array, shape (t + n,)
         Nodal forces on the other body.
-    pattern : Pattern
-    kkt : KKT
     solver : {'cvxpy', 'active-set'}
-        Who found the active set.
+        Which of them found the active set.
     """
 
     v: Floats
@@ -67,14 +64,14 @@ class ContactStep:
     tangential : int
         t: n in two dimensions, 0 in one.
     solver : {'auto', 'cvxpy', 'active-set'}
-        Who finds the active set.  ``cvxpy``: the convex program, at every step; ``active-set``: never the program;
-        ``auto``: the program where the active set does not close with its certificate.
+        ``cvxpy``: the convex program finds the active set at every step; ``active-set``: it never does; ``auto``: it
+        does where the active set does not close with its certificate.
     near : str
         What an error should name besides, as a Poisson ratio near 1/2.
     motions : array, shape (t + n, k), optional
-        Orthonormal traces of the rigid motions that contact alone holds: the kernel of S.
+        Orthonormal traces of the rigid motions that only contact holds: the kernel of S.
     body : str
-        What an error calls the body.
+        The name of the body in errors.
     systems : Systems, optional
         Of the same matrix, shared with other steps.
     """
@@ -92,20 +89,17 @@ class ContactStep:
     ) -> None:
         if solver not in ("auto", "cvxpy", "active-set"):
             raise ValueError(f"solver {solver!r}: needed 'auto', 'cvxpy' or 'active-set'")
-        self._S, self._free, self._t, self._solver, self._near = S, free, tangential, solver, near
-        self._body = body
+        self._S, self._free, self._t, self._solver, self._near, self._body = S, free, tangential, solver, near, body
         self._motions = np.zeros((len(S), 0)) if motions is None or not motions.size else motions
-        self._active, self._certificate = (
-            ActiveSet(S, free, tangential, self._motions, systems),
-            KKTCertificate(S, free),
-        )
+        self._active = ActiveSet(S, free, tangential, self._motions, systems)
+        self._certificate = KKTCertificate(S, free)
         self._model: ContactModel | None = None
         self._pattern = Pattern.sticking(len(S) - tangential, tangential)
 
     def solve(self, q: Floats, bound: Floats) -> ContactSolution:
         """Solve and certify.
 
-        The program's answer names the active set; the linear system of that set gives the digits Clarabel leaves out.
+        The program's answer gives the active set; the linear system of that set gives the digits Clarabel leaves out.
 
         Raises
         ------
@@ -115,11 +109,10 @@ class ContactStep:
         found = None if self._solver == "cvxpy" else self._by_active_set(q, bound, self._pattern, "active-set")
         if found is None and (way := way_out(self._motions, q, bound)):
             raise NoMinimiser(f"step II has no minimiser: the loads move {self._body} {way}")
-        if found is None and self._solver != "active-set":
-            found = self._by_program(q, bound)
+        if found is None and self._solver != "active-set" and (answer := self._of_program(q, bound)):
+            found = self._by_active_set(q, bound, answer.pattern, "cvxpy")
         if found is None:
-            n = len(self._S) - self._t
-            sticking = Pattern.sticking(n, self._t)
+            sticking = Pattern.sticking(len(self._S) - self._t, self._t)
             found = self._by_active_set(q, bound, sticking, "active-set") or self._by_a_guess(q, bound, sticking)
         if found is None:
             why = f": {self._near} is too near 1/2 for doubles" if self._near else ""
@@ -131,15 +124,13 @@ class ContactStep:
         self, q: Floats, bound: Floats, start: Pattern, solver: Literal["cvxpy", "active-set"]
     ) -> ContactSolution | None:
         closed = self._active.solve(q, bound, start)
-        if closed is None:
-            return None
-        return self._certified(q, bound, closed, solver)
+        return None if closed is None else self._certified(q, bound, closed, solver)
 
     def _by_a_guess(self, q: Floats, bound: Floats, start: Pattern) -> ContactSolution | None:
-        """The best of the guesses among which the active set goes round and round, if that is certified.
+        """Return the best of the guesses among which the active set cycles, if that one is certified.
 
-        Signs are read with a slack of 1e-14 of the largest force.  Where forces, or jumps times stiffness, differ from
-        where a condition changes by little more, as with a friction bound of 1e-13, the nodes may turn each
+        Signs are read with a slack of 1e-14 of the largest force.  Where forces, or jumps times stiffness, are hardly
+        further than that from where a condition changes, as with a friction bound of 1e-13, the nodes may turn each
         other for ever, though each of the guesses meets all conditions to a share of the tolerance.
         """
         guesses = (self._certified(q, bound, guess, "active-set") for guess in self._active.repeated(q, bound, start))
@@ -155,12 +146,8 @@ class ContactStep:
             return None
         return ContactSolution(v=v, force=force, pattern=pattern, kkt=kkt, solver=solver)
 
-    def _by_program(self, q: Floats, bound: Floats) -> ContactSolution | None:
-        found = self._of_program(q, bound)
-        return None if found is None else self._by_active_set(q, bound, found.pattern, "cvxpy")
-
     def _of_program(self, q: Floats, bound: Floats) -> ContactSolution | None:
-        """What the convex program itself answers; None where it gives nothing."""
+        """Return the answer of the convex program itself, or None where it gives none."""
         if self._model is None:
             self._model = contact_model()(self._S, self._free, self._t, self._motions.shape[1])
         v = self._model.solve(q, bound)
@@ -173,16 +160,10 @@ class ContactStep:
 
 
 class ProgramStep(ContactStep):
-    """Step II as the convex program answers it, with no active set behind it: right to its tolerance alone."""
+    """Step II by the convex program with no active set behind it: right only to the tolerance of the program."""
 
     def solve(self, q: Floats, bound: Floats) -> ContactSolution:
-        """Solve; the certificate is measured and not asked for.
-
-        Raises
-        ------
-        ContactError
-            The program gives no answer.
-        """
+        """Solve; the certificate is measured but need not hold.  ContactError where the program gives no answer."""
         found = self._of_program(q, bound)
         if found is None:
             raise ContactError("cvxpy's solver gave no answer to the contact step")
@@ -190,10 +171,55 @@ class ProgramStep(ContactStep):
 
 
 def contact_model() -> type[ContactModel]:
-    """The convex program of step II.
+    """Import the convex program of step II; cvxpy, which comes with it, takes a second.
 
-    cvxpy comes with it: that takes a second, and cvxpy takes an import that Ctrl-C breaks for a solver that is missing.
+    Ctrl-C waits: cvxpy takes an import that it breaks for a solver that is missing.
     """
     with undisturbed():
         from verification.contact.model import ContactModel
     return ContactModel
+
+
+def way_out(motions: Floats, q: Floats, bound: Floats) -> str:
+    """Describe how the loads move a body that only contact holds; empty where contact and friction can hold it.
+
+    The energy of step II is convex and quadratic, with friction piecewise linear, on a polyhedron.  It has a minimiser
+    if and only if it does not fall without end, which only rigid motions can cause: with the loads q, the friction
+    bounds beta and every rigid motion z that does not penetrate (z_N <= 0), a minimiser exists if and only if
+
+        q' z <= sum_j beta_j |z_T,j| .
+
+    Parameters
+    ----------
+    motions : array, shape (t + n, k)
+        Orthonormal traces of the rigid motions; normal components along n.
+    q : array, shape (t + n,)
+        The loads; forces that do no work in the motions may be left out.
+    bound : array, shape (t,)
+        Friction bounds.
+    """
+    if not motions.shape[1]:
+        return ""
+    if _work(motions, q, bound, sliding=True):
+        return f"along Gamma_c, where friction holds {float(bound.sum()):.3g} at most"
+    return "off" if _work(motions, q, bound, sliding=False) else ""
+
+
+def _work(motions: Floats, q: Floats, bound: Floats, *, sliding: bool) -> bool:
+    """Return True if the loads do more work in some motion (tangential only, if ``sliding``) than friction takes."""
+    from scipy.optimize import linprog  # slow to import and seldom needed
+
+    t, k = len(bound), motions.shape[1]
+    size = max(float(np.abs(q).max()), float(bound.max(initial=0.0)))
+    if size == 0.0:
+        return False
+    slip, normal, one = motions[:t], motions[t:], np.eye(t)
+    moves = np.hstack([normal, np.zeros((len(normal), t))])
+    rubs = np.block([[slip, -one], [-slip, -one]])
+    kept = {"A_ub": rubs, "b_ub": np.zeros(len(rubs)), "A_eq": moves, "b_eq": np.zeros(len(moves))}
+    if not sliding:
+        kept = {"A_ub": np.vstack([rubs, moves]), "b_ub": np.zeros(len(rubs) + len(moves))}
+    found = linprog(
+        np.concatenate([-(motions.T @ q), bound]) / size, bounds=[(-1, 1)] * k + [(0, None)] * t, method="highs", **kept
+    )
+    return bool(found.status == 0 and found.fun < -TOLERANCE)

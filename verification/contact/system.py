@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem1d2d.mesh import Floats, Ints
+from verification.contact.active_set import Pattern
 from verification.dense import STILL
 
 #: A solution is accepted below this relative KKT residual.
@@ -16,14 +17,13 @@ TOLERANCE = 1e-11
 #: Signs are read with this slack relative to the largest force or jump.
 SLACK = 1e-14
 
-#: Newton's method gives up after so many patterns; it needs a few, or repeats itself.
+#: Patterns after which Newton's method gives up; it needs a few, or repeats itself.
 LIMIT = 40
 
-#: Sweeps before the next start of Newton's method, doubled each time.
+#: Sweeps before the next start of Newton's method, doubled each time, and the number of starts.
 SWEEPS, RESTARTS = 10, 10
 
-
-#: How many problems with a given friction bound, and which part of the way to its next value the bound goes.
+#: Number of problems with a given friction bound, and the parts of the way to its next value that the bound goes.
 GIVEN, SHARES = 30, (1.0, 0.3)
 
 
@@ -31,26 +31,15 @@ class SolveError(RuntimeError):
     """The global method did not reach its KKT certificate."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Branches:
-    """The branch that each complementarity condition takes.
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Branches(Pattern):
+    """The branch of each complementarity condition: the state of each node, and the sign of S lambda_N, shape (t,)."""
 
-    Attributes
-    ----------
-    touching : bool array, shape (n,)
-    sliding : int array, shape (t,)
-        0 where the node sticks, else the sign of its slip.
-    threshold : int array, shape (t,)
-        Sign of S lambda_N.
-    """
-
-    touching: NDArray[np.bool_]
-    sliding: NDArray[np.int8]
     threshold: NDArray[np.int8]
 
+    @property
     def key(self) -> bytes:
-        """Equal for equal branches."""
-        return self.touching.tobytes() + self.sliding.tobytes() + self.threshold.tobytes()
+        return super().key + self.threshold.tobytes()
 
 
 class ContactSystem:
@@ -69,7 +58,7 @@ class ContactSystem:
     motions : array, shape (t + n, k), optional
         M: jumps of the rigid motions that only contact can hold.
     resultant : array, shape (k,), optional
-        What ``M' lambda`` must be: the work of the loads in those motions.
+        The value that ``M' lambda`` must have: the work of the loads in those motions.
     """
 
     def __init__(
@@ -118,13 +107,7 @@ class ContactSystem:
         return max(float(np.max(v, initial=0.0)) for v in violations)
 
     def solve(self) -> Equilibrium:
-        """Solve the system.
-
-        Raises
-        ------
-        SolveError
-            The certificate was not reached.
-        """
+        """Solve the system; SolveError where the certificate is not reached."""
         found = self.newton(self.start())
         if found is None and self.given is None:
             found = self._from_given_bounds()
@@ -143,7 +126,7 @@ class ContactSystem:
     def _from_given_bounds(self) -> Equilibrium | None:
         """Start Newton's method from problems with a given friction bound, each from the forces of the one before.
 
-        Each of these is convex, and solved whatever the friction; the bound moves part of the way where the whole way
+        Each of these is convex and has a solution for any friction; the bound moves part of the way where the whole way
         repeats itself.
         """
         for share in SHARES:
@@ -165,30 +148,30 @@ class ContactSystem:
         return None
 
     def start(self) -> Branches:
-        """What the bodies would do without contact forces, and sticking; all touch where contact has to hold a body."""
+        """Return branches for d_0, without contact forces, sticking; all touch if contact has to hold a body."""
         touching = self.d0[self.t :] > 0 if self.M.shape[1] == 0 else np.ones(len(self.d0) - self.t, dtype=bool)
         signs = np.ones(self.t, dtype=np.int8)
         return Branches(touching=touching, sliding=0 * signs, threshold=signs)
 
     def newton(self, branches: Branches) -> Equilibrium | None:
-        """Solve for the branches, mend them by the signs found, until they agree; None where they repeat."""
+        """Solve for the branches and correct them by the signs found until they agree; None where they repeat."""
         seen: set[bytes] = set()
         for _ in range(LIMIT):
-            if branches.key() in seen:
+            if branches.key in seen:
                 return None
-            seen.add(branches.key())
+            seen.add(branches.key)
             solved = self._equilibrium(branches)
             if solved is None:
                 return None
             mended = self._mend(branches, *solved)
-            if mended.key() == branches.key():
+            if mended.key == branches.key:
                 found = Equilibrium(force=solved[0], motion=solved[1], branches=branches)
                 return found if self.residual(*solved) <= TOLERANCE else None
             branches = mended
         return None
 
     def _equilibrium(self, branches: Branches) -> tuple[Floats, Floats] | None:
-        """The linear system of given branches: no jump where a node touches or sticks, its bound where it slides."""
+        """Solve the linear system of branches: no jump where a node touches or sticks, its bound where it slides."""
         t = self.t
         rows = np.flatnonzero(np.concatenate([branches.sliding == 0, branches.touching]) & self.flexible)
         slides = np.flatnonzero((branches.sliding != 0) & self.flexible[:t])
@@ -212,7 +195,7 @@ class ContactSystem:
         return force + spread @ solved[: len(rows)], solved[len(rows) :]
 
     def _pins(self, rows: Ints, works: Floats) -> Floats:
-        """What pins the rigid motions that no touching or sticking node feels, and no friction that follows forces.
+        """Stiffness for the rigid motions that no touching or sticking node resists, nor friction that follows forces.
 
         It is exact: a solution exists only where the loads do no work in them.
         """
@@ -229,7 +212,7 @@ class ContactSystem:
         return np.asarray(free @ free.T) * size**2 / float(np.diag(self.W).max())
 
     def _mend(self, branches: Branches, force: Floats, motion: Floats) -> Branches:
-        """The branches that the signs ask for; a sliding node of the wrong sign goes to stick first."""
+        """Return the branches that the signs require; a sliding node of the wrong sign goes to stick first."""
         t, bound, d = self.t, self.bound(force), self.jump(force, motion)
         weak = SLACK * max(float(np.abs(force).max()), float(bound.max(initial=0.0)))
         short = SLACK * max(float(np.abs(self.d0).max()), float(np.abs(d).max()))
@@ -279,15 +262,7 @@ class ContactSystem:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Equilibrium:
-    """A certified solution of a contact system.
-
-    Attributes
-    ----------
-    force : array, shape (t + n,)
-    motion : array, shape (k,)
-        Coefficients of the rigid motions.
-    branches : Branches
-    """
+    """A certified solution: forces, shape (t + n,), coefficients of the rigid motions, shape (k,), and branches."""
 
     force: Floats
     motion: Floats

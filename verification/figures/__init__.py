@@ -8,9 +8,8 @@ from verification.figures.factor import draw_factor
 from verification.figures.region import draw_region
 from verification.figures.reproduction import draw_reproduction
 from verification.figures.residuals import draw_residuals
-from verification.figures.rules import draw_rules
 from verification.figures.style import save
-from verification.figures.sweep import draw_sweep
+from verification.figures.sweep import draw_rules, draw_sweep
 from verification.figures.waterfall import draw_waterfall
 
 __all__ = [

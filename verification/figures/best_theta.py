@@ -1,4 +1,4 @@
-"""The best theta over the ratio of the moduli: seen in runs, predicted, proved, and from the moduli alone."""
+"""The best theta over the ratio of the moduli: seen in runs, predicted, proved, and from only the moduli."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from verification.figures.style import BODY1, BODY2, THETA, new_figure, plain, s
 if TYPE_CHECKING:  # scipy.optimize, which no other figure needs, comes with it
     from verification.advice.best_theta import BestTheta
 
-#: What the moduli alone say is drawn in these, one after the other: thin, as it knows no mesh.
+#: Colours and line styles of the thetas that follow from only the moduli, without a mesh.
 OF_MODULI = (("0.35", ":"), ("0.35", (0, (6, 2, 1, 2))))
 
 #: Each bound with friction: the attribute of BestTheta, its words, and how it is drawn.
@@ -30,14 +30,9 @@ TICKS = (0.01, 0.03, 0.1, 0.3, 0.5, 0.7, 0.9, 0.97, 0.99)
 
 @dataclass(frozen=True, kw_only=True)
 class Panel:
-    """One assignment of the roles.
+    """One assignment of the roles: results over the ratio of the moduli, with and without friction.
 
-    Attributes
-    ----------
-    title : str
-    with_friction, without : mapping from the ratio of the moduli to BestTheta
-        The second shows what is proved without friction.
-    moduli : mapping from a label to a mapping from the ratio to a theta
+    ``moduli`` maps labels to thetas over the same ratio.
     """
 
     title: str
@@ -50,13 +45,7 @@ def draw_best_theta(panels: list[Panel], x: str) -> Figure:
     """Points are runs, broken lines predictions, solid lines proofs; a proof that ends has no theta beyond.
 
     theta is drawn by its odds theta/(1 - theta): ``2/(2 + rho)`` has the odds ``2/rho``, a straight line wherever rho
-    is proportional to the ratio.
-
-    Parameters
-    ----------
-    panels : list of Panel
-    x : str
-        What the ratio is.
+    is proportional to the ratio.  The text ``x`` says which ratio it is.
     """
     with styled():
         figure = new_figure(7.2, 5.2)

@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from fem1d2d.mesh import Floats
 from verification.algorithm.runs import Run
 from verification.figures.style import BODY1, BODY2, PRESSURE, SHEAR, STATES, legend_beside, new_figure, plain, styled
+from verification.interface.assembly import TwoBodies
 from verification.interface.fields import ContactFields
-from verification.interface.two_bodies import TwoBodies
 from verification.monolithic import Solution
 
 #: Displacements are drawn so that the largest is about this fraction of the picture.
@@ -22,13 +22,7 @@ SHARE = 0.06
 
 
 def draw_bodies(result: Run | Solution) -> Figure:
-    """Deformed meshes above, pressure and shear along Gamma_c below, with what each node does.
-
-    Parameters
-    ----------
-    result : Run or Solution
-        Of a run the last iterate is drawn.
-    """
+    """Deformed meshes above, pressure, shear and states along Gamma_c below; of a run the last iterate is drawn."""
     bodies = result.bodies
     moved = [float(np.abs(u).max()) for u in result.displacements if u is not None]
     size = max(float(np.ptp(body.mesh.points[:, 0])) for body in bodies.elastic)
@@ -50,7 +44,7 @@ def _round_down(value: float) -> float:
 
 
 def _lift(bodies: TwoBodies, scale: float) -> float:
-    """How far body 2 is drawn up: a flat gap grows with the displacements, so that bodies that touch look so."""
+    """The shift of body 2 in the drawing: a flat gap is scaled as displacements are, so that contact looks closed."""
     if bodies.body1 is None or bodies.body2 is None or np.ptp(bodies.interface.gap) > 0:
         return 0.0
     levels = [float(body.mesh.points[body.nodes[0], -1]) for body in (bodies.body1, bodies.body2)]
@@ -88,7 +82,7 @@ def _draw_meshes(ax: Axes, bodies: TwoBodies, displacements: tuple[Floats | None
 
 
 def _obstacle(bodies: TwoBodies) -> float:
-    """Where the face of the obstacle lies."""
+    """The height of the face of the obstacle."""
     body, sign = (bodies.body2, -1.0) if bodies.body1 is None else (bodies.body1, 1.0)
     assert body is not None
     return float(body.mesh.points[body.nodes[0], 1] + sign * bodies.interface.gap[0])

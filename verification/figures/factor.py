@@ -1,4 +1,4 @@
-"""The factor of one step over theta: what is predicted from rho, and what is proved with friction."""
+"""The factor of one step over theta: predicted from rho, and proved with friction."""
 
 from __future__ import annotations
 
@@ -11,17 +11,12 @@ from ndtheory import EnergyConstants, evaluate_energy
 from ndtheory.energy_norms import predicted_factor
 from verification.figures.style import BODY1, BODY2, THETA, legend_beside, new_figure, styled
 
-#: How many thetas a curve has.
+#: Thetas of a curve.
 POINTS = 80
 
 
 def draw_factor(roles: Mapping[str, EnergyConstants]) -> Figure:
-    """One pair of curves for each assignment of the roles; the least proved factor is marked.
-
-    Parameters
-    ----------
-    roles : mapping from a label to EnergyConstants
-    """
+    """Two curves for each assignment of the roles, by its label; the least proved factor is marked."""
     thetas = np.linspace(0.01, 0.99, POINTS)
     with styled():
         figure = new_figure(7.2, 3.4)

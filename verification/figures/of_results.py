@@ -29,19 +29,7 @@ from verification.sweeps.sweep import Sweep
 
 @singledispatch
 def draw(result: Any, **options: Any) -> Figure:
-    """Draw the main figure of a result.
-
-    Parameters
-    ----------
-    result : Document
-    options
-        What the ``plot`` of its type takes.
-
-    Raises
-    ------
-    ValueError
-        There is nothing to draw.
-    """
+    """Draw the main figure of a result with the options of its ``plot``; ValueError if there is nothing to draw."""
     raise ValueError(f"a {type(result).__name__} has no figure")
 
 
@@ -71,7 +59,7 @@ def _(result: Measured) -> Figure:
 def _(result: Advice) -> Figure:
     """The factor of one step over theta, for each assignment of the roles."""
     if not result.roles:
-        raise ValueError("no reading is left alone: make the run that `next` names")
+        raise ValueError("several readings are left: make the run that `next` names")
     if result.moduli is not None:
         raise ValueError("moduli bound rho from below only: no factor of a step follows")
     named = {f"Neumann body {role.neumann_body}" if role.neumann_body else "that run": role for role in result.roles}

@@ -19,8 +19,8 @@ def draw_region(plane: Plane) -> Figure:
     """Regions in which contraction is proved, from the largest to the smallest, and the outcome of each run.
 
     Above, all of the plane on logarithmic axes; below, on linear ones, the part in which something is proved.
-    Between two frictions that were worked out the thetas of the larger one are shown: what is proved there is proved
-    for less friction, too.
+    Between two computed frictions the thetas of the larger one are shown: what is proved there is proved for less
+    friction, too.
     """
     ends = [hi for region in plane.regions.values() for _, hi in region.theta]
     frictions = [k for region in plane.regions.values() for k in region.k]

@@ -16,7 +16,7 @@ SHADES = ("#0072B2", "#D55E00", "#009E73", "#000000")
 
 
 def draw_reproduction(found: Reproduction) -> Figure:
-    """One panel for each figure: that of the paper's text in grey, ours in the reading that comes nearest."""
+    """One panel for each figure: the paper's text in grey, and the runs in the nearest reading."""
     results = found.results
     with styled():
         figure = new_figure(7.2, 2.9 * len(results))

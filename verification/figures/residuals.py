@@ -16,14 +16,7 @@ from verification.figures.style import PRESSURE, legend_beside, new_figure, plai
 
 
 def draw_residuals(run: Run, bounds: Sequence[BoundResult] = ()) -> Figure:
-    """Unrelaxed residual over evaluations of T, the observed rate, the proved factors and the noise floor.
-
-    Parameters
-    ----------
-    run : Run
-    bounds : sequence of BoundResult, optional
-        Those with a factor are drawn.
-    """
+    """Unrelaxed residual over evaluations of T, the observed rate, the noise floor and the factors of the bounds."""
     history = np.array(run.history)
     steps = np.arange(len(history))
     shown = np.isfinite(history) & (history > 0)

@@ -84,7 +84,7 @@ def legend_beside(ax: Axes) -> None:
 
 
 def plain(text: str) -> str:
-    """A text from outside as it is: no mathematics between dollar signs, no control characters."""
+    """A text from outside, literally: no mathematics between dollar signs, no control characters."""
     return printable(text).replace("$", r"\$")
 
 
@@ -100,7 +100,7 @@ class Powers(LogFormatterSciNotation):
 def save(figure: Figure, path: Path) -> None:
     """Write a figure; the ending of the path chooses SVG or PNG.
 
-    The axes are laid out for the first file alone: that takes longer than to draw them.
+    The axes are laid out only for the first file: that takes longer than to draw them.
     """
     for text in figure.findobj(Text):
         lines = text.get_text().split("\n")

@@ -1,7 +1,8 @@
-"""One column of a sweep over another, in curves."""
+"""Figures of sweeps: one column over another in curves, and steps of the relaxation rules over the moduli."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import matplotlib as mpl
@@ -9,9 +10,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from verification.figures.style import THETA, legend_beside, new_figure, plain, styled
+from verification.sweeps.row import Row
 from verification.sweeps.sweep import Sweep
 
-#: What is written beside an axis; the others have the name of their column.
+#: Labels of axes; the others have the name of their column.
 WORDS = {
     "theta": THETA,
     "friction": "coefficient of friction k",
@@ -24,16 +26,10 @@ MARKERS = "osD^vPX*"
 
 
 def draw_sweep(sweep: Sweep, x: str, y: str, curves: str | None = None) -> Figure:
-    """One column over another.
+    """One column over another; a row without a number there has no point.
 
-    Parameters
-    ----------
-    sweep : Sweep
-    x, y : str
-        Columns; a row without a number there has no point.
-    curves : str, optional
-        One colour for each value of this column.  Rows that differ in a further axis are never joined by a line.
-        By default each combination of the other axes has a curve.
+    Each value of the column ``curves`` has its colour.  Rows that differ in a further axis are never joined by a line.
+    By default each combination of the other axes has a curve.
 
     Raises
     ------
@@ -43,7 +39,7 @@ def draw_sweep(sweep: Sweep, x: str, y: str, curves: str | None = None) -> Figur
     for name in (x, y, *([] if curves is None else [curves])):
         if name not in sweep.columns:
             raise ValueError(f"column {name!r}: needed one of {', '.join(sweep.columns)}")
-    # the axes beside x; one that follows from those is no axis of its own
+    # the axes beside x
     others = [name for name in sweep.axes if name not in (x, curves)]
     colours = sweep.values([curves] if curves else others)
     lines = sweep.values([*([curves] if curves else []), *others])
@@ -86,3 +82,37 @@ def _text(value: Any) -> str:
 def _label(name: str, sweep: Sweep) -> str:
     unit = {"young1": "stress", "young2": "stress", "radius": "length"}.get(name)
     return plain(WORDS.get(name, name) + (f" ({sweep.units[unit]})" if unit else ""))
+
+
+def draw_rules(panels: Mapping[str, Sequence[Row]], *, columns: int = 2) -> Figure:
+    """Steps over E1/E2, a curve for each rule, solid and with full markers where its rate is proved.
+
+    ``panels`` maps titles to rows of sweeps, which need the columns young1, young2, rule, iterations and proved_rate; a
+    run that did not arrive has no point.  ``columns`` panels lie side by side.  No rows raise ValueError.
+    """
+    names = list(dict.fromkeys(row["rule"] for rows in panels.values() for row in rows))
+    if not names:
+        raise ValueError("needed at least one row")
+    with styled():
+        lines = -(-len(panels) // columns)
+        figure = new_figure(7.2, 0.8 + 2.4 * lines)
+        grid = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False)
+        shades = mpl.colormaps["viridis"](np.linspace(0, 0.85, len(names)))
+        for ax, (title, rows) in zip(grid.flat, panels.items(), strict=False):
+            for name, shade, marker in zip(names, shades, MARKERS, strict=False):
+                found = sorted((row["young1"] / row["young2"], row["iterations"], row["proved_rate"] is not None)
+                               for row in rows if row["rule"] == name and row["iterations"] is not None)  # fmt: skip
+                steps = np.array([max(count, 1) for _, count, _ in found])  # 0 has no place on a logarithmic axis
+                ratio, proved = np.array([r for r, _, _ in found]), np.array([p for _, _, p in found], dtype=bool)
+                style = {"color": shade, "marker": marker, "markersize": 4.5}
+                ax.plot(ratio, steps, linestyle=(0, (2, 2)), linewidth=0.9, markerfacecolor="white", **style)
+                ax.plot(ratio, np.where(proved, steps, np.nan), "-", linewidth=1.6, **style)
+                ax.plot([], [], "-", label=plain(name), **style)
+            ax.set(xscale="log", yscale="log", title=plain(title))
+            ax.grid(color="0.9", linewidth=0.6)
+        for ax in grid[-1]:
+            ax.set_xlabel("E1/E2, lower over upper body")
+        for ax in grid[:, 0]:
+            ax.set_ylabel("steps")
+        figure.legend(*grid.flat[0].get_legend_handles_labels(), loc="outside lower center", ncols=len(names))
+    return figure

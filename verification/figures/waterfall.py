@@ -1,4 +1,4 @@
-"""What each inequality of the proof gives away, in decades."""
+"""The loss in each inequality of the proof, in decades."""
 
 from __future__ import annotations
 
@@ -8,18 +8,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from verification.bounds.losses import Loss, Losses
-from verification.bounds.section5 import Printed, Repaired
+from verification.bounds.table import Printed, Repaired
 from verification.figures.style import STATES, new_figure, styled
 
 
 def draw_waterfall(losses: Losses, unit: str) -> Figure:
     """Each inequality by itself, then the steps from the largest quantity found to its bound, added up.
 
-    Parameters
-    ----------
-    losses : Losses
-    unit : str
-        The unit of stress, on which alone the step from the repaired to the printed bound depends.
+    The step from the repaired to the printed bound depends only on ``unit``, the unit of stress.
     """
     chains = [
         ("each inequality by itself", losses.links),

@@ -1,8 +1,10 @@
-"""From a problem to its two bodies on their meshes: supports, stiffness matrices, Gamma_c."""
+"""Two bodies on their meshes along Gamma_c, assembled from a problem: supports, stiffness matrices, warnings."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any
 
 import numpy as np
 
@@ -24,56 +26,148 @@ from fem1d2d.mesh import Floats, Ints
 from fem1d2d.trace import SAME, extent
 from verification.dense import STILL
 from verification.interface.body import Body, Name
-from verification.interface.interface import Law
+from verification.interface.interface import Interface, Law
 from verification.interface.joining import join
-from verification.interface.two_bodies import SingularRole, TwoBodies
 from verification.problem.specification import Problem
 from verification.problem.specs import MOST_CELLS, BodySpec
 from verification.problem.tables import ProblemError, short
+from verification.value import Value
 
-#: Interface matrices are dense; more contact nodes would fill the memory.
+#: Largest number of contact nodes for interface matrices, which are dense: more would fill the memory.
 MOST_CONTACT_NODES = 2000
+
+#: Poisson ratio from which linear triangles err visibly.  Two models against a mesh that does not lock (rectangles
+#: split by both diagonals, 72 cells along Gamma_c): at 0.48 the nodal pressures of the built-in split are off by 5 and
+#: 6 % (0.7 and 2.3 % at 0.3) and the force by 2 %, 7 to 11 % with 12 cells; at 0.499 the pressures by 40 and 11 %.
+LOCKING = 0.48
 
 
 class TooManyContactNodes(ProblemError):
-    """A sound problem, too large for dense interface matrices."""
+    """A valid problem, too large for dense interface matrices."""
+
+
+class SingularRole(ProblemError):
+    """The body that would get the Neumann problem can move rigidly.
+
+    ``motions`` is the number of rigid motions that its supports leave.
+    """
+
+    def __init__(self, source: str, body: int, motions: int) -> None:
+        name, other = f"body{body}", 3 - body
+        free = f"{motions} free motion{'s' if motions > 1 else ''}"
+        super().__init__(
+            source,
+            name,
+            None,
+            f"{name} can move rigidly ({free}), so that its stiffness matrix in the Neumann problem of step I is"
+            f" singular: give body {other} the Neumann problem (iteration.neumann_body = {other}), fix or prescribe"
+            f" more sides of {name}, or use `ndtheory solve`",
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class TwoBodies(Value):
+    """Two bodies on their meshes along Gamma_c; one of them may be rigid.
+
+    Attributes
+    ----------
+    body1, body2 : Body or None
+        None where rigid.
+    interface : Interface
+        In the roles of the problem.
+    friction : Fraction
+        k, constant along Gamma_c.
+    problem : Problem
+        The problem they were made from.
+    """
+
+    body1: Body | None
+    body2: Body | None
+    interface: Interface
+    friction: Fraction
+    problem: Problem
+
+    @property
+    def summary(self) -> str:
+        return f"{self.problem.title}, {self.interface.contact.n} contact nodes"
+
+    @property
+    def neumann(self) -> Body | None:
+        """The body whose traces reach the contact grid by the transfer; None where it is rigid."""
+        return self.body2 if self.problem.contact_body == 1 else self.body1
+
+    @property
+    def elastic(self) -> list[Body]:
+        """The bodies that are not rigid."""
+        return [body for body in (self.body1, self.body2) if body is not None]
+
+    @property
+    def outside(self) -> list[str]:
+        """The reasons why the theorem does not apply to this problem; empty where it does."""
+        return reasons_outside(self.interface, self.friction, [body.unknown for body in self.elastic])
+
+    @property
+    def warnings(self) -> list[str]:
+        """Facts that a user should know before trusting the numbers."""
+        return warnings_of(self.interface, self.friction, self.elastic)
+
+
+def reasons_outside(interface: Interface, friction: Fraction, free: list[Any]) -> list[str]:
+    reasons = []
+    if friction and interface.law is not None and interface.law.outside:
+        reasons.append(interface.law.outside)
+    if not all(components.all() for components in free):
+        reasons.append("a contact node is held tangentially: Gamma_u and Gamma_c must not meet")
+    return reasons
+
+
+def nearly_incompressible(bodies: list[Body]) -> str:
+    ratios = {f"{body.name}.poisson": body.poisson for body in bodies}
+    return " and ".join(f"{key} = {ratio:.12g}" for key, ratio in ratios.items() if ratio >= LOCKING)
+
+
+def warnings_of(interface: Interface, friction: Fraction, bodies: list[Body]) -> list[str]:
+    found = []
+    near = nearly_incompressible(bodies)
+    if near:
+        found.append(
+            f"{near}: near 1/2 linear triangles make a body too stiff and scatter the nodal"
+            f" pressures (Section 6 at {LOCKING:g}: 5 %, at 0.499: 40 %); needed a finer mesh, or a mesh file whose"
+            " rectangles are split by both diagonals"
+        )
+    if interface.gap.min() < 0:
+        j = int(np.argmin(interface.gap))
+        found.append(
+            f"the initial gap is {interface.gap[j]:.4g} at x = {interface.contact.x[j]:g}: the bodies overlap as they"
+            " are drawn, and press each other apart before any load acts"
+        )
+    if friction and interface.law is not None and interface.contact.dimension == 2:
+        found += interface.law.warnings(interface)
+    return found
 
 
 def held_bodies(problem: Problem, *, law: Law | None = None, dense: bool = True) -> TwoBodies:
-    """The bodies on their meshes as the iteration needs them: elastic, and held by their supports.
+    """Return the bodies on their meshes as the iteration needs them: elastic, and held by their supports.
 
-    Parameters
-    ----------
-    problem : Problem
-    law : Law, optional
-        As for :func:`verification.interface.pair.build`.
-    dense : bool
-        As for :func:`discretise`.
+    Parameters as for :func:`discretise`.
 
     Raises
     ------
     ProblemError
-        As :func:`verification.interface.pair.build`.
+        As :func:`verification.interface.pair.pair_from`.
     """
-    iteration = problem.iteration
-    for name in ("body1", "body2"):
-        if getattr(problem, name).rigid:
-            role = "Neumann" if iteration.neumann_body == int(name[-1]) else "contact"
-            raise ProblemError(
-                problem.source,
-                f"{name}.shape",
-                "rigid",
-                f"needed an elastic body: it has the {role} problem of the iteration; `ndtheory solve` takes obstacles",
-            )
+    for name, spec in _specs(problem):
+        if spec.rigid:
+            role = "Neumann" if problem.iteration.neumann_body == int(name[-1]) else "contact"
+            needed = f"needed an elastic body: it has the {role} problem of the iteration"
+            raise problem.refuse(f"{name}.shape", "rigid", f"{needed}; `ndtheory solve` takes obstacles")
     bodies = discretise(problem, law=law, dense=dense)
     if bodies.interface.transfer is not None and bodies.interface.law is not None and bodies.interface.law.of_contact:
-        raise ProblemError(
-            problem.source,
-            "contact.law",
-            problem.contact.law,
+        needed = (
             "needed another law on grids that differ: the iteration knows the forces of the Neumann grid, not those of"
-            " the contact grid; `ndtheory solve` takes it",
+            " the contact grid; `ndtheory solve` takes it"
         )
+        raise problem.refuse("contact.law", problem.contact.law, needed)
     _check_supports(bodies, dense=dense)
     return bodies
 
@@ -89,16 +183,15 @@ def _check_supports(bodies: TwoBodies, *, dense: bool) -> None:
             raise SingularRole(problem.source, number, k)
         moves = f"{body.name} can move rigidly"
         if problem.dimension == 1:
-            needed = (
-                f"{moves}: its loads are its contact force, and nothing is left to iterate; `ndtheory solve` takes it"
-            )
-            raise ProblemError(problem.source, body.name, None, needed)
-        if not dense:
-            needed = f"{moves}: needed at most {MOST_CONTACT_NODES} contact nodes for a body that contact alone holds"
-            raise ProblemError(problem.source, body.name, None, needed)
-        if body.motion_traces.shape[1] < k:
-            needed = f"{moves} where no contact node feels it: fix or prescribe more of its sides"
-            raise ProblemError(problem.source, body.name, None, needed)
+            needed = "its loads are its contact force, and nothing is left to iterate; `ndtheory solve` takes it"
+        elif not dense:
+            needed = f"needed at most {MOST_CONTACT_NODES} contact nodes for a body that contact alone holds"
+        elif body.motion_traces.shape[1] < k:
+            moves += " where no contact node feels it"
+            needed = "fix or prescribe more of its sides"
+        else:
+            continue
+        raise problem.refuse(body.name, None, f"{moves}: {needed}")
 
 
 def discretise(problem: Problem, *, law: Law | None = None, dense: bool = True) -> TwoBodies:
@@ -106,7 +199,6 @@ def discretise(problem: Problem, *, law: Law | None = None, dense: bool = True) 
 
     Parameters
     ----------
-    problem : Problem
     law : Law, optional
         A law of friction in place of the problem's.
     dense : bool
@@ -133,13 +225,13 @@ def discretise(problem: Problem, *, law: Law | None = None, dense: bool = True) 
         body1=body1, body2=body2, interface=interface, friction=problem.contact.friction, problem=problem
     )
     if len(bodies.elastic) == 2 and _move_together(bodies):
-        needed = "body1 and body2 can move rigidly together, each held by the other alone: fix or prescribe some sides"
-        raise ProblemError(problem.source, "body2", None, needed)
+        needed = "body1 and body2 can move rigidly together, each held only by the other: fix or prescribe some sides"
+        raise problem.refuse("body2", None, needed)
     return bodies
 
 
 def _move_together(bodies: TwoBodies) -> bool:
-    """Whether both bodies have a rigid motion in common that changes nothing between them."""
+    """Return True if both bodies have a rigid motion in common that changes nothing between them."""
     both = bodies.elastic
     if not all(body.motions.shape[1] for body in both):
         return False
@@ -157,9 +249,8 @@ def _mesh(problem: Problem, name: Name) -> Mesh:
     spec: BodySpec = getattr(problem, name)
     if spec.mesh is not None:
         path = spec.mesh.path
-        refuse = lambda needed: ProblemError(problem.source, f"{name}.mesh", path, needed)
-        why = spec.mesh.unusable()
-        if why:
+        refuse = lambda needed: problem.refuse(f"{name}.mesh", path, needed)
+        if why := spec.mesh.unusable():
             raise refuse(why)
         try:
             mesh = from_file(path)
@@ -171,12 +262,8 @@ def _mesh(problem: Problem, name: Name) -> Mesh:
         for key, sides in (("fixed", spec.fixed), ("prescribed", spec.prescribed), ("traction", spec.traction)):
             for side in sides:
                 if side not in mesh.sides:
-                    raise ProblemError(
-                        problem.source,
-                        f"{name}.{key}",
-                        side,
-                        "unknown side; the mesh file names " + short(", ".join(mesh.sides)),
-                    )
+                    needed = "unknown side; the mesh file names " + short(", ".join(mesh.sides))
+                    raise problem.refuse(f"{name}.{key}", side, needed)
         return mesh
     assert spec.x is not None
     assert spec.cells is not None
@@ -188,16 +275,18 @@ def _mesh(problem: Problem, name: Name) -> Mesh:
         mesh = rectangle(x, (float(spec.y[0]), float(spec.y[1])), (spec.cells[0], spec.cells[1]))
         return _with_parts(problem, name, mesh)
     except MeshError as error:  # coordinates that no longer differ in doubles
-        raise ProblemError(problem.source, f"{name}.cells", list(spec.cells), str(error)) from None
+        raise problem.refuse(f"{name}.cells", list(spec.cells), str(error)) from None
 
 
 def _with_parts(problem: Problem, name: Name, mesh: Mesh) -> Mesh:
-    """The mesh with the parts of sides that the problem names: the edges of the side between the ends of the part."""
+    """Add the parts of sides that the problem names: the edges of the side between the ends of the part."""
     parts = {}
     for key, part in getattr(problem, name).parts.items():
-        refuse = lambda needed, key=key: ProblemError(problem.source, f"{name}.parts.{key}", None, needed)
+        refuse = lambda needed, key=key: problem.refuse(f"{name}.parts.{key}", None, needed)
         if key in mesh.sides or part.side not in mesh.sides:
-            raise refuse(f"needed a part of a side, under a name of its own; sides: {short(', '.join(mesh.sides))}")
+            raise refuse(
+                f"needed a part of a side, with a name that no side has; sides: {short(', '.join(mesh.sides))}"
+            )
         edges, slack = mesh.sides[part.side], SAME * extent(mesh)
         along = mesh.points[edges, "xy".index(part.axis)].astype(float)
         low, high = map(float, part.ends)
@@ -217,18 +306,14 @@ def _body(problem: Problem, name: Name, mesh: Mesh, nodes: Ints, ends: Floats) -
     try:
         known = supports(mesh, sides)
     except MeshError as error:
-        raise ProblemError(problem.source, f"{name}.prescribed", None, str(error)) from None
+        raise problem.refuse(f"{name}.prescribed", None, str(error)) from None
     if known.known[nodes, d - 1].any():
         node = nodes[np.argmax(known.known[nodes, d - 1])]
         where = mesh.points[node].astype(float)
         holds = next(side for side, values in sides.items() if values[d - 1] is not None and node in mesh.sides[side])
-        raise ProblemError(
-            problem.source,
-            f"{name}.fixed" if holds in spec.fixed else f"{name}.prescribed.{holds}",
-            list(spec.fixed) if holds in spec.fixed else None,
-            "Gamma_u must leave the normal component of every contact node free; it holds the one at "
-            f"({', '.join(f'{c:g}' for c in where)})",
-        )
+        key, value = ("fixed", list(spec.fixed)) if holds in spec.fixed else (f"prescribed.{holds}", None)
+        needed = "Gamma_u must leave the normal component of every contact node free; it holds the one at "
+        raise problem.refuse(f"{name}.{key}", value, f"{needed}({', '.join(f'{c:g}' for c in where)})")
     motions = rigid_motions(mesh, known.known)
     material = plane_strain(float(spec.young), float(spec.poisson)) if d == 2 else bar(float(spec.young))
     matrix = stiffness(mesh, material)
@@ -239,12 +324,8 @@ def _body(problem: Problem, name: Name, mesh: Mesh, nodes: Ints, ends: Floats) -
         loaded = facet_weights(mesh, mesh.sides[side])
         loaded -= facet_weights(mesh, mesh.sides[side][covered], between=(ends[0], ends[1]))
         if any(force) and loaded.max() <= SAME * extent(mesh):
-            raise ProblemError(
-                problem.source,
-                f"{name}.traction.{side}",
-                list(force),
-                "Gamma_c covers this side: a force there is lost",
-            )
+            needed = "Gamma_c covers this side: a force there is lost"
+            raise problem.refuse(f"{name}.traction.{side}", list(force), needed)
         load += loaded[:, None] * plain(force)
     free = np.flatnonzero(~known.known.ravel())
     right = load.ravel()[free] - (matrix @ known.values.ravel())[free]
@@ -259,7 +340,7 @@ def _body(problem: Problem, name: Name, mesh: Mesh, nodes: Ints, ends: Floats) -
         poisson=float(spec.poisson),
         known=known,
         nodes=nodes,
-        free=free,
+        positions=free,
         unknown=unknown,
         interface=interface[unknown],
         stiffness=matrix[free][:, free].tocsc(),

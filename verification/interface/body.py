@@ -16,7 +16,7 @@ from scipy.linalg import cholesky, qr
 from fem1d2d import FEW, Condensation, Lifted, Material, Mesh, Supports, Uncoupled, elimination_order, gram, solver
 from fem1d2d.mesh import Floats, Ints
 from verification.dense import STILL, Cholesky
-from verification.interface.grid import Grid
+from verification.interface.interface import Grid
 from verification.threads import one_thread
 from verification.value import Value, freeze
 
@@ -33,15 +33,13 @@ class Body(Value):
     Attributes
     ----------
     name : {'body1', 'body2'}
-    mesh : Mesh
-    material : Material
     poisson : float
         Poisson's ratio; 0 for a bar.
     known : Supports
         Displacements known on Gamma_u.
     nodes : int array, shape (n,)
         Contact nodes from left to right.
-    free : int array
+    positions : int array
         Positions of the unknowns among all d * node + p.
     unknown : bool array, shape (2 n,) or (n,) in 1D
         Interface components that Gamma_u leaves free; a False one is held tangentially.
@@ -63,7 +61,7 @@ class Body(Value):
     poisson: float
     known: Supports
     nodes: Ints
-    free: Ints
+    positions: Ints
     unknown: NDArray[np.bool_]
     interface: Ints
     stiffness: sp.csc_array
@@ -77,13 +75,13 @@ class Body(Value):
 
     @cached_property
     def gram_matrix(self) -> sp.csc_array:
-        """The Gram matrix of H1 on the unknowns; a run goes without."""
+        """The Gram matrix of H1 on the unknowns; a run does not need it."""
         whole = gram(self.mesh, self.length)
-        return freeze(whole[self.free][:, self.free].tocsc())
+        return freeze(whole[self.positions][:, self.positions].tocsc())
 
     @cached_property
     def solve(self) -> Callable[[Floats], Floats]:
-        """``load -> A^-1 load`` on the unknowns, for one load or columns of loads.
+        """The function ``load -> A^-1 load`` on the unknowns, for one load or columns of loads.
 
         Where rigid motions are left, as many unknowns are pinned: exact, up to a motion, for loads in equilibrium.
         """
@@ -109,8 +107,8 @@ class Body(Value):
 
     @property
     def few(self) -> bool:
-        """Whether it has so few unknowns that dense matrices cost less than sparse ones."""
-        return len(self.free) <= FEW
+        """True if it has so few unknowns that dense matrices cost less than sparse ones."""
+        return len(self.positions) <= FEW
 
     @cached_property
     def elastic(self) -> Condensation:
@@ -125,17 +123,16 @@ class Body(Value):
         """The Gram matrix condensed onto the interface."""
         if self.few:
             return Lifted(self.gram_matrix, self.interface)
-        return Uncoupled(self.gram_matrix, self.interface, self.free % self.mesh.dimension, self.order)
+        return Uncoupled(self.gram_matrix, self.interface, self.positions % self.mesh.dimension, self.order)
 
     @cached_property
     def lift_gram(self) -> Floats:
         """``N_a = R_a' H_a R_a``: the H1 norm squared of the elastic lift (4.5), on the free components."""
         with one_thread():
-            gram: Floats = freeze(self.elastic.on_lifts(self.gram_matrix))
-        return gram
+            return freeze(self.elastic.on_lifts(self.gram_matrix))
 
     def times_as_stiff(self, other: Body) -> float | None:
-        """How often the stiffness matrix of another body its own is, where Young's modulus and loads alone differ."""
+        """Return the ratio of its stiffness matrix to that of ``other``, if only Young's moduli and loads differ."""
         plan = lambda body: (body.mesh.points, body.mesh.cells, body.known.known, body.nodes, body.poisson)
         if not all(map(np.array_equal, plan(self), plan(other))):
             return None
@@ -143,7 +140,7 @@ class Body(Value):
         return float(self.material.continuity(dimension) / other.material.continuity(dimension))
 
     def equals(self, other: Body) -> bool:
-        """Whether it is the same body, loads and norm included."""
+        """Return True if it is the same body, loads and norm included."""
         rest = lambda body: (body.known.values, body.load, body.length)
         return self.times_as_stiff(other) == 1.0 and all(map(np.array_equal, rest(self), rest(other)))
 
@@ -164,22 +161,21 @@ class Body(Value):
         return traces
 
     def displacement(self, trace: Floats) -> Floats:
-        """Displacement of all nodes for given interface values, shape (nodes, d), unit of length."""
+        """Return the displacement of all nodes for given interface values, shape (nodes, d), unit of length."""
         full = self.known.values.ravel().copy()
-        full[self.free] = self.elastic.extend(trace[self.unknown], self.load)
+        full[self.positions] = self.elastic.extend(trace[self.unknown], self.load)
         return full.reshape(self.mesh.points.shape)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Condensed(Value):
-    """A body as its contact nodes feel it: what the algorithm and its bounds know of it.
+    """A body condensed onto its contact nodes: the algorithm and its bounds use nothing else of it.
 
     Interface vectors have their normal components along n of the contact body.  Held components have zero rows and
     columns.
 
     Attributes
     ----------
-    grid : Grid
     stiffness : array, shape (2 n, 2 n)
         S_a, stress (times length in 1D per unit thickness).
     load : array, shape (2 n,)
@@ -195,7 +191,7 @@ class Condensed(Value):
     motions : array, shape (2 n, k)
         Orthonormal traces of the rigid motions that only contact holds: the kernel of S_a; of shape (0, 0) without.
     own_load : array, shape (2 n,), or None
-        l_a as the loads of ``body`` give it; a ``load`` that differs has further forces on Gamma_c.
+        The l_a of the loads of ``body``; a ``load`` that differs has further forces on Gamma_c.
     """
 
     grid: Grid
@@ -210,17 +206,17 @@ class Condensed(Value):
 
     @property
     def loose(self) -> bool:
-        """Whether contact alone holds the body: S_a is then semidefinite."""
+        """True if only contact holds the body: S_a is then semidefinite."""
         return bool(self.motions.size)
 
     @property
     def slides(self) -> bool:
-        """Whether a rigid motion that only contact holds is tangential somewhere on Gamma_c."""
+        """True if a rigid motion that only contact holds is tangential somewhere on Gamma_c."""
         return bool(np.abs(self.motions[self.grid.tangential]).max(initial=0.0) > STILL)
 
     @property
     def lifts(self) -> bool:
-        """Whether a rigid motion that only contact holds has a normal component on Gamma_c."""
+        """True if a rigid motion that only contact holds has a normal component on Gamma_c."""
         return bool(np.abs(self.motions[self.grid.normal]).max(initial=0.0) > STILL)
 
     @property
@@ -231,13 +227,8 @@ class Condensed(Value):
     def of(cls, body: Body, grid: Grid, like: Body | None = None) -> Condensed:
         """Condense a body onto its contact nodes; normal components along y.
 
-        Parameters
-        ----------
-        body : Body
-        grid : Grid
-        like : Body, optional
-            Where it differs in Young's modulus and loads alone its condensation serves: the stiffness is a multiple,
-            and the lift the same.
+        A body ``like`` it that differs only in Young's modulus and loads lends its condensation: the stiffness is a
+        multiple, and the lift the same.
         """
         times = None if like is None else body.times_as_stiff(like)
         elastic = body.elastic if like is None or times is None else like.elastic
@@ -259,15 +250,13 @@ class Condensed(Value):
         )
 
     def turned(self) -> Condensed:
-        """The same body with its normal components along the opposite direction."""
+        """Return the same body with its normal components along the opposite direction."""
         turn = self.grid.turn
-        return Condensed(
-            grid=self.grid,
-            stiffness=self.grid.turn_form(self.stiffness),
+        return replace(
+            self,
+            stiffness=turn(turn(self.stiffness).T),
             load=turn(self.load),
             known=turn(self.known),
-            free=self.free,
-            body=self.body,
             upward=not self.upward,
             motions=turn(self.motions) if self.loose else self.motions,
             own_load=None if self.own_load is None else turn(self.own_load),
@@ -278,7 +267,7 @@ class Condensed(Value):
         return interface.copy() if self.upward else self.grid.turn(interface)
 
     def orient_form(self, matrix: Floats) -> Floats:
-        """The same for a symmetric matrix on the free components."""
+        """Do the same with a symmetric matrix on the free components."""
         if self.upward:
             return matrix
         sign = np.where(np.arange(self.grid.size) < self.grid.t, 1.0, -1.0)[self.free]
@@ -286,26 +275,14 @@ class Condensed(Value):
 
     @property
     def mesh_body(self) -> Body:
-        """The body on its mesh.
-
-        Raises
-        ------
-        ValueError
-            Only matrices are known.
-        """
+        """The body on its mesh; ValueError where only matrices are known."""
         if self.body is None:
             raise ValueError("this pair is made from matrices: needed the meshes of both bodies")
         return self.body
 
     @property
     def loaded_body(self) -> Body:
-        """The body on its mesh under the loads of this side.
-
-        Raises
-        ------
-        ValueError
-            Only matrices are known.
-        """
+        """The body on its mesh under the loads of this side; ValueError where only matrices are known."""
         body = self.mesh_body
         if self.own_load is None or np.array_equal(self.load, self.own_load):
             return body
@@ -318,57 +295,40 @@ class Condensed(Value):
         return Cholesky(self.stiffness, np.flatnonzero(self.free), self.motions)
 
     def flexibility(self, force: Floats) -> Floats:
-        """``S_a^-1 force`` on the free components, 0 on held ones, for one force or columns of them.
+        """Return ``S_a^-1 force`` on the free components, 0 on held ones, for one force or columns of them.
 
-        Where contact alone holds the body, its motions are pinned: right for forces that do no work in them.
+        Where only contact holds the body, its motions are pinned: right for forces that do no work in them.
         """
         return self._factor.solve(force)
 
     @cached_property
     def inverse(self) -> Floats:
         """``S_a^-1`` as a matrix, 0 on held components, shape (2 n, 2 n)."""
-        inverse: Floats = freeze(self.flexibility(np.eye(len(self.load))))
-        return inverse
+        return freeze(self.flexibility(np.eye(len(self.load))))
 
     @cached_property
     def root(self) -> Floats:
         """L with ``S_a = L L'``, shape (2 n, free components): columns orthonormal in the norm (5.21)."""
         result = np.zeros((len(self.free), int(self.free.sum())))
         result[self.free] = cholesky(self.stiffness[np.ix_(self.free, self.free)], lower=True)
-        freeze(result)
-        return result
+        return freeze(result)
 
     @cached_property
     def gram(self) -> Floats:
-        """E_a: the H1 norm squared of the extension of least H1 norm, on the free components.
-
-        Raises
-        ------
-        ValueError
-            Only matrices are known.
-        """
+        """E_a: the H1 norm squared of the extension of least H1 norm, on the free components; needs ``body``."""
         with one_thread():
-            gram: Floats = freeze(self.orient_form(self.mesh_body.gram.schur))
-        return gram
+            return freeze(self.orient_form(self.mesh_body.gram.schur))
 
     @cached_property
     def lift_gram(self) -> Floats:
-        """``N_a = R_a' H_a R_a``: the H1 norm squared of the elastic lift (4.5), on the free components.
-
-        Raises
-        ------
-        ValueError
-            Only matrices are known.
-        """
-        gram: Floats = freeze(self.orient_form(self.mesh_body.lift_gram))
-        return gram
+        """``N_a = R_a' H_a R_a``: H1 norm squared of the elastic lift (4.5), on the free components; needs ``body``."""
+        return freeze(self.orient_form(self.mesh_body.lift_gram))
 
     @cached_property
     def unloaded(self) -> Floats:
-        """Its displacement where nothing touches it, ``known + S_a^-1 l_a``."""
-        unloaded: Floats = freeze(self.known + self.flexibility(self.load))
-        return unloaded
+        """The displacement without contact forces, ``known + S_a^-1 l_a``."""
+        return freeze(self.known + self.flexibility(self.load))
 
     def dual_norm(self, force: Floats) -> float:
-        """The norm (5.21), ``sqrt(force' S_a^-1 force)``, when this is the Neumann body."""
+        """Return the norm (5.21), ``sqrt(force' S_a^-1 force)``, when this is the Neumann body."""
         return math.sqrt(max(float(force @ self.flexibility(force)), 0.0))

@@ -14,8 +14,7 @@ from verification.interface import pair as pairs
 from verification.interface.body import NO_MOTIONS, Condensed
 from verification.interface.files import read_interface
 from verification.interface.friction import GivenOperator
-from verification.interface.grid import Grid
-from verification.interface.interface import Interface, Law
+from verification.interface.interface import Grid, Interface, Law
 from verification.interface.matrices import check_matrix, check_nodes, real_array, size, stiffness
 from verification.interface.pair import ContactPair
 from verification.problem import Problem, load
@@ -37,7 +36,7 @@ def build(
     friction: Numeric = 0,
     neumann_body: Literal[1, 2] = 2,
 ) -> ContactPair:
-    """A contact pair from a problem, or from the interface matrices of any code.
+    """Make a contact pair from a problem, or from the interface matrices of any code.
 
     Interface vectors list all tangential components from left to right, then all normal ones along y, which points from
     body 1 to body 2.
@@ -50,20 +49,20 @@ def build(
     law : Law, optional
         A law of friction in place of the problem's, or of a kernel.
     S1, S2 : array, shapes (2 n1, 2 n1), (2 n2, 2 n2)
-        Schur complements of the stiffness matrices on the contact nodes: symmetric, positive definite; that of the
-        contact body may be singular, where contact alone holds it.
+        Schur complements of the stiffness matrices on the contact nodes: symmetric, positive definite; for the
+        contact body it may be singular, where only contact holds it.
     load1, load2 : array, shapes (2 n1,), (2 n2,), optional
         Loads condensed onto the contact nodes; 0 by default.
     x : array, shape (n,)
         Positions of the contact nodes of the contact body, increasing.
     weights : array, shape (n,), optional
-        Weights of the quadrature on them; those of the trapezoid rule by default.
+        Weights of the quadrature on them; by default the trapezoid rule.
     gap : float or array, shape (n,)
         Initial distance at them; negative where the bodies overlap.
     kernel : array, shape (n, nodes of the Neumann body), optional
         The operator S: normal nodal forces on the Neumann body to normal stress at the contact nodes.
     transfer : array, shape (n, nodes of the Neumann body), optional
-        P: from values at the nodes of the Neumann body to values at those of the contact body; the identity by default.
+        P: from values at the nodes of the Neumann body to values at the contact body's nodes; the identity by default.
     friction : number
         k >= 0; needs a kernel or a law.
     neumann_body : {1, 2}
@@ -77,7 +76,7 @@ def build(
     ProblemError
         A problem that has no two elastic bodies facing each other.
     ValueError
-        Matrices that do not fit, or are no stiffness matrices.
+        Matrices that do not fit, or cannot be stiffness matrices.
 
     Examples
     --------
@@ -89,9 +88,9 @@ def build(
         if S1 is not None or S2 is not None:
             raise ValueError("received a problem and matrices: needed one of them")
         if isinstance(problem, Problem):
-            return pairs.build(problem, law=law)
+            return pairs.pair_from(problem, law=law)
         if Path(problem).suffix != ".npz":
-            return pairs.build(load(problem), law=law)
+            return pairs.pair_from(load(problem), law=law)
         if law is not None:
             raise ValueError("received a law and an interface file: its operator S is a matrix already")
         return read_interface(Path(problem))
@@ -133,7 +132,7 @@ def build(
 
 
 def pair_of(problem: Problem | ContactPair | Path | str) -> ContactPair:
-    """The pair that a problem, a file or a pair stands for."""
+    """Return the pair that a problem, a file or a pair stands for."""
     return problem if isinstance(problem, ContactPair) else build(problem)
 
 

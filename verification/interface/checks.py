@@ -1,4 +1,4 @@
-"""Checks of a deformed state: what the conditions on Gamma_c leave out, and whether the strains are small."""
+"""Checks of a deformed state outside Gamma_c: whether the bodies penetrate, and whether the strains are small."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ import numpy as np
 from fem1d2d import Mesh, depths, largest_strains, rectangle, surface
 from fem1d2d.mesh import Floats, Ints
 from fem1d2d.trace import SAME, extent
+from verification.interface.assembly import TwoBodies
 from verification.interface.body import Body
 from verification.interface.joining import obstacle_level
 from verification.interface.pair import ContactPair
-from verification.interface.two_bodies import TwoBodies
 from verification.problem.specs import BodySpec
 from verification.threads import one_thread
 from verification.value import Value
 
-#: Linear elasticity is for small strains; from here on a warning is given.
+#: Strain from which a warning is given: linear elasticity is for small strains.
 LARGE_STRAIN = 0.05
 
 #: The bodies give way along Gamma_c by the order of the largest strain times its length.  A penetration below this part
@@ -42,14 +42,13 @@ class Checks(Value):
     penetration_outside : float or None
         Greatest depth of a surface node outside Gamma_c inside the other body, unit of length; 0 where none is inside.
     penetration_at : tuple of float or None
-        Where that node is drawn; None where none is inside.
+        Position of that node as it is drawn; None where none is inside.
     largest_strain : float or None
         Largest absolute principal strain over the elements.
     strain_at : tuple of float or None
         Centre of that element as it is drawn.
     reason : mapping of str
         Why a measure is None.
-    warnings : tuple of str
     """
 
     penetration_outside: float | None = None
@@ -65,11 +64,11 @@ class Checks(Value):
 
     @classmethod
     def without(cls, why: str) -> Checks:
-        """No measures, for one reason."""
+        """Return no measures, for one reason."""
         return cls(reason=dict.fromkeys(("penetration_outside", "largest_strain"), why))
 
     def to_dict(self) -> dict[str, Any]:
-        """The object ``checks`` of runs and solutions."""
+        """Return the object ``checks`` of runs and solutions."""
         place = lambda at: None if at is None else list(at)
         places = {
             "penetration_at": self.reason.get("penetration_outside", "no node lies inside the other body"),
@@ -137,24 +136,21 @@ def _show(place: Place | None) -> str:
     return "" if place is None else f"({', '.join(f'{c:.6g}' for c in place)})"
 
 
-def _place(point: Floats) -> Place:
-    return tuple(float(c) for c in point)
-
-
 def _first_largest(values: Floats) -> int:
-    """Index of the first of the largest values: rounding decides none between a place and its mirror image."""
+    """Return the index of the first of the largest values, so that rounding does not choose between mirror images."""
     return int(np.argmax(values >= values.max() * (1 - TIE)))
 
 
 def _strain(bodies: TwoBodies, moved: Displacements) -> tuple[float, Place | None]:
-    """The largest absolute principal strain, and the centre of its element."""
+    """Return the largest absolute principal strain, and the centre of its element."""
     largest, at = 0.0, None
     for body, u in zip((bodies.body1, bodies.body2), moved, strict=True):
         if body is not None and u is not None:
             strains = largest_strains(body.mesh, u)
             cell = _first_largest(strains)
             if strains[cell] > largest * (1 + TIE):
-                largest, at = float(strains[cell]), _place(body.mesh.points[body.mesh.cells[cell]].mean(axis=0))
+                centre = body.mesh.points[body.mesh.cells[cell]].mean(axis=0)
+                largest, at = float(strains[cell]), tuple(map(float, centre))
     return largest, at
 
 
@@ -162,12 +158,8 @@ def _strain(bodies: TwoBodies, moved: Displacements) -> tuple[float, Place | Non
 class _Surface(Value):
     """The surface of a body in the deformed state.
 
-    Attributes
-    ----------
-    drawn, moved : array, shape (n, 2)
-        Its nodes outside Gamma_c, as they are drawn and where they lie now.
-    start, end : array, shape (b, 2)
-        Where its edges begin and end now, the body to the left of each.
+    ``drawn`` and ``moved``, shape (n, 2), are its nodes outside Gamma_c as they are drawn and where they lie now; its
+    edges run from ``start`` to ``end``, shape (b, 2), with the body on their left.
     """
 
     drawn: Floats
@@ -177,7 +169,7 @@ class _Surface(Value):
 
     @classmethod
     def of(cls, mesh: Mesh, u: Floats, contact: Ints, ends: Floats) -> _Surface:
-        """Surface of a mesh with these contact nodes, some of which may lie beyond the ends of Gamma_c."""
+        """Return the surface of a mesh with these contact nodes, some of which may lie beyond the ends of Gamma_c."""
         points, slack = mesh.points.astype(float), SAME * extent(mesh)
         x = points[contact, 0]
         on_contact = contact[(x >= ends[0] - slack) & (x <= ends[1] + slack)]
@@ -188,7 +180,7 @@ class _Surface(Value):
 
 
 def _penetration(bodies: TwoBodies, moved: Displacements) -> tuple[float, Place | None]:
-    """The greatest depth of a surface node outside Gamma_c inside the other body, and where it is drawn."""
+    """Return the greatest depth of a surface node outside Gamma_c inside the other body, and where it is drawn."""
     problem, ends = bodies.problem, bodies.interface.contact.x[[0, -1]]
     lift = np.array([0.0, float(problem.contact.gap)])  # of body 2
     one, two = (
@@ -207,12 +199,12 @@ def _penetration(bodies: TwoBodies, moved: Displacements) -> tuple[float, Place 
     for own, other in ((one, two), (two, one)):
         depth = depths(own.moved, other.start, other.end)
         if len(depth) and depth.max() > max(deepest * (1 + TIE), rounding):
-            deepest, at = float(depth.max()), _place(own.drawn[_first_largest(depth)])
+            deepest, at = float(depth.max()), tuple(map(float, own.drawn[_first_largest(depth)]))
     return deepest, at
 
 
 def _obstacle(spec: BodySpec, body: Body, opposite: _Surface, ends: Floats, lift: Floats, *, upper: bool) -> _Surface:
-    """An obstacle as a rectangle that reaches beyond the other body wherever the problem gives it no end."""
+    """Return an obstacle as a rectangle that reaches beyond the other body where the problem gives it no end."""
     low, high = opposite.start.min(axis=0), opposite.start.max(axis=0)
     size = float((high - low).max())
     x = (float(low[0]) - size, float(high[0]) + size) if spec.x is None else (float(spec.x[0]), float(spec.x[1]))

@@ -1,8 +1,8 @@
-"""The discrete problem as the exact rationals of a problem have it: matrices with radii, and what joins the grids.
+"""The discrete problem of the exact rationals of a problem: matrices with radii, and the join of the grids.
 
-Which nodes lie on which side, and which unknowns they hold, is that of the bodies in doubles.  The numbers are not:
-ends, moduli, length and radius are the rationals of the problem, the nodes of a rectangle divide its exact sides, and
-the nodes of a mesh file are the doubles read from it.
+The topology (which nodes lie on which side, and which unknowns they hold) is taken from the bodies in doubles.  The
+numbers are not: ends, moduli, length and radius are the rationals of the problem, the nodes of a rectangle divide its
+exact sides, and the nodes of a mesh file are the doubles read from it.
 """
 
 from __future__ import annotations
@@ -14,32 +14,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fem1d2d import Material, bar, exact, interval, mortar, plane_strain, rectangle_points, trapezoid
+from fem1d2d import bar, exact, interval, mortar, plane_strain, rectangle_points, trapezoid
 from fem1d2d.enclosed import Enclosed, nearest
 from fem1d2d.exact import Shapes
 from verification.interface.body import Body
 from verification.interface.friction import LAWS, Nonlocal
-from verification.interface.grid import Grid
-from verification.interface.interface import Interface
+from verification.interface.interface import Grid, Interface
 from verification.interface.pair import ContactPair
 from verification.problem.specification import Problem
 from verification.problem.specs import BodySpec
 
 
 class NotExact(ValueError):
-    """Why nothing can be proved: data that are not rational, or not of ordinary size."""
+    """Nothing can be proved: data that are not rational, or not of ordinary size."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ExactBody:
-    """A body whose stiffness and Gram matrices are known up to a radius.
+    """A body whose stiffness and Gram matrices, on its unknowns, are known up to a radius.
 
     Attributes
     ----------
     body : Body
         The same in doubles: its unknowns, its interface and its order of elimination.
-    stiffness, gram : Enclosed
-        Of the unknowns.
     x : array of Fraction, shape (contact nodes,)
         Positions of the contact nodes.
     """
@@ -51,7 +48,7 @@ class ExactBody:
 
     @classmethod
     def of(cls, problem: Problem, body: Body) -> ExactBody:
-        """The body of a problem.
+        """Return the body of a problem.
 
         Raises
         ------
@@ -62,22 +59,19 @@ class ExactBody:
         points, mesh = exact_points(spec, body), body.mesh
         try:
             shapes = Shapes.of(points, mesh.cells)
-            stiffness = exact.stiffness(mesh, _material(problem, spec), shapes)
+            material = plane_strain(spec.young, spec.poisson) if problem.dimension == 2 else bar(spec.young)
+            stiffness = exact.stiffness(mesh, material, shapes)
             gram = exact.gram(mesh, problem.length, shapes)
         except (TypeError, ValueError) as error:
             raise NotExact(f"{body.name}: {error}") from None
-        free = body.free
+        free = body.positions
         return cls(
             body=body, stiffness=stiffness.block(free, free), gram=gram.block(free, free), x=points[body.nodes, 0]
         )
 
 
-def _material(problem: Problem, spec: BodySpec) -> Material:
-    return plane_strain(spec.young, spec.poisson) if problem.dimension == 2 else bar(spec.young)
-
-
 def exact_points(spec: BodySpec, body: Body) -> NDArray[Any]:
-    """The nodes of a body in rationals, in the order of its mesh, shape (n, d)."""
+    """Return the nodes of a body in rationals, in the order of its mesh, shape (n, d)."""
     if spec.mesh is not None:
         return exact.fractions(body.mesh.points)
     assert spec.x is not None
@@ -88,14 +82,10 @@ def exact_points(spec: BodySpec, body: Body) -> NDArray[Any]:
 
 
 class ExactInterface:
-    """What joins the two grids, in rationals.
+    """The join of the two grids of a pair in rationals.
 
-    Parameters
-    ----------
-    pair : ContactPair
-        Made from a problem.
-    contact, neumann : array of Fraction
-        Positions of the contact nodes of both bodies.
+    ``contact`` and ``neumann`` are the exact positions of the contact nodes of both bodies; the pair is made from a
+    problem.
     """
 
     def __init__(self, pair: ContactPair, contact: NDArray[Any], neumann: NDArray[Any]) -> None:
@@ -162,25 +152,19 @@ class ExactInterface:
 
     @cached_property
     def kernel(self) -> Enclosed | None:
-        """S; None without a law of friction.
-
-        Raises
-        ------
-        NotExact
-            As for :attr:`exact_kernel`, or entries that are no rationals.
-        """
+        """S; None without a law of friction.  NotExact as :attr:`exact_kernel`, or for entries that are irrational."""
         try:
             return None if self.exact_kernel is None else Enclosed.rounded(self.exact_kernel)
         except (TypeError, ValueError) as error:
             raise NotExact(f"law of friction: {error}") from None
 
     def felt(self, form: Enclosed, *, normal: bool = False) -> Enclosed:
-        """``P' X P``: a form of the contact body on the Neumann grid, of all components or of the normal ones."""
+        """Return ``P' X P``: a form of the contact body on the Neumann grid, of all components or of normal ones."""
         P = self.transfer if normal else self.transfer_of_traces
         return form if P is None else P.T.times(form).times(P).symmetric()
 
     def tangential_mass(self, tangential: NDArray[np.bool_]) -> Enclosed:
-        """B_T on the free components of the contact grid."""
+        """Return B_T on the free components of the contact grid."""
         free = self.pair.contact.free[self.pair.contact.grid.tangential]
         entries = np.zeros(len(tangential), dtype=object)
         entries[tangential] = self.grid.weights[free]

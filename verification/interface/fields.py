@@ -1,4 +1,4 @@
-"""What happens along Gamma_c, node by node, in the frame of the paper."""
+"""Stresses and motions along Gamma_c, node by node, in the frame of the paper."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fem1d2d.mesh import Floats
-from verification.interface.grid import Grid
+from verification.contact.active_set import Pattern
+from verification.interface.interface import Grid
 from verification.value import Value
 
 
@@ -48,24 +48,20 @@ class ContactFields(Value):
         return ", ".join(f"{count} {name}" for name, count in self.pattern.items())
 
     @classmethod
-    def of(
-        cls, grid: Grid, *, force: Floats, jump: Floats, touching: NDArray[np.bool_], sliding: NDArray[Any]
-    ) -> ContactFields:
-        """From interface vectors on the contact grid, tangential components first.
+    def of(cls, grid: Grid, *, force: Floats, jump: Floats, state: Pattern) -> ContactFields:
+        """Make the fields from interface vectors on the contact grid, tangential components first.
 
         Parameters
         ----------
-        grid : Grid
-            That of the contact body.
         force : array
             Nodal forces: tangential on body 2, normal compressive.
         jump : array
             ``u1_T - u2_T`` and ``[u_N] - gap <= 0``.
-        touching, sliding : array, shapes (n,) and (n,) or (0,)
+        state : Pattern
         """
         plane, zero = grid.t > 0, np.zeros(grid.n)
-        slides = sliding != 0 if plane else np.ones(grid.n, dtype=bool)
-        names = np.where(touching, np.where(slides, "slip", "stick"), "open")
+        slides = state.sliding != 0 if plane else np.ones(grid.n, dtype=bool)
+        names = np.where(state.touching, np.where(slides, "slip", "stick"), "open")
         return cls(
             x=grid.x,
             weights=grid.weights,
@@ -78,7 +74,7 @@ class ContactFields(Value):
 
     @property
     def pattern(self) -> dict[str, int]:
-        """How many nodes stick, slip and are open."""
+        """Number of nodes that stick, slip and are open."""
         return {name: self.status.count(name) for name in ("stick", "slip", "open")}
 
     @property
@@ -87,11 +83,11 @@ class ContactFields(Value):
         return {"normal": float(self.pressure @ self.weights), "tangential": float(self.shear @ self.weights)}
 
     def table(self) -> dict[str, list[Any]]:
-        """Gamma_c as plain columns, one row for each contact node: ``pandas.DataFrame(contact.table())`` reads it."""
+        """Return Gamma_c as plain columns, one row a contact node: ``pandas.DataFrame(contact.table())`` reads it."""
         names = ("x", "weights", "pressure", "shear", "gap", "slip")
         return {name: getattr(self, name).tolist() for name in names} | {"status": list(self.status)}
 
     def to_dict(self) -> dict[str, Any]:
-        """The objects ``force``, ``pattern`` and ``contact`` that runs and solutions share."""
+        """Return the objects ``force``, ``pattern`` and ``contact`` that runs and solutions share."""
         arrays = {name: getattr(self, name).tolist() for name in ("x", "pressure", "shear", "gap", "slip")}
         return {"force": self.force, "pattern": self.pattern, "contact": {**arrays, "state": list(self.status)}}

@@ -2,10 +2,10 @@
 
 Arrays: S1, S2, load1, load2, x, weights, gap; x_neumann and weights_neumann, the nodes of the Neumann body; kernel and
 transfer where there are such; known1, known2, free1, free2 (which interface components Gamma_u leaves free, and the
-displacement of the others); motions1 or motions2, where contact alone holds a body, an orthonormal basis of the kernel
-of its matrix.  Texts: friction, neumann_body, dimension, theta, tolerance, max_iterations as numbers are
-written; law and outside, the words of a law of friction; ndtheory, the version.  Interface vectors list all tangential
-components from left to right, then all normal ones along y.
+displacement of the others); motions1 or motions2, where only contact holds a body, an orthonormal basis of the kernel
+of its matrix.  Texts: friction, neumann_body, dimension, theta, tolerance, max_iterations, with numbers as texts; law
+and outside, the words of a law of friction; ndtheory, the version.  Interface vectors list all tangential components
+from left to right, then all normal ones along y.
 """
 
 from __future__ import annotations
@@ -18,12 +18,10 @@ import scipy.sparse as sp
 
 from ndtheory import HypothesisError, __version__, exact
 from verification.dense import pinned
-from verification.interface.array_headers import headers
 from verification.interface.body import NO_MOTIONS, Condensed
 from verification.interface.friction import GivenOperator
-from verification.interface.grid import Grid
-from verification.interface.interface import Interface
-from verification.interface.matrices import ASYMMETRY, UNREADABLE, check_matrix, check_nodes, real_array
+from verification.interface.interface import Grid, Interface
+from verification.interface.matrices import ASYMMETRY, UNREADABLE, check_matrix, check_nodes, headers, real_array
 from verification.interface.pair import ContactPair
 from verification.problem import ProblemError, Settings
 from verification.problem.reading import at_least_one, factor, tolerance
@@ -32,13 +30,13 @@ from verification.problem.tables import TomlTable, choice, label, non_negative, 
 #: Largest size of an interface file, and of what it unpacks to: two matrices of 4000 rows, and what else there is.
 MOST_BYTES = 600_000_000
 
-#: Size of numbers in an interface file, at most.
+#: Largest size of a number in an interface file.
 LARGEST = 1e60
 
-#: What every interface file has.
+#: Names in every interface file.
 NEEDED = ("S1", "S2", "load1", "load2", "x", "weights", "gap", "friction", "neumann_body", "dimension")
 
-#: What is a text in an interface file, or a single number.
+#: Names of texts and single numbers in an interface file.
 SCALARS = ("friction", "neumann_body", "dimension", "theta", "tolerance", "max_iterations", "law", "outside")
 
 
@@ -50,11 +48,9 @@ def write_interface(pair: ContactPair, path: Path) -> None:
         arrays |= {f"S{i}": side.stiffness, f"load{i}": side.load, f"known{i}": side.known, f"free{i}": side.free}
         if side.loose:
             arrays[f"motions{i}"] = side.motions
+    for name, grid in (("", interface.contact), ("_neumann", interface.neumann)):
+        arrays |= {f"x{name}": grid.x, f"weights{name}": grid.weights}
     arrays |= {
-        "x": interface.contact.x,
-        "weights": interface.contact.weights,
-        "x_neumann": interface.neumann.x,
-        "weights_neumann": interface.neumann.weights,
         "gap": interface.gap,
         "friction": str(pair.friction),
         "neumann_body": str(pair.neumann_body),
@@ -78,20 +74,11 @@ def write_transfer(interface: Interface, path: Path) -> None:
     P leads from nodal values on the Neumann grid to those on the contact grid, its transpose from nodal forces back.
     """
     P = sp.csr_array(interface.transfer)
-    arrays = {
-        "format": b"csr",
-        "shape": P.shape,
-        "data": P.data,
-        "indices": P.indices,
-        "indptr": P.indptr,
-        "x_contact": interface.contact.x,
-        "weights_contact": interface.contact.weights,
-        "x_neumann": interface.neumann.x,
-        "weights_neumann": interface.neumann.weights,
-        "ndtheory": __version__,
-    }
+    arrays = {"format": b"csr", "shape": P.shape, "data": P.data, "indices": P.indices, "indptr": P.indptr}
+    for name, grid in (("contact", interface.contact), ("neumann", interface.neumann)):
+        arrays |= {f"x_{name}": grid.x, f"weights_{name}": grid.weights}
     with path.open("wb") as file:
-        np.savez(file, **arrays)
+        np.savez(file, **arrays, ndtheory=__version__)
 
 
 def read_interface(path: Path) -> ContactPair:
@@ -130,12 +117,7 @@ def read_interface(path: Path) -> ContactPair:
 
 
 def _check_sizes(arrays: dict[str, np.ndarray]) -> None:
-    """Refuse numbers of which a product of a few overflows a double, or vanishes.
-
-    Raises
-    ------
-    ValueError
-    """
+    """Raise ValueError for numbers of which a product of a few overflows a double, or vanishes."""
     for name, array in arrays.items():
         if array.dtype.kind not in "fiu" or not np.isfinite(array).all():
             continue
@@ -147,13 +129,8 @@ def _check_sizes(arrays: dict[str, np.ndarray]) -> None:
             raise ValueError(f"the largest entry of {name} is {largest:.2g}: {needed}")
 
 
-def _texts(arrays: dict[str, np.ndarray], source: str) -> TomlTable:
-    """The texts of an interface file, to be read as the keys of a problem file are."""
-    return TomlTable({name: _scalar(arrays[name]) for name in SCALARS if name in arrays}, source)
-
-
 def _scalar(array: np.ndarray) -> Any:
-    """A single value as a text or a whole number; several values as a list, which every key refuses."""
+    """Return a single value as a text or a whole number; several as a list, which every key refuses."""
     if array.shape != ():
         return array.tolist()
     text = str(array)
@@ -166,7 +143,7 @@ def _scalar(array: np.ndarray) -> Any:
 
 def _pair(arrays: dict[str, np.ndarray], source: str) -> ContactPair:
     _check_sizes(arrays)
-    texts = _texts(arrays, source)
+    texts = TomlTable({name: _scalar(arrays[name]) for name in SCALARS if name in arrays}, source)
     dimension: Literal[1, 2] = texts.take("dimension", choice(1, 2))
     neumann_body: Literal[1, 2] = texts.take("neumann_body", choice(1, 2))
     x, n = arrays["x"], len(arrays["x"])

@@ -1,7 +1,7 @@
-"""Laws of friction: the operator S that turns normal forces into the stress that friction feels.
+"""Laws of friction: the operator S from normal forces to the stress that bounds friction.
 
-A law is an object with an operator, its words, and what the theorem says of it.  :class:`Nonlocal` and :class:`Local`
-are those of problem files; another one derives from :class:`Law` and is handed to :func:`verification.build`.
+A law is an object with an operator, its words, and its relation to the theorem.  :class:`Nonlocal` and :class:`Local`
+are in problem files; another one derives from :class:`Law` and is handed to :func:`verification.build`.
 """
 
 from __future__ import annotations
@@ -15,16 +15,15 @@ from fem1d2d.mesh import Floats
 from verification.interface.interface import Interface, Law
 from verification.value import Value
 
-#: Part of the friction that the kernel may lose or add without a warning.  The share under an even pressure agrees with
-#: that of a block that slides as a whole within 0.01: 0.93 and 0.92 at radius 0.2 on a length of 1, 0.67 and 0.67 at 1.
+#: Part of the friction that the kernel may lose or add without a warning.  The share under an even pressure agrees
+#: within 0.01 with the share of a block that slides as a whole: 0.93 and 0.92 at radius 0.2 on a length of 1, 0.67 and
+#: 0.67 at 1.
 SHARE = 0.1
 
 
 def hat(t: Floats, radius: float) -> Floats:
-    """The kernel ``omega_r(t) = max(0, 1 - |t|/r)/r``, of integral 1, unit 1/length.
+    """Return the kernel ``omega_r(t) = max(0, 1 - |t|/r)/r``, of integral 1, unit 1/length.
 
-    Examples
-    --------
     >>> hat(np.array([0.0, 0.5, 2.0]), 1.0)
     array([1. , 0.5, 0. ])
     """
@@ -73,7 +72,7 @@ class Nonlocal(Law):
         x, weights, kernel = interface.neumann.x, interface.contact.weights, interface.kernel
         assert kernel is not None
         r, width, length = self.radius, float(np.diff(x).max()), float(np.ptp(interface.contact.x))
-        # What a sliding body carries under an even pressure, as a part of k times the normal force.
+        # the force that a sliding body carries under an even pressure, as a part of k times the normal force
         share = float(weights @ kernel @ interface.neumann.weights / weights.sum())
         if r < width * (1 - 1e-9):
             return [
@@ -130,15 +129,9 @@ class LocalOfContact(Law):
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class GivenOperator(Value, Law):
-    """An operator S that was given as a matrix.
+    """An operator S given as a matrix, shape (contact nodes, Neumann nodes), unit 1/length.
 
-    Attributes
-    ----------
-    matrix : array, shape (contact nodes, Neumann nodes)
-    words : str
-        The law it comes from, where that is known.
-    outside : str
-        Why the theorem does not speak of that law; empty where it does.
+    ``words`` and ``outside`` come from its law, where that is known.
     """
 
     name, label = "given", "given"

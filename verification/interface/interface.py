@@ -6,14 +6,82 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fem1d2d import trapezoid
 from fem1d2d.mesh import Floats
-from verification.interface.grid import Grid
 from verification.value import Value, freeze
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Grid(Value):
+    """The contact nodes of one body, from left to right, with the trapezoid rule on them.
+
+    An interface vector on it lists all tangential components first, then all normal ones.
+
+    Attributes
+    ----------
+    x : array, shape (n,)
+        Positions along Gamma_c, unit of length; in 1D the one point.
+    weights : array, shape (n,)
+        w_j of the trapezoid rule, unit of length; 1 in 1D.
+    dimension : {1, 2}
+    """
+
+    x: Floats
+    weights: Floats
+    dimension: Literal[1, 2] = 2
+
+    @property
+    def summary(self) -> str:
+        return f"{self.n} nodes from {self.x[0]:g} to {self.x[-1]:g}" if self.n else "no nodes"
+
+    @classmethod
+    def on(cls, x: Floats, dimension: Literal[1, 2] = 2) -> Grid:
+        """Return the grid of these nodes with trapezoid weights."""
+        return cls(x=x, weights=trapezoid(x), dimension=dimension)
+
+    def equals(self, other: Grid) -> bool:
+        """Return True for the same nodes and weights."""
+        return all(map(np.array_equal, (self.x, self.weights), (other.x, other.weights)))
+
+    @property
+    def n(self) -> int:
+        """Number of nodes."""
+        return len(self.x)
+
+    @property
+    def t(self) -> int:
+        """Number of tangential components: n in two dimensions, 0 in one."""
+        return self.n * (self.dimension - 1)
+
+    @property
+    def size(self) -> int:
+        """Number of components of an interface vector."""
+        return self.n * self.dimension
+
+    @property
+    def tangential(self) -> slice:
+        """Tangential components of an interface vector; empty in 1D."""
+        return slice(0, self.t)
+
+    @property
+    def normal(self) -> slice:
+        """Normal components of an interface vector."""
+        return slice(self.t, self.size)
+
+    def components(self, vectors: NDArray[Any]) -> NDArray[Any]:
+        """Split interface vectors, one or columns of them, by component: shape (d, n, ..)."""
+        return vectors.reshape(self.dimension, self.n, *vectors.shape[1:])
+
+    def turn(self, vectors: Floats) -> Floats:
+        """Return interface vectors, or columns of them, with reversed normal components (its own inverse)."""
+        turned = vectors.copy()
+        turned[self.normal] *= -1.0
+        return turned
 
 
 class Law(ABC):
@@ -23,14 +91,14 @@ class Law(ABC):
     ----------
     name : str
     label : str
-        What it is called in front of "law".
+        Adjective in front of "law".
     outside : str
-        Why the theorem does not speak of this law; empty where it does.
+        Why the theorem does not apply to this law; empty where it does.
     needs_radius : bool
         Whether a problem file with friction must give a radius.
     of_contact : bool
-        Whether it takes the forces of the contact grid where the grids differ.  They are no function of the forces g on
-        the Neumann grid, so that the global method alone can use it there.
+        Whether it takes the forces of the contact grid where the grids differ.  They are no function of the forces g
+        on the Neumann grid, so that there only the global method can use it.
     """
 
     name: ClassVar[str]
@@ -41,11 +109,11 @@ class Law(ABC):
 
     @classmethod
     def of(cls, radius: Fraction | None) -> Law | None:
-        """The law of a problem file with that radius; None where it needs one and has none, as there is no friction."""
+        """Return the law of a problem file with that radius; None if it needs one and has none, without friction."""
         return cls()
 
     def scaled(self, length: float) -> Law:
-        """The same law in a unit of length in which lengths are ``length`` times as large numbers.
+        """Return the same law in a unit of length in which lengths are ``length`` times as large numbers.
 
         Its operator must then be ``operator / length``; a law that holds a length multiplies it.
         """
@@ -58,14 +126,14 @@ class Law(ABC):
 
     @abstractmethod
     def operator(self, interface: Interface) -> Floats:
-        """S: normal nodal forces on the Neumann grid to normal stress at the contact nodes, shape (n_c, n_n).
+        """Return S: normal nodal forces on the Neumann grid to normal stress at the contact nodes, shape (n_c, n_n).
 
-        With ``of_contact`` those on the contact grid, shape (n_c, n_c).
-        Forces are per unit thickness, compressive ones positive.
+        With ``of_contact`` it takes those on the contact grid, shape (n_c, n_c).  Forces are per unit thickness,
+        compressive ones positive.
         """
 
     def warnings(self, interface: Interface) -> list[str]:
-        """What a user should know before trusting the numbers of this law on these grids."""
+        """Return what a user should know before trusting the numbers of this law on these grids."""
         return []
 
 
@@ -82,8 +150,8 @@ class Interface(Value):
     law : Law or None
         The law of friction; None where no friction force can act.
     transfer : array, shape (contact nodes, Neumann nodes), or None
-        P: values on the contact grid of a function given on the Neumann grid.  Its transpose and nothing else returns
-        the forces.  None where both grids are one: then P is the identity.
+        P: values on the contact grid of a function given on the Neumann grid.  Only its transpose returns the forces.
+        None where both grids are one: then P is the identity.
     """
 
     contact: Grid
@@ -94,7 +162,7 @@ class Interface(Value):
 
     @property
     def counts(self) -> dict[str, int]:
-        """How many nodes each grid has."""
+        """Number of nodes of each grid."""
         return {"contact_nodes": self.contact.n, "neumann_nodes": self.neumann.n}
 
     @property
@@ -105,17 +173,13 @@ class Interface(Value):
     def kernel(self) -> Floats | None:
         """S as a matrix: normal nodal forces on the Neumann grid to normal stress at the contact nodes.
 
-        Raises
-        ------
-        ValueError
-            The grids differ, and the law takes the forces of the contact grid.
+        ValueError where the grids differ, and the law takes the forces of the contact grid.
         """
         if self.law is None or self.contact.dimension == 1:
             return None
         if self.law.of_contact and self.transfer is not None:
             raise ValueError(f"{self.law.words}: no operator on the Neumann grid")
-        kernel: Floats = freeze(self.law.operator(self))
-        return kernel
+        return freeze(self.law.operator(self))
 
     @property
     def contact_kernel(self) -> Floats | None:
@@ -127,59 +191,49 @@ class Interface(Value):
         return self.kernel @ self.transfer.T
 
     def stress(self, force: Floats) -> Floats:
-        """``S sigma_N`` at the contact nodes for a force on the Neumann grid; 0 without a law of friction."""
+        """Return ``S sigma_N`` at the contact nodes for a force on the Neumann grid; 0 without a law of friction."""
         kernel = self.kernel
         return np.zeros(self.contact.n) if kernel is None else np.asarray(kernel @ force[self.neumann.normal])
 
     def carry(self, traces: Floats) -> Floats:
-        """``P u``: traces on the Neumann grid, one or columns of them, as the contact grid sees them."""
+        """Return ``P u``: traces on the Neumann grid, one or columns of them, on the contact grid."""
         if self.transfer is None:
             return traces
-        blocks = traces.reshape(self.neumann.dimension, self.neumann.n, *traces.shape[1:])
-        return np.concatenate([self.transfer @ block for block in blocks])
+        return np.concatenate([self.transfer @ block for block in self.neumann.components(traces)])
 
     def carry_back(self, forces: Floats) -> Floats:
-        """``P' f``: nodal forces on the contact grid, one or columns of them, as the Neumann grid receives them."""
+        """Return ``P' f``: nodal forces on the contact grid, one or columns of them, on the Neumann grid."""
         if self.transfer is None:
             return forces
-        blocks = forces.reshape(self.contact.dimension, self.contact.n, *forces.shape[1:])
-        return np.concatenate([self.onto_neumann(block) for block in blocks])
+        return np.concatenate([self.onto_neumann(block) for block in self.contact.components(forces)])
 
     def spread(self, forces: Floats) -> Floats:
-        """Nodal forces on the Neumann grid as nodal forces on the contact grid that have the same stresses there."""
+        """Return the nodal forces on the contact grid that have the stresses of given ones on the Neumann grid."""
         if self.transfer is None:
             return forces
-        blocks = forces.reshape(self.neumann.dimension, self.neumann.n)
-        weights = self.contact.weights
-        return np.concatenate([weights * (self.transfer @ (block / self.neumann.weights)) for block in blocks])
+        stresses = self.neumann.components(forces) / self.neumann.weights
+        return np.concatenate([self.contact.weights * (self.transfer @ stress) for stress in stresses])
 
     def reaches(self, components: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """True for the contact components whose forces act on some of the given components of the Neumann grid."""
+        """Return True for the contact components whose forces act on given components of the Neumann grid."""
         if self.transfer is None:
             return components
-        blocks = components.reshape(self.neumann.dimension, self.neumann.n)
-        return np.concatenate([(self.transfer != 0) @ block for block in blocks])
+        return np.concatenate([(self.transfer != 0) @ block for block in self.neumann.components(components)])
 
     def onto_neumann(self, forces: Floats) -> Floats:
-        """``P' f`` of one component: nodal forces on the contact grid, one or columns of them."""
+        """Return ``P' f`` of one component: nodal forces on the contact grid, one or columns of them."""
         return forces if self.transfer is None else np.asarray(self.transfer.T @ forces)
 
     def pressed(self, touching: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """The Neumann nodes on which the forces of some contact nodes act."""
+        """Return True for the Neumann nodes on which the forces of some contact nodes act."""
         return touching if self.transfer is None else np.asarray((self.transfer != 0).T @ touching, dtype=bool)
 
     def carry_form(self, form: Floats) -> Floats:
-        """``P' X P`` of a symmetric matrix on the contact grid."""
+        """Return ``P' X P`` of a symmetric matrix X on the contact grid."""
         return form if self.transfer is None else self.carry_back(self.carry_back(form).T)
 
     def swapped(self) -> Interface:
-        """The interface with the roles of the grids exchanged.
-
-        Raises
-        ------
-        ValueError
-            The grids differ: each direction has a transfer of its own.
-        """
+        """Return the interface with the roles of the grids exchanged; ValueError where the grids differ."""
         if self.transfer is not None:
-            raise ValueError("the grids differ: needed a pair built for these roles, with a transfer of its own")
+            raise ValueError("the grids differ: needed a pair built for these roles, with its own transfer")
         return Interface(contact=self.neumann, neumann=self.contact, gap=self.gap, law=self.law)

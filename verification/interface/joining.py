@@ -1,9 +1,8 @@
-"""Gamma_c: where the surfaces of two bodies lie opposite each other, and what joins their grids there."""
+"""Gamma_c, where the surfaces of two bodies lie opposite each other, and the join of their grids there."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -11,13 +10,11 @@ from fem1d2d import Mesh, MeshError, facing, mortar, surface
 from fem1d2d.mesh import Floats, Ints
 from fem1d2d.trace import SAME, extent
 from verification.interface.friction import LAWS
-from verification.interface.grid import Grid
-from verification.interface.interface import Interface, Law
+from verification.interface.interface import Grid, Interface, Law
 from verification.problem.specification import Problem
 from verification.problem.specs import BodySpec
-from verification.problem.tables import ProblemError
 
-#: The matrix of a transfer is dense; more nodes would fill the memory.
+#: Largest number of nodes of a transfer, whose matrix is dense: more would fill the memory.
 MOST_NODES_APART = 2000
 
 #: The largest slope of the contact body's line: its normals are taken as vertical.
@@ -35,8 +32,8 @@ Ends = tuple[float, float]
 def join(problem: Problem, meshes: list[Mesh | None], law: Law | None = None) -> tuple[list[Ints], Interface]:
     """Find Gamma_c, the nodes of each body on it, and the transfer between their grids.
 
-    Gamma_c begins and ends at nodes of the body that carries the contact grid.  That of the other one covers it: its
-    outermost nodes may lie beyond.
+    Gamma_c begins and ends at nodes of the body that carries the contact grid.  The surface of the other body covers
+    it: its outermost nodes may lie beyond.
 
     Parameters
     ----------
@@ -54,8 +51,8 @@ def join(problem: Problem, meshes: list[Mesh | None], law: Law | None = None) ->
     Raises
     ------
     ProblemError
-        Bodies that do not lie opposite each other or lie deep in each other, an interval outside the overlap or without
-        nodes of the contact body at its ends, a surface with a hole, a steep contact body, too many nodes.
+        Bodies that do not lie opposite each other or lie deep in each other, an interval outside the overlap or
+        without nodes of the contact body at its ends, a surface with a hole, a steep contact body, too many nodes.
     """
     size = max(extent(mesh) for mesh in meshes if mesh is not None)
     contact = problem.contact_body - 1
@@ -80,7 +77,7 @@ def join(problem: Problem, meshes: list[Mesh | None], law: Law | None = None) ->
         most = max(map(len, positions))
         if most > MOST_NODES_APART:
             needed = f"needed at most {MOST_NODES_APART} contact nodes on grids that differ, these are {most}"
-            raise _refuse(problem, "contact", None, needed)
+            raise problem.refuse("contact", None, needed)
         grid, x = Grid.on(positions[contact]), positions[1 - contact].copy()
         x[0], x[-1] = min(x[0], grid.x[0]), max(x[-1], grid.x[-1])  # ends that differ by rounding
         P = mortar(grid.x, x)
@@ -95,12 +92,8 @@ def join(problem: Problem, meshes: list[Mesh | None], law: Law | None = None) ->
     )
     if P is not None and interface.contact_kernel is not None and not interface.contact_kernel.any():
         needed = "needed a larger one: it reaches no node of the Neumann grid from any contact node, so that S is 0"
-        raise _refuse(problem, "contact.radius", problem.contact.radius, needed)
+        raise problem.refuse("contact.radius", problem.contact.radius, needed)
     return nodes, interface
-
-
-def _refuse(problem: Problem, key: str, value: Any, needed: str) -> ProblemError:
-    return ProblemError(problem.source, key, value, needed)
 
 
 def _interval(problem: Problem) -> Ends | None:
@@ -109,7 +102,7 @@ def _interval(problem: Problem) -> Ends | None:
 
 
 def _surfaces(problem: Problem, meshes: list[Mesh | None], ends: Ends | None) -> list[Ints]:
-    """The nodes of both surfaces, or those whose hat functions reach between two positions."""
+    """Find the nodes of both surfaces, or those whose hat functions reach between two positions."""
     nodes = []
     for mesh, upper in zip(meshes, UPPER, strict=True):
         try:
@@ -123,12 +116,12 @@ def _surfaces(problem: Problem, meshes: list[Mesh | None], ends: Ends | None) ->
                 nodes.append(surface(mesh, upper=upper, ends=ends))
         except MeshError as error:
             needed = f"{error}; needed the part of the x axis where they meet"
-            raise _refuse(problem, "contact.interval", None, needed) from None
+            raise problem.refuse("contact.interval", None, needed) from None
     return nodes
 
 
 def _ends(problem: Problem, meshes: list[Mesh | None], nodes: list[Ints], size: float) -> Ends:
-    """Where Gamma_c begins and ends: as the problem says, or where both bodies have a surface."""
+    """Return the ends of Gamma_c: as the problem gives them, or of the part where both bodies have a surface."""
     chosen = _interval(problem)
     reach = []
     for spec, mesh, own in zip((problem.body1, problem.body2), meshes, nodes, strict=True):
@@ -140,17 +133,17 @@ def _ends(problem: Problem, meshes: list[Mesh | None], nodes: list[Ints], size: 
     overlap = (max(low for low, _ in reach), min(high for _, high in reach))
     if not overlap[1] - overlap[0] > SAME * size:
         covers = ", ".join(f"body {i} covers x = {low:g} to {high:g}" for i, (low, high) in enumerate(reach, 1))
-        raise _refuse(problem, "body2.x", None, f"the bodies do not meet: {covers}")
+        raise problem.refuse("body2.x", None, f"the bodies do not meet: {covers}")
     if chosen is None:
         return overlap
     if chosen[0] < overlap[0] - SAME * size or chosen[1] > overlap[1] + SAME * size:
         needed = f"needed an interval inside the overlap [{overlap[0]:g}, {overlap[1]:g}]"
-        raise _refuse(problem, "contact.interval", list(problem.contact.interval or ()), needed)
+        raise problem.refuse("contact.interval", list(problem.contact.interval or ()), needed)
     return chosen
 
 
 def _check_nodes(problem: Problem, meshes: list[Mesh | None], nodes: list[Ints], ends: Ends, contact: int) -> None:
-    """Gamma_c must begin and end at nodes of the body that carries the contact grid, and no surface may have a hole."""
+    """Refuse a Gamma_c that does not begin and end at nodes of the contact body, and a surface with a hole."""
     given = None if problem.contact.interval is None else list(problem.contact.interval)
     fits = [False, False]
     for i, (mesh, own) in enumerate(zip(meshes, nodes, strict=True)):
@@ -164,7 +157,7 @@ def _check_nodes(problem: Problem, meshes: list[Mesh | None], nodes: list[Ints],
         if holes:
             where = f"between x = {x[holes[0]]:g} and {x[holes[0] + 1]:g}"
             needed = f"body {i + 1} has no surface {where}: needed a Gamma_c of one piece"
-            raise _refuse(problem, "contact.interval", given, needed)
+            raise problem.refuse("contact.interval", given, needed)
     if not fits[contact]:
         mesh = meshes[contact]
         assert mesh is not None
@@ -177,11 +170,11 @@ def _check_nodes(problem: Problem, meshes: list[Mesh | None], nodes: list[Ints],
             f"Gamma_c = [{ends[0]:g}, {ends[1]:g}] must begin and end at nodes of the contact body, body {contact + 1},"
             f" whose nodes near its ends lie at {near or 'no x'}{swap if possible else ''}"
         )
-        raise _refuse(problem, "contact.interval", given, needed)
+        raise problem.refuse("contact.interval", given, needed)
 
 
 def obstacle_level(spec: BodySpec, other: Floats | None, *, upper: bool) -> Floats:
-    """Level of the face of an obstacle; without coordinates it touches the other body."""
+    """Return the level of the face of an obstacle; without coordinates it touches the other body."""
     assert other is not None
     ends = spec.x if other.shape[1] == 1 else spec.y
     if ends is not None:
@@ -197,16 +190,10 @@ def check_slopes(problem: Problem, points: Sequence[Floats | None]) -> None:
     points : pair of array, shape (n, 2), or None
         Contact nodes of body 1 and of body 2, from left to right; None where rigid.  The face of an obstacle is flat,
         and gives the body opposite its normals.
-
-    Raises
-    ------
-    ProblemError
     """
     contact = problem.contact_body
     own, other = points[contact - 1], points[2 - contact]
-    if own is None or other is None:
-        return
-    if _flat(own):
+    if own is None or other is None or _flat(own):
         return
     rise = _slopes(own)
     j = int(np.argmax(np.abs(rise)))
@@ -215,8 +202,7 @@ def check_slopes(problem: Problem, points: Sequence[Floats | None]) -> None:
     if _flat(other):
         remedy = f"body {3 - contact} is flat: give body {contact} the Neumann problem"
         remedy += f" (iteration.neumann_body = {contact})"
-    raise _refuse(
-        problem,
+    raise problem.refuse(
         f"body{contact}.mesh",
         None,
         f"body {contact} is the contact body, and its line has the slope {rise[j]:.3g} from ({left:g}, {low:g}) to"
@@ -226,21 +212,21 @@ def check_slopes(problem: Problem, points: Sequence[Floats | None]) -> None:
 
 
 def _slopes(points: Floats) -> Floats:
-    """Slopes of a line between its nodes, which follow each other from left to right."""
+    """Return the slopes of a line between its nodes, which follow each other from left to right."""
     dx, dy = np.diff(points.astype(float), axis=0).T
     return np.asarray(dy / dx)
 
 
 def _flat(points: Floats) -> bool:
-    """True if a line is flat enough for vertical normals."""
+    """Return True if a line is flat enough for vertical normals."""
     return bool(np.abs(_slopes(points)).max() <= STEEPEST + SAME)
 
 
 def _gap(problem: Problem, meshes: Sequence[Mesh | None], grid: Grid, levels: list[Floats], rounding: float) -> Floats:
-    """Initial distance at the contact nodes: of the surfaces as they are drawn, plus ``contact.gap``.
+    """Return the initial distance at the contact nodes: of the surfaces as they are drawn, plus ``contact.gap``.
 
-    It is negative where the bodies are drawn into each other.  Flat bodies have one distance: what differs from the
-    least one by rounding equals it, and what differs from 0 by rounding is 0.
+    It is negative where the bodies are drawn into each other.  Flat bodies have one distance: a value that differs
+    from the least one by rounding is set to it, and one that differs from 0 by rounding is set to 0.
     """
     distance = levels[1] - levels[0]
     least = float(distance.min())
@@ -255,7 +241,7 @@ def _gap(problem: Problem, meshes: Sequence[Mesh | None], grid: Grid, levels: li
             f"the bodies lie in each other: {where}body 1 ends at {axis} = {levels[0][j]:g}, body 2 begins at {axis} ="
             f" {levels[1][j]:g}; needed an overlap of at most {100 * MOST_OVERLAP:g} % of the height {height:g}"
         )
-        raise _refuse(problem, f"body2.{axis}", None, needed)
+        raise problem.refuse(f"body2.{axis}", None, needed)
     return gap
 
 

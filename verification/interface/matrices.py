@@ -1,13 +1,15 @@
-"""Checks of arrays: finite and of one shape; of interface matrices: symmetric, positive (semi)definite too."""
+"""Checks of arrays and of interface matrices (symmetric, positive semidefinite); what a file of arrays unpacks to."""
 
 from __future__ import annotations
 
+import math
 import struct
 import tokenize
 import zipfile
 import zlib
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import IO, Any, BinaryIO
 
 import numpy as np
 
@@ -15,7 +17,7 @@ from fem1d2d.mesh import Floats
 from verification.threads import one_thread
 from verification.value import Value
 
-#: Matrices of more rows than this do not fit a dense eigenvalue problem.
+#: Largest number of rows of a matrix, for a dense eigenvalue problem.
 MOST_ROWS = 4000
 
 #: Largest asymmetry of a matrix, relative to its largest entry, that counts as rounding.
@@ -25,10 +27,10 @@ ASYMMETRY = 1e-8
 #: nodes leaves 3e-15 after condensation, a cantilever 2000 times as long as thick has 2e-11.
 MOTIONLESS = 1e-12
 
-#: An eigenvalue as far below 0 is rounding still.
+#: An eigenvalue above minus this is still rounding.
 BELOW_ZERO = 1e-10
 
-#: What numpy, scipy and zipfile raise on a file that is no matrix.
+#: The errors of numpy, scipy and zipfile for a file without a matrix.
 UNREADABLE = (
     ArithmeticError, AttributeError, EOFError, LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError,
     struct.error, tokenize.TokenError, SyntaxError, zipfile.BadZipFile, zlib.error,
@@ -36,17 +38,17 @@ UNREADABLE = (
 
 
 def size(matrix: np.ndarray) -> str:
-    """The shape of an array in words."""
+    """Return the shape of an array in words."""
     return " x ".join(map(str, matrix.shape)) or "a single number"
 
 
 def real_array(name: str, values: Any, shape: tuple[int, ...]) -> Floats:
-    """Finite real numbers of a shape.
+    """Return finite real numbers of a shape as an array.
 
     Raises
     ------
     ValueError
-        Another shape, texts or complex numbers, or what is not finite.
+        Another shape, texts or complex numbers, or an entry that is not finite.
     """
     received, needed = np.asarray(values), " x ".join(map(str, shape))
     if received.dtype.kind not in "fiubO":
@@ -61,14 +63,14 @@ def real_array(name: str, values: Any, shape: tuple[int, ...]) -> Floats:
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Stiffness(Value):
-    """An interface stiffness matrix that was given, and what was seen of it.
+    """An interface stiffness matrix that was given, and some of its properties.
 
     Attributes
     ----------
     matrix : array, shape (n, n)
         Its symmetric part.
     asymmetry : float
-        ``max |A - A'| / max |A|`` of what was given.
+        ``max |A - A'| / max |A|`` of the given matrix A.
     zeros : float
         The share of zeros among its entries off the diagonal; 0 where there are none.
     motions : array, shape (n, k)
@@ -89,14 +91,9 @@ class Stiffness(Value):
 
 
 def stiffness(name: str, matrix: Floats, *, asymmetry: float = ASYMMETRY) -> Stiffness:
-    """Take a matrix as interface stiffness matrix, singular where rigid motions are left.
+    """Check an interface stiffness matrix, which may be singular where rigid motions are left.
 
-    Parameters
-    ----------
-    name : str
-    matrix : array
-    asymmetry : float
-        The largest asymmetry allowed.
+    ``asymmetry`` is the largest one allowed.
 
     Raises
     ------
@@ -139,13 +136,7 @@ def stiffness(name: str, matrix: Floats, *, asymmetry: float = ASYMMETRY) -> Sti
 
 
 def check_matrix(name: str, matrix: Floats) -> None:
-    """Refuse what is no interface stiffness matrix of a body that its supports hold.
-
-    Raises
-    ------
-    ValueError
-        As :func:`stiffness`, and singular.
-    """
+    """Raise ValueError unless it is the interface stiffness matrix of a body that its supports hold."""
     found = stiffness(name, matrix)
     if found.motions.shape[1]:
         raise ValueError(
@@ -155,13 +146,44 @@ def check_matrix(name: str, matrix: Floats) -> None:
 
 
 def check_nodes(x: Floats, weights: Floats) -> None:
-    """Refuse what are no contact nodes from left to right, or no quadrature on them.
-
-    Raises
-    ------
-    ValueError
-    """
+    """Raise ValueError unless x increases and the weights are positive."""
     if not np.all(np.diff(x) > 0):
         raise ValueError("x: needed positions that increase")
     if not np.all(weights > 0):
         raise ValueError("weights: needed positive ones")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Header:
+    """The header of one array: its name, empty in a file of one array, the number of entries and the bytes of one."""
+
+    name: str
+    entries: int
+    entry_bytes: int
+
+    @property
+    def bytes(self) -> int:
+        """Memory for the array."""
+        return self.entries * self.entry_bytes
+
+
+def headers(file: BinaryIO) -> Iterator[Header]:
+    """Yield the headers of all arrays in a file ``.npy`` or ``.npz``; raise one of UNREADABLE for any other file.
+
+    No array is read: a small file may unpack to more than the memory holds.
+    """
+    if not zipfile.is_zipfile(file):
+        file.seek(0)
+        yield _header("", file)
+        return
+    with zipfile.ZipFile(file) as archive:
+        for name in archive.namelist():
+            with archive.open(name) as member:
+                yield _header(name.removesuffix(".npy"), member)
+
+
+def _header(name: str, stream: IO[bytes]) -> Header:
+    version = np.lib.format.read_magic(stream)
+    read = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}[version]
+    shape, _, dtype = read(stream)
+    return Header(name=name, entries=math.prod(shape), entry_bytes=dtype.itemsize)

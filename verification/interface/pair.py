@@ -13,27 +13,25 @@ from fem1d2d.mesh import Floats
 from ndtheory.constants import take
 from ndtheory.number import Numeric
 from verification.dense import reciprocal_condition
-from verification.interface.assembly import held_bodies
-from verification.interface.body import Body, Condensed
-from verification.interface.grid import Grid
-from verification.interface.interface import Interface, Law
-from verification.interface.joining import check_slopes
-from verification.interface.two_bodies import (
+from verification.interface.assembly import (
     SingularRole,
     TwoBodies,
+    held_bodies,
     nearly_incompressible,
     reasons_outside,
     warnings_of,
 )
+from verification.interface.body import Body, Condensed
+from verification.interface.interface import Grid, Interface, Law
+from verification.interface.joining import check_slopes
 from verification.problem import Problem, Settings
 from verification.problem.specs import MOST_FRICTION
-from verification.problem.tables import ProblemError
 from verification.value import Value, freeze
 
 #: Condensation loses one digit of the least stiff motion of a body for each digit of 1/rcond: at 1e-13 three are left.
 LEAST_RCOND = 1e-13
 
-#: What is unknown of matrices and runs from elsewhere.
+#: The units of matrices and runs from elsewhere.
 UNITS = {"length": "any", "stress": "any"}
 
 
@@ -51,11 +49,11 @@ class ContactPair(Value):
     friction : Fraction
         k, constant along Gamma_c.
     neumann_body : {1, 2}
-        Who has the Neumann problem; body 1 lies below body 2.
+        The body of the file with the Neumann problem; body 1 lies below body 2.
     settings : Settings
-        How a run goes unless it is told otherwise.
+        Settings of a run, unless others are given.
     problem : Problem or None
-        What the pair was made from, for documents and messages; None where it was made from matrices.
+        The problem of the pair, for documents and messages; None where it was made from matrices.
     """
 
     contact: Condensed
@@ -97,17 +95,13 @@ class ContactPair(Value):
         """+1 where the outward normal of the contact body points up (body 1), -1 where it points down (body 2)."""
         return 1.0 if self.neumann_body == 2 else -1.0
 
-    def orient(self, interface: Floats) -> Floats:
-        """Turn interface vectors of the contact grid between y and n of the contact body (its own inverse)."""
-        return self.contact.orient(interface)
-
     def at(self, *, friction: Numeric) -> ContactPair:
-        """The same bodies at another friction; what is condensed is shared.
+        """Return the same bodies at another friction; condensed matrices are shared.
 
         Raises
         ------
         HypothesisError
-            Unless k >= 0, or where friction has no law.
+            Unless k >= 0, or if friction has no law.
         """
         law = self.interface.kernel is not None
         needed = "a number >= 0" if law else "0: without a law of friction there is none"
@@ -118,11 +112,11 @@ class ContactPair(Value):
         return replace(self, friction=k, problem=origin)
 
     def changed(self, **values: Any) -> ContactPair:
-        """The pair of its problem with other values, which are those of :meth:`verification.Problem.changed`.
+        """Return the pair of its problem with other values, which are those of :meth:`verification.Problem.changed`.
 
-        What is condensed is shared: a body is condensed anew only where its mesh, its supports or its Poisson ratio
-        change.  Young's modulus multiplies its stiffness.  A law of friction of its own stays unless ``law`` or
-        ``radius`` is given; the settings are those of the changed problem.
+        Condensed matrices are shared: a body is condensed anew only where its mesh, its supports or its Poisson ratio
+        change.  Young's modulus multiplies its stiffness.  A law that was given to the pair stays unless ``law`` or
+        ``radius`` is given; the settings come from the changed problem.
 
         Raises
         ------
@@ -134,12 +128,12 @@ class ContactPair(Value):
         if self.problem is None:
             raise ValueError("this pair is made from matrices: needed a problem, whose values can change")
         law = None if {"law", "radius"} & values.keys() else self.interface.law
-        return build(self.problem.changed(**values), law=law, like=self)
+        return pair_from(self.problem.changed(**values), law=law, like=self)
 
     def swapped(self) -> ContactPair:
-        """The same bodies with the roles exchanged; what is condensed is shared.
+        """Return the same bodies with the roles exchanged; condensed matrices are shared.
 
-        Where the grids differ the transfer is another one: that of the problem with these roles.
+        Where the grids differ the transfer is made anew, from the problem with these roles.
 
         Raises
         ------
@@ -153,7 +147,7 @@ class ContactPair(Value):
         if self.contact.loose:
             raise SingularRole(self.source, self.contact_body, self.contact.motions.shape[1])
         if self.interface.transfer is not None and self.problem is not None:
-            return build(self.problem.swapped(), law=self.interface.law, like=self)
+            return pair_from(self.problem.swapped(), law=self.interface.law, like=self)
         if self.problem is not None and self.contact.grid.dimension == 2:
             bodies = [side.mesh_body for side in (self.body1, self.body2)]
             check_slopes(self.problem.swapped(), [body.mesh.points[body.nodes] for body in bodies])
@@ -167,7 +161,7 @@ class ContactPair(Value):
         )
 
     def on_meshes(self) -> TwoBodies:
-        """The bodies on their meshes under the loads of this pair, as the global method takes them.
+        """Return the bodies on their meshes under the loads of this pair, as the global method takes them.
 
         Raises
         ------
@@ -186,7 +180,7 @@ class ContactPair(Value):
 
     @property
     def title(self) -> str:
-        """That of the problem."""
+        """The title of the problem."""
         return "matrices" if self.problem is None else self.problem.title
 
     @property
@@ -196,27 +190,21 @@ class ContactPair(Value):
 
     @property
     def source(self) -> str:
-        """What errors name: a file, ``<dict>`` or ``<matrices>``."""
+        """The name in errors: a file, ``<dict>`` or ``<matrices>``."""
         return "<matrices>" if self.problem is None else self.problem.source
 
     @property
     def rubs(self) -> bool:
-        """Whether friction can act."""
+        """True if friction can act."""
         return bool(self.friction) and self.interface.kernel is not None
 
     @property
     def held(self) -> bool:
-        """Whether a contact node of a body is held tangentially."""
+        """True if a contact node of a body is held tangentially."""
         return not (self.contact.free.all() and self.neumann.free.all())
 
     def bound(self, force: Floats) -> Floats:
-        """Friction bound on nodal forces at the contact nodes, ``w_j k |(S sigma_N)_j|``, shape (t,).
-
-        Parameters
-        ----------
-        force : array
-            On the Neumann grid; sigma_N are its normal components.
-        """
+        """Return the friction bound ``w_j k |(S sigma_N)_j|``, shape (t,), for nodal forces on the Neumann grid."""
         if not self.rubs:
             return np.zeros(self.interface.contact.t)
         return np.asarray(self._limits * np.abs(self.interface.stress(force)))
@@ -224,12 +212,11 @@ class ContactPair(Value):
     @cached_property
     def _limits(self) -> Floats:
         """``w_j k``."""
-        limits: Floats = freeze(float(self.friction) * self.interface.contact.weights)
-        return limits
+        return freeze(float(self.friction) * self.interface.contact.weights)
 
     @property
     def outside(self) -> list[str]:
-        """Why the theorem does not speak of this pair; empty where it does."""
+        """The reasons why the theorem does not apply to this pair; empty where it does."""
         return reasons_outside(self.interface, self.friction, [self.contact.free, self.neumann.free])
 
     @property
@@ -239,13 +226,13 @@ class ContactPair(Value):
 
     @property
     def warnings(self) -> list[str]:
-        """What a user should know before trusting the numbers."""
+        """Facts that a user should know before trusting the numbers."""
         bodies = [side.body for side in (self.body1, self.body2) if side.body is not None]
         return warnings_of(self.interface, self.friction, bodies)
 
 
-def build(problem: Problem, *, law: Law | None = None, like: ContactPair | None = None) -> ContactPair:
-    """Two condensed bodies with roles, as the iteration and its constants need them.
+def pair_from(problem: Problem, *, law: Law | None = None, like: ContactPair | None = None) -> ContactPair:
+    """Condense the two bodies of a problem and give them roles, as the iteration and its constants need them.
 
     Parameters
     ----------
@@ -254,7 +241,7 @@ def build(problem: Problem, *, law: Law | None = None, like: ContactPair | None 
     law : Law, optional
         A law of friction in place of the problem's.
     like : ContactPair, optional
-        What it has condensed is shared by bodies that are the same, or differ in Young's modulus and loads alone.
+        Its condensed matrices are shared by bodies that are the same, or differ only in Young's modulus and loads.
 
     Raises
     ------
@@ -283,18 +270,18 @@ def build(problem: Problem, *, law: Law | None = None, like: ContactPair | None 
 
 
 def _check_digits(problem: Problem, name: str, side: Condensed) -> None:
-    """Refuse a body so slender, or of cells so stretched, that rounding takes its stiffness in the softest motion."""
+    """Refuse a body so slender, or of cells so stretched, that rounding hides its stiffness in the softest motion."""
     found = reciprocal_condition(side.stiffness, np.flatnonzero(side.free), side.motions)
     if not found > LEAST_RCOND:
         needed = (
             f"its stiffness on Gamma_c is lost in rounding (1/condition {found:.1g}): needed more than {LEAST_RCOND:g},"
             " by a body less slender or cells less stretched; `ndtheory solve` needs no such matrix"
         )
-        raise ProblemError(problem.source, name, None, needed)
+        raise problem.refuse(name, None, needed)
 
 
 def _condensed(body: Body, grid: Grid, upward: bool, like: Condensed | None) -> Condensed:
-    """A body condensed, its normal components along y or against it; one like it may be condensed already."""
+    """Condense a body, its normal components along y or against it; one like it may be condensed already."""
     if like is None or like.body is None:
         found = Condensed.of(body, grid)
     elif body.equals(like.body):

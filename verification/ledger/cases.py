@@ -1,4 +1,8 @@
-"""Problems to test inequalities on: random ones with loads, and named ones on which a printed bound is false."""
+"""Problems of the ledger.
+
+Inequalities are tested on random problems with loads and on named ones on which a printed bound is false, statements
+about whole displacement fields on PROBLEMS.
+"""
 
 from __future__ import annotations
 
@@ -30,19 +34,10 @@ def three_digits(value: float) -> Fraction:
 def problem(random: np.random.Generator, friction: Any = None, *, matching: bool = True, **iteration: Any) -> Problem:
     """Draw two rectangles, 2 to 9 contact nodes; one may jut out over the other on either side.
 
-    E1/E2 from 1/50 to 50, either role, friction 0, 0.1, .., 1.  The lower body is clamped at its bottom, the top of
-    the upper one is pushed and sheared, its sides carry tractions, and in one case of three there is a gap.
-
-    Parameters
-    ----------
-    random : Generator
-    friction : number, optional
-        k in place of the one drawn.
-    matching : bool
-        Whether the grids are one.  Where they are not, the wider body has the Neumann problem: the other one has nodes
-        at both ends of Gamma_c.
-    **iteration
-        Further keys of the table ``iteration``.
+    E1/E2 from 1/50 to 50, either role, friction 0, 0.1, .., 1 unless k is given.  The lower body is clamped at its
+    bottom, the top of the upper one is pushed and sheared, its sides carry tractions, and in one case of three there is
+    a gap.  Without ``matching`` the grids are drawn apart and the wider body has the Neumann problem: the other one has
+    nodes at both ends of Gamma_c.  Further keywords are keys of the table ``iteration``.
     """
     whole = lambda low, high: int(random.integers(low, high + 1))
     count = whole(1, 8)
@@ -54,14 +49,8 @@ def problem(random: np.random.Generator, friction: Any = None, *, matching: bool
     for i in (0, 1):
         x = [CELL * end for end in ends[i]]
         height = (x[1] - x[0]) * SHAPES[random.integers(len(SHAPES))]
-        body: dict[str, Any] = {
-            "shape": "rectangle",
-            "x": x,
-            "y": [-height, 0] if i == 0 else [0, height],
-            "young": young[i],
-        }
-        body |= {"cells": [ends[i][1] - ends[i][0], whole(1, 3)], "poisson": ["0", "0.3", "0.45"][random.integers(3)]}
-        bodies.append(body)
+        cells, poisson = [ends[i][1] - ends[i][0], whole(1, 3)], ["0", "0.3", "0.45"][random.integers(3)]
+        bodies.append(rectangle(x, [-height, 0] if i == 0 else [0, height], cells, young[i], poisson))
     bodies[0]["fixed"] = ["bottom"]
     slip, push = Fraction(whole(-20, 20), 1000), -Fraction(whole(1, 50), 1000)
     bodies[1]["prescribed"] = {"top": [slip * height, push * height]}
@@ -85,27 +74,16 @@ def problem(random: np.random.Generator, friction: Any = None, *, matching: bool
     )
 
 
+def rectangle(x: Any, y: Any, cells: Any, young: Any, poisson: Any, **more: Any) -> dict[str, Any]:
+    """The table of a rectangle in a problem file."""
+    return {"shape": "rectangle", "x": x, "y": y, "cells": cells, "young": young, "poisson": poisson, **more}
+
+
 def _clamped_plate(thickness: str) -> Mapping[str, Any]:
     """A thin plate, clamped at one end, under a block: the tangential trace is larger in L2 than in H^1/2."""
     return {
-        "body1": {
-            "shape": "rectangle",
-            "x": [0, 2],
-            "y": [f"-{thickness}", 0],
-            "cells": [10, 1],
-            "young": 1,
-            "poisson": 0,
-            "fixed": ["left"],
-        },
-        "body2": {
-            "shape": "rectangle",
-            "x": ["0.2", 2],
-            "y": [0, 1],
-            "cells": [9, 2],
-            "young": 1,
-            "poisson": 0,
-            "fixed": ["top"],
-        },
+        "body1": rectangle([0, 2], [f"-{thickness}", 0], [10, 1], 1, 0, fixed=["left"]),
+        "body2": rectangle(["0.2", 2], [0, 1], [9, 2], 1, 0, fixed=["top"]),
         "contact": {"friction": 1, "radius": "0.5", "gap": 1},
     }
 
@@ -116,24 +94,107 @@ NAMED: Mapping[str, Mapping[str, Any]] = {
     **{f"plate of thickness {t} clamped at one end": _clamped_plate(t) for t in ("0.05", "0.02", "0.01")},
     # the bound (5.30) grows as k for m -> 0, its left side as k^2
     "layer of a ten-thousandth on a block": {
-        "body1": {
-            "shape": "rectangle",
-            "x": [0, 1],
-            "y": ["-0.125", 0],
-            "cells": [2, 2],
-            "young": 1,
-            "poisson": 0,
-            "fixed": ["bottom"],
-        },
-        "body2": {
-            "shape": "rectangle",
-            "x": [0, 1],
-            "y": [0, "0.0001"],
-            "cells": [2, 1],
-            "young": 1,
-            "poisson": 0,
-            "prescribed": {"top": [-1, 0]},
-        },
+        "body1": rectangle([0, 1], ["-0.125", 0], [2, 2], 1, 0, fixed=["bottom"]),
+        "body2": rectangle([0, 1], [0, "0.0001"], [2, 1], 1, 0, prescribed={"top": [-1, 0]}),
         "contact": {"friction": 1, "radius": "0.5", "gap": 1},
     },
 }
+
+
+#: The relative residual at which their runs end.
+TOLERANCE = 1e-13
+
+LOWER = rectangle([0, 2], ["-0.3", 0], [10, 2], 7, "0.3")
+UPPER = rectangle(["0.4", "1.6"], [0, "0.3"], [6, 2], 2, "0.3")
+RUN = {"tolerance": TOLERANCE, "max_iterations": 3000}
+
+
+def _plates(lower: Any = None, upper: Any = None, **tables: Any) -> dict[str, Any]:
+    """Two plates, the upper one pressed down."""
+    return {
+        "body1": {**LOWER, "fixed": ["bottom"], **(lower or {})},
+        "body2": {**UPPER, "prescribed": {"top": [0, "-0.015"]}, **(upper or {})},
+        "contact": {"friction": "0.2", "radius": "0.2", **tables.get("contact", {})},
+        "iteration": {"neumann_body": 1, "theta": "0.7", **RUN, **tables.get("iteration", {})},
+    }
+
+
+#: Both roles; nodes that stick, slip and are open; an initial gap; no friction; grids that differ; one dimension.
+PROBLEMS: dict[str, dict[str, Any]] = {
+    "pressed": _plates(),
+    "sheared, body 2 Neumann": _plates(
+        {"young": 2},
+        {"young": 7, "prescribed": {"top": ["0.006", "-0.015"]}},
+        contact={"friction": "0.1"},
+        iteration={"neumann_body": 2, "theta": "0.6"},
+    ),
+    "much friction": _plates(upper={"prescribed": {"top": ["0.004", "-0.015"]}}, contact={"friction": "0.6"}),
+    "open in part, with a gap": _plates(
+        upper={"prescribed": {"top": [0, "-0.006"]}, "traction": {"right": [0, "0.9"]}}, contact={"gap": "0.005"}
+    ),
+    "bent over an edge, body 2 Neumann": _plates(
+        {"fixed": ["left"], "body_force": [0, "-0.003"]},
+        contact={"interval": ["0.4", "1.6"]},
+        iteration={"neumann_body": 2, "theta": "0.7"},
+    ),
+    "without friction": _plates(contact={"friction": 0}),
+    "sheared, a finer contact grid": _plates(
+        upper={"cells": [9, 2], "prescribed": {"top": ["0.004", "-0.015"]}}, contact={"friction": "0.1"}
+    ),
+    "open in part, a finer Neumann grid": _plates(
+        {"young": 2},
+        {"young": 7, "cells": [11, 2], "prescribed": {"top": [0, "-0.006"]}, "traction": {"right": [0, "0.9"]}},
+        iteration={"neumann_body": 2, "theta": "0.7"},
+    ),
+    "bars with a gap": {
+        "dimension": 1,
+        "body1": {"shape": "interval", "x": [0, 2], "cells": 3, "young": 1, "fixed": ["left"], "body_force": "0.1"},
+        "body2": {"shape": "interval", "x": [2, 3], "cells": 2, "young": 4, "prescribed": {"right": "-0.2"}},
+        "contact": {"gap": "0.05"},
+        "iteration": {"theta": "0.6", **RUN},
+    },
+}
+
+#: Where Proposition 5.6 has an interval in which a run ends within some hundred steps.
+CONVERGENT: dict[str, dict[str, Any]] = {
+    "two bars": {
+        "dimension": 1,
+        "body1": {"shape": "interval", "x": [0, 1], "cells": 6, "young": 2, "fixed": ["left"], "body_force": "0.1"},
+        "body2": {"shape": "interval", "x": [1, 2], "cells": 6, "young": 2, "prescribed": {"right": "-0.1"}},
+        "iteration": {**RUN},
+    },
+    "two short bars": {
+        "dimension": 1,
+        "body1": {"shape": "interval", "x": [0, "0.5"], "cells": 4, "young": 1, "fixed": ["left"]},
+        "body2": {"shape": "interval", "x": ["0.5", 1], "cells": 4, "young": 2, "prescribed": {"right": "-0.1"}},
+        "contact": {"gap": "0.02"},
+        "iteration": {**RUN},
+    },
+}
+#: Plane bodies; :class:`verification.ledger.convergence.RunsOfLevel` gives them a friction below their C_2.
+PLANE: dict[str, dict[str, Any]] = {
+    "squares": {
+        "body1": rectangle([0, 1], [-1, 0], [3, 3], 1, 0, fixed=["bottom"]),
+        "body2": rectangle([0, 1], [0, 1], [3, 3], 1, 0, prescribed={"top": ["0.01", "-0.05"]}),
+        "contact": {"friction": 0, "radius": "0.4"},
+        "iteration": {**RUN},
+    },
+    "plates whose grids differ": _plates(
+        {"young": 1}, {"young": 1, "cells": [7, 2], "prescribed": {"top": ["0.004", "-0.015"]}}, contact={"friction": 0}
+    ),
+}
+
+
+def drawn(rng: np.random.Generator) -> dict[str, Any]:
+    """Two plates with everything drawn at random; a third have grids that differ."""
+    pick = lambda low, high: round(float(rng.uniform(low, high)), 3)
+    lower: dict[str, Any] = {"young": round(10 ** rng.uniform(-1, 1), 3), "poisson": pick(-0.3, 0.45)}
+    upper: dict[str, Any] = {"young": round(10 ** rng.uniform(-1, 1), 3), "poisson": pick(-0.3, 0.45)}
+    upper["prescribed"] = {"top": [pick(-0.01, 0.01), pick(-0.02, -0.005)]}
+    if rng.random() < 0.5:
+        upper["traction"] = {"right": [0, pick(0, 0.3) * upper["young"]]}
+    contact = {"friction": pick(0, 0.5), "radius": pick(0.2, 0.8), "gap": pick(0, 0.004)}
+    iteration = {"neumann_body": int(rng.integers(1, 3)), "theta": "auto"}
+    if rng.random() < 1 / 3:
+        upper["cells"] = [int(rng.integers(3, 12)), 2]
+    return _plates(lower, upper, contact=contact, iteration=iteration)

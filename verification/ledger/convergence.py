@@ -1,4 +1,4 @@
-"""Convergence of the iteration: (3.1) III, Proposition 5.1, Theorem 5.9 and (5.47), held against runs."""
+"""Convergence of the iteration: (3.1) III, Proposition 5.1, Theorem 5.9 and (5.47), compared with runs."""
 
 from __future__ import annotations
 
@@ -22,11 +22,22 @@ from verification.algorithm.theta import CLOSEST_TO_ONE
 from verification.constants import measure
 from verification.contact import ContactError
 from verification.interface.body import Body
+from verification.ledger.cases import CONVERGENT, PLANE
 from verification.ledger.evidence import Evidence, Level, figure
-from verification.ledger.field_problems import CONVERGENT, PLANE
-from verification.ledger.found import Found, equations, evidence, on_problems
-from verification.ledger.reading import Reading
-from verification.ledger.weak_forms import CLEAR, EXACT, LIMIT, Case, Weak, cases, image_of
+from verification.ledger.inequalities import Reading
+from verification.ledger.weak_forms import (
+    CLEAR,
+    EXACT,
+    LIMIT,
+    Case,
+    Found,
+    Weak,
+    cases,
+    equations,
+    evidence,
+    image_of,
+    on_problems,
+)
 from verification.problem.specification import Problem
 
 #: Steps of (3.1) with the printed sign.
@@ -91,7 +102,7 @@ class Norms:
 
     def dual(self, force: Floats) -> float:
         """The norm of V^2' of nodal forces on Gamma_c."""
-        load = np.zeros(len(self.weak.two.free))
+        load = np.zeros(len(self.weak.two.positions))
         load[self.weak.two.interface] = self.weak.pair.neumann.orient(force)
         return float(np.sqrt(max(float(load @ self._solve(load)), 0.0)))
 
@@ -147,7 +158,7 @@ def forces_carry_displacements(setting: RunsOfLevel) -> list[Evidence]:
             if not case.grids_differ:
                 ratios = strong_convergence(case.weak, clear, float(case.run.theta), reading.m)
                 estimate[case.name] = float(ratios.max())
-    ends = [Found(case=c, values=np.array([apart(c)]), limit=LIMIT) for c in setting.cases if c.run.converged]
+    ends = [Found(c, np.array([apart(c)]), LIMIT) for c in setting.cases if c.run.converged]
     lost = min((there_and_back(case) for case in setting.cases if case.grids_differ), default=1.0)
     kept = f"which needs one grid (with mortar transfers both ways a^1(z, R^1 R^2 z) falls to {lost:.2g} of a^1(z, z))"
     return [
@@ -188,7 +199,7 @@ class Convergence:
 
     @cached_property
     def ratio(self) -> float:
-        """The largest ``|||g_i - g||| / |||g_{i-1} - g|||`` while the distance stands clear of rounding.
+        """The largest ``|||g_i - g||| / |||g_{i-1} - g|||`` while the distance is far above rounding.
 
         g is the functional of Theorem 5.9, from the displacement of body 1.
         """
@@ -199,51 +210,68 @@ class Convergence:
         return float((distance[1:count] / distance[: count - 1]).max(initial=0.0))
 
 
-def inside(level: Level) -> list[Convergence]:
-    """Runs inside Proposition 5.6, as printed and as repaired: theta = C_0, and k half of its bound.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RunsOfLevel:
+    """The problems and runs that the checks share, each solved when it is first asked for."""
 
-    The plane ones take thousands of steps; quick makes the first few hundred.
-    """
-    result = []
-    for name, data in (CONVERGENT | PLANE).items():
-        problem = Problem.from_dict(data)
-        measured = measure(problem)
-        if name in PLANE:
-            constants = measured.with_friction(1e-12).constants()
+    level: Level
+
+    @property
+    def count(self) -> int:
+        """Random test functions of each kind."""
+        return 10 if self.level == "quick" else 60
+
+    @cached_property
+    def cases(self) -> list[Case]:
+        """The problems of the level."""
+        return cases(self.level)
+
+    @cached_property
+    def inside(self) -> list[Convergence]:
+        """Runs inside Proposition 5.6, as printed and as repaired: theta = C_0, and k half of its bound.
+
+        The plane ones take thousands of steps; quick makes the first few hundred.
+        """
+        result = []
+        for name, data in (CONVERGENT | PLANE).items():
+            problem = Problem.from_dict(data)
+            measured = measure(problem)
+            if name in PLANE:
+                constants = measured.with_friction(1e-12).constants()
+                assert constants is not None
+                thresholds = [evaluate(edition, constants).C2 for edition in EDITIONS]
+                k = Fraction(min(c.value for c in thresholds if c is not None) / 2).limit_denominator(10**9)
+                steps = 300 if self.level == "quick" else 20_000
+                iteration = replace(problem.iteration, max_iterations=steps)
+                problem = replace(problem, contact=replace(problem.contact, friction=k), iteration=iteration)
+                measured = measured.with_friction(float(k))
+            constants = measured.constants()
             assert constants is not None
-            thresholds = [evaluate(edition, constants).C2 for edition in EDITIONS]
-            k = Fraction(min(c.value for c in thresholds if c is not None) / 2).limit_denominator(10**9)
-            steps = 300 if level == "quick" else 20_000
-            iteration = replace(problem.iteration, max_iterations=steps)
-            problem = replace(problem, contact=replace(problem.contact, friction=k), iteration=iteration)
-            measured = measured.with_friction(float(k))
-        constants = measured.constants()
-        assert constants is not None
-        theta = min(evaluate(edition, constants).C0.value for edition in EDITIONS)
-        factors = [evaluate(edition, constants, theta=theta).factor for edition in EDITIONS]
-        factor = max(2.0 if f is None else f.value for f in factors)
-        result.append(Convergence(case=Case(name=name, problem=problem.with_theta(theta)), factor=factor))
-    return result
+            theta = min(evaluate(edition, constants).C0.value for edition in EDITIONS)
+            factors = [evaluate(edition, constants, theta=theta).factor for edition in EDITIONS]
+            factor = max(2.0 if f is None else f.value for f in factors)
+            result.append(Convergence(case=Case(name=name, problem=problem.with_theta(theta)), factor=factor))
+        return result
 
-
-def energy(level: Level) -> list[Convergence]:
-    """Runs with half the friction that the theorem in energy norms allows, at its best theta."""
-    result = []
-    for name, problem in ((case.name, case.problem) for case in cases(level)):
-        measured = measure(problem)
-        threshold = measured.friction_threshold
-        if threshold is not None and float(problem.contact.friction) > threshold.value / 2:
-            k = Fraction(threshold.value / 2).limit_denominator(10**6)
-            problem = replace(problem, contact=replace(problem.contact, friction=k))
-            measured = measured.with_friction(float(k))
-        constants = measured.energy_constants()
-        assert constants is not None
-        bounds = evaluate_energy(constants)
-        if bounds.theta_proved is not None and bounds.factor_proved is not None:
-            theta = min(bounds.theta_proved, CLOSEST_TO_ONE)
-            case = Case(name=name, problem=problem.with_theta(theta))
-            result.append(Convergence(case=case, factor=bounds.factor_proved.value))
-    return result
+    @cached_property
+    def energy(self) -> list[Convergence]:
+        """Runs with half the friction that the theorem in energy norms allows, at its best theta."""
+        result = []
+        for name, problem in ((case.name, case.problem) for case in cases(self.level)):
+            measured = measure(problem)
+            threshold = measured.friction_threshold
+            if threshold is not None and float(problem.contact.friction) > threshold.value / 2:
+                k = Fraction(threshold.value / 2).limit_denominator(10**6)
+                problem = replace(problem, contact=replace(problem.contact, friction=k))
+                measured = measured.with_friction(float(k))
+            constants = measured.energy_constants()
+            assert constants is not None
+            bounds = evaluate_energy(constants)
+            if bounds.theta_proved is not None and bounds.factor_proved is not None:
+                theta = min(bounds.theta_proved, CLOSEST_TO_ONE)
+                case = Case(name=name, problem=problem.with_theta(theta))
+                result.append(Convergence(case=case, factor=bounds.factor_proved.value))
+        return result
 
 
 def forces_converge(setting: RunsOfLevel) -> list[Evidence]:
@@ -260,7 +288,7 @@ def _falling(of: Any, text: str, runs: Sequence[Convergence]) -> Evidence:
     ratios = {r.case.name: r.ratio / r.factor for r in runs}
     where = max(ratios, key=lambda name: figure(ratios[name]))
     converged = [r for r in runs if r.case.run.converged]
-    ends = [Found(case=r.case, values=np.array([end_of(r.case)]), limit=LIMIT) for r in converged]
+    ends = [Found(r.case, np.array([end_of(r.case)]), LIMIT) for r in converged]
     arrived = equations(of, "", ends)
     data = {
         "problems": list(ratios),
@@ -291,37 +319,10 @@ def end_of(case: Case) -> float:
 
 def fields_converge(setting: RunsOfLevel) -> list[Evidence]:
     def arrive(of: Any, text: str, runs: Sequence[Convergence]) -> Evidence:
-        ends = [Found(case=r.case, values=np.array([apart(r.case)]), limit=LIMIT) for r in runs if r.case.run.converged]
+        ends = [Found(r.case, np.array([apart(r.case)]), LIMIT) for r in runs if r.case.run.converged]
         return equations(of, f"u_i at the end of runs {text}, against the global method in V", ends)
 
     return [
         arrive("printed", "inside the intervals of Proposition 5.6", setting.inside),
         arrive("repaired", "inside the interval of the theorem in energy norms", setting.energy),
     ]
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class RunsOfLevel:
-    """What the checks share."""
-
-    level: Level
-
-    @cached_property
-    def cases(self) -> list[Case]:
-        """The problems, solved when first asked."""
-        return cases(self.level)
-
-    @cached_property
-    def inside(self) -> list[Convergence]:
-        """Runs inside Proposition 5.6."""
-        return inside(self.level)
-
-    @cached_property
-    def energy(self) -> list[Convergence]:
-        """Runs inside the theorem in energy norms."""
-        return energy(self.level)
-
-    @property
-    def count(self) -> int:
-        """Random test functions of each kind."""
-        return 10 if self.level == "quick" else 60

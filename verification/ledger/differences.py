@@ -1,8 +1,8 @@
-"""What Section 5 compares: the difference of two solutions of steps I and II for two forces psi and psi~.
+"""The difference of two solutions of steps I and II for two forces psi and psi~, and the pairs that are tried.
 
 "1" is the contact body and "2" the Neumann body, whatever their numbers in the file.  A pair of forces is
 pushed through steps I and II, or is a direction on an affine piece of T (:mod:`verification.algorithm.affine_piece`),
-each of which occurs for suitable loads.  Which pairs are drawn says :mod:`verification.ledger.draws`.
+each of which occurs for suitable loads.
 """
 
 from __future__ import annotations
@@ -14,17 +14,22 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
 
 from fem1d2d.mesh import Floats
 from verification.algorithm.affine_piece import Piece
 from verification.algorithm.fixed_point import FixedPointMap
-from verification.bounds.losses import LossForms
+from verification.bounds.losses import LossForms, square, top
+from verification.bounds.neighbours import Factors, squared
+from verification.bounds.pattern_search import Form, signs, worst_piece
 from verification.contact import ContactError, ContactSolution
+from verification.contact.active_set import Pattern
 from verification.interface.body import Body
 from verification.interface.pair import ContactPair
 
-#: In how many steps a force is brought up where the active set cycles, in turn: of 19 such cases on the quick level 11
-#: need 16 steps, 6 need 64 and 2 need 256.
+#: Numbers of steps, tried one after the other, in which a force is brought up where the active set cycles: of 19 such
+#: cases on the quick level 11 need 16 steps, 6 need 64 and 2 need 256.
 STEPS = (16, 64, 256)
 
 #: Up to this share of the energies behind it a^1(w^1 - w~^1, w^1 - w~^1) is rounding: where the Neumann grid is the
@@ -33,12 +38,9 @@ NO_MOTION = 1e-20
 
 
 def lifted_energy(body: Body) -> Floats:
-    """``R_a' A_a R_a`` from the lifted fields: ``a^a(R phi, R chi)`` on the interface.
-
-    It equals the Schur complement because the lift is a-harmonic, which is used nowhere here.
-    """
+    """``a^a(R phi, R chi)`` on the interface from the lifted fields; that the lift is a-harmonic is not used."""
     elastic = body.elastic
-    fields = np.zeros((len(body.free), len(elastic.interface)))
+    fields = np.zeros((len(body.positions), len(elastic.interface)))
     fields[elastic.interface] = np.eye(len(elastic.interface))
     fields[elastic.inside] = elastic.lift
     energy = fields.T @ (body.stiffness @ fields)
@@ -47,13 +49,7 @@ def lifted_energy(body: Body) -> Floats:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DrawnSetting:
-    """A problem with the matrices in which its differences are measured.
-
-    Attributes
-    ----------
-    pair : ContactPair
-        No contact node is held.
-    """
+    """A pair of bodies, no contact node of which is held, with the matrices in which its differences are measured."""
 
     pair: ContactPair
 
@@ -87,12 +83,11 @@ class DrawnSetting:
 class Difference:
     """The difference of two solutions of steps I and II.
 
-    Where the grids differ, what is of the Neumann body reaches the contact grid by P alone: step II stays below
-    ``P w^2_N``, with ``P w^2_T`` in the jump, and (5.4) lifts ``P v``.  (5.12) takes ``w~^1 + R_D^1 P (w^2 - w~^2)``.
+    Where the grids differ, only P leads from the Neumann body to the contact grid: step II stays below ``P w^2_N``,
+    with ``P w^2_T`` in the jump, and (5.4) lifts ``P v``.  (5.12) takes ``w~^1 + R_D^1 P (w^2 - w~^2)``.
 
     Attributes
     ----------
-    setting : DrawnSetting
     force : array
         ``psi - psi~``, nodal forces on the Neumann grid.
     reaction : array
@@ -186,13 +181,7 @@ class Difference:
 
 
 class Differences:
-    """Several differences of one problem, whose numbers are arrays: attributes are those of :class:`Difference`.
-
-    Parameters
-    ----------
-    each : sequence of Difference
-        At least one.
-    """
+    """One or more differences of one problem: each attribute of :class:`Difference` is an array of all of them."""
 
     def __init__(self, each: Sequence[Difference]) -> None:
         self.each, self.setting = each, each[0].setting
@@ -231,14 +220,9 @@ def _norm(v: Floats, gram: Floats) -> float:
 
 
 def between(setting: DrawnSetting, psi: Floats, other: Floats) -> Difference:
-    """The difference of the solutions for two forces.
-
-    Raises
-    ------
-    ContactError
-    """
+    """The difference of the solutions for two forces."""
     pair, t, forms = setting.pair, setting.pair.contact.grid.t, setting.forms
-    solutions, states, images, stress, size = [], [], [], [], 0.0
+    solutions, states, images, size = [], [], [], 0.0
     for force in (psi, other):
         u, solution = _solve(pair, force)
         image = pair.interface.carry_back(solution.force)
@@ -249,9 +233,8 @@ def between(setting: DrawnSetting, psi: Floats, other: Floats) -> Difference:
         solutions.append(solution)
         states.append(u)
         images.append(image)
-        stress.append(_stress(pair, force))
     weights = float(pair.friction) * pair.contact.grid.weights[:t]  # t = 0 in one dimension
-    bounds = [np.abs(value)[:t] for value in stress]
+    bounds = [np.abs(pair.interface.stress(force))[:t] for force in (psi, other)]
     slips = [np.abs(solution.v[:t]) for solution in solutions]
     d_2 = states[0] - states[1]
     return Difference(
@@ -285,11 +268,6 @@ def _solve(pair: ContactPair, force: Floats) -> tuple[Floats, ContactSolution]:
     return FixedPointMap(pair, "cvxpy")(force)
 
 
-def _stress(pair: ContactPair, force: Floats) -> Floats:
-    """``S sigma_N`` at the nodes."""
-    return pair.interface.stress(force)
-
-
 # --- a direction on a piece of T
 
 
@@ -320,3 +298,98 @@ def along(setting: DrawnSetting, piece: Piece, y: Floats) -> Difference:
         friction=-float(bound @ slip),
         size=size,
     )
+
+
+#: Distances of two random forces, over their size.
+DISTANCES = (0.1, 0.3, 1.0, 3.0)
+
+#: Random directions on each piece, beside the worst ones.
+RANDOM_DIRECTIONS = 2
+
+
+def random_pairs(setting: DrawnSetting, random: np.random.Generator, count: int) -> Iterator[Difference]:
+    """Forces of 0.1 to 10 times the size that the loads cause, at several distances; every second one presses."""
+    pair = setting.pair
+    root = setting.forms.root
+    loads = pair.neumann.load, pair.interface.carry_back(pair.contact.load)
+    size = max(map(pair.neumann.dual_norm, loads)) or 1.0
+    for i in range(count):
+        psi, step = (root @ random.standard_normal(root.shape[1]) / math.sqrt(root.shape[1]) for _ in range(2))
+        psi *= size * 10 ** random.uniform(-1, 1)
+        other = psi + step * DISTANCES[i % len(DISTANCES)] * pair.neumann.dual_norm(psi)
+        if i % 2:
+            for force in (psi, other):
+                force[pair.neumann.grid.normal] = np.abs(force[pair.neumann.grid.normal])
+        yield between(setting, psi, other)
+
+
+def work_form(forms: LossForms, piece: Piece) -> Floats:
+    """The work ``<T psi - T psi~, w^2 - w~^2>`` as a quadratic form in y."""
+    form = forms.d_2.T @ forms.force(piece)
+    return np.asarray(form + form.T) / 2
+
+
+def uniform_piece(pair: ContactPair, *, touching: bool, sliding: int) -> Piece:
+    """The piece on which all nodes have one state."""
+    t = pair.contact.grid.t
+    pattern = Pattern(touching=np.full(pair.contact.grid.n, touching), sliding=np.full(t, sliding, dtype=np.int8))
+    still: NDArray[np.bool_] = np.zeros(pair.neumann.grid.n, dtype=bool)
+    return Piece(pair=pair, pattern=pattern, sign=signs(pair), still=still)
+
+
+def pieces(setting: DrawnSetting, random: np.random.Generator, *, starts: int) -> list[Piece]:
+    """Pieces of T on which an inequality comes close to equality.
+
+    All nodes stick; all are open and slide one way; the worst pieces of searches for the largest friction term, the
+    largest ``|||T psi - T psi~|||`` and the largest work, from ``starts`` patterns each, 0 for no search.
+    """
+    pair, forms = setting.pair, setting.forms
+    friction = bool(pair.friction)
+    found = [uniform_piece(pair, touching=True, sliding=0 if friction else 1)]
+    found.append(uniform_piece(pair, touching=False, sliding=1))
+    objectives: list[tuple[Form, Factors]] = [
+        (lambda piece: square(forms.force(piece), forms.inverse), lambda found: squared(found.force, forms.inverse)),
+        (lambda piece: work_form(forms, piece), lambda found: (found.force @ forms.inverse, found.g)),
+    ]
+    if friction:
+        objectives.append((forms.friction, lambda found: found.friction))
+    if starts:
+        found += [
+            worst_piece(pair, form, factors=factors, random=random, starts=starts).piece for form, factors in objectives
+        ]
+    return found
+
+
+def directions(setting: DrawnSetting, piece: Piece, random: np.random.Generator) -> list[Floats]:
+    """Directions on a piece: the worst ones of the pencils of Section 5, and random ones."""
+    forms = setting.forms
+    T, work, F = forms.force(piece), work_form(forms, piece), forms.friction(piece)
+    size_1, size_2 = square(forms.d_1(piece), forms.N_1), square(forms.d_2, forms.N_2)
+    dual, one = square(forms.root, forms.dual), np.eye(len(F))
+    square_T = square(T, forms.inverse)
+    pencils = [
+        (size_1, size_2),
+        (square_T, one),
+        (square(T, forms.dual), dual),
+        (size_2, dual),
+        (one, dual),
+        (dual, one),
+        (work, one),
+        (square_T + 2 * work, one),  # T_theta at theta = 1/2
+    ]
+    if setting.pair.friction:
+        # 2 |x| |y| <= |x|^2/r + r |y|^2 with equality at r = |x|/|y|: (5.13) where |x|/|y| is the largest there is
+        r = math.sqrt(max(top(size_1, size_2), 1e-12))
+        pencils += [(F, one), (F, size_1 / (2 * r) + (1 + r / 2) * size_2)]
+    worst = [eigh(form, against, subset_by_index=[len(F) - 1] * 2)[1][:, 0] for form, against in pencils]
+    return worst + [random.standard_normal(len(F)) for _ in range(RANDOM_DIRECTIONS)]
+
+
+def draw_pairs(
+    setting: DrawnSetting, random: np.random.Generator, *, starts: int, realised: int
+) -> Iterator[Difference]:
+    """The pairs of one problem: ``realised`` random ones, and directions on pieces found from ``starts`` patterns."""
+    yield from random_pairs(setting, random, realised)
+    for piece in pieces(setting, random, starts=starts):
+        for y in directions(setting, piece, random):
+            yield along(setting, piece, y)

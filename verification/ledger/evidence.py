@@ -1,4 +1,4 @@
-"""What a check of a statement found, and the verdict that follows."""
+"""The evidence that a check of a statement found, and the verdict that follows."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from verification.threads import one_thread
 
 Level = Literal["quick", "full"]
 Method = Literal["symbolic", "dimension", "verified", "discrete", "reading"]
+Form = Literal["printed", "step", "repaired"]
 Verdict = Literal["PROVED", "REPAIRED", "REFUTED", "NUMERICAL", "ASSUMED", "INCONCLUSIVE"]
 
 #: Strongest first.
@@ -37,7 +38,7 @@ class Evidence:
     """
 
     method: Method
-    of: Literal["printed", "step", "repaired"]
+    of: Form
     holds: bool | None
     text: str
     data: Mapping[str, Any] = field(default_factory=dict)
@@ -54,21 +55,10 @@ class Evidence:
 
 
 class Source(Protocol):
-    """What gathers evidence: each module that does has a function like this one.
+    """A function that gathers evidence, by statement: each module that gathers has one.
 
-    Parameters
-    ----------
-    ids : collection of str or None
-        Statements; None for all.  Those it knows nothing of are left out of the answer.
-    level : {'quick', 'full'}
-        How many problems are taken, where that matters.
-    watch : callable
-        Called with the share done.
-
-    Returns
-    -------
-    mapping
-        Statement -> evidence.
+    ``ids`` are statements, None for all; those that it has no check for are left out of the answer.  The level decides
+    how many problems are taken, where that matters.  ``watch`` is called with the share that is done.
     """
 
     def __call__(
@@ -81,21 +71,24 @@ def figure(value: float, digits: int = 6) -> float:
     return float(f"{value:.{digits - 1}e}")
 
 
-def gather(
-    checks: Mapping[str, Callable[[Any], list[Evidence]]],
-    shared: Any,
-    ids: Collection[str] | None,
-    watch: Callable[[float], None],
-) -> dict[str, list[Evidence]]:
-    """Ask the checks of the statements that are wanted, all of them if ids is None; each receives what they share."""
-    chosen = [id for id in checks if ids is None or id in ids]
-    found = {}
-    with one_thread():
-        for done, id in enumerate(chosen):
-            watch(done / len(chosen))
-            found[id] = checks[id](shared)
-    watch(1.0)
-    return found
+def source(checks: Mapping[str, Callable[[Any], list[Evidence]]], shared: Callable[[Level], Any]) -> Source:
+    """A source with one check for each statement; the checks share an object, made for the level if any is wanted."""
+
+    def gather(
+        ids: Collection[str] | None = None, level: Level = "quick", watch: Callable[[float], None] = lambda done: None
+    ) -> dict[str, list[Evidence]]:
+        chosen = [id for id in checks if ids is None or id in ids]
+        found = {}
+        with one_thread():
+            given = shared(level) if chosen else None
+            for done, id in enumerate(chosen):
+                watch(done / len(chosen))
+                if entries := checks[id](given):
+                    found[id] = entries
+        watch(1.0)
+        return found
+
+    return gather
 
 
 def settle(evidence: Sequence[Evidence]) -> tuple[Verdict, Method | None]:
@@ -124,7 +117,7 @@ def settle(evidence: Sequence[Evidence]) -> tuple[Verdict, Method | None]:
     if broken:
         mended = any(e.holds and e.of == "repaired" and e.method in ("symbolic", "reading") for e in ordered)
         return ("REPAIRED" if mended else "REFUTED"), broken[0].method
-    differ = [e for e in ordered if e.holds is False]  # units alone
+    differ = [e for e in ordered if e.holds is False]  # only of units
     stands = {e.method for e in ordered if e.holds}
     if differ or (undecided and "symbolic" not in stands):
         return "INCONCLUSIVE", (*differ, *undecided)[0].method

@@ -7,7 +7,7 @@ paper's.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
@@ -19,22 +19,22 @@ from fem1d2d.mesh import Floats
 from verification.algorithm.runs import Run, run
 from verification.interface.fields import ContactFields
 from verification.interface.pair import ContactPair
-from verification.ledger.evidence import Evidence, Level, figure, gather
+from verification.ledger.evidence import Evidence, Level, figure, source
 from verification.monolithic import solution_force
 from verification.reproduce import READINGS, ModelReading, reproduce
 from verification.reproduce.claims import CLAIMS, HARD, OPTIMUM, SERVES, SOFT, Claim, Curve, zones
-from verification.reproduce.experiments import FAILED, Outcome, Result, curve_of
+from verification.reproduce.experiments import Outcome, Result, curve_of
 from verification.reproduce.readings import HALF
 from verification.reproduce.refutation import COMMON, LISTED, PRINTED, Runs, decide
 from verification.sweeps.course import PAPER, meets_paper_test
-from verification.sweeps.row import Row
+from verification.sweeps.row import FAILED, Row
 
 #: Results are the same below this relative difference, where runs go on until this residual.
 SAME, TIGHT = 1e-8, 1e-12
 
 AT = f"theta = {float(PRINTED):g}"
 
-#: The reading that leaves the text nowhere and comes first.
+#: The first of the readings that agree with the text.
 LITERAL = READINGS[0]
 
 #: What all readings assume.
@@ -42,15 +42,10 @@ ASSUMED = {"law": "nonlocal", "radius": 0.1, "elements": "P1"}
 
 
 class Section6:
-    """What the claims share: the runs of each reading, each made once.
+    """The runs of each reading, made once for all claims.
 
-    Parameters
-    ----------
-    level : {'quick', 'full'}
-        Quick takes only the mesh of 190 nodes, and more meshes of one reading where that settles a claim.
-    readings : sequence of ModelReading
-    run : callable, optional
-        From a reading and values of a grid to a row; by default its problem is run.
+    Quick takes only the mesh of 190 nodes, and more meshes of one reading where that settles a claim.  ``run`` makes a
+    row from a reading and values of a grid; by default it runs the problem of the reading.
     """
 
     def __init__(
@@ -83,7 +78,7 @@ class Section6:
 
     @property
     def compared(self) -> list[ModelReading]:
-        """The readings in which runs are compared with the global method: quick takes those of the text."""
+        """The readings in which runs are compared with the global method: quick takes only readings of the text."""
         return [reading for reading in self.readings if self._meshes is None or not reading.departs]
 
 
@@ -210,8 +205,8 @@ def difference(one: ContactFields, other: ContactFields) -> float:
 def _moduli(section: Section6) -> list[Evidence]:
     """Ours: no theta serves hard on soft and soft on hard.
 
-    Every theta that serves hard on soft is tried on soft on hard.  There the steps over those of the thetas tried are
-    at most the true cost.
+    Every theta that serves hard on soft is tried on soft on hard.  There the steps over the fewest of the thetas tried
+    are at most the true cost.
     """
     runs = section.runs(LITERAL)
     one = [runs.row(COMMON, theta) for theta in LISTED]
@@ -253,16 +248,7 @@ UNITS = {"MPa": 1, "TPa": 10**6}
 
 @dataclass(frozen=True, kw_only=True)
 class StoppedRuns:
-    """A run when a test stops it.
-
-    Attributes
-    ----------
-    steps : int
-    residual : float
-        Unrelaxed, relative to ``|||T g|||``.
-    error : float
-        ``|g_n - g|/|g|`` with the g of the global method.
-    """
+    """A run when a test stops it: the unrelaxed residual over ``|||T g|||``, and the error ``|g_n - g|/|g|``."""
 
     steps: int
     residual: float
@@ -270,7 +256,7 @@ class StoppedRuns:
 
 
 def stopped(pair: ContactPair, theta: Fraction, g: Floats) -> tuple[StoppedRuns, StoppedRuns]:
-    """A run where the printed test stops it, and where the unrelaxed residual does; g is that of the global method."""
+    """A run where the printed test stops it, and where the unrelaxed residual does; the global method has found g."""
     seen, size = finished(pair, theta, PAPER / 10).iterates, float(np.linalg.norm(g))
     by_paper = (n for n in range(1, len(seen)) if meets_paper_test(seen[n].g[:, None], seen[n - 1].g[:, None])[0])
     by_residual = (n for n, iterate in enumerate(seen) if iterate.relative_residual <= PAPER)
@@ -340,12 +326,5 @@ CHECKS: dict[str, Callable[[Section6], list[Evidence]]] = {
     "x-increment-test": _stopping,
 }
 
-
-def experiments(
-    ids: Collection[str] | None = None, level: Level = "quick", watch: Callable[[float], None] = lambda done: None
-) -> dict[str, list[Evidence]]:
-    """Evidence for the numerical results of Section 6: a ``Source``.
-
-    Quick takes the mesh of 190 nodes, full all four.
-    """
-    return gather(CHECKS, Section6(level), ids, watch)
+#: Evidence for the numerical results of Section 6.  Quick takes the mesh of 190 nodes, full all four.
+experiments = source(CHECKS, Section6)

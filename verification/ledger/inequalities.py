@@ -9,17 +9,20 @@ bracket of (5.30): there the right side depends on the unit of stress, so severa
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
 
-from ndtheory import energy_norms
-from verification.bounds.losses import top
+from ndtheory import PRINTED, energy_norms
+from ndtheory import bounds as formulas
+from ndtheory.intervals import Interval
+from verification.constants import Measured
 from verification.ledger.differences import Difference
-from verification.ledger.reading import Reading
+from verification.ledger.evidence import Form
 
 SEED = 2008
 
@@ -42,9 +45,165 @@ THETAS = (0.1, 0.5, 0.9)
 SHARES = (Fraction(1, 100), Fraction(99, 100))
 
 
+class RightSides:
+    """Right sides of Section 5 over numbers of any type, from the constants of a class that inherits."""
+
+    m: Any
+    M: Any
+    C_R: Any
+    P: Any
+    D: Any
+    Q: Any
+
+    @property
+    def A(self) -> Any:
+        """``M C_R``."""
+        return self.M * self.C_R
+
+    @property
+    def give(self) -> Any:
+        """``m^2/(M C_R)^2`` of (5.29)."""
+        return (self.m / self.A) ** 2
+
+    def weight(self, theta: Any) -> Any:
+        """The coefficient of ``|||T psi - T psi~|||^2`` in (5.32): positive above C_0."""
+        return theta**2 - 2 * theta * (1 - theta) * self.give
+
+    def h_1(self, theta: Any) -> Any:
+        """After (5.39)."""
+        return 1 - formulas.one_minus_h1(theta, self.D, self.Q)
+
+    def h_2(self, theta: Any) -> Any:
+        """(5.45)."""
+        return 1 - formulas.one_minus_h2(theta, self.P)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reading(RightSides):
+    """The constants as an inequality reads them, and the right sides that contain them.
+
+    Attributes
+    ----------
+    m, M, C_R, C_K : float
+        m is ``min(m, 1)`` from (5.36) on as printed.
+    u : float
+        The stress of the bracket in (5.30): m, or 1 as printed.
+    coercivity : float
+        m itself.
+    C_K_half : float
+        ``k C_s C_tr`` with C_tr into H^1/2 (5.8).
+    energy : tuple of float
+        rho, kappa_1, kappa_2 of the theorem in energy norms.
+    """
+
+    m: float
+    M: float
+    C_R: float
+    C_K: float
+    u: float
+    coercivity: float
+    C_K_half: float
+    energy: tuple[float, float, float]
+
+    @classmethod
+    def of(cls, measured: Measured) -> Reading:
+        """The constants as repaired; ValueError where one does not exist."""
+        constants, energy, half = measured.constants(), measured.energy_constants(), measured.C_tr_half
+        if constants is None or energy is None or half is None:
+            raise ValueError("the constants of the theorem are needed")
+        C_s = 0.0 if measured.C_s is None else measured.C_s.value
+        return cls(
+            m=float(constants.m),
+            M=float(constants.M),
+            C_R=float(constants.C_R),
+            C_K=float(constants.C_K),
+            u=float(constants.m),
+            coercivity=float(constants.m),
+            C_K_half=measured.friction * C_s * half.value,
+            energy=(float(energy.at_work), float(energy.kappa_1), float(energy.kappa_2)),
+        )
+
+    def in_unit(self, unit: float) -> Reading:
+        """All stresses times a factor, before an edition is chosen."""
+        scaled = {name: getattr(self, name) * unit for name in ("m", "M", "C_K", "u", "coercivity", "C_K_half")}
+        return replace(self, **scaled)
+
+    @property
+    def bracket(self) -> Reading:
+        """(5.30) to (5.33) as printed."""
+        return replace(self, u=PRINTED.unit(self.m))
+
+    @property
+    def printed(self) -> Reading:
+        """(5.36) on as printed."""
+        return replace(self, m=PRINTED.coercivity(self.m), u=PRINTED.unit(self.m))
+
+    @cached_property
+    def C_T(self) -> float:
+        """(5.16), where m is m itself in both editions."""
+        return float(formulas.lipschitz(self.coercivity, self.M, self.C_R, self.C_K))
+
+    @cached_property
+    def X(self) -> float:
+        """The factor of (5.11), by (5.16)."""
+        return float(self.C_T * self.coercivity / self.A)
+
+    @cached_property
+    def P(self) -> float:
+        """The factor of (5.30)."""
+        return float(formulas.P(self.C_K, self.m, self.M, self.C_R, self.u))
+
+    @cached_property
+    def Q(self) -> float:
+        """The Lipschitz constant of T squared, as h_1 has it."""
+        return float(formulas.Q(self.C_K, self.m, self.M, self.C_R))
+
+    @cached_property
+    def D(self) -> float:
+        """``C_T^2/C_R^2 - P``."""
+        return float(formulas.D(self.C_K, self.m, self.M, self.C_R, self.u))
+
+    @cached_property
+    def C_0(self) -> float:
+        """(5.37)."""
+        return float(formulas.C0(self.m, self.M, self.C_R))
+
+    def gain(self, theta: float) -> float:
+        """``1 - K(theta)^2``."""
+        h_1, h_2 = formulas.one_minus_h1(theta, self.D, self.Q), formulas.one_minus_h2(theta, self.P)
+        return float(min(h_1, h_2))
+
+    @cached_property
+    def threshold(self) -> float:
+        """``k C_s C_tr`` at k = C_2 (5.43)."""
+        return float(formulas.inverse_G(self.m**3 * (1 + self.give), self.m, self.M, self.C_R, self.u))
+
+    def contracting(self) -> tuple[float, ...]:
+        """Thetas inside the interval of Proposition 5.6; empty where it is."""
+        if not self.threshold > self.C_K:
+            return ()
+        low = float(formulas.C6(self.P)) if self.P > 1 else 0.0
+        high = float(formulas.C1(self.D, self.Q))
+        return tuple(low + share * (high - low) for share in (0.1, 0.5, 0.9) if low < high)
+
+    def from_C0(self) -> tuple[float, ...]:
+        """C_0 and the thetas above it inside the interval."""
+        C0, inside = float(formulas.C0(self.m, self.M, self.C_R)), self.contracting()
+        return (C0, *(theta for theta in inside if theta > C0)) if inside else ()
+
+    @property
+    def ratio(self) -> float:
+        """r, the largest ``|w^1 - w~^1|/|w^2 - w~^2|`` in energy norms."""
+        return float(energy_norms.largest_ratio(*self.energy))
+
+    def q_squared(self, theta: float) -> float:
+        """``q(theta)^2`` of the theorem in energy norms."""
+        return 1 - float(energy_norms.one_minus_square(theta, *self.energy))
+
+
 #: Numbers, or arrays of them.
 Terms = Any
-Side = Callable[[Any, Reading, float], Terms]
+Side = Callable[[Any, Any, Any], Terms]
 
 everywhere = lambda r: THETAS
 above = lambda r: tuple(theta for theta in (1.5 * r.C_0, *THETAS) if r.C_0 < theta < 1)
@@ -53,34 +212,34 @@ below = lambda r: tuple(share * r.C_0 for share in (0.1, 0.5, 0.99))
 
 @dataclass(frozen=True, kw_only=True)
 class Inequality:
-    """``left <= right``, or ``left = right``.
+    """``left <= right``, or ``left = right``, of the statement ``id``.
 
     Attributes
     ----------
-    id : str
-        Of the statement in the ledger.
-    of : {'printed', 'step', 'repaired'}
     left, right : callable
         Difference (or :class:`verification.ledger.worst.Trial`), constants, theta -> a number; several numbers are
-        added, or compared one by one where ``about`` is 'bodies'.  Of several differences: arrays of them.
+        added, or compared one by one where ``about`` is 'bodies'.  Of several differences: arrays of them.  The same
+        formulas take intervals (:mod:`verification.ledger.enclosures`).
     equality : bool
         Then both sides may be vectors whose Euclidean norm is (5.21).
     about : {'pairs', 'contraction', 'bodies'}
-        Two forces; two forces at a friction below C_2; the two bodies alone.
+        Two forces; two forces at a friction below C_2; only the two bodies.
     reading : callable
         How the constants are read.
     thetas : callable or None
         Constants -> the thetas tried.
     units : tuple of float
         Units of stress tried, in units of the file.
+    squares : bool
+        True if both sides are squares of norms, whose ratio is then taken.
     one_grid : bool
-        Whether it is tried only where both bodies have one grid along Gamma_c.
+        True to try it only where both bodies have one grid along Gamma_c.
     remark : str
-        What else is to be said of grids that differ.
+        Added to the text on grids that differ.
     """
 
     id: str
-    of: Literal["printed", "step", "repaired"] = "printed"
+    of: Form = "printed"
     left: Side
     right: Side
     equality: bool = False
@@ -88,32 +247,26 @@ class Inequality:
     reading: Callable[[Reading], Reading] = lambda r: r
     thetas: Callable[[Reading], Sequence[float]] | None = None
     units: tuple[float, ...] = (1.0,)
+    squares: bool = False
     one_grid: bool = False
     remark: str = ""
 
     def ratio(self, subject: Any, reading: Reading, theta: float = 0.0) -> Any:
-        """Left over right.
+        """Left over right for a Difference or a Trial; an array for Differences.
 
-        Negative terms change sides first, so that the ratio is at most 1 exactly where the inequality holds.  Of an
+        Negative terms change sides first, so that the ratio is at most 1 exactly where the inequality holds.  For an
         equality: 1 plus the difference over the energies.
-
-        Parameters
-        ----------
-        subject : Difference, Differences or Trial
-            Of several differences: an array.
-        reading : Reading
-            As this inequality reads the constants.
-        theta : float
         """
         left, right = self.left(subject, reading, theta), self.right(subject, reading, theta)
         if self.about == "bodies":
-            return float(np.max(np.asarray(left) / np.asarray(right)))
+            worst = float(np.max(np.asarray(left) / np.asarray(right)))
+            return float(np.sqrt(worst)) if self.squares else worst
         if self.equality:
             apart, size = np.abs(left - right), subject.size
             if np.ndim(apart) > np.ndim(size):
                 apart, size = np.linalg.norm(apart, axis=-1), np.sqrt(size)
             return 1 + apart / size
-        terms = [*_terms(left), *(-term for term in _terms(right))]
+        terms = [*terms_of(left), *(-term for term in terms_of(right))]
         positive = sum(np.maximum(term, 0.0) for term in terms)
         negative = sum(np.maximum(-term, 0.0) for term in terms)
         infinite = ~np.isfinite(positive + negative)  # also what is not a number
@@ -124,7 +277,8 @@ class Inequality:
         return np.where(infinite, math.inf, ratio)[()]
 
 
-def _terms(side: Terms) -> tuple[Any, ...]:
+def terms_of(side: Terms) -> tuple[Any, ...]:
+    """The terms of a side."""
     return side if isinstance(side, tuple) else (side,)
 
 
@@ -135,65 +289,63 @@ def _editions(id: str, left: Side, right: Side, *, early: bool = False, **option
     return [printed, Inequality(id=id, of="repaired", left=left, right=right, **options)]
 
 
+def _root(x: Any) -> Any:
+    """The square root of an interval, or of numbers, where a negative one is rounding."""
+    return x.sqrt() if isinstance(x, Interval) else np.sqrt(np.maximum(x, 0.0))
+
+
+def _lifts(b: Any, r: Reading, theta: float) -> Any:
+    """The squared norms of both lifts."""
+    return [b.top(N, E) for N, E in zip(b.N, b.E, strict=True)]
+
+
 def _square_of_step(d: Difference, r: Reading, theta: float) -> float:
     return d.relaxed(theta) ** 2
 
 
-#: Where the grids differ a trace of one body is none of the other.  P leads from the Neumann grid to the contact grid,
-#: and takes some traces to 0 where the Neumann grid has more nodes; nothing leads back.
+#: Where the grids differ, a trace of one body is not a trace of the other body.  P leads from the Neumann grid to the
+#: contact grid, and takes some traces to 0 where the Neumann grid has more nodes; nothing leads back.
 ONE_TRACE_SPACE = "bodies whose grids differ have no common space of traces on which to compare its norms"
 
 INEQUALITIES: tuple[Inequality, ...] = (
-    # --- Section 4: the two bodies alone
+    # --- Section 4: only the two bodies
     Inequality(
         id="4.7",
         about="bodies",
+        squares=True,
         one_grid=True,
-        left=lambda b, r, _: np.sqrt([top(b.E[1], b.N[0]), top(b.E[0], b.N[1])]),
-        right=lambda b, r, _: np.ones(2),
+        left=lambda b, r, _: [b.top(b.E[1], b.N[0]), b.top(b.E[0], b.N[1])],
+        right=lambda b, r, _: [1, 1],
     ),
     Inequality(
         id="4.7",
         of="repaired",
         about="bodies",
-        left=lambda b, r, _: np.sqrt([top(b.E[0], b.N[0]), top(b.E[1], b.N[1])]),
-        right=lambda b, r, _: np.ones(2),
+        squares=True,
+        left=lambda b, r, _: [b.top(E, N) for E, N in zip(b.E, b.N, strict=True)],
+        right=lambda b, r, _: [1, 1],
     ),
-    Inequality(
-        id="4.8",
-        of="repaired",
-        about="bodies",
-        left=lambda b, r, _: np.sqrt([top(N, E) for N, E in zip(b.N, b.E, strict=True)]),
-        right=lambda b, r, _: np.sqrt(b.contrast),
-    ),
+    Inequality(id="4.8", of="repaired", about="bodies", squares=True, left=_lifts, right=lambda b, r, _: b.contrast),
     # by the constant between the norms of traces, which a mesh always has and the proof must supply
     Inequality(
         id="prop-4.1.1",
         of="repaired",
         about="bodies",
+        squares=True,
         one_grid=True,
-        left=lambda b, r, _: np.sqrt([top(b.N[0], b.N[1]), top(b.N[1], b.N[0])]),
-        right=lambda b, r, _: np.sqrt(b.contrast * b.between_traces),
+        left=lambda b, r, _: [b.top(b.N[0], b.N[1]), b.top(b.N[1], b.N[0])],
+        right=lambda b, r, _: [c * between for c, between in zip(b.contrast, b.across(b.E), strict=True)],
     ),
     Inequality(
         id="prop-4.1.2",
         about="bodies",
+        squares=True,
         remark=" (there of the contact body's lift alone, as nothing leads from its grid to the other one)",
-        left=lambda b, r, _: np.sqrt(b.lifted_across),
-        right=lambda b, r, _: np.sqrt(b.contrast[: len(b.between_traces)] * b.between_traces),
+        left=lambda b, r, _: b.across(b.N),
+        right=lambda b, r, _: [c * between for c, between in zip(b.contrast, b.across(b.E), strict=False)],
     ),
-    Inequality(
-        id="x-continuity",
-        about="bodies",
-        left=lambda b, r, _: np.array([largest for _, largest in b.spectra]),
-        right=lambda b, r, _: np.array([body.material.continuity(body.mesh.dimension) for body in b.bodies]),
-    ),
-    Inequality(
-        id="x-lift-bound",
-        about="bodies",
-        left=lambda b, r, _: np.array([top(N, E) for N, E in zip(b.N, b.E, strict=True)]),
-        right=lambda b, r, _: b.contrast,
-    ),
+    Inequality(id="x-continuity", about="bodies", left=lambda b, r, _: b.largest, right=lambda b, r, _: b.continuity),
+    Inequality(id="x-lift-bound", about="bodies", left=_lifts, right=lambda b, r, _: b.contrast),
     # --- Section 5: two forces
     Inequality(id="5.11", left=lambda d, r, _: d.size_1, right=lambda d, r, _: r.X * d.size_2),
     Inequality(id="5.12", left=lambda d, r, _: d.energy_1, right=lambda d, r, _: (d.mixed_1, d.friction)),
@@ -227,9 +379,9 @@ INEQUALITIES: tuple[Inequality, ...] = (
     ),
     Inequality(id="5.18", left=lambda d, r, _: d.dual_T, right=lambda d, r, _: r.A * d.size_1),
     Inequality(id="5.19", left=lambda d, r, _: d.size_2, right=lambda d, r, _: d.dual / r.m),
-    Inequality(id="5.22", left=lambda d, r, _: d.norm, right=lambda d, r, _: d.dual / math.sqrt(r.m)),
-    Inequality(id="5.23", left=lambda d, r, _: d.dual, right=lambda d, r, _: r.M / math.sqrt(r.m) * d.norm),
-    Inequality(id="x-root-M", left=lambda d, r, _: d.dual, right=lambda d, r, _: math.sqrt(r.M) * d.norm),
+    Inequality(id="5.22", left=lambda d, r, _: d.norm, right=lambda d, r, _: d.dual / _root(r.m)),
+    Inequality(id="5.23", left=lambda d, r, _: d.dual, right=lambda d, r, _: r.M / _root(r.m) * d.norm),
+    Inequality(id="x-root-M", left=lambda d, r, _: d.dual, right=lambda d, r, _: _root(r.M) * d.norm),
     Inequality(
         id="5.24",
         equality=True,
@@ -267,13 +419,9 @@ INEQUALITIES: tuple[Inequality, ...] = (
     Inequality(
         id="x-friction-energy",
         left=lambda d, r, _: d.friction,
-        right=lambda d, r, _: r.energy[1] * np.sqrt(np.maximum(d.energy_1, 0.0)) * d.norm + r.energy[2] * d.norm**2,
+        right=lambda d, r, _: r.energy[1] * _root(d.energy_1) * d.norm + r.energy[2] * d.norm**2,
     ),
-    Inequality(
-        id="x-ratio",
-        left=lambda d, r, _: np.sqrt(np.maximum(d.energy_1, 0.0)),
-        right=lambda d, r, _: float(energy_norms.largest_ratio(*r.energy)) * d.norm,
-    ),
+    Inequality(id="x-ratio", left=lambda d, r, _: _root(d.energy_1), right=lambda d, r, _: r.ratio * d.norm),
     Inequality(
         id="x-energy", thetas=everywhere, left=_square_of_step, right=lambda d, r, t: r.q_squared(t) * d.norm**2
     ),
@@ -298,3 +446,6 @@ INEQUALITIES: tuple[Inequality, ...] = (
         thetas=Reading.contracting,
     ),
 )
+
+#: The inequalities by statement and form.
+ENTRIES: Mapping[tuple[str, Form], Inequality] = {(each.id, each.of): each for each in INEQUALITIES}

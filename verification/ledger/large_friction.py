@@ -1,4 +1,4 @@
-"""How the printed (5.30) fails on any pair of bodies: much friction, a unit of stress in which m is a small number.
+"""Failure of the printed (5.30) on any pair of bodies: much friction, a unit of stress in which m is a small number.
 
 All nodes are open and slide one way, for loads that are put on the contact body, without a gap.  There the friction
 term grows as k^2; the printed bound grows as k where the unit makes its bracket 1 (``docs/theory.md``).
@@ -17,11 +17,9 @@ from fem1d2d.mesh import Floats
 from verification.bounds.losses import square
 from verification.interface.pair import ContactPair
 from verification.ledger.cases import three_digits
-from verification.ledger.differences import Difference, DrawnSetting, along, between
-from verification.ledger.draws import uniform_piece
+from verification.ledger.differences import Difference, DrawnSetting, along, between, uniform_piece
 from verification.ledger.evidence import Evidence, Level, figure
-from verification.ledger.inequalities import SEED
-from verification.ledger.reading import Reading
+from verification.ledger.inequalities import SEED, Reading
 from verification.ledger.worst import Trial, draw_cases
 from verification.threads import one_thread
 
@@ -40,18 +38,14 @@ STEP = 1e-4
 
 @dataclass(frozen=True, kw_only=True)
 class Witness:
-    """Two forces, for loads of their own, that break what is printed.
+    """Two forces that break what is printed, for loads made for them.
 
     Attributes
     ----------
     name : str
-        Of the problem.
-    difference : Difference
-        Of the two solutions of steps I and II.
+        The name of the problem.
     reading : Reading
-        The constants in the unit that is chosen, as repaired.
-    friction, unit : float
-        k, and the factor of all stresses.
+        The constants, as repaired, in the chosen unit: all stresses are multiplied by ``unit``.
     """
 
     name: str
@@ -61,14 +55,9 @@ class Witness:
     unit: float
 
     def ratios(self, *, printed: bool) -> dict[str, float]:
-        """Left over right of each inequality: those with a theta just below C_0, (5.39) at C_0.
+        """Left over right of each inequality, as printed or as repaired: theta just below C_0, in (5.39) C_0.
 
-        (5.32), (5.33) and (5.36) are one where m is below 1.  Negative terms change sides first.
-
-        Parameters
-        ----------
-        printed : bool
-            As printed, or as repaired.
+        (5.32), (5.33) and (5.36) are the same where m is below 1.  Negative terms change sides first.
         """
         d, r = self.difference, self.reading.printed if printed else self.reading
         e2, t2 = d.norm**2 * self.unit, d.norm_T**2 * self.unit
@@ -91,16 +80,8 @@ IDS = ("5.30", "5.31", "5.32", "5.33", "5.36", "5.39", "5.44", "x-printed-false-
 def loaded(pair: ContactPair, g: Floats, v: Floats, force: Floats) -> ContactPair:
     """The same bodies, the contact body loaded so that step II answers g with the jump v and the reaction ``force``.
 
-    ``l_1 = force + S_1 (u_2 + gap + v)``, applied as forces on the contact nodes: condensation leaves these alone.
-
-    Parameters
-    ----------
-    pair : ContactPair
-        The two bodies with any loads.
-    g : array
-        Force on the Neumann body, on its grid.
-    v, force : array, shape (2 n,)
-        On the contact grid.  They must obey the conditions of step II.
+    ``l_1 = force + S_1 (u_2 + gap + v)``, applied as forces on the contact nodes, which condensation does not change.
+    g acts on the grid of the Neumann body; v and the reaction, on the contact grid, must obey step II.
     """
     neumann, contact = pair.neumann, pair.contact
     u = pair.interface.carry(neumann.known + neumann.flexibility(g + neumann.load)) + v
@@ -109,14 +90,7 @@ def loaded(pair: ContactPair, g: Floats, v: Floats, force: Floats) -> ContactPai
 
 
 def witness(case: Trial, random: np.random.Generator) -> Witness:
-    """Friction, a unit, loads and two forces that break what is printed.
-
-    Parameters
-    ----------
-    case : Trial
-        A problem with a law of friction.
-    random : Generator
-    """
+    """Friction, a unit, loads and two forces that break what is printed; the problem has a law of friction."""
     one = case.measured.with_friction(1.0)
     reading = Reading.of(one)
     steep = reading.C_K * reading.M**2 / reading.m**3  # of the printed bound in k, where the bracket is 1

@@ -7,10 +7,10 @@ rationals is taken only where it satisfies every condition of step II exactly.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -22,34 +22,18 @@ from fem1d2d.material import plane_strain
 from verification.algorithm.fixed_point import FixedPointMap
 from verification.interface.body import Condensed
 from verification.interface.exact_bodies import ExactInterface, exact_points
-from verification.interface.pair import build
-from verification.ledger.evidence import Evidence, Level
+from verification.interface.pair import pair_from
+from verification.ledger.cases import rectangle
+from verification.ledger.evidence import Evidence, source
 from verification.problem.specification import Problem
-from verification.threads import one_thread
 
 #: Rationals.
 Exact = NDArray[Any]
 
 #: Two blocks with three contact nodes and a body inside, on one grid.
 BLOCKS: Mapping[str, Any] = {
-    "body1": {
-        "shape": "rectangle",
-        "x": [0, 2],
-        "y": [-1, 0],
-        "cells": [2, 2],
-        "young": 3,
-        "poisson": "1/4",
-        "fixed": ["bottom"],
-    },
-    "body2": {
-        "shape": "rectangle",
-        "x": [0, 2],
-        "y": [0, 1],
-        "cells": [2, 2],
-        "young": 2,
-        "poisson": "1/3",
-        "fixed": ["top"],
-    },
+    "body1": rectangle([0, 2], [-1, 0], [2, 2], 3, "1/4", fixed=["bottom"]),
+    "body2": rectangle([0, 2], [0, 1], [2, 2], 2, "1/3", fixed=["top"]),
     "contact": {"friction": "1/2", "radius": 1},
 }
 
@@ -81,13 +65,7 @@ def solved(A: Exact, B: Exact) -> Exact:
 
 
 class ExactSide:
-    """A body in rationals, as its contact nodes feel it.
-
-    Parameters
-    ----------
-    problem : Problem
-    side : Condensed
-        The same in doubles.
+    """A body, condensed to its contact nodes in rationals; ``side`` is the same in doubles.
 
     Attributes
     ----------
@@ -107,7 +85,7 @@ class ExactSide:
         for corners, entries in zip(cells, local, strict=True):
             unknowns = (2 * corners[:, None] + np.arange(2)).ravel()
             A[np.ix_(unknowns, unknowns)] += entries.reshape(len(unknowns), -1)
-        A = A[np.ix_(body.free, body.free)]
+        A = A[np.ix_(body.positions, body.positions)]
         b = body.interface
         inside = np.setdiff1d(np.arange(len(A)), b)
         lift = np.full((len(A), len(b)), Fraction(0), dtype=object)
@@ -121,19 +99,7 @@ class ExactSide:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RationalSolution:
-    """Steps I and II for one force, in rationals.
-
-    Attributes
-    ----------
-    g, reaction : array of Fraction
-        psi and T psi.
-    w_1, w_2 : array of Fraction
-        Traces of both bodies.
-    slip, bound : array of Fraction
-        Tangential jump, and ``w k |S sigma_N|``, by node.
-    state : str
-        What the nodes do.
-    """
+    """Steps I and II for the force g, with ``reaction = T g``, traces w_1 and w_2, and ``bound = w k |S sigma_N|``."""
 
     g: Exact
     reaction: Exact
@@ -145,19 +111,11 @@ class RationalSolution:
 
 
 class RationalPair:
-    """The difference of two solutions of steps I and II, every number of which is rational.
-
-    Parameters
-    ----------
-    table : mapping
-        A problem without loads, whose grids are one.
-    forces : pair of arrays of Fraction
-        psi and psi~.
-    """
+    """The difference of two solutions of steps I and II for a problem without loads on one grid, all rational."""
 
     def __init__(self, table: Mapping[str, Any] = BLOCKS, forces: tuple[Exact, ...] = FORCES) -> None:
         problem = Problem.from_dict(table)
-        self.pair = pair = build(problem)
+        self.pair = pair = pair_from(problem)
         self.one, self.two = (ExactSide(problem, side) for side in (pair.contact, pair.neumann))
         x = [exact_points(getattr(problem, s.mesh_body.name), s.mesh_body) for s in (pair.contact, pair.neumann)]
         nodes = [p[s.mesh_body.nodes, 0] for p, s in zip(x, (pair.contact, pair.neumann), strict=True)]
@@ -172,13 +130,7 @@ class RationalPair:
         self.friction = -((one.bound - other.bound) @ (abs(one.slip) - abs(other.slip)))
 
     def solve(self, g: Exact) -> RationalSolution:
-        """Steps I and II.
-
-        Raises
-        ------
-        ArithmeticError
-            What doubles say of the nodes leads to no exact solution.
-        """
+        """Steps I and II; ArithmeticError if the states found in doubles lead to no exact solution."""
         n, S = self.n, self.one.S
         assert self.kernel is not None
         _, found = FixedPointMap(self.pair, "active-set")(g.astype(float))
@@ -199,7 +151,7 @@ class RationalPair:
             and (force[:n] * slip == bound * abs(slip)).all()
         )
         if not satisfied:
-            raise ArithmeticError("what doubles say of the nodes leads to no exact solution of step II")
+            raise ArithmeticError("the states of the nodes in doubles lead to no exact solution of step II")
         state = f"{int(touching.sum())} of {n} nodes touch, {int((sliding != 0).sum())} slip"
         return RationalSolution(g=g, reaction=force, w_1=w_2 + v, w_2=w_2, slip=slip, bound=bound, state=state)
 
@@ -243,7 +195,7 @@ class RationalPair:
 
 
 def _number(product: Any) -> Fraction:
-    """A product of vectors of rationals: what numpy makes of it is no array."""
+    """A product of vectors of rationals, which numpy returns as an object."""
     return Fraction(product)
 
 
@@ -268,29 +220,8 @@ AT_MOST: Mapping[str, Sides] = {
 }
 
 
-def in_rationals(
-    ids: Collection[str] | None = None, level: Level = "quick", watch: Callable[[float], None] = lambda done: None
-) -> dict[str, list[Evidence]]:
-    """Decide equalities on one pair of bodies in rationals: a ``Source``, the same at both levels."""
-    wanted = [id for id in (*EQUAL, *AT_MOST) if ids is None or id in ids]
-    found: dict[str, list[Evidence]] = {}
-    if wanted:
-        with one_thread():
-            pair = RationalPair()
-            found = {id: [decide(pair, id)] for id in wanted}
-    watch(1.0)
-    return found
-
-
 def decide(pair: RationalPair, id: str) -> Evidence:
-    """The evidence of an equality or inequality; nothing is rounded, so that there always is some.
-
-    Parameters
-    ----------
-    pair : RationalPair
-    id : str
-        Of the statement.
-    """
+    """The evidence of an equality or inequality; nothing is rounded, so that there always is some."""
     left, right = EQUAL[id](pair) if id in EQUAL else AT_MOST[id](pair)
     holds = bool(np.all(left == right) if id in EQUAL else left <= right)
     apart = max(map(abs, np.atleast_1d(left - right)))
@@ -305,3 +236,11 @@ def decide(pair: RationalPair, id: str) -> Evidence:
     }
     text = f"{said} ({where}), computed in rationals"
     return Evidence(method="verified", of="printed", holds=holds, text=text, data=data)
+
+
+def _decided(id: str, pair: RationalPair) -> list[Evidence]:
+    return [decide(pair, id)]
+
+
+#: Equalities on one pair of bodies, decided in rationals, the same at both levels.
+in_rationals = source({id: partial(_decided, id) for id in (*EQUAL, *AT_MOST)}, lambda level: RationalPair())

@@ -1,26 +1,19 @@
 """The recorded verdicts, and the statements as pages and screens quote them.
 
-A page or a screen that says what stands, and what does not, takes it from here: then no two of them contradict each
-other, or the ledger.
+Pages and screens take verdicts and texts from here, so that none of them contradicts another or the ledger.
 """
 
 from __future__ import annotations
 
-import json
-from functools import lru_cache
-from importlib.resources import files
-
 from ndtheory.statements import statements
 
-#: What may be quoted of a statement beside its verdict.
+#: The texts of a statement that may be quoted.
 TEXTS = ("title", "claims", "wrong", "repair", "proof", "note")
 
 
-@lru_cache(maxsize=1)
 def recorded() -> dict[str, str]:
     """The recorded verdicts by id."""
-    text = files("verification").joinpath("data/verdicts.json").read_text("utf-8")
-    return dict(json.loads(text)["verdicts"])
+    return {id: statement.verdict for id, statement in statements().items() if statement.verdict}
 
 
 def quote(id: str, what: str = "verdict") -> str:
@@ -54,7 +47,7 @@ def quote(id: str, what: str = "verdict") -> str:
 
 
 def on_the_printed_proof() -> str:
-    """What screens and reports say of the printed proof where m < 1."""
+    """Sentences of screens and reports on the printed proof where m < 1."""
     rescued = "x-printed-rescued"
     return (
         f"The printed proof needs m >= 1: it rests on (5.30), whose verdict in the ledger is {quote('5.30')}."

@@ -18,16 +18,12 @@ NO_GROUND = ("REFUTED", "INCONCLUSIVE")
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """A statement with its evidence and verdict.
+    """A statement with its evidence, strongest first, and its verdict.
 
     Attributes
     ----------
-    statement : Statement
-    evidence : tuple of Evidence
-        Strongest first.
-    verdict : str
     method : str or None
-        What decided.
+        The kind of evidence that decided.
     recorded : str or None
         The recorded verdict; None where none is recorded.
     """
@@ -40,7 +36,7 @@ class Row:
 
     @property
     def changed(self) -> bool:
-        """Whether the verdict differs from the recorded one."""
+        """True if the verdict differs from the recorded one."""
         return self.verdict != self.recorded
 
     def to_dict(self) -> dict[str, Any]:
@@ -82,7 +78,7 @@ class Ledger(Document):
 
     @property
     def whole(self) -> bool:
-        """Whether every statement is there."""
+        """True if every statement is there."""
         return len(self.rows) == len(statements())
 
     @property
@@ -95,7 +91,7 @@ class Ledger(Document):
         return ", ".join(f"{count} {verdict}" for verdict, count in self.counts().items())
 
     def counts(self) -> dict[str, int]:
-        """How many rows have each verdict."""
+        """The number of rows with each verdict."""
         verdicts = [row.verdict for row in self.rows]
         return {verdict: verdicts.count(verdict) for verdict in dict.fromkeys(verdicts)}
 
@@ -161,7 +157,7 @@ def verify(
 
 
 def _read(statement: Statement, found: Sequence[Evidence]) -> list[Evidence]:
-    """What reading alone says: what a definition rests on, and a gap with its repair where nothing else shows it."""
+    """Evidence by reading: the grounds of a definition, and a gap with its repair where nothing else shows it."""
     entry = lambda of, holds, text: Evidence(method="reading", of=of, holds=holds, text=text)
     entries = (
         [entry("repaired" if statement.fault else "printed", True, statement.reading)] if statement.reading else []

@@ -50,7 +50,7 @@ METHODS: Mapping[Method, tuple[str, str]] = {
 }
 
 #: Why statements that were checked in floating point have no evidence of the kind *verified*, by prefixes of their ids;
-#: the last reason is that of all others.
+#: the last reason applies to all others.
 NOT_VERIFIED = (
     ("fig- sec- x-no-theta x-incr", "it is about how many steps runs take, or where a stress changes its sign"),
     ("x-printed-false", "it is about all pairs of bodies; what it says is proved on one under (5.30) to (5.44)"),
@@ -145,7 +145,7 @@ def _counterexample(evidence: Evidence) -> str:
 
 
 def errata(ledger: Ledger) -> str:
-    """What is wrong in the paper, by kind of fault, for its authors: one line a fault, in MyST Markdown."""
+    """The errors in the paper by kind, for its authors: one line each, in MyST Markdown."""
     faulty = [row for row in ledger.rows if row.statement.fault]
     lines = [
         "# Errata",
@@ -179,6 +179,6 @@ def errata(ledger: Ledger) -> str:
 
 
 def verdicts(ledger: Ledger) -> str:
-    """The verdicts as they are recorded in ``verification/data/verdicts.json``."""
+    """The verdicts by statement, as a JSON document."""
     found = {row.statement.id: row.verdict for row in ledger.rows}
     return json.dumps({"schema": "ndtheory.verdicts/1", "verdicts": found}, indent=2)

@@ -1,8 +1,12 @@
-"""Statements about solutions and iterates, held against the weak forms (:mod:`verification.ledger.weak_forms`)."""
+"""Statements about solutions and iterates, checked with the weak forms (:mod:`verification.ledger.weak_forms`).
+
+>>> [e.holds for e in solutions(["2.3"], "quick")["2.3"]]
+[False, True]
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,34 +20,45 @@ from verification.ledger.convergence import (
     forces_converge,
     strong_form,
 )
-from verification.ledger.evidence import Evidence, Level, figure, gather
-from verification.ledger.found import Found, equations, evidence, figures, inequalities, with_friction
-from verification.ledger.moves import directions, largest, moves_in_K, moves_of_one, obstacle_tests
+from verification.ledger.evidence import Evidence, figure, source
 from verification.ledger.weak_forms import (
     EXACT,
     LIMIT,
     Case,
     Fields,
+    Found,
     Weak,
     balance,
     contact_inequality,
     coulomb,
+    directions,
+    equations,
+    evidence,
+    figures,
     generator,
     image_of,
+    inequalities,
     inequality,
+    largest,
+    moves_in_K,
+    moves_of_one,
     neumann_equation,
     norm,
+    obstacle_tests,
     reaction,
     shifted_inequality,
     transfer,
     unilateral,
+    with_friction,
 )
+
+Check = Callable[[RunsOfLevel], list[Evidence]]
 
 
 def _action_and_reaction(setting: RunsOfLevel) -> list[Evidence]:
     seen = [(case, reaction(case.weak, case.solution)) for case in setting.cases]
-    normal = [Found(case=c, values=np.array([s["sigma_N^1 = sigma_N^2"]]), limit=EXACT) for c, s in seen]
-    opposite = [Found(case=c, values=np.array([s["sigma_T^1 = -sigma_T^2"]]), limit=EXACT) for c, s in seen]
+    normal = [Found(case, np.array([s["sigma_N^1 = sigma_N^2"]])) for case, s in seen]
+    opposite = [Found(case, np.array([s["sigma_T^1 = -sigma_T^2"]])) for case, s in seen]
     printed = {case.name: s["sigma_T^1 = sigma_T^2"] for case, s in seen}
     where = max(printed, key=lambda name: figure(printed[name]))
     held = printed[where] <= EXACT and equations("printed", "", normal).holds
@@ -59,16 +74,12 @@ def _action_and_reaction(setting: RunsOfLevel) -> list[Evidence]:
 
 
 def _signorini(setting: RunsOfLevel) -> list[Evidence]:
-    seen = [
-        Found(case=c, values=np.array(list(unilateral(c.weak, c.solution).values())), limit=EXACT)
-        for c in setting.cases
+    seen = [Found(case, unilateral(case.weak, case.solution)) for case in setting.cases]
+    forces = [
+        -case.weak.force(case.weak.one, case.solution.one)[case.weak.pair.contact.grid.normal] for case in setting.cases
     ]
-    force = {
-        case.name: -case.weak.force(case.weak.one, case.solution.one)[case.weak.pair.contact.grid.normal]
-        for case in setting.cases
-    }
-    closed = sum(int((f > EXACT * (np.abs(f).max() or 1.0)).sum()) for f in force.values())
-    nodes = sum(len(f) for f in force.values())
+    closed = sum(int((f > EXACT * (np.abs(f).max() or 1.0)).sum()) for f in forces)
+    nodes = sum(map(len, forces))
     text = f"the three conditions at {nodes} contact nodes, {closed} of them pressed"
     lowest = min((lowest_pressure(c) for c in setting.cases if c.grids_differ), default=0.0)
     if lowest < -EXACT:
@@ -84,34 +95,13 @@ def lowest_pressure(case: Case) -> float:
 
 def _friction(setting: RunsOfLevel) -> list[Evidence]:
     plane = with_friction(setting.cases)
-    seen = [Found(case=c, values=np.array(list(coulomb(c.weak, c.solution).values())), limit=EXACT) for c in plane]
+    seen = [Found(case, coulomb(case.weak, case.solution)) for case in plane]
     slips = [np.abs(c.weak.jump(c.solution.one, c.solution.two)[c.weak.pair.contact.grid.tangential]) for c in plane]
+    # a jump below this share of the largest one is rounding
     sliding = sum(int((s > 1e-9 * (s.max() or 1.0)).sum()) for s in slips)
-    nodes = sum(len(s) for s in slips)
+    nodes = sum(map(len, slips))
     text = f"both lines at {nodes} nodes, {sliding} of them with a jump, with sigma_T that of body 1"
     return [equations("printed", text, seen, nodes=nodes, sliding=sliding)]
-
-
-def _gather(
-    setting: RunsOfLevel,
-    key: str,
-    items: Callable[[Case], Iterable[Any]],
-    values: Callable[[Weak, Any, np.random.Generator], Floats],
-    limit: float = EXACT,
-) -> list[Found]:
-    """A check at all items of all problems."""
-    rng = generator(key)
-    return [
-        Found(case=case, values=values(case.weak, item, rng), limit=limit)
-        for case in setting.cases
-        for item in items(case)
-    ]
-
-
-def _original(setting: RunsOfLevel) -> list[Evidence]:
-    values = lambda weak, u, rng: inequality(weak, u, moves_in_K(weak, u, rng, setting.count))
-    seen = _gather(setting, "4.4", lambda case: [case.solution], values)
-    return [inequalities("printed", "at the solution of the global method, for v in K", seen)]
 
 
 def _lift(setting: RunsOfLevel) -> list[Evidence]:
@@ -124,26 +114,8 @@ def _lift(setting: RunsOfLevel) -> list[Evidence]:
             v[body.interface] = 0.0
             pairing = np.abs(v.T @ (body.stiffness @ lifted)) / np.outer(norm(body, v), norm(body, lifted))
             trace = np.abs(lifted[body.interface] - phi).max(axis=0) / np.abs(phi).max(axis=0)
-            seen.append(Found(case=case, values=np.concatenate([pairing.ravel(), trace]), limit=EXACT))
+            seen.append(Found(case, np.concatenate([pairing.ravel(), trace])))
     return [equations("printed", "a(R phi, v) = 0 for v = 0 on Gamma_c, and R phi = phi there, on both bodies", seen)]
-
-
-def _step_1(setting: RunsOfLevel) -> list[Evidence]:
-    values = lambda weak, step, rng: neumann_equation(
-        weak, weak.at(step[0]).two, step[0].g, directions(rng, weak.two, setting.count)
-    )
-    seen = _gather(setting, "4.9.1", lambda case: case.steps, values)
-    return [equations("printed", "for v in V^2, along runs", seen)]
-
-
-def _step_2(setting: RunsOfLevel) -> list[Evidence]:
-    def values(weak: Weak, step: tuple[Iterate, Iterate], rng: np.random.Generator) -> Floats:
-        u = weak.at(step[0])
-        return shifted_inequality(weak, u, obstacle_tests(weak, u, rng, setting.count))
-
-    text = "with the jump [u_T] in the friction term, along runs, for w in V^1_-(0)"
-    seen = _gather(setting, "4.9.2", lambda case: case.steps, values)
-    return [_printed_step_2(setting.cases), inequalities("repaired", text, seen)]
 
 
 def printed_defect(weak: Weak, u: Fields) -> tuple[float, Floats]:
@@ -180,112 +152,108 @@ def _printed_step_2(found: Sequence[Case]) -> Evidence:
     return evidence("printed", worst >= -EXACT, text, data)
 
 
-def _step_3(setting: RunsOfLevel) -> list[Evidence]:
-    def values(weak: Weak, item: tuple[float, Iterate, Iterate], rng: np.random.Generator) -> Floats:
-        theta, state, following = item
-        image = (following.g - (1 - theta) * state.g) / theta
-        return transfer(weak, weak.at(state), image, directions(rng, weak.two, setting.count))
-
-    items = lambda case: [(float(case.run.theta), *step) for step in case.steps]
-    seen = _gather(setting, "4.9.3", items, values)
-    return [equations("printed", "for v in V^2, along runs", seen)]
-
-
 def _fixed_point(found: Sequence[Case]) -> Evidence:
     seen = []
     for case in found:
         neumann, g = case.weak.pair.neumann, case.g
         moved = neumann.dual_norm(image_of(case.weak.pair, g).image - g) / (neumann.dual_norm(g) or 1.0)
-        seen.append(Found(case=case, values=np.array([moved]), limit=EXACT))
+        seen.append(Found(case, np.array([moved])))
     return equations("printed", "T g = g for the contact forces g of the global method", seen)
 
 
-def _neumann_problem(setting: RunsOfLevel) -> list[Evidence]:
-    values = lambda weak, u, rng: balance(weak, u, directions(rng, weak.two, setting.count))
-    seen = _gather(setting, "5.1", lambda case: [case.solution], values)
-    return [equations("printed", "at the solution of the global method, for v in V^2", seen)]
+#: A check at one place of a run or at the solution: the weak forms, the place, a random generator and the number of
+#: random test functions lead to residuals or to left minus right sides.
+Values = Callable[[Weak, Any, np.random.Generator, int], Floats]
+
+#: The places of a problem.
+Places = Callable[[Case], Iterable[Any]]
+
+_balance: Values = lambda weak, u, rng, n: balance(weak, u, directions(rng, weak.two, n))
+_inequality: Values = lambda weak, u, rng, n: inequality(weak, u, moves_in_K(weak, u, rng, n))
+_shifted: Values = lambda weak, u, rng, n: shifted_inequality(weak, u, obstacle_tests(weak, u, rng, n))
+_contact: Values = lambda weak, u, rng, n: contact_inequality(weak, u, moves_of_one(weak, u, rng, n))
 
 
-def _shifted_problem(setting: RunsOfLevel) -> list[Evidence]:
-    values = lambda weak, u, rng: shifted_inequality(weak, u, obstacle_tests(weak, u, rng, setting.count))
-    seen = _gather(setting, "5.2", lambda case: [case.solution], values)
-    return [inequalities("printed", "at the solution of the global method, for w in V^1_-(0)", seen)]
+def _loaded(weak: Weak, state: Iterate, rng: np.random.Generator, n: int) -> Floats:
+    return neumann_equation(weak, weak.at(state).two, state.g, directions(rng, weak.two, n))
 
 
-def _obstacle_problem(setting: RunsOfLevel) -> list[Evidence]:
-    values = lambda weak, u, rng: contact_inequality(weak, u, moves_of_one(weak, u, rng, setting.count))
-    seen = _gather(setting, "5.3", lambda case: [case.solution], values)
-    return [inequalities("printed", "at the solution of the global method, for v in V^1_-(u^2_N)", seen)]
+def _transfer(weak: Weak, item: tuple[Iterate, Floats], rng: np.random.Generator, n: int) -> Floats:
+    state, image = item
+    return transfer(weak, weak.at(state), image, directions(rng, weak.two, n))
 
 
-def _definition_of_T(setting: RunsOfLevel) -> list[Evidence]:
-    values = lambda weak, state, rng: transfer(
-        weak, weak.at(state), state.image, directions(rng, weak.two, setting.count)
-    )
-    seen = _gather(setting, "5.4", lambda case: case.arbitrary, values)
-    return [equations("printed", "at random psi, for v in V^2", seen), _fixed_point(setting.cases)]
+def _images(case: Case) -> list[tuple[Iterate, Floats]]:
+    """Steps of the run, each with T of its force as step III of the algorithm gives it."""
+    theta = float(case.run.theta)
+    return [(state, (following.g - (1 - theta) * state.g) / theta) for state, following in case.steps]
 
 
-def _contact_problem(setting: RunsOfLevel) -> list[Evidence]:
-    def values(weak: Weak, state: Iterate, rng: np.random.Generator) -> Floats:
-        w = weak.at(state)
-        return contact_inequality(weak, w, moves_of_one(weak, w, rng, setting.count))
-
-    seen = _gather(setting, "5.5", lambda case: case.arbitrary, values)
-    return [inequalities("printed", "at random psi, for v in V^1_-(w^2_N)", seen)]
-
-
-def _loaded_problem(setting: RunsOfLevel) -> list[Evidence]:
-    values = lambda weak, state, rng: neumann_equation(
-        weak, weak.at(state).two, state.g, directions(rng, weak.two, setting.count)
-    )
-    seen = _gather(setting, "5.6", lambda case: case.arbitrary, values)
-    return [equations("printed", "at random psi, for v in V^2", seen)]
+_solution: Places = lambda case: [case.solution]
+_limits: Places = lambda case: [case.limit] if case.run.converged else []
+_begun: Places = lambda case: [state for state, _ in case.steps]
+_fields_of_steps: Places = lambda case: [case.weak.at(state) for state, _ in case.steps]
+_arbitrary: Places = lambda case: case.arbitrary
+_arbitrary_fields: Places = lambda case: [case.weak.at(state) for state in case.arbitrary]
+_arbitrary_images: Places = lambda case: [(state, state.image) for state in case.arbitrary]
 
 
-def _limit(setting: RunsOfLevel) -> list[Evidence]:
-    values = lambda weak, u, rng: inequality(weak, u, moves_in_K(weak, u, rng, setting.count))
-    items = lambda case: [case.limit] if case.run.converged else []
-    seen = _gather(setting, "lemma-5.2", items, values, LIMIT)
-    return [inequalities("printed", "(4.4) at the limit of runs, for v in K", seen)]
+def _everywhere(
+    id: str,
+    judge: Callable[..., Evidence],
+    text: str,
+    items: Places,
+    values: Values,
+    of: str = "printed",
+    limit: float = EXACT,
+) -> tuple[str, Check]:
+    """A statement with the check of its weak form at all items of all problems, with its own random numbers."""
+
+    def check(setting: RunsOfLevel) -> list[Evidence]:
+        rng = generator(id)
+        at = [(case, item) for case in setting.cases for item in items(case)]
+        found = [Found(case, values(case.weak, item, rng, setting.count), limit) for case, item in at]
+        return [judge(of, text, found)]
+
+    return id, check
 
 
-Check = Callable[[RunsOfLevel], list[Evidence]]
+AT_SOLUTION, RANDOM, RUNS = "at the solution of the global method, for", "at random psi, for", "along runs"
+LEMMA_5_2 = "(4.4) at the limit of runs, for v in K"
+STEP_2 = f"with the jump [u_T] in the friction term, {RUNS}, for w in V^1_-(0)"
 
-#: What answers for each statement.
+#: Statements that are one weak form.
+FORMS: dict[str, Check] = dict(
+    [
+        _everywhere("4.4", inequalities, f"{AT_SOLUTION} v in K", _solution, _inequality),
+        _everywhere("4.9.1", equations, f"for v in V^2, {RUNS}", _begun, _loaded),
+        _everywhere("4.9.2", inequalities, STEP_2, _fields_of_steps, _shifted, of="repaired"),
+        _everywhere("4.9.3", equations, f"for v in V^2, {RUNS}", _images, _transfer),
+        _everywhere("5.1", equations, f"{AT_SOLUTION} v in V^2", _solution, _balance),
+        _everywhere("5.2", inequalities, f"{AT_SOLUTION} w in V^1_-(0)", _solution, _shifted),
+        _everywhere("lemma-5.2", inequalities, LEMMA_5_2, _limits, _inequality, limit=LIMIT),
+        _everywhere("5.3", inequalities, f"{AT_SOLUTION} v in V^1_-(u^2_N)", _solution, _contact),
+        _everywhere("5.4", equations, f"{RANDOM} v in V^2", _arbitrary_images, _transfer),
+        _everywhere("5.5", inequalities, f"{RANDOM} v in V^1_-(w^2_N)", _arbitrary_fields, _contact),
+        _everywhere("5.6", equations, f"{RANDOM} v in V^2", _arbitrary, _loaded),
+    ]
+)
+
+#: The check of each statement.
 CHECKS: dict[str, Check] = {
+    **FORMS,
     "2.3": _action_and_reaction,
     "2.4": _signorini,
     "2.6": _friction,
     "3.1.3": strong_form,
-    "4.4": _original,
     "4.5": _lift,
-    "4.9.1": _step_1,
-    "4.9.2": _step_2,
-    "4.9.3": _step_3,
+    "4.9.2": lambda setting: [_printed_step_2(setting.cases), *FORMS["4.9.2"](setting)],
     "prop-5.1": forces_carry_displacements,
-    "5.1": _neumann_problem,
-    "5.2": _shifted_problem,
-    "lemma-5.2": _limit,
-    "5.3": _obstacle_problem,
-    "5.4": _definition_of_T,
-    "5.5": _contact_problem,
-    "5.6": _loaded_problem,
+    "5.4": lambda setting: [*FORMS["5.4"](setting), _fixed_point(setting.cases)],
     "thm-5.9.1": forces_converge,
     "thm-5.9.2": fields_converge,
 }
 
-
-def solutions(
-    ids: Collection[str] | None = None, level: Level = "quick", watch: Callable[[float], None] = lambda done: None
-) -> dict[str, list[Evidence]]:
-    """Evidence for statements about solutions, iterates and their limit: a ``Source``.
-
-    Full halves the meshes too, draws problems at random and runs to the end.
-
-    Examples
-    --------
-    >>> [e.holds for e in solutions(["2.3"], "quick")["2.3"]]
-    [False, True]
-    """
-    return gather(CHECKS, RunsOfLevel(level=level), ids, watch)
+#: Evidence for statements about solutions, iterates and their limit.  Full halves the meshes too, draws problems at
+#: random and runs to the end.
+solutions = source(CHECKS, lambda level: RunsOfLevel(level=level))

@@ -17,7 +17,7 @@ from verification.ledger.worst import discrete
 
 
 def exact(ids: Collection[str], level: Level, watch: Callable[[float], None]) -> dict[str, list[Evidence]]:
-    """Symbolic evidence, and that of units: a ``Source``, the same at both levels."""
+    """Gather symbolic evidence and compare units: a ``Source``, the same at both levels."""
     found: dict[str, list[Evidence]] = {}
     chosen = [check for check in checks() if check.id in ids]
     for i, check in enumerate(chosen):
@@ -38,7 +38,7 @@ def exact(ids: Collection[str], level: Level, watch: Callable[[float], None]) ->
     return found
 
 
-#: By the name that a watcher is told.
+#: By the name that progress messages have.
 SOURCES: dict[str, Source] = {
     "exact arithmetic and units": exact,
     "inequalities on random problems": discrete,

@@ -1,15 +1,19 @@
 """The weak forms of the paper on whole bodies: each equation as a residual, each inequality as left minus right side.
 
-The algorithm works on the interface alone, with condensed matrices.  Here a displacement is the field of a whole body,
+The algorithm works only on the interface, with condensed matrices.  Here a displacement is the field of a whole body,
 ``a`` and ``L`` are its stiffness matrix and its load, and lifts are solved for anew: a second path to the same numbers.
 
 Indices are the paper's: body 1 is the contact body, body 2 the Neumann body.  Normal components are along n^1, and an
 initial gap d, which the paper does not have, turns ``[v_N] <= 0`` into ``[v_N] <= d``.  Traces and forces are on the
 grid of their body; where the grids differ v^2 enters a jump, K and R_D^1 as ``P v^2`` at the contact nodes.
+
+Test functions are random ones and those for which an inequality is close to equality.  Values of a check on several
+problems become evidence by :func:`equations` and :func:`inequalities`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -23,9 +27,9 @@ from verification.algorithm.iterate import Iterate
 from verification.algorithm.runs import Run, run
 from verification.contact import ContactError
 from verification.interface.body import Body, Condensed
-from verification.interface.pair import ContactPair, build
-from verification.ledger.evidence import Level
-from verification.ledger.field_problems import PROBLEMS, drawn
+from verification.interface.pair import ContactPair, pair_from
+from verification.ledger.cases import PROBLEMS, drawn
+from verification.ledger.evidence import Evidence, Level, figure
 from verification.monolithic import solve
 from verification.problem.specification import Problem
 
@@ -35,10 +39,10 @@ SEED = 2008
 #: An equation holds below this relative residual, and an inequality above minus it.
 EXACT = 1e-10
 
-#: The same at the limit of a run, whose residual is at most :data:`verification.ledger.field_problems.TOLERANCE`.
+#: The same at the limit of a run, whose residual is at most :data:`verification.ledger.cases.TOLERANCE`.
 LIMIT = 1e-9
 
-#: Distances to the solution below this share of its norm are not compared step by step: rounding stands behind them.
+#: Distances to the solution below this share of its norm are not compared step by step: they contain rounding.
 CLEAR = 1e-4
 
 
@@ -70,14 +74,14 @@ class Weak:
     def _lifts(self) -> dict[str, Any]:
         inside: dict[str, Any] = {}
         for body in (self.one, self.two):
-            rows = np.setdiff1d(np.arange(len(body.free)), body.interface)
+            rows = np.setdiff1d(np.arange(len(body.positions)), body.interface)
             inside[body.name] = rows, solver(body.stiffness[rows][:, rows])
         return inside
 
     def lift(self, body: Body, trace: Floats) -> Floats:
         """R_D phi of (4.5)."""
         rows, solved = self._lifts[body.name]
-        field = np.zeros((len(body.free), *trace.shape[1:]))
+        field = np.zeros((len(body.positions), *trace.shape[1:]))
         field[body.interface] = self._side(body).orient(trace)
         field[rows] = -solved(np.asarray(body.stiffness[rows][:, body.interface] @ field[body.interface]))
         return field
@@ -119,7 +123,7 @@ class Weak:
     def of(self, displacements: tuple[Floats | None, Floats | None]) -> Fields:
         """The unknowns of two displacement fields, the lower body's first."""
         first, second = (
-            displacement.ravel()[body.free] if displacement is not None else np.zeros(len(body.free))
+            displacement.ravel()[body.positions] if displacement is not None else np.zeros(len(body.positions))
             for body, displacement in zip(self.pair.on_meshes().elastic, displacements, strict=True)
         )
         return Fields(one=first, two=second) if self.pair.neumann_body == 2 else Fields(one=second, two=first)
@@ -148,11 +152,11 @@ class Case:
     @cached_property
     def weak(self) -> Weak:
         """The weak forms."""
-        return Weak(pair=build(self.problem))
+        return Weak(pair=pair_from(self.problem))
 
     @property
     def grids_differ(self) -> bool:
-        """Whether the bodies have different grids along Gamma_c."""
+        """True if the bodies have different grids along Gamma_c."""
         return self.weak.pair.interface.transfer is not None
 
     @cached_property
@@ -218,35 +222,25 @@ def cases(level: Level) -> list[Case]:
 # The statements, as numbers that should vanish or be non-negative; each relative to what its terms are made of.
 
 
-def unilateral(weak: Weak, u: Fields) -> dict[str, float]:
-    """(2.4) with sigma_N of body 1: the largest violation of each condition, lengths over the largest displacement.
+def unilateral(weak: Weak, u: Fields) -> Floats:
+    """(2.4) with sigma_N of body 1: the largest violations of ``[u_N] <= 0``, ``sigma_N <= 0``, ``sigma_N [u_N] = 0``.
 
-    P' has negative entries, so that where the grids differ sigma_N of body 2 may have the other sign at some node.
+    Lengths are relative to the largest displacement.  P' has negative entries: where the grids differ sigma_N of body 2
+    may have the other sign at some node.
     """
     normal, one = weak.pair.contact.grid.normal, -weak.force(weak.one, u.one)
-    jump = weak.jump(u.one, u.two)[normal] / max(np.abs(u.one).max(), np.abs(u.two).max())
+    jump = weak.jump(u.one, u.two)[normal] / largest(u)
     pressure = one[normal] / (np.abs(one).max() or 1.0)
-    worst = lambda values: float(np.max(values, initial=0.0))
-    return {
-        "[u_N] <= 0": worst(jump),
-        "sigma_N <= 0": worst(-pressure),
-        "sigma_N [u_N] = 0": worst(np.abs(pressure * jump)),
-    }
+    return np.array([np.max(values, initial=0.0) for values in (jump, -pressure, np.abs(pressure * jump))])
 
 
-def coulomb(weak: Weak, u: Fields) -> dict[str, float]:
-    """(2.6) with the tangential stress of body 1: the largest violation of each line."""
+def coulomb(weak: Weak, u: Fields) -> Floats:
+    """(2.6) with sigma_T of body 1: largest violations of ``|sigma_T| <= b`` and ``b |[u_T]| + sigma_T [u_T] = 0``."""
     t = weak.pair.contact.grid.tangential
     force, bound, jump = weak.force(weak.one, u.one)[t], weak.bound(u.two), weak.jump(u.one, u.two)[t]
     forces = float(np.abs(weak.force(weak.two, u.two)).max()) or 1.0
-    lengths = float(max(np.abs(u.one).max(), np.abs(u.two).max()))
-    worst = lambda values: float(np.max(values, initial=0.0))
-    return {
-        "|sigma_T| <= k|S(sigma_N)|": worst((np.abs(force) - bound) / forces),
-        "k|S(sigma_N)||[u_T]| + sigma_T [u_T] = 0": worst(
-            np.abs(bound * np.abs(jump) + force * jump) / forces / lengths
-        ),
-    }
+    beyond, work = (np.abs(force) - bound) / forces, np.abs(bound * np.abs(jump) + force * jump) / forces / largest(u)
+    return np.array([np.max(values, initial=0.0) for values in (beyond, work)])
 
 
 def reaction(weak: Weak, u: Fields) -> dict[str, float]:
@@ -270,14 +264,13 @@ def inequality(weak: Weak, u: Fields, d: Fields) -> Floats:
     """(4.4): left minus right side for columns ``d = v - u``, relative to ``|u| |d|`` in the norm of a."""
     work = weak.excess(weak.one, u.one) @ d.one + weak.excess(weak.two, u.two) @ d.two
     value = work + _friction_of_move(weak, u, weak.trace(weak.one, d.one) - weak.carried(d.two))
-    return _over(value, weak.energy(u) * _moved(weak.energy(d), weak.energy(u)))
+    return _of_move(weak, u, value, weak.energy(d))
 
 
 def contact_inequality(weak: Weak, u: Fields, d: Floats) -> Floats:
     """(5.3), (5.5): left minus right side for columns ``d = v - u^1``, relative to ``|u| |d|``."""
     work = weak.excess(weak.one, u.one) @ d
-    value = work + _friction_of_move(weak, u, weak.trace(weak.one, d))
-    return _over(value, weak.energy(u) * _moved(norm(weak.one, d), weak.energy(u)))
+    return _of_move(weak, u, work + _friction_of_move(weak, u, weak.trace(weak.one, d)), norm(weak.one, d))
 
 
 def shifted_inequality(weak: Weak, u: Fields, w: Floats) -> Floats:
@@ -285,8 +278,7 @@ def shifted_inequality(weak: Weak, u: Fields, w: Floats) -> Floats:
     t = weak.pair.contact.grid.tangential
     d = w + (weak.lift(weak.one, weak.carried(u.two)) - u.one)[:, None]
     slides = np.abs(weak.trace(weak.one, w)[t]) - np.abs(weak.jump(u.one, u.two)[t])[:, None]
-    value = weak.excess(weak.one, u.one) @ d + weak.bound(u.two) @ slides
-    return _over(value, weak.energy(u) * _moved(norm(weak.one, d), weak.energy(u)))
+    return _of_move(weak, u, weak.excess(weak.one, u.one) @ d + weak.bound(u.two) @ slides, norm(weak.one, d))
 
 
 def _friction_of_move(weak: Weak, u: Fields, moved: Floats) -> Floats:
@@ -320,11 +312,167 @@ def norm(body: Body, field: Floats) -> Floats:
     return np.asarray(np.sqrt(_dot(field, body.stiffness @ field)))
 
 
-def _moved(d: Floats, u: Floats) -> Floats:
-    """The size of ``v - u``, at least a small share of u: a v cut back to u differs by rounding alone."""
-    return np.maximum(d, 1e-5 * u)
+def _of_move(weak: Weak, u: Fields, value: Floats, size: Floats) -> Floats:
+    """A value over the energy norms of u and of ``v - u``; the latter at least 1e-5 of u: what is less is rounding."""
+    energy = weak.energy(u)
+    return _over(value, energy * np.maximum(size, 1e-5 * energy))
 
 
 def _over(value: Floats, scale: Floats) -> Floats:
     """The quotient; 0 where both vanish."""
     return np.asarray(np.divide(value, scale, out=np.zeros(np.broadcast(value, scale).shape), where=scale > 0))
+
+
+# Test functions.
+
+
+def directions(rng: np.random.Generator, body: Body, count: int) -> Floats:
+    """Rough and smooth random fields of a body, largest value 1, as columns."""
+    rough = rng.standard_normal((len(body.positions), count))
+    smooth = body.solve(rng.standard_normal((len(body.positions), count)))
+    columns = np.concatenate([rough, smooth], axis=1)
+    return np.asarray(columns / np.abs(columns).max(axis=0))
+
+
+def hats(body: Body) -> Floats:
+    """Both signs of the hat function of every interface unknown, as columns."""
+    columns = np.zeros((len(body.positions), len(body.interface)))
+    columns[body.interface, np.arange(len(body.interface))] = 1.0
+    return np.concatenate([columns, -columns], axis=1)
+
+
+def closing(weak: Weak, u: Fields) -> Floats:
+    """Moves of body 1 by hat functions that undo the jump of u at one node, in one direction."""
+    count = len(weak.one.interface)
+    return np.asarray(hats(weak.one)[:, :count] * -weak.pair.contact.orient(weak.jump(u.one, u.two)))
+
+
+def _sizes(rng: np.random.Generator, size: float, count: int) -> Floats:
+    return np.asarray(size * 10.0 ** rng.uniform(-4, 1, count))
+
+
+def moves_in_K(weak: Weak, u: Fields, rng: np.random.Generator, count: int) -> Fields:
+    """Columns ``v - u`` with v in K: random fields, hat functions on one body, on the other and on both, closing moves.
+
+    Where a column would penetrate one of the bodies gives way; where the grids differ it is body 1, node by node.
+    """
+    size = largest(u)
+    one, two = (directions(rng, body, count) for body in (weak.one, weak.two))
+    hat_1, hat_2 = hats(weak.one), hats(weak.two)
+    still_1, still_2 = np.zeros((len(u.one), hat_2.shape[1])), np.zeros((len(u.two), hat_1.shape[1]))
+    with_2 = still_1.copy()
+    with_2[weak.one.interface] = weak.pair.contact.orient(weak.carried(hat_2))
+    columns_1 = np.concatenate([one, hat_1, still_1, with_2] * 2 + [100 * one], axis=1)
+    columns_2 = np.concatenate([two, still_2, hat_2, hat_2] * 2 + [100 * two], axis=1)
+    sizes = _sizes(rng, size, columns_1.shape[1])
+    undone = closing(weak, u)
+    one = np.concatenate([sizes * columns_1, undone], axis=1)
+    two = np.concatenate([sizes * columns_2, np.zeros((len(u.two), undone.shape[1]))], axis=1)
+    normal, up = weak.pair.contact.grid.normal, weak.pair.upward
+    rows = weak.one.interface[normal]
+    room = -weak.jump(u.one, u.two)[normal][:, None]
+    one_grid = weak.pair.interface.transfer is None
+    first = (rng.random(one.shape[1]) < 0.5) | (not one_grid)
+    above = up * one[rows], weak.carried(two)[normal]
+    if one_grid:
+        two[weak.two.interface[normal]] = up * np.where(first, above[1], np.maximum(above[1], above[0] - room))
+    one[rows] = up * np.where(first, np.minimum(above[0], above[1] + room), above[0])
+    return Fields(one=one, two=two)
+
+
+def moves_of_one(weak: Weak, u: Fields, rng: np.random.Generator, count: int) -> Floats:
+    """Columns ``v - u^1`` with v in V^1_-(u^2_N): random fields, hat functions, closing moves."""
+    random, hat = directions(rng, weak.one, count), hats(weak.one)
+    columns = np.concatenate([random, hat, hat, 100 * random], axis=1)
+    d = np.concatenate([_sizes(rng, largest(u), columns.shape[1]) * columns, closing(weak, u)], axis=1)
+    normal, up = weak.pair.contact.grid.normal, weak.pair.upward
+    rows = weak.one.interface[normal]
+    d[rows] = up * np.minimum(up * d[rows], -weak.jump(u.one, u.two)[normal][:, None])
+    return np.asarray(d)
+
+
+def obstacle_tests(weak: Weak, u: Fields, rng: np.random.Generator, count: int) -> Floats:
+    """Columns w of V^1_-(0): random ones, and ``u^1 - R u^2`` moved as in ``moves_of_one``."""
+    body, normal, up = weak.one, weak.pair.contact.grid.normal, weak.pair.upward
+    random, hat = directions(rng, body, count), hats(body)
+    start = u.one - weak.lift(body, weak.carried(u.two))
+    columns = np.concatenate([random, hat, hat], axis=1)
+    moves = np.concatenate([_sizes(rng, largest(u), columns.shape[1]) * columns, closing(weak, u)], axis=1)
+    w = np.concatenate([start[:, None] + moves, 10 * largest(u) * random], axis=1)
+    rows = body.interface[normal]
+    w[rows] = up * np.minimum(up * w[rows], weak.pair.interface.gap[:, None])
+    return w
+
+
+def largest(u: Fields) -> float:
+    return float(max(np.abs(u.one).max(), np.abs(u.two).max()))
+
+
+# Evidence.
+
+
+@dataclass(frozen=True)
+class Found:
+    """Values of a check on one problem, and their limit."""
+
+    case: Case
+    values: Floats
+    limit: float = EXACT
+
+
+def on_problems(found: Iterable[Case]) -> str:
+    """The number of problems, and of those with grids that differ."""
+    problems = {case.name: case.grids_differ for case in found}
+    apart = sum(problems.values())
+    return f"{len(problems)} problems" + (f", of which {apart} have grids that differ" if apart else "")
+
+
+def equations(of: Any, text: str, found: Sequence[Found], **data: Any) -> Evidence:
+    """All values at most their limits; rounding is not reported, only that it is below the limit."""
+    top, where, holds = _worst(found, 1)
+    data = _data(found, data)
+    limit = data["limit"]
+    if holds:
+        seen = f"relative residuals below {limit:g} in {data['cases']} cases on {on_problems(f.case for f in found)}"
+        return evidence(of, True, f"{text}: {seen}", data)
+    data |= {"worst": top, "where": where}
+    return evidence(of, False, f"{text}: a relative residual of {top:.3g} ({where}); needed {limit:g}", data)
+
+
+def inequalities(of: Any, text: str, found: Sequence[Found], **data: Any) -> Evidence:
+    """All values at least minus their limits."""
+    low, where, holds = _worst(found, -1)
+    # a figure far from rounding, and from the test functions that barely leave u
+    most = max(float(f.values.max(initial=0.0)) for f in found)
+    data = _data(found, data) | {"largest": figure(most)}
+    if holds:
+        ends = f"between -{data['limit']:g} and {most:.3g} for {data['cases']} test functions"
+        problems = on_problems(f.case for f in found)
+        return evidence(of, True, f"{text}: left minus right over its scale {ends} on {problems}", data)
+    data |= {"worst": low, "where": where}
+    return evidence(of, False, f"{text}: left minus right is {low:.3g} of its scale ({where})", data)
+
+
+def _worst(found: Sequence[Found], sign: int) -> tuple[float, str, bool]:
+    """The value that is largest relative to its limit, times the sign; its problem; True if all are at most theirs."""
+    size = lambda f: float((sign * f.values).max(initial=0.0))
+    worst = max(found, key=lambda f: size(f) / f.limit)
+    return sign * size(worst), worst.case.name, all(size(f) <= f.limit for f in found)
+
+
+def _data(found: Sequence[Found], data: Mapping[str, Any]) -> dict[str, Any]:
+    names, limit = list(dict.fromkeys(f.case.name for f in found)), max(f.limit for f in found)
+    return {"seed": SEED, "problems": names, "cases": sum(f.values.size for f in found), **data, "limit": limit}
+
+
+def evidence(of: Any, holds: bool | None, text: str, data: Mapping[str, Any]) -> Evidence:
+    return Evidence(method="discrete", of=of, holds=holds, text=text, data=data)
+
+
+def figures(values: Floats, size: float) -> list[float]:
+    """Six digits relative to a size; what is smaller may be rounding."""
+    return [figure(v) + 0.0 for v in np.round(values / size, 6) * size]
+
+
+def with_friction(found: Sequence[Case]) -> list[Case]:
+    return [case for case in found if float(case.problem.contact.friction) > 0]

@@ -16,29 +16,27 @@ from fem1d2d.mesh import Floats
 from verification.bounds.losses import top
 from verification.constants import Measured, measure
 from verification.interface.body import Body
-from verification.interface.pair import ContactPair, build
+from verification.interface.pair import ContactPair, pair_from
 from verification.ledger.cases import NAMED, problem
-from verification.ledger.differences import Differences, DrawnSetting
-from verification.ledger.draws import draw_pairs
+from verification.ledger.differences import Differences, DrawnSetting, draw_pairs
 from verification.ledger.evidence import Evidence, figure
-from verification.ledger.inequalities import ALLOWANCE, INEQUALITIES, LEVELS, ONE_TRACE_SPACE, SEED, SHARES, Inequality
-from verification.ledger.reading import Reading
+from verification.ledger.inequalities import (
+    ALLOWANCE,
+    INEQUALITIES,
+    LEVELS,
+    ONE_TRACE_SPACE,
+    SEED,
+    SHARES,
+    Inequality,
+    Reading,
+)
 from verification.problem.specification import Problem
 from verification.threads import one_thread
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Trial:
-    """A problem with its constants.
-
-    Attributes
-    ----------
-    name : str
-    pair : ContactPair
-        Its bodies.
-    measured : Measured
-        The constants of the mesh.
-    """
+    """The bodies of a problem with the constants of its mesh."""
 
     name: str
     pair: ContactPair
@@ -47,7 +45,7 @@ class Trial:
     @classmethod
     def of(cls, name: str, problem: Problem) -> Trial:
         """Build the bodies of a problem and measure its constants."""
-        pair = build(problem)
+        pair = pair_from(problem)
         return cls(name=name, pair=pair, measured=measure(pair))
 
     @cached_property
@@ -92,35 +90,36 @@ class Trial:
         return [getattr(self.measured, body.name).M.value for body in self.bodies]
 
     @property
-    def contrast(self) -> Floats:
+    def contrast(self) -> list[float]:
         """``M^a/m^a``."""
-        return np.array([M / m for M, m in zip(self.M, self.m, strict=True)])
+        return [M / m for M, m in zip(self.M, self.m, strict=True)]
+
+    @property
+    def largest(self) -> list[float]:
+        """M^a from the whole spectrum."""
+        return [largest for _, largest in self.spectra]
+
+    @property
+    def continuity(self) -> list[float]:
+        """The bounds of M^a that follow from the materials."""
+        return [body.material.continuity(body.mesh.dimension) for body in self.bodies]
+
+    #: The largest eigenvalue of a pencil.
+    top = staticmethod(top)
 
     @property
     def grids_differ(self) -> bool:
-        """Whether the bodies have different grids along Gamma_c."""
+        """True if the bodies have different grids along Gamma_c."""
         return self.pair.interface.transfer is not None
 
-    @property
-    def between_traces(self) -> Floats:
-        """The constants from the norm of H^1/2(Gamma_c) squared of the other body into that of each body.
+    def across(self, forms: tuple[Floats, Floats]) -> list[float]:
+        """The largest quotients of each form over the other body's squared norm of H^1/2(Gamma_c).
 
-        Where the grids differ into that of the contact body alone: nothing leads from its grid to the other one.
+        Where the grids differ only of the contact body's form: nothing leads from its grid to the other one.
         """
-        return self._across(self.E)
-
-    @property
-    def lifted_across(self) -> Floats:
-        """``|R_D^1 gamma v|^2 / |v|^2`` for v of the other body, at most, and with the bodies exchanged.
-
-        Where the grids differ ``R_D^1 P gamma v`` alone: nothing leads from the contact grid to the other one.
-        """
-        return self._across(self.N)
-
-    def _across(self, forms: tuple[Floats, Floats]) -> Floats:
         one, other = forms
         values = [top(self.pair.interface.carry_form(one), self.E[1])]
-        return np.array(values if self.grids_differ else [*values, top(other, self.E[0])])
+        return values if self.grids_differ else [*values, top(other, self.E[0])]
 
     def at_share(self, share: Fraction) -> Trial:
         """The same bodies at a share of the friction C_2 of the repaired bound."""
@@ -136,11 +135,10 @@ class WorstTally:
 
     Attributes
     ----------
-    inequality : Inequality
     pairs, problems, apart : int
         How many were compared; in how many of the problems the grids differ.
     by_unit : dict
-        Unit of stress -> the worst ratio, where, the theta, and the problem where it has a name.
+        Unit of stress -> the worst ratio, where, the theta, and the name of the problem.
     worst_apart : float
         The worst ratio where the grids differ, in any unit of stress; -inf where nothing was compared there.
     """
@@ -153,7 +151,7 @@ class WorstTally:
     worst_apart: float = -math.inf
 
     def take(self, case: Trial, subjects: Trial | Differences) -> None:
-        """Compare both sides on the pairs of a problem, where the inequality speaks of its grids."""
+        """Compare both sides on the pairs of a problem, unless the inequality needs one grid and there are two."""
         inequality = self.inequality
         if inequality.one_grid and case.grids_differ:
             return
@@ -171,19 +169,19 @@ class WorstTally:
                 self.worst_apart = max(float(by_pair.max()), self.worst_apart)
             for place in np.flatnonzero(by_pair > self._to_beat(unit)).tolist():
                 ratio = float(by_pair.ravel()[place])
-                # equal but for rounding: the first one stays, on any machine
+                # equal up to rounding: the first one stays, on any machine
                 if ratio > self._to_beat(unit):
                     number, which = divmod(place, len(thetas))
                     where = case.name if inequality.about == "bodies" else f"{case.name}, pair {number + 1}"
                     self.by_unit[unit] = (ratio, where, thetas[which], case.name)
 
     def _to_beat(self, unit: float) -> float:
-        """What a ratio must exceed to be the worst."""
+        """The number that a ratio must exceed to be the worst."""
         return self.by_unit[unit][0] * (1 + ALLOWANCE) if unit in self.by_unit else -math.inf
 
     @property
     def evidence(self) -> Evidence | None:
-        """What was found; None where nothing was compared."""
+        """The worst ratio as evidence; None where nothing was compared."""
         if not self.by_unit:
             return None
         unit = max(self.by_unit, key=lambda unit: (figure(self.by_unit[unit][0], 7), unit == 1.0))
@@ -221,21 +219,17 @@ class WorstTally:
 
 
 def _digits(value: float) -> float | None:
-    """Seven digits: what another machine finds too; None where there is no number."""
+    """A number to the seven digits that another machine finds too; None unless it is finite."""
     return figure(value, 7) if math.isfinite(value) else None
 
 
 def draw_cases(
     count: int, apart: Callable[[int], bool] = lambda number: number % 3 == 0
 ) -> Iterator[tuple[Trial, np.random.Generator]]:
-    """The problems of a pass, each with a generator of its own: named ones, then random ones.
+    """The problems of a pass, each with its own random generator: named ones, then ``count`` random ones.
 
-    Parameters
-    ----------
-    count : int
-        Random problems; every fifth has friction 10.
-    apart : callable
-        Of which of them the grids are drawn apart, by number; now and then these come out as one grid.
+    Every fifth random problem has friction 10.  ``apart`` chooses, by their numbers, the problems whose grids are drawn
+    apart; now and then these come out as one grid.
     """
     for number, (name, data) in enumerate(NAMED.items()):
         yield Trial.of(name, Problem.from_dict(data)), np.random.default_rng([SEED, 0, number])

@@ -1,1 +1,1 @@
-"""What is written into a folder."""
+"""Files of results."""

@@ -1,4 +1,4 @@
-"""Writing files: only over our own, all of one result or none."""
+"""Writing files: only over files of this program, all of one result or none."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _ROWS = ("fig5.csv", "fig10.csv", "fig11.csv", "fig12.csv")
 
 _MATRICES = ("interface.npz", "P.npz")
 
-#: What each command writes, beside the problem.
+#: The files that each command writes, beside the problem.
 FILES: dict[Kind, tuple[str, ...]] = {
     "run": ("run.json", *_TABLES, *_MATRICES, *_PICTURES),
     "solve": ("solve.json", *_TABLES[:1], *_MATRICES[1:], *_PICTURES[:2]),
@@ -40,7 +40,7 @@ FILES: dict[Kind, tuple[str, ...]] = {
     "verify": ("ledger.json", "ledger.md", "errata.md", "verdicts.json"),
 }
 
-#: How a file of ours is told from somebody else's.
+#: Marks by which files of this program are recognised.
 MARKS = {
     ".json": b'"schema": "ndtheory.',
     ".svg": b"<dc:title>ndtheory</dc:title>",
@@ -54,24 +54,29 @@ MARKS = {
 }
 
 
-#: No file of ours is larger: reading another one to tell whose it is must end.
+#: No file of this program is larger, so that reading a file to look for its mark ends.
 MOST_BYTES = 500_000_000
 
 
 def check_ours(target: Path) -> None:
-    """Refuse to overwrite what is not ours.
-
-    Raises
-    ------
-    ProblemError
-    """
+    """Raise ProblemError where writing would replace a file that this program has not written."""
     check_place(target)
     if target.exists() and (unreadable(target, MOST_BYTES) or MARKS[target.suffix] not in target.read_bytes()):
         raise ProblemError(str(target), "", None, "not written by this program; needed another folder or name (-o)")
 
 
+def check_folder(room: Path, option: str = "") -> None:
+    """Make a folder; ProblemError, with the option that named it, if it cannot be written to."""
+    try:
+        room.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=room).close()
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise ProblemError(str(room), "", None, f"needed a folder to write to{option}: {why}") from None
+
+
 def check_place(target: Path) -> None:
-    """Refuse a name that a folder has."""
+    """Raise ProblemError for the name of a folder."""
     if target.is_dir():
         raise ProblemError(str(target), "", None, "this is a folder: needed another folder or name (-o)")
 
@@ -82,23 +87,11 @@ ROOM = ".ndtheory-writing-"
 
 @contextlib.contextmanager
 def staged(folder: Path, stale: Collection[str] = (), *, shown: Path | None = None) -> Iterator[Path]:
-    """A folder to write into, whose files take their places together at the end; after an error none does.
+    """A folder to write into, whose files move into ``folder`` together at the end; after an error none does.
 
-    What is to be replaced goes before anything comes: a process that is killed in between leaves files of one run, some
-    of which are missing, never files of two.  Ctrl-C keeps the documents where there is nothing to replace.
-
-    Parameters
-    ----------
-    folder : Path
-        Where the files belong.
-    stale : collection of str
-        Names of the files of an earlier run, which go when the others come.
-    shown : Path, optional
-        What an error names; the folder by default.
-
-    Raises
-    ------
-    ProblemError
+    Old files, and those named in ``stale``, are removed before any new one comes: a process that is killed in between
+    leaves files of one run, some of which are missing, never files of two.  Ctrl-C keeps the documents if there is
+    nothing to replace.  A ProblemError names ``shown``, by default the folder.
     """
     try:
         with contextlib.ExitStack() as stack:
@@ -130,7 +123,7 @@ def _place(room: Path, folder: Path, pattern: str, stale: Collection[str] = ()) 
 
 @contextlib.contextmanager
 def _held(folder: Path) -> Iterator[None]:
-    """Hold a folder against other processes of this program; when a process ends the system lets go of it."""
+    """Lock a folder for this process; the system ends the lock with the process."""
     if not LOCKS:
         yield
         return
@@ -166,12 +159,12 @@ def _remove(room: Path) -> None:
         room.rmdir()
 
 
-def writing(found: Document, target: Path | None) -> Callable[[], None] | None:
-    """A function that writes a document into a file; None where no name was given."""
+def writing(target: Path | None) -> Callable[[Document], None] | None:
+    """A function that writes a document into a file; None if no name was given."""
     if target is None:
         return None
 
-    def write() -> None:
+    def write(found: Document) -> None:
         with staged(target.parent, shown=target) as room:
             (room / target.name).write_text(found.to_json(), encoding="utf-8")
 

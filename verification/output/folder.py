@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,85 +11,68 @@ from verification.algorithm.runs import Run
 from verification.interface.files import write_interface, write_transfer
 from verification.interrupts import undisturbed
 from verification.ledger import sheets
-from verification.output.files import FILES, MARKS, MOST_BYTES, Kind, check_ours, check_place, staged
+from verification.output.files import FILES, MARKS, MOST_BYTES, Kind, check_folder, check_ours, check_place, staged
 from verification.problem.tables import ProblemError, unreadable
 from verification.spreadsheet import as_csv
 
 if TYPE_CHECKING:
     from verification.comparison import Comparison
+    from verification.figures import Figure
     from verification.ledger import Ledger
     from verification.monolithic import Solution
     from verification.reproduce import Reproduction
 
 
 class Folder:
-    """A folder for results; refused at once where it cannot be written, before anything long is computed.
-
-    Parameters
-    ----------
-    path : Path
-    kind : {'run', 'solve', 'compare', 'verify', 'reproduce'}
-        What will be written: none of those files may be somebody else's.
+    """A folder for results of one kind, checked before anything long is computed.
 
     Raises
     ------
     ProblemError
-        Not a folder, not writable, or it holds a file of that name that is not ours.
+        Not a folder, not writable, or it holds a file with a name of this kind that another program has written.
     """
 
     def __init__(self, path: Path, kind: Kind) -> None:
-        self.path = path
-        try:
-            path.mkdir(parents=True, exist_ok=True)
-            tempfile.TemporaryFile(dir=path).close()
-        except (OSError, ValueError) as error:
-            why = getattr(error, "strerror", None) or error
-            raise ProblemError(str(path), "", None, f"needed a folder to write to: {why}") from None
+        self.path, self.kind = path, kind
+        check_folder(path)
         for name in FILES[kind]:
             check_ours(path / name)
         if kind not in ("verify", "reproduce"):
             check_place(path / "problem.toml")  # a file of a user's stays as it is
 
     def write_problem(self, text: str) -> Path:
-        """Write ``problem.toml``.
-
-        Raises
-        ------
-        ProblemError
-            A different problem.toml is there: an edited one is not overwritten.
-        """
+        """Write ``problem.toml``; ProblemError if an edited one is there, which is not overwritten."""
         target = self.path / "problem.toml"
-        if target.exists() and (target.is_dir() or not _may_go(target.read_bytes(), text)):
+        if target.exists() and (target.is_dir() or not _replaceable(target.read_bytes(), text)):
             needed = "differs from the built-in problem: needed another folder (-o), or run compare on this file"
             raise ProblemError(str(target), "", None, needed)
         with staged(self.path, shown=target) as room:
             (room / target.name).write_text(text, encoding="utf-8")
         return target
 
-    def write_run(self, run: Run) -> None:
-        """Write ``run.json``, the tables, the interface, the problem and the figures."""
-        with staged(self.path, FILES["run"]) as room:
-            _text(room / "run.json", run.to_json())
-            self._tables(room, run)
-            _pictures(room, run)
+    def write(self, found: Any) -> None:
+        """Write a result of this kind: its document with tables, matrices, the problem, figures or pages."""
+        with staged(self.path, FILES[self.kind]) as room:
+            _text(room / FILES[self.kind][0], found.to_json())
+            match self.kind:
+                case "verify":
+                    _pages(room, found)
+                case "reproduce":
+                    _reproduced(room, found)
+                case "compare":
+                    self._compared(room, found)
+                case _:
+                    self._tables(room, found)
+                    _pictures(room, found)
 
-    def write_solution(self, solution: Solution) -> None:
-        """Write ``solve.json``, the table of Gamma_c, the problem and the figure of the bodies."""
-        with staged(self.path, FILES["solve"]) as room:
-            _text(room / "solve.json", solution.to_json())
-            self._tables(room, solution)
-            _pictures(room, solution)
-
-    def write_comparison(self, comparison: Comparison) -> None:
-        """Write ``compare.json``, the tables, the interface, the problem, the figures and ``report.html``."""
+    def _compared(self, room: Path, comparison: Comparison) -> None:
+        """The files of the run, and ``report.html``."""
         from verification.output.report import report
 
-        with staged(self.path, FILES["compare"]) as room:
-            _text(room / "compare.json", comparison.to_json())
-            self._tables(room, comparison.run)
-            names = _pictures(room, comparison.run, comparison)
-            figures = {name: (room / f"{name}.svg").read_text("utf-8") for name in names}
-            _text(room / "report.html", report(comparison, figures))
+        self._tables(room, comparison.run)
+        names = _pictures(room, comparison.run, comparison)
+        figures = {name: (room / f"{name}.svg").read_text("utf-8") for name in names}
+        _text(room / "report.html", report(comparison, figures))
 
     def _tables(self, room: Path, result: Run | Solution) -> None:
         """Gamma_c and the history as CSV, the interface as matrices, and the problem where a user has none there."""
@@ -108,33 +90,27 @@ class Folder:
         if result.problem is not None and ours:
             _text(room / "problem.toml", f"{MARKS['.toml'].decode()}\n{result.problem.to_toml()}")
 
-    def write_reproduction(self, found: Reproduction) -> None:
-        """Write ``reproduce.json``, the rows behind each figure and the figures."""
-        from verification import figures
 
-        with staged(self.path, FILES["reproduce"]) as room:
-            _text(room / "reproduce.json", found.to_json())
-            for result in found.results:
-                names = list(dict.fromkeys(name for row in result.rows for name in row))
-                columns = {name: [row.get(name) for row in result.rows] for name in names}
-                units = "x, gap, slip in mm; pressure, shear, young1, young2 in MPa"
-                _csv(room / f"{result.figure}.csv", f"{result.figure} of Section 6, by reading; {units}", columns)
-            figure = found.plot()
-            for ending in ("png", "svg"):
-                figures.save(figure, room / f"reproduce.{ending}")
-
-    def write_ledger(self, ledger: Ledger) -> None:
-        """Write ``ledger.json``, ``ledger.md``, and of a whole ledger ``errata.md`` and ``verdicts.json``."""
-        with staged(self.path, FILES["verify"]) as room:
-            _text(room / "ledger.json", ledger.to_json())
-            _text(room / "ledger.md", sheets.page(ledger))
-            if ledger.whole:
-                _text(room / "errata.md", sheets.errata(ledger))
-                _text(room / "verdicts.json", sheets.verdicts(ledger))
+def _reproduced(room: Path, found: Reproduction) -> None:
+    """The rows behind each figure, and the figures."""
+    for result in found.results:
+        names = list(dict.fromkeys(name for row in result.rows for name in row))
+        columns = {name: [row.get(name) for row in result.rows] for name in names}
+        units = "x, gap, slip in mm; pressure, shear, young1, young2 in MPa"
+        _csv(room / f"{result.figure}.csv", f"{result.figure} of Section 6, by reading; {units}", columns)
+    _save(room, {"reproduce": found.plot()})
 
 
-def _may_go(there: bytes, text: str) -> bool:
-    """Whether a problem file may be replaced by a text: it is the same, or was written beside a result."""
+def _pages(room: Path, ledger: Ledger) -> None:
+    """``ledger.md``, and of a whole ledger ``errata.md`` and ``verdicts.json``."""
+    _text(room / "ledger.md", sheets.page(ledger))
+    if ledger.whole:
+        _text(room / "errata.md", sheets.errata(ledger))
+        _text(room / "verdicts.json", sheets.verdicts(ledger))
+
+
+def _replaceable(there: bytes, text: str) -> bool:
+    """True if a problem file is the same as a text, or was written beside a result."""
     return there == text.encode() or MARKS[".toml"] in there
 
 
@@ -158,7 +134,14 @@ def _pictures(room: Path, result: Run | Solution, comparison: Comparison | None 
         drawn["residuals"] = figures.draw_residuals(result, [] if comparison is None else comparison.computed)
     if comparison is not None and comparison.losses is not None:
         drawn["waterfall"] = figures.draw_waterfall(comparison.losses, comparison.units["stress"])
+    _save(room, drawn)
+    return list(drawn)
+
+
+def _save(room: Path, drawn: Mapping[str, Figure]) -> None:
+    """Write figures as PNG and SVG."""
+    from verification.figures import save
+
     for name, figure in drawn.items():
         for ending in ("png", "svg"):
-            figures.save(figure, room / f"{name}.{ending}")
-    return list(drawn)
+            save(figure, room / f"{name}.{ending}")

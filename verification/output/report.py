@@ -1,4 +1,4 @@
-"""The written report: one HTML file that asks no other file and no other host."""
+"""The written report: one HTML file that loads nothing from other files or hosts."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ GLOSSARY = {
 }
 
 VERDICTS = {
-    "CONSISTENT": "The largest ratio seen, rounding included, is below the bound, or attains it.",
-    "VIOLATED": "It is above: for a proved bound a bug or an error in the proof, for the printed one a finding; for "
+    "consistent": "The largest ratio seen, rounding included, is below the bound, or attains it.",
+    "violated": "It is above: for a proved bound a bug or an error in the proof, for the printed one a finding; for "
     "linearised, a forecast that missed.",
-    "INCONCLUSIVE": "The difference is smaller than rounding.",
-    "HYPOTHESES_NOT_MET": "The theorem draws no conclusion at this friction and theta.",
-    "NOT_COMPUTED": "There is nothing to hold against the run; the reason stands beside it.",
+    "inconclusive": "The difference is smaller than rounding.",
+    "no conclusion": "The theorem draws no conclusion at this friction and theta.",
+    "not computed": "No number was available to compare with the run; the reason is given.",
 }
 
 #: Beyond three columns, or with cells longer than this, a table is shown row by row on a phone.
@@ -47,12 +47,12 @@ NARROW = 20
 
 
 def _wide(part: Table) -> bool:
-    """Whether a table does not fit on a phone side by side."""
+    """True if the columns of a table do not fit on a phone."""
     return len(part.head) > 3 or any(len(str(cell)) > NARROW for row in part.rows for cell in row)
 
 
 def _inline(name: str, svg: str) -> str:
-    """An SVG without its prologue and with ids of its own, so that two can stand in one page."""
+    """An SVG without its prologue, its ids made unique, so that a page can contain several."""
     svg = re.sub(r"^.*?(?=<svg)", "", svg, flags=re.DOTALL)
     for reference in ('id="', 'href="#', "url(#"):
         svg = svg.replace(reference, f"{reference}{name}-")
@@ -60,13 +60,7 @@ def _inline(name: str, svg: str) -> str:
 
 
 def report(comparison: Comparison, figures: Mapping[str, str]) -> str:
-    """Render a comparison: its sections with figures, and what its words mean.
-
-    Parameters
-    ----------
-    comparison : Comparison
-    figures : mapping from ``bodies``, ``residuals``, ``waterfall`` to SVG text
-    """
+    """Render a comparison: its sections with figures, the SVG texts by name, and what its words mean."""
     environment = Environment(
         loader=PackageLoader("verification", "data"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )

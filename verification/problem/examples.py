@@ -6,31 +6,26 @@ import tomllib
 from collections.abc import Iterable
 from decimal import Decimal
 from importlib import resources
+from string import digits
 
 from ndtheory.texts import did_you_mean
 from verification.problem.specification import Problem
 from verification.problem.tables import short
 
-#: The meshes of Section 6 by their number of nodes: how often that of 60 nodes is halved.
+#: The meshes of Section 6 by their number of nodes: how often the mesh of 60 nodes is halved.
 FAMILY = {60: 0, 190: 1, 666: 2, 2482: 3}
 
 
 def examples() -> dict[str, str]:
-    """The built-in problem files by name, as text."""
-    files = resources.files("verification") / "data"
-    found = {
-        entry.name.removesuffix(".toml"): entry.read_text("utf-8")
-        for entry in sorted(files.iterdir(), key=lambda entry: entry.name)
-        if entry.name.endswith(".toml")
-    }
-    family = {f"section6-{nodes}": _member(found["section6"], nodes) for nodes in FAMILY}
-    return dict(
-        sorted({**found, **family}.items(), key=lambda item: (item[0].rstrip("0123456789"), len(item[0]), item[0]))
-    )
+    """Return the texts of the built-in problem files by name."""
+    files = [file for file in (resources.files("verification") / "data").iterdir() if file.name.endswith(".toml")]
+    found = {file.name.removesuffix(".toml"): file.read_text("utf-8") for file in files}
+    found |= {f"section6-{nodes}": _member(found["section6"], nodes) for nodes in FAMILY}
+    return {name: found[name] for name in sorted(found, key=lambda name: (name.rstrip(digits), len(name), name))}
 
 
 def _member(section6: str, nodes: int) -> str:
-    """The file of Section 6 on a mesh of the paper: 10 x 2 cells below and 8 x 2 above, halved; the grids differ."""
+    """Return the file of Section 6 on a mesh of the paper: 10 x 2 and 8 x 2 cells, halved; the two grids differ."""
     n = 2 ** FAMILY[nodes]
     return (
         section6.replace(
@@ -43,7 +38,7 @@ def _member(section6: str, nodes: int) -> str:
 
 
 def unknown_example(name: str, available: Iterable[str]) -> str:
-    """Message for a name that no built-in problem has: the known ones, and the one that may be meant."""
+    """Return the message for a name that no built-in problem has: the known ones, and the one that may be meant."""
     known = list(available)
     return f"no example {short(name)!r}; there are {', '.join(known)}{did_you_mean(name, known)}"
 

@@ -45,7 +45,7 @@ def load(path: Path | str) -> Problem:
 
 
 def read_file(path: Path | str) -> dict[str, Any]:
-    """The tables of a TOML file; decimals are read exactly.
+    """Read the tables of a TOML file; decimals are read exactly.
 
     Raises
     ------
@@ -53,22 +53,19 @@ def read_file(path: Path | str) -> dict[str, Any]:
         No such file, not readable, not TOML.
     """
     path = Path(path)
-    name = str(path)
-    why = unreadable(path, MOST_BYTES)
-    if why:
-        raise ProblemError(name, "", None, why)
+    refused = lambda why: ProblemError(str(path), "", None, why)
+    if why := unreadable(path, MOST_BYTES):
+        raise refused(why)
     try:
         content = path.read_bytes()
+        if not content.strip():
+            raise refused("the file is empty; `ndtheory example` prints one to start from")
+        return tomllib.loads(content.decode("utf-8-sig"), parse_float=Decimal)
     except OSError as error:
-        raise ProblemError(name, "", None, f"cannot be read: {error.strerror}") from None
-    if not content.strip():
-        raise ProblemError(name, "", None, "the file is empty; `ndtheory example` prints one to start from")
-    try:
-        data = tomllib.loads(content.decode("utf-8-sig"), parse_float=Decimal)
+        raise refused(f"cannot be read: {error.strerror}") from None
+    except ProblemError:  # a ValueError, as errors of TOML are
+        raise
     except UnicodeDecodeError:
-        raise ProblemError(name, "", None, "a TOML text file is needed, this is not UTF-8 text") from None
-    except (tomllib.TOMLDecodeError, RecursionError, ArithmeticError, ValueError) as error:
-        raise ProblemError(
-            name, "", None, f"not TOML: {' '.join(str(error).split()) or type(error).__name__}"
-        ) from None
-    return data
+        raise refused("a TOML text file is needed, this is not UTF-8 text") from None
+    except (RecursionError, ArithmeticError, ValueError) as error:
+        raise refused(f"not TOML: {' '.join(str(error).split()) or type(error).__name__}") from None

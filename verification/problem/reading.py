@@ -1,15 +1,16 @@
-"""The tables of a problem file, validated: from nested dictionaries to the data of a problem."""
+"""Reading of the tables of a problem file: from nested dictionaries to the validated data of a problem."""
 
 from __future__ import annotations
 
+import importlib
 import math
+import re
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 from ndtheory import HypothesisError
-from verification.problem.meshes import MeshFile, sha256_text
 from verification.problem.specs import (
     INTERVAL_SIDES,
     MOST_CELLS,
@@ -20,6 +21,7 @@ from verification.problem.specs import (
     Components,
     ContactSpec,
     IterationSpec,
+    MeshFile,
     ProblemSpec,
     SidePart,
     Theta,
@@ -39,19 +41,44 @@ from verification.problem.tables import (
     several,
     text,
 )
-from verification.problem.vocabulary import LawEntry, Vocabulary
 
 
-def read_problem(data: Mapping[str, Any], source: str, words: Vocabulary) -> ProblemSpec:
-    """Validate a nested dictionary with the keys of the problem file.
+class LawEntry(Protocol):
+    """The attributes of a law that a reader needs; see :class:`verification.interface.interface.Law`."""
 
-    Parameters
-    ----------
-    data : mapping
-    source : str
-        What errors name.
-    words : Vocabulary
-        The laws and rules that the file may name.
+    label: str
+    needs_radius: bool
+
+
+class RuleEntry(Protocol):
+    """The attributes of a rule that a reader needs; see :class:`verification.algorithm.relaxation.Rule`."""
+
+    takes_theta: bool
+
+
+def registered_laws() -> Mapping[str, LawEntry]:
+    """Return the laws of friction that a file may name now.
+
+    Laws and rules act on what is made from problems, so this module imports theirs by name.
+    """
+    laws: Mapping[str, LawEntry] = importlib.import_module("verification.interface.friction").LAWS
+    return laws
+
+
+def registered_rules() -> Mapping[str, RuleEntry]:
+    """Return the relaxation rules that a file may name now."""
+    rules: Mapping[str, RuleEntry] = importlib.import_module("verification.algorithm.relaxation").RULES
+    return rules
+
+
+def takes_theta(relaxation: Any) -> bool:
+    """Return True if the rule of that name uses a given theta; names of no rule are refused elsewhere."""
+    rule = registered_rules().get(relaxation) if isinstance(relaxation, str) else None
+    return rule is None or rule.takes_theta
+
+
+def read_problem(data: Mapping[str, Any], source: str) -> ProblemSpec:
+    """Validate a nested dictionary with the keys of the problem file; errors name its source.
 
     Raises
     ------
@@ -73,8 +100,8 @@ def read_problem(data: Mapping[str, Any], source: str, words: Vocabulary) -> Pro
     if not (body1.rigid or body2.rigid or 1 / MOST_CONTRAST <= body1.young / body2.young <= MOST_CONTRAST):
         needed = f"needed a modulus within {float(MOST_CONTRAST):g} times that of body1, {float(body1.young):g}"
         raise top.refuse("body2.young", body2.young, f'{needed}; for `solve`, shape = "rigid" makes an obstacle')
-    contact = _read_contact(top.table("contact"), dimension, words.laws)
-    iteration = _read_iteration(top.table("iteration"), words)
+    contact = _read_contact(top.table("contact"), dimension)
+    iteration = _read_iteration(top.table("iteration"))
     norm = top.table("norm")
     length = norm.take("length", positive, Fraction(1))
     norm.close()
@@ -93,7 +120,7 @@ def read_problem(data: Mapping[str, Any], source: str, words: Vocabulary) -> Pro
 
 
 def _read_shape(table: TomlTable, dimension: int, source: str) -> dict[str, Any]:
-    """The geometry of a body: a mesh file, or a shape with its cells."""
+    """Read the geometry of a body: a mesh file, or a shape with its cells."""
     if "mesh" in table:
         if dimension == 1:
             raise table.refuse("mesh", None, "in one dimension a body is an interval")
@@ -101,25 +128,20 @@ def _read_shape(table: TomlTable, dimension: int, source: str) -> dict[str, Any]
             if name in table:
                 raise table.refuse(name, None, "needed either mesh or shape, x, y and cells, not both")
         return {"shape": "mesh", "mesh": _read_mesh(table, source)}
-    natural = "interval" if dimension == 1 else "rectangle"
-    shape = table.take("shape", choice(natural, "rigid"))
+    axes = ("x", "y")[:dimension]
+    shape = table.take("shape", choice("interval" if dimension == 1 else "rectangle", "rigid"))
     if shape == "rigid":
-        read_rigid = {"x": table.take("x", ends, None)}
-        if dimension == 2:
-            read_rigid["y"] = table.take("y", ends, None)
-        return {"shape": shape, **read_rigid}
-    if dimension == 1:
-        read: dict[str, Any] = {"x": table.take("x", ends), "cells": (table.take("cells", at_least_one),)}
-    else:
-        pair = several(at_least_one, 2, "two whole numbers >= 1, along x and y")
-        read = {"x": table.take("x", ends), "y": table.take("y", ends), "cells": table.take("cells", pair)}
+        return {"shape": shape, **{axis: table.take(axis, ends, None) for axis in axes}}
+    read: dict[str, Any] = {axis: table.take(axis, ends) for axis in axes}
+    pair = several(at_least_one, 2, "two whole numbers >= 1, along x and y")
+    read["cells"] = table.take("cells", pair) if dimension == 2 else (table.take("cells", at_least_one),)
     if math.prod(read["cells"]) > MOST_CELLS:
         raise table.refuse("cells", list(read["cells"]), f"needed at most {MOST_CELLS} cells")
     return {"shape": shape, **read}
 
 
 def _read_mesh(table: TomlTable, source: str) -> MeshFile:
-    """A mesh file: its name, its name and the SHA-256 it must have, or one that was read before."""
+    """Read a mesh file: its name, its name and the SHA-256 it must have, or one that was read before."""
 
     def read(value: Any) -> MeshFile | TomlTable | str:
         if isinstance(value, Mapping):
@@ -130,27 +152,29 @@ def _read_mesh(table: TomlTable, source: str) -> MeshFile:
     if isinstance(given, MeshFile):
         return given
     if isinstance(given, TomlTable):
-        name, sha256 = given.take("path", text), given.take("sha256", sha256_text)
+        name, sha256 = given.take("path", text), given.take("sha256", _sha256)
         given.close()
     else:
         name, sha256 = given, None
-    path = Path() if source == "<dict>" else Path(source).parent
-    path /= name
+    path = (Path() if source == "<dict>" else Path(source).parent) / name
     try:
         return MeshFile.read(path, sha256)
     except Unfit as error:
         raise table.refuse("mesh", path, str(error)) from None
 
 
+def _sha256(value: object) -> str:
+    """Read a SHA-256 in hexadecimal digits."""
+    given = text(value)
+    if not re.fullmatch("[0-9a-f]{64}", given):
+        raise Unfit("needed the SHA-256 of the mesh file, 64 hexadecimal digits")
+    return given
+
+
 def _components(dimension: int, *, free: bool) -> Any:
-    """Read a vector by components; in 1D a bare number will do."""
+    """Return a reader of vectors by components; in 1D it takes a bare number too."""
     plain = number()
-
-    def one(value: Any) -> Fraction | None:
-        if free and value == "free":
-            return None
-        return plain(value)
-
+    one = lambda value: None if free and value == "free" else plain(value)
     needed = "a number" if dimension == 1 else "two numbers, along x and y"
     if free:
         needed += ' ("free" leaves a component free)'
@@ -176,7 +200,7 @@ def _by_side(table: TomlTable, sides: tuple[str, ...] | None, read: Any) -> Mapp
 
 
 def _read_parts(table: TomlTable, sides: tuple[str, ...] | None, dimension: int) -> Mapping[str, SidePart]:
-    """Parts of sides, each under a name of its own: the side, and the ends of the part along x or y."""
+    """Read parts of sides, each with its own name: the side, and the ends of the part along x or y."""
     parts = {}
     for name in _names(table):
         if dimension == 1:
@@ -192,7 +216,7 @@ def _read_parts(table: TomlTable, sides: tuple[str, ...] | None, dimension: int)
 
 
 def _names(table: TomlTable) -> Iterator[str]:
-    """The keys of a table, each of which must be a name that a file can hold."""
+    """Yield the keys of a table, each of which must be a name that a file can hold."""
     for name in table.names():
         try:
             yield label(name)
@@ -205,10 +229,8 @@ def _read_body(table: TomlTable, dimension: int, source: str) -> BodySpec:
     if shape["shape"] == "rigid":
         table.close()
         return BodySpec(**shape)
-    sides: tuple[str, ...] | None = {"rectangle": RECTANGLE_SIDES, "interval": INTERVAL_SIDES, "mesh": None}[
-        shape["shape"]
-    ]
-
+    known: dict[str, tuple[str, ...]] = {"rectangle": RECTANGLE_SIDES, "interval": INTERVAL_SIDES}
+    sides = known.get(shape["shape"])  # the sides of a mesh file are known only later
     parts = _read_parts(table.table("parts"), sides, dimension)
     if sides is not None:
         sides += tuple(parts)
@@ -257,7 +279,8 @@ def _read_body(table: TomlTable, dimension: int, source: str) -> BodySpec:
     )
 
 
-def _read_contact(table: TomlTable, dimension: int, laws: Mapping[str, LawEntry]) -> ContactSpec:
+def _read_contact(table: TomlTable, dimension: int) -> ContactSpec:
+    laws = registered_laws()
     friction = table.take("friction", coefficient, Fraction(0))
     law = table.take("law", choice(*laws), "nonlocal")
     radius = table.take("radius", positive, None)
@@ -291,11 +314,11 @@ tolerance = number("a number with 0 < tolerance < 1", lambda v: 0 < v < 1)
 at_least_one = integer("a whole number >= 1", 1)
 
 
-def _read_iteration(table: TomlTable, words: Vocabulary) -> IterationSpec:
-    relaxation: str = table.take("relaxation", choice(*words.rules), "constant")
+def _read_iteration(table: TomlTable) -> IterationSpec:
+    relaxation: str = table.take("relaxation", choice(*registered_rules()), "constant")
     spec = IterationSpec(
         neumann_body=table.take("neumann_body", choice(1, 2), 2),
-        theta=table.take("theta", factor, Fraction(1, 2) if words.takes_theta(relaxation) else "auto"),
+        theta=table.take("theta", factor, Fraction(1, 2) if takes_theta(relaxation) else "auto"),
         relaxation=relaxation,
         tolerance=float(table.take("tolerance", tolerance, Fraction(1, 10**9))),
         max_iterations=table.take("max_iterations", at_least_one, 500),

@@ -2,27 +2,51 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+import tomllib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from decimal import Decimal
 from typing import Any, Literal
 
 from ndtheory.number import Numeric
-from verification.problem.changes import Key, given, typed, with_values
-from verification.problem.digest import fingerprint
-from verification.problem.reading import read_problem
+from verification.problem.reading import read_problem, takes_theta
 from verification.problem.specs import MOST_CELLS, BodySpec, ProblemSpec, read_theta
-from verification.problem.tables import ProblemError
-from verification.problem.toml import document
-from verification.problem.vocabulary import vocabulary
-from verification.problem.writing import plain, tables
+from verification.problem.tables import QUOTED, ProblemError
+from verification.problem.writing import plain, tables, toml
+
+_OF_A_BODY = (
+    *("shape", "mesh", "x", "y", "cells", "young", "poisson", "parts", "fixed", "prescribed", "traction", "body_force"),
+)
+
+#: The keys that enter a digest whether they have their default or another value: those of 0.1.0.  This list never
+#: grows: a later key enters only where it differs from its default, so that the digests of problems without it stay.
+ALWAYS = {
+    "dimension": (),
+    "body1": _OF_A_BODY,
+    "body2": _OF_A_BODY,
+    "contact": ("interval", "friction", "law", "radius", "gap"),
+    "iteration": ("neumann_body", "theta", "relaxation", "tolerance", "max_iterations"),
+    "norm": ("length",),
+}
+
+#: The keys that change no number.
+NEVER = ("title", "units")
+
+#: A key by its tables and its name.
+Key = tuple[str, ...]
+
+#: Stands where a value would, while a key is read.
+_HERE = "value"
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Problem(ProblemSpec):
     """A validated problem; see the problem file in the documentation.
 
-    Problems are equal where all but their source is; :attr:`digest` asks only for what changes a number.
+    Two problems are equal where all but their source is; :attr:`digest` compares only what changes a number.
 
     Attributes
     ----------
@@ -59,32 +83,36 @@ class Problem(ProblemSpec):
         ProblemError
             Naming source, key, value received and what is needed.
         """
-        return cls(**vars(read_problem(data, source, vocabulary())))
+        return cls(**vars(read_problem(data, source)))
+
+    def refuse(self, key: str, value: object, needed: str) -> ProblemError:
+        """Return the error for a key of this problem."""
+        return ProblemError(self.source, key, value, needed)
 
     def to_dict(self) -> dict[str, Any]:
-        """The nested dictionary of the problem file, from which :meth:`from_dict` makes an equal problem.
+        """Return the nested dictionary of the problem file, from which :meth:`from_dict` makes an equal problem.
 
         It holds every key that has a value, defaults too; a key without one (no interval, no radius, no sides) is left
         out.  Equal problems give equal dictionaries.  A number is a number where the decimal that JSON prints of it is
-        exact, a text such as ``"1/3"`` elsewhere.  A mesh file stands there by its absolute path and the SHA-256 of its
-        content, and :meth:`from_dict` refuses a file whose content is another.
+        exact, a text such as ``"1/3"`` elsewhere.  A mesh file is written as its absolute path and the SHA-256 of its
+        content, and :meth:`from_dict` refuses a file with other content.
         """
         written: dict[str, Any] = plain(tables(self))
         return written
 
     def to_toml(self) -> str:
-        """The text of a problem file (UTF-8) that reads back as an equal problem, wherever it is kept.
+        """Return the text of a problem file (UTF-8) that reads back as an equal problem, wherever it is kept.
 
         Raises
         ------
         ProblemError
-            The path of a mesh file is no text, so that no TOML can name it.
+            The path of a mesh file is not UTF-8, so that TOML cannot name it.
         """
-        written = document(self.to_dict())
+        written = toml(self.to_dict())
         try:
             written.encode()
         except UnicodeEncodeError:
-            raise ProblemError(self.source, "mesh", None, "needed a mesh file whose path is UTF-8") from None
+            raise self.refuse("mesh", None, "needed a mesh file whose path is UTF-8") from None
         return written
 
     @property
@@ -94,7 +122,17 @@ class Problem(ProblemSpec):
         Left out are title, labels of units, source, the places of mesh files (their content counts) and the order of
         sides.  It outlives releases: a key that the problem file gets later counts only where it has no default.
         """
-        return fingerprint(self)
+        data = _without_defaults(self, tables(self))
+        for name in NEVER:
+            data.pop(name, None)
+        for name in ("body1", "body2"):
+            body = data[name]
+            if "mesh" in body:
+                body["mesh"] = body["mesh"].sha256
+            if "fixed" in body:
+                body["fixed"] = tuple(sorted(body["fixed"]))
+        text = json.dumps(plain(data), sort_keys=True, separators=(",", ":"))
+        return hashlib.sha256(text.encode("ascii")).hexdigest()
 
     def changed(
         self,
@@ -113,7 +151,7 @@ class Problem(ProblemSpec):
         tolerance: Numeric | None = None,
         max_iterations: int | None = None,
     ) -> Problem:
-        """The same problem with other values, read as those of a file are: exactly, and refused by the same words.
+        """Return the same problem with other values, read and refused like the values of a file.
 
         Parameters
         ----------
@@ -127,41 +165,59 @@ class Problem(ProblemSpec):
         ProblemError
             Naming the key as the problem file has it.
         """
-        contact = {"friction": friction, "law": law, "radius": radius, "gap": gap}
-        iteration = {
-            "neumann_body": neumann_body,
-            "theta": theta,
-            "relaxation": relaxation,
-            "tolerance": tolerance,
-            "max_iterations": max_iterations,
-        }
-        each: dict[Key, Any] = {
+        given: dict[Key, Any] = {
             ("title",): title,
-            **{("contact", name): value for name, value in contact.items()},
-            **{("iteration", name): value for name, value in iteration.items()},
+            ("contact", "friction"): friction,
+            ("contact", "law"): law,
+            ("contact", "radius"): radius,
+            ("contact", "gap"): gap,
+            ("iteration", "neumann_body"): neumann_body,
+            ("iteration", "theta"): theta,
+            ("iteration", "relaxation"): relaxation,
+            ("iteration", "tolerance"): tolerance,
+            ("iteration", "max_iterations"): max_iterations,
         }
-        return self._with(given(each, {"young": young, "poisson": poisson, "cells": cells}, self.source))
+        for name, pair in {"young": young, "poisson": poisson, "cells": cells}.items():
+            if pair is not None and (not isinstance(pair, (list, tuple)) or len(pair) != 2):
+                needed = "needed two values, for body 1 and body 2 (None leaves a body as it is)"
+                raise self.refuse(name, pair, needed)
+            given |= {(f"body{i}", name): value for i, value in enumerate(pair or (), 1)}
+        return self._with({key: value for key, value in given.items() if value is not None})
 
     def with_keys(self, values: Mapping[str, Any]) -> Problem:
-        """The same problem with keys of its file set, as ``{"contact.friction": "0.4", "body1.cells": "[40, 6]"}``.
+        """Return the problem with keys of its file set, as ``{"contact.friction": "0.4", "body1.cells": "[40, 6]"}``.
 
         Parameters
         ----------
         values : mapping from dotted key to value
-            A text is read as a TOML value; one that is no TOML value and opens none is meant as it stands (``auto``,
-            ``1/3``).  What is no text is taken as it is.  Keys are set one after the other.
+            A text is read as a TOML value; a text that is none and opens none is taken literally (``auto``, ``1/3``).
+            Any other object is taken as it is.  Keys are set one after the other.
 
         Raises
         ------
         ProblemError
         """
-        return self._with(typed(values, self.source))
+        source = self.source
+        return self._with({_key(name, source): _value(name, value, source) for name, value in values.items()})
 
-    def _with(self, values: Iterable[tuple[Key, Any]]) -> Problem:
-        return Problem(**vars(with_values(self, values, vocabulary())))
+    def _with(self, values: Mapping[Key, Any]) -> Problem:
+        """Set some keys of the file, in order; a rule that takes its step from rho, without a theta, gets ``auto``."""
+        data = tables(self)
+        if not takes_theta(values.get(("iteration", "relaxation"))):
+            values = {("iteration", "theta"): "auto", **values}
+        for key, value in values.items():
+            *parents, name = key
+            table = data
+            for depth, parent in enumerate(parents, 1):
+                table = table.setdefault(parent, {})
+                if not isinstance(table, dict):
+                    needed = f"unknown key; {'.'.join(key[:depth])} is no table"
+                    raise self.refuse(".".join(key), None, needed)
+            table[name] = value
+        return Problem.from_dict(data, self.source)
 
     def with_theta(self, theta: Numeric) -> Problem:
-        """The same problem at another theta.
+        """Return the same problem at another theta.
 
         Raises
         ------
@@ -178,12 +234,12 @@ class Problem(ProblemSpec):
         return 1 if self.iteration.neumann_body == 2 else 2
 
     def swapped(self) -> Problem:
-        """The same problem with the Neumann problem given to the other body."""
+        """Return the same problem with the Neumann problem given to the other body."""
         other: Literal[1, 2] = 1 if self.iteration.neumann_body == 2 else 2
         return replace(self, iteration=replace(self.iteration, neumann_body=other))
 
     def refined(self, halvings: int) -> Problem:
-        """The same problem on a mesh halved ``halvings`` times.
+        """Return the same problem on a mesh halved ``halvings`` times.
 
         Raises
         ------
@@ -196,13 +252,67 @@ class Problem(ProblemSpec):
                 return body
             if body.cells is None:
                 named = body.mesh.path.name if body.mesh else None
-                raise ProblemError(self.source, f"{name}.mesh", named, "a mesh file cannot be halved")
+                raise self.refuse(f"{name}.mesh", named, "a mesh file cannot be halved")
             cells = tuple(n * 2**halvings for n in body.cells)
             if math.prod(cells) > MOST_CELLS:
                 needed = f"needed at most {MOST_CELLS} cells after {halvings} halvings"
-                raise ProblemError(self.source, f"{name}.cells", list(cells), needed)
+                raise self.refuse(f"{name}.cells", list(cells), needed)
             return replace(body, cells=cells)
 
         if not isinstance(halvings, int) or halvings < 0:  # type: ignore[redundant-expr]  # a caller need not be typed
             raise ValueError(f"{halvings} halvings: a whole number >= 0 is needed")
         return replace(self, body1=halved("body1", self.body1), body2=halved("body2", self.body2))
+
+
+def _key(name: str, source: str) -> Key:
+    """Split ``body2.prescribed.top`` into its parts; TOML reads it, so that a part may be quoted."""
+    refused = ProblemError(source, name or QUOTED, None, "needed the name of a key, as contact.friction")
+    try:
+        found: Any = tomllib.loads(f'{name} = "{_HERE}"') if name.isprintable() else None
+    except (tomllib.TOMLDecodeError, RecursionError):
+        raise refused from None
+    parts = []
+    while isinstance(found, dict) and len(found) == 1:
+        [(part, found)] = found.items()
+        parts.append(part)
+    if found != _HERE or not parts:
+        raise refused
+    return tuple(parts)
+
+
+def _value(name: str, value: Any, source: str) -> Any:
+    """Read a TOML value; a text that is none and opens none is taken literally."""
+    if not isinstance(value, str):
+        return value
+    if not value.strip():
+        raise ProblemError(source, name, value, 'needed a value (an empty text is "")')
+    try:
+        found = tomllib.loads(f"{_HERE} = {value}", parse_float=Decimal)
+        if len(found) == 1:
+            return found[_HERE]
+    except (ValueError, ArithmeticError, RecursionError):
+        pass
+    if value.lstrip()[0] in "\"'[{":
+        raise ProblemError(source, name, value, "this is not a TOML value: a bracket, brace or quotation mark is wrong")
+    return value
+
+
+def _without_defaults(problem: ProblemSpec, data: dict[str, Any]) -> dict[str, Any]:
+    """Leave out the later keys of a problem that have their default: it reads back the same without them."""
+
+    def shorter(less: dict[str, Any]) -> dict[str, Any]:
+        try:
+            return less if tables(read_problem(less, problem.source)) == tables(problem) else data
+        except ProblemError:  # the file must have them
+            return data
+
+    for name in [name for name in data if name not in (*ALWAYS, *NEVER)]:
+        data = shorter(_without(data, name))
+    for name, always in ALWAYS.items():
+        for key in [key for key in data[name] if key not in always] if always else []:
+            data = shorter(data | {name: _without(data[name], key)})
+    return data
+
+
+def _without(table: Mapping[str, Any], name: str) -> dict[str, Any]:
+    return {key: value for key, value in table.items() if key != name}

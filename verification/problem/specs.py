@@ -1,46 +1,124 @@
-"""The parts of a problem: two bodies, their contact, the iteration and the norm, as plain data."""
+"""Parts of a problem: two bodies, their contact, the iteration and the norm, as plain data."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import hashlib
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from fractions import Fraction
-from typing import Any, Literal
+from pathlib import Path
+from typing import Any, Literal, TypeVar
 
 from ndtheory import HypothesisError, relaxation_factor
-from verification.problem.meshes import MeshFile
-from verification.problem.read_only import ReadOnly
+from verification.problem.tables import Unfit, unreadable
+
+V = TypeVar("V")
 
 #: A displacement or a force by component; None leaves a displacement component free.
 Components = tuple[Fraction | None, ...]
 
-#: A relaxation factor, or the one that theory chooses.
+#: A relaxation factor, or ``auto`` for the one that the theory chooses.
 Theta = Fraction | Literal["auto"]
 
 RECTANGLE_SIDES = ("left", "right", "bottom", "top")
 INTERVAL_SIDES = ("left", "right")
 
-#: Largest number of cells of a body; a typing error should not fill the memory.
+#: Largest size of a mesh file: several times the size of the largest mesh as text.
+MOST_MESH_BYTES = 200_000_000
+
+#: Largest number of cells of a body, so that a typing error does not fill the memory.
 MOST_CELLS = 250_000
 
 #: Largest ratio of the two moduli: at 1e60 the bounds of Section 5, with high powers of M C_R / m, overflow a double.
 MOST_CONTRAST = Fraction(10**30)
 
-#: Largest coefficient of friction; larger ones differ from it by nothing but overflow, as all contact sticks.
+#: Largest coefficient of friction: all contact sticks already, and larger ones would only overflow.
 MOST_FRICTION = Fraction(10**9)
+
+
+class ReadOnly(Mapping[str, V]):
+    """An immutable mapping that a frozen dataclass can hold; equal ones iterate alike, in the order of the keys.
+
+    >>> ReadOnly({"top": 1, "left": 2})
+    {'left': 2, 'top': 1}
+    """
+
+    __slots__ = ("_values",)
+
+    def __init__(self, values: Mapping[str, V] | Iterable[tuple[str, V]] = ()) -> None:
+        self._values = dict(sorted(dict(values).items()))
+
+    def __getitem__(self, key: str) -> V:
+        return self._values[key]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def __hash__(self) -> int:
+        return hash(tuple(self._values.items()))
+
+    def __repr__(self) -> str:
+        return repr(self._values)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeshFile:
+    """A mesh file as it was when the problem was read.
+
+    Attributes
+    ----------
+    path : Path
+        Absolute, so that it means the same file wherever the process or the problem goes.
+    sha256 : str
+        Of the content, in hexadecimal digits.
+    """
+
+    path: Path
+    sha256: str
+
+    @classmethod
+    def read(cls, path: Path, sha256: str | None = None) -> MeshFile:
+        """Return the file at a path.
+
+        Raises
+        ------
+        Unfit
+            Not a file, too large, or with another SHA-256 than the one given.
+        """
+        file = cls(path=path.absolute(), sha256=sha256 or _fingerprint(path))
+        why = file.unusable() if sha256 else None
+        if why:
+            raise Unfit(why)
+        return file
+
+    def unusable(self) -> str | None:
+        """Return why the file is not the one that was read, or None where it is."""
+        try:
+            found = _fingerprint(self.path)
+        except Unfit as error:
+            return str(error)
+        if found == self.sha256:
+            return None
+        return f"its content has changed: needed the file with sha256 {self.sha256}, this one has {found}"
+
+
+def _fingerprint(path: Path) -> str:
+    why = unreadable(path, MOST_MESH_BYTES)
+    if why:
+        raise Unfit(why)
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise Unfit(f"cannot be read: {error.strerror}") from None
 
 
 @dataclass(frozen=True, kw_only=True)
 class SidePart:
-    """A part of a side of a body, between two positions along an axis.
-
-    Attributes
-    ----------
-    side : str
-    axis : {'x', 'y'}
-    ends : pair of Fraction
-        Unit of length; the part has the edges of the side that lie between them.
-    """
+    """A part of a side of a body: the side's edges between two positions along an axis (unit of length)."""
 
     side: str
     axis: Literal["x", "y"]
@@ -54,15 +132,11 @@ class BodySpec:
     Attributes
     ----------
     shape : {'rectangle', 'interval', 'mesh', 'rigid'}
-        A rigid body is an obstacle: of the rest it has x and y at most.
-    x, y : pair of Fraction or None
-    cells : tuple of int or None
-    mesh : MeshFile or None
+        A rigid body is an obstacle: of the other attributes it has at most x and y.
     young, poisson : Fraction
         E in stress; Poisson's ratio is 0 for a bar.  Both 0 where rigid.
     parts : read-only mapping from name to SidePart
-        Parts of sides that are named like sides.
-    fixed : tuple of str
+        Parts of sides, each with a name that is used like a side's.
     prescribed, traction : read-only mapping from side to components
         Displacement (length; None: free) and force per area (stress).
     body_force : tuple of Fraction
@@ -88,7 +162,7 @@ class BodySpec:
 
     @property
     def rigid(self) -> bool:
-        """Whether the body is an obstacle."""
+        """True if the body is an obstacle."""
         return self.shape == "rigid"
 
 
@@ -119,7 +193,7 @@ class ContactSpec:
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """How a run goes: its relaxation and when it ends.
+    """Settings of a run: its relaxation and when it ends.
 
     Attributes
     ----------
@@ -127,10 +201,9 @@ class Settings:
         ``auto``: the proved theta; the predicted one where nothing is proved or the proved one is more than twice as
         slow.  Momentum takes its step from rho: ``auto`` unless the file has a theta, which is then not used.
     relaxation : str
-        One of :data:`verification.algorithm.relaxation.RULES`; beside ``constant`` outside the theorem.
+        One of :data:`verification.algorithm.relaxation.RULES`; the theorem covers only ``constant``.
     tolerance : float
         The run ends when ``|||T g - g||| <= tolerance |||T g|||`` in the norm (5.21), with the largest T g so far.
-    max_iterations : int
     """
 
     theta: Theta = Fraction(1, 2)
@@ -141,12 +214,9 @@ class Settings:
 
 @dataclass(frozen=True, kw_only=True)
 class IterationSpec(Settings):
-    """The table ``[iteration]``.
+    """The table ``[iteration]``: settings of a run, and the body of the linear problem of step I.
 
-    Attributes
-    ----------
-    neumann_body : {1, 2}
-        Who gets the linear problem of step I: 2 as in Section 3, 1 as in Section 6.
+    ``neumann_body`` is 2 in Section 3, 1 in Section 6.
     """
 
     neumann_body: Literal[1, 2] = 2
@@ -159,7 +229,7 @@ class IterationSpec(Settings):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class ProblemSpec:
-    """The tables of a problem file, each key with its value; :class:`verification.Problem` says more."""
+    """The tables of a problem file, each key with its value; see :class:`verification.Problem`."""
 
     title: str
     dimension: Literal[1, 2]
@@ -176,7 +246,7 @@ class ProblemSpec:
 
 
 def read_theta(value: Any) -> Theta:
-    """A relaxation factor, or "auto".
+    """Read a relaxation factor, or "auto".
 
     Raises
     ------

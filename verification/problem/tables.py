@@ -1,4 +1,4 @@
-"""Typed reading of tables: every key once, each error one line with file, key, value and what is needed."""
+"""Typed reading of tables: every key is read once; an error is one line with file, key, value and what is needed."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
+from string import digits
 from typing import Any, TypeVar
 
 from ndtheory import exact
@@ -19,16 +20,13 @@ _MISSING: Any = object()
 #: Numbers of a problem file lie between these sizes or are 0; beyond them products of a few overflow a double.
 SMALLEST, LARGEST = Fraction(1, 10**30), Fraction(10**30)
 
-
-DIGITS = "0123456789"
-
 #: Most characters of a value that a message repeats.
 LONGEST = 60
 
 #: Most characters of a path that a message repeats.
 LONGEST_PATH = 600
 
-#: How a message writes an empty key.
+#: An empty key in a message.
 QUOTED = '""'
 
 
@@ -40,7 +38,7 @@ class ProblemError(ValueError):
     file : str
         The problem file, or ``<dict>``.
     key : str
-        Dotted path of the key, empty where the file as a whole is meant.
+        Dotted path of the key, empty where the error is about the whole file.
     value : object
         The value received; None where there is none.
     needed : str
@@ -59,11 +57,11 @@ class ProblemError(ValueError):
 
 
 class Unfit(Exception):
-    """A value that a reading function refuses; carries what is needed."""
+    """A value that a reading function refuses; the message says what is needed."""
 
 
 def short(text: str, most: int = 100) -> str:
-    """A text of at most so many characters, its end left out where it has more.
+    """Shorten a text to so many characters, leaving out its end.
 
     >>> short("a" * 200, 10)
     'aaaaaaa...'
@@ -72,9 +70,9 @@ def short(text: str, most: int = 100) -> str:
 
 
 def unreadable(path: Path, most: int) -> str | None:
-    """Why a path is no regular file of at most ``most`` bytes, or None where it is one.
+    """Return why a path is not a regular file of at most ``most`` bytes, or None where it is.
 
-    Asked before a file is opened: a pipe or a device may have no end.
+    Call it before opening a file: a pipe or a device may have no end.
     """
     try:
         found = path.stat()
@@ -92,7 +90,7 @@ def unreadable(path: Path, most: int) -> str | None:
 
 
 def show(value: object) -> str:
-    """A value on one short line, as a problem file writes it."""
+    """Write a value on one short line, as a problem file writes it."""
     if isinstance(value, bool):
         text = str(value).lower()
     elif isinstance(value, int) and value.bit_length() > 1000:
@@ -116,9 +114,9 @@ def show(value: object) -> str:
 
 
 def number(needed: str = "a number", holds: Callable[[Fraction], bool] = lambda v: True) -> Callable[[Any], Fraction]:
-    """Read an exact number: 0.4, 4e-1 or "2/5"; never true, NaN or infinity.
+    """Return a reader of exact numbers: 0.4, 4e-1 or "2/5"; never true, NaN or infinity.
 
-    The condition must hold of the number and of the double it becomes.
+    The condition must hold for the number and for the double it becomes.
     """
 
     def read(value: Any) -> Fraction:
@@ -142,7 +140,7 @@ non_negative = number("a number >= 0", lambda v: v >= 0)
 
 
 def integer(needed: str, least: int) -> Callable[[Any], int]:
-    """Read a whole number, not 12.0 and not true."""
+    """Return a reader of whole numbers: not 12.0 and not true."""
 
     def read(value: Any) -> int:
         if isinstance(value, bool) or not isinstance(value, int) or value < least or value.bit_length() > 1000:
@@ -160,10 +158,7 @@ def text(value: Any) -> str:
 
 
 def label(value: Any) -> str:
-    """Read a string that a terminal and files of any kind can show: without characters of control.
-
-    Half of a surrogate pair, which a dictionary may bring, is none either.
-    """
+    """Read a string that terminals and files can show: no control characters, no half of a surrogate pair."""
     try:
         text(value).encode()
     except UnicodeEncodeError:
@@ -174,7 +169,7 @@ def label(value: Any) -> str:
 
 
 def choice(*allowed: Any) -> Callable[[Any], Any]:
-    """Read one of a few values."""
+    """Return a reader of one of a few values."""
 
     def read(value: Any) -> Any:
         if type(value) not in {type(v) for v in allowed} or value not in allowed:  # 1 is not true and not 1.0
@@ -186,7 +181,7 @@ def choice(*allowed: Any) -> Callable[[Any], Any]:
 
 
 def several(read: Callable[[Any], V], count: int, needed: str) -> Callable[[Any], tuple[V, ...]]:
-    """Read a list of exactly ``count`` values."""
+    """Return a reader of lists of exactly ``count`` values."""
 
     def read_all(value: Any) -> tuple[V, ...]:
         if not isinstance(value, (list, tuple)) or len(value) != count:
@@ -206,12 +201,10 @@ def ends(value: Any) -> tuple[Fraction, Fraction]:
 
 
 class TomlTable:
-    """A table of which every key is taken once; what is left over is an error.
+    """A table of which every key is taken once; any key left over is an error.
 
     Parameters
     ----------
-    data : mapping
-    file : str
     path : str
         Dotted path of the table, empty at the top.
     """
@@ -223,23 +216,18 @@ class TomlTable:
         self._known: list[str] = []
 
     def key(self, name: str) -> str:
-        """Dotted path of a key in this table, an empty one in quotes."""
+        """Return the dotted path of a key in this table, an empty one in quotes."""
         return f"{self._path}.{name or QUOTED}" if self._path else name or QUOTED
 
     def refuse(self, name: str, value: Any, needed: str) -> ProblemError:
-        """The error for a key of this table."""
+        """Return the error for a key of this table."""
         return ProblemError(self._file, self.key(name), value, needed)
 
     def __contains__(self, name: str) -> bool:
         return name in self._data
 
     def take(self, name: str, read: Callable[[Any], V], default: Any = _MISSING) -> V:
-        """Read a key; a missing one takes its default or is an error.
-
-        Raises
-        ------
-        ProblemError
-        """
+        """Read a key; a missing one takes its default or raises ProblemError, as a value does that does not fit."""
         self._known.append(name)
         value = self._data.pop(name, _MISSING)
         if value is _MISSING:
@@ -265,20 +253,14 @@ class TomlTable:
         return self.take(name, read, TomlTable({}, self._file, self.key(name)))
 
     def names(self) -> Iterable[str]:
-        """Keys not taken yet."""
+        """Return the keys not taken yet."""
         return list(self._data)
 
     def close(self) -> None:
-        """Refuse what nobody took.
-
-        Raises
-        ------
-        ProblemError
-            Naming the unknown key and the nearest known one.
-        """
+        """Raise ProblemError for a key that was not taken, naming it and the nearest known one."""
         for name, value in self._data.items():
-            # body3 is no misspelling of body2: names that differ in their number alone are meant as they are
-            others = [known for known in self._known if known.rstrip(DIGITS) != str(name).rstrip(DIGITS)]
+            # body3 does not misspell body2: names that differ only in their number are meant as they are
+            others = [known for known in self._known if known.rstrip(digits) != str(name).rstrip(digits)]
             near = nearest(str(name), others)
             known = f"did you mean {near[0]!r}?" if near else "known here: " + ", ".join(self._known)
             what = "table" if isinstance(value, Mapping) else "key"

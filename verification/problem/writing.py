@@ -1,7 +1,8 @@
-"""A problem as the dictionary of its file, exactly."""
+"""A problem as the dictionary of its file, exactly, and a dictionary as TOML text."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from decimal import Decimal
 from fractions import Fraction
@@ -9,18 +10,21 @@ from typing import Any
 
 from ndtheory import exact
 from ndtheory.number import LARGEST_EXPONENT
-from verification.problem.meshes import MeshFile
-from verification.problem.specs import BodySpec, ProblemSpec
+from ndtheory.texts import CONTROL
+from verification.problem.specs import BodySpec, MeshFile, ProblemSpec
 
 #: Integers up to this size are doubles: readers of JSON agree on them.
 LARGEST_INTEGER = 2**53
 
+#: What a basic string of TOML cannot hold as it is, or should not, and the short escapes.
+ESCAPED = re.compile(rf'(?![\ud800-\udfff])(?:{CONTROL.pattern}|["\\])')  # TOML has no halves of surrogate pairs
+SHORT = {"\b": r"\b", "\t": r"\t", "\n": r"\n", "\f": r"\f", "\r": r"\r", '"': r"\"", "\\": r"\\"}
+
 
 def tables(problem: ProblemSpec) -> dict[str, Any]:
-    """The keys of the problem file with the values that their readers return.
+    """Return the keys of the problem file with the values that their readers return.
 
-    A key stands there where it has a value, its default or another; where there is none (no interval, no radius, no
-    sides) it is left out.  Keys come in the order of the built-in files.
+    They come in the order of the built-in files.  A key without a value (no interval, no radius, no sides) is left out.
     """
     return {
         "title": problem.title,
@@ -58,7 +62,7 @@ def _body(body: BodySpec) -> dict[str, Any]:
 
 
 def _vector(values: tuple[Fraction | None, ...], bar: bool) -> Any:
-    """A vector by components, of a bar its only one; None as the word for it."""
+    """List the components of a vector, None as ``free``; of a bar there is only one, and it stays a number."""
     named = tuple("free" if v is None else v for v in values)
     return named[0] if bar else named
 
@@ -68,7 +72,7 @@ def _present(table: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def plain(value: Any) -> Any:
-    """The same with what JSON and TOML know: dictionaries, lists, numbers, texts."""
+    """Convert to the types that JSON and TOML have: dictionaries, lists, numbers, texts."""
     if isinstance(value, Mapping):
         return {key: plain(v) for key, v in value.items()}
     if isinstance(value, tuple):
@@ -79,7 +83,7 @@ def plain(value: Any) -> Any:
 
 
 def written_number(value: Fraction) -> int | float | str:
-    """A rational as a number where the decimal that is printed of it is exact, as a fraction in a text elsewhere.
+    """Write a rational as a number where the decimal printed for it is exact, else as a fraction in a text.
 
     >>> written_number(Fraction(1, 10)), written_number(Fraction(1, 3)), written_number(Fraction(70000))
     (0.1, '1/3', 70000)
@@ -95,3 +99,65 @@ def written_number(value: Fraction) -> int | float | str:
     if max(numerator.adjusted(), denominator.adjusted()) <= LARGEST_EXPONENT:  # what is read back as it stands
         return f"{numerator}/{denominator}"
     return f"{numerator}e-{shift}/{denominator}e-{shift}"
+
+
+def toml(data: Mapping[str, Any]) -> str:
+    """Write a dictionary as TOML: its dictionaries as tables, those within them inline.
+
+    The keys are texts; the values are texts, numbers, truth values, lists and dictionaries.
+
+    >>> print(toml({"title": "bars", "body": {"x": [0, 0.1], "prescribed": {"right": "1/3"}}}), end="")
+    title = "bars"
+    <BLANKLINE>
+    [body]
+    x = [0, 0.1]
+    prescribed = { right = "1/3" }
+    """
+    tables = {name: value for name, value in data.items() if isinstance(value, Mapping)}
+    blocks = [_lines({name: value for name, value in data.items() if name not in tables})]
+    blocks += [f"[{key(name)}]\n{_lines(table)}" for name, table in tables.items()]
+    return "\n".join(block for block in blocks if block)
+
+
+def _lines(table: Mapping[str, Any]) -> str:
+    return "".join(f"{key(name)} = {value(v)}\n" for name, v in table.items())
+
+
+def key(name: str) -> str:
+    """Write a key, in quotes where it needs them.
+
+    >>> key("young"), key("left side")
+    ('young', '"left side"')
+    """
+    return name if re.fullmatch("[A-Za-z0-9_-]+", name) else string(name)
+
+
+def string(text: str) -> str:
+    r"""Write a basic string of TOML.
+
+    >>> print(string('E in "MPa"'))
+    "E in \"MPa\""
+    """
+    return '"' + ESCAPED.sub(lambda found: SHORT.get(found[0], f"\\u{ord(found[0]):04x}"), text) + '"'
+
+
+def value(given: Any) -> str:
+    """Write a value on one line.
+
+    Raises
+    ------
+    TypeError
+        For None and any other type without a form in TOML.
+    """
+    if isinstance(given, bool):
+        return str(given).lower()
+    if isinstance(given, (int, float)):
+        return repr(given)
+    if isinstance(given, str):
+        return string(given)
+    if isinstance(given, (list, tuple)):
+        return f"[{', '.join(map(value, given))}]"
+    if isinstance(given, Mapping):
+        inside = ", ".join(f"{key(name)} = {value(v)}" for name, v in given.items())
+        return f"{{ {inside} }}" if inside else "{}"
+    raise TypeError(f"{type(given).__name__} is no value of TOML")

@@ -1,4 +1,4 @@
-"""What the paper says of its figures, and what it takes to call that reproduced; written down before any run."""
+"""The paper's claims about its figures, and the criteria for calling them reproduced, set before any run."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ Verdict = Literal["reproduced", "reproduced under an assumption", "undecided", "
 #: The theta that Section 6.3 calls the best.
 PRINTED_THETA = 0.6
 
-#: It serves a curve where it takes at most this many times its fewest steps.
+#: A theta serves a curve if it takes at most this many times the fewest steps.
 SERVES = 1.25
 
-#: The mesh matters little where the fewest steps on all meshes differ by no more than this factor.
+#: The steps depend little on the mesh if the fewest steps on all meshes differ by at most this factor.
 ALIKE = 1.5
 
 #: The zones of Figure 5, from the left end of Gamma_c in mm; the first, "sliding", must be stick.
@@ -28,19 +28,9 @@ ZONES: tuple[tuple[str, float], ...] = (("stick", 0.6), ("slip", 1.0), ("open", 
 
 @dataclass(frozen=True, kw_only=True)
 class Claim:
-    """A figure of the paper.
+    """A claim of the paper in short, and the criterion by which a reading reproduces it.
 
-    Attributes
-    ----------
-    name : str
-    says : str
-        What the paper says, shortly.
-    criterion : str
-        When a reading reproduces it.
-    axes : mapping from an axis of a sweep to its values
-        Empty for Figure 5.
-    labels : tuple of str
-        Of the curves, in the order of the values.
+    ``axes`` maps the axes of a sweep to their values, none for Figure 5; ``labels`` name its curves, in order.
     """
 
     name: str
@@ -91,7 +81,7 @@ CLAIMS: dict[str, Claim] = {
     )
 }
 
-#: What Section 6.3 says of the curve that Figures 10, 11 and 12 have in common.
+#: The claim of Section 6.3 on the curve that Figures 10, 11 and 12 have in common.
 OPTIMUM = Claim(
     name="sec-6.3",
     says="0.6 is the best theta (190 nodes, k = 0.2, E1 = 70000, E2 = 20000)",
@@ -103,16 +93,9 @@ OPTIMUM = Claim(
 
 @dataclass(frozen=True, kw_only=True)
 class Curve:
-    """Steps over theta.
+    """Steps over theta by the increment test, and by the unrelaxed residual; None where it was not met.
 
-    Where only some theta were run, the fewest steps are those of all theta or more, and each cost is a lower bound.
-
-    Attributes
-    ----------
-    label : str
-    steps : mapping from theta to steps by the increment test, None where it was not met
-    unrelaxed : the same by the unrelaxed residual
-    rho : float or None
+    If only some theta were run, all of them may need fewer steps than ``fewest``, and each cost is a lower bound.
     """
 
     label: str
@@ -122,7 +105,7 @@ class Curve:
 
     @property
     def fewest(self) -> int | None:
-        """The fewest steps; None where no theta arrives."""
+        """The fewest steps; None if no theta arrives."""
         return min((n for n in self.steps.values() if n is not None), default=None)
 
     @property
@@ -150,9 +133,9 @@ class Curve:
 
 
 def curves_hold(name: str, curves: Sequence[Curve]) -> bool:
-    """Whether the curves of a reading show what the figure is said to show."""
-    fewest = [curve.fewest for curve in curves]
-    alike = name != "fig10" or (None not in fewest and max(fewest) <= ALIKE * min(fewest))  # type: ignore[type-var,operator]
+    """True if the curves of a reading meet the criterion of the figure."""
+    fewest = [curve.fewest or math.inf for curve in curves]
+    alike = name != "fig10" or (math.inf not in fewest and max(fewest) <= ALIKE * min(fewest))
     return alike and all(curve.cost <= SERVES for curve in curves)
 
 
@@ -170,7 +153,7 @@ def zones(contact: ContactFields) -> list[tuple[str, float, float]]:
 
 
 def zones_hold(contact: ContactFields) -> bool:
-    """Whether Gamma_c has the zones of Figure 5, each end within the width of a cell."""
+    """True if Gamma_c has the zones of Figure 5, each end within the width of a cell."""
     found, width = zones(contact), float(np.diff(contact.x).max())
     if [state for state, _, _ in found] != [state for state, _ in ZONES]:
         return False
@@ -178,7 +161,7 @@ def zones_hold(contact: ContactFields) -> bool:
 
 
 def share_as_printed(contact: ContactFields) -> float:
-    """The part of the length of Gamma_c that is in the state that Figure 5 has there."""
+    """The share of the length of Gamma_c that is in the state of Figure 5."""
     same = 0.0
     for state, low, high in zones(contact):
         before = 0.0

@@ -1,4 +1,4 @@
-"""The experiments of Section 6 in every reading: runs, and what they say of each figure."""
+"""The experiments of Section 6 in every reading, with a verdict on each figure."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from verification.reproduce.claims import (
     zones_hold,
 )
 from verification.reproduce.readings import READINGS, ModelReading
-from verification.sweeps.row import FAILED as FAILED  # the ledger takes it from here
+from verification.sweeps.row import FAILED
 from verification.sweeps.sweep import sweep
 
 FIGURES = tuple(CLAIMS)
@@ -36,22 +36,15 @@ THETAS = tuple(f"{n / 20:.2f}" for n in range(1, 20))
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """What one reading makes of one figure.
+    """One figure in one reading: contact for Figure 5, curves for the others.
 
     Attributes
     ----------
-    reading : ModelReading
     holds : bool or None
-        None where the reading is refused, or its runs do not decide.
+        None where the reading is refused, or its runs do not decide; ``reason`` says why.
     closeness : float
-        How near it comes, between readings: the share of Gamma_c in the printed state, or the fewest steps over those
-        at 0.6 on the worst curve; 1 at best.
-    contact : ContactFields or None
-        Of Figure 5.
-    curves : tuple of Curve
-        Of the other figures.
-    reason : str
-        Why it is refused or undecided.
+        For comparing readings: the share of Gamma_c in the printed state, or the fewest steps over the steps at 0.6 on
+        the worst curve; 1 at best.
     """
 
     reading: ModelReading
@@ -63,7 +56,7 @@ class Outcome:
 
     @property
     def refused(self) -> bool:
-        """Whether nothing of it was computed."""
+        """True if nothing of it was computed."""
         return self.holds is None and not self.curves
 
     def to_dict(self) -> dict[str, Any]:
@@ -83,15 +76,7 @@ class Outcome:
 
 @dataclass(frozen=True, kw_only=True)
 class Result:
-    """A figure of the paper in all readings.
-
-    Attributes
-    ----------
-    figure : str
-    outcomes : tuple of Outcome
-    rows : tuple of dict
-        The runs behind it, with the name of the reading.
-    """
+    """A figure of the paper in all readings; ``rows`` are the runs behind it, with the name of the reading."""
 
     figure: str
     outcomes: tuple[Outcome, ...]
@@ -99,7 +84,7 @@ class Result:
 
     @property
     def verdict(self) -> Verdict:
-        """Reproduced in every reading that does not leave the text, in some reading, perhaps in one, or in none."""
+        """Reproduced if all readings of the text show it, under an assumption if any reading does."""
         seen = [o for o in self.outcomes if not o.refused]
         of_text = [o.holds for o in seen if not o.reading.departs]
         if of_text and all(of_text):
@@ -110,7 +95,7 @@ class Result:
 
     @property
     def closest(self) -> Outcome:
-        """The reading that comes nearest; of equals the one that leaves the text least, and the first."""
+        """The reading that comes nearest; among equals the one that departs least from the text, and the first."""
         return max(self.outcomes, key=lambda o: (bool(o.holds), o.closeness, -len(o.reading.departs)))
 
     def to_dict(self) -> dict[str, Any]:
@@ -128,12 +113,7 @@ class Result:
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Reproduction(Document):
-    """Figures of Section 6, run again.
-
-    Attributes
-    ----------
-    results : tuple of Result
-    """
+    """Figures of Section 6, run again."""
 
     schema: ClassVar[str] = "ndtheory.reproduce/1"
     units: ClassVar[Mapping[str, str]] = {"length": "mm", "stress": "MPa"}  # type: ignore[misc]
@@ -155,7 +135,7 @@ class Reproduction(Document):
         return max((outcome.reading for outcome in self.results[0].outcomes), key=score)
 
     def reproduced(self, reading: ModelReading) -> int:
-        """How many of the figures a reading reproduces."""
+        """The number of figures that a reading reproduces."""
         return sum(bool(outcome.holds) for outcome in self._of(reading))
 
     def _of(self, reading: ModelReading) -> list[Outcome]:
@@ -187,11 +167,7 @@ def reproduce(
     store : path, optional
         A file that keeps the runs, and has those that were made before.  Figure 5 has no run: it is solved anew.
     progress : callable
-        Told what is run.
-
-    Returns
-    -------
-    Reproduction
+        Receives the name of what is run, and the share that is done.
 
     Raises
     ------
@@ -244,16 +220,10 @@ def _curves(name: str, reading: ModelReading, jobs: int, store: Path | None) -> 
 def outcome_of(
     figure: str, reading: ModelReading, rows: Mapping[str, Sequence[Mapping[str, Any]]], missing: str = ""
 ) -> Outcome:
-    """What runs make of a figure.
+    """The outcome of a figure from the runs of each curve, by label.
 
-    Parameters
-    ----------
-    figure : str
-    reading : ModelReading
-    rows : mapping from the label of a curve to its runs
-        A curve on which only some theta were run may refute; a reading that it does not refute needs all of them.
-    missing : str
-        Which runs of the figure were not made: without them a reading is refuted or undecided.
+    A curve on which only some theta were run may refute; a reading that it does not refute needs all of them.
+    ``missing`` names the runs of the figure that were not made: without them a reading is refuted or undecided.
     """
     failed = [row for some in rows.values() for row in some if row["outcome"] in FAILED]
     curves = tuple(curve for label, some in rows.items() if PRINTED_THETA in (curve := curve_of(label, some)).steps)

@@ -1,4 +1,4 @@
-"""What the text of Section 6 leaves open, and each way to read it, named before any run.
+"""The gaps in the text of Section 6, and each way to read it, named before any run.
 
 The text gives both rectangles, their moduli, nu = 0.3, k = 0.2, the displacement -0.015 mm of the upper body, and the
 numbers of nodes of four meshes.  Its pictures are not in the text: it does not say where the upper body sits, nor
@@ -24,10 +24,10 @@ HALF = "half model"
 #: Where the upper body, 1.2 mm long, begins on the lower one, 2 mm long.
 POSITIONS: dict[str, Fraction] = {"centred": Fraction(2, 5), "left edges aligned": Fraction(0), HALF: Fraction(0)}
 
-#: Which part of the top is moved down: the share of its length from the left.
+#: The part of the top that is moved down: the share of its length from the left.
 MOVED: dict[str, Fraction] = {"whole top": Fraction(1), "left two thirds": Fraction(2, 3), "left half": Fraction(1, 2)}
 
-#: Whether what is moved may slide.
+#: The part that is moved is held along x, or not.
 TOPS = ("clamped", "free to slide")
 
 #: Young's moduli of the lower and the upper body, in MPa.
@@ -38,17 +38,9 @@ LENGTH, DOWN = Fraction(6, 5), Fraction(-15, 1000)
 
 @dataclass(frozen=True, kw_only=True)
 class ModelReading:
-    """One way to read Section 6.
+    """One way to read Section 6: a key of POSITIONS, of MOVED and of MODULI, and one of TOPS.
 
-    Attributes
-    ----------
-    position : {'centred', 'left edges aligned', 'half model'}
-    moved : {'whole top', 'left two thirds', 'left half'}
-    top : {'clamped', 'free to slide'}
-    neumann_body : {1, 2}
-        1, the lower body, as Section 6 has it, or 2 as Section 3.
-    moduli : {'as printed', 'exchanged'}
-        Exchanged: the upper body has the larger modulus.
+    ``neumann_body`` is 1, the lower body, as in Section 6, or 2 as in Section 3.
     """
 
     position: str
@@ -67,7 +59,7 @@ class ModelReading:
 
     @property
     def departs(self) -> list[str]:
-        """Where it leaves the text of Section 6; empty where it only fills what the text leaves open."""
+        """Its departures from the text of Section 6; empty if it only fills gaps in the text."""
         departures = {
             "the left sides of both bodies lie on an axis of symmetry": self.position == HALF,
             f"only the {self.moved} of the top is moved": self.moved != "whole top",
@@ -78,17 +70,12 @@ class ModelReading:
 
     @property
     def assumes(self) -> list[str]:
-        """What it assumes where the text is silent."""
+        """Its assumptions where the text is silent."""
         positions = {"centred": ["the upper body is centred"], HALF: []}
         return [*positions.get(self.position, [self.position]), f"top {self.top}"]
 
     def problem(self, nodes: int = 60) -> Problem:
-        """The problem on a mesh of the family.
-
-        Parameters
-        ----------
-        nodes : {60, 190, 666, 2482}
-        """
+        """The problem on the mesh with 60, 190, 666 or 2482 nodes."""
         start = POSITIONS[self.position]
         ends = [start, start + LENGTH]
         down: list[Any] = [0 if self.top == "clamped" else "free", DOWN]

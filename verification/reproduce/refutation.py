@@ -1,4 +1,4 @@
-"""Whether a reading shows what is said of steps over theta, with no more runs than that takes.
+"""The verdict on a claim about steps over theta in one reading, with no more runs than that takes.
 
 On a curve on which only some theta were run, 0.6 costs at least what these say: one theta of the list that takes few
 enough steps refutes a reading, and only a curve that is not refuted needs all of them.
@@ -15,9 +15,8 @@ from verification.interface.pair import ContactPair
 from verification.reproduce.claims import NODES, PRINTED_THETA, SERVES, Claim
 from verification.reproduce.experiments import THETAS, Outcome, curve_of, outcome_of
 from verification.reproduce.readings import ModelReading
-from verification.sweeps.bodies import SharedBodies
 from verification.sweeps.grid import SweepGrid
-from verification.sweeps.row import FAILED, REFUSED, Row, row
+from verification.sweeps.row import FAILED, REFUSED, Row, SharedBodies, row
 
 #: The mesh of 190 nodes with the friction and the moduli of the text: a curve that Figures 10 to 12 have in common.
 COMMON: Mapping[str, Any] = {"refine": NODES.index(190)}
@@ -28,13 +27,9 @@ LISTED = tuple(map(Fraction, THETAS))
 
 
 class Runs:
-    """The runs of one reading, each made once it is asked for.
+    """The runs of one reading, each made when it is first asked for.
 
-    Parameters
-    ----------
-    reading : ModelReading
-    run : callable, optional
-        From values of a grid to the row of a sweep; by default it runs the problem of the reading.
+    ``run`` makes the row of a sweep from values of a grid; by default it runs the problem of the reading.
     """
 
     def __init__(self, reading: ModelReading, run: Callable[[Mapping[str, Any]], Row] | None = None) -> None:
@@ -45,21 +40,15 @@ class Runs:
 
     @cached_property
     def bodies(self) -> SharedBodies:
-        """What the runs share."""
+        """The condensed bodies that the runs share."""
         return SharedBodies(self._problem)
 
     def pair(self, **values: Any) -> ContactPair:
-        """The bodies on the mesh of 190 nodes, with other values of a grid.
-
-        Raises
-        ------
-        ProblemError
-            The reading is refused.
-        """
+        """The bodies on the mesh of 190 nodes with other values of a grid; ProblemError if the reading is refused."""
         return self.bodies.setting({**COMMON, **values}).pair
 
     def row(self, values: Mapping[str, Any], theta: Fraction) -> Row:
-        """The run at one theta; what the problem has anyway need not be among the values."""
+        """The run at one theta; values that the problem has need not be given."""
         key = (*self.changed(values).items(), ("theta", theta))
         if key not in self._rows:
             self._rows[key] = self._run(dict(key))
@@ -72,7 +61,7 @@ class Runs:
         return {name: value for name, value in values.items() if own.get(name) != value}
 
     def until_refuted(self, values: Mapping[str, Any]) -> list[Row]:
-        """A curve from 0.6 on, then outwards from 2/(2 + rho), up to the theta that refutes it; all where none does."""
+        """A curve from 0.6 on, then outwards from 2/(2 + rho), up to the theta that refutes it, if one does."""
         rows = [self.row(values, PRINTED)]
         rho = rows[0]["rho"]
         best = PRINTED if rho is None else 2 / (2 + rho)
@@ -84,20 +73,15 @@ class Runs:
 
 
 def refuted(rows: Sequence[Row]) -> bool:
-    """Whether the runs of a curve, all or some, show that 0.6 does not serve it; the first is that at 0.6."""
+    """True if some or all runs of a curve, the first of them at 0.6, show that 0.6 does not serve it."""
     return rows[0]["outcome"] not in FAILED and curve_of("", rows).cost > SERVES
 
 
 def decide(claim: Claim, runs: Runs, meshes: Collection[int] | None = None) -> Outcome:
-    """What a reading makes of a claim on steps over theta; its closeness is at most what is told.
+    """The outcome of a claim on steps over theta in one reading; its true closeness is at most the one given.
 
-    Parameters
-    ----------
-    claim : Claim
-    runs : Runs
-    meshes : collection of int, optional
-        Halvings of the mesh of 60 nodes that are run, of those the claim has; all by default.  A reading that they do
-        not refute is undecided where the claim has more.
+    ``meshes`` are the halvings of the mesh of 60 nodes to run, by default all of the claim.  A reading that they do not
+    refute is undecided where the claim has more.
     """
     curves = list(zip(claim.labels, SweepGrid.of(claim.axes).rows(), strict=True))
     chosen = [(label, values) for label, values in curves if meshes is None or values["refine"] in meshes]

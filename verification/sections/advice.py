@@ -2,18 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from verification.advice.readings import LARGEST_TO_PASTE
-from verification.advice.role import Role, in_steps, steps
-from verification.advice.roles import Advice
+from verification.advice.readings import LARGEST_TO_PASTE, NextRun, RunReading, SeenRun
+from verification.advice.roles import Advice, Role, in_steps, steps
+from verification.advice.runs_with_friction import FrictionBounds
+from verification.advice.seen import LogBound, RhoInterval, SeenLog
+from verification.advice.seen_moduli import Corners, ModuliRole, SeenModuli, excluded_from
+from verification.advice.sides import SeenMatrices
 from verification.advice.snippets import SNIPPETS
-from verification.problem.vocabulary import vocabulary
-from verification.sections import logs, moduli
-from verification.sections.advised import given, pasted, which_body
-from verification.sections.numbers import NONE, count, figures, near_one
-from verification.sections.parts import Block, Cell, Next, Section, Sections, closing, following, of, section, table
+from verification.problem.reading import takes_theta
+from verification.sections.numbers import NONE, count, figures, near_one, rounded
+from verification.sections.parts import (
+    Block,
+    Cell,
+    Facts,
+    Next,
+    Note,
+    Quantity,
+    Section,
+    Sections,
+    Table,
+    closing,
+    following,
+    of,
+    section,
+    table,
+)
 from verification.sections.setting import outside_the_theorem
 
 NAMES = {1: "body 1", 2: "body 2", None: "as in that run"}
@@ -22,18 +38,18 @@ NAMES = {1: "body 1", 2: "body 2", None: "as in that run"}
 @of.register
 def sections(found: Advice) -> Sections:
     """The sections."""
-    return moduli.sections(found, found.moduli) if found.moduli is not None else tuple(_sections(found))
+    return _of_moduli(found, found.moduli) if found.moduli is not None else tuple(_sections(found))
 
 
 def _sections(found: Advice) -> Iterator[Section]:
     if found.assumes is not None:
-        yield logs.assumed(found)
+        yield assumed(found)
     if found.matrices is not None:
         yield given(found.matrices)
     if found.run is not None:
-        yield from logs.of_a_run(found, found.run)
+        yield from of_a_run(found, found.run)
     if found.interval is not None:
-        yield from logs.of_logs(found, found.interval)
+        yield from of_logs(found, found.interval)
         if found.roles:
             others = "Predicted for the roles that the bodies have; logs tell nothing of the other assignment."
             yield _paste(found, others)
@@ -70,13 +86,13 @@ def _after_a_problem(found: Advice) -> Next | str:
         return "ndtheory advise --help"
     if found.best.theta_auto is None:  # too large for a run
         return following("constants")
-    taken = found.theta is not None and vocabulary().takes_theta(found.problem.iteration.relaxation)
+    taken = found.theta is not None and takes_theta(found.problem.iteration.relaxation)
     theta = ["--theta", f"{found.theta:g}"] if taken else []
     return following("run", *theta, exchanged=found.roles[0].neumann_body != found.neumann_body)
 
 
 def _which_body(found: Advice) -> Section:
-    """Which body gets the Neumann problem, what exchanging the roles changes, and who reads what."""
+    """The body that gets the Neumann problem, the effect of exchanging the roles, and the data each solver reads."""
     best, other = found.best, found.other
     if found.neumann_body is None:
         said = ["One run tells nothing of the other assignment."]
@@ -100,7 +116,7 @@ def _which_body(found: Advice) -> Section:
 
 
 def _which_theta(found: Advice) -> Section:
-    """What is predicted and proved of each role, what holds if nothing opens or slips, and what "auto" takes."""
+    """The predicted and the proved theta of each role, the one if nothing opens or slips, and the one of "auto"."""
     rows: list[tuple[Cell, ...]] = []
     why = {}
     possible = [role for role in found.roles if role.rho is not None]
@@ -151,7 +167,7 @@ def _at_predicted(role: Role) -> str:
 
 
 def _friction(found: Advice) -> Iterator[Section]:
-    """How much friction is proved."""
+    """The friction for which contraction is proved."""
     if found.friction is None:
         return
     said = {}
@@ -166,7 +182,7 @@ def _friction(found: Advice) -> Iterator[Section]:
 
 
 def _together(said: Mapping[str, str]) -> list[str]:
-    """What is to be said of each role, once where it is the same of both."""
+    """A text for each role, or one text for both."""
     return [
         f"{', '.join(name for name, own in said.items() if own == text)}: {text}"
         for text in dict.fromkeys(said.values())
@@ -200,3 +216,228 @@ def snippets(found: Advice, library: str) -> Sections:
         section(name, title, Block(tuple(found.snippet(name).split("\n"))))
         for name, title in zip(names, titles, strict=True)
     )
+
+
+def which_body(*notes: str) -> Section:
+    """The body that gets the Neumann problem."""
+    return section("body", "WHICH BODY GETS THE NEUMANN PROBLEM?", *notes)
+
+
+def next_run(made: NextRun | None) -> Sections:
+    """The run to make next, if there is one."""
+    return () if made is None else (section("next", "WHICH RUN NEXT?", f"theta = {made.theta:g}: {made.why}"),)
+
+
+def pasted(neumann_body: int | None, theta: float | None, *notes: str) -> Section:
+    """The lines for a problem file and for a coupling configuration."""
+    lines = [] if neumann_body is None else [f"neumann_body = {neumann_body}"]
+    lines.append(f"theta = {theta:g}")
+    lines.append(f'<acceleration:constant><relaxation value="{theta:g}" /></acceleration:constant>')
+    return section("paste", "TO PASTE", Block(tuple(lines), 2), *notes)
+
+
+def given(seen: SeenMatrices) -> Section:
+    """The matrices that were given."""
+    of = [f"S{body}: {one.rows} unknowns" for body, one in ((1, seen.S1), (2, seen.S2))]
+    if seen.transfer is not None and seen.neumann_body is not None:
+        rows, columns = seen.transfer
+        of.append(f"P: {rows} x {columns}, from body {seen.neumann_body} to body {3 - seen.neumann_body}")
+    said = ["; ".join(of)]
+    if seen.ordering is None:
+        said.append("Ordering: any, so long as both have the same.")
+    else:
+        said.append(f"Ordering assumed: {seen.ordering}.")
+    said += [f"Note: {words}." for words in seen.notes]
+    for found in seen.lanczos:
+        ends = f"rho {figures(found.rho, 6)}, residual {found.residual:.1e}"
+        least = f"least {figures(found.rho_min)}, residual {found.residual_min:.1e}"
+        said.append(f"Lanczos, Neumann body {found.neumann_body}: {ends}; {least}; steps: {found.steps}.")
+    if seen.lanczos:
+        said.append("An eigenvalue lies within each residual; rho is at least what was found, not proved to be it.")
+    return section("given", "WHAT WAS GIVEN?", *said)
+
+
+#: Columns of all logs together that are shown; the document holds every one.
+MOST_COLUMNS = 8
+
+#: Words for kinds of residuals; the others are called by their names.
+RESIDUALS = {"assumed": "taken as absolute", "drop": "over the first one"}
+
+
+def assumed(found: Advice) -> Section:
+    """The assumption under which runs are read, before all else."""
+    notes = [Note(f"Assumed: {found.assumes}.", 0)]
+    if not found.tied and found.friction_bounds is None:
+        notes.append(Note("With friction what follows may be false: add --friction.", 0))
+    return section("assumed", "", *notes)
+
+
+def of_a_run(found: Advice, run: SeenRun) -> Sections:
+    """The readings of a run as values of rho, and the run to make next."""
+    given = f"theta = {float(run.theta):.4g}; the residual |Tg - g| changes by {float(run.ratio):.4g} a step"
+    notes = (
+        f"{given}, absolute and unrelaxed, steadily over {run.steps} steps or more.",
+        "A residual that rises and falls has no steady ratio: give 1.",
+        "The relative residual |Tg - g|/|Tg| of coupling libraries tells other things.",
+    )
+    said = section("rho", "WHAT DOES THE RUN SAY OF RHO?", *notes, _readings(found.readings))
+    return (said, *_with_friction(found.friction_bounds), *next_run(found.next))
+
+
+def of_logs(found: Advice, interval: RhoInterval) -> Sections:
+    """The values of rho that each log and all logs together allow, and the run to make next."""
+    read = [_readings(found.readings)] if found.readings else []
+    notes = [] if read else ["Nothing: no residual falls, grows or stays steadily."]
+    if interval.contradiction is not None:
+        notes.append(f"CONTRADICTION: {interval.contradiction}.")
+    else:
+        notes += _bound("least", interval.lo, found.logs) + _bound("most", interval.hi, found.logs)
+    return (
+        _seen(found.logs),
+        section("rho", "WHAT DO THEY SAY OF RHO?", *read, *notes),
+        *_with_friction(found.friction_bounds),
+        *next_run(found.next),
+    )
+
+
+def _seen(logs: Sequence[SeenLog]) -> Section:
+    """The logs, column by column."""
+    parts: list[Note | str] = []
+    room = MOST_COLUMNS
+    for log in logs:
+        parts.append(f"theta = {float(log.theta):.4g}, {log.form}, {log.file}")
+        for column in log.columns[:room]:
+            parts.append(Note(f"{column.name}, {RESIDUALS.get(column.residual, column.residual)}: {column.says}", 4))
+        room -= len(log.columns[:room])
+        parts += [Note(words, 4) for words in log.notes]
+    left = sum(len(log.columns) for log in logs) - MOST_COLUMNS
+    if left > 0:
+        parts.append(f"and {left} columns more, see --json")
+    steps = " and ".join(f"{n}" for n in sorted({log.steps for log in logs})) + " steps"
+    parts.append(f"Assumed: theta constant in each run, no Aitken or quasi-Newton.  A ratio counts over {steps}.")
+    return section("logs", "WHAT DO THE LOGS SHOW?", *parts)
+
+
+def _readings(readings: Sequence[RunReading]) -> Table:
+    rows: list[tuple[Cell, ...]] = []
+    for reading in readings:
+        low = reading.lo
+        rho = NONE if low is None else Quantity(float(low), f">= {rounded(low, 3, up=False)}")
+        rows.append((reading.kind, rho, reading.says))
+    return table(("reading", "rho", "if it is the right one"), rows)
+
+
+def _bound(which: str, bound: LogBound | None, logs: Sequence[SeenLog]) -> list[str]:
+    if bound is None:
+        return []
+    source = f"theta = {float(bound.log.theta):.4g}: {bound.says}" if len(logs) > 1 else bound.says
+    value = rounded(float(bound.value), 3, up=which == "most")
+    return [f"rho is at {which} {value} given {bound.assumes} ({source})"]
+
+
+def _with_friction(bounds: FrictionBounds | None) -> Sections:
+    """Bounds that hold with friction; nothing without friction."""
+    if bounds is None:
+        return ()
+    said = []
+    if bounds.image is not None:
+        image = rounded(bounds.image, 3, up=False)
+        theorem = "sqrt(rho) R, with 2 R = s + sqrt(s^2 + 4 kappa_2) and s = sqrt(rho) + kappa_1"
+        said.append(f"The Lipschitz constant of T in the norm (5.21) is at least {image}; it is at most {theorem}.")
+    if bounds.eigenvalue is not None and bounds.theta is not None and bounds.rate is not None:
+        least, most = (rounded(end, 3, up=up) for end, up in zip(bounds.eigenvalue, (False, True), strict=True))
+        gain = rounded(1 - bounds.rate, 3, up=False)
+        near = f"Near the solution of the run at theta = {bounds.theta:.4g}, if contact does not change there, its"
+        words = f"slowest mode has |1 + lambda| from {least} to {most}, and a smaller theta' takes at most"
+        said.append(f"{near} {words} 1 - {gain} theta'/{bounds.theta:.4g} a step.")
+    return (section("with friction", "WHAT IS PROVED WITH FRICTION?", *(said or ["Nothing."])),)
+
+
+PLANES = {"strain": "plane strain", "stress": "plane stress", "3d": "three-dimensional"}
+ENDS: dict[Corners, str] = {
+    "none": "any geometry",
+    "1": "corners of body 1",
+    "2": "corners of body 2",
+    "both": "corners of both bodies",
+}
+
+
+def _of_moduli(found: Advice, seen: SeenModuli) -> Sections:
+    """The sections of advice from moduli."""
+    each = (f"body {i}: E = {float(b.young):.5g}, nu = {float(b.poisson):.5g}" for i, b in enumerate(seen.bodies, 1))
+    started = [role for role in seen.roles if role.start is not None]
+    tried = next((role for role in started if found.neumann_body in (role.neumann_body, None)), None)
+    then = ""
+    if found.next is not None:
+        theta = f"{found.next.theta:g}"
+        then = f"ndtheory advise run --theta {theta} --ratio R (R: the ratio of that run)"
+    last = next_run(found.next)
+    if tried is not None and tried.start is not None:
+        last = (pasted(tried.neumann_body, tried.start.theta_guess),)
+    return (
+        section("setting", "", Facts("", (*each, PLANES[seen.bodies[0].plane]))),
+        _least_rho(seen),
+        _excluded(seen),
+        _who(found, seen),
+        _start(started),
+        *last,
+        closing("a bound of rho from above with friction, or where no image fits", then=then),
+    )
+
+
+def _least_rho(seen: SeenModuli) -> Section:
+    heads = (
+        ("Neumann problem on", "body 1", "", "body 2", ""),
+        ("where a piece of Gamma_c", "sticks", "slides", "sticks", "slides"),
+    )
+    rows: list[tuple[Cell, ...]] = []
+    for name, words in ENDS.items():
+        if seen.corners in (None, name) or name == "none":
+            bounds = [role.corners[name] for role in seen.roles]
+            rows.append((words, *(figures(end) for bound in bounds for end in (bound.stick, bound.slide))))
+    proved = (
+        "Proved for the continuum, where both bodies are homogeneous and isotropic near one inner point of Gamma_c, "
+        "or near a corner of 90 degrees at its end; fine meshes come close. rho may be larger."
+    )
+    return section("bounds", "HOW LARGE IS RHO AT LEAST?", Table(heads, tuple(rows)), proved)
+
+
+def _excluded(seen: SeenModuli) -> Section:
+    stuck = "where a piece may stick" if seen.corners in (None, "none") else "where a piece at such an end may stick"
+    notes = []
+    for role in seen.roles:
+        bounds = seen.bounds(role)
+        kinds = ((excluded_from(bounds.stick), stuck), (excluded_from(bounds.slide), "without friction"))
+        found = [f"{figures(theta)} and above {where}" for theta, where in kinds if theta is not None]
+        notes.append(f"body {role.neumann_body}: {', '.join(found) or 'none up to 1 is excluded'}")
+    return section("excluded", "WHICH THETAS CANNOT CONTRACT ON FINE MESHES?", *notes)
+
+
+def _who(found: Advice, seen: SeenModuli) -> Section:
+    free, says = seen.smaller("slide"), ""
+    if seen.smaller("stick") is None and free is None:
+        says = "No difference: the bounds of both roles are the same"
+        says += "." if seen.corners else ", unless one body ends in corners."
+    elif found.neumann_body is not None:
+        says = f"Try body {found.neumann_body}: the bound is smaller. Two lower bounds prove no order of the roles."
+        if free not in (None, found.neumann_body):
+            says += f" Without friction body {free} has the smaller one."
+    return which_body(says)
+
+
+def _start(started: Sequence[ModuliRole]) -> Section:
+    notes = []
+    for role in started:
+        start, body = role.start, f"body {role.neumann_body}"
+        assert start is not None
+        rate = near_one(start.factor_free(start.theta_free).value)
+        notes += [
+            f"{body}, without friction: theta = {start.theta_free:.4g}, factor {rate} a step, proved: rho_normal <="
+            f" {figures(float(start.s))} by the mirror image, in the continuum and on nested meshes",
+            f"{body}, with friction: theta = {start.theta_guess:.4g}, a guess: rho at most {figures(start.guess)}, as"
+            f" with {start.guessed_from}",
+        ]
+    if not started:
+        notes.append("None: a lower bound of rho gives no theta, 2/(2 + bound) can diverge.")
+        notes.append("If the mirror image of a body fits into the other one, say --mirror.")
+    return section("start", "WHICH THETA TO START WITH?", *notes)

@@ -6,8 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from ndtheory import Bounds, EnergyBounds
 from verification.bounds.bound import BoundResult, bounded
-from verification.bounds.calculated import Calculated
-from verification.bounds.table import named
+from verification.bounds.table import Calculated, named
 from verification.ledger.record import on_the_printed_proof
 from verification.sections.numbers import LEGEND, NONE, at_least, factor, figures, interval, marked
 from verification.sections.parts import (
@@ -28,7 +27,7 @@ from verification.sections.parts import (
 #: The constants of Section 5 that follow from those that are given.
 DERIVED = ("C_T", "C0", "C1", "C2", "C3", "C4", "C5", "C6")
 
-#: What the table of bounds shows.
+#: The caption of the table of bounds.
 CAPTION = (
     "Each bound that follows from the constants: the friction k below which every small theta, and some theta, "
     "contracts; the theta allowed at the friction of this problem; by which factor one step of this run multiplies the "
@@ -37,14 +36,7 @@ CAPTION = (
 
 
 def bounds(rows: Sequence[BoundResult], unit: str) -> list[Shown | str]:
-    """The bounds that were worked out, and what is to be said of each.
-
-    Parameters
-    ----------
-    rows : sequence of BoundResult
-    unit : str
-        "MPa", or what the unit of stress is that of.
-    """
+    """The bounds that were computed, with remarks; ``unit`` names the unit of stress, as "MPa"."""
     results = [row for row in rows if row.worked_out]
     if not results:
         return []

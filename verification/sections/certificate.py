@@ -1,15 +1,32 @@
-"""A certificate of one step, and what came of checking one again."""
+"""A certificate of one step on a mesh, the check of one, and the proof for the continuous problem."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from shlex import quote
+from typing import Any
 
+from ndtheory.number import directed
 from verification.bounds.table import named
 from verification.certificate import check
+from verification.certificate.continuum import ContinuumCertificate
 from verification.certificate.contraction import Certificate, Checked
-from verification.sections.numbers import near_one
-from verification.sections.parts import Facts, Note, Sections, closing, following, of, section
+from verification.sections.numbers import figures, near_one
+from verification.sections.parts import (
+    Cell,
+    Facts,
+    Note,
+    Quantity,
+    Section,
+    Sections,
+    closing,
+    following,
+    of,
+    section,
+    table,
+)
 
 CLAIMS = "anything about the continuum"
 
@@ -58,3 +75,105 @@ def checked(found: Checked) -> Sections:
         section("proved", "IS IT PROVED?", *said),
         closing(CLAIMS, then=then),
     )
+
+
+def _at_most(number: Mapping[str, float] | None, unit: str = "", *, up: bool = True) -> Cell:
+    if number is None:
+        return "no bound"
+    end, sign = (number["hi"], "<=") if up else (number["lo"], ">=")
+    return Quantity(end, f"{sign} {_few(end, up)}", unit, "guaranteed")
+
+
+_at_least = partial(_at_most, up=False)
+
+
+def _few(value: float, up: bool) -> str:
+    return f"{float(directed(value, 4, up=up)):.4g}"
+
+
+@of.register
+def continuum(found: ContinuumCertificate) -> Sections:
+    """The sections of a proof for the continuous problem."""
+    problem, document = found.problem, found.content()
+    stress, length = problem.units["stress"], problem.units["length"]
+    radius = [] if problem.contact.radius is None else [f"r = {float(problem.contact.radius):g} {length}"]
+    body = f"Neumann body: {'lower' if problem.iteration.neumann_body == 1 else 'upper'}"
+    friction = ", ".join([f"k = {float(found.friction):g}", *radius])
+    return (
+        section("setting", "", Facts(f"{problem.title}: the continuous problem, no mesh"), Facts(body, (friction,))),
+        _used(found, document["constants"], f"sqrt({stress}/{length})", f"sqrt({length}/{stress})"),
+        section("continuum", "DOES ONE STEP CONTRACT IN THE CONTINUUM?", *_contracts(found, document)),
+        section("mesh", "DOES IT CONTRACT ON THE MESH OF THE FILE?", *_on_the_mesh(found, document)),
+        closing(document["not_claimed"], then=following("compare", iteration=True)),
+    )
+
+
+def _used(found: ContinuumCertificate, constants: Mapping[str, Any], of_stress: str, of_trace: str) -> Section:
+    """The bounds behind the proof."""
+    first, second = (f"K = {figures(float(value))}" for value in found.constants.segments)
+    used = (
+        ("C_s", "C_s", _at_most, of_stress, "strip of the Neumann body, intervals"),
+        ("C_t1", "C_t1", _at_most, of_trace, f"segments, contact body, {first}"),
+        ("C_t2", "C_t2", _at_most, of_trace, f"segments, Neumann body, {second}"),
+        ("R", "strips", _at_most, "", "both strips, intervals"),
+        ("eps", "cut_off", _at_most, "", "cut-off beside Gamma_c, segments"),
+        ("rho", "rho", _at_most, "", "(1 + eps) R"),
+        ("rho", "rho_least", _at_least, "", "half-planes"),
+        ("rho", "rho_ends", _at_least, "", "wedges at the ends of Gamma_c"),
+        ("rho_normal", "rho_normal", _at_most, "", "mirror image"),
+        ("kappa_1", "kappa_1", _at_most, "", "k C_s C_t1"),
+        ("kappa_2", "kappa_2", _at_most, "", "k C_s C_t2"),
+    )
+    rows = [(name, bound(constants[key], unit), unit, by) for name, key, bound, unit, by in used]
+    return section("used", "WHAT WAS USED?", table(("bound", "", "unit", "by"), rows))
+
+
+def _contracts(found: ContinuumCertificate, document: Mapping[str, Any]) -> list[str]:
+    k, threshold = float(found.friction), _few(document["friction_threshold"]["lo"], False)
+    said = [f"Every small theta contracts for k < {threshold}: one fixed point, and (P1) has exactly one solution."]
+    if document["friction_limit"] is not None:
+        said.append(f"Some theta contracts for k < {_few(document['friction_limit']['lo'], False)}.")
+    if found.energy is None:
+        said.append(f"For no single theta is anything proved. {document['reason']['rho']}.")
+    elif document["interval"] is None:
+        said.append(f"At k = {k:g} no theta is proved to contract: no conclusion.")
+    else:
+        lo, hi = document["interval"][0], "1"
+        if found.energy.interval != (0.0, 1.0):
+            hi = _few(document["theta_max_proved"]["lo"], False)
+        best = f"{document['theta_proved']:.3f}, factor {_at_most(document['factor_proved'])}"
+        said.append(f"At k = {k:g}: {lo:.4g} < theta < {hi}; the best proved theta is {best}.")
+        if document["factor"] is not None:
+            said.append(f"theta = {document['theta']:g}: factor {_at_most(document['factor'])}, guaranteed.")
+        elif document["theta"] is not None:
+            said.append(f"theta = {document['theta']:g}: no conclusion.")
+    return said
+
+
+def _on_the_mesh(found: ContinuumCertificate, document: Mapping[str, Any]) -> list[str]:
+    """rho of the mesh beside rho of the continuum, and whether the theta contracts on both."""
+    mesh, k = document["mesh"], document["friction"]
+    name, limit = "rho" if k else "rho_normal", mesh["theta_limit"]
+    if limit is None:
+        finer = "The mesh may need a smaller theta than the continuum, and so may every finer one."
+        return [f"Not known. {mesh['reason']['rho']}.", finer]
+    continuum = document["constants"][name] or document["constants"]["rho"]
+    bound = "no bound" if continuum is None else f"{_at_most(continuum)}, guaranteed"
+    nodes, where = mesh["interface_nodes"], " where all of Gamma_c sticks" if k else ""
+    said = [f"{name}: {mesh[name]['value']:.5g} on {nodes} contact nodes (float); in the continuum {bound}."]
+    if limit <= 1:
+        said.append(f"On this mesh no theta from {limit:.4g} on contracts{where} (float).")
+    if mesh["theta"] is not None:
+        judged = f"theta = {mesh['theta']:.4g}"
+        if mesh["contracts"]:
+            said.append(f"{judged} contracts on this mesh (float).")
+        elif mesh["contracts"] is None:
+            said.append(f"{judged}: no conclusion on this mesh; `ndtheory compare` has sharper bounds.")
+        elif found.contracts:
+            said.append(
+                f"{judged} contracts in the continuum (guaranteed), and NOT on this mesh (float). Finer meshes of such"
+                " cells may need a smaller theta for good, too."
+            )
+        else:
+            said.append(f"{judged} does not contract on this mesh (float).")
+    return said

@@ -1,8 +1,8 @@
-"""A comparison: each section when it is known, or all of them of one that has ended."""
+"""A comparison: each section as soon as it is known, or all of them at the end."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from verification.algorithm.reference import Reference
@@ -13,6 +13,7 @@ from verification.bounds.losses import Losses
 from verification.comparison import Comparison, Listener
 from verification.constants import Measured
 from verification.interface.pair import ContactPair
+from verification.sections.answer import answer
 from verification.sections.bounds import bounds, contracts, thetas
 from verification.sections.constants import compared
 from verification.sections.constants import sections as all_constants
@@ -20,8 +21,9 @@ from verification.sections.numbers import near_one
 from verification.sections.parts import Labelled, Note, Section, Sections, following, of, section, table
 from verification.sections.run import happened
 from verification.sections.setting import limits, outside_the_theorem, setting
+from verification.verdicts import RunVerdict
 
-#: What the table of verdicts shows, and the figure of the losses.
+#: The captions of the table of verdicts and of the figure of the losses.
 RATIOS = (
     "Each bound beside the largest ratio of successive residuals in the norm (5.21), in which forces count by the "
     "energy that they store in the Neumann body; linearised: the forecast beside the end of the run."
@@ -37,31 +39,52 @@ WATERFALL = (
 )
 
 
-class Parts(Listener):
-    """Hands on the sections of a comparison, each when it is known.
+#: The verdicts as they are read; a bound has no conclusion where its hypotheses are not met.
+WORDS: Mapping[RunVerdict, str] = {
+    "CONSISTENT": "consistent",
+    "VIOLATED": "violated",
+    "INCONCLUSIVE": "inconclusive",
+    "HYPOTHESES_NOT_MET": "no conclusion",
+    "NOT_COMPUTED": "not computed",
+}
 
-    Parameters
-    ----------
-    pair : ContactPair
-        What is compared, made from a problem.
-    show : callable
-        Takes a tuple of sections; those of one id may come one after the other.
+
+class Parts(Listener):
+    """Passes the sections of a comparison to ``show``, each when it is known; several of one id may follow each other.
+
+    The pair is made from a problem.  The answer comes first: what is known before the run waits for it, until the
+    listener is closed at the latest.
     """
 
     def __init__(self, pair: ContactPair, show: Callable[[Sections], None]) -> None:
         self.pair, self.show, self.unit = pair, show, pair.units["stress"]
+        self.waiting: list[Section] = []
+        self.results: Sequence[BoundResult] = ()
+
+    def __enter__(self) -> Parts:
+        return self
+
+    def __exit__(self, *ended: object) -> None:
+        """Show what waited for a run that did not come."""
+        if self.waiting:
+            self.show(tuple(self.waiting))
+            self.waiting = []
 
     def constants(self, measured: Measured, choice: Choice) -> None:
         problem = self.pair.problem
         assert problem is not None  # see `sections`
         first = setting(problem.with_theta(choice.theta), measured.nodes, measured.interface_nodes)
-        self.show((first, compared(measured)))
+        self.show((first,))
+        if measured.unverified is not None:
+            self.waiting.append(compared(measured))
 
     def bounds(self, results: Sequence[BoundResult], measured: Measured) -> None:
-        self.show((contracts(results, self.unit, measured.why_no_energy),))
+        self.results = results
+        self.waiting.append(contracts(results, self.unit, measured.why_no_energy))
 
     def run(self, finished: Run) -> None:
-        self.show((happened(finished, alone=False),))
+        before, self.waiting = self.waiting, []
+        self.show((answer(finished, self.results), *before, happened(finished, alone=False)))
 
     def cvxpy(self, reference: Reference | None, why: str) -> None:
         part: Labelled | str = f"cvxpy: {why}"
@@ -78,11 +101,11 @@ class Parts(Listener):
             estimates = [loss for loss in friction if not loss.only_unit]
             total = sum(loss.decades for loss in estimates)
             unit = sum(loss.decades for loss in friction) - total
-            links = ", ".join(f"{loss.label} {loss.decades:.1f}" for loss in estimates)
-            parts.append(f"{total:.1f} decades from the largest friction term found to (5.30), repaired:")
-            parts.append(f"{links}; the unit adds {unit:.1f}")
+            links = ", ".join(f"10^{loss.decades:.1f} by {loss.label}" for loss in estimates)
+            sizes = f"10^{total:.1f} times the largest friction term found (10^{total + unit:.1f} as printed)"
+            parts.append(f"(5.30) is {sizes}: {links}.")
         if parts:
-            self.show((section("losses", "WHAT DOES EACH ESTIMATE GIVE AWAY?", *parts, pictures=WATERFALL),))
+            self.show((section("losses", "HOW MUCH DOES EACH ESTIMATE LOSE?", *parts, pictures=WATERFALL),))
 
     def programs(self, results: Sequence[BoundResult]) -> None:
         parts = [*bounds(results, self.unit), *(f"{r.name}: {r.not_computed}" for r in results if not r.worked_out)]
@@ -94,14 +117,14 @@ class Parts(Listener):
 
 def verdicts(result: Comparison) -> Sections:
     """The end of a comparison."""
-    judged = table(("bound", "verdict", "why"), [(n, j.verdict, j.reason) for n, j in result.verdicts.items()])
+    judged = table(("bound", "verdict", "why"), [(n, WORDS[j.verdict], j.reason) for n, j in result.verdicts.items()])
     title = "DOES THE RUN AGREE WITH THE BOUND?"
     return section("verdicts", title, judged, caption=RATIOS), limits(result.run.outside, following("advise"))
 
 
 @of.register
 def sections(result: Comparison) -> Sections:
-    """The sections; a report has more at the begin and at the end: warnings, the theta, all constants."""
+    """The sections; a report has more at its beginning and end: warnings, the theta, all constants."""
     if result.problem is None:
         return ()
     found: list[Section] = []

@@ -14,10 +14,29 @@ from verification.sections.setting import setting
 #: The constants that a comparison shows.
 COMPARED = ("m", "M", "C_R", "C_s", "C_tr", "C_K", "rho_max")
 
+#: What each constant measures, in at most 40 characters; norms are those of H^1, where no energy is named.
+WORDS = {
+    "m": "least energy (doubled) at norm 1",
+    "M": "largest energy (doubled) at norm 1",
+    "C_R": "largest norm of a lift per trace norm",
+    "C_s": "largest smoothed pressure at norm 1",
+    "C_tr": "largest tangential trace at norm 1",
+    "C_tr_half": "the same in the trace norm of (5.8)",
+    "C_K": "k C_s C_tr: how friction enters",
+    "rho_max": "stiffness, contact / Neumann, at most",
+    "rho_min": "stiffness, contact / Neumann, at least",
+    "rho_normal": "rho_max without friction",
+    "C_s_energy": "smoothed pressure at energy 1, Neumann",
+    "C_t1": "tangential trace at energy 1, contact",
+    "C_t2": "tangential trace at energy 1, Neumann",
+    "kappa_1": "k C_s_energy C_t1: how friction enters",
+    "kappa_2": "k C_s_energy C_t2: how friction enters",
+}
+
 
 @of.register
 def sections(measured: Measured) -> Sections:
-    """The sections; none of constants that come from matrices alone."""
+    """The sections; none if the constants come from matrices without a problem."""
     problem = measured.problem
     if problem is None:
         return ()
@@ -28,11 +47,17 @@ def sections(measured: Measured) -> Sections:
         ends = "exact, verified: proved for the exact data of the file on this mesh, all rounding errors bounded."
     else:
         unit = _units(measured)
+        words = WORDS if len(levels) == 1 else {}  # there is no room beside several columns
         rows = [
-            (name, *(figures(getattr(level, name), 6, unit.get(name, "")) for level in levels), unit.get(name, ""))
+            (
+                name,
+                *(figures(getattr(level, name), 6, unit.get(name, "")) for level in levels),
+                unit.get(name, ""),
+                *([words[name]] if words else []),
+            )
             for name in (*NAMES, *ENERGY_NAMES)
         ]
-        head = ("nodes", *(str(level.nodes) for level in levels), "unit")
+        head = ("nodes", *(str(level.nodes) for level in levels), "unit", *([""] if words else []))
         parts.append(table(head, rows, right=range(1, len(levels) + 1)))
         ends = "Exact for this mesh, up to rounding."
     for reason in dict.fromkeys(measured.reason.values()):
@@ -51,35 +76,39 @@ def sections(measured: Measured) -> Sections:
 
 
 def compared(measured: Measured) -> Section:
-    """Those that a comparison shows."""
-    if measured.unverified is not None:
-        parts = _between_bounds(measured, COMPARED)
-    else:
-        stress = measured.units["stress"]
-        m, M, C_R, C_s, C_tr, C_K, rho = (figures(getattr(measured, name), 4) for name in COMPARED)
-        parts = [
-            Note(f"m = {m} {stress}, M = {M} {stress}, C_R = {C_R}"),
-            Note(f"C_s = {C_s}, C_tr = {C_tr}, C_K = {C_K} {stress}, rho = {rho}"),
-        ]
+    """Those that a comparison shows with their proved bounds."""
+    parts = _between_bounds(measured, COMPARED)
     caption = "The constants of the theorem on this mesh, with the bounds proved of them."
     return section("constants", "HOW LARGE ARE THE CONSTANTS?", *parts, caption=caption)
 
 
 def _units(measured: Measured) -> Mapping[str, str]:
-    return dict.fromkeys(("m", "M", "C_K"), measured.units["stress"])
+    """The unit of each constant that has one."""
+    stress, length = measured.units["stress"], measured.units.get("length", "")
+    units = dict.fromkeys(("m", "M", "C_K"), stress)
+    if length:
+        units |= {
+            "C_s": f"{stress}/sqrt({length})",
+            "C_tr": f"sqrt({length})",
+            "C_s_energy": f"sqrt({stress}/{length})",
+        }
+        units |= dict.fromkeys(("C_t1", "C_t2"), f"sqrt({length}/{stress})")
+    return units
 
 
 def _between_bounds(measured: Measured, names: Sequence[str]) -> list[Shown]:
-    """Constants with the bounds that are proved of them, and why there are none."""
+    """Constants with their proved bounds, and the reasons where there are none."""
     units, rows = _units(measured), []
+    roots = {name: unit for name, unit in units.items() if name in names and "sqrt" in unit}  # too wide for the table
     for name in names:
-        number, unit = getattr(measured, name), units.get(name, "")
+        number, unit = getattr(measured, name), "" if name in roots else units.get(name, "")
         level = "" if number is None else number.level
         rows.append((name, figures(number, 4, unit), *between(number, unit=unit), level, unit))
     head = (f"{measured.nodes} nodes", "about", "at least", "at most", "level", "unit")
     why = {name: reason for name, reason in (measured.unverified or {}).items() if name in names}
     return [
         table(head, rows, right=(1, 2, 3)),
+        *([Note("units: " + ", ".join(f"{name} in {unit}" for name, unit in roots.items()))] if roots else []),
         *(
             Note(f"not proved, {', '.join(name for name in why if why[name] == reason)}: {reason}")
             for reason in dict.fromkeys(why.values())

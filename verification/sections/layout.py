@@ -12,7 +12,7 @@ WIDTH = 80
 #: Where the text of a labelled line begins, after its indent.
 LABEL = 20
 
-#: From a command to the words to type; empty where there are none.
+#: A function from a command to the words to type; empty if there are none.
 Typing = Callable[[Next], str]
 
 
@@ -24,16 +24,9 @@ def nothing_typed(part: Next) -> str:
 def lines(
     sections: Iterable[Section], place: Place, *, typing: Typing = nothing_typed, after: str = ""
 ) -> Iterator[tuple[str, bool]]:
-    """Lines, and whether each is a title.
+    """Lines, each with True if it is a title, for a terminal or a notebook.
 
-    Parameters
-    ----------
-    sections : iterable of Section
-    place : {'terminal', 'notebook'}
-    typing : callable
-        Completes a command by what was typed.
-    after : str
-        The id of the section that was shown before these.
+    ``typing`` completes a command by what was typed; ``after`` is the id of the section shown before these.
     """
     for section in shown(sections, place):
         if section.id != after:

@@ -11,7 +11,7 @@ from verification.sections.parts import Cell, Quantity
 #: Marks of the levels, beside numbers and in tables; a number in doubles has none.
 MARKS: Mapping[Level, str] = {"exact": "e", "verified": "v", "guaranteed": "g", "float": ""}
 
-#: What the mark of a number that is proved on a mesh means; see ``docs/glossary.md`` for all of them.
+#: The meaning of the mark of a number that is proved on a mesh; ``docs/glossary.md`` explains all marks.
 LEGEND = (
     "v (verified): proved for the exact data of the file on this mesh, and rounded to the safe side; what has no mark"
     " is computed in doubles"
@@ -81,7 +81,7 @@ def at_least(number: Number | None, digits: int = 3) -> Cell:
 
 
 def at_most(number: Number | None, digits: int = 3) -> Cell:
-    """A number of which it matters that it is no larger: its upper end rounded upwards, where it has one.
+    """An upper bound, rounded up: the upper end of the enclosure, if there is one.
 
     >>> print(at_most(Number(value=0.2, lo=0.19999, hi=0.20001, level="verified")), at_most(None))
     0.201 v -
@@ -109,7 +109,7 @@ def between(number: Number | None, digits: int = 12, unit: str = "") -> tuple[Ce
 
 
 def interval(ends: tuple[float, float] | None, level: Level) -> Cell:
-    """An open interval, its ends rounded inward where each number in it is proved to have what it is told for."""
+    """An open interval; its ends are rounded inward where the property of its numbers is proved."""
     if ends is None:
         return NONE
     text = f"({ends[0]:.3g}, {figures(ends[1])})"

@@ -1,18 +1,7 @@
-"""The sections of our results: a function is registered where it stands, and all of them are known here."""
+"""The sections of all results of this program: importing a module registers its functions."""
 
-from verification.sections import (  # noqa: F401
-    advice,
-    bounds,
-    certificate,
-    comparison,
-    constants,
-    continuum,
-    ledger,
-    region,
-    reproduction,
-    run,
-    sweep,
-)
+# ruff: noqa: F401
+from verification.sections import advice, bounds, certificate, comparison, constants, ledger, reproduction, run, sweep
 from verification.sections.parts import of
 
 __all__ = ["of"]

@@ -16,12 +16,9 @@ Place = Literal["terminal", "notebook", "report"]
 
 @dataclass(frozen=True, kw_only=True)
 class Shown:
-    """Base of all that is shown: in its texts, characters of control are escapes.
+    """Base of all parts; control characters in their texts become escapes.
 
-    Attributes
-    ----------
-    only : {'terminal', 'notebook', 'report'} or None
-        The one place where it is needed; None where it is in all of them.
+    ``only`` names the one place where the part is needed; None if it is shown in all places.
     """
 
     only: Place | None = field(default=None, repr=False)
@@ -39,18 +36,8 @@ def _clean(value: Any) -> Any:
 
 @dataclass(frozen=True)
 class Quantity(Shown):
-    """A number, or the pair of numbers of an interval, with its unit and its level.
-
-    Attributes
-    ----------
-    value : float or pair of float
-        As it was computed.
-    text : str
-        As it is read: rounded, with the mark of its level.
-    unit : str
-        Empty for a pure number.
-    level : {'exact', 'verified', 'guaranteed', 'float'}
-    """
+    """A number, or the ends of an interval, as computed; a rounded text with the mark of its level; its unit, if
+    any."""
 
     value: float | tuple[float, float]
     text: str
@@ -61,13 +48,13 @@ class Quantity(Shown):
         return self.text
 
 
-#: What stands in a table: words or a number.
+#: A cell of a table: words or a number.
 Cell = str | Quantity
 
 
 @dataclass(frozen=True)
 class Facts(Shown):
-    """One line: a title, or an empty text where the title stands above, and facts."""
+    """One line: a title, empty if the title is above, and facts."""
 
     about: str
     facts: tuple[str, ...] = ()
@@ -84,7 +71,7 @@ class Note(Shown):
 
 @dataclass(frozen=True)
 class Labelled(Shown):
-    """A text and what it is about."""
+    """A text with a label."""
 
     label: str
     text: str
@@ -119,16 +106,11 @@ class Block(Shown):
 
 @dataclass(frozen=True)
 class Next(Shown):
-    """A command to type next.
+    """A command to type next: a text, or a command and its options.
 
-    Attributes
-    ----------
-    words : tuple of str
-        A text, or a command and its options.
-    problem : bool
-        Whether the command is about the problem that was typed.
-    iteration, exchanged : bool
-        Whether it has the theta, the relaxation and the roles that were typed, and whether it exchanges the roles.
+    With ``problem`` it is about the problem that was typed, with ``iteration`` also its theta, relaxation and roles;
+    with
+    ``exchanged`` it exchanges the roles.
     """
 
     words: tuple[str, ...]
@@ -145,19 +127,10 @@ def following(*words: str, iteration: bool = False, exchanged: bool = False) -> 
 
 @dataclass(frozen=True)
 class Section(Shown):
-    """Parts below one title.
+    """Parts below one title, the question that they answer; the title is empty before and after all questions.
 
-    Attributes
-    ----------
-    id : str
-        Its name among the sections of a result.  A section with the id of the one before continues it.
-    title : str
-        The question that it answers; empty for what stands before and after all questions.
-    parts : tuple of Shown
-    caption : str
-        What its table shows.
-    pictures : tuple of pairs of str
-        The names of figures that stand below it in a report, and what they show.
+    A section with the id of the one before continues it.  ``caption`` explains its table; ``pictures`` are the names of
+    the figures below it in a report, with their captions.
     """
 
     id: str
@@ -172,9 +145,9 @@ Sections = tuple[Section, ...]
 
 @singledispatch
 def of(result: Any) -> Sections:
-    """The sections of a result; none of a kind that has none, which is shown as its document.
+    """The sections of a result; a result without sections is shown as its document.
 
-    ``of.register`` takes a function of the results of a class: :mod:`verification.sections.of_results` knows ours.
+    ``of.register`` adds a function for a class of results; :mod:`verification.sections.of_results` imports all of ours.
     """
     return ()
 
@@ -188,7 +161,7 @@ def section(
 
 
 def closing(claims: str, *notes: Note, then: Next | str = "") -> Section:
-    """The end of a result: what it does not say, after other notes, and what to type next."""
+    """The end of a result: other notes, what is not claimed, and the command to type next."""
     last = [Note(f"Not claimed: {claims}.", 0)] if claims else []
     command = [Next((then,)) if isinstance(then, str) else then] if then else []
     return section("limits", "", *notes, *last, *command)

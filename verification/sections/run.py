@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from verification.advice.role import steps
+from verification.advice.roles import steps
 from verification.algorithm.runs import Run
 from verification.interface.fields import ContactFields
 from verification.interface.interface import Interface
@@ -41,7 +41,7 @@ PICTURES = (
 
 @of.register
 def sections(finished: Run) -> Sections:
-    """The sections; none of a run on matrices alone."""
+    """The sections; none of a run on matrices without a problem."""
     if finished.problem is None:
         return ()
     nodes = sum(len(body.mesh.points) for body in finished.bodies.elastic)
@@ -53,7 +53,7 @@ def sections(finished: Run) -> Sections:
 
 
 def happened(finished: Run, *, alone: bool) -> Section:
-    """What a run did; ``alone`` where no verdict says why there is no forecast."""
+    """The course of a run; ``alone`` if no answer shows its end and no verdict explains a missing forecast."""
     problem = finished.problem
     assert problem is not None  # see `sections`
     rate, linear, made = finished.observed_rate, finished.linearised, finished.forecast
@@ -62,14 +62,17 @@ def happened(finished: Run, *, alone: bool) -> Section:
         name = f"forecast at step {made.made_at_iteration}"
         rows.append((name, near_one(made.rate), count(made.iterations), "prediction, not a bound"))
     if linear is not None:
-        steady = "" if linear.predicted is None else f"; consistency of J {near_one(linear.predicted)}"
         needed = count(steps(linear.rate, problem.iteration.tolerance))
-        rows.append(("linearised at the solution", near_one(linear.rate), needed, f"afterwards{steady}"))
+        rows.append(("linearised at the solution", near_one(linear.rate), needed, "computed after the run"))
     seen: Cell = NONE if rate is None else near_one(rate.value)
     if finished.observed_growth is not None:
         seen = Quantity(finished.observed_growth, f"grows by {finished.observed_growth:.4g}")
-    rows.append(("observed", seen, count(finished.iterations), f"seen: {finished.outcome}"))
+    if alone or not rows:
+        rows.append(("observed", seen, count(finished.iterations), f"seen: {finished.outcome}"))
     parts: list[Shown | str] = [table(("", "rate", "steps", ""), rows)]
+    if linear is not None and linear.predicted is not None:
+        rate_of_it = f"this linearisation has the rate {near_one(linear.predicted)} along the run"
+        parts.append(Labelled("replayed", rate_of_it, only="report"))
     if made is None and finished.relaxation == "constant" and alone:
         parts.append(f"no forecast: {finished.why_no_forecast}")
     if linear is None:
@@ -117,7 +120,7 @@ def solution(found: Solution) -> Sections:
 
 
 def _grids(contact_body: int, interface: Interface) -> list[Shown]:
-    """Who carries the contact grid, where there are two."""
+    """The body that carries the contact grid, if there are two grids."""
     if interface.transfer is None:
         return []
     names = {1: "lower", 2: "upper"}
@@ -127,7 +130,7 @@ def _grids(contact_body: int, interface: Interface) -> list[Shown]:
 
 
 def _contact(problem: Problem, contact: ContactFields, solved: str = "") -> list[Shown]:
-    """What happens along Gamma_c, in totals, and how well it was solved."""
+    """States and forces along Gamma_c, in totals, and the residual of step II."""
     units, total = problem.units, contact.force
     normal = f"{figures(total['normal'], 6)} normal"
     nodes = Labelled("nodes", ", ".join(f"{number} {name}" for name, number in contact.pattern.items()))

@@ -30,7 +30,7 @@ def setting(problem: Problem, nodes: int | None, interface: int) -> Section:
 
 
 def _how(problem: Problem) -> str:
-    """How the iteration is relaxed."""
+    """The relaxation of the iteration."""
     theta, relaxation = problem.iteration.theta, problem.iteration.relaxation
     if relaxation != "constant":
         return relaxation

@@ -1,1 +1,1 @@
-"""Runs over a grid of values: ``grid`` and ``sweep_file`` say which, ``row`` makes one of them, ``sweep`` all."""
+"""Runs over a grid of values: ``grid`` reads it, ``row`` makes one of its rows, ``sweep`` all."""

@@ -23,11 +23,11 @@ PATIENCE = 10
 
 
 def on_cluster(address: str) -> Work:
-    """On the workers of the scheduler at an address.
+    """Return workers of the dask scheduler at an address.
 
-    A worker condenses the bodies of a mesh once.  The pieces of a worker that dies go to another one.  The scheduler
-    gives a piece up that was on four workers when they died, also where it only waited there behind another one.  The
-    rows of such pieces are tried again one at a time, once nothing else runs; one that is given up then says so.
+    A worker condenses the bodies of a mesh once.  The batches of a worker that dies go to another one.  The scheduler
+    gives up a batch that was on four workers when they died, even if it only waited there behind another one.  The
+    rows of such batches are tried again one at a time, once nothing else runs; one that is given up then says so.
 
     Raises
     ------
@@ -52,13 +52,7 @@ def on_cluster(address: str) -> Work:
 
 
 def _ask(address: str) -> None:
-    """Knock at a scheduler: a client that finds none says so by many lines.
-
-    Raises
-    ------
-    ProblemError
-        Nobody answers.
-    """
+    """Raise ProblemError if no scheduler answers: a client that finds none prints many lines."""
     from distributed.comm.core import connect
 
     async def knock() -> None:
@@ -92,40 +86,40 @@ def _rows(
     from distributed.comm.core import CommClosedError
 
     threads = max(1, sum(client.ncores().values()))
-    pieces = Batches(wanted, threads)
-    source = iter(pieces)
+    batches = Batches(wanted, threads)
+    source = iter(batches)
     # a future, so that a pair of large matrices goes to each worker once, and is made again where a worker dies
     origin = client.submit(_same, Origin.of(start), pure=False)
     sent: dict[str, Sequence[tuple[int, Row]]] = {}
     together: set[str] = set()  # of what is sent, all that was not alone all the time
     suspects: deque[tuple[int, Row]] = deque()
 
-    def submit(piece: Sequence[tuple[int, Row]]) -> Any:
-        future = client.submit(some, origin, piece, pure=False)
+    def submit(batch: Sequence[tuple[int, Row]]) -> Any:
+        future = client.submit(some, origin, batch, pure=False)
         if sent:
             together.update((*sent, future.key))
-        sent[future.key] = piece
+        sent[future.key] = batch
         return future
 
     try:
-        coming = as_completed((submit(piece) for piece in islice(source, AHEAD * threads)), loop=client.loop)
+        coming = as_completed((submit(batch) for batch in islice(source, AHEAD * threads)), loop=client.loop)
         for future in coming:
-            piece, alone = sent.pop(future.key), future.key not in together
+            batch, alone = sent.pop(future.key), future.key not in together
             together.discard(future.key)
             if future.status not in ("finished", "error"):
                 raise NoWorkers(address, "the scheduler has gone")
             error = future.exception()
-            if isinstance(error, KilledWorker) and not (alone and len(piece) == 1):
-                suspects.extend(piece)
+            if isinstance(error, KilledWorker) and not (alone and len(batch) == 1):
+                suspects.extend(batch)
             elif isinstance(error, KilledWorker):
-                index, values = piece[0]
+                index, values = batch[0]
                 yield [(index, lost(start, values, "the workers that ran it were killed, perhaps as memory ran out"))]
             elif error is not None:
                 raise NoWorkers(address, f"a worker cannot make rows: {type(error).__name__}: {error}")
             else:
-                yield pieces.taken(future.result())
-            for piece in islice(source, 1):
-                coming.add(submit(piece))
+                yield batches.taken(future.result())
+            for batch in islice(source, 1):
+                coming.add(submit(batch))
             if suspects and not sent:
                 coming.add(submit([suspects.popleft()]))
     except (CommClosedError, TimeoutError) as error:

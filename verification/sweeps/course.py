@@ -1,68 +1,264 @@
-"""What one run of a sweep does: when it ends, by which test, and at which rate."""
+"""One run of a sweep: when it ends, by which test, and at which rate; constant relaxation takes many steps at once.
+
+While each contact node keeps its state, T is affine.  With constant relaxation such steps are taken together, by a few
+products of matrices, and then every sign that step II requires is checked for each of them.  Where one fails T is
+evaluated as elsewhere, with its certificate.
+"""
 
 from __future__ import annotations
 
 import math
-from collections import deque
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import partial
-from itertools import takewhile
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fem1d2d.mesh import Floats
+from verification.algorithm.affine_piece import Piece, piece_of
 from verification.algorithm.ending import NO_FORCE, PATIENCE, RUNAWAY, Ending, Outcome, arrived, coupled_residual
-from verification.algorithm.fixed_point import iterate_at, iterates
+from verification.algorithm.fixed_point import FixedPointMap, iterate_at, iterates
 from verification.algorithm.iterate import Iterate
-from verification.algorithm.linearisation import NotLinear, linearised_rate
-from verification.algorithm.rates import noises, rate_of
+from verification.algorithm.linearisation import NotLinear, at_solution, linearised_rate
+from verification.algorithm.rates import Noise, rate_of
 from verification.algorithm.relaxation import Constant, Relaxation, Rule, Step
+from verification.algorithm.start import Start, begin_at
 from verification.algorithm.theta import Choice
 from verification.contact import ContactError
+from verification.contact.active_set import SLACK, Pattern, Systems
 from verification.interface.pair import ContactPair
 from verification.monolithic import SolveError
-from verification.sweeps.lean import KnownPieces, key_of, lengths
 
 #: The bound of the test of Section 6.3.
 PAPER = 1e-9
 
-#: After so many steps without a new least residual a run most likely stalls; few that do not have as many.
+#: Steps without a new least residual after which a run most likely stalls; few other runs have as many.
 WANDERS = 12
 
 #: A residual within this share of the tolerance is on either side of it by rounding: it has about seven digits there.
 TIE = 1e-6
 
+#: Number of steps that are taken together: few at first, as the pattern changes most then.
+FEWEST, MOST = 4, 64
 
-@dataclass(frozen=True, kw_only=True)
-class Course:
-    """What a run did.
+#: Number of pieces of one pair that are kept.
+KEPT = 64
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Steps:
+    """Consecutive evaluations of T on one piece, each an array over the steps.
 
     Attributes
     ----------
-    steps : int
-        Steps until it ended, as :attr:`verification.algorithm.runs.Run.iterations` counts them.
-    paper : int or None
-        n at which the test of Section 6.3 is met.
-    outcome : {'converged', 'stalled', 'limit', 'diverged'}
-    observed_rate, linearised_rate, coupled_residual : float or None
-        As a run has them.
-    reason : mapping
-        Why a value is None, or why the outcome is not ``converged``.
+    g, u, image : array, shape (2 n, steps)
+        g, its displacement and T g.
+    residual, scale : array, shape (steps,)
+        ``|||T g - g|||`` and the larger of ``|||g|||`` and ``|||T g|||`` in the norm (5.21).
+    pattern, piece : object
+        Equal for steps of one contact pattern, and of one affine piece.
+    found : Iterate or None
+        The one step, for other rules than constant relaxation.
     """
 
-    steps: int
-    paper: int | None
-    outcome: Outcome
-    observed_rate: float | None
-    linearised_rate: float | None
-    coupled_residual: float | None
-    reason: Mapping[str, str] = field(default_factory=dict)
+    g: Floats
+    u: Floats
+    image: Floats
+    residual: Floats
+    scale: Floats
+    pattern: bytes
+    piece: tuple[bytes, ...]
+    found: Iterate | None = None
+
+    def first(self, count: int) -> Steps:
+        """Return the first of them."""
+        arrays = {name: getattr(self, name)[..., :count] for name in ("g", "u", "image", "residual", "scale")}
+        return replace(self, **arrays)
+
+
+class Affine:
+    """T on one affine piece of a pair without held contact nodes, with the signs that hold there."""
+
+    def __init__(self, piece: Piece, systems: Systems) -> None:
+        pair = piece.pair
+        contact, interface = pair.contact, pair.interface
+        self.piece, self.key = piece, key_of(piece)
+        unloaded = interface.carry(pair.neumann.unloaded)
+        obstacle = unloaded.copy()
+        obstacle[contact.grid.normal] += interface.gap
+        trace = interface.carry(pair.neumann.inverse)
+        start = contact.load - contact.stiffness @ obstacle  # q of step II at g = 0, where the bound is 0 as well
+        v, force = systems.of(piece.pattern).solve(start, np.zeros(contact.grid.t))
+        parts = [
+            (piece.reaction, force),
+            (piece.jump, v),
+            (-contact.stiffness @ trace, start),
+            (pair.neumann.inverse, pair.neumann.unloaded),
+            (piece.force, interface.carry_back(force)),
+        ]
+        self._matrix = np.vstack([matrix for matrix, _ in parts])
+        self._offset = np.concatenate([offset for _, offset in parts])[:, None]
+        self._image = parts[-1]
+        self._stiffness = float(np.diag(contact.stiffness).max())
+        self._sliding = piece.pattern.sliding.astype(float)[:, None]
+
+    def relaxed(self, theta: float) -> tuple[Floats, Floats]:
+        """Return T_theta as a matrix and its value at 0."""
+        matrix, offset = self._image
+        relaxed = theta * matrix
+        relaxed[np.diag_indices_from(relaxed)] += 1 - theta
+        return relaxed, theta * offset
+
+    def on(self, g: Floats, norm: Norm) -> tuple[Steps, int]:
+        """Evaluate T at the columns of g, and count those, from the first on, that the signs of the piece admit."""
+        pair = self.piece.pair
+        interface, t = pair.interface, pair.contact.grid.t
+        found, size = self._matrix @ g + self._offset, pair.contact.grid.size
+        force, v, q = (found[i * size : (i + 1) * size] for i in range(3))
+        u, image = found[3 * size : -len(g)], found[-len(g) :]
+        if pair.rubs and interface.kernel is not None:
+            stress = interface.kernel @ g[pair.neumann.grid.normal]
+            bound = norm.limits * np.abs(stress)
+            kept = (np.sign(stress) == self.piece.sign[:, None]).all(axis=0)
+        else:
+            bound, kept = np.zeros((t, g.shape[1])), np.ones(g.shape[1], dtype=bool)
+        slack = SLACK * np.maximum(np.abs(q).max(axis=0), bound.max(axis=0, initial=0.0))
+        # the conditions of the active set, at every step
+        kept &= (force[t:] >= -slack).all(axis=0) & (v[t:] <= slack / self._stiffness).all(axis=0)
+        kept &= (np.abs(force[:t]) <= bound + slack).all(axis=0)
+        kept &= ((self._sliding * v[:t] >= -slack / self._stiffness) | (bound == 0)).all(axis=0)
+        steps = Steps(
+            g=g,
+            u=u,
+            image=image,
+            residual=norm.of(image - g),
+            scale=np.maximum(norm.of(g), norm.of(image)),
+            pattern=self.key[0],
+            piece=self.key,
+        )
+        return steps, len(kept) if kept.all() else int(np.argmin(kept))
+
+
+class Norm:
+    """The norm (5.21) of columns, and the limit of friction at each node."""
+
+    def __init__(self, pair: ContactPair) -> None:
+        self._factor = np.linalg.inv(pair.neumann.root)
+        self.limits = (float(pair.friction) * pair.contact.grid.weights)[:, None]
+
+    def of(self, force: Floats) -> Floats:
+        """Return ``sqrt(force' S2^-1 force)`` of every column."""
+        return lengths(self._factor @ force)
+
+
+def lengths(columns: Floats) -> Floats:
+    """Return the Euclidean norm of every column."""
+    found: Floats = np.sqrt(np.einsum("ij,ij->j", columns, columns))
+    return found
+
+
+def key_of(piece: Piece) -> tuple[bytes, ...]:
+    """Return a key that is equal for equal pieces of one pair; its first member is the pattern."""
+    return piece.pattern.key, piece.sign.tobytes(), piece.still.tobytes()
+
+
+class KnownPieces:
+    """Shared data of the runs of one pair: its affine pieces, and the solution of the global method."""
+
+    def __init__(self, pair: ContactPair) -> None:
+        self.pair = pair
+        contact = pair.contact
+        self._systems = Systems(contact.stiffness, contact.free, contact.motions)
+        self._found: dict[tuple[bytes, ...], Piece] = {}
+        self._affine: dict[tuple[bytes, ...], Affine] = {}
+
+    def map(self) -> FixedPointMap:
+        """Return T for one run: the pattern it tries first depends on the steps before."""
+        return FixedPointMap(self.pair, systems=self._systems)
+
+    def piece(self, g: Floats, pattern: Pattern) -> Piece:
+        """Return the piece around g."""
+        new = piece_of(self.pair, g, pattern)
+        if len(self._found) >= KEPT:
+            self._found.clear()
+            self._affine.clear()
+        return self._found.setdefault(key_of(new), new)
+
+    def affine(self, piece: Piece) -> Affine:
+        """Return T on a piece."""
+        key = key_of(piece)
+        if key not in self._affine:
+            self._affine[key] = Affine(piece, self._systems)
+        return self._affine[key]
+
+    @cached_property
+    def norm(self) -> Norm:
+        """The norm (5.21) of columns."""
+        return Norm(self.pair)
+
+    @cached_property
+    def noise(self) -> Noise:
+        """The rounding of one evaluation of T."""
+        return Noise(self.pair)
+
+    @cached_property
+    def _solution(self) -> Iterate | Exception:
+        try:
+            return at_solution(self.map())
+        except (NotLinear, SolveError, RuntimeError) as error:
+            return error
+
+    def solution(self) -> Iterate:
+        """Return T at the solution of the global method; may raise NotLinear, SolveError or RuntimeError."""
+        if isinstance(self._solution, Exception):
+            raise self._solution
+        return self._solution
+
+    @cached_property
+    def start(self) -> Start:
+        """Start of the runs."""
+        return begin_at(self.map())
+
+    def steps(self, T: FixedPointMap, theta: float) -> Iterator[Steps]:
+        """Yield the run of a new :meth:`map` with constant relaxation from its start, without end."""
+        g = self.start.g
+        while True:
+            found = iterate_at(T, g)
+            piece = self.piece(g, found.contact.pattern)
+            yield replace(self.single(found), found=None)
+            g = theta * found.image + (1 - theta) * g
+            affine, count = self.affine(piece), FEWEST
+            relaxed, kept = affine.relaxed(theta), count
+            while kept == count:
+                with np.errstate(over="ignore", invalid="ignore"):  # of a run that diverges; no sign admits it
+                    taken, kept = affine.on(_walk(*relaxed, g, count), self.norm)
+                if kept:
+                    yield taken.first(kept)
+                    g = theta * taken.image[:, kept - 1] + (1 - theta) * taken.g[:, kept - 1]
+                if kept == count:
+                    kept = count = min(2 * count, MOST)
+
+    def single(self, found: Iterate) -> Steps:
+        """Return one evaluation of T with its piece."""
+        key = key_of(self.piece(found.g, found.contact.pattern))
+        g, u, image = (column[:, None] for column in (found.g, found.displacement, found.image))
+        residual, scale = np.array([found.residual]), np.array([found.scale])
+        return Steps(g=g, u=u, image=image, residual=residual, scale=scale, pattern=key[0], piece=key, found=found)
+
+
+def _walk(matrix: Floats, offset: Floats, g: Floats, count: int) -> Floats:
+    """Return so many iterates as columns, from g on."""
+    walked = np.empty((len(g), count))
+    for i in range(count):
+        walked[:, i] = g
+        g = matrix @ g + offset
+    return walked
 
 
 def meets_paper_test(g: Floats, before: Floats) -> NDArray[np.bool_]:
-    """The test of Section 6.3: ``|g_n - g_{n-1}|/|g_n| < 1e-9`` or ``|g_n - g_{n-1}| < 1e-9``, for every column.
+    """Apply the test of Section 6.3, ``|g_n - g_{n-1}|/|g_n| < 1e-9`` or ``|g_n - g_{n-1}| < 1e-9``, to every column.
 
     Norms are Euclidean; the second part is in the unit of force of the file.
     """
@@ -70,21 +266,44 @@ def meets_paper_test(g: Floats, before: Floats) -> NDArray[np.bool_]:
     return (increment < PAPER) | (increment < PAPER * lengths(g))
 
 
-def course(pair: ContactPair, rule: Rule, choice: Choice, step: Step, pieces: KnownPieces) -> Course:
-    """Run from its start until both tests are met, or the run stalls, runs away or reaches its limit.
+def course(
+    pair: ContactPair, rule: Rule, choice: Choice, step: Step, pieces: KnownPieces
+) -> tuple[dict[str, Any], dict[str, str]]:
+    """Run a pair from its start until both tests are met, or the run stalls, runs away or reaches its limit.
+
+    Returns
+    -------
+    dict
+        The columns of the run in its row, by name: ``steps``, the number until the run ended; ``iterations``, the same
+        if it converged; ``iterations_paper``, n at which the test of Section 6.3 is met; ``outcome``; the other three
+        as a run has them.
+    dict
+        Why a column is None, by its name.
 
     Raises
     ------
     ContactError
         Step II did not reach its certificate before the run ended.
     """
-    went = _lean(pieces, step.theta) if isinstance(step, Relaxation) and not pair.held else None
-    # where rounding decides the steps of `run` do: a residual that wanders at a level, or meets the tolerance exactly
-    went = went or _stepwise(pieces, step)
-    reason = _reason(went.outcome, len(went.residuals) - 1, went.paper, went.why)
+    T, went = pieces.map(), None
+    if isinstance(step, Relaxation) and not pair.held:
+        went = _follow(pieces, pieces.steps(T, step.theta), T, lean=True)
+    if went is None:  # any rule, and where rounding decides: a residual that wanders, or meets the tolerance exactly
+        T = pieces.map()
+        went = _follow(pieces, map(pieces.single, iterates(T, step, pieces.start.g)), T, lean=False)
+    assert went is not None  # only lean steps leave it to others
+    steps = len(went.residuals) - 1
+    reason = {
+        "limit": {"iterations": f"not converged in {steps} steps"},
+        "stalled": {"iterations": f"no new least residual over {PATIENCE} steps"},
+        "diverged": {"iterations": f"the residual grew by more than {RUNAWAY:g}"},
+    }.get(went.outcome, {})
+    if went.paper is None:
+        reason["iterations_paper"] = went.why or f"not met before the run ended: {went.outcome}"
     observed = None if went.outcome == "diverged" else rate_of(went.residuals, went.floors, went.kinds)
     if observed is None:
-        reason["observed_rate"] = _no_rate(went.outcome)
+        diverged = went.outcome == "diverged"
+        reason["observed_rate"] = "the run diverged" if diverged else "too few steps stand clear of the rounding"
     end: Iterate | None = None
     coupled, linear = None, None
     try:
@@ -98,39 +317,40 @@ def course(pair: ContactPair, rule: Rule, choice: Choice, step: Step, pieces: Kn
     try:
         if not isinstance(rule, Constant):
             raise NotLinear(f"the {rule.name} relaxation is no constant theta")
-        here, first = (end, went.entry()) if end and went.outcome == "converged" else (pieces.solution(), None)
+        here, first = (end, went.entry) if end and went.outcome == "converged" else (pieces.solution(), None)
         linear = linearised_rate(pieces.piece(here.g, here.contact.pattern), here, float(choice.theta), first)
     except (NotLinear, SolveError, ContactError) as error:
         reason["linearised_rate"] = str(error)
-    return Course(
-        steps=len(went.residuals) - 1,
-        paper=went.paper,
-        outcome=went.outcome,
-        observed_rate=None if observed is None else observed.value,
-        linearised_rate=linear,
-        coupled_residual=coupled,
-        reason=reason,
-    )
+    columns = {
+        "iterations": steps if went.outcome == "converged" else None,
+        "iterations_paper": went.paper,
+        "steps": steps,
+        "outcome": went.outcome,
+        "observed_rate": None if observed is None else observed.value,
+        "linearised_rate": linear,
+        "coupled_residual": coupled,
+    }
+    return columns, reason
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Went:
-    """How a run went.
+    """The steps of a run.
 
     Attributes
     ----------
     outcome : {'converged', 'stalled', 'limit', 'diverged'}
     residuals, floors : list of float
-        Those of every evaluation until it ended, and the rounding of each.
+        Of every evaluation until it ended, and the rounding of each.
     kinds : list
-        What tells one contact pattern from another, for each.
+        The contact pattern of each, in a form that can be compared.
     paper : int or None
         n at which the test of Section 6.3 is met.
     why : str
-        What ended it before that test was met, other than its outcome.
+        The error that ended it before that test was met.
     end : callable
         T at its last g.
-    entry : callable
+    entry : array
         The g with which it came onto the piece of the last g for good.
     """
 
@@ -141,23 +361,27 @@ class _Went:
     paper: int | None
     why: str
     end: Callable[[], Iterate]
-    entry: Callable[[], Floats]
+    entry: Floats
 
 
-def _lean(pieces: KnownPieces, theta: float) -> _Went | None:
-    """With constant relaxation: steps on one affine piece are taken together; None where rounding decides the count."""
-    pair, settings, T = pieces.pair, pieces.pair.settings, pieces.map()
-    ending, bound = Ending(settings), settings.tolerance
-    joined = lambda g: arrived(pair, iterate_at(T, g))
+def _follow(pieces: KnownPieces, batches: Iterable[Steps], T: FixedPointMap, *, lean: bool) -> _Went | None:
+    """Follow a run, and go on until the test of Section 6.3 is met or the run is given up.
+
+    Lean steps, which are not evaluated one by one, give None where rounding decides when the run ends.
+    """
+    pair, bound = pieces.pair, pieces.pair.settings.tolerance
+    ending = Ending(pair.settings)
     residuals: list[float] = []
     walked: list[tuple[Floats, Floats]] = []
     kinds: list[object] = []
     outcome: Outcome | None = None
     paper, why, n, least, since = None, "", -1, math.inf, 0
-    before = last = first = np.zeros(0)
+    before = first = np.zeros(0)
     piece: tuple[bytes, ...] = ()
+    evaluated: Callable[[], Iterate]
+    joined = lambda here: arrived(pair, here())
     try:
-        for taken in pieces.steps(T, theta):
+        for taken in batches:
             if paper is None:
                 paper = _paper(taken.g, before, n)
             if outcome is None:
@@ -165,16 +389,15 @@ def _lean(pieces: KnownPieces, theta: float) -> _Went | None:
                 if taken.piece != piece:
                     piece, first = taken.piece, taken.g[:, 0]
             for i, (residual, scale) in enumerate(zip(taken.residual.tolist(), taken.scale.tolist(), strict=True)):
-                n, g = n + 1, taken.g[:, i]
-                ended = ending.at(n, residual, scale, partial(joined, g))
+                n += 1
+                here = partial(_evaluated, T, taken, i)
+                ended = ending.at(n, residual, scale, partial(joined, here))
                 if outcome is None:
-                    if abs(residual - bound * scale) <= TIE * bound * scale:
-                        return None
                     residuals.append(residual)
                     kinds.append(taken.pattern)
-                    outcome, last = ended, g
+                    outcome, evaluated = ended, here
                     least, since = (residual, 0) if residual < least else (least, since + 1)
-                    if since > WANDERS:
+                    if lean and (since > WANDERS or abs(residual - bound * scale) <= TIE * bound * scale):
                         return None
                 if outcome and ((paper is not None and paper <= n) or ending.given_up(n, residual)):
                     paper = None if paper is None or paper > n else paper
@@ -187,81 +410,27 @@ def _lean(pieces: KnownPieces, theta: float) -> _Went | None:
         if outcome is None:
             raise
         why = str(error)
-    assert outcome is not None  # the iterates have no end of their own
+    assert outcome is not None  # the iterates do not end
     gs, us = (np.hstack(parts)[:, : len(residuals)] for parts in zip(*walked, strict=True))
     return _Went(
         outcome=outcome,
         residuals=residuals,
-        floors=pieces.norm.rounding(gs, us).tolist(),
+        floors=pieces.noise.of(gs, us).tolist(),
         kinds=kinds,
         paper=paper,
         why=why,
-        end=lambda: iterate_at(T, last),
-        entry=lambda: first,
+        end=evaluated,
+        entry=first,
     )
+
+
+def _evaluated(T: FixedPointMap, taken: Steps, i: int) -> Iterate:
+    """Return T at one of some steps."""
+    return taken.found or iterate_at(T, taken.g[:, i])
 
 
 def _paper(g: Floats, before: Floats, last: int) -> int | None:
-    """n of the first column of g at which :func:`meets_paper_test` is true, where ``last`` columns came before."""
+    """Return n of the first column of g at which :func:`meets_paper_test` is true; ``last`` is n of the one before."""
     columns = np.column_stack([before, g]) if len(before) else g
     met = np.flatnonzero(meets_paper_test(columns[:, 1:], columns[:, :-1]))
     return None if not len(met) else last + int(met[0]) + (1 if len(before) else 2)
-
-
-def _stepwise(pieces: KnownPieces, step: Step) -> _Went:
-    """With any rule: as :func:`verification.run` goes."""
-    pair = pieces.pair
-    seen: list[Iterate] = []
-    ending, paper, why = Ending(pair.settings), None, ""
-    outcome: Outcome | None = None
-    before: Floats | None = None
-    try:
-        for found in iterates(pieces.map(), step, pieces.start.g):
-            if paper is None and before is not None and meets_paper_test(found.g[:, None], before[:, None])[0]:
-                paper = found.iteration
-            if outcome is None:
-                seen.append(found)
-            ended = ending.at(found.iteration, found.residual, found.scale, partial(arrived, pair, found))
-            outcome = outcome or ended
-            if outcome is not None and (paper is not None or ending.given_up(found.iteration, found.residual)):
-                break
-            before = found.g
-    except ContactError as error:
-        if outcome is None:
-            raise
-        why = str(error)
-    assert outcome is not None  # the iterates have no end of their own
-
-    def entry() -> Floats:
-        last = key_of(pieces.piece(seen[-1].g, seen[-1].contact.pattern))
-        same = takewhile(lambda each: key_of(pieces.piece(each.g, each.contact.pattern)) == last, reversed(seen))
-        return deque(same, maxlen=1)[0].g
-
-    return _Went(
-        outcome=outcome,
-        residuals=[each.residual for each in seen],
-        floors=noises(pair, seen),
-        kinds=[each.contact.pattern for each in seen],
-        paper=paper,
-        why=why,
-        end=lambda: seen[-1],
-        entry=entry,
-    )
-
-
-def _reason(outcome: Outcome, steps: int, paper: int | None, why: str) -> dict[str, str]:
-    """Why a run has no count of steps."""
-    found = {
-        "converged": {},
-        "limit": {"iterations": f"not converged in {steps} steps"},
-        "stalled": {"iterations": f"no new least residual over {PATIENCE} steps"},
-        "diverged": {"iterations": f"the residual grew by more than {RUNAWAY:g}"},
-        "interrupted": {},
-    }[outcome]
-    if paper is None:
-        found["iterations_paper"] = why or f"not met before the run ended: {outcome}"
-    return found
-
-
-def _no_rate(outcome: Outcome) -> str:
-    return "the run diverged" if outcome == "diverged" else "too few steps stand clear of the rounding"

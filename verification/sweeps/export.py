@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 #: Results that are words; the others are numbers, with NaN where a row has none.
 TEXTS = ("outcome", "reason")
 
-#: What the results and the axes are called in full.
+#: Full names of the results and the axes.
 NAMES = {
     "theta": "relaxation factor",
     "friction": "coefficient of friction k",
@@ -49,11 +49,11 @@ MISSING = "missing"
 
 
 def dataset(sweep: Sweep) -> xarray.Dataset:
-    """The sweep as an :class:`xarray.Dataset`.
+    """Return the sweep as an :class:`xarray.Dataset`.
 
     Dimensions are the axes of the grid, in its order; ``young`` counts pairs, with the coordinates ``young1`` and
-    ``young2``.  A row that was not made has the outcome ``missing``.  What has a unit has it as the attribute
-    ``units``, 1 where it is a number without one; the dataset itself has version, units and the problem as JSON.
+    ``young2``.  A row that was not made has the outcome ``missing``.  A variable with a unit has it as the attribute
+    ``units``, 1 for a number without one; the dataset itself has version, units and the problem as JSON.
 
     Raises
     ------
@@ -103,13 +103,7 @@ def dataset(sweep: Sweep) -> xarray.Dataset:
 
 
 def write_dataset(sweep: Sweep, path: Path) -> None:
-    """Write the dataset as netCDF 4.
-
-    Raises
-    ------
-    ProblemError
-        As :func:`dataset`.
-    """
+    """Write the dataset as netCDF 4; errors as for :func:`dataset`."""
     dataset(sweep).to_netcdf(path, engine="netcdf4")
 
 

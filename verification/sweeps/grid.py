@@ -1,4 +1,4 @@
-"""The grid of a sweep: which values each axis has, and their product in a fixed order."""
+"""The grid of a sweep: the values of each axis, their product in a fixed order, and the file that lists them."""
 
 from __future__ import annotations
 
@@ -6,32 +6,44 @@ import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 from functools import partial
+from pathlib import Path
 from typing import Any
 
-from ndtheory import HypothesisError
+from ndtheory.texts import did_you_mean
 from verification.algorithm.relaxation import RULES, Rule
 from verification.interface.friction import LAWS
-from verification.problem.specs import MOST_FRICTION, read_theta
-from verification.problem.tables import ProblemError, Unfit, choice, integer, number, positive, several, show
+from verification.problem.examples import example, examples
+from verification.problem.files import load, read_file
+from verification.problem.reading import coefficient, factor
+from verification.problem.specification import Problem
+from verification.problem.tables import (
+    ProblemError,
+    TomlTable,
+    Unfit,
+    choice,
+    integer,
+    number,
+    positive,
+    several,
+    show,
+    text,
+)
 
-#: Most rows of a sweep: a typing error should not fill the memory.
+#: Largest number of rows of a sweep, so that a typing error does not fill the memory.
 MOST_ROWS = 200_000
 
-#: Most halvings of a mesh, as `ndtheory constants --refine` has it.
+#: Largest number of halvings of a mesh, as in `ndtheory constants --refine`.
 MOST_HALVINGS = 8
 
-#: A value of a grid by the name of its axis: what one row is a function of.
+#: The keys of a range of values.
+RANGE = ("start", "stop", "step")
+
+#: The arguments of one row: a value of the grid by the name of its axis.
 Values = Mapping[str, Any]
 
 _moduli = "two numbers > 0, Young's modulus of body 1 and of body 2"
-
-
-def _theta(value: Any) -> Any:
-    try:
-        return read_theta(value)
-    except HypothesisError as error:
-        raise Unfit(f"needed {error.needed}") from None
 
 
 def _halvings(value: Any) -> int:
@@ -41,21 +53,17 @@ def _halvings(value: Any) -> int:
     return int(value)
 
 
-def _rule(value: Any) -> Any:
-    return value if isinstance(value, Rule) else choice(*RULES)(value)
-
-
-#: How a value of each axis is read, from the axis that changes most slowly to the one that changes fastest: rows that
-#: stand together share what is condensed.
+#: Reader of a value of each axis, from the axis that changes most slowly to the one that changes fastest: neighbouring
+#: rows share condensed bodies.
 AXES: dict[str, Callable[[Any], Any]] = {
     "refine": _halvings,
     "young": several(positive, 2, _moduli),
     "neumann_body": choice(1, 2),
     "law": lambda value: choice(*LAWS)(value),  # those that are registered at that moment
     "radius": positive,
-    "friction": number(f"a number >= 0, at most {float(MOST_FRICTION):g}", lambda v: 0 <= v <= MOST_FRICTION),
-    "rule": _rule,
-    "theta": _theta,
+    "friction": coefficient,
+    "rule": lambda value: value if isinstance(value, Rule) else choice(*RULES)(value),
+    "theta": factor,
 }
 
 
@@ -81,16 +89,12 @@ class SweepGrid:
     def of(cls, given: Mapping[str, Sequence[Any] | None], source: str = "<dict>", table: str = "") -> SweepGrid:
         """Read the values of the axes, exactly; None leaves an axis out.
 
-        Parameters
-        ----------
-        given : mapping
-        source, table : str
-            What errors name: a file, and the table of the axes in it.
+        Errors name the source, a file, and the table of the axes in it.
 
         Raises
         ------
         ProblemError
-            An axis that is unknown or has no values, a value that does not fit or stands there twice, too many rows.
+            An axis that is unknown or has no values, a value that does not fit or is listed twice, too many rows.
         """
         key = lambda name: f"{table}.{name}" if table else name
         for name in given:
@@ -110,7 +114,7 @@ class SweepGrid:
         return math.prod(map(len, self.axes.values()))
 
     def rows(self) -> Iterator[dict[str, Any]]:
-        """The values of each row, the last axis of :data:`AXES` changing fastest."""
+        """Yield the values of each row, the last axis of :data:`AXES` changing fastest."""
         for values in itertools.product(*self.axes.values()):
             yield dict(zip(self.axes, values, strict=True))
 
@@ -131,6 +135,72 @@ def _read(values: Any, read: Callable[[Any], Any], refuse: Callable[[Any, str], 
         except Unfit as error:
             raise refuse(value, str(error)) from None
         if one in found:
-            raise refuse(value, f"needed each value once, {show(value)} stands there twice")
+            raise refuse(value, f"needed each value once, {show(value)} is listed twice")
         found[one] = None
     return tuple(found)
+
+
+def read_sweep(path: Path | str) -> tuple[Problem, SweepGrid]:
+    """Read a sweep file.
+
+    Parameters
+    ----------
+    path : path
+        A TOML file.  ``problem`` is a problem file beside it, or else the name of a built-in
+        problem; ``[grid]`` has a list of values for each axis, or ``{ start, stop, step }`` with both ends.
+
+    Raises
+    ------
+    ProblemError
+        Naming file, key, value received and what is needed.
+    """
+    path = Path(path)
+    data = read_file(path)
+    if "body1" in data and "grid" not in data:
+        needed = (
+            "needed the file of a sweep, this is a problem file; write another one beside it that names it and the "
+            f'values, as problem = "{path.name}" and [grid] theta = [0.3, 0.5]'
+        )
+        raise ProblemError(str(path), "", None, needed)
+    top = TomlTable(data, str(path))
+    name = top.take("problem", text)
+    grid = top.table("grid", required=True)
+    top.close()
+    problem = _problem(path, name)
+    given = {axis: grid.take(axis, partial(_values, str(path), grid.key(axis))) for axis in grid.names()}
+    if not given:
+        raise ProblemError(str(path), "grid", None, "needed at least one axis, as theta = [0.3, 0.5]")
+    return problem, SweepGrid.of(given, str(path), "grid")
+
+
+def _problem(path: Path, name: str) -> Problem:
+    place = path.parent / name
+    built_in = examples()
+    try:
+        there = place.is_file() or (place.exists() and name not in built_in)
+    except ValueError:  # a null character
+        there = False
+    if there:
+        return load(place)
+    if name in built_in:
+        return example(name)
+    needed = f"needed a problem file beside the sweep file, or the name of a built-in problem: {', '.join(built_in)}"
+    raise ProblemError(str(path), "problem", name, needed + did_you_mean(name, built_in))
+
+
+def _values(file: str, key: str, value: Any) -> Any:
+    """Return a list as it is, a range as the list of its values."""
+    if not isinstance(value, Mapping):
+        return value
+    table = TomlTable(value, file, key)
+    reads: tuple[Callable[[Any], Fraction], ...] = (number(), number(), positive)
+    start, stop, step = (table.take(name, read) for name, read in zip(RANGE, reads, strict=True))
+    table.close()
+    steps = (stop - start) / step
+    if steps < 0 or steps.denominator != 1:
+        raise Unfit("needed a whole number of steps from start up to stop: both ends are values")
+    if steps >= MOST_ROWS:
+        raise Unfit(f"needed at most {MOST_ROWS} values")
+    values = [start + i * step for i in range(int(steps) + 1)]
+    whole = all(isinstance(value[name], int) for name in RANGE)
+    return [int(v) for v in values] if whole else values

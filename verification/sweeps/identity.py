@@ -9,14 +9,13 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
-from collections.abc import Iterator
 from dataclasses import MISSING, dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
-from verification.algorithm.relaxation import RULES, Rule, rule_of
+from verification.algorithm.relaxation import RULES, rule_of
 from verification.interface.friction import LAWS, GivenOperator
 from verification.interface.interface import Law
 from verification.interface.pair import ContactPair
@@ -24,16 +23,19 @@ from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
 from verification.sweeps.grid import SweepGrid
 
-#: How step II is solved in a row: by the active set, and by the model where that does not settle.
+#: The solver of step II in a row: the active set, and the model where that does not settle.
 SOLVER = "auto"
 
-#: Raised where a digit of a row may change, and only there: 2 since a residual is compared with the present forces.
+#: Raised by every change of a digit of a row, and only by these: 2 since a residual is compared with present forces.
 NUMERICS = 2
 
-#: What the key of a pair always has of its settings and arrays, whatever they are; a setting that comes later counts
-#: where it has no default, an array where there is one, so that keys stay.
+#: Settings and arrays that always enter the key of a pair; a later setting enters where it differs from its default, a
+#: later array where there is one, so that keys stay.
 SETTINGS = ("theta", "relaxation", "tolerance", "max_iterations")
 ARRAYS = ("stiffness", "load", "known", "free", "motions")
+
+#: Why a rule or a law of a user's own has no key.
+NEEDED = "needed a {} of this library, as nothing tells two versions of another one apart; or no store"
 
 #: Bytes of a key: at a million rows two of them agree by chance once in 1e26 stores.
 LENGTH = 16
@@ -41,18 +43,18 @@ LENGTH = 16
 
 @dataclass(frozen=True, kw_only=True)
 class Identity:
-    """What the rows of a sweep have in common, as far as a digit of them can depend on it.
+    """The data that rows of a sweep have in common, as far as a digit of them can depend on it.
 
     Attributes
     ----------
     of : str
         The problem or the pair, as JSON; numbers exactly, mesh files and matrices by their content.
     source : str
-        What errors name.
+        The name of the problem in errors.
     numerics : int
         Number of the numerics.
     version : str
-        Empty, but in a store of 0.1.0: there a key holds the version of this library, too.
+        Empty, except in a store of 0.1.0: there a key holds the version of this library, too.
     """
 
     of: str
@@ -62,23 +64,23 @@ class Identity:
 
     @classmethod
     def read(cls, start: Problem | ContactPair) -> Identity:
-        """That of a problem or of a pair.
+        """Return the identity of a problem or of a pair.
 
         Raises
         ------
         ProblemError
-            The pair has a law of friction of its own, of which nothing tells two versions apart.
+            The pair has a user's own law of friction, of which nothing distinguishes two versions.
         """
         if isinstance(start, Problem):
             return cls(of=json.dumps({"problem": start.digest}), source=start.source)
         return cls(of=json.dumps(_of_pair(start), sort_keys=True), source=start.source)
 
     def before(self, numerics: int, version: str = "") -> Identity:
-        """The same under another number of the numerics, and as a store of 0.1.0 has it where a version is given."""
+        """Return the same under another number of the numerics; with a version, as a store of 0.1.0 has it."""
         return replace(self, numerics=numerics, version=version)
 
     def study(self, version: str) -> str:
-        """The key under which a version of this library keeps it: SHA-256, in hexadecimal digits."""
+        """Return the key under which a version of this library keeps it: SHA-256, in hexadecimal digits."""
         of = self._written() if self.version else {"made by": version} | self._written()
         return hashlib.sha256(json.dumps(of).encode("ascii")).hexdigest()
 
@@ -87,12 +89,12 @@ class Identity:
         return {"version": self.version} | of if self.version else of
 
     def keys(self, grid: SweepGrid) -> list[bytes]:
-        """The key of each row of a grid, in the order of its rows.
+        """Return the key of each row of a grid, in the order of its rows.
 
         Raises
         ------
         ProblemError
-            A relaxation rule of one's own, of which nothing tells two versions apart.
+            A user's own relaxation rule, of which nothing distinguishes two versions.
 
         Examples
         --------
@@ -104,36 +106,26 @@ class Identity:
         True
         """
         axes = [[f"{name}={self._text(name, value)};".encode() for value in grid.axes[name]] for name in grid.axes]
-        return list(self._keys(axes))
-
-    def _keys(self, axes: list[list[bytes]]) -> Iterator[bytes]:
-        start = hashlib.sha256(json.dumps(self._written()).encode("ascii"))
+        start, keys = hashlib.sha256(json.dumps(self._written()).encode("ascii")), []
         for values in itertools.product(*axes):
             one = start.copy()
             one.update(b"".join(values))
-            yield one.digest()[:LENGTH]
+            keys.append(one.digest()[:LENGTH])
+        return keys
 
     def _text(self, name: str, value: Any) -> str:
         if name == "rule":
-            return self._rule(value)
+            rule = rule_of(value)
+            if RULES.get(rule.name) != rule:
+                raise ProblemError(self.source, "rule", rule.name, NEEDED.format("rule"))
+            return rule.name
         if isinstance(value, tuple):
             return ",".join(exactly(v) for v in value)
         return exactly(value) if isinstance(value, Fraction) else str(value)
 
-    def _rule(self, value: Rule | str) -> str:
-        rule = rule_of(value)
-        if RULES.get(rule.name) != rule:
-            raise ProblemError(
-                self.source,
-                "rule",
-                rule.name,
-                "needed a rule of this library, as nothing tells two versions of another one apart; or no store",
-            )
-        return rule.name
-
 
 def exactly(value: Fraction) -> str:
-    """A rational as a text, of whatever length.
+    """Write a rational as a text, of whatever length.
 
     >>> exactly(Fraction(1, 10))
     '1/a'
@@ -142,7 +134,7 @@ def exactly(value: Fraction) -> str:
 
 
 def _of_pair(pair: ContactPair) -> dict[str, Any]:
-    """A pair by its matrices, bit by bit, and by what else a run of it depends on."""
+    """Describe a pair by its matrices, bit by bit, and by everything else on which a run of it depends."""
     default, interface = type(pair.settings)(), pair.interface
     settings = {
         name: value
@@ -175,12 +167,7 @@ def _law(law: Law, source: str) -> dict[str, str]:
     if isinstance(law, GivenOperator):
         return {"name": law.name, "words": law.words, "outside": law.outside, "matrix": _content(law.matrix)}
     if type(law) not in LAWS.values():
-        raise ProblemError(
-            source,
-            "law",
-            type(law).__name__,
-            "needed a law of this library, as nothing tells two versions of another one apart; or no store",
-        )
+        raise ProblemError(source, "law", type(law).__name__, NEEDED.format("law"))
     default = {name: field.default for name, field in getattr(type(law), "__dataclass_fields__", {}).items()}
     given = {name: str(value) for name, value in vars(law).items() if value != default.get(name, MISSING)}
     return {"name": law.name} | given

@@ -1,10 +1,13 @@
-"""One row of a sweep: a function of a problem and the values of a grid, which never raises."""
+"""One row of a sweep, a function of a problem and the values of a grid which never raises; and what rows share."""
 
 from __future__ import annotations
 
 import math
 import sys
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cached_property, lru_cache
 from typing import Any
 
 from ndtheory import HypothesisError
@@ -12,21 +15,31 @@ from ndtheory.energy_norms import one_minus_square
 from ndtheory.texts import clean, printable
 from verification.algorithm.relaxation import Constant, Rule, rule_of
 from verification.algorithm.theta import Choice, begin
+from verification.constants import Measured, measure
 from verification.contact import ContactError
-from verification.interface.pair import ContactPair
+from verification.interface.interface import Law
+from verification.interface.pair import ContactPair, pair_from
 from verification.monolithic import SolveError
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
-from verification.sweeps.bodies import RowSetting, SharedBodies
-from verification.sweeps.course import Course, course
+from verification.sweeps.course import KnownPieces, course
 from verification.threads import one_thread
 
 Row = dict[str, Any]
 
+#: The axes of a grid that change bodies or what joins them; friction and theta do not.
+OF_BODIES = ("young", "neumann_body", "law", "radius")
+
+#: Values of those axes, as pairs of name and value.
+Changes = tuple[tuple[str, Any], ...]
+
+#: Number of pairs and constants that are kept: rows that share them are neighbours.
+KEPT = 16
+
 #: The columns of a row that the grid may vary.
 GIVEN = ("theta", "friction", "young1", "young2", "neumann_body", "refine", "law", "radius", "rule")
 
-#: Outcomes of a row that has no run.  What is refused is refused again; an error may have had a reason that passes.
+#: Outcomes of a row without a run.  A refused row is refused again; an error may have had a reason that passes.
 REFUSED, ERROR = "refused", "error"
 FAILED = (REFUSED, ERROR)
 
@@ -44,15 +57,108 @@ WHOLE = ("neumann_body", "refine", "iterations", "iterations_paper", "steps")
 TEXTS = ("law", "rule", "outcome", "reason")
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RowSetting:
+    """Shared data of rows that differ only in theta or in the rule.
+
+    ``pieces`` are the affine pieces of T that runs have passed through.
+    """
+
+    pair: ContactPair
+    measured: Measured
+    pieces: KnownPieces
+
+    @cached_property
+    def energy(self) -> tuple[float, float, float] | None:
+        """rho, kappa_1 and kappa_2 of the theorem in energy norms; None where they do not exist."""
+        found = self.measured.energy_constants()
+        return None if found is None else (float(found.at_work), float(found.kappa_1), float(found.kappa_2))
+
+
+class SharedBodies:
+    """The pairs and the constants of a sweep of ``start``, each made once while it is in use.
+
+    A row does not depend on the rows before it: bodies are always scaled from the problem's own bodies on the mesh of
+    the row, and constants always measured for the modulus of body 2 that the problem has.
+    """
+
+    def __init__(self, start: Problem | ContactPair) -> None:
+        self.start = start
+        self.problem = start if isinstance(start, Problem) else start.problem
+        self._law: Law | None = None if isinstance(start, Problem) else start.interface.law
+        self._base = lru_cache(maxsize=2)(self._condense)
+        self._pair = lru_cache(maxsize=KEPT)(self._change)
+        self._constants = lru_cache(maxsize=KEPT)(self._measure)
+        self._setting = lru_cache(maxsize=KEPT)(self._set)
+
+    def setting(self, values: Mapping[str, Any]) -> RowSetting:
+        """Return the data that a row shares with the rows of the same bodies and friction."""
+        return self._setting(*self._key(values), values.get("friction"))
+
+    def _set(self, refine: int, changes: Changes, friction: Fraction | None) -> RowSetting:
+        pair = self._pair(refine, changes)
+        if friction is not None:
+            pair = pair.at(friction=friction)
+        named = dict(changes)
+        if "young" in named and self.problem is not None:
+            # rho and the kappas do not change where both moduli are multiplied by one number
+            lower, upper = named["young"]
+            second = self.problem.body2.young
+            named["young"] = (lower / upper * second, second)
+        measured = self._constants(refine, tuple(named.items()))
+        if measured.of_friction:  # else friction is absent, or its constants do not exist
+            measured = measured.with_friction(float(pair.friction))
+        return RowSetting(pair=pair, measured=measured, pieces=KnownPieces(pair))
+
+    @staticmethod
+    def _key(values: Mapping[str, Any]) -> tuple[int, Changes]:
+        return values.get("refine", 0), tuple((name, values[name]) for name in OF_BODIES if name in values)
+
+    def _condense(self, refine: int) -> ContactPair:
+        """Condense the bodies of the problem on a mesh halved so often."""
+        if isinstance(self.start, ContactPair) and not refine:
+            return self.start
+        return pair_from(self._refined(refine), law=self._law)
+
+    def _refined(self, refine: int) -> Problem:
+        if self.problem is None:
+            raise ProblemError("<matrices>", "refine", refine, "needed a problem, whose mesh can be halved")
+        return self.problem.refined(refine)
+
+    def _change(self, refine: int, changes: Changes) -> ContactPair:
+        changed = dict(changes)
+        if self.problem is None:
+            base = self._base(refine)
+            roles = changed.pop("neumann_body", base.neumann_body)
+            if changed:
+                name, value = next(iter(changed.items()))
+                raise ProblemError("<matrices>", name, value, "needed a problem, whose values can change")
+            return base if roles == base.neumann_body else base.swapped()
+        try:
+            base = self._base(refine)
+        except ProblemError:  # the roles or the law of the problem do not fit; those of the row may
+            if not changed:
+                raise
+            law = None if {"law", "radius"} & changed.keys() else self._law
+            return pair_from(self._refined(refine).changed(**changed), law=law)
+        return base.changed(**changed) if changed else base
+
+    def _measure(self, refine: int, changes: Changes) -> Measured:
+        """Measure rho and the constants of the energy norms, not those of Section 5."""
+        pair = self._pair(refine, changes)
+        contact, neumann = replace(pair.contact, body=None), replace(pair.neumann, body=None)
+        return measure(replace(pair, contact=contact, neumann=neumann, problem=None))
+
+
 def is_row(found: Any) -> bool:
-    """True if a value that was read from JSON has the columns of a row, each of its type and printable."""
+    """Return True if a value that was read from JSON has the columns of a row, each of its type and printable."""
     if not isinstance(found, dict) or found.keys() != {*GIVEN, *RESULTS} or not found["outcome"]:
         return False
     return all(value is None or _fits(name, value) for name, value in found.items())
 
 
 def renamed(found: Any) -> Any:
-    """A value that was read from JSON; in a row the columns have their present names, in their order.
+    """Return a value that was read from JSON; in a row the columns have their present names, in their order.
 
     >>> renamed({"rho": 2.0, "sharp_factor": None, "reason": "sharp_factor: outside"})
     {'rho': 2.0, 'energy_factor': None, 'reason': 'energy_factor: outside'}
@@ -75,15 +181,14 @@ def _fits(name: str, value: Any) -> bool:
 
 
 def row(problem: Problem | ContactPair, values: Mapping[str, Any], bodies: SharedBodies | None = None) -> Row:
-    """Run a problem with other values, and say what happened.
+    """Run a problem with other values, and return the row of results.
 
     Parameters
     ----------
-    problem : Problem or ContactPair
     values : mapping
         As :meth:`verification.sweeps.grid.SweepGrid.rows` yields them: the name of an axis to its value.
     bodies : SharedBodies, optional
-        What is condensed already, of the same problem; no digit of the row depends on it.
+        Condensed bodies of the same problem; no digit of the row depends on it.
 
     Returns
     -------
@@ -115,7 +220,7 @@ def row(problem: Problem | ContactPair, values: Mapping[str, Any], bodies: Share
 
 
 def lost(problem: Problem | ContactPair, values: Mapping[str, Any], words: str) -> Row:
-    """The row of a run that ended with the process that made it."""
+    """Return the row of a run that ended with the process that made it."""
     return _closed(
         _given(SharedBodies(problem), values) | dict.fromkeys(RESULTS) | {"outcome": ERROR}, {"outcome": words}
     )
@@ -130,7 +235,7 @@ def _closed(found: Row, why: Mapping[str, str]) -> Row:
 
 
 def _given(bodies: SharedBodies, values: Mapping[str, Any]) -> Row:
-    """The columns of the grid; what does not vary is what the problem has."""
+    """Return the columns of the grid; those that do not vary have the values of the problem."""
     problem = bodies.problem
     rule = values.get("rule", "constant" if problem is None else problem.iteration.relaxation)
     start: Row = dict.fromkeys(("theta", "friction", "young1", "young2", "neumann_body"))
@@ -156,14 +261,14 @@ def _given(bodies: SharedBodies, values: Mapping[str, Any]) -> Row:
 
 
 def _of_pair(pair: ContactPair) -> Row:
-    """What the pair itself knows better than the problem: a friction, roles and a law of its own."""
+    """Return the values of a pair that may differ from its problem's: friction, roles and law."""
     law = pair.interface.law
     found: Row = {"friction": float(pair.friction), "neumann_body": pair.neumann_body}
     return found if law is None else found | {"law": law.name}
 
 
 def _run(found: Row, setting: RowSetting, values: Mapping[str, Any]) -> dict[str, str]:
-    """Fill the columns of a run; returns why some of them are None."""
+    """Fill the columns of a run; return why some of them are None."""
     pair, measured = setting.pair, setting.measured
     found["rho"] = None if measured.rho_max is None else measured.rho_max.value
     why = {} if measured.rho_max else {"rho": measured.reason["rho_max"]}
@@ -173,21 +278,13 @@ def _run(found: Row, setting: RowSetting, values: Mapping[str, Any]) -> dict[str
     proved, unproved = _proved(setting, chosen_rule, choice)
     found |= proved
     why |= unproved
-    went: Course = course(pair, chosen_rule, choice, step, setting.pieces)
-    found |= {
-        "iterations": went.steps if went.outcome == "converged" else None,
-        "iterations_paper": went.paper,
-        "steps": went.steps,
-        "outcome": went.outcome,
-        "observed_rate": went.observed_rate,
-        "linearised_rate": went.linearised_rate,
-        "coupled_residual": went.coupled_residual,
-    }
-    return why | dict(went.reason)
+    columns, unmet = course(pair, chosen_rule, choice, step, setting.pieces)
+    found |= columns
+    return why | unmet
 
 
 def _proved(setting: RowSetting, rule: Rule, choice: Choice) -> tuple[Row, dict[str, str]]:
-    """The columns that a theorem gives, and why one is None."""
+    """Return the columns that a theorem gives, and why one is None."""
     pair, factor, rate = setting.pair, None, None
     outside = pair.outside + ([words] if (words := rule.outside(pair.friction)) else [])
     of_factor = of_rate = outside[0] if outside else "rho or the constants of friction do not exist"
@@ -195,7 +292,7 @@ def _proved(setting: RowSetting, rule: Rule, choice: Choice) -> tuple[Row, dict[
         factor = energy_factor(setting.energy, float(choice.theta))
         if factor is not None:
             rate, of_rate = (factor, "") if factor < 1 else (None, "q(theta) is not below 1")
-    elif not outside:  # q is about steps with one factor, even where the rule has a proved rate of its own
+    elif not outside:  # q is about steps with one factor, even where the rule itself has a proved rate
         of_factor = f"{rule.words}: no constant theta"
         rate = None if choice.rho is None else rule.proved_rate(choice.rho)
     found = {"energy_factor": factor, "proved_rate": rate}
@@ -204,5 +301,5 @@ def _proved(setting: RowSetting, rule: Rule, choice: Choice) -> tuple[Row, dict[
 
 
 def energy_factor(energy: tuple[float, float, float] | None, theta: float) -> float | None:
-    """q(theta) of the theorem in energy norms, also where it is 1 or more; None where its constants do not exist."""
+    """Return q(theta) of the theorem in energy norms, even if it is 1 or more; None without its constants."""
     return None if energy is None else math.sqrt(max(1 - one_minus_square(theta, *energy), 0.0))

@@ -11,21 +11,26 @@ import contextlib
 import json
 import sqlite3
 import zlib
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any, ClassVar
 
 from ndtheory import __version__
+from verification.document import Document
+from verification.interface.pair import UNITS, ContactPair
 from verification.interrupts import undisturbed
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
+from verification.sweeps.grid import SweepGrid
 from verification.sweeps.identity import Identity
 from verification.sweeps.row import ERROR, FAILED, Row, is_row, renamed
 
-#: Tells a store from other files of SQLite: "ndth".
+#: The application id of a store, which distinguishes it from other files of SQLite: "ndth".
 APPLICATION = 0x6E647468
 
-#: What the tables look like.
+#: Number of the layout of the tables.
 FORMAT = 1
 
 TABLES = """
@@ -36,13 +41,13 @@ CREATE TABLE rows (key BLOB PRIMARY KEY, study INTEGER NOT NULL, outcome TEXT, r
 #: Seconds to wait for a process that is about to let go of a store.
 PATIENCE = 2.0
 
-#: A file that SQLite reads, and whose content is not what was written.
+#: The message for a file that SQLite reads, but with changed content.
 DAMAGED = "the file is damaged; it is left as it is: needed another name (--store), or move the file away"
 
-#: How SQLite begins where it repeats text of a damaged file, which may be anything.
+#: Beginnings of messages in which SQLite repeats text of a damaged file, which may be anything.
 REPEATS = ("malformed database schema", "Could not decode to UTF-8")
 
-#: What SQLite says, in the words of a user; what stands here for no error of it is repeated as it stands.
+#: Messages of SQLite in the words of a user; any other message is repeated.
 WORDS = {
     "database is locked": "another sweep is at work on it: needed another store (--store), or wait until that one ends",
     "database or disk is full": "the disk is full: needed room on it",
@@ -60,15 +65,15 @@ class StoreError(ProblemError):
 
 @dataclass(frozen=True, kw_only=True)
 class Known:
-    """What a store has of some keys.
+    """The rows that a store has for some keys.
 
     Attributes
     ----------
     rows : dict from the number of a key to its row as :func:`written` has it
     failed : int
-        How many of them have no run.
+        Number of them without a run.
     errors : int
-        How many of those ended in an error.
+        Number of those that ended in an error.
     damaged : int
         Number of rows whose checksum or columns are wrong; they count as missing.
     """
@@ -79,7 +84,7 @@ class Known:
     damaged: int = 0
 
     def __or__(self, other: Known) -> Known:
-        """The rows of a store that have these keys, and the number of others."""
+        """Join the rows and add the other numbers."""
         return Known(
             rows=self.rows | other.rows,
             failed=self.failed + other.failed,
@@ -89,17 +94,12 @@ class Known:
 
 
 class Store:
-    """Rows by their keys, in a file that this process alone holds.
-
-    Parameters
-    ----------
-    path : Path
-        Made where there is none.
+    """Rows by their keys, in a file that only this process holds; it is created if it does not exist.
 
     Raises
     ------
     StoreError
-        The file is no store, is damaged, cannot be written, or another process holds it.
+        The file is not a store, is damaged, cannot be written, or another process holds it.
     """
 
     def __init__(self, path: Path) -> None:
@@ -141,7 +141,7 @@ class Store:
         run("CREATE TEMP TABLE wanted (number INTEGER PRIMARY KEY, key BLOB NOT NULL)")
 
     def _schema(self) -> list[str]:
-        """Statements that make the tables, views and triggers of the file; an index changes no answer."""
+        """Return the statements that make the tables, views and triggers of the file; an index changes no answer."""
         return sorted(row[0] for row in self._file.execute("SELECT sql FROM sqlite_master WHERE type != 'index'"))
 
     def __enter__(self) -> Store:
@@ -158,17 +158,9 @@ class Store:
             self._file.close()
 
     def known(self, keys: Mapping[int, bytes], again: Callable[[str], bool] = lambda outcome: False) -> Known:
-        """The rows of some keys.
+        """Return the rows of some keys, given by the numbers of the rows.
 
-        Parameters
-        ----------
-        keys : mapping from the number of a row to its key
-        again : callable
-            From an outcome to whether rows that have it count as missing.
-
-        Raises
-        ------
-        StoreError
+        Rows whose outcome is one for which ``again`` returns True count as missing.
         """
         found: dict[int, bytes] = {}
         damaged = failed = errors = 0
@@ -187,12 +179,7 @@ class Store:
         return Known(rows=found, failed=failed, errors=errors, damaged=damaged)
 
     def count(self, keys: Mapping[int, bytes]) -> dict[str, int]:
-        """The number of keys that have a row, by the version of this library that made it.
-
-        Raises
-        ------
-        StoreError
-        """
+        """Count the keys that have a row, by the version of this library that made it."""
         with self._told(), self._wanted(keys):
             rows = self._file.execute(
                 "SELECT version, count(*) FROM temp.wanted JOIN rows ON rows.key = wanted.key"
@@ -201,23 +188,13 @@ class Store:
             return {str(version): int(count) for version, count in rows}
 
     def studies(self) -> dict[str, str]:
-        """The studies of this store, and by which version of this library each was made.
-
-        Raises
-        ------
-        StoreError
-        """
+        """Return the studies of this store, with the version of this library that made each."""
         with self._told():
             rows = self._file.execute("SELECT identity, version FROM studies ORDER BY version").fetchall()
         return {str(identity): str(version) for identity, version in rows}
 
     def begin(self, identity: Identity, problem: Problem | None) -> int:
-        """The number of a study: what rows are made from, with the problem as its file has it.
-
-        Raises
-        ------
-        StoreError
-        """
+        """Return the number of a study, the origin of rows, with the problem as its file has it."""
         written = None if problem is None else json.dumps(problem.to_dict())
         with self._told(), self._transaction():
             self._file.execute(
@@ -228,12 +205,7 @@ class Store:
         return int(row[0])
 
     def add(self, study: int, rows: Sequence[tuple[bytes, Row]]) -> None:
-        """Keep rows, all of them or none; a row that is there already is replaced.
-
-        Raises
-        ------
-        StoreError
-        """
+        """Keep rows, all of them or none; a row that is there already is replaced."""
         values = [(key, study, row["outcome"], text := written(row), _crc(key, text)) for key, row in rows]
         with self._told(), self._transaction():
             self._file.executemany(
@@ -266,7 +238,7 @@ class Store:
 
     @contextlib.contextmanager
     def _told(self) -> Iterator[None]:
-        """Say in words what SQLite complains of."""
+        """Turn errors of SQLite into StoreError, with a message in words."""
         try:
             yield
         except (sqlite3.Error, UnicodeDecodeError) as error:  # what SQLite says of a damaged file may be no text
@@ -281,17 +253,17 @@ class Store:
 
 
 def _tables() -> list[str]:
-    """The statements that make the tables, as SQLite keeps them."""
+    """Return the statements that make the tables, as SQLite keeps them."""
     return [table.strip() for table in TABLES.split(";") if table.strip()]
 
 
 def written(row: Row) -> bytes:
-    """A row as text; it reads back to the last digit."""
+    """Write a row as text that reads back to the last digit."""
     return json.dumps(row, separators=(",", ":")).encode("ascii")
 
 
 def _read(key: object, outcome: object, text: object, crc: object) -> bytes | None:
-    """The row that a store has of a key, with its columns as they are named now; None where this program wrote none."""
+    """Return the row of a key, its columns with their present names; None if this program did not write it."""
     if not (isinstance(key, bytes) and isinstance(text, bytes) and crc == _crc(key, text)):
         return None
     try:
@@ -306,3 +278,157 @@ def _read(key: object, outcome: object, text: object, crc: object) -> bytes | No
 
 def _crc(key: bytes, text: bytes) -> int:
     return zlib.crc32(text, zlib.crc32(key))
+
+
+class Kept:
+    """A store for the time of one sweep; a context that lets go of the file at its end.
+
+    With ``fresh`` all rows count as missing, and are replaced once they are made again; with ``retry`` the rows do
+    that ended in an error.  The file is created if it does not exist.
+
+    Raises
+    ------
+    ProblemError
+        A law or a rule that no store can distinguish from another one.
+    StoreError
+    """
+
+    def __init__(
+        self, path: Path, start: Problem | ContactPair, grid: SweepGrid, *, fresh: bool = False, retry: bool = False
+    ) -> None:
+        identity = Identity.read(start)
+        self._keys = identity.keys(grid)
+        self._store = Store(path)
+        try:
+            again = lambda outcome: fresh or (retry and outcome == ERROR)
+            self.known = Known()
+            for form in self._forms(identity):
+                keys = self._keys if form == identity else form.keys(grid)
+                missing = {i: key for i, key in enumerate(keys) if i not in self.known.rows}
+                self.known |= self._store.known(missing, again)
+            #: The rows of this sweep that were made under other numerics, by the version of this library.
+            self.others = Counter[str]()
+            for numerics in range(1, identity.numerics):
+                for form in self._forms(identity.before(numerics)):
+                    self.others.update(self._store.count(dict(enumerate(form.keys(grid)))))
+            self._study = self._store.begin(identity, start if isinstance(start, Problem) else start.problem)
+        except BaseException:
+            self._store.close()
+            raise
+
+    def _forms(self, identity: Identity) -> list[Identity]:
+        """Return the forms of an identity under which the store has rows: the present one, and those of 0.1.0."""
+        studies = self._store.studies()
+        versions = dict.fromkeys(studies.values())
+        forms = [identity, *(identity.before(identity.numerics, version) for version in versions)]
+        return [form for form in forms if any(form.study(version) in studies for version in versions)]
+
+    def __enter__(self) -> Kept:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._store.close()
+
+    def add(self, rows: Sequence[tuple[int, Row]]) -> None:
+        """Keep rows by their places in the grid; may raise StoreError."""
+        self._store.add(self._study, [(self._keys[i], row) for i, row in rows])
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences about rows that are there and not used, or ended in an error."""
+        return notes(self._store.path, self.others, self.known.damaged, self.known.errors)
+
+
+def notes(path: Path, others: Mapping[str, int], damaged: int, errors: int) -> tuple[str, ...]:
+    """Return sentences about rows of a store that are not used, or may not be wanted."""
+    found = [
+        f"{path}: {count} of these rows are of version {version} with other numerics; they are not used, and stay"
+        for version, count in others.items()
+    ]
+    if damaged:
+        found.append(f"{path}: {damaged} of these rows are damaged: they are made again")
+    if errors:
+        found.append(f"{path}: {errors} of these rows ended in an error and stay as they are; --retry makes them again")
+    return tuple(found)
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Plan(Document):
+    """Numbers of rows that a sweep would make and use.
+
+    Attributes
+    ----------
+    asked : int
+        Number of rows of the grid.
+    stored : int
+        Number of them that the store has and that would not be made again.
+    damaged : int
+        Number of further rows that it has damaged.
+    errors : int
+        Number of the stored rows that ended in an error.
+    others : mapping from a version of this library to a number
+        Rows of this sweep that were made under other numerics: they are not used.
+    store : Path or None
+        The store of the rows.
+    """
+
+    schema: ClassVar[str] = "ndtheory.sweep-plan/1"
+
+    asked: int
+    stored: int
+    damaged: int
+    store: Path | None
+    errors: int = 0
+    others: Mapping[str, int] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=lambda: UNITS)
+    problem: Problem | None = None
+
+    @property
+    def left(self) -> int:
+        """Number of rows that would be made."""
+        return self.asked - self.stored
+
+    @property
+    def summary(self) -> str:
+        return f"{self.asked} runs, {self.stored} of them are there, {self.left} are left"
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences about rows of the store that would not be used, or ended in an error."""
+        return () if self.store is None else notes(self.store, self.others, self.damaged, self.errors)
+
+    def content(self) -> dict[str, Any]:
+        return {
+            "asked": self.asked,
+            "stored": self.stored,
+            "left": self.left,
+            "damaged": self.damaged,
+            "errors": self.errors,
+            "other_versions": dict(self.others),
+            "store": None if self.store is None else str(self.store),
+        }
+
+
+def plan(
+    start: Problem | ContactPair,
+    grid: SweepGrid,
+    store: Path | None = None,
+    *,
+    fresh: bool = False,
+    retry: bool = False,
+) -> Plan:
+    """Count the rows that a sweep would make; nothing is run, no store is made, and a sweep has the same errors."""
+    known, others = Known(), Counter[str]()
+    if store is not None and store.exists():
+        with Kept(store, start, grid, fresh=fresh, retry=retry) as kept:
+            known, others = kept.known, kept.others
+    return Plan(
+        asked=len(grid),
+        stored=len(known.rows),
+        damaged=known.damaged,
+        errors=known.errors,
+        others=others,
+        store=store,
+        units=start.units if start.units else UNITS,
+        problem=start if isinstance(start, Problem) else start.problem,
+    )

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import json
+import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -18,9 +19,8 @@ from verification.problem.specification import Problem
 from verification.progress import Progress, silent
 from verification.spreadsheet import as_csv
 from verification.sweeps.grid import SweepGrid
-from verification.sweeps.keeping import Kept
 from verification.sweeps.row import FAILED, Row
-from verification.sweeps.tally import Tally
+from verification.sweeps.store import Kept
 from verification.sweeps.workers import Work, alone, together
 
 if TYPE_CHECKING:
@@ -36,17 +36,17 @@ class Sweep(Document):
     rows : tuple of dict
         One for each run, in the order of :meth:`verification.sweeps.grid.SweepGrid.rows`.
     asked : int
-        How many rows the grid has; Ctrl-C may have left some out.
+        Number of rows of the grid; Ctrl-C may have left some out.
     axes : tuple of str
         The columns that vary.
     grid : SweepGrid
-        What was asked.
+        The grid of all rows.
     places : tuple of int
         The place of each row among the rows of the grid.
     stored : int
-        How many rows a store had already.
+        Number of rows that a store had already.
     notes : tuple of str
-        What the store has that was not used, or ended in an error, in words.
+        Sentences about rows of the store that were not used, or that ended in an error.
     """
 
     schema: ClassVar[str] = "ndtheory.sweep/1"
@@ -69,7 +69,7 @@ class Sweep(Document):
 
     @property
     def interrupted(self) -> bool:
-        """Whether Ctrl-C left rows out."""
+        """True if Ctrl-C left rows out."""
         return len(self.rows) < self.asked
 
     @property
@@ -78,7 +78,7 @@ class Sweep(Document):
         return {"rows": f"interrupted after {len(self.rows)} of {self.asked} rows"} if self.interrupted else {}
 
     def table(self) -> dict[str, list[Any]]:
-        """The rows as plain columns: ``pandas.DataFrame(sweep.table())`` reads it."""
+        """Return the rows as columns: ``pandas.DataFrame(sweep.table())`` reads it."""
         return {name: [each[name] for each in self.rows] for name in self.columns}
 
     @property
@@ -87,26 +87,26 @@ class Sweep(Document):
         return tuple(self.rows[0])
 
     def values(self, columns: Sequence[str]) -> dict[tuple[Any, ...], list[Row]]:
-        """The rows by their values in some columns."""
+        """Group the rows by their values in some columns."""
         found: dict[tuple[Any, ...], list[Row]] = {}
         for each in self.rows:
             found.setdefault(tuple(each[name] for name in columns), []).append(each)
         return found
 
     def plot(self, x: str = "theta", y: str = "iterations", curves: str | None = None) -> Figure:
-        """One column over another, one curve for each value of a third.
+        """Draw one column over another, with one curve for each value of a third.
 
         Raises
         ------
         ValueError
-            A column that there is not, or without numbers.
+            A column that does not exist, or has no numbers.
         """
         return self.drawn(x=x, y=y, curves=curves)
 
     def to_csv(self) -> str:
-        """The rows as CSV, under lines that begin with ``#`` and hold version, units and the problem as TOML.
+        """Return the rows as CSV, under lines that begin with ``#`` and hold version, units and the problem as TOML.
 
-        ``pandas.read_csv(name, comment="#")`` reads it; what is None is empty.
+        ``pandas.read_csv(name, comment="#")`` reads it; None is an empty cell.
         """
         units = ", ".join(f"{name} in {unit}" for name, unit in self.units.items())
         head = [f"ndtheory {__version__}: sweep, {units}"]
@@ -123,8 +123,46 @@ class Sweep(Document):
         }
 
 
+@dataclass(kw_only=True)
+class Tally:
+    """A count of rows as they come in: done, failed and left, with the time to go."""
+
+    asked: int
+    stored: int
+    progress: Progress
+    made: int = 0
+    failed: int = 0
+    begun: float = field(default_factory=time.monotonic)
+
+    def count(self, rows: int, failed: int) -> None:
+        """Add rows that have come in, of which ``failed`` have no run."""
+        self.made += rows
+        self.failed += failed
+        self.tell()
+
+    def tell(self) -> None:
+        """Report how far the sweep is, with the share that is done."""
+        done = self.stored + self.made
+        left = self.asked - done
+        says = f"runs: {done} done, {self.failed} failed, {left} left"
+        if self.made:
+            says += f", {duration((time.monotonic() - self.begun) * left / self.made)} to go"
+        self.progress(says, done / self.asked)
+
+
+def duration(seconds: float) -> str:
+    """Write an estimate of a time.
+
+    >>> duration(4.2), duration(80), duration(8000)
+    ('about 4 s', 'about 1 min', 'about 2.2 h')
+    """
+    if seconds < 60:
+        return f"about {seconds:.0f} s"
+    return f"about {seconds / 60:.0f} min" if seconds < 3600 else f"about {seconds / 3600:.1f} h"
+
+
 def work_of(jobs: int, dask: str | None = None) -> Work:
-    """Who makes rows: the workers of a dask scheduler, this process for one job, else processes of this machine."""
+    """Choose who makes rows: the workers of a dask scheduler, this process for one job, else processes here."""
     if dask is not None:
         from verification.sweeps.cluster import on_cluster
 
@@ -155,7 +193,7 @@ def sweep(
     Parameters
     ----------
     problem : Problem, ContactPair or path
-        What is not varied is as it has it.
+        It has the values that are not varied.
     theta : list of number or 'auto', optional
     friction : list of number, optional
     young : list of pairs, optional
@@ -170,15 +208,15 @@ def sweep(
     jobs : int
         Processes; 0 or less counts back from all cores, -1 is all.
     store : path, optional
-        A file that keeps each row once it is made, and has those that were made before; made where there is none.
+        A file that keeps each row once it is made, and has those that were made before; a new one is created.
     fresh : bool
         Whether rows that the store has are made again.
     retry : bool
-        Whether those of them are made again that ended in an error: its reason may have passed.
+        Whether rows that ended in an error are made again: its reason may have passed.
     dask : str, optional
         The address of a dask scheduler, whose workers make the rows; ``jobs`` is not used then.
     progress : callable
-        Told how many rows are done.
+        Called with the number of rows that are done.
 
     Returns
     -------
@@ -201,14 +239,12 @@ def sweep(
     >>> [(round(row["theta"], 3), row["iterations"], round(row["rho"], 12)) for row in found.rows]
     [(0.333, 1, 2.0), (0.5, 32, 2.0)]
     """
-    start: Problem | ContactPair
     if isinstance(problem, (Problem, ContactPair)):
         start = problem
     else:
         start = read_interface(Path(problem)) if Path(problem).suffix == ".npz" else load(problem)
-    of = start.source if start.source else "<dict>"
     axes = {"theta": theta, "friction": friction, "young": young, "neumann_body": neumann_body, "refine": refine}
-    grid = SweepGrid.of(axes | {"law": law, "radius": radius, "rule": rule}, of)
+    grid = SweepGrid.of(axes | {"law": law, "radius": radius, "rule": rule}, start.source)
     place = None if store is None else Path(store)
     return sweep_grid(start, grid, work=work_of(jobs, dask), store=place, fresh=fresh, retry=retry, progress=progress)
 
@@ -223,15 +259,7 @@ def sweep_grid(
     retry: bool = False,
     progress: Progress = silent,
 ) -> Sweep:
-    """As :func:`sweep`, over a grid that is read already.
-
-    Parameters
-    ----------
-    start, grid, store, fresh, retry, progress
-        As :func:`sweep` has them.
-    work : callable, optional
-        Who makes the rows, as :func:`work_of` says; this process by default.
-    """
+    """Run :func:`sweep` over a grid that is read already; ``work`` makes the rows, as :func:`work_of` returns it."""
     wanted = list(grid.rows())
     done: dict[int, Row | bytes] = {}
     with contextlib.ExitStack() as stack:

@@ -1,4 +1,4 @@
-"""Who makes the rows of a sweep: this process, several ones on this machine, or the workers of a cluster."""
+"""Workers that make the rows of a sweep: this process, several on this machine, or the workers of a cluster."""
 
 from __future__ import annotations
 
@@ -18,8 +18,7 @@ from verification.interface.pair import ContactPair
 from verification.interrupts import begin_child, undisturbed
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
-from verification.sweeps.bodies import SharedBodies
-from verification.sweeps.row import Row, row
+from verification.sweeps.row import Row, SharedBodies, row
 
 #: Rows by their places in the grid.
 Placed = list[tuple[int, Row]]
@@ -31,13 +30,13 @@ Work = Callable[[Problem | ContactPair, Sequence[tuple[int, Row]]], Generator[Pl
 #: than what its workers have not handed over.
 MOST_AT_ONCE, SECONDS = 32, 0.25
 
-#: Processes for each core of this machine, at most: more of them fill the memory and make no row sooner.
+#: Largest number of processes for each core of this machine: more of them fill the memory and make no row sooner.
 MOST_FOR_A_CORE = 4
 
-#: Pieces that a process or a thread of a worker has before it, so that it need not wait.
+#: Batches that wait for each process or thread of a worker, so that it need not wait.
 AHEAD = 2
 
-#: Seconds that the executor has to take the pieces that it was given, before it is ended without that.
+#: Seconds that the executor has to take the batches that it was given, before it is ended without that.
 LATEST = 1.0
 
 #: The environment in which the libraries that multiply matrices use one thread in each process.
@@ -45,21 +44,14 @@ ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_
 
 
 class NoWorkers(ProblemError):
-    """No worker is left that could make the rows.
-
-    Parameters
-    ----------
-    where : str
-    why : str
-        What happened.
-    """
+    """No worker is left that could make the rows."""
 
     def __init__(self, where: str, why: str) -> None:
         super().__init__(where, "", None, f"{why}; with a store the same command goes on from the rows that were done")
 
 
 def alone(start: Problem | ContactPair, wanted: Sequence[tuple[int, Row]]) -> Generator[Placed, None, None]:
-    """In this process, one after the other."""
+    """Make the rows in this process, one after the other."""
     if why := unusable(start):
         raise ProblemError(start.source, "mesh", None, why)
     bodies = SharedBodies(start)
@@ -69,26 +61,25 @@ def alone(start: Problem | ContactPair, wanted: Sequence[tuple[int, Row]]) -> Ge
 
 @dataclass(frozen=True, kw_only=True)
 class Origin:
-    """What a sweep varies, known to a worker by the name of the sweep."""
+    """The problem or pair of a sweep, under a name by which a worker recognises it."""
 
     name: str
     start: Any = field(compare=False)
 
     @classmethod
     def of(cls, start: Problem | ContactPair) -> Origin:
-        """That of a new sweep."""
+        """Return the origin of a new sweep."""
         return cls(name=uuid.uuid4().hex, start=start)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Handed:
-    """What a worker hands over.
+    """The rows that a worker hands over.
 
     Attributes
     ----------
-    rows : list
     seconds : float
-        How long they took.
+        Time to make them.
     version : str
         Of the library there.
     unusable : str
@@ -107,12 +98,12 @@ _one_at_a_time = threading.Lock()
 
 @lru_cache(maxsize=1)
 def _bodies(origin: Origin) -> SharedBodies:
-    """What the rows of a worker share."""
+    """Shared bodies of the rows of a worker."""
     return SharedBodies(origin.start)
 
 
 def unusable(start: Problem | ContactPair) -> str:
-    """Why a mesh file of a problem cannot be used here, which is no property of its rows; empty where all can."""
+    """Return why a mesh file of a problem cannot be used here, whatever the row; empty where all can."""
     bodies = (start.body1, start.body2) if isinstance(start, Problem) else ()
     return "; ".join(f"{body.mesh.path}: {why}" for body in bodies if body.mesh and (why := body.mesh.unusable()))
 
@@ -122,32 +113,27 @@ def _unusable(origin: Origin) -> str:
     return unusable(origin.start)
 
 
-def some(origin: Origin, piece: Sequence[tuple[int, Row]]) -> Handed:
-    """Rows in a worker."""
+def some(origin: Origin, batch: Sequence[tuple[int, Row]]) -> Handed:
+    """Make some rows in a worker."""
     with _one_at_a_time:
         begun = time.monotonic()
         if why := _unusable(origin):
             return Handed(rows=[], unusable=why)
         bodies = _bodies(origin)
-        rows = [(index, row(origin.start, values, bodies)) for index, values in piece]
+        rows = [(index, row(origin.start, values, bodies)) for index, values in batch]
         return Handed(rows=rows, seconds=time.monotonic() - begun)
 
 
 @lru_cache(maxsize=1)
 def _life() -> tuple[Any, Any]:
-    """Both ends of a pipe on which nothing is sent: the reading end meets its end when this process does."""
+    """Return both ends of a pipe on which nothing is sent: the reading end meets its end when this process does."""
     return Pipe(duplex=False)
 
 
 def processes(jobs: int, rows: int) -> int:
-    """Number of processes that start for some rows: no more than the rows, nor than 4 for each core.
+    """Return the number of processes for some rows that are still to be made: at most one a row, and 4 a core.
 
-    Parameters
-    ----------
-    jobs : int
-        As asked for; 0 or less counts back from all cores.
-    rows : int
-        Rows that are still to be made.
+    ``jobs`` is the number asked for; 0 or less counts back from all cores.
     """
     from joblib import cpu_count, effective_n_jobs
 
@@ -155,7 +141,7 @@ def processes(jobs: int, rows: int) -> int:
 
 
 def together(jobs: int) -> Work:
-    """In processes of this machine, by the executor of joblib; 0 or less counts back from all cores."""
+    """Return workers in processes of this machine, by joblib's executor; 0 or fewer jobs count back from all cores."""
 
     def work(start: Problem | ContactPair, wanted: Sequence[tuple[int, Row]]) -> Generator[Placed, None, None]:
         from joblib.executor import get_memmapping_executor
@@ -164,8 +150,8 @@ def together(jobs: int) -> Work:
         if not wanted:
             return
         count = processes(jobs, len(wanted))
-        origin, pieces = Origin.of(start), Batches(wanted, count)
-        source, ahead = iter(pieces), AHEAD * count
+        origin, batches = Origin.of(start), Batches(wanted, count)
+        source, ahead = iter(batches), AHEAD * count
         executor = None
         waiting: set[Future[Handed]] = set()
         try:
@@ -174,13 +160,13 @@ def together(jobs: int) -> Work:
                 executor = get_memmapping_executor(
                     count, initializer=begin_child, initargs=(_life()[0],), env=ONE_THREAD
                 )
-                waiting = {executor.submit(some, origin, piece) for piece in islice(source, ahead)}
+                waiting = {executor.submit(some, origin, batch) for batch in islice(source, ahead)}
             while waiting:
                 done, waiting = wait(waiting, return_when=FIRST_COMPLETED)
                 for future in done:
-                    yield pieces.taken(future.result())
+                    yield batches.taken(future.result())
                 with undisturbed():  # what is submitted is known here
-                    waiting |= {executor.submit(some, origin, piece) for piece in islice(source, ahead - len(waiting))}
+                    waiting |= {executor.submit(some, origin, batch) for batch in islice(source, ahead - len(waiting))}
         except BrokenProcessPool:
             _stop(executor, waiting)
             raise NoWorkers("--jobs", "a process was killed, perhaps as memory ran out: needed fewer jobs") from None
@@ -192,7 +178,7 @@ def together(jobs: int) -> Work:
 
 
 def _start_trackers() -> None:
-    """Start the processes that clean up behind the others: one that starts lets signals through that are held back."""
+    """Start the processes that clean up after the others: a starting one lets held-back signals through."""
     from multiprocessing import resource_tracker as of_python
 
     from joblib.externals.loky.backend import resource_tracker as of_joblib
@@ -202,10 +188,11 @@ def _start_trackers() -> None:
 
 
 def _stop(executor: Any, waiting: Collection[Future[Handed]]) -> None:
-    """End the processes at once: what they compute is not wanted any more.
+    """End the processes at once: their results are not wanted any more.
 
-    The executor's thread looks up every piece that it was given, also those that it forgot as it was told to end, and
-    shows a traceback then: it is told once it has put all of them into its queue, which holds `AHEAD` for each process.
+    The executor's thread looks up every batch that it was given, also one that it dropped when it had to end, and then
+    shows a traceback.  So it must end only once it has put all of them into its queue, which holds `AHEAD` for each
+    process.
     """
     if executor is None:
         return
@@ -217,14 +204,7 @@ def _stop(executor: Any, waiting: Collection[Future[Handed]]) -> None:
 
 
 class Batches:
-    """Rows that stand together and have one mesh, as many at once as take a moment.
-
-    Parameters
-    ----------
-    wanted : sequence
-        Values of rows by their places.
-    workers : int
-    """
+    """Neighbouring rows on one mesh, as many at once as take a moment for one of the workers."""
 
     def __init__(self, wanted: Sequence[tuple[int, Row]], workers: int) -> None:
         self._wanted = wanted
@@ -242,7 +222,7 @@ class Batches:
             first = last
 
     def taken(self, handed: Handed) -> Placed:
-        """The rows that a worker hands over, whose time says how many the next pieces have.
+        """Return the rows that a worker hands over; their time decides the size of the next batches.
 
         Raises
         ------
@@ -253,7 +233,7 @@ class Batches:
             raise NoWorkers("worker", f"it has version {handed.version} of ndtheory: needed {__version__}, as here")
         if handed.unusable:
             raise NoWorkers("worker", f"it cannot read {handed.unusable}")
-        # the last pieces count most: another mesh takes another time
+        # the last batches count most: another mesh takes another time
         self._rows, self._seconds = self._rows / 2 + len(handed.rows), self._seconds / 2 + handed.seconds
         self._at_once = max(1, min(self._most, int(SECONDS * self._rows / max(self._seconds, 1e-9))))
         return handed.rows

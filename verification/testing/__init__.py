@@ -1,8 +1,8 @@
-"""A conformance kit: the property tests of this project for a rule, a law, a bound or a step of one's own.
+"""A conformance kit: the property tests of this project for your own rule, law, bound or step.
 
-Each ``check_`` function draws random pairs of bodies and forces, holds what it is given against what must be true of
-it, and raises :class:`Refused`, an ``AssertionError`` that names the property and the counterexample.  What passes
-comes back as a :class:`Report`.  The strategies that draw the cases are public too.
+Each ``check_`` function draws random pairs of bodies and forces, ``examples`` cases for each property.  It returns a
+:class:`Report`, or raises :class:`Refused`, an ``AssertionError`` that names the first property that fails and the
+counterexample.  The strategies that draw the cases are public too.
 
 The kit needs hypothesis, which ``pip install 'ndtheory[test]'`` installs; nothing else in the package does.
 
@@ -15,7 +15,7 @@ rule 'aitken'
 from __future__ import annotations
 
 try:
-    import hypothesis as _hypothesis  # noqa: F401  asked for first, so that its absence is told in words
+    import hypothesis as _hypothesis  # noqa: F401  first, so that a message says that it is missing
 except ImportError:
     raise ImportError("verification.testing needs hypothesis: pip install 'ndtheory[test]'") from None
 

@@ -1,4 +1,4 @@
-"""What must be true of a bound on the factor of one step."""
+"""Properties of every bound on the factor of one step."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from verification.constants import measure
 from verification.interface.build import build
 from verification.interface.pair import ContactPair
 from verification.problem import Problem
-from verification.testing.properties import Fails, Finding, Refused, Report, examine, over
+from verification.testing.properties import Fails, Finding, Kit, Report, over
 from verification.testing.strategies import SEEDS, bar_problems, forces, matrix_pairs, plane_problems
 from verification.testing.transforms import problem_in_units, problem_mirrored
 
-#: Two factors are the same up to this; those of a convex program up to what its solver leaves.
+#: Two factors are the same up to this, and up to the error of its solver where a convex program gives them.
 SAME, SAME_BY_SOLVER = 1e-8, 1e-4
 
-#: An observed factor is not told from a bound below it by less than this.
+#: An observed factor may exceed its bound by this rounding error.
 NOISE = 1e-10
 
-#: The share of a factor, and of what is gained beside it, that the mutants claim.
+#: The share of a factor that one mutant claims; another one claims 1/MUTANT of the gain.
 MUTANT = 0.9
 
-#: A bound that is attained is refused where none of so many conclusions, or more, came near a step.
+#: A bound that is attained is refused if none of so many conclusions, or more, came near a step.
 ENOUGH = 5
 
 #: Distances of two random forces, over their size.
@@ -38,7 +38,7 @@ DISTANCES = (1e-2, 1.0, 1e2)
 
 
 def check_bound(bound: Bound, *, examples: int = 20) -> Report:
-    """Hold a bound on the factor of one step against what must be true of every one.
+    """Test a bound on the factor of one step.
 
     ``bounds every step``
         ``|T_theta f - T_theta g| <= factor |f - g|`` in the norm (5.21), for random forces, and for the two forces
@@ -52,29 +52,15 @@ def check_bound(bound: Bound, *, examples: int = 20) -> Report:
         The factor is the same with both moduli and all loads 4096 times as large.  Not asked of a bound whose
         violation is a finding (``finding``): that may depend on the unit, and is proved only where m >= 1.
     ``knows no unit of length``
-        The factor is the same with all lengths 1024 times as small, that of the norm too.
+        The factor is the same with all lengths 1024 times as small, the length of the norm too.
     ``sees no left or right``
-        The factor is that of the mirror image.
+        The mirror image has the same factor.
 
-    Where a bound draws no conclusion at a drawn theta, one of the interval that it names is taken.
-
-    Parameters
-    ----------
-    bound : Bound
-    examples : int
-        Cases drawn for each property.
-
-    Returns
-    -------
-    Report
-
-    Raises
-    ------
-    Refused
-        The first property that fails.
+    Where a bound draws no conclusion at a drawn theta, one of the interval that it names is taken.  ``examples`` is the
+    number of cases for each property; the first property that fails raises Refused.
     """
-    subject = f"bound {bound.name!r}"
-    findings = list(_holds(subject, bound, examples))
+    kit = Kit(f"bound {bound.name!r}", examples)
+    findings = _holds(kit, bound)
     scaled: dict[str, Any] = {
         "knows no unit of stress": lambda problem: problem_in_units(problem, stress=Fraction(4096)),
         "knows no unit of length": lambda problem: problem_in_units(problem, length=Fraction(1, 1024)),
@@ -86,8 +72,8 @@ def check_bound(bound: Bound, *, examples: int = 20) -> Report:
             findings.append(Finding(property=property, verdict="not asked", detail=why))
             continue
         test = lambda problem, theta, seen=image: _same(bound, problem, seen(problem), theta)
-        findings.append(examine(subject, property, _problems(), test, examples=examples))
-    return Report(subject=subject, findings=tuple(findings))
+        findings.append(kit.examine(property, _problems(), test))
+    return kit.report(*findings)
 
 
 # --- cases ------------------------------------------------------------------------------------------------------------
@@ -126,7 +112,7 @@ def _pushed(draw: st.DrawFn) -> dict[str, Any]:
 
 
 def conclusion(bound: Bound, pair: ContactPair, theta: Fraction) -> BoundResult:
-    """What a bound says at theta, or inside the interval that it names where it has no factor at theta."""
+    """The result of a bound at theta, or inside the interval that it names where it has no factor at theta."""
     subject = Subject.of(pair, measure(pair))
     result = bound.evaluate(subject, theta)
     if result.factor is None and result.interval is not None:
@@ -156,7 +142,7 @@ def observed(pair: ContactPair, theta: float, force: Floats, other: Floats, seed
 # --- tests ------------------------------------------------------------------------------------------------------------
 
 
-def _holds(subject: str, bound: Bound, examples: int) -> list[Finding]:
+def _holds(kit: Kit, bound: Bound) -> list[Finding]:
     asked = 0
     factor_refuted = gain_refuted = 0
     share = 0.0
@@ -176,7 +162,7 @@ def _holds(subject: str, bound: Bound, examples: int) -> list[Finding]:
         gain_refuted += 1 - seen < gain / MUTANT - NOISE
         share = max(share, gain / (1 - seen)) if seen < 1 else share
 
-    holds = examine(subject, "bounds every step", _pushed(), test, examples=examples)
+    holds = kit.examine("bounds every step", _pushed(), test)
     holds = replace(holds, detail=f"{over(asked)} with a conclusion, of {holds.detail}")
     if not asked:
         why = f"it drew no conclusion in any of {holds.detail}"
@@ -186,7 +172,7 @@ def _holds(subject: str, bound: Bound, examples: int) -> list[Finding]:
         f" at most {share:.3g} of the gain seen is claimed"
     )
     if bound.attained and asked >= ENOUGH and not (factor_refuted and gain_refuted):
-        raise Refused(subject, "attained", f"no step comes near it: {said}", {})
+        raise kit.refused("attained", f"no step comes near it: {said}")
     verdict = "attained" if factor_refuted and gain_refuted else "not attained"
     return [holds, Finding(property="attained", verdict=verdict, detail=said)]
 

@@ -1,4 +1,4 @@
-"""What must be true of a law of friction."""
+"""Properties of every law of friction."""
 
 from __future__ import annotations
 
@@ -13,28 +13,27 @@ from fem1d2d import Condensation, plane_strain, rectangle, stiffness, supports, 
 from fem1d2d.mesh import Floats
 from verification.algorithm.fixed_point import FixedPointMap
 from verification.interface.build import build
-from verification.interface.grid import Grid
-from verification.interface.interface import Interface, Law
+from verification.interface.interface import Grid, Interface, Law
 from verification.interface.pair import ContactPair
 from verification.problem import Problem
-from verification.testing.properties import Fails, Finding, Refused, Report, examine
+from verification.testing.properties import Fails, Finding, Kit, Report
 from verification.testing.strategies import SEEDS, forces, plane_problems
 
 #: Two operators are the same up to this part of their largest entry.
 SAME = 1e-9
 
-#: What a friction force may exceed its bound by, relative to the forces: the certificate of step II allows as much.
+#: A friction force may exceed its bound by this part of the forces: the certificate of step II allows as much.
 BEYOND = 1e-6
 
 #: Cells along Gamma_c of the body on which the norm of S is followed, each mesh a halving of the one before.
 CELLS = (8, 16, 32, 64)
 
-#: The norm of a bounded S settles; that of the local law grows by sqrt(2) at each halving.
+#: The norm of a bounded S settles; the norm of the local law grows by sqrt(2) at each halving.
 GROWS = 1.2
 
 
 def check_law(law: Law, *, examples: int = 20, length: float = 1.0) -> Report:
-    """Hold a law of friction against what must be true of every one.
+    """Test a law of friction.
 
     ``a matrix of its grids``
         ``operator`` gives finite real numbers, of shape (contact nodes, Neumann nodes), the same ones each time, on
@@ -49,39 +48,25 @@ def check_law(law: Law, *, examples: int = 20, length: float = 1.0) -> Report:
     ``bounds friction``
         The friction bound is ``w_j k |(S sigma_N)_j|``, and every step II obeys it.
     ``maps into L2``
-        Asked of a law that the theorem speaks of (``outside`` is empty): the norm of S, from the normal forces of an
-        elastic body in the norm (5.21) into L2(Gamma_c), settles when the mesh is halved.  A local law fails here, and
-        must say in ``outside`` why no theorem speaks of it.
+        Asked where the theorem applies (``outside`` is empty): the norm of S, from the normal forces of an elastic body
+        in the norm (5.21) into L2(Gamma_c), settles when the mesh is halved.  A local law fails here, so its
+        ``outside`` must name the reason why the theorem does not apply.
 
-    Parameters
-    ----------
-    law : Law
-    examples : int
-        Cases drawn for each property.
-    length : float
-        Length of Gamma_c in the cases: of the order of the lengths that the law holds.  The last property is followed
-        down to cells of 1/64 of it.
-
-    Returns
-    -------
-    Report
-
-    Raises
-    ------
-    Refused
-        The first property that fails.
+    ``examples`` is the number of cases for each property; the first property that fails raises Refused.
+    ``length`` is the length of Gamma_c in the cases, of the order of the law's lengths.  The last property is followed
+    down to cells of 1/64 of it.
     """
-    subject = f"law {law.name!r}"
-    grids, with_forces = _grids(law, length), _with_forces(law, length)
+    kit = Kit(f"law {law.name!r}", examples)
+    grids = st.fixed_dictionaries({"law": st.just(law), "interface": _interfaces(law, length)})
     tests: dict[str, tuple[Any, Any]] = {
         "a matrix of its grids": (grids, _is_matrix),
-        "linear": (with_forces, _is_linear),
+        "linear": (_with_forces(law, length), _is_linear),
         "knows no units": (grids, _knows_no_units),
         "sees no left or right": (grids, _sees_no_sides),
         "bounds friction": (_pressed(law, length), _bounds_friction),
     }
-    findings = [examine(subject, name, cases, test, examples=examples) for name, (cases, test) in tests.items()]
-    return Report(subject=subject, findings=(*findings, _maps_into_L2(subject, law, length)))
+    findings = [kit.examine(name, cases, test) for name, (cases, test) in tests.items()]
+    return kit.report(*findings, _maps_into_L2(kit, law, length))
 
 
 # --- cases ------------------------------------------------------------------------------------------------------------
@@ -108,11 +93,6 @@ def _interfaces(draw: st.DrawFn, law: Law, length: float) -> Interface:
 
 
 @st.composite
-def _grids(draw: st.DrawFn, law: Law, length: float) -> dict[str, Any]:
-    return {"law": law, "interface": draw(_interfaces(law, length))}
-
-
-@st.composite
 def _with_forces(draw: st.DrawFn, law: Law, length: float) -> dict[str, Any]:
     interface = draw(_interfaces(law, length))
     random = np.random.default_rng(draw(SEEDS))
@@ -132,10 +112,10 @@ def _pressed(draw: st.DrawFn, law: Law, length: float) -> dict[str, Any]:
     """A pair of meshes whose Gamma_c has about the given length, with this law."""
     data = draw(plane_problems(friction=st.sampled_from([0.1, 0.5, 1.0]), law="nonlocal", most_cells=3))
     problem = Problem.from_dict(data)
-    pair = build(problem)
-    span = float(np.ptp(pair.contact.grid.x)) or 1.0
-    pair = build(problem, law=law.scaled(span / length))
-    return {"law": law.scaled(span / length), "pair": pair, "force": draw(forces(pair))}
+    span = float(np.ptp(build(problem).contact.grid.x)) or 1.0
+    scaled = law.scaled(span / length)
+    pair = build(problem, law=scaled)
+    return {"law": scaled, "pair": pair, "force": draw(forces(pair))}
 
 
 # --- tests of one case ------------------------------------------------------------------------------------------------
@@ -215,7 +195,7 @@ def _normal_stiffness(cells: int) -> tuple[Floats, Floats]:
 
 
 def norms(law: Law, length: float = 1.0) -> list[float]:
-    """``sup |S sigma_N|_L2 / |sigma_N|`` on meshes with 8, 16, 32, 64 cells along Gamma_c, the norm below being (5.21).
+    """``sup |S sigma_N|_L2 / |sigma_N|`` with (5.21) below, on meshes with 8, 16, 32, 64 cells along Gamma_c.
 
     It is the constant C_s of the theorem in energy norms for a block of that length and half that height.
     """
@@ -229,7 +209,7 @@ def norms(law: Law, length: float = 1.0) -> list[float]:
     return found
 
 
-def _maps_into_L2(subject: str, law: Law, length: float) -> Finding:
+def _maps_into_L2(kit: Kit, law: Law, length: float) -> Finding:
     property = "maps into L2"
     found = norms(law, length)
     growth = found[-1] / found[-2] if found[-2] else 1.0
@@ -238,5 +218,5 @@ def _maps_into_L2(subject: str, law: Law, length: float) -> Finding:
         return Finding(property=property, verdict="not asked", detail=f"it is {law.outside!r}; {shown}")
     if not growth <= GROWS:
         how = f"the norm of S grows with the mesh, so that the theorem does not speak of it: {shown}"
-        raise Refused(subject, property, how, {"length": length})
+        raise kit.refused(property, how, length=length)
     return Finding(property=property, verdict="holds", detail=shown)

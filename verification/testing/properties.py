@@ -1,4 +1,4 @@
-"""What a property test says: a report of what holds, or a refusal with its counterexample."""
+"""Results of property tests: a report of what holds, or a refusal with its counterexample."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ SIMPLER = 40
 
 
 class Fails(Exception):
-    """What a test of one case raises where a property fails: how, in words."""
+    """A test of one case failed; the message describes how."""
 
 
 class _Enough(BaseException):
-    """The counterexample is simple enough; hypothesis stops at what is no ``Exception``."""
+    """The counterexample is simple enough; hypothesis stops only at a ``BaseException``."""
 
 
 class Refused(AssertionError):
@@ -50,14 +50,9 @@ class Refused(AssertionError):
 
 @dataclass(frozen=True, kw_only=True)
 class Finding:
-    """What became of one property.
+    """The verdict on one property: 'holds', 'attained', 'not attained' or 'not asked'.
 
-    Attributes
-    ----------
-    property : str
-    verdict : {'holds', 'attained', 'not attained', 'not asked'}
-    detail : str
-        Over how many cases, by how much, or why it was not asked.
+    ``detail`` says over how many cases, by how much, or why it was not asked.
     """
 
     property: str
@@ -67,13 +62,7 @@ class Finding:
 
 @dataclass(frozen=True, kw_only=True)
 class Report:
-    """What holds of a subject.
-
-    Attributes
-    ----------
-    subject : str
-    findings : tuple of Finding
-    """
+    """The findings on a subject, by property."""
 
     subject: str
     findings: tuple[Finding, ...]
@@ -88,67 +77,68 @@ class Report:
 
 
 def over(cases: int) -> str:
-    """How many cases a property was held against."""
+    """The number of cases in words."""
     return f"{cases} case{'s' if cases != 1 else ''}"
 
 
-def examine(
-    subject: str, property: str, cases: st.SearchStrategy[dict[str, Any]], test: Callable[..., None], *, examples: int
-) -> Finding:
-    """Hold a property against drawn cases.
+@dataclass(frozen=True)
+class Kit:
+    """The tests of one subject, with so many drawn cases for each property."""
 
-    Parameters
-    ----------
-    cases : strategy of dict
-        The keywords of ``test``.
-    test : callable
-        Raises :class:`Fails` where the property does not hold.
-    examples : int
-        How many cases are drawn.
+    subject: str
+    examples: int
 
-    Raises
-    ------
-    Refused
-        With the simplest case found.
-    """
-    seen: list[Refused] = []
-    tried = more = 0
+    def refused(self, property: str, how: str, /, **case: Any) -> Refused:
+        """The error for a property that does not hold in a case."""
+        return Refused(self.subject, property, how, case)
 
-    @st.composite
-    def counted(draw: st.DrawFn) -> dict[str, Any]:
-        nonlocal more
-        more += bool(seen)
-        if more > SIMPLER:
-            raise _Enough
-        return draw(cases)
+    def examine(self, property: str, cases: st.SearchStrategy[dict[str, Any]], test: Callable[..., None]) -> Finding:
+        """Test a property on drawn cases; raise Refused with the simplest case found in which it fails.
 
-    @settings(
-        max_examples=examples,
-        deadline=None,
-        database=None,
-        phases=PHASES,
-        report_multiple_bugs=False,
-        suppress_health_check=list(HealthCheck),
-    )
-    @given(case=counted())
-    def run(case: dict[str, Any]) -> None:
-        nonlocal tried
-        tried += 1
+        A case is the keywords of ``test``, which raises :class:`Fails` where the property does not hold.
+        """
+        seen: list[Refused] = []
+        tried = more = 0
+
+        @st.composite
+        def counted(draw: st.DrawFn) -> dict[str, Any]:
+            nonlocal more
+            more += bool(seen)
+            if more > SIMPLER:
+                raise _Enough
+            return draw(cases)
+
+        @settings(
+            max_examples=self.examples,
+            deadline=None,
+            database=None,
+            phases=PHASES,
+            report_multiple_bugs=False,
+            suppress_health_check=list(HealthCheck),
+        )
+        @given(case=counted())
+        def run(case: dict[str, Any]) -> None:
+            nonlocal tried
+            tried += 1
+            try:
+                test(**case)
+            except Fails as failure:
+                seen.append(self.refused(property, str(failure), **case))
+                raise seen[-1] from None
+
         try:
-            test(**case)
-        except Fails as failure:
-            seen.append(Refused(subject, property, str(failure), case))
+            run()
+        except _Enough:
             raise seen[-1] from None
+        except Flaky:  # what remembers earlier cases does not fail the same way twice
+            if not seen:
+                raise
+            raise seen[-1] from None
+        return Finding(property=property, verdict="holds", detail=over(tried))
 
-    try:
-        run()
-    except _Enough:
-        raise seen[-1] from None
-    except Flaky:  # what remembers earlier cases does not fail the same way twice
-        if not seen:
-            raise
-        raise seen[-1] from None
-    return Finding(property=property, verdict="holds", detail=over(tried))
+    def report(self, *findings: Finding) -> Report:
+        """The report of all findings."""
+        return Report(subject=self.subject, findings=findings)
 
 
 def describe(value: Any) -> str:

@@ -1,9 +1,10 @@
-"""What must be true of a relaxation rule."""
+"""Properties of every relaxation rule."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from fractions import Fraction
+from functools import partial
 from itertools import islice
 from math import sqrt
 from typing import Any
@@ -20,7 +21,7 @@ from verification.algorithm.theta import below_one, choose, energy_bounds
 from verification.constants import measure
 from verification.contact import ContactError
 from verification.interface.pair import ContactPair
-from verification.testing.properties import Fails, Finding, Refused, Report, examine, over
+from verification.testing.properties import Fails, Finding, Kit, Report, over
 from verification.testing.strategies import force_scale, forces, pairs
 from verification.testing.transforms import in_units, mirrored, reflect, upside_down
 
@@ -36,7 +37,7 @@ CLEAR = 1e-4
 #: Tolerance, and most steps, of a run that looks for the solution, and of one of the rule that is checked.
 SOLVED, ARRIVED, MOST = 1e-13, 1e-9, 300
 
-#: What a rate is claimed of: ``|g_n - g| <= 4 sqrt(1 + rho) rate^n |g_0 - g|`` in the norm (5.21).  Of the triple
+#: A rate claims that ``|g_n - g| <= 4 sqrt(1 + rho) rate^n |g_0 - g|`` in the norm (5.21).  Of the triple
 #: momentum method it is proved, where 4 stands for 2 (1 + p)/(2 - p) with p < 1.
 CONSTANT = 4.0
 
@@ -45,7 +46,7 @@ MUTANT = 0.9
 
 
 def check_rule(rule: Rule, *, examples: int = 20) -> Report:
-    """Hold a relaxation rule against what must be true of every one.
+    """Test a relaxation rule.
 
     ``stays at the solution``
         Where ``T g = g`` the next g is g.
@@ -62,34 +63,17 @@ def check_rule(rule: Rule, *, examples: int = 20) -> Report:
         ``|g_n - g| <= 4 sqrt(1 + rho) rate^n |g_0 - g|`` in the norm (5.21), where it claims a rate; ``attained`` where
         some run refutes 0.9 of that rate.
 
-    Parameters
-    ----------
-    rule : Rule
-    examples : int
-        Cases drawn for each property.
-
-    Returns
-    -------
-    Report
-
-    Raises
-    ------
-    Refused
-        The first property that fails.
+    ``examples`` is the number of cases for each property; the first property that fails raises Refused.
     """
-    subject = f"rule {rule.name!r}"
+    kit = Kit(f"rule {rule.name!r}", examples)
     tests: dict[str, tuple[Any, Any]] = {
-        "stays at the solution": (_solved(), _stays),
+        "stays at the solution": (SOLVED_PAIRS, _stays),
         "knows no units": (_begun(), _knows_no_units),
         "starts afresh": (st.fixed_dictionaries({"case": _begun(), "other": _begun()}), _starts_afresh),
         "sees no left, right, top or bottom": (_begun(), _sees_no_sides),
     }
-    findings = [
-        examine(subject, property, cases, lambda test=test, **case: test(rule, **case), examples=examples)
-        for property, (cases, test) in tests.items()
-    ]
-    findings.insert(1, _ends(subject, rule, examples))
-    return Report(subject=subject, findings=(*findings, _rate(subject, rule, examples)))
+    stays, *others = (kit.examine(name, cases, partial(test, rule)) for name, (cases, test) in tests.items())
+    return kit.report(stays, _ends(kit, rule), *others, _rate(kit, rule))
 
 
 # --- cases ------------------------------------------------------------------------------------------------------------
@@ -107,9 +91,7 @@ def _contracting(draw: st.DrawFn) -> ContactPair:
     return pair.at(friction=min(pair.friction, Fraction(allowed) / 2))
 
 
-@st.composite
-def _solved(draw: st.DrawFn) -> dict[str, Any]:
-    return {"pair": draw(_contracting())}
+SOLVED_PAIRS = st.fixed_dictionaries({"pair": _contracting()})
 
 
 @st.composite
@@ -141,12 +123,7 @@ def proved_theta(pair: ContactPair) -> tuple[Fraction, float]:
 def solution(pair: ContactPair) -> tuple[Floats, float]:
     """The only fixed point of T and a bound on its error in the norm (5.21), for a pair with a proved theta.
 
-    ``|g - g*| <= theta |T g - g|/(1 - q)``, whatever found g.
-
-    Raises
-    ------
-    Fails
-        No rule of this project found it.
+    ``|g - g*| <= theta |T g - g|/(1 - q)`` for every g; Fails where no rule of this project found it.
     """
     theta, q = proved_theta(pair)
     settings = replace(pair.settings, tolerance=SOLVED, max_iterations=40 * MOST)
@@ -160,7 +137,7 @@ def solution(pair: ContactPair) -> tuple[Floats, float]:
 
 
 def steps(rule: Rule, pair: ContactPair, theta: Fraction, start: Floats, count: int = STEPS) -> list[Floats]:
-    """The g of the first steps of a run, as long as the residual stands clear of rounding."""
+    """The g of the first steps of a run, as long as the residual is far above rounding."""
     choice = choose(pair, theta, rule=rule)
     found: list[Floats] = []
     for step in islice(iterates(FixedPointMap(pair), rule.begin(pair, float(choice.theta), choice.rho), start), count):
@@ -184,7 +161,7 @@ def _stays(rule: Rule, pair: ContactPair) -> None:
             raise Fails(f"T g = g, and step {n} moves g by {moved:.2g} of {at.scale:.2g} in the norm (5.21)")
 
 
-def _ends(subject: str, rule: Rule, examples: int) -> Finding:
+def _ends(kit: Kit, rule: Rule) -> Finding:
     outcomes: list[str] = []
 
     def test(pair: ContactPair) -> None:
@@ -208,16 +185,16 @@ def _ends(subject: str, rule: Rule, examples: int) -> Finding:
             if done.converged and not off <= 2 * allowed + 1e-12 * done.last.scale:
                 raise Fails(f"its run converged {off:.2g} away from the solution, {done.last.scale:.2g} large")
 
-    finding = examine(subject, "ends at the solution", _solved(), test, examples=examples)
+    finding = kit.examine("ends at the solution", SOLVED_PAIRS, test)
     reached = outcomes.count("converged")
     if not reached:
         how = f"none of {len(outcomes)} runs converged, and a constant theta is proved to in each"
-        raise Refused(subject, finding.property, how, {"outcomes": sorted(set(outcomes))})
+        raise kit.refused(finding.property, how, outcomes=sorted(set(outcomes)))
     return replace(finding, detail=f"{reached} of {len(outcomes)} runs converged")
 
 
 def _in(role: ContactPair, other: ContactPair, error: float) -> float:
-    """An error in the norm (5.21) of one role as one in that of the other: at most sqrt(rho) times as large."""
+    """An error in the norm (5.21) of one role, in the norm of the other role: at most sqrt(rho) times as large."""
     rho = measure(role).rho_max if other.interface.transfer is None else None
     # g' S_b^-1 g <= lambda g' S_a^-1 g with lambda = lambda_max(S_a, S_b)
     assert rho is not None
@@ -272,7 +249,7 @@ def _compare(own: list[Floats], other: list[Floats], where: str, same: float = S
 # --- the proved rate --------------------------------------------------------------------------------------------------
 
 
-def _rate(subject: str, rule: Rule, examples: int) -> Finding:
+def _rate(kit: Kit, rule: Rule) -> Finding:
     property = "keeps its proved rate"
     if rule.proved_rate(1.0) is None:
         return Finding(property=property, verdict="not asked", detail="it claims none")
@@ -311,7 +288,7 @@ def _rate(subject: str, rule: Rule, examples: int) -> Finding:
                 break
         refuted += beaten
 
-    finding = examine(subject, property, cases(), test, examples=examples)
+    finding = kit.examine(property, cases(), test)
     if not refuted:
         return replace(finding, verdict="not attained", detail=f"no run refutes {MUTANT} of it; {over(tried)}")
     return replace(finding, verdict="attained", detail=f"{refuted} of {tried} runs refute {MUTANT} of it")

@@ -1,4 +1,4 @@
-"""What must be true of a step T of another code."""
+"""Properties of a step T of another code."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from verification.bounds.multipliers import QuadraticForms
 from verification.constants import Measured, measure
 from verification.interface.build import build
 from verification.interface.pair import ContactPair
-from verification.testing.properties import Fails, Finding, Refused, Report, examine
+from verification.testing.properties import Fails, Finding, Kit, Report
 from verification.testing.strategies import forces
 
 #: A step T: from nodal forces on the Neumann body to those that the contact body answers with.
@@ -38,7 +38,7 @@ POWER = 12
 def check_step(
     T: StepMap, pair: ContactPair | None = None, *, examples: int = 20, tolerance: float = 1e-6, **matrices: Any
 ) -> Report:
-    """Hold a step T of another code against the theorem for its matrices, and against the step of this project.
+    """Compare a step T of another code with the theorem for its matrices, and with the step of this project.
 
     T takes and gives nodal forces on the Neumann body (per unit thickness): all tangential components from left to
     right, then all normal ones along y, which points from body 1 to body 2.
@@ -46,7 +46,7 @@ def check_step(
     ``stays below its bound``
         ``|T_theta f - T_theta g| <= factor |f - g|`` in the norm (5.21), ``T_theta = theta T + (1 - theta)``, at the
         theta that is proved to be best for the matrices and at others; for random forces, and for differences that T
-        itself has enlarged.  The factor is that of the theorem in energy norms, or the semidefinite bound where that
+        itself has enlarged.  The theorem in energy norms gives the factor, or the semidefinite bound where that theorem
         draws no conclusion.
     ``converges at the advised theta``
         Asked where the theorem proves that it does: ``g <- T_theta g`` reaches a fixed point.
@@ -69,10 +69,6 @@ def check_step(
     examples : int
         Cases drawn for each property.
 
-    Returns
-    -------
-    Report
-
     Raises
     ------
     Refused
@@ -89,23 +85,15 @@ def check_step(
     else:
         loaded = True
     check = _Check(T, pair, tolerance)
-    subject = f"step T on {pair.neumann.grid.n} nodes"
-    cases = _cases(pair)
-    findings = [
-        examine(subject, "stays below its bound", cases, check.stays_below, examples=examples),
-        check.converges(subject),
-        examine(subject, "knows no units", cases, check.knows_no_units, examples=examples),
-    ]
+    kit = Kit(f"step T on {pair.neumann.grid.n} nodes", examples)
+    pushed = {"force": forces(pair), "other": forces(pair), "share": st.sampled_from([0.3, 1.0, 1.0, 1.2])}
+    cases = st.fixed_dictionaries(pushed)
+    below = kit.examine("stays below its bound", cases, check.stays_below)
+    converges = check.converges(kit)
+    units = kit.examine("knows no units", cases, check.knows_no_units)
     ours, where = (check.is_ours, "with its loads") if loaded else (check.is_ours_far, "far from its loads")
-    same = examine(subject, "is the step of these matrices", cases, ours, examples=examples)
-    findings.append(replace(same, detail=f"{same.detail}, {where}"))
-    return Report(subject=subject, findings=tuple(findings))
-
-
-def _cases(pair: ContactPair) -> st.SearchStrategy[dict[str, Any]]:
-    return st.fixed_dictionaries(
-        {"force": forces(pair), "other": forces(pair), "share": st.sampled_from([0.3, 1.0, 1.0, 1.2])}
-    )
+    same = kit.examine("is the step of these matrices", cases, ours)
+    return kit.report(below, converges, units, replace(same, detail=f"{same.detail}, {where}"))
 
 
 class _Check:
@@ -150,7 +138,7 @@ class _Check:
         for start, difference in ((force, other), (self.pressed(force), self.steepest())):
             at = self.image(start)
             d = difference * (norm(start) / (norm(difference) or 1.0))
-            for _ in range(POWER):  # T sends the difference it enlarges most to itself, but for its sign
+            for _ in range(POWER):  # T sends the difference it enlarges most to minus a multiple of itself
                 change = self.image(start + d) - at
                 size = norm(change) + norm(at)
                 relaxed = norm(float(theta) * change + (1 - float(theta)) * d)
@@ -177,7 +165,7 @@ class _Check:
         neumann = self.pair.neumann.stiffness
         return np.asarray(neumann @ eigh(contact, neumann)[1][:, -1])
 
-    def converges(self, subject: str) -> Finding:
+    def converges(self, kit: Kit) -> Finding:
         property = "converges at the advised theta"
         if not self.proved:
             return Finding(property=property, verdict="not asked", detail="no theta is proved of these matrices")
@@ -188,14 +176,14 @@ class _Check:
             try:
                 image = self.image(g)
             except Fails as failure:
-                raise Refused(subject, property, str(failure), {"g": self.pair.neumann.orient(g)}) from None
+                raise kit.refused(property, str(failure), g=self.pair.neumann.orient(g)) from None
             scale = max(scale, self.norm(image))
             residual = self.norm(image - g)
             if residual <= limit * scale:
                 return Finding(property=property, verdict="holds", detail=f"{n} steps at theta = {theta:.4g}")
             g = theta * image + (1 - theta) * g
         how = f"after {MOST} steps the residual is {residual / scale:.2g} of the forces at theta = {theta:.4g}"
-        raise Refused(subject, property, how, {"theta": theta})
+        raise kit.refused(property, how, theta=theta)
 
     def far(self, force: Floats) -> Floats:
         """A force in the direction of a given one that no longer feels loads and gaps."""

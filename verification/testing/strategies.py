@@ -1,7 +1,7 @@
 """Hypothesis strategies for problems, pairs, forces and relaxation factors: every case drawn is valid.
 
-The dictionaries are those of a problem file; ``Problem.from_dict`` takes them.  Nothing is held on Gamma_c.  Hypothesis
-examines each strategy that it has not seen before; those that a case asks for again and again are kept.
+Dictionaries have the keys of a problem file; ``Problem.from_dict`` takes them.  Nothing is held on Gamma_c.  Strategies
+that many cases ask for are kept, because hypothesis examines each new one.
 """
 
 from __future__ import annotations
@@ -109,12 +109,8 @@ def plane_problems(
 ) -> dict[str, Any]:
     """Two rectangles whose grids match; body 1 wider, equal or narrower, offset by whole cells.
 
-    Parameters
-    ----------
-    friction : strategy of rationals, optional
-        By default 0 to 1.
-    law : str, optional
-        By default mostly the non-local one; of the local one the discrete inequalities hold as well.
+    By default friction is 0 to 1, and the law mostly the non-local one; the discrete inequalities hold for the local
+    one as well.
     """
     h = draw(st.sampled_from([Fraction(1, 20), Fraction(1, 4), Fraction(1), Fraction(30)]))
     n1, n2 = draw(st.integers(1, most_cells)), draw(st.integers(1, most_cells))
@@ -213,14 +209,8 @@ def matrix_pairs(
 ) -> ContactPair:
     """Pairs made from random matrices, loads, gaps and kernels, in both roles.
 
-    Parameters
-    ----------
-    friction : strategy of rationals, optional
-        k; by default 0 to 1, often 0.
-    unlike : bool, optional
-        Whether the grids differ, with a random transfer that carries a constant exactly; by default either.
-    most_nodes : int
-        Contact nodes of a body.
+    Friction is by default 0 to 1, often 0.  ``unlike`` grids have a random transfer that carries a constant exactly; by
+    default grids are alike or not.
     """
     n = m = draw(st.integers(1, most_nodes))
     differ = draw(st.booleans()) if unlike is None else unlike
@@ -262,12 +252,8 @@ def mesh_pairs(**plane: Any) -> st.SearchStrategy[ContactPair]:
 def pairs(*, friction: Numbers | None = None, unlike: bool | None = None) -> st.SearchStrategy[ContactPair]:
     """Pairs of every kind: from matrices and from small meshes, with and without friction, in both roles.
 
-    Parameters
-    ----------
-    friction : strategy of rationals, optional
-        k; by default 0 to 1.  Bars have none.
-    unlike : bool, optional
-        Whether the grids differ; by default either.  Those of meshes never do.
+    Friction is by default 0 to 1; bars have none.  ``unlike`` gives only pairs whose grids differ, False only pairs
+    whose grids do not: grids of meshes never do.
     """
     of_matrices = matrix_pairs(friction=friction, unlike=unlike)
     return of_matrices if unlike else st.one_of(of_matrices, mesh_pairs(friction=friction))

@@ -1,11 +1,11 @@
-"""The same pair or problem seen otherwise: in another unit, in a mirror, from below.
+"""The same pair or problem in another unit, in a mirror, or from below.
 
 Nothing that is true of the theorem may change with any of these.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any
@@ -15,36 +15,27 @@ import numpy as np
 from fem1d2d.mesh import Floats
 from verification.interface.body import Condensed
 from verification.interface.friction import GivenOperator
-from verification.interface.grid import Grid
-from verification.interface.interface import Interface
+from verification.interface.interface import Grid
 from verification.interface.pair import ContactPair
 from verification.problem import Problem
 from verification.problem.specs import BodySpec
 
 
-def _on(grid: Grid, side: Condensed, **arrays: Floats) -> Condensed:
-    own = {"stiffness": side.stiffness, "load": side.load, "known": side.known}
-    given: dict[str, Any] = {name: np.array(array) for name, array in (own | arrays).items()}
-    return Condensed(grid=grid, upward=side.upward, **({"free": np.array(side.free)} | given))
-
-
-def _of_matrices(pair: ContactPair, contact: Condensed, neumann: Condensed, **changes: Any) -> ContactPair:
-    interface = pair.interface
-    kernel, transfer = interface.kernel, interface.transfer
-    given = {
-        "gap": interface.gap,
-        "law": None if kernel is None else GivenOperator(matrix=kernel),
-        "transfer": transfer,
-    }
-    joined = Interface(contact=contact.grid, neumann=neumann.grid, **(given | changes))
+def _of_matrices(
+    pair: ContactPair, side: Callable[[Condensed], Condensed], kernel: Floats | None, **changes: Any
+) -> ContactPair:
+    """A pair of matrices whose sides are made from those of another one."""
+    contact, neumann = (replace(side(given), body=None, own_load=None) for given in (pair.contact, pair.neumann))
+    law = None if kernel is None else GivenOperator(matrix=kernel)
+    joined = replace(pair.interface, contact=contact.grid, neumann=neumann.grid, law=law, **changes)
     return replace(pair, contact=contact, neumann=neumann, interface=joined, problem=None)
 
 
 def in_units(pair: ContactPair, *, force: float = 1.0, stress: float = 1.0, length: float = 1.0) -> ContactPair:
     """A pair whose numbers are those of other units, as a pair of matrices.
 
-    Stresses are ``stress`` times as large numbers, lengths ``length`` times.  ``force`` is no unit: loads, prescribed
-    displacements and gaps are that many times as large, and so are forces and displacements of the solution.
+    Stresses are ``stress`` times as large numbers, lengths ``length`` times.  ``force`` does not change a unit: loads,
+    prescribed displacements and gaps are that many times as large, and so are forces and displacements of the solution.
 
     Interface forces, per unit thickness, are then ``force * stress * length`` times as large (``force * stress`` in one
     dimension).
@@ -56,18 +47,16 @@ def in_units(pair: ContactPair, *, force: float = 1.0, stress: float = 1.0, leng
     def side(given: Condensed) -> Condensed:
         grid = given.grid
         scaled = Grid(x=length * grid.x, weights=(length if plane else 1.0) * grid.weights, dimension=grid.dimension)
-        return _on(
-            scaled,
+        return replace(
             given,
+            grid=scaled,
             stiffness=of_stiffness * given.stiffness,
             load=of_forces * given.load,
             known=force * length * given.known,
         )
 
-    kernel = pair.interface.kernel
-    law = None if kernel is None else GivenOperator(matrix=kernel / length)
-    gap = force * length * pair.interface.gap
-    return _of_matrices(pair, side(pair.contact), side(pair.neumann), gap=gap, law=law)
+    kernel, gap = pair.interface.kernel, force * length * pair.interface.gap
+    return _of_matrices(pair, side, None if kernel is None else kernel / length, gap=gap)
 
 
 def reflect(pair: ContactPair, force: Floats) -> Floats:
@@ -83,32 +72,24 @@ def _reflected(grid: Grid, vector: Floats) -> Floats:
 
 def mirrored(pair: ContactPair) -> ContactPair:
     """The mirror image of a pair, x to -x, as a pair of matrices; bars are their own."""
+    interface = pair.interface
     if pair.contact.grid.dimension == 1:
-        return _of_matrices(pair, _on(pair.contact.grid, pair.contact), _on(pair.neumann.grid, pair.neumann))
+        return _of_matrices(pair, lambda side: side, interface.kernel)
 
     def side(given: Condensed) -> Condensed:
         grid = given.grid
-        image = Grid(x=-grid.x[::-1], weights=grid.weights[::-1])
-        return _on(
-            image,
+        return replace(
             given,
+            grid=Grid(x=-grid.x[::-1], weights=grid.weights[::-1]),
             stiffness=_reflected(grid, _reflected(grid, given.stiffness).T),
             load=_reflected(grid, given.load),
             known=_reflected(grid, given.known),
             free=np.concatenate([given.free[grid.tangential][::-1], given.free[grid.normal][::-1]]),
         )
 
-    interface = pair.interface
     turn = lambda matrix: None if matrix is None else matrix[::-1, ::-1].copy()
-    kernel = turn(interface.kernel)
-    return _of_matrices(
-        pair,
-        side(pair.contact),
-        side(pair.neumann),
-        gap=interface.gap[::-1],
-        transfer=turn(interface.transfer),
-        law=None if kernel is None else GivenOperator(matrix=kernel),
-    )
+    gap, transfer = interface.gap[::-1], turn(interface.transfer)
+    return _of_matrices(pair, side, turn(interface.kernel), gap=gap, transfer=transfer)
 
 
 def upside_down(pair: ContactPair) -> ContactPair:
@@ -116,18 +97,8 @@ def upside_down(pair: ContactPair) -> ContactPair:
 
     Forces, in the direction of the contact body's normal, keep their numbers.
     """
-    sides = (
-        Condensed(
-            grid=side.grid,
-            stiffness=np.array(side.stiffness),
-            load=np.array(side.load),
-            known=np.array(side.known),
-            free=np.array(side.free),
-            upward=not side.upward,
-        )
-        for side in (pair.contact, pair.neumann)
-    )
-    return replace(_of_matrices(pair, *sides), neumann_body=1 if pair.neumann_body == 2 else 2)
+    turned = _of_matrices(pair, lambda side: replace(side, upward=not side.upward), pair.interface.kernel)
+    return replace(turned, neumann_body=1 if pair.neumann_body == 2 else 2)
 
 
 # --- problems ---------------------------------------------------------------------------------------------------------

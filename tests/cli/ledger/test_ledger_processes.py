@@ -90,7 +90,7 @@ def test_ctrl_c_while_files_are_written_keeps_the_result_that_was_shown(call, ke
     def interrupt(*arguments):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("verification.output.folder.Folder.write_ledger", interrupt)
+    monkeypatch.setattr("verification.output.folder.Folder.write", interrupt)
     answer = call("verify", READ, "-o", tmp_path, *options)
     assert answer.status == 130
     assert answer.err == f"interrupted while {tmp_path} was written; the result is shown above\n"

@@ -1,0 +1,72 @@
+"""The answer of a comparison in three lines, before its tables: what the run did, what is proved of it, which theta."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ndtheory import EnergyBounds
+from verification.algorithm.runs import Run
+from verification.bounds.bound import BoundResult
+from verification.sections.numbers import factor, figures, interval, near_one
+from verification.sections.parts import Labelled, Section, section
+
+#: What the lines of the answer mean.
+CAPTION = (
+    "What this run did; by which factor one step multiplies the error at most, whatever the loads; which theta is "
+    "predicted to be the best one, and which ones a bound allows."
+)
+
+
+def answer(finished: Run, bounds: Sequence[BoundResult]) -> Section:
+    """The answer after a run.
+
+    Parameters
+    ----------
+    finished : Run
+    bounds : sequence of BoundResult
+        Those that follow from the constants; the others take longer, and come below.
+    """
+    proved = [bound for bound in bounds if bound.proved and bound.worked_out]
+    parts = (Labelled("seen", _seen(finished)), Labelled("bound", _bound(finished, proved)), *_theta(proved))
+    return section("answer", "DOES IT CONVERGE, AND HOW FAST?", *parts, caption=CAPTION)
+
+
+def _seen(finished: Run) -> str:
+    """How the run ended, and its rate."""
+    steps = f"{finished.outcome} after {finished.iterations} steps"
+    if finished.observed_growth is not None:
+        return f"{steps}, error times {finished.observed_growth:.4g} per step"
+    if finished.observed_rate is None:
+        return f"{steps}, too few to see a rate"
+    return f"{steps}, error times {near_one(finished.observed_rate.value)} per step"
+
+
+def _bound(finished: Run, bounds: Sequence[BoundResult]) -> str:
+    """The smallest factor that a bound gives for one step, or how far the bounds reach; none may be known yet."""
+    if finished.relaxation != "constant":
+        return f"none: bounds are for a constant theta, not for {finished.relaxation}"
+    if finished.outside:
+        return "none: the problem is outside the theorem"
+    if not bounds:
+        return "see below"
+    found = [bound for bound in bounds if bound.factor is not None]
+    if not found:
+        limits = [bound.friction.some.value for bound in bounds if bound.friction.some is not None]
+        reach = f"; some theta contracts for k < {figures(max(limits))}" if limits else ""
+        return f"none at this theta and friction{reach}"
+    best = min(found, key=lambda bound: bound.factor.value if bound.factor is not None else 1.0)
+    how = "in doubles" if best.level == "float" else best.level
+    return f"error times {factor(best.factor, best.one_minus_factor)} at most per step ({best.name}, {how})"
+
+
+def _theta(bounds: Sequence[BoundResult]) -> list[Labelled]:
+    """The theta that is predicted to be the best one, and those that a bound allows."""
+    words = []
+    for detail in (bound.detail for bound in bounds):
+        if isinstance(detail, EnergyBounds):
+            words.append(f"{figures(detail.theta_predicted)} predicted best")
+    allowed = [bound for bound in bounds if bound.interval is not None]
+    if allowed:
+        widest = max(allowed, key=lambda bound: bound.interval[1] - bound.interval[0] if bound.interval else 0.0)
+        words.append(f"a bound allows {interval(widest.interval, widest.interval_level)}")
+    return [Labelled("theta", "; ".join(words))] if words else []
