@@ -142,6 +142,12 @@ def test_every_term_that_a_page_uses_is_in_the_glossary():
     assert [(page, term) for page, term in sorted(used) if term not in terms] == []
 
 
+def test_the_glossary_lists_all_its_terms_in_alphabetical_order():
+    text = (DOCS / "glossary.md").read_text("utf-8")
+    listed = re.findall(r"\{term\}`([^`]+)`", text.partition("\n## ")[0])
+    assert listed == sorted(defined(text), key=str.lower)
+
+
 @pytest.fixture(scope="module")
 def notebooks(builder):
     return builder.notebooks
