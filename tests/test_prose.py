@@ -19,7 +19,9 @@ PACKAGES = ("ndtheory", "fem1d2d", "verification")
 
 #: Habit -> what shows it.  Code neither knows nor speaks, and a docstring begins with a noun or an imperative.
 HABITS = {
-    "code that knows or speaks": r"\bknows? (?:no|nothing|of|only)\b|\bspeaks? (?:of|only)\b|\b(?:is|are) told (?:of|from|apart)\b",
+    "code that knows or speaks": (
+        r"\bknows? (?:no|nothing|of|only)\b|\bspeaks? (?:of|only)\b|\b(?:is|are) told (?:of|from|apart)\b"
+    ),
     "a chain of that of": r"\b(?:that|those) of (?:an?|the|its|their|which|what)\b",
     "alone at the end": r"\balone(?=[.,;:)]|$)",
     "of its own": r"\bof (?:its|their|one's|your) own\b",
@@ -33,7 +35,16 @@ OPENING = "a docstring that begins with what or whether"
 OPENS = re.compile(r"(?:What|Whether|Who|Whose|Where|When|Which|How|Of|That)\b")
 
 #: At most so many places have it.
-MOST = {}
+MOST = {
+    "code that knows or speaks": 13,
+    "a chain of that of": 12,
+    "alone at the end": 7,
+    "of its own": 8,
+    "stands for is": 1,
+    "dear": 2,
+    "a sentence without its head": 0,
+    "a docstring that begins with what or whether": 4,
+}
 
 
 class Found(NamedTuple):
@@ -113,7 +124,7 @@ def test_no_habit_grows():
         ("of its own", "It has a page of its own."),
         ("stands for is", "The reason stands beside it."),
         ("dear", "A third solve is dear."),
-        ("a sentence without its head", "Who wants more reads on."),
+        ("a sentence without its head", "It ends. Who wants more reads on."),
     ],
 )
 def test_a_planted_habit_is_found_in_prose_and_in_comments_only(habit, line):

@@ -259,7 +259,7 @@ def decide(logs: tuple[SeenLog, ...], interval: RhoInterval, tied: bool) -> Deci
     if (found := by_all()) is not None:
         return found
     if not falling and len(rising) > 1:
-        why = "a quarter of the smallest theta so far, as none converges; come back with the log of that run, too"
+        why = "a quarter of the smallest theta so far, as none converges; the log of that run narrows rho"
         return base.readings, NextRun(theta=rounded_down(base.theta / 4), why=why), None
     return base.readings, between(base, rising), None
 

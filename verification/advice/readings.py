@@ -209,10 +209,10 @@ def read_observed(theta: Fraction, ratio: Observed) -> tuple[tuple[RunReading, .
     elif r > 1 + spread(theta):
         following = between
         confirmed = f"a ratio of {few(following * (1 + high) - 1)} there confirms mode-high"
-        why = f"smaller, as this run does not converge; {confirmed}, and else come back with what you see"
+        why = f"smaller, as this run does not converge; {confirmed}; with another ratio, repeat this command"
     elif "level" in kinds:
         following = theta / 2
-        why = f"half of {few(theta)}, which does not converge, or hardly; come back with the ratio that you see there"
+        why = f"half of {few(theta)}, which does not converge, or hardly; the ratio of that run narrows rho"
     else:
         following = min(between if between >= SHORTEST_STEP * theta else 3 * theta / 2, (1 + theta) / 2)
         confirmed = f"a ratio of {few(following * (1 + high) - 1)} there confirms mode-high"
@@ -260,7 +260,7 @@ def read_plateau(theta: Fraction, plateau: Observed) -> tuple[tuple[RunReading, 
     least = 2 / theta - 1
     rho = 1 / (plateau.value - 1)
     found = []
-    following, why = theta / 2, f"half of {few(theta)}, which does not converge; come back with its log"
+    following, why = theta / 2, f"half of {few(theta)}, which does not converge; its log narrows rho"
     if rho > least:
         says = (
             f"a tied run diverges, its relative residual at {few(plateau.value)} = 1 + 1/rho: nothing opens or slides"
@@ -338,4 +338,4 @@ def anew(following: NextRun, made: Sequence[Made]) -> NextRun:
         best = min(falling, key=lambda one: (one.ratio is None, one.ratio or 0, one.theta))
         return kept(best.theta, "it falls, and no other theta is worth a run")
     steps = f"{steps_needed(theta)} steps or more in one time window"
-    return NextRun(theta=rounded_down(theta), why=f"{why}; come back with all logs, with {steps}")
+    return NextRun(theta=rounded_down(theta), why=f"{why}; give all logs together, the new one with {steps}")

@@ -131,7 +131,7 @@ def next_with_friction(falling: Sequence[tuple[Fraction, Observed]], rising: Seq
     if not falling:
         parts = 2 if len(rising) == 1 else 4
         share = "half" if parts == 2 else "a quarter"
-        why = f"{share} of {few(min(rising))}, which does not converge; come back with what you see there"
+        why = f"{share} of {few(min(rising))}, which does not converge; that run shows whether a still smaller one is needed"
         return NextRun(theta=rounded_down(min(rising) / parts), why=why)
     theta, ratio = min(falling, key=lambda run: (run[1].value, run[0]))
     pace = f"its residual changes by {few(ratio.value)} a step"
@@ -151,7 +151,7 @@ def next_with_friction(falling: Sequence[tuple[Fraction, Observed]], rising: Seq
         return kept(theta, f"{pace}, and the runs next to it leave no room for a faster one")
     where, end = ("smaller", low) if middle / low > high / middle else ("larger", high)
     next_theta = math.sqrt(middle * end)
-    why = f"{where} than {middle:.4g}, the fastest so far: {pace}; come back with what you see there"
+    why = f"{where} than {middle:.4g}, the fastest so far: {pace}; that run shows whether a smaller one is faster"
     return NextRun(theta=rounded_down(next_theta), why=why)
 
 

@@ -68,7 +68,7 @@ class Printed(Section5):
     finding = of_unit = True
 
     def remarks(self, result: BoundResult | None, unit: str) -> tuple[str, ...]:
-        return (f"{self.name}: with stresses in {unit}; in another unit its figures are others",)
+        return (f"{self.name}: its numbers are for stresses in {unit} and change with the unit",)
 
 
 class Repaired(Section5):
@@ -174,7 +174,7 @@ class SemidefiniteBound(Bound):
         found = None if result is None else result.detail
         if found is None:
             return ()
-        said = [f"{self.name}: {found.lower:.3f} occurs for some loads, {found.gap:.2%} less"]
+        said = [f"{self.name}: some loads reach {found.lower:.3f}, {found.gap:.2%} less"]
         if found.divided is not None:
             divided = f"dividing the pieces of T gives {found.divided.value:#.4g} in doubles"
             said.append(f"{self.name}: proved is the factor of one program; {divided}")
