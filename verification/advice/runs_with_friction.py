@@ -131,7 +131,7 @@ def next_with_friction(falling: Sequence[tuple[Fraction, Observed]], rising: Seq
     if not falling:
         parts = 2 if len(rising) == 1 else 4
         share = "half" if parts == 2 else "a quarter"
-        why = f"{share} of {few(min(rising))}, which does not converge; that run shows whether a still smaller one is needed"
+        why = f"{share} of {few(min(rising))}, which does not converge; that run shows whether it suffices"
         return NextRun(theta=rounded_down(min(rising) / parts), why=why)
     theta, ratio = min(falling, key=lambda run: (run[1].value, run[0]))
     pace = f"its residual changes by {few(ratio.value)} a step"
