@@ -126,11 +126,11 @@ class Tied:
     @cached_property
     def spectrum(self) -> Floats:
         """The eigenvalues of (S_c, S_n)."""
-        return eigh(self.contact.schur, self.neumann.schur, eigvals_only=True)
+        return eigh(self.contact.stiffness, self.neumann.stiffness, eigvals_only=True)
 
     def forces(self, theta: float) -> Iterator[tuple[Floats, Floats]]:
         """g and T g, step by step."""
-        factor, g = cho_factor(self.neumann.schur), np.zeros(len(self.neumann.load))
+        factor, g = cho_factor(self.neumann.stiffness), np.zeros(len(self.neumann.load))
         while True:
             image = self.image(cho_solve(factor, g + self.neumann.load))
             yield g, image
@@ -138,7 +138,7 @@ class Tied:
 
     def image(self, u: Floats) -> Floats:
         """What the contact body answers to the displacement of the Neumann body."""
-        return self.contact.load - self.contact.schur @ u
+        return self.contact.load - self.contact.stiffness @ u
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,13 +150,13 @@ class Contact(Tied):
 
     @cached_property
     def _root(self) -> Floats:
-        return cholesky(self.contact.schur)
+        return cholesky(self.contact.stiffness)
 
     def image(self, u: Floats) -> Floats:
         # phi = u + side z, z >= 0, and R' R = S: the least of |R z - R^-T (l - S u) side|
-        free = self.side * (self.contact.load - self.contact.schur @ u)
+        free = self.side * (self.contact.load - self.contact.stiffness @ u)
         z, _ = nnls(self._root, solve_triangular(self._root, free, trans="T"))
-        return self.contact.load - self.contact.schur @ (u + self.side * z)
+        return self.contact.load - self.contact.stiffness @ (u + self.side * z)
 
 
 @dataclass(frozen=True, kw_only=True)

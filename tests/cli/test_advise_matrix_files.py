@@ -169,7 +169,7 @@ def test_an_asymmetry_is_rounded_told_or_refused(call, tmp_path, skew):
 def test_an_assembled_matrix_is_told_from_a_condensed_one(call, tmp_path):
     """Both are positive definite: nothing but the zeros speaks."""
     body = pair_from(vf.example("section6")).body1.mesh_body
-    S = pair_from(vf.example("section6")).body1.stiffness
+    S = pair_from(vf.example("section6")).body1.schur
     sp.save_npz(tmp_path / "K.npz", body.stiffness)
     whole = call("advise", "matrices", "--S1", tmp_path / "K.npz", "--S2", tmp_path / "K.npz")
     assert whole.status == 0

@@ -425,7 +425,7 @@ def test_two_thresholds_on_friction_have_two_names_and_the_printed_one_its_unit(
         head = next(i for i, line in enumerate(lines) if "every small" in line)
         assert lines[head].split() == ["every", "small", "some"]
         assert lines[head + 1].count(f"theta {on} <") == 2
-        assert any(line.startswith("  printed: with stresses in " + unit) for line in lines)
+        assert any(line.startswith("  printed: its numbers are for stresses in " + unit) for line in lines)
     small = call("compare", write(), "--json").document
     assert small["energy"]["friction_threshold"]["value"] < small["energy"]["friction_limit"]["value"]
 

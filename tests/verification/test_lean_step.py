@@ -360,7 +360,7 @@ def test_what_does_not_change_is_the_same_object():
 def test_bars_share_too_and_their_stiffness_is_E_over_L():
     pair = pair_named("bars")
     other = pair.changed(young=(9, 5))
-    assert (other.body1.stiffness[0, 0], other.body2.stiffness[0, 0]) == pytest.approx((9, 2.5), rel=1e-13)
+    assert (other.body1.schur[0, 0], other.body2.schur[0, 0]) == pytest.approx((9, 2.5), rel=1e-13)
 
 
 def test_a_law_of_its_own_stays():

@@ -4,12 +4,12 @@ A certificate describes two elastic bodies on meshes of triangles in rational nu
 the Neumann-Dirichlet iteration between them has a Lipschitz constant, whatever the loads and the gap.  S_a are the
 Schur complements of the stiffness matrices on the contact nodes, the form ``.' S_n^-1 .`` is the squared norm of forces
 on the Neumann body, and P carries its traces to the contact nodes.  Two forces g = S_n d differ by p = S_c c after step
-II, and the displacement of the contact body relative to the other one by v = -(P d + c).  Step II gives, node by node,
+II, and the displacement of the contact body relative to the other one by v = -(P d + c).  Step II gives, node by node::
 
     p_N v_N >= 0,      p_T v_T >= -w k |zeta| |v_T|  with  zeta = kernel g_N,
 
 so that for multipliers lambda, tau, a, b >= 0 with 4 a b >= tau^2 the sum over the nodes of
-``lambda p_N v_N + tau p_T v_T + w k (a zeta^2 + b v_T^2)`` is not negative.  The claim holds if
+``lambda p_N v_N + tau p_T v_T + w k (a zeta^2 + b v_T^2)`` is not negative.  The claim holds if::
 
     factor^2 |g|^2 - |theta P' p + (1 - theta) g|^2 - that sum
 

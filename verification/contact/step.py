@@ -185,7 +185,7 @@ def way_out(motions: Floats, q: Floats, bound: Floats) -> str:
 
     The energy of step II is convex and quadratic, with friction piecewise linear, on a polyhedron.  It has a minimiser
     if and only if it does not fall without end, which only rigid motions can cause: with the loads q, the friction
-    bounds beta and every rigid motion z that does not penetrate (z_N <= 0), a minimiser exists if and only if
+    bounds beta and every rigid motion z that does not penetrate (z_N <= 0), a minimiser exists if and only if::
 
         q' z <= sum_j beta_j |z_T,j| .
 

@@ -7,7 +7,7 @@ be decided so, are left to :mod:`verification.ledger.rational_pairs`.  In all un
 A pair of forces differs on a piece of T by d_2 = u, a vector of doubles, and ``g = S_n u``.  Where all nodes are open
 and slip one way ``p_T = w k sign S g_N``, ``p_N = 0``, and ``d_1 = -S_c^-1 p``; where all stick ``d_1 = u`` and
 ``p = -S_c u``.  An inverse is enclosed in two ways, for a vector y that a solver gives and its residual
-``r = x - Y y``:
+``r = x - Y y``::
 
     x' Y^-1 x = 2 x' y - y' Y y + r' Y^-1 r,      |Y^-1 x - y|_Y^2 = r' Y^-1 r <= |r|^2 / least eigenvalue of Y.
 """
