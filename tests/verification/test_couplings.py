@@ -154,10 +154,10 @@ def test_the_bodies_of_the_other_code_have_symmetric_matrices_and_feel_a_rigid_p
 def test_the_spectrum_of_a_tied_coupling_is_that_of_its_iteration(made):
     tied = next(iter(made.couplings()))
     (g, image), (other, its_image) = islice(tied.forces(0.3), 2)
-    modes = np.linalg.eigvals(np.linalg.solve(tied.neumann.schur.T, tied.contact.schur.T).T).real
+    modes = np.linalg.eigvals(np.linalg.solve(tied.neumann.stiffness.T, tied.contact.stiffness.T).T).real
     assert modes.max() == pytest.approx(tied.spectrum[-1])
     assert np.allclose(other, g + 0.3 * (image - g))
-    S_c, S_n = tied.contact.schur, tied.neumann.schur
+    S_c, S_n = tied.contact.stiffness, tied.neumann.stiffness
     assert np.allclose(its_image - image, -S_c @ np.linalg.solve(S_n, other - g))
 
 
