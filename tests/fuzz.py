@@ -74,9 +74,11 @@ def laws(document: dict[str, Any]) -> str | None:
     if kind == "run" and document["converged"] and document["outcome"] != "converged":
         return "converged and not"
     if kind == "constants":
+        loose = document["m"]["value"] == 0  # where only contact holds the contact body
         for name in ("m", "M", "rho_max", "rho_min"):
-            if document[name] is not None and not document[name]["value"] > 0:
-                return f"{name} = {document[name]['value']}"
+            value = 1.0 if document[name] is None else document[name]["value"]
+            if not value > 0 and not (loose and value == 0 and name in ("m", "rho_min")):
+                return f"{name} = {value}"
         if not document["m"]["value"] <= document["M"]["value"]:
             return "m > M"
     return None

@@ -38,7 +38,7 @@ OPENS = re.compile(r"(?:What|Whether|Who|Whose|Where|When|Which|How|Of|That)\b")
 MOST = {
     "code that knows or speaks": 13,
     "a chain of that of": 12,
-    "alone at the end": 7,
+    "alone at the end": 6,
     "of its own": 8,
     "stands for is": 1,
     "dear": 2,

@@ -110,7 +110,7 @@ def test_a_frictionless_prediction_that_a_tied_interface_would_not_survive_is_ma
 
 # --- theta = "auto" and the advice -----------------------------------------------------------------------------------
 
-SAME, KEEPS = 'This is what theta = "auto" takes, rounded.', 'theta = "auto" keeps to the proved one'
+SAME, KEEPS = 'This is what theta = "auto" takes, rounded.', 'theta = "auto" uses the proved theta unless'
 
 
 def explained(found):

@@ -46,7 +46,12 @@ HEADINGS = {
         "DOES THE RUN AGREE WITH THE BOUND?",
     ],
     "bounds": ["DOES ONE STEP CONTRACT?", "THE CONSTANTS OF SECTION 5"],
-    "advise": ["WHICH BODY GETS THE NEUMANN PROBLEM?", "WHICH THETA?", "HOW MUCH FRICTION IS PROVED?", "TO PASTE"],
+    "advise": [
+        "WHICH BODY GETS THE NEUMANN PROBLEM?",
+        "WHICH THETA?",
+        "HOW MUCH FRICTION DOES THE ENERGY BOUND ALLOW?",
+        "TO PASTE",
+    ],
 }
 
 #: Edits whose screens hold what others do not: reasons, rates next to 1, other rules.

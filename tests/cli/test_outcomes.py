@@ -42,7 +42,7 @@ def test_a_command_ends_with_its_status_in_words_and_as_a_document(call, write, 
     assert (run["outcome"], answer.status) == (outcome, status)
     screen = call(command, file)
     assert screen.status == status
-    line = rf"^  seen +{outcome} after " if command == "compare" else rf"^  observed .* {outcome}$"
+    line = rf"^  observed +{outcome} after " if command == "compare" else rf"^  observed .* {outcome}$"
     assert re.search(line, screen.out, flags=re.M)
     assert answer.err == screen.err
 

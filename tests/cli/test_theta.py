@@ -146,7 +146,7 @@ def test_the_screen_of_a_run_says_which_residual_is_meant_and_what_is_sure(call)
     flat = " ".join(call("advise", "run", "--theta", "0.1", "--ratio", "1.4").out.split())
     for said in (
         "|Tg - g| changes by 1.4 a step, absolute and unrelaxed",
-        "The relative residual |Tg - g|/|Tg| of coupling libraries tells other things",
+        "For the relative residual |Tg - g|/|Tg| that coupling libraries log, use --log",
         "without friction rho is at least 19, nothing more; with friction this does not bound rho",
         "rho is at least 23",
         "rises and falls has no steady ratio: give 1",

@@ -66,7 +66,7 @@ def example(name: str | None, as_json: bool) -> None:
     elif name is None:
         for key, title in titles.items():
             say(f"  {key:14}  {title}")
-        say("\nNext: ndtheory example section6 > my.toml; ndtheory compare my.toml")
+        say("\nNext: ndtheory example section6 > ex.toml; ndtheory compare ex.toml")
     else:
         say(available[name].rstrip())
 
@@ -327,6 +327,7 @@ def _status_of_comparison(comparison: Comparison, swapped: bool) -> int:
 
 def remedy(finished: Run, swapped: bool) -> str:
     """Advice after a run that did not converge, with ``--swap-roles`` or without, in one sentence."""
+    from ndtheory.number import directed
     from verification.algorithm.ending import MOST
     from verification.algorithm.rates import noise
     from verification.constants import measure
@@ -350,10 +351,11 @@ def remedy(finished: Run, swapped: bool) -> str:
         return f"{here}; try a smaller theta" + (f", or {roles}" if exchanged else "")
     beside = None if exchanged is None else measure(exchanged).rho_max
     good, other = _worth_trying(rho.rho_max.value), 0.0 if beside is None else _worth_trying(beside.value)
-    better = f", or {roles} with --theta {other:.2g}" if other > good else ""
+    typed = lambda value: f"{directed(value, 2, up=False):g}"
+    better = f", or {roles} with --theta {typed(other)}" if other > good else ""
     if theta <= good:
-        return f"{here}; try --theta {theta / 2:.2g}{better}"
-    return f"{here}; try --theta {good:.2g} (2/(2 + rho), rho = {rho.rho_max.value:.3g}){better}"
+        return f"{here}; try --theta {typed(theta / 2)}{better}"
+    return f"{here}; try --theta {typed(good)} (2/(2 + rho), rho = {rho.rho_max.value:.3g}){better}"
 
 
 def _exchanged(pair: ContactPair) -> ContactPair | None:

@@ -68,7 +68,7 @@ def _end(found: Advice) -> Section:
     outside = map(outside_the_theorem, found.outside)
     if found.next is None:
         tied = "that nothing opens or slips"
-        claims = tied if found.tied else "that the predicted theta is the best one for your loads"
+        claims = tied if found.tied else "that the predicted theta is the best one for other loads or meshes"
         return closing(claims, *outside, then=_after_a_problem(found))
     theta = f"{found.next.theta:g}"
     assumed = "--tied " * found.tied + "--friction " * (found.friction_bounds is not None)
@@ -139,7 +139,7 @@ def _which_theta(found: Advice) -> Section:
             rows.append(("", "", "if tied", *numbers, _at_predicted(role)))
         elif found.tied:
             why[name] = role.why_not_tied
-    said = [*_together(why), "predicted: theta = 2/(2 + rho); proved: the theta of least proved factor"]
+    said = [*_together(why), "predicted: theta = 2/(2 + rho); proved: by the energy bound"]
     ends = [
         f"{figures(role.rho_min)}, {figures(role.rho_tied)} ({NAMES[role.neumann_body]})"
         for role in possible
@@ -178,7 +178,7 @@ def _friction(found: Advice) -> Iterator[Section]:
         if role.friction_threshold is not None:
             allowed = f"every small theta contracts for k < {figures(role.friction_threshold)}"
             said[NAMES[role.neumann_body]] = f"{allowed} (here k = {figures(found.friction, 2)})"
-    yield section("friction", "HOW MUCH FRICTION IS PROVED?", *_together(said))
+    yield section("friction", "HOW MUCH FRICTION DOES THE ENERGY BOUND ALLOW?", *_together(said))
 
 
 def _together(said: Mapping[str, str]) -> list[str]:
@@ -201,7 +201,7 @@ def _paste(found: Advice, *more: str) -> Section:
         elif found.tied:
             said.append('theta = "auto" takes another one, since contact may open and slip.')
         elif auto.source == "proved":
-            said.append('theta = "auto" keeps to the proved one up to twice the predicted steps.')
+            said.append('theta = "auto" uses the proved theta unless it needs more than twice the predicted steps.')
     same = "The same theta for forces and displacements (heat: fluxes and temperatures) in serial coupling"
     said.append(f"{same}, not in parallel coupling.")
     said.append("Transient: rho is that of K + c M/dt^2; the better role may change with dt.")
@@ -278,7 +278,7 @@ def of_a_run(found: Advice, run: SeenRun) -> Sections:
     notes = (
         f"{given}, absolute and unrelaxed, steadily over {run.steps} steps or more.",
         "A residual that rises and falls has no steady ratio: give 1.",
-        "The relative residual |Tg - g|/|Tg| of coupling libraries tells other things.",
+        "For the relative residual |Tg - g|/|Tg| that coupling libraries log, use --log.",
     )
     said = section("rho", "WHAT DOES THE RUN SAY OF RHO?", *notes, _readings(found.readings))
     return (said, *_with_friction(found.friction_bounds), *next_run(found.next))

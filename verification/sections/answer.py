@@ -27,7 +27,7 @@ def answer(finished: Run, bounds: Sequence[BoundResult]) -> Section:
         Those that follow from the constants; the others take longer, and come below.
     """
     proved = [bound for bound in bounds if bound.proved and bound.worked_out]
-    parts = (Labelled("seen", _seen(finished)), Labelled("bound", _bound(finished, proved)), *_theta(proved))
+    parts = (Labelled("observed", _seen(finished)), Labelled("bound", _bound(finished, proved)), *_theta(proved))
     return section("answer", "DOES IT CONVERGE, AND HOW FAST?", *parts, caption=CAPTION)
 
 
@@ -50,10 +50,12 @@ def _bound(finished: Run, bounds: Sequence[BoundResult]) -> str:
     if not bounds:
         return "see below"
     found = [bound for bound in bounds if bound.factor is not None]
+    if not found and (allowed := _widest(bounds)) is not None:
+        return f"none at this theta: outside {interval(allowed.interval, allowed.interval_level)}"
     if not found:
         limits = [bound.friction.some.value for bound in bounds if bound.friction.some is not None]
         reach = f"; some theta contracts for k < {figures(max(limits))}" if limits else ""
-        return f"none at this theta and friction{reach}"
+        return f"none at this friction{reach}"
     best = min(found, key=lambda bound: bound.factor.value if bound.factor is not None else 1.0)
     how = "in doubles" if best.level == "float" else best.level
     return f"error times {factor(best.factor, best.one_minus_factor)} at most per step ({best.name}, {how})"
@@ -65,8 +67,13 @@ def _theta(bounds: Sequence[BoundResult]) -> list[Labelled]:
     for detail in (bound.detail for bound in bounds):
         if isinstance(detail, EnergyBounds):
             words.append(f"{figures(detail.theta_predicted)} predicted best")
-    allowed = [bound for bound in bounds if bound.interval is not None]
-    if allowed:
-        widest = max(allowed, key=lambda bound: bound.interval[1] - bound.interval[0] if bound.interval else 0.0)
-        words.append(f"a bound allows {interval(widest.interval, widest.interval_level)}")
+    if (allowed := _widest(bounds)) is not None:
+        words.append(f"a bound allows {interval(allowed.interval, allowed.interval_level)}")
     return [Labelled("theta", "; ".join(words))] if words else []
+
+
+def _widest(bounds: Sequence[BoundResult]) -> BoundResult | None:
+    """The bound that allows most theta; None where none allows any."""
+    width = lambda bound: bound.interval[1] - bound.interval[0] if bound.interval is not None else -1.0
+    widest = max(bounds, key=width, default=None)
+    return None if widest is None or widest.interval is None else widest

@@ -98,7 +98,7 @@ def sections(found: Calculated) -> Sections:
         closing(
             "",
             *([Note(on_the_printed_proof(), 0)] if unproved else []),
-            then="ndtheory example section6 > my.toml; ndtheory constants my.toml",
+            then="ndtheory example section6 > ex.toml; ndtheory constants ex.toml",
         ),
     )
 

@@ -38,8 +38,8 @@ def sections(found: Certificate, target: Path | None = None) -> Sections:
     nodes = sum(len(discrete[name]["points"]) for name in ("body1", "body2"))
     factor, theta = near_one(float(found.factor)), float(found.theta)
     claim.append(
-        f"On these meshes T_theta with theta = {theta:g} has the Lipschitz constant {factor} in the norm (5.21),"
-        " whatever the loads and the gap: it contracts.  Level: verified."
+        f"On these meshes a step with theta = {theta:g} multiplies the difference of two forces, in the norm (5.21), by"
+        f" {factor} at most, for all loads and gaps: it contracts.  Level: verified."
     )
     if found.lower is not None:
         claim.append(f"No proof can give less than {found.lower:.6g}, a factor that two forces attain (in doubles).")
@@ -130,7 +130,7 @@ def _used(found: ContinuumCertificate, constants: Mapping[str, Any], of_stress: 
 
 def _contracts(found: ContinuumCertificate, document: Mapping[str, Any]) -> list[str]:
     k, threshold = float(found.friction), _few(document["friction_threshold"]["lo"], False)
-    said = [f"Every small theta contracts for k < {threshold}: one fixed point, and (P1) has exactly one solution."]
+    said = [f"Every small theta contracts for k < {threshold}: one fixed point, and contact has exactly one solution."]
     if document["friction_limit"] is not None:
         said.append(f"Some theta contracts for k < {_few(document['friction_limit']['lo'], False)}.")
     if found.energy is None:

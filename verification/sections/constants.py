@@ -17,7 +17,7 @@ COMPARED = ("m", "M", "C_R", "C_s", "C_tr", "C_K", "rho_max")
 #: What each constant measures, in at most 40 characters; norms are those of H^1, where no energy is named.
 WORDS = {
     "m": "least energy (doubled) at norm 1",
-    "M": "largest energy (doubled) at norm 1",
+    "M": "sum of both largest energies, doubled",
     "C_R": "largest norm of a lift per trace norm",
     "C_s": "largest smoothed pressure at norm 1",
     "C_tr": "largest tangential trace at norm 1",
@@ -29,8 +29,8 @@ WORDS = {
     "C_s_energy": "smoothed pressure at energy 1, Neumann",
     "C_t1": "tangential trace at energy 1, contact",
     "C_t2": "tangential trace at energy 1, Neumann",
-    "kappa_1": "k C_s_energy C_t1: how friction enters",
-    "kappa_2": "k C_s_energy C_t2: how friction enters",
+    "kappa_1": "k C_s_energy C_t1, contact body",
+    "kappa_2": "k C_s_energy C_t2, Neumann body",
 }
 
 
