@@ -254,7 +254,9 @@ def friction_threshold(constants: ContinuumConstants) -> Number:
 
 
 def statement(constants: ContinuumConstants, *, friction: Numeric, theta: Numeric | None = None) -> EnergyBounds | None:
-    """The answer of the theorem in energy norms for the continuum and k <= ``friction``; None if rho is not bounded.
+    """The answer of the theorem in energy norms for the continuum; None if rho is not bounded.
+
+    ``friction`` is an upper bound of the coefficient k >= 0, ``theta`` where a factor is wanted, 0 < theta <= 1.
 
     q grows with its constants, so the values for upper bounds are bounds: ``factor`` and ``factor_proved`` from above,
     ``theta_max_proved`` and both multiples of friction from below.

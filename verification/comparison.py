@@ -34,8 +34,8 @@ T = TypeVar("T")
 class Listener:
     """A receiver of each part of a comparison as soon as it is known, in the order of these methods.
 
-    This one ignores them; a screen shows them.  A part that was not asked for is left out.  Ctrl-C in a method leaves
-    out all later parts.
+    This one ignores them; a screen shows them, the answer, which needs the run, before what led to it.  A part that was
+    not asked for is left out.  Ctrl-C in a method leaves out all later parts.
     """
 
     def constants(self, measured: Measured, choice: Choice) -> None:

@@ -42,7 +42,8 @@ def test_a_command_ends_with_its_status_in_words_and_as_a_document(call, write, 
     assert (run["outcome"], answer.status) == (outcome, status)
     screen = call(command, file)
     assert screen.status == status
-    line = rf"^  observed +{outcome} after " if command == "compare" else rf"^  observed .* {outcome}$"
+    ended = "not converged" if outcome == "limit" else outcome
+    line = rf"^  observed +{ended} after " if command == "compare" else rf"^  observed .* {outcome}$"
     assert re.search(line, screen.out, flags=re.M)
     assert answer.err == screen.err
 
@@ -314,3 +315,18 @@ def test_a_remedy_names_no_roles_that_are_refused(call, write):
     assert answer.status == NOT_MET
     assert "does not contract here; try --theta 0." in answer.err
     assert "--swap-roles" not in answer.err
+
+
+@pytest.mark.parametrize("edits", [{"iteration.relaxation": '"aitken"'}, "local law"], ids=["aitken", "local law"])
+def test_the_answer_allows_no_theta_where_no_bound_applies(call, write, edits):
+    out = call("compare", write(edits), "--bounds", "energy").out
+    answer = out[out.index("DOES IT CONVERGE") : out.index("DOES ONE STEP CONTRACT?")]
+    assert re.search(r"^  bound +none: ", answer, flags=re.M)
+    assert "allows" not in answer
+
+
+def test_the_answer_names_the_thetas_allowed_where_that_of_the_run_is_not(call, write):
+    out = call("compare", write(), "--bounds", "energy", "--theta", "0.999").out
+    bound = re.search(r"^  bound +(none.*)$", out, flags=re.M)[1]
+    (allowed,) = re.findall(r"a bound allows (.*)$", out, flags=re.M)
+    assert bound == f"none at this theta: outside {allowed}"

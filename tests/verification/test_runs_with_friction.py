@@ -174,3 +174,11 @@ def test_a_ratio_of_a_run_with_friction_may_exceed_what_rho_allows_without():
     r = math.exp(np.mean(np.log(ratios)))
     assert r > 1 - theta
     assert (1 + r) / theta - 1 > 2 * rho
+
+
+@pytest.mark.parametrize("theta", ["0.02", "0.1", "0.6"])
+def test_the_next_run_with_friction_is_explained_by_where_it_lies(theta):
+    found = vf.advise_run(theta, "0.3", friction=True).next
+    where = "larger" if found.theta > float(theta) else "smaller"
+    assert found.why.startswith(f"{where} than {theta}")
+    assert found.why.endswith(f"that run shows whether a {where} one is faster")

@@ -151,7 +151,7 @@ def next_with_friction(falling: Sequence[tuple[Fraction, Observed]], rising: Seq
         return kept(theta, f"{pace}, and the runs next to it leave no room for a faster one")
     where, end = ("smaller", low) if middle / low > high / middle else ("larger", high)
     next_theta = math.sqrt(middle * end)
-    why = f"{where} than {middle:.4g}, the fastest so far: {pace}; that run shows whether a smaller one is faster"
+    why = f"{where} than {middle:.4g}, the fastest so far: {pace}; that run shows whether a {where} one is faster"
     return NextRun(theta=rounded_down(next_theta), why=why)
 
 

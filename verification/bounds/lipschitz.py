@@ -4,6 +4,9 @@ T is piecewise affine, so that its Lipschitz constant is the largest ``|J|`` of 
 a sign eps_j, with which step II gives ``p_T v_T = eps_j w k zeta v_T`` in place of the inequality (2.6): both sides
 are 0 where the node sticks.  So the set of pieces with the largest bound is divided in two, by the sign of a node or by
 its state, until the bound of every set is close to the largest ``|J|`` found.  Proofs in ``docs/energy.md``.
+
+:func:`work_out` does all of it for one pair: both bounds, the thetas and the friction that they allow, and half of
+the work where the bodies are their own mirror image.
 """
 
 from __future__ import annotations
@@ -461,7 +464,7 @@ def work_out(
     ------
     LMIError
     ValueError
-        As :class:`verification.bounds.multipliers.QuadraticForms`.
+        As :class:`verification.bounds.conditions.Conditions`.
     """
     progress("semidefinite bound: largest theta", None)
     forms = QuadraticForms(pair, measured)

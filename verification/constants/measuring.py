@@ -1,4 +1,4 @@
-"""The paper's constants, measured on the mesh as extremal generalised eigenvalues."""
+"""Constants of Section 5 and of the theorem in energy norms, measured on the mesh as extremal eigenvalues."""
 
 from __future__ import annotations
 

@@ -141,7 +141,7 @@ class ActiveSet:
         return start if sliding is start.sliding else Pattern(touching=start.touching, sliding=sliding.astype(np.int8))
 
     def solve(self, q: Floats, bound: Floats, start: Pattern) -> tuple[Floats, Floats, Pattern] | None:
-        """Correct the pattern until every sign agrees; None where it does not settle."""
+        """Correct the pattern until every sign agrees: v, the force and the pattern; None where it does not settle."""
         seen: set[bytes] = set()
         for v, force, pattern, agrees in islice(self._guesses(q, bound, start), LIMIT):
             if agrees:

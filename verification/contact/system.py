@@ -39,6 +39,7 @@ class Branches(Pattern):
 
     @property
     def key(self) -> bytes:
+        """Bytes that are equal for equal branches only."""
         return super().key + self.threshold.tobytes()
 
 

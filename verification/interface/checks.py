@@ -147,10 +147,10 @@ def _strain(bodies: TwoBodies, moved: Displacements) -> tuple[float, Place | Non
     for body, u in zip((bodies.body1, bodies.body2), moved, strict=True):
         if body is not None and u is not None:
             strains = largest_strains(body.mesh, u)
-            cell = _first_largest(strains)
-            if strains[cell] > largest * (1 + TIE):
-                centre = body.mesh.points[body.mesh.cells[cell]].mean(axis=0)
-                largest, at = float(strains[cell]), tuple(map(float, centre))
+            if strains.max() > largest * (1 + TIE):
+                centre = body.mesh.points[body.mesh.cells[_first_largest(strains)]].mean(axis=0)
+                at = tuple(map(float, centre))
+            largest = max(largest, float(strains.max()))
     return largest, at
 
 
@@ -199,7 +199,9 @@ def _penetration(bodies: TwoBodies, moved: Displacements) -> tuple[float, Place 
     for own, other in ((one, two), (two, one)):
         depth = depths(own.moved, other.start, other.end)
         if len(depth) and depth.max() > max(deepest * (1 + TIE), rounding):
-            deepest, at = float(depth.max()), tuple(map(float, own.drawn[_first_largest(depth)]))
+            at = tuple(map(float, own.drawn[_first_largest(depth)]))
+        if at is not None:
+            deepest = max(deepest, float(depth.max(initial=0.0)))
     return deepest, at
 
 

@@ -51,7 +51,10 @@ class Folder:
         return target
 
     def write(self, found: Any) -> None:
-        """Write a result of this kind: its document with tables, matrices, the problem, figures or pages."""
+        """Write a result of this kind: its document with tables, matrices, the problem, figures or pages.
+
+        RuntimeError if a file is written that FILES does not list: then nothing takes its place.
+        """
         with staged(self.path, FILES[self.kind]) as room:
             _text(room / FILES[self.kind][0], found.to_json())
             match self.kind:
@@ -64,6 +67,9 @@ class Folder:
                 case _:
                     self._tables(room, found)
                     _pictures(room, found)
+            if unknown := {path.name for path in room.iterdir()} - {*FILES[self.kind], "problem.toml"}:
+                names = ", ".join(sorted(unknown))
+                raise RuntimeError(f"{names}: needed in FILES, so that a file of a user's is never overwritten")
 
     def _compared(self, room: Path, comparison: Comparison) -> None:
         """The files of the run, and ``report.html``."""

@@ -27,13 +27,16 @@ def answer(finished: Run, bounds: Sequence[BoundResult]) -> Section:
         Those that follow from the constants; the others take longer, and come below.
     """
     proved = [bound for bound in bounds if bound.proved and bound.worked_out]
-    parts = (Labelled("observed", _seen(finished)), Labelled("bound", _bound(finished, proved)), *_theta(proved))
+    applies = finished.relaxation == "constant" and not finished.outside
+    theta = _theta(proved, allowed=_widest(proved) if applies else None)
+    parts = (Labelled("observed", _seen(finished)), Labelled("bound", _bound(finished, proved)), *theta)
     return section("answer", "DOES IT CONVERGE, AND HOW FAST?", *parts, caption=CAPTION)
 
 
 def _seen(finished: Run) -> str:
     """How the run ended, and its rate."""
-    steps = f"{finished.outcome} after {finished.iterations} steps"
+    how = "not converged" if finished.outcome == "limit" else finished.outcome
+    steps = f"{how} after {finished.iterations} steps"
     if finished.observed_growth is not None:
         return f"{steps}, error times {finished.observed_growth:.4g} per step"
     if finished.observed_rate is None:
@@ -61,13 +64,13 @@ def _bound(finished: Run, bounds: Sequence[BoundResult]) -> str:
     return f"error times {factor(best.factor, best.one_minus_factor)} at most per step ({best.name}, {how})"
 
 
-def _theta(bounds: Sequence[BoundResult]) -> list[Labelled]:
+def _theta(bounds: Sequence[BoundResult], allowed: BoundResult | None) -> list[Labelled]:
     """The theta that is predicted to be the best one, and those that a bound allows."""
     words = []
     for detail in (bound.detail for bound in bounds):
         if isinstance(detail, EnergyBounds):
             words.append(f"{figures(detail.theta_predicted)} predicted best")
-    if (allowed := _widest(bounds)) is not None:
+    if allowed is not None:
         words.append(f"a bound allows {interval(allowed.interval, allowed.interval_level)}")
     return [Labelled("theta", "; ".join(words))] if words else []
 

@@ -53,7 +53,7 @@ class Parts(Listener):
     """Passes the sections of a comparison to ``show``, each when it is known; several of one id may follow each other.
 
     The pair is made from a problem.  The answer comes first: what is known before the run waits for it, until the
-    listener is closed at the latest.
+    listener is closed at the latest: where a run is slow, its bounds appear late.
     """
 
     def __init__(self, pair: ContactPair, show: Callable[[Sections], None]) -> None:
