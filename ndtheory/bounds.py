@@ -310,8 +310,8 @@ class Bounds(Answer):
 def evaluate(edition: Edition, constants: Constants, theta: Numeric | None = None) -> Bounds:
     """Evaluate an edition of Proposition 5.6.
 
-    The four cases are one: C5 = C2 identically, h1 = h2 at C0, and the end points C3, C4 hold too, so T_theta contracts
-    for ``max(0, C6) < theta < C1`` as long as ``k < C2``, with ``K^2 = max(h1, h2)``.
+    T_theta contracts for ``max(0, C6) < theta < C1`` as long as ``k < C2``, with ``K^2 = max(h1, h2)``; the four cases
+    of the proposition are one (C5 = C2 identically, h1 = h2 at C0, and the end points C3, C4 hold too).
 
     Parameters
     ----------
@@ -324,10 +324,9 @@ def evaluate(edition: Edition, constants: Constants, theta: Numeric | None = Non
     Returns
     -------
     Bounds
-        Right to the last place of a double: evaluated with 200 decimal digits, comparisons included.  Where a constant
-        was given as an enclosure, and the others as one or exactly, the numbers have enclosures too, at the weakest
-        level (``verified`` at best), if all of the constants enclosed have such a number: ``factor`` and
-        ``one_minus_factor`` have one only if there is a contraction interval, with theta inside it, throughout.
+        Right to the last place of a double: evaluated with 200 decimal digits, comparisons included.  If every constant
+        is exact or an enclosure, the numbers are enclosures too, at the weakest level (``verified`` at best), but
+        ``factor`` and ``one_minus_factor`` only if theta is inside the contraction interval throughout.
         ``interval`` and ``verdict`` come from the values, not from the enclosures.
 
     Raises

@@ -109,10 +109,10 @@ BUDGET = {
     "verification.interface": 2660,
     "verification.ledger": 4320,
     "verification.output": 450,
-    "verification.problem": 1490,
+    "verification.problem": 1510,
     "verification.reproduce": 630,
     "verification.sections": 2100,
-    "verification.sweeps": 2340,
+    "verification.sweeps": 2360,
     "verification.testing": 1570,
 }
 

@@ -448,8 +448,9 @@ class Advice(Document):
 def advise(problem: Problem | ContactPair | Path | str, *, tied: bool = False, progress: Progress = silent) -> Advice:
     """Advise on the roles of the bodies and on theta.
 
-    The body whose prediction ``rho/(2 + rho)`` is smaller gets the Neumann problem; for a tied interface the one whose
-    rate ``(rho - rho_min)/(2 + rho_min + rho)`` is.
+    rho and rho_min are the largest and the smallest ratio of two stiffnesses on the interface, of the contact body over
+    the Neumann body.  The body with the smaller predicted rate ``rho/(2 + rho)`` gets the Neumann problem; for a tied
+    interface the rate is ``(rho - rho_min)/(2 + rho_min + rho)``.
 
     Parameters
     ----------
@@ -457,7 +458,7 @@ def advise(problem: Problem | ContactPair | Path | str, *, tied: bool = False, p
     tied : bool
         True to advise for an interface where nothing opens or slips.
     progress : callable
-        Called with the steps of Lanczos where there are too many contact nodes for matrices.
+        Called with the Lanczos steps where there are too many contact nodes for matrices.
 
     Returns
     -------

@@ -345,10 +345,10 @@ def run(
     watch: Callable[[Iterate], None] = lambda iterate: None,
     measured: Measured | None = None,
 ) -> Run:
-    """Run the algorithm until it converges, stalls, runs away, reaches its limit or Ctrl-C.
+    """Run the algorithm until it converges, stalls, diverges, reaches its limit, or Ctrl-C ends it.
 
     It has converged where ``|||T g - g|||`` is at most the tolerance times the larger of ``|||g|||`` and ``|||T g|||``,
-    and the joined state is one of contact (:func:`verification.algorithm.ending.arrived`).
+    and the joined state satisfies the contact laws (:func:`verification.algorithm.ending.arrived`).
 
     Parameters
     ----------

@@ -126,7 +126,8 @@ def certify(
     theta : number or 'auto', optional
         The problem's by default.
     edition : str, optional
-        Name of the bound that proposes factor and multipliers: one of those that certify, by default the strongest.
+        Name of the bound that proposes factor and multipliers, 'repaired', 'energy' or 'lmi' among ours; by default the
+        strongest one that certifies.
     progress : callable
 
     Returns
@@ -138,7 +139,7 @@ def certify(
     NoCertificate
         The bound has no conclusion, or its multipliers do not prove what they should in rationals.
     ProblemError
-        Not two plane bodies of which the theorem speaks.
+        Not two plane bodies, or a problem outside the theorem.
 
     Examples
     --------

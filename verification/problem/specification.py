@@ -158,12 +158,22 @@ class Problem(ProblemSpec):
         young, poisson, cells : pair
             For body 1 and body 2; None leaves a body as it is.
         friction, law, radius, gap, neumann_body, theta, relaxation, tolerance, max_iterations, title
-            As in the problem file.  Momentum takes its step from rho: without a theta it comes with ``"auto"``.
+            As in the problem file.  Momentum takes its step from rho: without a theta it sets theta to ``"auto"``.
+
+        Returns
+        -------
+        Problem
 
         Raises
         ------
         ProblemError
             Naming the key as the problem file has it.
+
+        Examples
+        --------
+        >>> from verification.problem.examples import example
+        >>> str(example("section6").changed(friction="1/3").contact.friction)
+        '1/3'
         """
         given: dict[Key, Any] = {
             ("title",): title,

@@ -62,7 +62,8 @@ def _allowed(row: BoundResult) -> list[Cell]:
     friction = row.friction
     if friction.on == "any":
         return ["any", "any"]
-    cells = [at_least(value) for value in (friction.every, friction.some)]
+    every = at_least(friction.every)  # where every small theta contracts some theta does
+    cells = [every, every if friction.some is None else at_least(friction.some)]
     if friction.on != "multiple":
         return cells
     return [

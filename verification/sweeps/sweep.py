@@ -193,26 +193,30 @@ def sweep(
     Parameters
     ----------
     problem : Problem, ContactPair or path
-        It has the values that are not varied.
+        Source of the values that are not varied.
     theta : list of number or 'auto', optional
+        Relaxation factors, 0 < theta < 1.
     friction : list of number, optional
+        Friction coefficients, at least 0.
     young : list of pairs, optional
         ``(E1, E2)``, stress.
     neumann_body : list of {1, 2}, optional
     refine : list of int, optional
         Halvings of the problem's mesh.
     law : list of str, optional
+        Friction laws by name: 'nonlocal', 'local', 'local-contact'.
     radius : list of number, optional
         Of the kernel of S, length.
     rule : list of Rule or str, optional
+        Relaxation rules, or their names: 'constant', 'aitken', 'anderson', 'newton', 'momentum'.
     jobs : int
         Processes; 0 or less counts back from all cores, -1 is all.
     store : path, optional
-        A file that keeps each row once it is made, and has those that were made before; a new one is created.
+        File of finished rows, reused where it exists and created where it does not.
     fresh : bool
-        Whether rows that the store has are made again.
+        True to make rows again that the store has.
     retry : bool
-        Whether rows that ended in an error are made again: its reason may have passed.
+        True to make rows again that ended in an error, whose reason may have passed.
     dask : str, optional
         The address of a dask scheduler, whose workers make the rows; ``jobs`` is not used then.
     progress : callable
