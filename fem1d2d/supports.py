@@ -21,20 +21,20 @@ class Supports:
 
     Attributes
     ----------
-    known : bool array, shape (n, d)
+    held : bool array, shape (n, d)
     values : float array, shape (n, d)
-        Displacement where known (unit of length), 0 elsewhere.
+        Displacement where held (unit of length), 0 elsewhere.
     """
 
-    known: NDArray[np.bool_]
+    held: NDArray[np.bool_]
     values: Floats
 
     def __post_init__(self) -> None:
-        for array in (self.known, self.values):
+        for array in (self.held, self.values):
             array.setflags(write=False)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return partial(Supports, known=self.known, values=self.values), ()
+        return partial(Supports, held=self.held, values=self.values), ()
 
 
 def supports(mesh: Mesh, sides: Mapping[str, Sequence[float | None]]) -> Supports:
@@ -46,26 +46,26 @@ def supports(mesh: Mesh, sides: Mapping[str, Sequence[float | None]]) -> Support
     Examples
     --------
     >>> from fem1d2d.mesh import interval
-    >>> supports(interval((0.0, 1.0), 2), {"left": [0.0]}).known[:, 0]
+    >>> supports(interval((0.0, 1.0), 2), {"left": [0.0]}).held[:, 0]
     array([ True, False, False])
     """
-    known = np.zeros(mesh.points.shape, dtype=bool)
+    held = np.zeros(mesh.points.shape, dtype=bool)
     values = np.zeros(mesh.points.shape)
     for name, components in sides.items():
         nodes = np.unique(mesh.sides[name])
         for p, value in enumerate(components):
             if value is None:
                 continue
-            clash = nodes[known[nodes, p] & (values[nodes, p] != value)]
+            clash = nodes[held[nodes, p] & (values[nodes, p] != value)]
             if len(clash):
                 where = ", ".join(f"{c:g}" for c in mesh.points[clash[0]].astype(float))
                 raise MeshError(
                     f"side {name!r} prescribes {value:g} at ({where}) where another side prescribes "
                     f"{values[clash[0], p]:g} for the same component"
                 )
-            known[nodes, p] = True
+            held[nodes, p] = True
             values[nodes, p] = value
-    return Supports(known=known, values=values)
+    return Supports(held=held, values=values)
 
 
 def rigid_motions(mesh: Mesh, known: NDArray[np.bool_]) -> Floats:

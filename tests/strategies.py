@@ -213,7 +213,7 @@ def held_bodies(draw, most: int = 4):
     points, cells, sides = draw(plane_grids(most, least=2))
     mesh, material = Mesh(points=points.astype(float), cells=cells, sides=sides), draw(materials())
     held = draw(st.lists(st.sampled_from(["left", "right", "bottom"]), min_size=1, max_size=3, unique=True))
-    known = supports(mesh, {side: [0.0, 0.0] for side in held}).known
+    known = supports(mesh, {side: [0.0, 0.0] for side in held}).held
     floats = Material(lame_lambda=float(material.lame_lambda), lame_mu=float(material.lame_mu))
     return mesh, floats, np.flatnonzero(~known.ravel())
 

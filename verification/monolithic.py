@@ -175,7 +175,7 @@ def solution_force(pair: ContactPair) -> Floats:
         A pair made from matrices.
     """
     found = solve(pair).contact
-    stress = np.concatenate([pair.upward * found.shear[: pair.contact.grid.t], found.pressure])
+    stress = np.concatenate([pair.normal_sign * found.shear[: pair.contact.grid.t], found.pressure])
     return pair.interface.carry_back(np.tile(found.weights, pair.contact.grid.dimension) * stress)
 
 

@@ -158,7 +158,7 @@ def test_a_pencil_of_multiples_has_one_eigenvalue_at_every_size(n):
 @pytest.mark.parametrize("nx", [2, 4, 6, 8, 10, 12, 14, 16])
 def test_of_two_equal_bodies_the_stiffer_is_so_on_every_trace_by_the_quotient_of_the_moduli(nx):
     mesh = rectangle((0.0, 2.0), (0.0, 0.3), (nx, 4))
-    free = np.flatnonzero(~supports(mesh, {"bottom": [0.0, 0.0]}).known.ravel())
+    free = np.flatnonzero(~supports(mesh, {"bottom": [0.0, 0.0]}).held.ravel())
     top = surface(mesh, upper=True)
     trace = np.searchsorted(free, np.concatenate([2 * top, 2 * top + 1]))
     S1, S2 = (
@@ -198,7 +198,7 @@ def test_an_upper_bound_of_the_spectrum_does_not_change_the_eigenvalue(pencil, s
 def test_an_upper_bound_tells_apart_what_crowds_below_it():
     """A body without lateral contraction: the top of its spectrum crowds below 2 mu."""
     mesh, law = rectangle((0.0, 2.0), (0.0, 0.3), (16, 4)), plane_strain(1.0, 0.0)
-    free = np.flatnonzero(~supports(mesh, {"bottom": [0.0, 0.0]}).known.ravel())
+    free = np.flatnonzero(~supports(mesh, {"bottom": [0.0, 0.0]}).held.ravel())
     A, H = (matrix[free][:, free].tocsc() for matrix in (stiffness(mesh, law), gram(mesh)))
     found = largest_sparse(A, H, solver(H), above=law.continuity(2))
     assert found.value == pytest.approx(scipy.linalg.eigh(A.toarray(), H.toarray(), eigvals_only=True)[-1], rel=1e-13)

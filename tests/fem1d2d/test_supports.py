@@ -45,7 +45,7 @@ def test_a_component_is_known_at_the_nodes_of_the_sides_that_prescribe_it(held):
         for node in NODES[side]:
             expected[node] |= components
     found = supports(SQUARE, given_sides)
-    assert np.array_equal(found.known, expected)
+    assert np.array_equal(found.held, expected)
     assert not found.values.any()
 
 
@@ -56,23 +56,23 @@ def test_values_stand_where_they_are_prescribed_and_zero_elsewhere(side, ux, uy)
     expected[NODES[side]] = [ux, 0.0 if uy is None else uy]
     assert np.array_equal(found.values, expected)
     on_side = np.isin(np.arange(9), NODES[side])
-    assert np.array_equal(found.known, np.column_stack([on_side, on_side & (uy is not None)]))
+    assert np.array_equal(found.held, np.column_stack([on_side, on_side & (uy is not None)]))
 
 
 def test_no_sides_leave_everything_free():
-    assert not supports(SQUARE, {}).known.any()
+    assert not supports(SQUARE, {}).held.any()
 
 
 @given(lines(), st.floats(-1, 1), st.floats(-1, 1))
 def test_a_bar_is_held_at_its_ends(mesh, left, right):
     found = supports(in_floats(mesh), {"left": [left], "right": [right]})
-    assert np.flatnonzero(found.known).tolist() == [0, len(mesh.points) - 1]
+    assert np.flatnonzero(found.held).tolist() == [0, len(mesh.points) - 1]
     assert found.values[[0, -1], 0].tolist() == [left, right]
 
 
 def test_supports_are_read_only():
     found = supports(SQUARE, {"left": [0.0, 0.0]})
-    for array in (found.known, found.values):
+    for array in (found.held, found.values):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 1
 
@@ -104,7 +104,7 @@ def test_sides_that_agree_at_their_corner_are_accepted_in_either_order(left, top
     one, other = (
         supports(SQUARE, dict(sides)) for sides in [[("left", left), ("top", top)], [("top", top), ("left", left)]]
     )
-    assert np.array_equal(one.known, other.known)
+    assert np.array_equal(one.held, other.held)
     assert np.array_equal(one.values, other.values)
 
 
@@ -160,7 +160,7 @@ def test_the_rigid_motions_of_a_square_are_counted_as_by_hand(known, motions):
     ],
 )
 def test_sides_leave_the_rigid_motions_that_slide_along_them(sides, motions):
-    assert rigid_motions(SQUARE, supports(SQUARE, sides).known) == motions
+    assert rigid_motions(SQUARE, supports(SQUARE, sides).held) == motions
 
 
 def test_a_roller_on_a_circle_about_the_hinge_holds_nothing():
@@ -285,7 +285,7 @@ def test_nothing_moves_where_everything_is_known():
 def test_the_count_does_not_see_the_unit_of_length_or_the_origin(size, far):
     mesh = Mesh(points=(SQUARE.points + far) * size, cells=SQUARE.cells, sides=SQUARE.sides)
     for sides, motions in [({"bottom": [None, 0.0]}, 1), ({"bottom": [0.0, 0.0]}, 0), ({}, 3)]:
-        assert rigid_motions(mesh, supports(mesh, sides).known) == motions
+        assert rigid_motions(mesh, supports(mesh, sides).held) == motions
 
 
 def test_triangles_that_share_one_node_only_turn_about_it():

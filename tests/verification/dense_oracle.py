@@ -167,7 +167,7 @@ def dense_body(pair: ContactPair, name: str) -> DenseBody:
         H=H[np.ix_(free, free)],
         trace=np.searchsorted(free, interface),
         load=(forces - A @ values)[free],
-        up=pair.upward,
+        up=pair.normal_sign,
         everything=A,
         forces=forces,
         held=held,

@@ -45,7 +45,7 @@ def magnitude(runs: list[Run]) -> tuple[float, float]:
     pair = runs[0].pair
     force = displacement = 0.0
     sides = (pair.contact, pair.neumann)
-    for name, side in zip(("body1", "body2"), sides[:: int(pair.upward)], strict=True):
+    for name, side in zip(("body1", "body2"), sides[:: int(pair.normal_sign)], strict=True):
         body = dense_body(pair, name)
         acting = np.abs(body.forces) + np.abs(body.everything) @ np.abs(body.values)
         load = np.abs(body.R).T @ acting[~body.held]

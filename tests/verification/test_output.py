@@ -14,8 +14,7 @@ from small_result import ONE_STEP, problem
 
 import verification as vf
 from verification import figures
-from verification.output import folder
-from verification.output.files import LOCKS, staged
+from verification.output.files import FILES, LOCKS, staged
 from verification.output.folder import Folder
 
 FIGURES = {f"{figure}.{ending}" for figure in ("bodies", "residuals") for ending in ("svg", "png")}
@@ -127,16 +126,17 @@ def test_a_file_is_whole_or_not_there_when_writing_fails(quick, results, tmp_pat
     assert contents(tmp_path) == before
 
 
-@pytest.mark.usefixtures("known_bounds")
 def test_a_figure_that_files_do_not_list_replaces_nothing(quick, results, tmp_path, monkeypatch):
-    (tmp_path / "pressure.svg").write_text("of a user", encoding="utf-8")
-    monkeypatch.setattr(folder, "_pictures", lambda room, *found: (room / "pressure.svg").write_text("ours"))
-    with pytest.raises(RuntimeError, match=r"pressure\.svg: needed in FILES"):
+    (tmp_path / "bodies.svg").write_text("of a user", encoding="utf-8")
+    listed = tuple(name for name in FILES["run"] if name != "bodies.svg")
+    monkeypatch.setitem(FILES, "run", listed)
+    with pytest.raises(RuntimeError, match=r"bodies\.svg: needed in FILES"):
         Folder(tmp_path, "run").write(results["run"])
-    assert (tmp_path / "pressure.svg").read_text("utf-8") == "of a user"
-    assert [path.name for path in tmp_path.iterdir()] == ["pressure.svg"]
+    assert (tmp_path / "bodies.svg").read_text("utf-8") == "of a user"
+    assert [path.name for path in tmp_path.iterdir()] == ["bodies.svg"]
 
 
+@pytest.mark.usefixtures("known_bounds")
 def test_a_report_that_fails_leaves_the_comparison_before_it(quick, comparison, tmp_path, monkeypatch):
     """The document of another theta beside an old report would be two runs in one folder."""
     write(tmp_path, "comparison", comparison)

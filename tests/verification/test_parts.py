@@ -21,7 +21,7 @@ def test_a_part_of_a_side_has_the_edges_between_its_ends():
     for end, last in (("0.8", 0.8), ("0.79", 0.6), ("0.9", 0.8)):
         data = changed(PRESSED, body2={"parts": {"pressed": {"side": "top", "x": ["-1", end]}}})
         body = discretise(vf.Problem.from_dict(data)).body2
-        held = body.mesh.points[body.known.known.any(axis=1)]
+        held = body.mesh.points[body.known.held.any(axis=1)]
         assert held[:, 1].tolist() == [0.3] * len(held)
         assert held[:, 0] == pytest.approx(np.arange(0, last + 0.1, 0.2))
         assert len(body.mesh.sides["pressed"]) == len(held) - 1
@@ -44,7 +44,7 @@ def test_parts_of_upright_sides_and_tractions_on_parts():
     )
     load = np.zeros(with_it.mesh.points.shape)
     load.ravel()[with_it.positions] = with_it.load - without.load
-    on_top = with_it.known.known.any(axis=1)  # half of the uppermost edge's load acts on a node that is held
+    on_top = with_it.known.held.any(axis=1)  # half of the uppermost edge's load acts on a node that is held
     assert load[~on_top].sum(axis=0) == pytest.approx([2 * 0.15, -3 * 0.15])
 
 

@@ -55,7 +55,7 @@ def test_readings_are_every_combination_and_four_leave_the_text_nowhere():
 def test_the_left_sides_of_a_half_model_move_along_the_axis_of_symmetry_alone(top):
     reading = next(r for r in READINGS if (r.position, r.moved, r.top) == ("half model", "left two thirds", top))
     for body, ends in zip(discretise(reading.problem(190)).elastic, (2.0, 1.2), strict=True):
-        points, known = body.mesh.points, body.known.known
+        points, known = body.mesh.points, body.known.held
         left = points[:, 0] == 0
         assert points[:, 0].max() == ends
         assert known[left, 0].all()
@@ -67,7 +67,7 @@ def test_the_left_sides_of_a_half_model_move_along_the_axis_of_symmetry_alone(to
 def test_a_part_of_the_top_ends_at_its_share_of_the_length():
     half = next(r for r in READINGS if r.moved == "left half" and r.position == "centred")
     body = discretise(half.problem(190)).body2
-    held = body.mesh.points[body.known.known.any(axis=1), 0]
+    held = body.mesh.points[body.known.held.any(axis=1), 0]
     assert (held.min(), held.max()) == pytest.approx((0.4, 1.0))
 
 

@@ -192,7 +192,7 @@ def step_by_step(name, path):
     for down in path:
         pair = vf.build(pressed(name, down))
         contact, shift = pair.contact, np.zeros(pair.contact.grid.size)
-        shift[contact.grid.tangential] = pair.upward * before  # slip is u1_T - u2_T; the contact body is body 2
+        shift[contact.grid.tangential] = pair.normal_sign * before  # slip is u1_T - u2_T; the contact body is body 2
         moved = replace(contact, load=contact.load - contact.schur @ shift)
         run = vf.run(replace(pair, contact=moved, settings=replace(pair.settings, tolerance=1e-12)))
         assert run.converged

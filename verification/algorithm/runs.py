@@ -191,7 +191,7 @@ class Run(Document):
     def _fields(self, iterate: Iterate) -> ContactFields:
         pair, solved = self.pair, iterate.contact
         turned = np.ones(len(solved.v))
-        turned[pair.contact.grid.tangential] = pair.upward  # to body 1 against body 2
+        turned[pair.contact.grid.tangential] = pair.normal_sign  # to body 1 against body 2
         force, jump = turned * solved.force, turned * solved.v
         return ContactFields.of(pair.contact.grid, force=force, jump=jump, state=solved.pattern)
 

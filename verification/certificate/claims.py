@@ -222,7 +222,7 @@ def _described(spec: BodySpec, body: Body, points: NDArray[Any]) -> dict[str, An
     return {
         "points": [_texts(point) for point in points],
         "cells": body.mesh.cells.tolist(),
-        "held": np.argwhere(body.known.known).tolist(),
+        "held": np.argwhere(body.known.held).tolist(),
         "surface": body.nodes.tolist(),
         "young": str(spec.young),
         "poisson": str(spec.poisson),

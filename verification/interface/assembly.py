@@ -307,14 +307,14 @@ def _body(problem: Problem, name: Name, mesh: Mesh, nodes: Ints, ends: Floats) -
         known = supports(mesh, sides)
     except MeshError as error:
         raise problem.refuse(f"{name}.prescribed", None, str(error)) from None
-    if known.known[nodes, d - 1].any():
-        node = nodes[np.argmax(known.known[nodes, d - 1])]
+    if known.held[nodes, d - 1].any():
+        node = nodes[np.argmax(known.held[nodes, d - 1])]
         where = mesh.points[node].astype(float)
         holds = next(side for side, values in sides.items() if values[d - 1] is not None and node in mesh.sides[side])
         key, value = ("fixed", list(spec.fixed)) if holds in spec.fixed else (f"prescribed.{holds}", None)
         needed = "Gamma_u must leave the normal component of every contact node free; it holds the one at "
         raise problem.refuse(f"{name}.{key}", value, f"{needed}({', '.join(f'{c:g}' for c in where)})")
-    motions = rigid_motions(mesh, known.known)
+    motions = rigid_motions(mesh, known.held)
     material = plane_strain(float(spec.young), float(spec.poisson)) if d == 2 else bar(float(spec.young))
     matrix = stiffness(mesh, material)
     load = body_load(mesh, plain(spec.body_force))
@@ -327,9 +327,9 @@ def _body(problem: Problem, name: Name, mesh: Mesh, nodes: Ints, ends: Floats) -
             needed = "Gamma_c covers this side: a force there is lost"
             raise problem.refuse(f"{name}.traction.{side}", list(force), needed)
         load += loaded[:, None] * plain(force)
-    free = np.flatnonzero(~known.known.ravel())
+    free = np.flatnonzero(~known.held.ravel())
     right = load.ravel()[free] - (matrix @ known.values.ravel())[free]
-    position = np.full(known.known.size, -1)
+    position = np.full(known.held.size, -1)
     position[free] = np.arange(len(free))
     interface = np.concatenate([position[d * nodes + p] for p in range(d)])
     unknown = interface >= 0
@@ -345,6 +345,6 @@ def _body(problem: Problem, name: Name, mesh: Mesh, nodes: Ints, ends: Floats) -
         interface=interface[unknown],
         stiffness=matrix[free][:, free].tocsc(),
         load=right,
-        motions=motions.reshape(known.known.size, motions.shape[2])[free],
+        motions=motions.reshape(known.held.size, motions.shape[2])[free],
         length=float(problem.length),
     )

@@ -133,7 +133,7 @@ class Body(Value):
 
     def times_as_stiff(self, other: Body) -> float | None:
         """Return the ratio of its stiffness matrix to that of ``other``, if only Young's moduli and loads differ."""
-        plan = lambda body: (body.mesh.points, body.mesh.cells, body.known.known, body.nodes, body.poisson)
+        plan = lambda body: (body.mesh.points, body.mesh.cells, body.known.held, body.nodes, body.poisson)
         if not all(map(np.array_equal, plan(self), plan(other))):
             return None
         dimension = self.mesh.dimension

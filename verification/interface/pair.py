@@ -91,7 +91,7 @@ class ContactPair(Value):
         return lower, upper
 
     @property
-    def upward(self) -> float:
+    def normal_sign(self) -> float:
         """+1 where the outward normal of the contact body points up (body 1), -1 where it points down (body 2)."""
         return 1.0 if self.neumann_body == 2 else -1.0
 

@@ -368,7 +368,7 @@ def moves_in_K(weak: Weak, u: Fields, rng: np.random.Generator, count: int) -> F
     undone = closing(weak, u)
     one = np.concatenate([sizes * columns_1, undone], axis=1)
     two = np.concatenate([sizes * columns_2, np.zeros((len(u.two), undone.shape[1]))], axis=1)
-    normal, up = weak.pair.contact.grid.normal, weak.pair.upward
+    normal, up = weak.pair.contact.grid.normal, weak.pair.normal_sign
     rows = weak.one.interface[normal]
     room = -weak.jump(u.one, u.two)[normal][:, None]
     one_grid = weak.pair.interface.transfer is None
@@ -385,7 +385,7 @@ def moves_of_one(weak: Weak, u: Fields, rng: np.random.Generator, count: int) ->
     random, hat = directions(rng, weak.one, count), hats(weak.one)
     columns = np.concatenate([random, hat, hat, 100 * random], axis=1)
     d = np.concatenate([_sizes(rng, largest(u), columns.shape[1]) * columns, closing(weak, u)], axis=1)
-    normal, up = weak.pair.contact.grid.normal, weak.pair.upward
+    normal, up = weak.pair.contact.grid.normal, weak.pair.normal_sign
     rows = weak.one.interface[normal]
     d[rows] = up * np.minimum(up * d[rows], -weak.jump(u.one, u.two)[normal][:, None])
     return np.asarray(d)
@@ -393,7 +393,7 @@ def moves_of_one(weak: Weak, u: Fields, rng: np.random.Generator, count: int) ->
 
 def obstacle_tests(weak: Weak, u: Fields, rng: np.random.Generator, count: int) -> Floats:
     """Columns w of V^1_-(0): random ones, and ``u^1 - R u^2`` moved as in ``moves_of_one``."""
-    body, normal, up = weak.one, weak.pair.contact.grid.normal, weak.pair.upward
+    body, normal, up = weak.one, weak.pair.contact.grid.normal, weak.pair.normal_sign
     random, hat = directions(rng, body, count), hats(body)
     start = u.one - weak.lift(body, weak.carried(u.two))
     columns = np.concatenate([random, hat, hat], axis=1)

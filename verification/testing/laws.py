@@ -185,8 +185,8 @@ def _normal_stiffness(cells: int) -> tuple[Floats, Floats]:
     """Positions and ``(S_2)_NN`` along the top of a block of length 1 and height 1/2, E = 1, fixed below."""
     mesh = rectangle((0.0, 1.0), (-0.5, 0.0), (cells, cells // 2))
     nodes = surface(mesh, upper=True)
-    held = supports(mesh, {"bottom": (0.0, 0.0)})
-    free = np.flatnonzero(~held.known.ravel())
+    known = supports(mesh, {"bottom": (0.0, 0.0)})
+    free = np.flatnonzero(~known.held.ravel())
     interface = np.flatnonzero(np.isin(free, np.concatenate([2 * nodes, 2 * nodes + 1])))
     matrix = stiffness(mesh, plane_strain(1.0, 0.3))[free][:, free]
     schur = Condensation(matrix.tocsc(), interface).schur
