@@ -64,7 +64,8 @@ def test_compare_shows_proved_ends_with_their_mark_and_its_legend(call, write):
     assert every <= F(energy["friction_threshold"]["lo"])
     assert some <= F(energy["friction_limit"]["lo"])
     assert factor >= F(energy["factor"]["hi"])
-    allowed, bound = numbers_of(row("lmi"))
+    allowed, same, bound = numbers_of(row("lmi"))
+    assert same == allowed  # where every small theta contracts some theta does
     assert allowed <= F(lmi["friction_threshold"]["lo"])
     assert allowed == pytest.approx(lmi["friction_threshold"]["lo"], rel=1e-2)
     assert bound == pytest.approx(lmi["lipschitz"]["hi"], abs=1e-3)
