@@ -12,7 +12,7 @@ from verification import comparison, figures, verdicts
 from verification.cli.problems import examples
 from verification.contact import ContactError
 from verification.monolithic import SolveError
-from verification.sections.comparison import WORDS
+from verification.sections.comparison import NAMES, WORDS
 from verification.verdicts import Judgement
 
 DONE, NOT_MET, BAD_INPUT, INCONCLUSIVE, INTERRUPTED, CRASH = 0, 1, 2, 3, 130, 70
@@ -73,7 +73,7 @@ def test_the_worst_verdict_decides(call, write, monkeypatch, judged, edits, stat
     answer = call("compare", write(edits))
     assert answer.status == status
     for name, verdict in judged.items():
-        assert re.search(rf"^  {name} +{WORDS[verdict]} +made up$", answer.out, flags=re.M)
+        assert re.search(rf"^  {NAMES.get(name, name)} +{WORDS[verdict]} +made up$", answer.out, flags=re.M)
 
 
 def test_bad_input_wins_over_everything(call, write, monkeypatch):

@@ -21,7 +21,7 @@ from verification.ledger.record import on_the_printed_proof
 from verification.output.folder import Folder
 from verification.output.report import report
 from verification.sections.bounds import thetas
-from verification.sections.comparison import WORDS
+from verification.sections.comparison import NAMES, WORDS
 from verification.sections.layout import text
 from verification.verdicts import RunVerdict
 
@@ -86,7 +86,7 @@ def test_the_report_holds_its_figures_and_every_verdict_with_its_reason(comparis
     page = read(written)
     assert page.tags.count("svg") == 3
     for name, judgement in comparison.verdicts.items():
-        assert f"{name}\n" in page.text
+        assert f"{NAMES.get(name, name)}\n" in page.text
         assert WORDS[judgement.verdict] in page.text
         assert judgement.reason in page.text
     assert "Relative residual without relaxation at the end" in page.text

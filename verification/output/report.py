@@ -36,7 +36,7 @@ GLOSSARY = {
 VERDICTS = {
     "consistent": "The largest ratio seen, rounding included, is below the bound, or attains it.",
     "violated": "It is above: for a proved bound a bug or an error in the proof, for the printed one a finding; for "
-    "linearised, a forecast that missed.",
+    "the forecast, that it missed.",
     "inconclusive": "The difference is smaller than rounding.",
     "no conclusion": "The theorem draws no conclusion at this friction and theta.",
     "not computed": "No number was available to compare with the run; the reason is given.",

@@ -147,7 +147,7 @@ def _which_theta(found: Advice) -> Section:
     ]
     if ends:
         said.append(f"if tied, nothing opens or slips: 2/(2+rho_min+rho) of {', '.join(ends)}")
-    said.append(f"steps: to 1e-9 of the first error{'; at the end those of the predicted theta' * bool(ends)}")
+    said.append(f"steps: to 1e-9{'; last column: of the predicted theta, if tied' * bool(ends)}")
     for role in possible:
         auto = role.theta_auto
         if auto is not None:

@@ -26,7 +26,7 @@ from verification.verdicts import RunVerdict
 #: The captions of the table of verdicts and of the figure of the losses.
 RATIOS = (
     "Each bound beside the largest ratio of successive residuals in the norm (5.21), in which forces count by the "
-    "energy that they store in the Neumann body; linearised: the forecast beside the end of the run."
+    "energy that they store in the Neumann body; forecast: what was said half way, beside the end of the run."
 )
 WATERFALL = (
     (
@@ -47,6 +47,9 @@ WORDS: Mapping[RunVerdict, str] = {
     "HYPOTHESES_NOT_MET": "no conclusion",
     "NOT_COMPUTED": "not computed",
 }
+
+#: Verdicts that are not on a bound, as they are read.
+NAMES: Mapping[str, str] = {"linearised": "forecast"}
 
 
 class Parts(Listener):
@@ -117,7 +120,9 @@ class Parts(Listener):
 
 def verdicts(result: Comparison) -> Sections:
     """The end of a comparison."""
-    judged = table(("bound", "verdict", "why"), [(n, WORDS[j.verdict], j.reason) for n, j in result.verdicts.items()])
+    judged = table(
+        ("bound", "verdict", "why"), [(NAMES.get(n, n), WORDS[j.verdict], j.reason) for n, j in result.verdicts.items()]
+    )
     title = "DOES THE RUN AGREE WITH THE BOUND?"
     return section("verdicts", title, judged, caption=RATIOS), limits(result.run.outside, following("advise"))
 
