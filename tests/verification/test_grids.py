@@ -257,6 +257,18 @@ def test_a_surface_with_a_hole_under_gamma_c_is_refused(tmp_path):
         vf.solve(vf.Problem.from_dict(APART | {"body1": notched}))
 
 
+def test_a_surface_whose_edges_are_rounding_beside_a_far_node_is_refused(tmp_path):
+    """A typing error in one coordinate: beside 1e9 no edge of the surface has a length."""
+    mesh = rectangle((0.0, 2.0), (-0.3, 0.0), (10, 2))
+    points = mesh.points.copy()
+    points[np.argmax(points.sum(axis=1)), 1] = 1e9
+    write_gmsh22(tmp_path / "far.msh", points, mesh.cells, {"bottom": mesh.sides["bottom"]})
+    far = {"mesh": str(tmp_path / "far.msh"), "young": 70000, "poisson": "0.3", "fixed": ["bottom"]}
+    data = APART | {"body1": far, "contact": APART["contact"] | {"interval": ["0.4", "1.6"]}}
+    with pytest.raises(vf.ProblemError, match=r"contact\.interval = .*body 1 has no surface that faces the other body"):
+        vf.run(vf.Problem.from_dict(data))
+
+
 def test_mesh_files_with_any_positions_of_nodes_are_taken(tmp_path):
     """Nodes along Gamma_c moved at random: the pressed blocks still have a constant pressure."""
     random = np.random.default_rng(1)

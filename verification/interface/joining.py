@@ -143,12 +143,15 @@ def _ends(problem: Problem, meshes: list[Mesh | None], nodes: list[Ints], size: 
 
 
 def _check_nodes(problem: Problem, meshes: list[Mesh | None], nodes: list[Ints], ends: Ends, contact: int) -> None:
-    """Refuse a Gamma_c that does not begin and end at nodes of the contact body, and a surface with a hole."""
+    """Refuse a Gamma_c that does not begin and end at nodes of the contact body, a surface with a hole, and none."""
     given = None if problem.contact.interval is None else list(problem.contact.interval)
     fits = [False, False]
     for i, (mesh, own) in enumerate(zip(meshes, nodes, strict=True)):
         if mesh is None:
             continue
+        if not len(own):  # all edges of the surface are steep, or short against the extent of the mesh
+            needed = f"body {i + 1} has no surface that faces the other body from x = {ends[0]:g} to {ends[1]:g}"
+            raise problem.refuse("contact.interval", given, needed)
         x = mesh.points[own, 0].astype(float)
         off = SAME * extent(mesh)
         fits[i] = bool(len(x) > 1 and abs(x[0] - ends[0]) <= off and abs(x[-1] - ends[1]) <= off)
