@@ -6,12 +6,16 @@ import threading
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
+import numpy as np
 import pytest
 from kinds import KINDS, problem
 from strategies import AT_NIGHT
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from verification import threads
+from verification.bounds.multipliers import QuadraticForms
+from verification.constants import measure
+from verification.interface.pair import pair_from
 from verification.threads import one_thread
 
 THREADS = 8
@@ -65,6 +69,19 @@ def test_numbers_found_in_threads_are_those_of_one_thread(in_threads):
         random.Random(0).shuffle(asked)
         found = in_threads(find, asked)
     assert [name for name, document in zip(asked, found, strict=True) if document != alone[name]] == []
+
+
+def test_quadratic_forms_have_the_digits_of_one_blas_thread():
+    """Comparisons and certificates build on them; the test above runs these two by night only."""
+    pair = pair_from(problem(60))
+    measured = measure(pair)
+
+    def rows(blas_threads):
+        with threadpool_limits(blas_threads, user_api="blas"):
+            forms = QuadraticForms(pair, measured)
+        return [forms.p, forms.carried, *(side for family in forms.families for side in family)]
+
+    assert all(map(np.array_equal, rows(1), rows(4)))
 
 
 def numbers() -> set[int]:

@@ -16,6 +16,7 @@ from verification.bounds.interior_point import Optimum, Program, Weights
 from verification.bounds.trace_forms import TraceForms, families
 from verification.constants import Measured
 from verification.interface.pair import ContactPair
+from verification.threads import one_thread
 
 Signs = NDArray[np.int8]
 Cones = NDArray[np.intp]
@@ -86,6 +87,7 @@ class Conditions:
         :data:`verification.bounds.LARGEST`.
     """
 
+    @one_thread()
     def __init__(self, pair: ContactPair, measured: Measured, *, friction: float | None = None) -> None:
         if pair.contact.grid.n > LARGEST:
             raise ValueError(f"{pair.contact.grid.n} contact nodes: worked out up to {LARGEST}")
