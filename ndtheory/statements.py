@@ -6,11 +6,12 @@ evidence (:mod:`verification.ledger`).
 
 from __future__ import annotations
 
+import re
 import tomllib
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import files
-from typing import Literal
+from typing import Any, Literal
 
 Fault = Literal["false as printed", "does not follow", "gap", "typo"]
 
@@ -72,6 +73,31 @@ def statements() -> dict[str, Statement]:
     >>> statements()["5.30"].fault
     'false as printed'
     """
-    text = files("ndtheory").joinpath("statements.toml").read_text("utf-8")
-    rows = tomllib.loads(text)["statement"]
+    rows = _file()["statement"]
     return {row["id"]: Statement(**{**row, "leans_on": tuple(row.get("leans_on", ()))}) for row in rows}
+
+
+def symbols(statement: Statement) -> dict[str, str]:
+    r"""Symbols of a statement's formulas, in TeX, each with its meaning in a few words.
+
+    Those are left out that the statement defines itself, and those whose meaning depends on the statement.
+
+    Examples
+    --------
+    >>> symbols(statements()["5.17"])
+    {'T': 'one step without relaxation: forces to forces'}
+    """
+    formulas = " ; ".join((statement.claims + " " + statement.repair).split("$")[1::2])
+    return {name: words for name, words in _file()["symbols"].items() if _occurs(name, formulas)}
+
+
+def _occurs(name: str, formulas: str) -> bool:
+    """True if a symbol occurs in formulas, with any exponent, and none of them is its definition."""
+    more = "" if "_" in name else r"(?![_(])"  # another index is another symbol, e(u) is a strain
+    one = rf"(?<![A-Za-z\\_]){re.escape(name)}(?![A-Za-z]){more}"
+    return bool(re.search(one, formulas)) and not re.search(one + r"\s*=", formulas)
+
+
+@lru_cache(maxsize=1)
+def _file() -> dict[str, Any]:
+    return tomllib.loads(files("ndtheory").joinpath("statements.toml").read_text("utf-8"))

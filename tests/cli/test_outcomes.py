@@ -43,7 +43,7 @@ def test_a_command_ends_with_its_status_in_words_and_as_a_document(call, write, 
     screen = call(command, file)
     assert screen.status == status
     ended = "not converged" if outcome == "limit" else outcome
-    line = rf"^  observed +{ended} after " if command == "compare" else rf"^  observed .* {outcome}$"
+    line = rf"^  observed +{ended} after " if command == "compare" else rf"^  observed .* {ended}$"
     assert re.search(line, screen.out, flags=re.M)
     assert answer.err == screen.err
 
@@ -163,7 +163,7 @@ def test_ctrl_c_leaves_a_screen(call, endless, after, command):
     after(3, lambda: signal.raise_signal(signal.SIGINT))
     answer = call(command, endless)
     assert answer.status == INTERRUPTED
-    assert "  seen: interrupted\n" in answer.out
+    assert "  interrupted\n" in answer.out
 
 
 @pytest.mark.parametrize("judged", ["VIOLATED", "INCONCLUSIVE"])

@@ -211,7 +211,7 @@ class Boasting(Momentum):
         (Remembering(), "starts afresh"),
         (Sharing(), "starts afresh"),
         (WithAUnit(), "stays at the solution"),
-        (Saturating(), "knows no units"),
+        (Saturating(), "is independent of units"),
         (LeftHanded(), "sees no left, right, top or bottom"),
         (OfTheUpperBody(), "sees no left, right, top or bottom"),
         (Leaving(), "ends at the solution"),
@@ -223,7 +223,7 @@ def test_a_rule_that_is_wrong_in_one_way_is_refused(rule, property):
     with pytest.raises(Refused) as error:
         check_rule(rule, examples=3)
     # what remembers earlier runs, or knows a unit, may show it at any property that compares runs
-    loose = {"starts afresh": {"knows no units", "starts afresh"}}
+    loose = {"starts afresh": {"is independent of units", "starts afresh"}}
     assert error.value.property in loose.get(property, {property})
     assert error.value.counterexample
     assert rule.name in str(error.value)
@@ -286,7 +286,7 @@ class OfTheWrongGrid(Nonlocal):
     ("law", "property"),
     [
         (Nonlinear(), "linear"),
-        (InOneUnit(radius=0.3), "knows no units"),
+        (InOneUnit(radius=0.3), "is independent of units"),
         (LocalInside(), "maps into L2"),
         (Skewed(radius=0.3), "sees no left or right"),
         (OfTheWrongGrid(radius=0.3), "a matrix of its grids"),

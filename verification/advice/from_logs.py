@@ -297,7 +297,8 @@ def by_ends(logs: tuple[SeenLog, ...], base: SeenLog, lo: Fraction | None, tied:
         return (only,), following, Fraction(stiffest) - 1
     rising = [float(log.theta) for log in logs if log.diverges]
     theta = rounded_down(ends.telling(boxes, known, most if tied else min([most, *rising])))
-    why = f"it tells more: if {ends_in_words(boxes)}, no theta is sure to be within {DEAR:g} times the fewest steps"
+    unsure = f"no theta is sure to be within {DEAR:g} times the fewest steps"
+    why = f"a run there narrows rho: as long as {ends_in_words(boxes)}, {unsure}"
     return base.readings, NextRun(theta=theta, why=why), None
 
 

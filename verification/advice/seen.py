@@ -33,8 +33,8 @@ _WORDS = {
     "level": "at a level",
     "floor": "at a low level",
     "plateau": "at a plateau",
-    "unsteady": "not steady",
-    "short": "too short",
+    "unsteady": "without a steady ratio",
+    "short": "with too few steps",
 }
 
 

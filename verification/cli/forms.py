@@ -51,7 +51,7 @@ class AdviseCommand(click.Command):
 
     def needed(self, ctx: click.Context) -> str:
         """The arguments of the command, in words."""
-        return "options only"
+        return "options only, and none of them takes this value"
 
 
 class Default(AdviseCommand):

@@ -1,12 +1,14 @@
-"""The loss in each inequality of the proof, in decades."""
+"""The loss in each inequality of the proof, in powers of ten."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from textwrap import fill
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ndtheory.statements import statements
 from verification.bounds.losses import Loss, Losses
 from verification.bounds.table import Printed, Repaired
 from verification.figures.style import STATES, new_figure, styled
@@ -27,7 +29,7 @@ def draw_waterfall(losses: Losses, unit: str) -> Figure:
     ]
     chains = [(title, chain) for title, chain in chains if chain]
     with styled():
-        figure = new_figure(7.2, 0.7 + 0.32 * sum(len(chain) + 2 for _, chain in chains))
+        figure = new_figure(9.0, 0.7 + 0.32 * sum(len(chain) + 2 for _, chain in chains))
         shares = [len(chain) + 1 for _, chain in chains]
         axes = figure.subplots(len(chains), 1, squeeze=False, height_ratios=shares)[:, 0]
         for ax, (title, chain) in zip(axes, chains, strict=True):
@@ -45,7 +47,7 @@ def _draw(ax: Axes, title: str, chain: Sequence[Loss], *, adds_up: bool) -> None
         says = f" {loss.decades:.1f}" + (", only the unit" if loss.only_unit else "")
         ax.text(max(begin, end), i, says, va="center")
         begin = end if adds_up else 0.0
-    labels = [loss.label for loss in chain]
+    labels = [_in_words(loss.label) for loss in chain]
     if adds_up:
         ax.barh(len(chain), begin, color=STATES["open"], edgecolor="black", linewidth=0.5)
         ax.text(begin, len(chain), f" {begin:.1f}", va="center")
@@ -53,5 +55,11 @@ def _draw(ax: Axes, title: str, chain: Sequence[Loss], *, adds_up: bool) -> None
     ax.set_yticks(range(len(labels)), labels)
     ax.invert_yaxis()
     ax.set_xlim(right=1.12 * farthest)
-    ax.set_xlabel("decades given away")
-    ax.set_title(title)
+    ax.set_xlabel("powers of ten lost")
+    ax.set_title(fill(title, 64))
+
+
+def _in_words(label: str) -> str:
+    """The label of an inequality with the title of its statement, if it is one of the paper's."""
+    statement = statements().get(label.strip("()"))
+    return label if statement is None else f"{statement.title} {label}"

@@ -9,6 +9,7 @@ from verification.algorithm.runs import Run
 from verification.bounds.bound import BoundResult
 from verification.sections.numbers import factor, figures, interval, near_one
 from verification.sections.parts import Labelled, Section, section
+from verification.sections.run import ended
 
 #: What the lines of the answer mean.
 CAPTION = (
@@ -35,8 +36,7 @@ def answer(finished: Run, bounds: Sequence[BoundResult]) -> Section:
 
 def _seen(finished: Run) -> str:
     """How the run ended, and its rate."""
-    how = "not converged" if finished.outcome == "limit" else finished.outcome
-    steps = f"{how} after {finished.iterations} steps"
+    steps = f"{ended(finished)} after {finished.iterations} steps"
     if finished.observed_growth is not None:
         return f"{steps}, error times {finished.observed_growth:.4g} per step"
     if finished.observed_rate is None:

@@ -67,7 +67,7 @@ def _allowed(row: BoundResult) -> list[Cell]:
     if friction.on != "multiple":
         return cells
     return [
-        Quantity(cell.value, f"{cell} x this", "x this", cell.level) if isinstance(cell, Quantity) else cell
+        Quantity(cell.value, f"{cell} x given", "x given", cell.level) if isinstance(cell, Quantity) else cell
         for cell in cells
     ]
 

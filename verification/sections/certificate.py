@@ -27,6 +27,7 @@ from verification.sections.parts import (
     section,
     table,
 )
+from verification.sections.setting import NAMES
 
 CLAIMS = "anything about the continuum"
 
@@ -97,7 +98,8 @@ def continuum(found: ContinuumCertificate) -> Sections:
     problem, document = found.problem, found.content()
     stress, length = problem.units["stress"], problem.units["length"]
     radius = [] if problem.contact.radius is None else [f"r = {float(problem.contact.radius):g} {length}"]
-    body = f"Neumann body: {'lower' if problem.iteration.neumann_body == 1 else 'upper'}"
+    number = problem.iteration.neumann_body
+    body = f"Neumann body: {number} ({NAMES[number]})"
     friction = ", ".join([f"k = {float(found.friction):g}", *radius])
     return (
         section("setting", "", Facts(f"{problem.title}: the continuous problem, no mesh"), Facts(body, (friction,))),
@@ -112,11 +114,11 @@ def _used(found: ContinuumCertificate, constants: Mapping[str, Any], of_stress: 
     """The bounds behind the proof."""
     first, second = (f"K = {figures(float(value))}" for value in found.constants.segments)
     used = (
-        ("C_s", "C_s", _at_most, of_stress, "strip of the Neumann body, intervals"),
-        ("C_t1", "C_t1", _at_most, of_trace, f"segments, contact body, {first}"),
-        ("C_t2", "C_t2", _at_most, of_trace, f"segments, Neumann body, {second}"),
-        ("R", "strips", _at_most, "", "both strips, intervals"),
-        ("eps", "cut_off", _at_most, "", "cut-off beside Gamma_c, segments"),
+        ("C_s", "C_s", _at_most, of_stress, "smoothed pressure, Neumann body; strip"),
+        ("C_t1", "C_t1", _at_most, of_trace, f"trace, contact body; segments, {first}"),
+        ("C_t2", "C_t2", _at_most, of_trace, f"trace, Neumann body; segments, {second}"),
+        ("R", "strips", _at_most, "", "ratio of stiffness of two strips"),
+        ("eps", "cut_off", _at_most, "", "for the bodies beside Gamma_c; segments"),
         ("rho", "rho", _at_most, "", "(1 + eps) R"),
         ("rho", "rho_least", _at_least, "", "half-planes"),
         ("rho", "rho_ends", _at_least, "", "wedges at the ends of Gamma_c"),
@@ -125,7 +127,7 @@ def _used(found: ContinuumCertificate, constants: Mapping[str, Any], of_stress: 
         ("kappa_2", "kappa_2", _at_most, "", "k C_s C_t2"),
     )
     rows = [(name, bound(constants[key], unit), unit, by) for name, key, bound, unit, by in used]
-    return section("used", "WHAT WAS USED?", table(("bound", "", "unit", "by"), rows))
+    return section("used", "WHAT WAS USED?", table(("bound", "", "unit", "of what, and by what"), rows))
 
 
 def _contracts(found: ContinuumCertificate, document: Mapping[str, Any]) -> list[str]:

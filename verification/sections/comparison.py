@@ -31,7 +31,7 @@ RATIOS = (
 WATERFALL = (
     (
         "waterfall",
-        "What the inequalities of the proof give away, in decades. At the top each one stands by itself, at the pair "
+        "What the inequalities of the proof lose, in powers of ten. At the top each one stands by itself, at the pair "
         "of forces that comes closest to equality; these pairs differ, so these bars do not add up. Below it one "
         "quantity is followed step by step to its bound in each panel, and the bars add up; what leads from the "
         "repaired to the printed bound is only the unit of stress.",
@@ -105,8 +105,8 @@ class Parts(Listener):
             total = sum(loss.decades for loss in estimates)
             unit = sum(loss.decades for loss in friction) - total
             links = ", ".join(f"10^{loss.decades:.1f} by {loss.label}" for loss in estimates)
-            sizes = f"10^{total:.1f} times the largest friction term found (10^{total + unit:.1f} as printed)"
-            parts.append(f"(5.30) is {sizes}: {links}.")
+            sizes = f"10^{total:.1f} times the largest one found (10^{total + unit:.1f} as printed)"
+            parts.append(f"The bound (5.30) of the friction term is {sizes}: {links}.")
         if parts:
             self.show((section("losses", "HOW MUCH DOES EACH ESTIMATE LOSE?", *parts, pictures=WATERFALL),))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
+from ndtheory.statements import symbols
 from verification.ledger.rows import Ledger, Row
 from verification.ledger.sheets import FAULTS, OUTCOME, WORDS
 from verification.sections.numbers import count
@@ -51,6 +52,8 @@ def _row(row: Row) -> Section:
 def _said(row: Row) -> Iterator[Note | str]:
     s = row.statement
     yield plain(s.claims)
+    if meanings := symbols(s):
+        yield Note("; ".join(f"{plain(f'${name}$')}: {words}" for name, words in meanings.items()), 4)
     if s.fault:
         yield f"{s.fault}: {plain(s.wrong)}"
     if s.repair:

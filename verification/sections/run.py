@@ -22,7 +22,7 @@ from verification.sections.parts import (
     section,
     table,
 )
-from verification.sections.setting import limits, setting
+from verification.sections.setting import NAMES, limits, setting
 
 #: What the table of a run shows, and its figures.
 RATES = (
@@ -68,7 +68,7 @@ def happened(finished: Run, *, alone: bool) -> Section:
     if finished.observed_growth is not None:
         seen = Quantity(finished.observed_growth, f"grows by {finished.observed_growth:.4g}")
     if alone or not rows:
-        rows.append(("observed", seen, count(finished.iterations), f"seen: {finished.outcome}"))
+        rows.insert(0, ("observed", seen, count(finished.iterations), ended(finished)))
     parts: list[Shown | str] = [table(("", "rate", "steps", ""), rows)]
     if linear is not None and linear.predicted is not None:
         rate_of_it = f"this linearisation has the rate {near_one(linear.predicted)} along the run"
@@ -88,6 +88,11 @@ def happened(finished: Run, *, alone: bool) -> Section:
     parts += _contact(problem, finished.contact, f"; KKT residual of step II {finished.last.contact.kkt.residual:.1e}")
     parts.append(Note(_at_the_end(finished), only="report"))
     return section("run", "WHAT HAPPENED", *parts, caption=RATES, pictures=PICTURES)
+
+
+def ended(finished: Run) -> str:
+    """The outcome of a run in words."""
+    return "not converged" if finished.outcome == "limit" else finished.outcome
 
 
 def _at_the_end(finished: Run) -> str:
@@ -123,8 +128,7 @@ def _grids(contact_body: int, interface: Interface) -> list[Shown]:
     """The body that carries the contact grid, if there are two grids."""
     if interface.transfer is None:
         return []
-    names = {1: "lower", 2: "upper"}
-    own, other = names[contact_body], names[3 - contact_body]
+    own, other = NAMES[contact_body], NAMES[3 - contact_body]
     counts = f"{interface.contact.n} nodes of the {own} body, Neumann grid: {interface.neumann.n} of the {other}"
     return [Labelled("contact grid", counts)]
 

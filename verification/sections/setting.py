@@ -9,6 +9,9 @@ from verification.problem.specification import Problem
 from verification.sections.numbers import figures
 from verification.sections.parts import Facts, Next, Note, Section, closing, section
 
+#: Where the bodies of a file are.
+NAMES = {1: "lower", 2: "upper"}
+
 
 def setting(problem: Problem, nodes: int | None, interface: int) -> Section:
     """A problem, on so many nodes of both bodies and of Gamma_c."""
@@ -16,7 +19,7 @@ def setting(problem: Problem, nodes: int | None, interface: int) -> Section:
     counts = [] if nodes is None else [f"{nodes} nodes, {interface} on Gamma_c"]
     bodies = (problem.body1, problem.body2)
     moduli = " / ".join("rigid" if body.rigid else f"{float(body.young):g}" for body in bodies)
-    body = {1: "lower", 2: "upper"}[problem.iteration.neumann_body]
+    body = problem.iteration.neumann_body
     law = LAWS[contact.law].label if LAWS[contact.law].needs_radius else f"{LAWS[contact.law].label} law"
     friction = "no friction" if not contact.friction else f"k = {figures(float(contact.friction), 2)}, {law}"
     if contact.friction and contact.radius is not None and LAWS[contact.law].needs_radius:
@@ -24,7 +27,7 @@ def setting(problem: Problem, nodes: int | None, interface: int) -> Section:
     if any(one.rigid for one in bodies):
         facts = [f"Obstacle: {'lower' if problem.body1.rigid else 'upper'} body", friction]
     else:
-        facts = [f"Neumann body: {body}", friction, _how(problem)]
+        facts = [f"Neumann body: {body} ({NAMES[body]})", friction, _how(problem)]
     first = Facts(problem.title, (*counts, f"E {moduli} {units['stress']}"))
     return section("setting", "", first, Facts("", tuple(facts)))
 

@@ -40,7 +40,7 @@ def check_law(law: Law, *, examples: int = 20, length: float = 1.0) -> Report:
         grids that are alike and on grids that differ.
     ``linear``
         ``S (a f + b h) = a S f + b S h``.
-    ``knows no units``
+    ``is independent of units``
         Of lengths: on grids s times as large ``law.scaled(s)`` has the operator S/s.  Of stress: S is linear, and never
         sees one.
     ``sees no left or right``
@@ -61,7 +61,7 @@ def check_law(law: Law, *, examples: int = 20, length: float = 1.0) -> Report:
     tests: dict[str, tuple[Any, Any]] = {
         "a matrix of its grids": (grids, _is_matrix),
         "linear": (_with_forces(law, length), _is_linear),
-        "knows no units": (grids, _knows_no_units),
+        "is independent of units": (grids, _is_independent_of_units),
         "sees no left or right": (grids, _sees_no_sides),
         "bounds friction": (_pressed(law, length), _bounds_friction),
     }
@@ -140,7 +140,7 @@ def _is_linear(law: Law, interface: Interface, compressive: Floats, other: Float
         raise Fails(f"S (a f + h) - a S f - S h is {np.abs(stress - expected).max():.2g} of {size:.2g}")
 
 
-def _knows_no_units(law: Law, interface: Interface) -> None:
+def _is_independent_of_units(law: Law, interface: Interface) -> None:
     S = law.operator(interface)
     for factor in (2.0**-10, 25.4, 1e3):
         scale = lambda grid, by=factor: Grid(x=by * grid.x, weights=by * grid.weights)

@@ -53,7 +53,7 @@ def check_rule(rule: Rule, *, examples: int = 20) -> Report:
     ``ends at the solution``
         Wherever its run converges it has found the solution that the theorem says is the only one, in both roles of the
         bodies; and some run converges.
-    ``knows no units``
+    ``is independent of units``
         In other units of stress and length, and with loads and gaps 4, 16, .. times as large, it takes the same steps.
     ``starts afresh``
         A run is not changed by another one, before it or beside it.
@@ -68,7 +68,7 @@ def check_rule(rule: Rule, *, examples: int = 20) -> Report:
     kit = Kit(f"rule {rule.name!r}", examples)
     tests: dict[str, tuple[Any, Any]] = {
         "stays at the solution": (SOLVED_PAIRS, _stays),
-        "knows no units": (_begun(), _knows_no_units),
+        "is independent of units": (_begun(), _is_independent_of_units),
         "starts afresh": (st.fixed_dictionaries({"case": _begun(), "other": _begun()}), _starts_afresh),
         "sees no left, right, top or bottom": (_begun(), _sees_no_sides),
     }
@@ -201,7 +201,7 @@ def _in(role: ContactPair, other: ContactPair, error: float) -> float:
     return sqrt(rho.value) * error
 
 
-def _knows_no_units(rule: Rule, pair: ContactPair, theta: Fraction, start: Floats) -> None:
+def _is_independent_of_units(rule: Rule, pair: ContactPair, theta: Fraction, start: Floats) -> None:
     own = steps(rule, pair, theta, start)
     plane = pair.contact.grid.dimension == 2
     scales = (

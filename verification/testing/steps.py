@@ -50,7 +50,7 @@ def check_step(
         draws no conclusion.
     ``converges at the advised theta``
         Asked where the theorem proves that it does: ``g <- T_theta g`` reaches a fixed point.
-    ``knows no units``
+    ``is independent of units``
         Far from the loads ``T(4 g) = 4 T(g)``.
     ``is the step of these matrices``
         T g is what this project computes, where a pair or loads are given; else it is far from the loads.
@@ -90,7 +90,7 @@ def check_step(
     cases = st.fixed_dictionaries(pushed)
     below = kit.examine("stays below its bound", cases, check.stays_below)
     converges = check.converges(kit)
-    units = kit.examine("knows no units", cases, check.knows_no_units)
+    units = kit.examine("is independent of units", cases, check.is_independent_of_units)
     ours, where = (check.is_ours, "with its loads") if loaded else (check.is_ours_far, "far from its loads")
     same = kit.examine("is the step of these matrices", cases, ours)
     return kit.report(below, converges, units, replace(same, detail=f"{same.detail}, {where}"))
@@ -190,7 +190,7 @@ class _Check:
         size = max(self.norm(self.image(np.zeros_like(force))), self.norm(force))
         return np.asarray(FAR * size / self.norm(force) * force)
 
-    def knows_no_units(self, force: Floats, other: Floats, share: float) -> None:
+    def is_independent_of_units(self, force: Floats, other: Floats, share: float) -> None:
         far = self.far(force)
         off = self.norm(self.image(4 * far) - 4 * self.image(far)) / (4 * self.norm(far))
         if not off <= self.tolerance:
