@@ -25,7 +25,8 @@ def linear_run(modes: Series, theta: float, steps: int) -> tuple[list[float], li
         if not residual < 1e200:
             break
         absolute.append(residual)
-        relative.append(residual / float(np.linalg.norm(image)))
+        size = float(np.linalg.norm(image))
+        relative.append(residual / size if size else float("inf"))
         x = x + theta * (image - x)
     return absolute, relative
 
