@@ -221,8 +221,8 @@ def _rest(factor: Number) -> Number:
     return Number(value=max(1 - factor.value, least), lo=least, level=factor.level)
 
 
-#: The bounds by name, from the weakest to the strongest.  A bound that is put in here at any time is worked out, judged,
-#: shown and drawn with the others.
+#: The bounds by name, from the weakest to the strongest.  A bound that is put in here at any time is worked out,
+#: judged, shown and drawn with the others.
 BOUNDS: dict[str, Bound] = {bound.name: bound for bound in (Printed(), Repaired(), Energy(), SemidefiniteBound())}
 
 #: The bounds that this library brings along.
