@@ -22,6 +22,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 demo: $(VENV)/.run
 	$(BIN)/ndtheory demo
+	$(BIN)/ndtheory explore ndtheory-demo/problem.toml -o ndtheory-demo/explore.html
 
 test: $(VENV)/.test
 	$(BIN)/python -m pytest -n auto --dist worksteal

@@ -42,6 +42,8 @@ if TYPE_CHECKING:
     from verification.constants.measured import Measured as Measured
     from verification.constants.measuring import measure as measure
     from verification.contact import ContactError as ContactError
+    from verification.exploration.page import Exploration as Exploration
+    from verification.exploration.page import explore as explore
     from verification.interface.build import build as build
     from verification.interface.interface import Law as Law
     from verification.interface.pair import ContactPair as ContactPair
@@ -63,6 +65,7 @@ _HOME = {
     "Comparison": "comparison",
     "ContactError": "contact",
     "ContactPair": "interface.pair",
+    "Exploration": "exploration.page",
     "Law": "interface.interface",
     "Ledger": "ledger",
     "Measured": "constants.measured",
@@ -84,6 +87,7 @@ _HOME = {
     "check_again": "certificate.contraction",
     "compare": "comparison",
     "example": "problem.examples",
+    "explore": "exploration.page",
     "iterate": "algorithm.start",
     "load": "problem.files",
     "measure": "constants.measuring",

@@ -14,6 +14,7 @@ from sphinx.errors import ExtensionError
 from sphinx.util.docutils import SphinxDirective
 from sphinx_proof.domain import ProofDomain
 
+import verification as vf
 from builder import equations, notebooks, widgets
 from builder.references import References
 
@@ -85,7 +86,9 @@ def fill_galleries(app: Sphinx, doctree: nodes.document, page: str) -> None:
 
 def write_widgets(app: Sphinx, config: Config) -> None:
     """What the widgets show, computed at every build, before Sphinx looks for the folder among the static ones."""
-    widgets.write(Path(app.srcdir) / "generated" / "widgets")
+    folder = Path(app.srcdir) / "generated" / "widgets"
+    widgets.write(folder)
+    vf.explore(vf.example("section6"), folder / "explore.html")
 
 
 def write_equations(app: Sphinx) -> None:

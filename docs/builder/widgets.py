@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,8 @@ from scipy.linalg import eigh
 
 import verification as vf
 from builder import stills
-from builder.javascript import function
 from ndtheory import bounds, energy_norms
+from verification.exploration.javascript import function
 from verification.figures import style
 
 #: The formulas that the widgets call, by their name in JavaScript.
@@ -163,6 +164,8 @@ def write(folder: Path) -> None:
     """Formulas, data and still pictures, for the site to copy."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "formulas.js").write_text(javascript(), encoding="utf-8")
+    for name in ("drawing.js", "widgets.css"):
+        (folder / name).write_text(files("verification").joinpath("data", name).read_text("utf-8"), encoding="utf-8")
     for name, widget in WIDGETS.items():
         data = widget.data()
         script = f"(window.ndData = window.ndData || {{}}).{name} = {json.dumps(data, separators=(',', ':'))};\n"

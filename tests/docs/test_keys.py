@@ -293,6 +293,7 @@ def test_the_page_lists_every_key_of_every_document_and_no_other(documents, comp
         f"sweep {folder / 'grid.toml'} --dry-run",
         f"certify {folder / 'small.toml'} --set contact.friction=5",  # no proof
         f"region {folder / 'small.toml'} -o {folder / 'plane.svg'}",
+        f"explore {folder / 'small.toml'} -o {folder / 'page.html'}",
     ):
         documents = [*documents, printed(arguments)]
     for document in (*documents, compared):

@@ -14,6 +14,7 @@ from browser import chromium, needs_browser
 import verification as vf
 from ndtheory import PRINTED, REPAIRED, evaluate, evaluate_energy
 from verification.algorithm.fixed_point import FixedPointMap
+from verification.exploration.javascript import function
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -111,13 +112,13 @@ def test_formulas_in_the_browser_equal_those_of_the_library(browser, builder):
 
 def test_a_formula_that_branches_on_a_scalar_is_refused(builder):
     with pytest.raises(TypeError, match="takes no `if`"):
-        builder.javascript.function("f", lambda x: 1 if x > 0 else 2, "x")
+        function("f", lambda x: 1 if x > 0 else 2, "x")
     with pytest.raises(NotImplementedError, match="power"):
-        builder.javascript.function("f", lambda x: x**0.3, "x")
+        function("f", lambda x: x**0.3, "x")
 
 
 def test_what_is_written_twice_is_computed_once(builder):
-    text = builder.javascript.function("f", lambda x: (x + 1) * (x + 1), "x")
+    text = function("f", lambda x: (x + 1) * (x + 1), "x")
     assert text.count("x + 1") == 1
 
 

@@ -145,7 +145,7 @@ def test_no_cell_of_the_report_leaves_the_screen_of_a_phone(phone, comparison, w
         "return [...document.querySelectorAll('tbody th, tbody td')].map(cell => {"
         "const box = cell.getBoundingClientRect(); return [cell.innerText, box.left, box.right, cell.scrollWidth]})"
     )
-    assert {judgement.verdict for judgement in comparison.verdicts.values()} <= {text for text, *_ in cells}
+    assert {WORDS[judgement.verdict] for judgement in comparison.verdicts.values()} <= {text for text, *_ in cells}
     assert [cell for cell in cells if cell[1] < 0 or cell[2] > 375 or cell[1] + cell[3] > 375.5] == []
 
 

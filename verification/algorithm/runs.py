@@ -186,9 +186,10 @@ class Run(Document):
     @cached_property
     def contact(self) -> ContactFields:
         """Stresses and motions along Gamma_c at the last iterate."""
-        return self._fields(self.last)
+        return self.contact_at(self.last)
 
-    def _fields(self, iterate: Iterate) -> ContactFields:
+    def contact_at(self, iterate: Iterate) -> ContactFields:
+        """Return stresses and motions along Gamma_c at an iterate."""
         pair, solved = self.pair, iterate.contact
         turned = np.ones(len(solved.v))
         turned[pair.contact.grid.tangential] = pair.normal_sign  # to body 1 against body 2
@@ -206,11 +207,15 @@ class Run(Document):
 
         ValueError where the pair is made from matrices.
         """
+        first, second = self.traces_at(self.last)
+        return self.pair.body1.mesh_body.displacement(first), self.pair.body2.mesh_body.displacement(second)
+
+    def traces_at(self, iterate: Iterate) -> tuple[Floats, Floats]:
+        """Return the displacements of body 1 and body 2 along Gamma_c at an iterate, normal components along y."""
         contact, neumann = self.pair.contact, self.pair.neumann
-        moved = self.pair.interface.carry(self.last.displacement) + self.last.contact.v
+        moved = self.pair.interface.carry(iterate.displacement) + iterate.contact.v
         moved[contact.grid.normal] += self.pair.interface.gap
-        of_contact = contact.mesh_body.displacement(contact.orient(moved))
-        of_neumann = neumann.mesh_body.displacement(neumann.orient(self.last.displacement))
+        of_contact, of_neumann = contact.orient(moved), neumann.orient(iterate.displacement)
         return (of_contact, of_neumann) if self.pair.neumann_body == 2 else (of_neumann, of_contact)
 
     @cached_property
@@ -245,7 +250,7 @@ class Run(Document):
         II; the numbers of nodes that stick, slip and are open.
         """
         rows = self.iterates
-        patterns = [self._fields(iterate).pattern for iterate in rows]
+        patterns = [self.contact_at(iterate).pattern for iterate in rows]
         return {
             "iteration": [iterate.iteration for iterate in rows],
             "residual": [iterate.residual for iterate in rows],

@@ -12,12 +12,12 @@ import numpy as np
 from verification.algorithm.ending import Outcome
 from verification.bounds.bound import NotComputed, Region, Subject
 from verification.bounds.table import BOUNDS
-from verification.constants import measure
+from verification.constants import Measured, measure
 from verification.constants.measured import SLIDES
 from verification.contact import ContactError
 from verification.document import Document
 from verification.interface.friction import LAWS
-from verification.interface.pair import pair_from
+from verification.interface.pair import ContactPair, pair_from
 from verification.interrupts import INTERRUPTED
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
@@ -96,18 +96,8 @@ def chart(problem: Problem, *, store: Path | None = None, progress: Progress = s
     """
     progress("tracing the regions", None)
     pair = pair_from(problem)
-    law = problem.contact.law
-    if LAWS[law].outside:
-        raise ProblemError(problem.source, "contact.law", law, 'no region is proved of it; needed "nonlocal"')
-    if pair.outside:
-        raise ProblemError(problem.source, "contact", None, f"no region is proved: {pair.outside[0]}")
     measured = measure(pair)
-    if pair.contact.slides:
-        raise ProblemError(problem.source, f"body{pair.contact_body}", None, f"no region is proved: C_t1 is {SLIDES}")
-    if measured.constants() is None and measured.energy_constants() is None:
-        raise ProblemError(problem.source, "contact", None, measured.why_no_constants)
-    if measured.friction_threshold is None or measured.friction_limit is None:
-        raise ProblemError(problem.source, "contact.radius", None, "needed a law of friction to vary k")
+    check_plane(pair, measured)
     subject = Subject.of(pair, measured)
     regions: dict[str, Region] = {}
     reason = dict.fromkeys((*BOUNDS, "points"), INTERRUPTED)
@@ -134,6 +124,26 @@ def chart(problem: Problem, *, store: Path | None = None, progress: Progress = s
     return Plane(
         title=problem.title, regions=regions, points=tuple(points), reason=reason, units=problem.units, problem=problem
     )
+
+
+def check_plane(pair: ContactPair, measured: Measured) -> None:
+    """Raise ProblemError for a pair without a plane of theta and k: outside the theorem, or without a law of friction.
+
+    The pair is made from a problem.
+    """
+    problem = pair.problem
+    assert problem is not None  # only a problem has a plane
+    law = problem.contact.law
+    if LAWS[law].outside:
+        raise ProblemError(problem.source, "contact.law", law, 'no region is proved of it; needed "nonlocal"')
+    if pair.outside:
+        raise ProblemError(problem.source, "contact", None, f"no region is proved: {pair.outside[0]}")
+    if pair.contact.slides:
+        raise ProblemError(problem.source, f"body{pair.contact_body}", None, f"no region is proved: C_t1 is {SLIDES}")
+    if measured.constants() is None and measured.energy_constants() is None:
+        raise ProblemError(problem.source, "contact", None, measured.why_no_constants)
+    if measured.friction_threshold is None or measured.friction_limit is None:
+        raise ProblemError(problem.source, "contact.radius", None, "needed a law of friction to vary k")
 
 
 def _point(row: Row) -> Point:

@@ -18,7 +18,7 @@ import ndtheory
 import verification
 from ndtheory import HypothesisError
 from ndtheory.texts import printable
-from verification.cli import advising, calculator, certifying, ledger, problems, sweeping
+from verification.cli import advising, calculator, certifying, exploring, ledger, problems, sweeping
 from verification.cli.console import (
     NOTHING,
     SHOWN,
@@ -59,6 +59,7 @@ for command in (
     problems.run,
     problems.solve,
     problems.compare,
+    exploring.explore,
     advising.advise,
     sweeping.region,
     sweeping.sweep,

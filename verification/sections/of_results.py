@@ -1,7 +1,18 @@
 """The sections of all results of this program: importing a module registers its functions."""
 
 # ruff: noqa: F401
-from verification.sections import advice, bounds, certificate, comparison, constants, ledger, reproduction, run, sweep
+from verification.sections import (
+    advice,
+    bounds,
+    certificate,
+    comparison,
+    constants,
+    exploration,
+    ledger,
+    reproduction,
+    run,
+    sweep,
+)
 from verification.sections.parts import of
 
 __all__ = ["of"]

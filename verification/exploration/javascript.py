@@ -57,8 +57,8 @@ class Scalar:
     __le__ = partialmethod(_compared, "<=")
     __gt__ = partialmethod(_compared, ">")
     __ge__ = partialmethod(_compared, ">=")
-    __eq__ = partialmethod(_compared, "===")  # type: ignore[assignment]
-    __ne__ = partialmethod(_compared, "!==")  # type: ignore[assignment]
+    __eq__ = partialmethod(_compared, "===")
+    __ne__ = partialmethod(_compared, "!==")
     __hash__ = None  # type: ignore[assignment]
 
     def __bool__(self) -> bool:

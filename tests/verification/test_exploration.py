@@ -1,0 +1,208 @@
+"""The page about one problem: its numbers are those of runs, in the data, in the browser and in the pictures."""
+
+import base64
+import json
+import random
+import re
+import time
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from browser import chromium, needs_browser
+from kinds import problem as plates
+from strategies import AT_NIGHT
+
+import verification as vf
+from ndtheory.energy_norms import one_minus_square, predicted_factor
+from verification.exploration.film import STATES, steps_shown
+
+#: A page of a problem with 25 contact nodes weighs at most so many bytes.
+LARGEST = 1_500_000
+
+#: Rounding of displacements to a byte and of lifts to two.
+ROUNDED = 1 / 100
+
+
+@pytest.fixture(scope="module")
+def found():
+    return vf.explore(plates(10))
+
+
+@pytest.fixture(scope="module")
+def data(found):
+    return json.loads(re.search(r"explore: (\{.*\}) \};</script>", found.page())[1])
+
+
+def places(found, count):
+    """Random positions: role, friction, theta."""
+    sizes = len(found.films), len(found.frictions), len(found.thetas)
+    return [tuple(map(random.Random(i).randrange, sizes)) for i in range(count)]
+
+
+def run_at(found, role, k, theta):
+    pair = found.films[role].pair.at(friction=found.frictions[k])
+    return vf.run(pair, theta=found.thetas[theta], rule="constant")
+
+
+def test_the_grid_has_the_problems_own_theta_and_friction_and_the_predicted_thetas(found):
+    assert found.thetas[found.own[0]] == Fraction(found.problem.iteration.theta)
+    assert found.frictions[found.own[1]] == found.problem.contact.friction
+    for role in vf.advise(found.problem).roles:
+        assert min(abs(float(theta) / role.theta_predicted - 1) for theta in found.thetas) < 0.005
+
+
+def test_each_position_is_a_run(found, data):
+    for role, k, theta in places(found, 8):
+        made, shown = run_at(found, role, k, theta), data["roles"][role]["runs"][k][theta]
+        assert (shown["outcome"], shown["steps"]) == (made.outcome, made.iterations)
+        assert shown["residuals"] == pytest.approx([made.history[step] for step in shown["shown"]], rel=5e-3)
+        rate = made.observed_rate
+        assert shown["rate"] == (None if rate is None else pytest.approx(rate.value, rel=1e-3))
+
+
+def test_factors_are_those_of_a_comparison(found, data):
+    for role, k, theta in places(found, 3):
+        pair = found.films[role].pair.at(friction=found.frictions[k])
+        compared = vf.compare(pair, theta=found.thetas[theta], bounds=("printed", "repaired", "energy"))
+        shown = dict(
+            zip([b["name"] for b in data["bounds"]], data["roles"][role]["runs"][k][theta]["factors"], strict=True)
+        )
+        for bound in compared.computed:
+            assert shown[bound.name] == (None if bound.factor is None else pytest.approx(bound.factor.value, rel=1e-5))
+
+
+def numbers(text, kind):
+    return np.frombuffer(base64.b64decode(text), dtype=kind).astype(float)
+
+
+def test_the_pictures_of_a_step_are_those_of_the_run(found, data):
+    for role, k, theta in places(found, 6):
+        made, shown = run_at(found, role, k, theta), data["roles"][role]["runs"][k][theta]
+        at = random.Random(role + k + theta).randrange(len(shown["shown"]))
+        iterate, n = made.iterates[shown["shown"][at]], data["roles"][role]["contactNodes"]
+        sizes = [2 * len(body["contact"]) for body in data["bodies"]]
+        width, frame = sum(sizes) + 3 * n, shown["first"] + at
+        row = numbers(data["roles"][role]["frames"], np.int8)[frame * width : (frame + 1) * width]
+        length, stress = data["roles"][role]["scales"][frame]
+        fields = made.contact_at(iterate)
+        assert row[sum(sizes) : -n] * stress / 127 == pytest.approx(
+            np.concatenate([fields.pressure, fields.shear]), abs=ROUNDED * stress
+        )
+        assert [STATES[int(i)] for i in row[-n:]] == list(fields.status)
+        begin = 0
+        for body, side, trace in zip(
+            data["bodies"], (made.pair.body1, made.pair.body2), made.traces_at(iterate), strict=True
+        ):
+            lift = numbers(body["lift"], "<i2").reshape(-1, len(trace)) * body["size"] / 32767
+            drawn = np.array(body["still"]) + lift @ (row[begin : begin + len(trace)] * length / 127)
+            exact = side.mesh_body.displacement(trace).ravel()
+            assert drawn == pytest.approx(exact, abs=3 * ROUNDED * max(length, np.abs(exact).max()))
+            begin += len(trace)
+
+
+def test_later_steps_are_shown_more_rarely_and_the_last_one_always():
+    history = list(np.geomspace(1, 1e-9, 400))
+    shown = steps_shown(history)
+    assert shown[:11] == list(range(11))
+    assert shown[-1] == 399
+    assert len(shown) <= 21
+    assert list(np.diff(shown)[:-1]) == sorted(np.diff(shown)[:-1])
+
+
+def test_a_body_that_contact_alone_holds_keeps_its_role():
+    loose = vf.example("section6").changed(cells=((10, 2), (6, 2)), radius="0.2").to_dict()
+    loose["body2"] |= {"prescribed": {"top": ["free", "-0.01"]}}
+    found = vf.explore(vf.Problem.from_dict(loose))
+    assert len(found.films) == 1
+    assert "can move rigidly" in found.why_one_role
+    assert "The roles cannot be exchanged" in found.page()
+
+
+def test_a_pair_of_matrices_is_refused():
+    one = np.diag([2.0, 3.0])
+    pair = vf.build(S1=one, S2=one, x=[0.0], load1=np.ones(2), load2=np.zeros(2))
+    with pytest.raises(vf.ProblemError, match="needed the meshes"):
+        vf.explore(pair)
+
+
+def test_a_title_does_not_end_the_script():
+    bars = vf.example("two-bars").to_dict() | {"title": "</script><b>x</b>"}
+    page = vf.explore(vf.Problem.from_dict(bars)).page()
+    assert "</script><b>" not in page
+    assert page.count("</script>") == 4
+
+
+@pytest.mark.skipif(not AT_NIGHT, reason="eight seconds: by night")
+def test_a_page_of_25_nodes_is_small():
+    assert len(vf.explore(vf.example("section6")).page().encode()) < LARGEST
+
+
+@pytest.fixture(scope="module")
+def opened(found, tmp_path_factory):
+    path = tmp_path_factory.mktemp("explore") / "page.html"
+    path.write_text(found.page(), "utf-8")
+    with chromium("--window-size=1280,1400") as driver:
+        driver.get(path.as_uri())
+        yield driver
+
+
+MOVE = """
+const set = (name, value) => { const input = document.querySelector(`input[name=${name}]`); input.value = value;
+  input.dispatchEvent(new Event("input")); };
+const button = document.querySelector("button[name=roles]");
+if ((button.getAttribute("aria-pressed") === "true") !== (arguments[0] === 1)) button.click();
+set("friction", arguments[1]); set("theta", arguments[2]);
+return document.querySelector(".answer").textContent;
+"""
+
+
+@needs_browser
+def test_the_page_says_what_a_run_does(found, opened):
+    for role, k, theta in places(found, 20):
+        made, text = run_at(found, role, k, theta), opened.execute_script(MOVE, role, k, theta)
+        assert f"theta = {float(f'{float(made.theta):.4g}'):g}, k = {float(found.frictions[k]):g}" in text
+        assert f"Neumann body {made.pair.neumann_body} " in text
+        assert int(re.search(r"after (\d+) steps", text)[1]) == made.iterations
+        assert ("converged after" in text) == made.converged
+    assert opened.get_log("browser") == []
+
+
+@needs_browser
+def test_formulas_of_the_page_are_those_of_the_library(opened):
+    for theta, rho, one, two in np.random.default_rng(0).uniform(0.05, 0.95, (20, 4)):
+        seen = opened.execute_script(
+            "return [ndFormulas.predictedFactor(...arguments[0]), ndFormulas.energyOneMinusSquare(...arguments[1])]",
+            [theta, rho],
+            [theta, rho, one, two],
+        )
+        assert seen == pytest.approx([predicted_factor(theta, rho), one_minus_square(theta, rho, one, two)], rel=1e-12)
+
+
+@needs_browser
+def test_the_page_fits_a_phone_and_obeys_the_keyboard(opened):
+    from selenium.webdriver.common.keys import Keys
+
+    small = {"width": 390, "height": 1600, "deviceScaleFactor": 1, "mobile": True}
+    opened.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", small)
+    assert opened.execute_script("return document.documentElement.scrollWidth") <= 390
+    size = "(s) => 11 * s.clientWidth / s.viewBox.baseVal.width"
+    sizes = f"return Math.min(...[...document.querySelectorAll('svg.chart')].map({size}))"
+    assert opened.execute_script(sizes) >= 9
+    slider = opened.find_element("css selector", "input[name=theta]")
+    before = slider.get_attribute("value")
+    slider.send_keys(Keys.ARROW_LEFT)
+    assert int(slider.get_attribute("value")) == int(before) - 1
+    opened.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+@needs_browser
+def test_a_film_plays_to_its_end(opened):
+    opened.execute_script(MOVE, 0, 1, 12)
+    opened.execute_script("[...document.querySelectorAll('button')].find((b) => b.textContent === 'play').click()")
+    end = time.monotonic() + 30
+    position = "const s = document.querySelector('input[name=step]'); return [Number(s.value), Number(s.max)]"
+    assert opened.execute_script(position)[0] <= 1
+    while time.monotonic() < end and len({*opened.execute_script(position)}) == 2:
+        time.sleep(0.1)
+    assert len({*opened.execute_script(position)}) == 1

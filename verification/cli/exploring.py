@@ -1,0 +1,40 @@
+"""``ndtheory explore``: a page that moves about one problem."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from verification.cli.console import deliver, stages
+from verification.cli.options import FILE, JSON, SET, SWAP, check_place, one_file
+from verification.cli.problems import load_problem
+
+
+@click.command()
+@FILE
+@SET
+@SWAP
+@one_file(".html", words="Page to write", required=True)
+@JSON
+def explore(file: Path, keys: dict[str, str], swap: bool, target: Path, as_json: bool) -> None:
+    """Write a page on which theta, friction and the roles of the bodies can be moved.
+
+    The page is one HTML file that needs no network.  It shows both bodies step by step, the residual, and the plane of
+    theta and friction; each position of a slider is a run that was made, with a constant theta.
+
+    \b
+    Example:
+      ndtheory explore my.toml -o page.html
+    """
+    from verification.exploration import page
+    from verification.output.files import staged
+    from verification.sections.exploration import sections
+
+    problem = load_problem(file, keys, swap=swap)
+    check_place(target)
+    with stages() as tell:
+        found = page.explore(problem, progress=tell)
+    with staged(target.parent, shown=target) as room:
+        (room / target.name).write_text(found.page(), encoding="utf-8")
+    deliver(found, lambda shown: sections(shown, target), as_json)

@@ -1,0 +1,245 @@
+"""Runs on a grid of theta and friction in one role, with the steps that a page shows, packed as bytes."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem1d2d.mesh import Floats
+from verification.algorithm.runs import Run, run
+from verification.bounds.bound import Bound, NotComputed, Region, Subject
+from verification.bounds.region import check_plane
+from verification.bounds.table import BOUNDS
+from verification.constants import Measured
+from verification.contact import ContactError
+from verification.interface.body import Body
+from verification.interface.pair import ContactPair
+from verification.problem.tables import ProblemError
+from verification.progress import Progress
+
+#: A step is drawn until the relative residual is below this: later steps look the same at the size of a page.
+VISIBLE = 1e-3
+
+#: Number of first steps that are all shown, and of steps that are shown of one run at most.
+FIRST, MOST = 10, 20
+
+#: Steps in which a displacement is larger than this multiple of the largest one of the problem's own run leave the
+#: picture.
+FARTHEST = 10.0
+
+#: Numbers of a lift that are stored of the whole mesh; of a larger one only the boundary is drawn.
+MOST_NUMBERS = 150_000
+
+#: The states of contact nodes as they are packed.
+STATES = ("stick", "slip", "open")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Shown:
+    """One run, and the steps that a page shows.
+
+    Attributes
+    ----------
+    theta, friction : float
+    outcome : str
+        As of a run; or why there is none.
+    iterations, rate : int or None, float or None
+    steps, residuals : tuple of int, tuple of float
+        The shown steps, and their relative residuals.
+    frames : int8 array, shape (steps, bytes)
+        By step: displacements along Gamma_c of body 1 and of body 2, pressure and shear at the contact nodes, each in
+        127ths of its size; the states of these nodes.
+    sizes : tuple of pairs
+        By step: the largest displacement and the largest stress.
+    factors : mapping from str to float or None
+        By bound: the factor that it proves for one step; None where it has no conclusion.
+    """
+
+    theta: float
+    friction: float
+    outcome: str
+    iterations: int | None
+    rate: float | None
+    steps: tuple[int, ...]
+    residuals: tuple[float, ...]
+    frames: NDArray[np.int8]
+    sizes: tuple[tuple[float, float], ...]
+    factors: dict[str, float | None]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Film:
+    """Runs of one pair on a grid.
+
+    Attributes
+    ----------
+    pair, measured : ContactPair, Measured
+        The bodies in these roles at the problem's friction.
+    runs : tuple of tuple of Shown
+        By friction, then theta.
+    regions : mapping from str to Region
+        Where each bound that follows from the constants proves contraction.
+    why_no_region : str
+    """
+
+    pair: ContactPair
+    measured: Measured
+    runs: tuple[tuple[Shown, ...], ...]
+    regions: dict[str, Region]
+    why_no_region: str
+
+
+def film(
+    pair: ContactPair,
+    measured: Measured,
+    thetas: Sequence[Fraction],
+    frictions: Sequence[Fraction],
+    farthest: float,
+    progress: Progress,
+) -> Film:
+    """Run every theta at every friction with constant relaxation, and evaluate the bounds there.
+
+    A step in which a displacement is larger than ``farthest`` leaves the picture, and is not shown.
+    """
+    calculated = [bound for bound in BOUNDS.values() if bound.calculated]
+    regions: dict[str, Region] = {}
+    runs, why = [], ""
+    for i, k in enumerate(frictions):
+        progress(f"running {len(thetas)} thetas at k = {float(k):.3g}", i / len(frictions))
+        there = pair.at(friction=k)
+        # bounds take a double
+        try:
+            subject = Subject.of(there, measured.with_friction(float(k)))
+        except ValueError:  # a constant is infinite: no bound applies
+            subject = None
+        line = []
+        for theta in thetas:
+            factors = {bound.name: None if subject is None else _factor(bound, subject, theta) for bound in calculated}
+            line.append(_shown(there, theta, farthest, factors))
+        runs.append(tuple(line))
+    try:
+        check_plane(pair, measured)
+        regions = {bound.name: bound.region(Subject.of(pair, measured)) for bound in calculated}
+    except (ProblemError, NotComputed) as error:
+        why = str(error)
+    return Film(pair=pair, measured=measured, runs=tuple(runs), regions=regions, why_no_region=why)
+
+
+def _factor(bound: Bound, subject: Subject, theta: Fraction) -> float | None:
+    factor = bound.evaluate(subject, theta).factor
+    return None if factor is None else factor.value
+
+
+def _shown(pair: ContactPair, theta: Fraction, farthest: float, factors: dict[str, float | None]) -> Shown:
+    at: dict[str, Any] = {"theta": float(theta), "friction": float(pair.friction), "factors": factors}
+    try:
+        made = run(pair, theta=theta, rule="constant")
+    except ContactError as error:
+        at |= {"outcome": str(error), "iterations": None, "rate": None, "steps": (), "residuals": ()}
+        return Shown(**at, frames=np.zeros((0, 0), np.int8), sizes=())
+    steps: list[int] = []
+    frames, sizes = [], []
+    for step in steps_shown(made.history):
+        frame, size = _frame(made, step)
+        if size[0] > farthest and steps:
+            break
+        steps.append(step)
+        frames.append(frame)
+        sizes.append(size)
+    return Shown(
+        **at,
+        outcome=made.outcome,
+        iterations=made.iterations,
+        rate=None if made.observed_rate is None else made.observed_rate.value,
+        steps=tuple(steps),
+        residuals=tuple(made.history[step] for step in steps),
+        frames=np.stack(frames),
+        sizes=tuple(sizes),
+    )
+
+
+def steps_shown(history: Sequence[float]) -> list[int]:
+    """The steps of a run that are shown: the first ones, ever fewer while the residual is visible, and the last one.
+
+    >>> steps_shown([1, 0.1, 1e-2, 1e-4, 1e-6, 1e-9])
+    [0, 1, 2, 3, 5]
+    """
+    last = len(history) - 1
+    visible = next((i for i, residual in enumerate(history) if residual <= VISIBLE), last)
+    later = np.geomspace(FIRST, visible, MOST - FIRST) if visible > FIRST else np.zeros(0)
+    return sorted({*range(min(visible, FIRST) + 1), *(int(step) for step in later), last})
+
+
+def packed(found: Film) -> dict[str, Any]:
+    """The runs of a film as data of a page: numbers of each run, and all frames as one text in base 64."""
+    every = [each for line in found.runs for each in line]
+    firsts = iter(np.cumsum([0, *(len(each.steps) for each in every)]).tolist())
+    rounded = lambda value, digits: None if value is None else float(f"{value:.{digits}g}")
+    runs = [
+        [
+            {
+                "outcome": each.outcome,
+                "steps": each.iterations,
+                "rate": rounded(each.rate, 4),
+                "shown": each.steps,
+                "residuals": [rounded(value, 3) for value in each.residuals],
+                "factors": [rounded(value, 6) for value in each.factors.values()],
+                "first": next(firsts),
+            }
+            for each in line
+        ]
+        for line in found.runs
+    ]
+    frames = np.concatenate([each.frames.ravel() for each in every])
+    return {
+        "runs": runs,
+        "scales": [[rounded(size, 4) for size in sizes] for each in every for sizes in each.sizes],
+        "frames": _text(frames),
+    }
+
+
+def _frame(finished: Run, step: int) -> tuple[NDArray[np.int8], tuple[float, float]]:
+    """One step as bytes, and the sizes of its displacements and stresses."""
+    iterate = finished.iterates[step]
+    moved, fields = np.concatenate(finished.traces_at(iterate)), finished.contact_at(iterate)
+    stress = np.concatenate([fields.pressure, fields.shear])
+    states = np.array([STATES.index(name) for name in fields.status], dtype=np.int8)
+    sizes = float(np.abs(moved).max()), float(np.abs(stress).max())
+    return np.concatenate([_bytes(moved, sizes[0], 127), _bytes(stress, sizes[1], 127), states]), sizes
+
+
+def _bytes(values: Floats, size: float, most: int) -> NDArray[Any]:
+    kind = np.int8 if most < 128 else np.int16
+    return np.asarray(np.rint(values * (most / size)) if size else np.zeros(len(values))).astype(kind)
+
+
+def _text(values: NDArray[Any]) -> str:
+    return b64encode(values.astype(values.dtype.newbyteorder("<")).tobytes()).decode()
+
+
+def drawn(body: Body) -> dict[str, Any]:
+    """A body for a page: points, cells or boundary, and the affine map from its trace on Gamma_c to displacements.
+
+    The finite elements give the map; it is rounded to 16 bits: ``u = still + size * lift @ trace / 32767``.
+    """
+    components = len(body.unknown)
+    whole = body.mesh.points.size * components <= MOST_NUMBERS
+    cells = body.mesh.cells if whole else body.mesh.boundary
+    nodes, corners = np.unique(cells, return_inverse=True)
+    still = body.displacement(np.zeros(components))[nodes].ravel()
+    lift = np.stack([body.displacement(row)[nodes].ravel() - still for row in np.eye(components)], axis=1)
+    size = float(np.abs(lift).max())
+    return {
+        "points": [float(f"{x:.6g}") for x in body.mesh.points[nodes].ravel()],
+        "cells": corners.reshape(cells.shape).tolist(),
+        "still": [float(f"{x:.5g}") for x in still],
+        "size": size,
+        "lift": _text(_bytes(lift.ravel(), size, 32767)),
+        "contact": np.searchsorted(nodes, body.nodes).tolist(),
+    }

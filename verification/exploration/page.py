@@ -1,0 +1,232 @@
+"""Runs of one problem on a grid in both roles, as a document and as one page of HTML."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from fractions import Fraction
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from ndtheory import __version__
+from ndtheory.energy_norms import one_minus_square, predicted_factor, predicted_theta
+from verification.algorithm.runs import run
+from verification.bounds.bound import Region
+from verification.bounds.table import named
+from verification.constants import measure
+from verification.document import Document
+from verification.exploration.film import FARTHEST, Film, drawn, film, packed
+from verification.exploration.javascript import function
+from verification.interface.build import pair_of
+from verification.interface.pair import ContactPair
+from verification.problem.specification import Problem
+from verification.problem.tables import ProblemError
+from verification.progress import Progress, silent
+
+#: Multiples of the problem's friction that are run; without friction, the frictions themselves.
+SHARES = tuple(Fraction(n, 4) for n in (0, 2, 4, 6, 8))
+FRICTIONS = tuple(Fraction(n, 10) for n in (0, 1, 2, 4))
+
+#: The formulas that the page evaluates, by their names in JavaScript.
+FORMULAS = (
+    ("predictedFactor", predicted_factor, ("theta", "rho")),
+    ("energyOneMinusSquare", one_minus_square, ("theta", "rho", "kappa1", "kappa2")),
+)
+
+#: The names of the bodies of a file.
+BODIES = {1: "lower", 2: "upper"}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Exploration(Document):
+    """Runs of one problem at several theta and frictions, in both roles of the bodies.
+
+    Attributes
+    ----------
+    problem : Problem
+    thetas, frictions : tuple of Fraction
+        The grid; all runs have a constant theta.
+    films : tuple of Film
+        One for each role, the role of the problem first.
+    why_one_role : str
+        Why the roles cannot be exchanged; empty where they can.
+    """
+
+    schema: ClassVar[str] = "ndtheory.explore/1"
+
+    problem: Problem
+    thetas: tuple[Fraction, ...]
+    frictions: tuple[Fraction, ...]
+    own: tuple[int, int]
+    films: tuple[Film, ...]
+    why_one_role: str
+
+    @property
+    def units(self) -> Any:  # type: ignore[override]
+        return self.problem.units
+
+    @property
+    def summary(self) -> str:
+        count = len(self.films) * len(self.thetas) * len(self.frictions)
+        return f"{self.problem.title}, {count} runs at {len(self.thetas)} thetas and {len(self.frictions)} frictions"
+
+    def content(self) -> dict[str, Any]:
+        """Return the values of ``ndtheory.explore/1``."""
+        names = ("theta", "friction", "outcome", "iterations", "rate")
+        return {
+            "title": self.problem.title,
+            "theta": [float(theta) for theta in self.thetas],
+            "friction": [float(k) for k in self.frictions],
+            "roles": [
+                {
+                    "neumann_body": found.pair.neumann_body,
+                    "runs": [{name: getattr(each, name) for name in names} for line in found.runs for each in line],
+                }
+                for found in self.films
+            ],
+            "reason": {"roles": self.why_one_role} if self.why_one_role else {},
+        }
+
+    def page(self) -> str:
+        """Return the page: HTML that loads nothing from other files or hosts."""
+        environment = Environment(
+            loader=PackageLoader("verification", "data"), autoescape=True, undefined=StrictUndefined
+        )
+        formulas = "\n".join(function(name, formula, *arguments) for name, formula, arguments in FORMULAS)
+        # "<" would let a title end the script
+        data = json.dumps(self._data(), separators=(",", ":")).replace("<", "\\u003c")
+        text = {name: files("verification").joinpath("data", name).read_text("utf-8") for name in PARTS}
+        return environment.get_template("explore.html.j2").render(
+            title=self.problem.title, version=__version__, formulas=formulas, data=data, parts=text, found=self
+        )
+
+    def _data(self) -> dict[str, Any]:
+        """Return what the scripts of the page read."""
+        first = self.films[0].pair
+        grid = first.contact.grid
+        return {
+            "units": dict(self.units),
+            "dimension": grid.dimension,
+            "theta": [float(theta) for theta in self.thetas],
+            "friction": [float(k) for k in self.frictions],
+            "own": self.own,
+            "tolerance": float(first.settings.tolerance),
+            "gap": _gap(first),
+            "bodies": [drawn(side.mesh_body) for side in (first.body1, first.body2)],
+            "roles": [self._role(found) for found in self.films],
+            "bounds": [{"name": name, "colour": named(name).colour} for name in self._bounds],
+        }
+
+    @property
+    def _bounds(self) -> list[str]:
+        return list(self.films[0].runs[0][0].factors)
+
+    def _role(self, found: Film) -> dict[str, Any]:
+        energy = found.measured.energy_constants()
+        k = float(found.pair.friction)
+        per_friction = energy is not None and k > 0
+        return {
+            "neumann": found.pair.neumann_body,
+            "name": BODIES[found.pair.neumann_body],
+            "contactNodes": found.pair.contact.grid.n,
+            "rho": None if energy is None else float(energy.rho),
+            "kappa": [float(energy.kappa_1) / k, float(energy.kappa_2) / k] if per_friction and energy else None,
+            "regions": [_corners(found.regions.get(name)) for name in self._bounds],
+            "whyNoRegion": found.why_no_region,
+            **packed(found),
+        }
+
+
+#: The scripts and styles of the page, in the folder of data.
+PARTS = ("drawing.js", "widgets.css", "explore.js", "explore.css")
+
+
+def _corners(region: Region | None) -> list[list[float]]:
+    """The frictions of a region, each with the ends of its theta; none where the bound has no region."""
+    if region is None:
+        return []
+    return [[float(f"{x:.5g}") for x in (k, *ends)] for k, ends in zip(region.k, region.theta, strict=True)]
+
+
+def _gap(pair: ContactPair) -> dict[str, Any]:
+    """The initial gap, where it is flat: it is then enlarged like displacements, which otherwise stay as they are."""
+    gap = pair.interface.gap
+    return {"flat": bool(np.ptp(gap) == 0), "size": float(gap[0])}
+
+
+def explore(
+    problem: Problem | ContactPair | Path | str, path: Path | str | None = None, *, progress: Progress = silent
+) -> Exploration:
+    """Run a problem on a grid of theta and friction in both roles, and write a page about it.
+
+    Parameters
+    ----------
+    problem : Problem, ContactPair or path
+        Two elastic bodies on meshes.
+    path : path, optional
+        The page to write, HTML.
+    progress : callable
+        Called with words and a share.
+
+    Returns
+    -------
+    Exploration
+
+    Raises
+    ------
+    ProblemError, HypothesisError
+        Bad input: a rigid body, or matrices without a problem.
+
+    Examples
+    --------
+    >>> from verification.problem.examples import example
+    >>> explore(example("two-bars"))
+    <Exploration: Two bars, 40 runs at 20 thetas and 1 frictions>
+    """
+    pair = pair_of(problem)
+    if pair.problem is None:
+        raise ProblemError("", "", None, "this pair is made from matrices: needed the meshes of both bodies")
+    made = run(pair, rule="constant")
+    seen = made.iterates[0] if made.outcome == "diverged" else made.last
+    farthest = FARTHEST * max(float(np.abs(u).max()) for u in made.traces_at(seen))
+    pairs, why = [pair], ""
+    try:
+        pairs.append(pair.swapped())
+    except ValueError as error:
+        why = str(error)
+    measured = [measure(each) for each in pairs]
+    rhos = [one.rho_max for one in measured if one.rho_max is not None]
+    predicted = (Fraction(f"{float(predicted_theta(rho.value)):.3g}") for rho in rhos)
+    thetas = tuple(sorted({made.theta, *predicted, *(Fraction(n, 20) for n in range(1, 20))}))
+    frictions = _frictions(pair)
+    films = [
+        film(each, constants, thetas, frictions, farthest, _part(progress, i, len(pairs)))
+        for i, (each, constants) in enumerate(zip(pairs, measured, strict=True))
+    ]
+    found = Exploration(
+        problem=pair.problem,
+        thetas=thetas,
+        frictions=frictions,
+        own=(thetas.index(made.theta), frictions.index(pair.friction)),
+        films=tuple(films),
+        why_one_role=why,
+    )
+    if path is not None:
+        Path(path).write_text(found.page(), encoding="utf-8")
+    return found
+
+
+def _part(progress: Progress, i: int, count: int) -> Progress:
+    """The progress of one role of several."""
+    return lambda what, share: progress(f"role {i + 1} of {count}: {what}", (i + (share or 0.0)) / count)
+
+
+def _frictions(pair: ContactPair) -> tuple[Fraction, ...]:
+    """The frictions of the grid; only the problem's own where no law of friction is given."""
+    if pair.interface.kernel is None:
+        return (pair.friction,)
+    return tuple(share * pair.friction for share in SHARES) if pair.friction else FRICTIONS

@@ -1,0 +1,43 @@
+"""Runs on a grid of theta and friction in both roles."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from shlex import quote
+
+from verification.exploration.film import Shown
+from verification.exploration.page import Exploration
+from verification.sections.numbers import NONE, count, figures, near_one
+from verification.sections.parts import Cell, Facts, Section, Sections, closing, of, section, table
+from verification.sections.setting import NAMES
+
+
+@of.register
+def sections(found: Exploration, target: Path | None = None) -> Sections:
+    """The sections: for each role and friction the theta with the fewest steps; ``target`` is the page."""
+    rows: list[tuple[Cell, ...]] = []
+    for each in found.films:
+        body = each.pair.neumann_body
+        for line in each.runs:
+            rows.append((f"{body} ({NAMES[body]})", figures(line[0].friction, 2), *_best(line)))
+    head = ("Neumann body", "k", "theta", "steps", "rate", "converged")
+    caption = "For each role and friction the theta with the fewest steps, and how many of the thetas converged."
+    grid = f"{len(found.thetas)} thetas, {len(found.frictions)} frictions"
+    closing_words = "that a theta between two of the grid behaves like them"
+    parts: list[Section] = [
+        section("setting", "", Facts(found.problem.title, (grid, "constant theta"))),
+        section("runs", "WHICH THETA TAKES THE FEWEST STEPS?", table(head, rows), caption=caption),
+    ]
+    if found.why_one_role:
+        parts.append(section("roles", "", f"The roles cannot be exchanged: {found.why_one_role}"))
+    return (*parts, closing(closing_words, then="" if target is None else f"open {quote(str(target))}"))
+
+
+def _best(line: tuple[Shown, ...]) -> tuple[Cell, ...]:
+    arrived = [each for each in line if each.outcome == "converged" and each.iterations is not None]
+    of_all = f"{len(arrived)} of {len(line)}"
+    if not arrived:
+        return (NONE, NONE, NONE, of_all)
+    best = min(arrived, key=lambda each: (each.iterations, each.theta))
+    rate = NONE if best.rate is None else near_one(best.rate)
+    return (figures(best.theta), count(best.iterations), rate, of_all)
