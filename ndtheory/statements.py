@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import files
@@ -33,6 +34,8 @@ class Statement:
         The recorded one; empty where none is recorded.
     title, claims : str
         What it is about, in a few words; what it says.
+    short : str
+        The title in at most four words without formulas; empty where the title is such.
     leans_on : tuple of str
         Statements that its proof uses.
     fault : {'false as printed', 'does not follow', 'gap', 'typo'} or None
@@ -62,6 +65,7 @@ class Statement:
     reading: str = ""
     note: str = ""
     verdict: str = ""
+    short: str = ""
 
 
 @lru_cache(maxsize=1)
@@ -75,6 +79,23 @@ def statements() -> dict[str, Statement]:
     """
     rows = _file()["statement"]
     return {row["id"]: Statement(**{**row, "leans_on": tuple(row.get("leans_on", ()))}) for row in rows}
+
+
+def proof_of(ids: Collection[str]) -> dict[str, Statement]:
+    """Some statements with all that they lean on, directly or not, in the order of the paper.
+
+    Examples
+    --------
+    >>> list(proof_of(["4.3"]))
+    ['4.1', '4.2', '4.3']
+    """
+    found, left = set(), list(ids)
+    while left:
+        id = left.pop()
+        if id not in found:
+            found.add(id)
+            left += statements()[id].leans_on
+    return {id: one for id, one in statements().items() if id in found}
 
 
 def symbols(statement: Statement) -> dict[str, str]:

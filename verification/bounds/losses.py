@@ -70,6 +70,66 @@ class Losses:
         return {name: [vars(loss) for loss in losses] for name, losses in vars(self).items()}
 
 
+@dataclass(frozen=True, kw_only=True)
+class Suprema:
+    """Largest values, squared, that are eigenvalues: with m, M, C_R they give the losses that need no search.
+
+    Each is a power of the moduli times a number of the geometry.
+
+    Attributes
+    ----------
+    reaction, energy : float
+        Of the contact body's reaction, in the dual norm over its displacement, and in the norm (5.21) over its energy.
+    force, displacement : float
+        Of the dual norm of a force and of the Neumann body's displacement, over the norm (5.21) of the force.
+    displacement_dual, force_dual : float
+        Of the Neumann body's displacement and of the norm (5.21), over the dual norm of the force.
+    """
+
+    reaction: float
+    energy: float
+    force: float
+    displacement: float
+    displacement_dual: float
+    force_dual: float
+
+
+#: The inequalities of which :func:`quotients` returns the loss, in its order.
+EXACT = ("(5.18)", "(5.19)", "(5.22)", "(5.23)", "(5.29)")
+
+
+def quotients(
+    m: Any,
+    M: Any,
+    C_R: Any,
+    reaction: Any,
+    energy: Any,
+    force: Any,
+    displacement: Any,
+    displacement_dual: Any,
+    force_dual: Any,
+) -> tuple[Any, ...]:
+    """Squares of right over left side of the inequalities :data:`EXACT` at their worst pairs; of (5.29) the quotient.
+
+    The last one is for (5.19) as a step of a chain, after the largest displacement.  Arguments of any number type, the
+    last six as in :class:`Suprema`.
+
+    Examples
+    --------
+    >>> quotients(1, 2, 3, 4, 5, 6, 7, 8, 9)[0]
+    9.0
+    """
+    a = M * C_R
+    return (
+        a * a / reaction,
+        1 / (m * m * displacement_dual),
+        1 / (m * force_dual),
+        M * M / (m * force),
+        a * a / (m * m * energy),
+        force / (m * m * displacement),
+    )
+
+
 class LossForms:
     """The quadratic forms of Section 5 in y with ``psi - psi~ = L_2 y``, so that the length of y is the norm (5.21).
 
@@ -101,6 +161,21 @@ class LossForms:
         return np.asarray(form + form.T) / 2
 
 
+def suprema(forms: LossForms) -> Suprema:
+    """Find them for a pair."""
+    S_1, N_1, dual = forms.pair.contact.schur, forms.N_1, forms.dual
+    felt = forms.pair.interface.carry_back(S_1)  # the contact body's reaction, as the Neumann body receives it
+    norm, size2 = square(forms.root, dual), square(forms.d_2, forms.N_2)
+    return Suprema(
+        reaction=top(square(felt, dual), N_1),
+        energy=top(square(felt, forms.inverse), S_1),
+        force=top(norm),
+        displacement=top(size2),
+        displacement_dual=top(size2, norm),
+        force_dual=top(np.eye(len(norm)), norm),
+    )
+
+
 def top(form: Floats, against: Floats | None = None) -> float:
     """The largest eigenvalue of a symmetric form, against the identity by default."""
     return float(eigvalsh(form, against)[-1])
@@ -126,9 +201,7 @@ def locate(pair: ContactPair, measured: Measured, *, seed: int = 0, progress: Pr
     with one_thread():
         forms = LossForms(pair)
         N_1, N_2, dual, d_2 = forms.N_1, forms.N_2, forms.dual, forms.d_2
-        S_1, size2 = pair.contact.schur, square(d_2, N_2)
-        felt = pair.interface.carry_back(S_1)  # the contact body's reaction, as the Neumann body receives it
-        norm = square(forms.root, dual)
+        size2, norm = square(d_2, N_2), square(forms.root, dual)
 
         def found(form: Form, factors: Factors, against: Floats | None = None) -> float:
             """The largest value of a quadratic form against another one, the norm (5.21) by default."""
@@ -149,25 +222,20 @@ def locate(pair: ContactPair, measured: Measured, *, seed: int = 0, progress: Pr
         # suprema against e = |||psi - psi~|||, squared
         F = found(forms.friction, lambda some: some.friction)
         t, t_dual, d1 = force(forms.inverse), force(dual), trace()
-        d2, psi_dual = top(size2), top(norm)
         # and against other norms
         ratio, T_dual = trace(size2), force(dual, norm)
-        reaction = top(square(felt, dual), N_1)
-        energy = top(square(felt, forms.inverse), S_1)
-        d2_dual, e_dual = top(size2, norm), top(np.eye(len(norm)), norm)
+        eigen = suprema(forms)
+    d2, psi_dual = eigen.displacement, eigen.force
 
     decades = lambda right, left: math.log10(right / left) if left > 0 else math.inf
     half = lambda right, left: decades(right * right, left) / 2
     P = lambda edition: formulas.P(x, edition.coercivity(m), M, C_R, edition.unit(m))
     C_T = formulas.lipschitz(m, M, C_R, x)
+    exact = zip(EXACT, map(math.log10, quotients(m, M, C_R, **vars(eigen))), strict=False)
     links = [
         Loss(label="(5.11)", decades=half(X, ratio), searched=True),
         Loss(label="(5.16)", decades=half(C_T, T_dual), searched=True),
-        Loss(label="(5.18)", decades=half(A, reaction), searched=False),
-        Loss(label="(5.19)", decades=half(1 / m, d2_dual), searched=False),
-        Loss(label="(5.22)", decades=half(1 / math.sqrt(m), e_dual), searched=False),
-        Loss(label="(5.23)", decades=half(M / math.sqrt(m), psi_dual), searched=False),
-        Loss(label="(5.29)", decades=decades((A / m) ** 2, energy), searched=False),
+        *(Loss(label=label, decades=d if label == "(5.29)" else d / 2, searched=False) for label, d in exact),
         Loss(label="(5.38)", decades=decades((C_T * M / m) ** 2, t), searched=True),
     ]
     lipschitz = _chain(

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import click
 
-from ndtheory.statements import statements
+from ndtheory.statements import proof_of, statements
 from ndtheory.texts import nearest
-from verification.cli.console import Interrupted, complain, deliver, stages
-from verification.cli.options import FOLDER, JOBS, JSON, STORE, OneOf
+from verification.cli.console import Interrupted, complain, deliver, say, stages
+from verification.cli.options import FOLDER, JOBS, JSON, STORE, OneOf, check_place, one_file
 
 
 @click.command()
@@ -18,26 +19,35 @@ from verification.cli.options import FOLDER, JOBS, JSON, STORE, OneOf
 @click.option(
     "--level",
     type=OneOf(["quick", "full"]),
-    default="quick",
-    show_default=True,
-    help="How many problems the discrete evidence takes: within a minute, or within twenty.",
+    help="How many problems the discrete evidence takes: within a minute, or within twenty.  [default: quick]",
 )
+@one_file(".svg", words="Draw the map of the proof into this file", names=("--map",))
 @FOLDER
 @JSON
-def verify(ids: tuple[str, ...], level: Any, folder: Path | None, as_json: bool) -> int:
+def verify(ids: tuple[str, ...], level: Any, target: Path | None, folder: Path | None, as_json: bool) -> int:
     """Check every numbered statement of the paper, or those named by ID.
 
     Each gets a verdict that was earned: by exact arithmetic, on random problems, by reading, or as a definition; the
     units of both sides are compared too.  Exit status 1 if one differs from its recorded verdict.  -o writes the ledger
     as JSON and Markdown, and of all statements the errata sheet.
 
+    --map draws each ID, or all statements, below what its proof leans on.  An edge is as wide as the powers of ten that
+    its step loses for the built-in problem section6.  With nothing but IDs beside it no statement is checked, and the
+    map has the recorded verdicts.  With --level, -o or --json the statements are checked, and it has what is found.
+
     \b
     Examples:
       ndtheory verify
       ndtheory verify 5.30 prop-5.6 C5
       ndtheory verify --level full -o ledger
+      ndtheory verify thm-5.9 --map proof.svg
     """
     chosen = [one for id in ids for one in _named(id)]
+    if target is not None:
+        check_place(target, "--map")
+        if not (level or folder or as_json):
+            say(_draw(target, chosen, {}))
+            return 0
     from verification.ledger import verify as check
     from verification.output.folder import Folder
     from verification.sections.ledger import sections
@@ -45,12 +55,38 @@ def verify(ids: tuple[str, ...], level: Any, folder: Path | None, as_json: bool)
     write = None if folder is None else Folder(folder, "verify").write
     try:
         with stages() as watch:
-            found = check(chosen, level=level, watch=watch)
+            found = check(chosen, level=level or "quick", watch=watch)
     except KeyboardInterrupt:
         complain("interrupted before every check was done: no verdict is reached")
         raise Interrupted from None
     deliver(found, sections, as_json, write, folder)
+    if target is not None:
+        drawn = _draw(target, chosen, {row.statement.id: row.verdict for row in found.rows})
+        if not as_json:
+            complain(drawn)
     return 1 if found.changed else 0
+
+
+def _draw(target: Path, ids: list[str], found: Mapping[str, str]) -> str:
+    """Write the map of some statements, or of all, with verdicts over the recorded ones; return what is in it."""
+    from verification import build, example, measure
+    from verification.bounds.losses import locate
+    from verification.figures import draw_map
+    from verification.ledger.record import recorded
+    from verification.output.files import staged
+
+    problem, verdicts = example("section6"), recorded() | dict(found)
+    with stages() as watch:
+        pair = build(problem)
+        losses = locate(pair, measure(pair), progress=watch)
+        with staged(target.parent, shown=target) as room:
+            of = f"{problem.title}, in {problem.units['stress']}"
+            text = draw_map(ids, losses=losses, of=of, verdicts=verdicts)
+            (room / target.name).write_text(text, encoding="utf-8")
+    shown = [verdicts.get(id, "INCONCLUSIVE") for id in proof_of(ids or statements())]
+    counts = ", ".join(f"{shown.count(verdict)} {verdict}" for verdict in dict.fromkeys(shown))
+    source = f"{len(found)} as found now, the others as recorded" if found else "with their recorded verdicts"
+    return f"{target}: a map of {len(shown)} statements, {source}: {counts}"
 
 
 def _named(id: str) -> list[str]:

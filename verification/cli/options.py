@@ -101,8 +101,10 @@ def folder_name(context: click.Context, parameter: click.Parameter, value: str |
     return None if value is None else Path(value)
 
 
-def one_file(*endings: str, words: str, required: bool = False) -> Callable[[F], F]:
-    """The option ``-o`` of a command that makes one file, with a name that ends in one of these."""
+def one_file(
+    *endings: str, words: str, required: bool = False, names: Sequence[str] = ("-o", "--output")
+) -> Callable[[F], F]:
+    """The option ``-o``, or another, of a command that makes one file, with a name that ends in one of these."""
     needed = f"a name ending in {' or '.join(endings)}"
 
     def named(context: click.Context, parameter: click.Parameter, value: Path | None) -> Path | None:
@@ -111,8 +113,7 @@ def one_file(*endings: str, words: str, required: bool = False) -> Callable[[F],
         return value
 
     return click.option(
-        "-o",
-        "--output",
+        *names,
         "target",
         type=click.Path(path_type=Path),
         callback=named,
@@ -122,14 +123,14 @@ def one_file(*endings: str, words: str, required: bool = False) -> Callable[[F],
     )
 
 
-def check_place(target: Path) -> None:
+def check_place(target: Path, option: str = "-o") -> None:
     """Raise ProblemError for a file that cannot be written, or that another program has written."""
     from verification.output.files import check_ours
     from verification.problem.tables import ProblemError
 
     if not target.parent.is_dir():
-        raise ProblemError(str(target), "", None, "needed a name in a folder that exists (-o)")
-    check_ours(target)
+        raise ProblemError(str(target), "", None, f"needed a name in a folder that exists ({option})")
+    check_ours(target, option)
 
 
 FOLDER = click.option("-o", "--output", "folder", callback=folder_name, metavar="DIR", help="Folder for the results.")

@@ -58,11 +58,13 @@ MARKS = {
 MOST_BYTES = 500_000_000
 
 
-def check_ours(target: Path) -> None:
+def check_ours(target: Path, option: str = "-o") -> None:
     """Raise ProblemError where writing would replace a file that this program has not written."""
-    check_place(target)
+    check_place(target, option)
     if target.exists() and (unreadable(target, MOST_BYTES) or MARKS[target.suffix] not in target.read_bytes()):
-        raise ProblemError(str(target), "", None, "not written by this program; needed another folder or name (-o)")
+        raise ProblemError(
+            str(target), "", None, f"not written by this program; needed another folder or name ({option})"
+        )
 
 
 def check_folder(room: Path, option: str = "") -> None:
@@ -75,10 +77,10 @@ def check_folder(room: Path, option: str = "") -> None:
         raise ProblemError(str(room), "", None, f"needed a folder to write to{option}: {why}") from None
 
 
-def check_place(target: Path) -> None:
+def check_place(target: Path, option: str = "-o") -> None:
     """Raise ProblemError for the name of a folder."""
     if target.is_dir():
-        raise ProblemError(str(target), "", None, "this is a folder: needed another folder or name (-o)")
+        raise ProblemError(str(target), "", None, f"this is a folder: needed another folder or name ({option})")
 
 
 #: Files are written into a folder of such a name before they take their places.
