@@ -103,7 +103,7 @@ BUDGET = {
     "verification": 1210,
     "verification.advice": 4500,
     "verification.algorithm": 2140,
-    "verification.bounds": 3215,
+    "verification.bounds": 3220,
     "verification.certificate": 1100,
     "verification.cli": 2345,
     "verification.constants": 1100,

@@ -120,6 +120,17 @@ def places(statement: Statement, texts: list[tuple[str, str]]) -> list[str]:
     )
 
 
+def anchor(statement: Statement) -> str:
+    """The id of its heading in the index.
+
+    Examples
+    --------
+    >>> anchor(statements()["5.30"])
+    'statement-5-30'
+    """
+    return "statement-" + re.sub("[^a-z0-9]+", "-", statement.id.lower())
+
+
 def _listed(found: list[str], form: str) -> str:
     shown = [form.format(name) for name in found[:SHOWN]]
     rest = f" and {len(found) - SHOWN} more" if len(found) > SHOWN else ""
@@ -138,6 +149,7 @@ def page() -> str:
     ]
     for statement in statements().values():
         lines += [
+            f"({anchor(statement)})=",
             f"## {statement.label}: {statement.title}",
             "",
             f"Verdict: [{quote(statement.id)}](ledger.md).",

@@ -101,8 +101,8 @@ def load_scripts(app: Sphinx, page: str, template: str, context: dict[str, Any],
     shown = app.env.metadata.get(page, {}).get("widgets", ())
     for file in widgets.scripts(shown):
         app.add_js_file(file, loading_method="defer")
-    if shown:
-        app.add_css_file("widgets.css")
+    for file in widgets.styles(shown):
+        app.add_css_file(file)
 
 
 class Navigation:

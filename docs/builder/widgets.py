@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -14,10 +15,21 @@ import numpy as np
 from scipy.linalg import eigh
 
 import verification as vf
-from builder import stills
+from builder import equations, stills
 from ndtheory import bounds, energy_norms
+from ndtheory.scalar import maximum, minimum
+from ndtheory.statements import Statement, proof_of, statements
+from verification.bounds import losses
 from verification.exploration.javascript import function
-from verification.figures import style
+from verification.figures import proof_map, style
+
+
+def section5_constants(
+    E1: Any, E2: Any, unit: Any, m1: Any, m2: Any, M1: Any, M2: Any, Cs1: Any, Cs2: Any, Ctr: Any
+) -> tuple[Any, Any, Any]:
+    """m, M and C_K/k in a unit of stress, from the moduli and from what :func:`plane` measures."""
+    return minimum(m1 * E1, m2 * E2) / unit, (M1 * E1 + M2 * E2) / unit, maximum(Cs1 * E1, Cs2 * E2) * Ctr / unit
+
 
 #: The formulas that the widgets call, by their name in JavaScript.
 FORMULAS: dict[str, tuple[Callable[..., Any], tuple[str, ...]]] = {
@@ -36,6 +48,19 @@ FORMULAS: dict[str, tuple[Callable[..., Any], tuple[str, ...]]] = {
     "lowerEnd": (bounds.lower_end, ("P",)),
     "oneMinusH1": (bounds.one_minus_h1, ("theta", "D", "Q")),
     "oneMinusH2": (bounds.one_minus_h2, ("theta", "P")),
+    "constants": (section5_constants, ("E1", "E2", "unit", "m1", "m2", "M1", "M2", "Cs1", "Cs2", "Ctr")),
+    "lossQuotients": (losses.quotients, ("m", "M", "CR", *losses.Suprema.__annotations__)),
+}
+
+#: How the largest values of :class:`verification.bounds.losses.Suprema` grow: the powers of the moduli of the contact
+#: body and of the Neumann body.
+POWERS = {
+    "reaction": (2, 0),
+    "energy": (1, -1),
+    "force": (0, 1),
+    "displacement": (0, -1),
+    "displacement_dual": (0, -2),
+    "force_dual": (0, -1),
 }
 
 #: The two bars: stiffness of the contact body, of the Neumann body, and how far the end is moved.
@@ -44,6 +69,9 @@ BARS = {"S1": 3.0, "S2": 1.0, "moved": 0.1}
 #: The thetas of the runs that are shown step by step, and how many steps of each.
 THETAS = tuple(Fraction(n, 20) for n in range(1, 20))
 STEPS = 40
+
+#: The problem of the maps of the proof.
+SETTING = "Section 6, in MPa"
 
 #: One letter for the state of a contact node.
 STICK, SLIP, OPEN = "s", "l", "o"
@@ -56,6 +84,7 @@ def javascript() -> str:
     return "\n".join(["window.ndFormulas = (() => {", *written, f"return {{ {names} }};", "})();", ""])
 
 
+@cache
 def plane() -> dict[str, float]:
     """The constants of Section 6, the lower body being the Neumann body, per unit of Young's modulus.
 
@@ -82,6 +111,54 @@ def plane() -> dict[str, float]:
         "Ct2": even.C_t2.value,
         "E2": 20000.0,
     }
+
+
+@cache
+def searched() -> tuple[losses.Losses, dict[str, float]]:
+    """The losses of Section 6, and the largest values that are eigenvalues, per power of the moduli."""
+    problem = vf.example("section6")
+    pair, measured = vf.build(problem), vf.measure(problem)
+    neumann, contact = (float(body.young) for body in (problem.body1, problem.body2))
+    found = losses.locate(pair, measured)
+    assert found is not None
+    values = vars(losses.suprema(losses.LossForms(pair)))
+    return found, {name: values[name] / contact**a / neumann**b for name, (a, b) in POWERS.items()}
+
+
+def whole_map() -> dict[str, Any]:
+    """All that the theorems, propositions and lemmas of the paper lean on."""
+    kinds = ("theorem", "proposition", "lemma")
+    return _map(list(proof_of([id for id, one in statements().items() if one.kind in kinds])))
+
+
+def chain() -> dict[str, Any]:
+    """The steps that lose something, and how they reach the theorem."""
+    return _map(proof_map.CHAIN)
+
+
+def _map(ids: Collection[str]) -> dict[str, Any]:
+    """A map of statements, their texts, and what it takes to find the losses of its steps at other values."""
+    found, suprema = searched()
+    problem = vf.example("section6")
+    return {
+        "svg": proof_map.draw_map(ids, losses=found, of=SETTING, grounds=False),
+        "nodes": {id: _texts(statements()[id]) for id in ids},
+        "steps": {" ".join(edge): step for edge, step in proof_map.STEPS.items()},
+        "losses": found.to_dict(),
+        "suprema": {name: [suprema[name], *POWERS[name]] for name in POWERS},
+        "exact": losses.EXACT,
+        "base": plane(),
+        "own": {"ratio": float(problem.body1.young / problem.body2.young), "k": float(problem.contact.friction)},
+        "width": proof_map.WIDTH,
+        "printed": " ".join(proof_map.PRINTED),
+    }
+
+
+def _texts(statement: Statement) -> dict[str, Any]:
+    """What a box shows when it is opened; ``at`` is its place in the index of equations."""
+    names = ("title", "verdict", "claims", "wrong", "repair", "proof", "reading", "note")
+    texts = {name: text for name in names if (text := getattr(statement, name))}
+    return texts | {"name": proof_map.number(statement), "leans": statement.leans_on, "at": equations.anchor(statement)}
 
 
 def spectrum() -> dict[str, Any]:
@@ -133,12 +210,18 @@ class Widget:
     data : callable
         What it needs beside the formulas.
     still : callable
-        Draws its first view.
+        Draws its first view, as a figure or as the text of an SVG.
+    script : str
+        The script that fills it, if it has another name.
+    style : str
+        A style sheet that it has beside the common one.
     """
 
     label: str
     data: Callable[[], dict[str, Any]]
     still: Callable[[dict[str, Any]], Any]
+    script: str = ""
+    style: str = ""
 
 
 WIDGETS = {
@@ -157,6 +240,19 @@ WIDGETS = {
         data=spectrum,
         still=stills.spectrum,
     ),
+    "map": Widget(
+        label="Map of the proof: each statement below those that it leans on, with its verdict and what its steps lose",
+        data=whole_map,
+        still=lambda data: data["svg"],
+        style="map.css",
+    ),
+    "chain": Widget(
+        label="Map of the main chain of the proof, with the verdict on each statement and what its steps lose",
+        data=chain,
+        still=lambda data: data["svg"],
+        script="map",
+        style="map.css",
+    ),
 }
 
 
@@ -170,13 +266,24 @@ def write(folder: Path) -> None:
         data = widget.data()
         script = f"(window.ndData = window.ndData || {{}}).{name} = {json.dumps(data, separators=(',', ':'))};\n"
         (folder / f"{name}-data.js").write_text(script, encoding="utf-8")
-        style.save(widget.still(data), folder / f"{name}.svg")
+        still, target = widget.still(data), folder / f"{name}.svg"
+        if isinstance(still, str):
+            target.write_text(still, encoding="utf-8")
+        else:
+            style.save(still, target)
 
 
 def scripts(shown: Iterable[str]) -> list[str]:
     """The scripts of a page that shows these widgets, in the order in which they are loaded."""
-    own = [f"{name}{end}" for name in shown for end in ("-data.js", ".js")]
-    return ["formulas.js", "drawing.js", *own] if own else []
+    names = list(shown)
+    own = [f"{name}-data.js" for name in names] + [f"{WIDGETS[name].script or name}.js" for name in names]
+    return ["formulas.js", "drawing.js", *dict.fromkeys(own)] if own else []
+
+
+def styles(shown: Iterable[str]) -> list[str]:
+    """The style sheets of a page that shows these widgets."""
+    own = [sheet for name in shown for sheet in ("widgets.css", WIDGETS[name].style) if sheet]
+    return list(dict.fromkeys(own))
 
 
 def element(name: str, static: str) -> str:
@@ -189,4 +296,5 @@ def element(name: str, static: str) -> str:
         The way to the folder of the pictures, from the page.
     """
     still = f'<noscript><img src="{static}/{name}.svg" alt="{WIDGETS[name].label}"></noscript>'
-    return f'<figure class="widget" data-widget="{name}" aria-label="{WIDGETS[name].label}">{still}</figure>'
+    page = f'data-site="{static.removesuffix("_static")}"'
+    return f'<figure class="widget" data-widget="{name}" {page} aria-label="{WIDGETS[name].label}">{still}</figure>'

@@ -25,9 +25,9 @@ nd.onPage("plane", (figure) => {
   // The constants at a ratio of the moduli and a unit of stress (MPa).
   function constants() {
     const E1 = base.E2 * 10 ** ratio.value, E2 = base.E2, u = 10 ** unit.value;
+    const [m, M, scale] = f.constants(E1, E2, u, base.m1, base.m2, base.M1, base.M2, base.Cs1, base.Cs2, base.Ctr);
     return {
-      m: Math.min(base.m1 * E1, base.m2 * E2) / u, M: (base.M1 * E1 + base.M2 * E2) / u, CR: base.CR,
-      scale: Math.max(base.Cs1 * E1, base.Cs2 * E2) / u * base.Ctr,
+      m, M, CR: base.CR, scale,
       rho: base.rho * E2 / E1, kappa1: base.CsEnergy * base.Ct1 * Math.sqrt(E1 / E2), kappa2: base.CsEnergy * base.Ct2,
     };
   }

@@ -1,11 +1,13 @@
 """The tools that build the site, for its tests."""
 
+import shutil
 import sys
 from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from browser import chromium
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -25,3 +27,33 @@ def builder():
         return SimpleNamespace(**{name: import_module(f"builder.{name}") for name in names})
     finally:
         sys.path.remove(str(DOCS))
+
+
+@pytest.fixture(scope="module")
+def page(builder, tmp_path_factory):
+    """A page with all widgets and nothing else."""
+    folder = tmp_path_factory.mktemp("widgets")
+    builder.widgets.write(folder)
+    for file in (DOCS / "widgets").iterdir():
+        shutil.copy(file, folder)
+    names = list(builder.widgets.WIDGETS)
+    scripts = "".join(f'<script defer src="{name}"></script>' for name in builder.widgets.scripts(names))
+    body = "".join(builder.widgets.element(name, ".") for name in names)
+    styles = "".join(f'<link rel="stylesheet" href="{name}">' for name in builder.widgets.styles(names))
+    html = f'<!doctype html><meta charset="utf-8">{styles}{scripts}<body>{body}</body>'
+    (folder / "page.html").write_text(html, encoding="utf-8")
+    return folder / "page.html"
+
+
+@pytest.fixture(scope="module")
+def driver():
+    with chromium("--window-size=1000,2400") as found:
+        yield found
+
+
+@pytest.fixture
+def browser(driver, page):
+    driver.get("about:blank")
+    driver.get(page.as_uri())
+    yield driver
+    assert [entry["message"] for entry in driver.get_log("browser")] == []

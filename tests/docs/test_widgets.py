@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import random
 import re
-import shutil
 from math import log10
 from pathlib import Path
 
 import pytest
-from browser import chromium, needs_browser
+from browser import needs_browser
+from widget_page import frame, move, rows, says
 
 import verification as vf
 from ndtheory import PRINTED, REPAIRED, evaluate, evaluate_energy
@@ -20,60 +20,6 @@ DOCS = Path(__file__).parents[2] / "docs"
 
 #: More than any widget may weigh, with what it shares.
 LARGEST = 300_000
-
-
-@pytest.fixture(scope="module")
-def page(builder, tmp_path_factory):
-    """A page with all widgets and nothing else."""
-    folder = tmp_path_factory.mktemp("widgets")
-    builder.widgets.write(folder)
-    for file in (DOCS / "widgets").iterdir():
-        shutil.copy(file, folder)
-    names = list(builder.widgets.WIDGETS)
-    scripts = "".join(f'<script defer src="{name}"></script>' for name in builder.widgets.scripts(names))
-    body = "".join(builder.widgets.element(name, ".") for name in names)
-    html = (
-        f'<!doctype html><meta charset="utf-8"><link rel="stylesheet" href="widgets.css">{scripts}<body>{body}</body>'
-    )
-    (folder / "page.html").write_text(html, encoding="utf-8")
-    return folder / "page.html"
-
-
-@pytest.fixture(scope="module")
-def driver():
-    with chromium("--window-size=1000,2400") as found:
-        yield found
-
-
-@pytest.fixture
-def browser(driver, page):
-    driver.get("about:blank")
-    driver.get(page.as_uri())
-    yield driver
-    assert [entry["message"] for entry in driver.get_log("browser")] == []
-
-
-def frame(browser, name):
-    return browser.find_element("css selector", f"[data-widget={name}]")
-
-
-def says(browser, name):
-    return frame(browser, name).find_element("css selector", ".says").text
-
-
-def move(browser, name, slider, value):
-    browser.execute_script(
-        "const i = document.querySelector(`[data-widget=${arguments[0]}] input[name=${arguments[1]}]`);"
-        "i.value = arguments[2]; i.dispatchEvent(new Event('input'));",
-        name,
-        slider,
-        value,
-    )
-
-
-def rows(browser, name):
-    table = frame(browser, name).find_element("css selector", "table").get_attribute("innerHTML")
-    return [re.findall(r"<td>(.*?)</td>", row) for row in table.split("<tr>") if "<td>" in row]
 
 
 # The formulas.
@@ -184,8 +130,9 @@ def test_runs_of_the_spectrum_are_runs_of_the_library(builder):
 def test_each_widget_weighs_little_and_has_a_picture(page, builder):
     folder = page.parent
     shared = sum((folder / name).stat().st_size for name in ("formulas.js", "drawing.js", "widgets.css"))
-    for name in builder.widgets.WIDGETS:
-        own = sum((folder / file).stat().st_size for file in (f"{name}.js", f"{name}-data.js", f"{name}.svg"))
+    for name, widget in builder.widgets.WIDGETS.items():
+        script = f"{widget.script or name}.js"
+        own = sum((folder / file).stat().st_size for file in (script, f"{name}-data.js", f"{name}.svg"))
         assert own + shared < LARGEST
         assert f'<noscript><img src="./{name}.svg" alt="' in page.read_text(encoding="utf-8")
 

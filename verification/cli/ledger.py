@@ -85,7 +85,7 @@ def _draw(target: Path, ids: list[str], found: Mapping[str, str]) -> str:
             (room / target.name).write_text(text, encoding="utf-8")
     shown = [verdicts.get(id, "INCONCLUSIVE") for id in proof_of(ids or statements())]
     counts = ", ".join(f"{shown.count(verdict)} {verdict}" for verdict in dict.fromkeys(shown))
-    source = f"{len(found)} as found now, the others as recorded" if found else "with their recorded verdicts"
+    source = f"{len(found)} as found now, others as recorded" if found else "with their recorded verdicts"
     return f"{target}: a map of {len(shown)} statements, {source}: {counts}"
 
 

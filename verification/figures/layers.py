@@ -10,6 +10,7 @@ from __future__ import annotations
 from bisect import bisect_right, insort
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from graphlib import TopologicalSorter
 from itertools import accumulate, pairwise
 from statistics import fmean
 
@@ -21,10 +22,7 @@ Item = tuple[str, int]
 Links = Mapping[Item, Sequence[Item]]
 
 #: Number of sweeps over all rows for their order, and for the places in them.
-SWEEPS, PLACING = 30, 120
-
-#: How strongly an edge pulls the items at its ends together, by how many of them are lanes: long edges become straight.
-PULL = (1, 2, 8)
+SWEEPS, PLACING = 30, 80
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +62,7 @@ def layered(
 
     Raises
     ------
-    ValueError
+    graphlib.CycleError
         The edges make a circle.
 
     Examples
@@ -104,15 +102,8 @@ def _rows(above: Mapping[str, Sequence[str]], most: int) -> list[list[str]]:
         for head in heads:
             below[head].add(id)
     depth: dict[str, int] = {}  # the longest chain above each
-    while len(depth) < len(above):
-        found = {
-            id: max((depth[head] + 1 for head in heads), default=0)
-            for id, heads in above.items()
-            if id not in depth and all(head in depth for head in heads)
-        }
-        if not found:
-            raise ValueError("needed a graph without circles")
-        depth |= found
+    for id in TopologicalSorter(above).static_order():
+        depth[id] = max((depth[head] + 1 for head in above[id]), default=0)
     rows: list[list[str]] = []
     placed: set[str] = set()
     while len(placed) < len(above):
@@ -193,20 +184,21 @@ def _placed(
     """The x of each item: in the order of its row, near the mean of its neighbours."""
     x: dict[Item, float] = {}
     for row in rows:
-        x |= zip(row, _spread([width / 2] * len(row), list(map(size, row)), width), strict=True)
+        x |= zip(row, spread([width / 2] * len(row), list(map(size, row)), width), strict=True)
     for sweep in range(PLACING):
         first, second = (up, down) if sweep % 2 == 0 else (down, up)
         for row in rows if sweep % 2 == 0 else rows[::-1]:
             wanted = []
-            for item in row:
+            for item in row:  # a lane goes straight down to where it ends
                 near = [*first[item], *(second[item] if sweep > PLACING / 4 or not first[item] else ())] or [item]
-                pulls = [PULL[lane(item) + lane(other)] for other in near]
-                wanted.append(sum(x[other] * pull for other, pull in zip(near, pulls, strict=True)) / sum(pulls))
-            x |= zip(row, _spread(wanted, list(map(size, row)), width), strict=True)
+                if lane(item):
+                    near = [other for other in down[item] if lane(other)] or list(down[item])
+                wanted.append(fmean([x[other] for other in near]))
+            x |= zip(row, spread(wanted, list(map(size, row)), width), strict=True)
     return x
 
 
-def _spread(wanted: Sequence[float], sizes: Sequence[float], width: float) -> list[float]:
+def spread(wanted: Sequence[float], sizes: Sequence[float], width: float) -> list[float]:
     """Centres without overlap, between 0 and the width, whose squared distances to the wanted ones are least.
 
     Without the sizes before them the centres may not decrease: neighbours that would are given their mean.

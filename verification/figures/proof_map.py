@@ -233,8 +233,8 @@ def _legend(verdicts: Sequence[str], width: float, losses: Losses | None, of: st
         place = f"translate({i % columns * COLUMN},{i // columns * 28 + 14})"
         parts.append(f'<g transform="{place}">{drawn}<text class="legend" x="42" y="4">{escape(words)}</text></g>')
     y = (len(entries) + columns - 1) // columns * 28 + 10
-    for text in texts:
+    for i, text in enumerate(texts):
         for line in textwrap.wrap(text, int(width / LETTER)):
             y += 16
-            parts.append(f'<text class="legend" x="0" y="{y}">{escape(line)}</text>')
+            parts.append(f'<text class="legend{" lost" * (i > 0)}" x="0" y="{y}">{escape(line)}</text>')
     return parts, y + 6.0
