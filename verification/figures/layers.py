@@ -67,7 +67,7 @@ def layered(
 
     Examples
     --------
-    >>> drawn = layered({"a": [], "b": ["a"]}, most=3, box=(20, 10), gap=(4, 6), lane=lambda id: 3)
+    >>> drawn = layered({"a": [], "b": ["a"]}, most=3, box=(20.0, 10.0), gap=(4.0, 6.0), lane=len)
     >>> drawn.edges
     {('a', 'b'): ((12.0, 10.0), (12.0, 16.0))}
     """
