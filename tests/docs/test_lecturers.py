@@ -93,7 +93,7 @@ def test_the_facts_at_the_head_of_the_readme_are_those_of_the_package() -> None:
     versions = [c.rsplit(" ", 1)[1] for c in classifiers if re.search(r":: 3\.\d+$", c)]
     assert pythons == f"Python {', '.join(versions)}"
     assert licence == project["license"]
-    assert (typed == "typed") == ("Typing :: Typed" in classifiers)
+    assert (typed == "with type hints") == ("Typing :: Typed" in classifiers)
     assert any(c.startswith("Development Status") and c.endswith(status.split(": ")[1]) for c in classifiers)
 
 
