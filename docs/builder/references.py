@@ -54,6 +54,9 @@ class References:
             return cited([entries[key.strip()] for key in target.split(",")], in_brackets=role == "cite")
         prefix, _, kind = role.rpartition(":")
         domain = prefix or ("math" if kind == "eq" else "std")
+        if target.startswith("~"):
+            target = target[1:]
+            title = title or target.rpartition(".")[2]
         wanted = pending_xref(
             refdoc=self.page, refdomain=domain, reftype=kind, reftarget=target, refexplicit=bool(title)
         )

@@ -90,7 +90,8 @@ See {doc}`../index`, {doc}`the theory <../index>`, {ref}`small-friction`, {ref}`
 by {prf:ref}`thm-one`, {prf:ref}`lem-two`, {prf:ref}`the theorem <thm-one>`, {eq}`eq-one` and {eq}`eq-two`,
 seen in {numref}`fig-dot`.
 {cite:t}`BayadaSabilSassi2008` and {cite:t}`HueberWohlmuth2005` prove it {cite}`EckWohlmuth2003`.
-The [first page](../index.md) has the {term}`rates <rate>` of {py:func}`run`, or of {py:func}`verification.run <run>`.
+The [first page](../index.md) has the {term}`rates <rate>` of {py:func}`run`, or
+of {py:func}`verification.run <run>`, {py:func}`~run`.
 
 ```{widget} cobweb
 ```
@@ -112,7 +113,8 @@ See *The theory*, the theory, *Small friction*, that part;
 by Theorem 1, Lemma 1, the theorem, (1) and (2),
 seen in Fig. 1.
 Bayada, Sabil and Sassi (2008) and Hüeber and Wohlmuth (2005) prove it (Eck and Wohlmuth 2003).
-The first page has the rates of run, or of verification.run.
+The first page has the rates of run, or
+of verification.run, run.
 
 On the site a picture to move is here: *A page*, COBWEB.
 """
@@ -124,7 +126,8 @@ LINKS = (
 
 MORE_LINKS = (
     "The [first page](https://a.org/b/index.html) has the [rates](https://a.org/b/index.html#term-rate)"
-    " of [run](https://a.org/b/index.html#run), or of [verification.run](https://a.org/b/index.html#run).\n\n"
+    " of [run](https://a.org/b/index.html#run), or\nof [verification.run](https://a.org/b/index.html#run),"
+    " [run](https://a.org/b/index.html#run).\n\n"
     "On the site a picture to move is here: [A page](https://a.org/b/examples/page.html), COBWEB."
 )
 
