@@ -85,6 +85,8 @@ def blocks(section: nodes.Element) -> Iterator[nodes.Node]:
             for part in child.children:
                 if "cell_output" in part["classes"]:
                     yield from part.children
+        elif isinstance(child, nodes.container) and "table-wrapper" in child["classes"]:  # of the theme
+            yield from child.children
         elif not isinstance(child, nodes.section | nodes.title):
             yield child
 

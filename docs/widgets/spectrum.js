@@ -40,7 +40,7 @@ nd.onPage("spectrum", (figure) => {
     v.dot(rho, factor(rho), { fill: nd.COLOURS.orange, r: 4 });
     v.note(rho, factor(rho), "rho", { "text-anchor": "end", dx: -4, dy: -9, "font-style": "italic" });
     v.note(0.98 * most, 1 - 0.05 * high, "above 1: grows", { "text-anchor": "end", dy: -18 });
-    v.note(0.03 * most, factor(0) + 0.05 * high, "an open node");
+    v.note(0.03 * most, factor(0) + (swap.on ? 0.22 : 0.05) * high, "an open node"); // above the stems of the swapped roles
 
     residuals.clear();
     const seen = run.residuals.map((r, i) => [i, Math.max(r, LEAST)]);
