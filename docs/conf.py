@@ -66,6 +66,7 @@ html_title = "ndtheory"
 html_static_path = [
     "site.css",
     "widgets",
+    "slides",
     "generated/widgets",
     str(distribution("sphinx-mathjax-offline").locate_file(f"sphinx-mathjax-offline/static/mathjax/{MATHJAX}")),
 ]

@@ -221,7 +221,7 @@ class Constants(GivenConstants):
 
     @property
     def corners(self) -> tuple[Corner, Corner] | None:
-        """m, M, C_R, C_K and the friction scale where the theorem says most and where it says least.
+        """m, M, C_R, C_K and the friction scale at two corners of their enclosures: strongest and weakest theorem.
 
         It says more the larger m and the smaller the others are (:mod:`ndtheory.bounds`).  None unless a constant was
         given as an enclosure, all others as one or exactly, and m <= M holds throughout.

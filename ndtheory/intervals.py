@@ -100,7 +100,7 @@ class Interval:
         return -self if self.hi <= 0 else Interval(Decimal(0), max(self.lo.copy_negate(), self.hi))
 
     def exp(self) -> Interval:
-        """The exponential, which grows."""
+        """Exponential function; it increases, so that the ends suffice."""
         lo = _down.exp(self.lo)  # correctly rounded to the nearest, whatever the context
         hi = lo if self.hi == self.lo else _down.exp(self.hi)
         return Interval(_down.next_minus(lo), _up.next_plus(hi))

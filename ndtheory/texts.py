@@ -44,7 +44,7 @@ def nearest(word: str, names: Iterable[str], most: int = 1) -> list[str]:
 
 
 def did_you_mean(word: str, names: Iterable[str]) -> str:
-    """A question after the refusal of a word; empty where no name resembles it.
+    """Suggestion to append to an error message; empty where no name resembles it.
 
     >>> did_you_mean("sectoin6", ["two-bars", "section6"])
     "; did you mean 'section6'?"

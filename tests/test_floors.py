@@ -102,7 +102,7 @@ BUDGET = {
     "ndtheory": 5600,
     "verification": 1210,
     "verification.advice": 4500,
-    "verification.algorithm": 2140,
+    "verification.algorithm": 2160,
     "verification.bounds": 3220,
     "verification.certificate": 1100,
     "verification.cli": 2345,

@@ -128,6 +128,7 @@ def solve(problem: Problem | TwoBodies | ContactPair | Path | str) -> Solution:
     Returns
     -------
     Solution
+        ``contact.pressure``, ``contact.shear`` and ``contact.status`` along Gamma_c; ``displacements`` of both bodies.
 
     Raises
     ------

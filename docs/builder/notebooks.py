@@ -24,8 +24,11 @@ FENCE = re.compile(
     re.DOTALL | re.MULTILINE,
 )
 
-#: Roles whose words stand elsewhere on the site; the others show their target.
-REFERENCES = ("doc", "ref", "numref", "eq", "prf:ref", "cite", "cite:t")
+#: A link to another page: its words and that page.
+LINK = re.compile(r"\[([^\]\n]+)\]\(([\w./-]+)\.md(?:#[\w-]+)?\)")
+
+#: Roles that lead to a place on the site or to a work; the others show their target.
+REFERENCES = ("doc", "ref", "numref", "eq", "prf:ref", "cite", "cite:t", "term", "py:func", "py:class", "py:mod")
 
 #: From a role, its target and the words that the page gives it to Markdown.
 Shown = Callable[[str, str, str], str]
@@ -56,8 +59,8 @@ def plain(text: str, values: Mapping[str, str], shown: Shown) -> str:
     >>> shown = lambda role, target, title: title or {"thm-zero": "Theorem 3", "eq-K": "(7)"}[target]
     >>> plain("rho is {glue:text}`rho`, by {prf:ref}`thm-zero` and the {term}`trace <traces>`.", {"rho": "3"}, shown)
     'rho is 3, by Theorem 3 and the trace.'
-    >>> plain("(5.12) is {verdict}`5.12`.", {}, shown)
-    '(5.12) is PROVED.'
+    >>> plain("(5.12) is {verdict}`5.12`, see [two bars](two_bars.md).", {}, shown)
+    '(5.12) is PROVED, see two bars.'
     >>> print(plain(":::{prf:theorem} Small\\n:label: thm-zero\\n\\n$$ K < 1 $$ (eq-K)\\n:::", {}, shown))
     **Theorem 3** (Small)
     <BLANKLINE>
@@ -71,7 +74,7 @@ def plain(text: str, values: Mapping[str, str], shown: Shown) -> str:
         if kind == "dropdown":
             return ""
         if kind == "widget":
-            return f"*The page has a picture to move here: {title}.*"
+            return f"On the site a picture to move is here: {shown('widget', title, '')}."
         inner = plain(body, values, shown)
         if kind.startswith("prf:"):
             label = LABEL.search(options)
@@ -94,6 +97,7 @@ def plain(text: str, values: Mapping[str, str], shown: Shown) -> str:
     text = GLUE.sub(lambda match: values[match[1]], text)
     text = LEDGER.sub(lambda match: quote(*match[1].split()), text)
     text = EQUATION.sub(equation, text)
+    text = LINK.sub(lambda match: shown("doc", match[2], match[1]), text)
     return ROLE.sub(role, text)
 
 

@@ -1,4 +1,4 @@
-"""What the pages need of Sphinx: widgets, notebooks, the index of equations, several processes, a shared navigation."""
+"""Directives and events of the site: widgets, notebooks, the course, equations, several processes, navigation."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sphinx.util.docutils import SphinxDirective
 from sphinx_proof.domain import ProofDomain
 
 import verification as vf
-from builder import equations, notebooks, widgets
+from builder import course, equations, notebooks, slides, widgets
 from builder.references import References
 
 
@@ -42,6 +42,25 @@ class WidgetDirective(SphinxDirective):
         page["widgets"] = sorted({name, *page.get("widgets", ())})
         static = "../" * self.env.docname.count("/") + "_static"
         return [nodes.raw("", widgets.element(name, static), format="html")]
+
+
+class CourseDirective(SphinxDirective):
+    """``{course}``: the map of the course, whose boxes are links."""
+
+    def run(self) -> list[nodes.Node]:
+        docs, page, builder = Path(self.env.srcdir), self.env.docname, self.env.app.builder
+        found = course.pages(docs)
+        for name in found:
+            self.env.note_dependency(f"{name}.md")
+        drawn = course.svg(found, lambda name: builder.get_relative_uri(page, name))
+        return [nodes.raw("", drawn, format="html")]
+
+
+def say_needs(app: Sphinx, page: str, source: list[str]) -> None:
+    """Put what a page of the course needs, and its minutes, where its source has the mark for them."""
+    found = course.read(page, source[0])
+    if found is not None:
+        source[0] = source[0].replace(course.MARK, found.sentence())
 
 
 class gallery(nodes.General, nodes.Element):
@@ -199,6 +218,10 @@ def setup(app: Sphinx) -> dict[str, bool]:
     """Connect all of it."""
     app.add_domain(Proofs, override=True)
     app.add_directive("widget", WidgetDirective)
+    app.add_directive("course", CourseDirective)
+    app.add_role("slides", slides.SlidesRole())
+    app.connect("html-collect-pages", slides.write_decks)
+    app.connect("source-read", say_needs)
     app.add_node(gallery)
     app.add_directive("gallery", GalleryDirective)
     app.connect("doctree-resolved", fill_galleries)

@@ -11,6 +11,8 @@ from pybtex.richtext import Text
 from sphinx.addnodes import pending_xref
 from sphinx.application import Sphinx
 
+from builder.widgets import WIDGETS
+
 #: Where a notebook has neither the title of a page or a section nor a link to it, it is set apart from the sentence.
 TITLES = ("doc", "ref")
 
@@ -34,7 +36,8 @@ class References:
         Parameters
         ----------
         role : str
-            Its name on the page: ``doc``, ``ref``, ``numref``, ``eq``, ``prf:ref``, ``cite`` or ``cite:t``.
+            Its name on the page: one of :data:`builder.notebooks.REFERENCES`; or ``widget``, for the page and the label
+            of a widget.
         target : str
         title : str
             The words that the page gives it; by default those of the target.
@@ -44,11 +47,16 @@ class References:
         KeyError
             There is no such target.
         """
+        if role == "widget":
+            return f"{self('doc', '/' + self.page)}, {WIDGETS[target].label}"
         if role in ("cite", "cite:t"):
             entries = self.app.env.get_domain("cite").bibdata.data.entries
             return cited([entries[key.strip()] for key in target.split(",")], in_brackets=role == "cite")
         prefix, _, kind = role.rpartition(":")
         domain = prefix or ("math" if kind == "eq" else "std")
+        if target.startswith("~"):
+            target = target[1:]
+            title = title or target.rpartition(".")[2]
         wanted = pending_xref(
             refdoc=self.page, refdomain=domain, reftype=kind, reftarget=target, refexplicit=bool(title)
         )
@@ -60,7 +68,8 @@ class References:
         words = title or found.astext()
         if base := self.app.config.html_baseurl:
             here = urljoin(f"{base.rstrip('/')}/", self.app.builder.get_target_uri(self.page))
-            return f"[{words}]({urljoin(here, found.get('refuri') or '#' + found['refid'])})"
+            there = f"#{found['refid']}" if "refid" in found else found["refuri"]
+            return f"[{words}]({urljoin(here, there)})"
         return f"*{words}*" if role in TITLES and not title else words
 
 

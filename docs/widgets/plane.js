@@ -9,7 +9,10 @@ nd.onPage("plane", (figure) => {
     name: "plane",
     question: "Which region moves when stresses are written in GPa instead of MPa?",
     answers: ["all of them", "the printed one", "none"],
-    reveal: () => "Only the printed one: it adds the number 1 to stresses. Move the unit to 1000 MPa, which is 1 GPa, and see. The bodies have not changed, so no true threshold can.",
+    right: "the printed one",
+    reveal: () => "only the printed one, because it adds the number 1 to stresses. The unit is now 1000 MPa, which is 1 GPa: the dashed region "
+      + "has moved from the dotted one. The bodies have not changed, so no true threshold can.",
+    show: () => { unit.value = 3; },
     draw,
   });
   const theta = nd.slider(widget, { name: "theta", label: "theta", low: -18, high: -0.001, step: 0.001, value: Math.log10(0.6), show: (v) => nd.short(10 ** v) });
@@ -20,11 +23,11 @@ nd.onPage("plane", (figure) => {
   const X = { low: LEAST, high: 1, log: true, name: "theta" };
   const Y = { low: LOW, high: HIGH, log: true, name: "friction k" };
   const chart = new nd.Chart({ width: 440, height: 300, label: "Where each form of the theorem proves contraction", x: X, y: Y });
-  widget.pictures.append(chart.root, nd.html("p", { class: "legend" }, "Green: in energy norms. Blue: repaired. Dashed red: printed."));
+  widget.pictures.append(chart.root, nd.html("p", { class: "legend" }, "Green: in energy norms. Blue: repaired. Dashed red: printed (dotted: in MPa)."));
 
   // The constants at a ratio of the moduli and a unit of stress (MPa).
-  function constants() {
-    const E1 = base.E2 * 10 ** ratio.value, E2 = base.E2, u = 10 ** unit.value;
+  function constants(u) {
+    const E1 = base.E2 * 10 ** ratio.value, E2 = base.E2;
     const [m, M, scale] = f.constants(E1, E2, u, base.m1, base.m2, base.M1, base.M2, base.Cs1, base.Cs2, base.Ctr);
     return {
       m, M, CR: base.CR, scale,
@@ -64,7 +67,7 @@ nd.onPage("plane", (figure) => {
   }
 
   function draw() {
-    const c = constants(), k = 10 ** friction.value, t = 10 ** theta.value, close = zoom.on;
+    const c = constants(10 ** unit.value), inMPa = constants(1), k = 10 ** friction.value, t = 10 ** theta.value, close = zoom.on;
     if (close) chart.axes({ low: 0, high: 1, name: "theta" }, { low: 0, high: ZOOM, name: "friction k" });
     else chart.axes(X, Y);
     chart.clear();
@@ -75,19 +78,30 @@ nd.onPage("plane", (figure) => {
       ["printed", (at) => section5(c, true, at), { fill: "none", stroke: nd.COLOURS.red, "stroke-width": 2.5, "stroke-dasharray": "6 3" }],
     ];
     const rows = [], words = [];
-    for (const [name, region, look] of kinds) {
-      const end = name === "in energy norms" ? f.energyLimit(c.rho, c.kappa1, c.kappa2) : threshold(region), highest = Math.min(end, top), left = [], right = [];
+    const outline = (region, end) => {
+      const highest = Math.min(end, top), left = [], right = [];
       for (let i = 0; i <= ROWS && bottom < highest; i += 1) {
         const at = close ? bottom + (highest - bottom) * i / ROWS : bottom * (highest / bottom) ** (i / ROWS);
         const found = region(at * (1 - 1e-9));
         if (found) { left.push([Math.max(found[0], close ? 0 : LEAST), at]); right.push([found[1], at]); }
       }
-      chart.area([...left, ...right.reverse()], { ...look, "data-region": name });
+      return [...left, ...right.reverse()];
+    };
+    for (const [name, region, look] of kinds) {
+      const end = name === "in energy norms" ? f.energyLimit(c.rho, c.kappa1, c.kappa2) : threshold(region);
+      chart.area(outline(region, end), { ...look, "data-region": name });
+      if (!close && name !== "printed") chart.note(3 * LEAST, end / (name === "repaired" ? 1e6 : 1e3), name);
       const here = region(k), inside = here && here[0] < t && t < here[1];
       const said = inside ? `contraction by ${factor(here[2](t))} a step` : "no conclusion";
       rows.push([name, nd.digits(end), here ? `${nd.digits(here[0])} to ${nd.digits(here[1])}` : "none", said]);
       words.push(`${name}: ${said}`);
     }
+    if (unit.value !== 0) {
+      const before = (at) => section5(inMPa, true, at), end = threshold(before);
+      chart.area(outline(before, end), { fill: "none", stroke: nd.COLOURS.red, "stroke-width": 1, "stroke-dasharray": "1 3" });
+      if (!close && Math.abs(unit.value) > 1) chart.note(3 * LEAST, end / 1e3, "printed, in MPa");
+    }
+    if (!close) chart.note(3 * LEAST, 1e3 * LOW, unit.value === 0 ? "printed" : "printed, in this unit");
     chart.line([[t, bottom], [t, top]], { stroke: nd.COLOURS.grey, "stroke-width": 0.7 });
     if (k <= top) chart.dot(t, Math.max(k, bottom), { fill: "currentColor", class: "handle" });
     rows.push(["in energy norms, every small theta", nd.digits(f.energyMultiple(c.kappa1, c.kappa2)), "", ""]);

@@ -4,11 +4,16 @@ nd.onPage("spectrum", (figure) => {
   const { roles, thetas } = ndData.spectrum, LEAST = 1e-10;
   const STATE = { s: ["stick", nd.COLOURS.green, "●"], l: ["slip", nd.COLOURS.orange, "▲"], o: ["open", "#dddddd", "○"] };
 
+  const all = roles[1].eigenvalues, growing = all.filter((x) => ndFormulas.predictedFactor(0.6, x) > 1).length;
+
   const widget = nd.build(figure, {
     name: "spectrum",
     question: "theta = 0.6 works well with the lower, stiffer body as Neumann body. What happens if the roles are swapped?",
     answers: ["it works as well", "it is slower", "it does not converge"],
-    reveal: () => "It does not converge. Swapping the roles turns each eigenvalue into its inverse, and the largest then lies far beyond 2/theta - 1. Press the button.",
+    right: "it does not converge",
+    reveal: () => `it does not converge. Swapping the roles turns each eigenvalue into its inverse. ${growing} of ${all.length} now exceed `
+      + `2/theta - 1 = ${nd.short(2 / 0.6 - 1)}, where the factor is 1; the largest of them, rho, has the largest factor.`,
+    show: () => { theta.value = thetas.indexOf(0.6); step.value = 39; swap.on = true; },
     draw,
   });
   const theta = nd.slider(widget, { name: "theta", label: "theta", low: 0, high: thetas.length - 1, step: 1,
@@ -32,7 +37,10 @@ nd.onPage("spectrum", (figure) => {
     for (const x of values) v.line([[x, 0], [x, factor(x)]], { stroke: nd.COLOURS.red, "stroke-width": 1 });
     for (const x of values) v.dot(x, factor(x), { fill: nd.COLOURS.red, r: 2.5 });
     v.dot(0, factor(0), { fill: "none", stroke: nd.COLOURS.grey, "stroke-width": 2 });
-    v.note(0.02 * most, factor(0) + 0.06 * high, "an open node");
+    v.dot(rho, factor(rho), { fill: nd.COLOURS.orange, r: 4 });
+    v.note(rho, factor(rho), "rho", { "text-anchor": "end", dx: -4, dy: -9, "font-style": "italic" });
+    v.note(0.98 * most, 1 - 0.05 * high, "above 1: grows", { "text-anchor": "end", dy: -18 });
+    v.note(0.03 * most, factor(0) + (swap.on ? 0.22 : 0.05) * high, "an open node"); // above the stems of the swapped roles
 
     residuals.clear();
     const seen = run.residuals.map((r, i) => [i, Math.max(r, LEAST)]);

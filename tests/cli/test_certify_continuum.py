@@ -14,7 +14,7 @@ def test_the_screen_says_that_section_6_contracts_at_its_own_friction(call, writ
     assert answer.status == 0
     assert "Every small theta contracts for k < 0.2357" in said
     assert "theta = 0.4: factor <= 0.9469, guaranteed." in said
-    assert "Not claimed: contraction on a mesh, which may need a smaller theta for good" in said
+    assert "Not claimed: contraction on a mesh, which may need a smaller theta" in said
     assert max(map(len, answer.out.splitlines()[:-1])) <= 80
 
 
@@ -46,7 +46,7 @@ def test_where_gamma_c_reaches_an_end_small_theta_are_proved_and_none_in_numbers
     said = " ".join(answer.out.split())
     assert answer.status == 1
     assert "Every small theta contracts for k < 0.3076" in said
-    assert "For no single theta is anything proved" in said
+    assert "Nothing is proved for any particular theta" in said
     assert "rho >= 19.26 wedges at the ends of Gamma_c" in said
 
 
@@ -84,7 +84,7 @@ def test_a_theta_that_contracts_in_the_continuum_and_not_on_the_mesh_is_shown_wi
     assert (document["verdict"], document["mesh"]["contracts"]) == ("contraction", False)
     assert document["mesh"]["rho_normal"]["level"] == "float"
     assert document["constants"]["rho_normal"]["level"] == "guaranteed"
-    assert "a mesh, which may need a smaller theta for good" in document["not_claimed"]
+    assert "a mesh, which may need a smaller theta" in document["not_claimed"]
     stalled = call("run", path, "--theta", "0.43", "--json")
     assert stalled.document["outcome"] == "stalled"
     assert call("run", path, "--theta", "0.33", "--json").document["outcome"] == "converged"

@@ -35,7 +35,7 @@ BUILT_IN = {"inside": (1, 0), "section6": (0, 0), "section6-190": (0, 0), "signo
 ALIKE = {"section6-60", "section6-666", "section6-2482"}
 
 HEADINGS = {
-    "constants": ["WHAT DOES THE THEOREM NEED TO KNOW?"],
+    "constants": ["WHICH CONSTANTS DOES THE THEOREM USE?"],
     "run": ["WHAT HAPPENED"],
     "solve": ["WHAT IS THE SOLUTION?"],
     "compare": [
@@ -429,7 +429,7 @@ def test_two_thresholds_on_friction_have_two_names_and_the_printed_one_its_unit(
         lines = call(*arguments).out.splitlines()
         head = next(i for i, line in enumerate(lines) if "every small" in line)
         assert lines[head].split() == ["every", "small", "some"]
-        assert lines[head + 1].count(f"theta {on} <") == 2
+        assert lines[head + 1].count(f"theta: {on}<") == 2
         assert any(line.startswith("  printed: its numbers are for stresses in " + unit) for line in lines)
     small = call("compare", write(), "--json").document
     assert small["energy"]["friction_threshold"]["value"] < small["energy"]["friction_limit"]["value"]

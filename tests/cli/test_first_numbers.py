@@ -58,7 +58,7 @@ ORDER = [
     "DOES ONE STEP CONTRACT?",
     "WHAT HAPPENED",
     "--- cvxpy",
-    "  cvxpy alone         ",
+    "  check by cvxpy      ",
     "--- locate",
     "HOW MUCH DOES EACH ESTIMATE LOSE?",
     "--- work_out",

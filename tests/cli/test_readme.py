@@ -64,7 +64,7 @@ def test_the_numbers_that_the_readme_explains_are_those_of_section_6() -> None:
     lower, upper = advice.roles
     text = " ".join(README.split())
     assert f"give rho = {lower.rho.value:.3f}:" in text
-    assert f"(2/1.475 = {2 / (1 + lower.rho.value):.2f})" in text
-    assert f"below theta = {2 / (1 + upper.rho.value):.3f}, and {steps(upper.rate_predicted)} steps are" in text
+    assert f"2/1.475 = {2 / (1 + lower.rho.value):.2f}" in text
+    assert f"below theta = {2 / (1 + upper.rho.value):.3f}, and {steps(upper.rate_predicted)} steps" in text
     assert f"2/2.475 = {lower.theta_predicted:.2f}" in text
     assert f"the same model has rho = {upper.rho.value:.1f}" in text

@@ -145,7 +145,7 @@ def test_nothing_is_pasted_while_a_ratio_has_several_readings(call, ratio):
 def test_the_screen_of_a_run_says_which_residual_is_meant_and_what_is_sure(call):
     flat = " ".join(call("advise", "run", "--theta", "0.1", "--ratio", "1.4").out.split())
     for said in (
-        "|Tg - g| changes by 1.4 a step, absolute and unrelaxed",
+        "|Tg - g| is multiplied by 1.4 in each step, absolute and unrelaxed",
         "For the relative residual |Tg - g|/|Tg| that coupling libraries log, use --log",
         "without friction rho is at least 19, nothing more; with friction this does not bound rho",
         "rho is at least 23",

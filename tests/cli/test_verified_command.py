@@ -23,7 +23,7 @@ def test_the_screen_shows_ends_that_lie_outside_those_of_the_document(call, writ
         assert low <= F(number["lo"])
         assert F(number["hi"]) <= high
     assert document.document["unverified"] == {}
-    assert "all rounding errors bounded" in " ".join(screen.out.split())
+    assert "rounding included" in " ".join(screen.out.split())
     assert max(map(len, screen.out.splitlines()[:-1])) <= 80  # the last one names the file
 
 

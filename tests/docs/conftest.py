@@ -23,7 +23,7 @@ def builder():
     """The modules of ``docs/builder`` that need no Sphinx; they lie in a folder of scripts, not in a package."""
     sys.path.append(str(DOCS))
     try:
-        names = ("api", "cheat_sheet", "equations", "notebooks", "widgets")
+        names = ("api", "cheat_sheet", "course", "equations", "notebooks", "widgets")
         return SimpleNamespace(**{name: import_module(f"builder.{name}") for name in names})
     finally:
         sys.path.remove(str(DOCS))
@@ -52,8 +52,18 @@ def driver():
 
 
 @pytest.fixture
-def browser(driver, page):
+def unanswered(driver, page):
+    """The page as a reader finds it."""
     driver.get("about:blank")
     driver.get(page.as_uri())
+    yield driver
+    assert [entry["message"] for entry in driver.get_log("browser")] == []
+
+
+@pytest.fixture
+def browser(driver, page):
+    """The page with an address that holds a state of each widget, so that no question is asked."""
+    driver.get("about:blank")
+    driver.get(f"{page.as_uri()}#cobweb.theta=1&plane.unit=0&spectrum.step=0")
     yield driver
     assert [entry["message"] for entry in driver.get_log("browser")] == []

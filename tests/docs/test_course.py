@@ -163,7 +163,7 @@ def test_the_notebook_of_a_page_says_what_the_page_says_without_its_solutions(pa
     for quoted in re.findall(r"\{(?:verdict|ledger)\}`([^`]+)`", SOLUTION.sub("", text)):
         assert quote(*quoted.split()) in told
     for widget in re.findall(r"\{widget\} (\w+)", text):
-        assert f"a picture to move here: {widget}" in told
+        assert f"On the site a picture to move is here: [{widget}]." in told
     assert "Solution" not in told
     for solution in SOLUTION.findall(text):
         first = max(re.split(r"[`{}$\n]", solution), key=len)

@@ -104,6 +104,19 @@ def test_the_table_and_the_button_show_the_losses_of_the_problem(browser):
 
 @needs_browser
 @pytest.mark.parametrize("name", MAPS)
+def test_the_question_is_answered_with_the_numbers_of_the_problem(browser, name):
+    losses = of_the_library(values(browser, name))
+    frame(browser, name).find_elements("css selector", ".ask button")[0].click()
+    told = frame(browser, name).find_element("css selector", ".told").text
+    unit = next(loss for loss in losses.friction if loss.only_unit)
+    most = max((loss for loss in losses.friction if not loss.only_unit), key=lambda loss: loss.decades)
+    assert told.startswith("You said: (5.13)")
+    assert f"the unit of stress adds {unit.decades:.1f}" in told
+    assert f"{most.label} loses most: {most.decades:.1f}" in told
+
+
+@needs_browser
+@pytest.mark.parametrize("name", MAPS)
 def test_a_box_opens_its_statement_by_keys(browser, name):
     from selenium.webdriver import ActionChains, Keys
 

@@ -13,6 +13,7 @@ import sys
 from pathlib import Path
 
 sys.path.append({docs!r})
+from sphinx.util.docutils import SphinxDirective
 from builder.notebooks import plain
 from builder.references import References
 
@@ -26,12 +27,28 @@ def write(app, failed):
     (Path(app.outdir) / "told.md").write_text(plain(text, {{}}, References(app, "examples/page")), "utf-8")
 
 
+class Widget(SphinxDirective):
+    required_arguments = 1
+
+    def run(self):
+        return []
+
+
 def setup(app):
+    app.add_directive("widget", Widget)
     app.connect("build-finished", write)
 """
 
 INDEX = """\
 # The theory
+
+```{py:function} run(problem)
+```
+
+```{glossary}
+rate
+  A number.
+```
 
 (small-friction)=
 ## Small friction
@@ -73,6 +90,11 @@ See {doc}`../index`, {doc}`the theory <../index>`, {ref}`small-friction`, {ref}`
 by {prf:ref}`thm-one`, {prf:ref}`lem-two`, {prf:ref}`the theorem <thm-one>`, {eq}`eq-one` and {eq}`eq-two`,
 seen in {numref}`fig-dot`.
 {cite:t}`BayadaSabilSassi2008` and {cite:t}`HueberWohlmuth2005` prove it {cite}`EckWohlmuth2003`.
+The [first page](../index.md) has the {term}`rates <rate>` of {py:func}`run`, or
+of {py:func}`verification.run <run>`, {py:func}`~run`.
+
+```{widget} cobweb
+```
 """
 
 TOLD = """\
@@ -91,6 +113,10 @@ See *The theory*, the theory, *Small friction*, that part;
 by Theorem 1, Lemma 1, the theorem, (1) and (2),
 seen in Fig. 1.
 Bayada, Sabil and Sassi (2008) and Hüeber and Wohlmuth (2005) prove it (Eck and Wohlmuth 2003).
+The first page has the rates of run, or
+of verification.run, run.
+
+On the site a picture to move is here: *A page*, COBWEB.
 """
 
 LINKS = (
@@ -98,9 +124,16 @@ LINKS = (
     " [Small friction](https://a.org/b/index.html#small-friction)"
 )
 
+MORE_LINKS = (
+    "The [first page](https://a.org/b/index.html) has the [rates](https://a.org/b/index.html#term-rate)"
+    " of [run](https://a.org/b/index.html#run), or\nof [verification.run](https://a.org/b/index.html#run),"
+    " [run](https://a.org/b/index.html#run).\n\n"
+    "On the site a picture to move is here: [A page](https://a.org/b/examples/page.html), COBWEB."
+)
+
 
 @pytest.fixture
-def told(site_tools, tmp_path):
+def told(site_tools, builder, tmp_path):
     """From the place of a site to the text of its page; without the tools of the site there is none."""
 
     def build(name, base):
@@ -114,12 +147,16 @@ def told(site_tools, tmp_path):
 
     folders = [build("here", ""), build("hosted", "https://a.org/b")]
     assert sites(*folders) == "here 0\nhosted 0\n"
-    return {folder.name: (folder / "built" / "told.md").read_text("utf-8") for folder in folders}
+    label = builder.widgets.WIDGETS["cobweb"].label
+    return {
+        folder.name: (folder / "built" / "told.md").read_text("utf-8").replace(label, "COBWEB") for folder in folders
+    }
 
 
 def test_references_are_words_in_a_notebook_and_links_once_the_site_has_an_address(told):
     assert told["here"] == TOLD
     assert LINKS in told["hosted"]
+    assert MORE_LINKS in told["hosted"]
     assert (
         "by [Theorem 1](https://a.org/b/index.html#thm-one), [Lemma 1](https://a.org/b/examples/page.html#lem-two)"
         in (told["hosted"])

@@ -13,6 +13,7 @@ from widget_page import frame, move, rows, says
 
 import verification as vf
 from ndtheory import PRINTED, REPAIRED, evaluate, evaluate_energy
+from ndtheory.energy_norms import predicted_factor
 from verification.algorithm.fixed_point import FixedPointMap
 from verification.exploration.javascript import function
 
@@ -140,16 +141,61 @@ def test_each_widget_weighs_little_and_has_a_picture(page, builder):
 # The pictures.
 
 
+#: Widget -> the right answer, and what the picture says afterwards.
+ANSWERS = {
+    "cobweb": ("nowhere: it goes round for ever", "theta = 1.00: in contact each step multiplies the error by 3"),
+    "plane": ("the printed one", "In this unit m = 3.08"),
+    "spectrum": ("it does not converge", "upper body Neumann, rho = 11.3, theta = 0.60: the largest factor is 6.41"),
+}
+
+
+def test_each_widget_with_a_right_answer_is_answered_below(builder):
+    scripts = {path.stem: path.read_text("utf-8") for path in (DOCS / "widgets").glob("*.js")}
+    found = builder.widgets.WIDGETS.items()
+    assert {name for name, one in found if "\n    right: " in scripts[one.script or name]} == set(ANSWERS)
+
+
 @needs_browser
-def test_a_prediction_comes_first_and_is_answered(browser, builder):
-    for name in builder.widgets.WIDGETS:
-        told = frame(browser, name).find_element("css selector", ".told")
-        assert not told.is_displayed()
-        answer = frame(browser, name).find_elements("css selector", ".ask button")[0]
-        said = answer.text
-        answer.click()
-        assert told.text.startswith(f"You said: {said}.")
-        assert not answer.is_displayed()
+@pytest.mark.parametrize("name", ANSWERS)
+@pytest.mark.parametrize("choice", [0, 1, 2, 3])
+def test_the_outcome_is_hidden_until_a_choice_is_made_which_is_then_judged(unanswered, name, choice):
+    """Three answers, and to be shown it without one."""
+    right, shown = ANSWERS[name]
+    widget = frame(unanswered, name)
+    hidden = widget.find_elements("css selector", ".told, .controls, .says, details, .link")
+    assert len(hidden) == 5
+    assert not any(part.is_displayed() for part in hidden)
+    answer = widget.find_elements("css selector", ".ask button")[choice]
+    said = answer.text
+    assert (said == "Just show me") == (choice == 3)
+    answer.click()
+    told = widget.find_element("css selector", ".told").text
+    assert told.startswith("Answer: " if choice == 3 else "Right: " if said == right else "Not quite: ")
+    assert all(part.is_displayed() for part in hidden)
+    assert not answer.is_displayed()
+    assert shown in says(unanswered, name)
+
+
+@needs_browser
+def test_the_cobweb_and_its_factors_are_drawn_after_the_answer(unanswered):
+    charts = frame(unanswered, "cobweb").find_elements("css selector", "svg.chart")
+    curves = "path.curve"
+    before = len(charts[0].find_elements("css selector", curves))
+    assert [chart.is_displayed() for chart in charts] == [True, False]
+    frame(unanswered, "cobweb").find_element("css selector", ".reveal").click()
+    assert [chart.is_displayed() for chart in charts] == [True, True]
+    assert len(charts[0].find_elements("css selector", curves)) == before + 1
+
+
+@needs_browser
+def test_a_count_in_the_answer_of_the_spectrum_is_that_of_the_library(unanswered, builder):
+    _, swapped = builder.widgets.section6_in_both_roles()
+    eigenvalues = builder.widgets.spectrum()["roles"][1]["eigenvalues"]
+    growing = [value for value in eigenvalues if predicted_factor(0.6, value) > 1]
+    frame(unanswered, "spectrum").find_element("css selector", ".reveal").click()
+    told = frame(unanswered, "spectrum").find_element("css selector", ".told").text
+    assert f"{len(growing)} of {len(eigenvalues)} now exceed 2/theta - 1 = 2.33" in told
+    assert not vf.run(swapped, theta="0.6").converged
 
 
 @needs_browser

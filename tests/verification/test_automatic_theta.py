@@ -49,8 +49,8 @@ def test_the_proved_theta_is_taken_unless_it_needs_more_than_twice_the_steps(rho
     assert chosen.source == ("predicted" if slow else "proved")
     assert float(chosen.theta) == (energy.theta_predicted if slow else energy.theta_proved)
     if kappa:
-        assert f"{predicted if slow else proved} steps predicted" in chosen.why
-        assert f" {proved if slow else predicted} at the" in chosen.why
+        assert f"{predicted if slow else proved} steps" in chosen.why
+        assert f" {proved if slow else predicted} {'at' if slow else 'of'} the" in chosen.why
 
 
 def test_both_sources_occur_among_those_cases():
@@ -76,7 +76,7 @@ def test_the_flagship_keeps_its_proved_theta_though_its_bound_asks_for_many_step
     assert float(chosen.theta) == pytest.approx(0.7012, abs=1e-4)
     bound = math.log(1e-9) / math.log(energy.factor_proved.value)
     assert bound > 2 * math.log(1e-9) / math.log(energy.rate_predicted)
-    assert chosen.why.startswith("18 steps predicted, at most twice the 13 ")
+    assert chosen.why.startswith("18 steps expected, at most twice the 13 ")
     finished = vf.run(section6, theta="auto")
     assert (finished.converged, finished.iterations) == (True, 17)
 

@@ -142,7 +142,7 @@ def test_showing_a_result_computes_nothing(problem, monkeypatch):
 @pytest.mark.parametrize("name", NAMES)
 def test_a_notebook_shows_what_the_screen_shows(results, name):
     questions = {
-        "Measured": "WHAT DOES THE THEOREM NEED TO KNOW?",
+        "Measured": "WHICH CONSTANTS DOES THE THEOREM USE?",
         "Run": "WHAT HAPPENED",
         "Solution": "WHAT IS THE SOLUTION?",
         "Comparison": "DOES THE RUN AGREE WITH THE BOUND?",

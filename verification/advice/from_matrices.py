@@ -78,7 +78,7 @@ def advise_matrices(
     ----------
     S1, S2 : array, sparse array, LinearOperator or callable
         Schur complements of bodies 1 and 2 on the interface, or ``u -> S u``.  Symmetric, positive semidefinite; a
-        matrix may be asymmetric by TOLD of its largest entry.
+        matrix may be asymmetric by 0.001 of its largest entry.
     solve1, solve2 : callable, LinearOperator or matrix, optional
         ``f -> S1^-1 f`` and ``f -> S2^-1 f``, as a solver with the Neumann problem of that body does them: S1 and
         solve2 suffice for the role in which body 2 has the Neumann problem.  A matrix S needs none.

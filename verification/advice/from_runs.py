@@ -36,8 +36,9 @@ ONE_END = "residuals show one end of the spectrum"
 def advise_run(theta: Numeric, ratio: Numeric, *, tied: bool = False, friction: bool = False) -> Advice:
     """Advice from one run of any code with constant theta: bounds of rho, and the run to make next.
 
-    While contact does not change, a mode is multiplied by ``1 - theta (1 + lambda)`` in a step, with lambda at most
-    rho, and an open node by ``1 - theta``.  A residual has no sign, so that a ratio r of residuals can mean
+    While contact does not change, a mode is multiplied by ``1 - theta (1 + lambda)`` in a step, with lambda, the
+    stiffness ratio of this mode, at most rho, and an open node by ``1 - theta``. A residual has no sign, so that a
+    ratio r of residuals can mean
 
     * ``mode-high``: ``lambda = (1 + r)/theta - 1``.  Without friction or tied, rho is at least that wherever
       ``r > 1 - theta``, since no step is longer than ``max(1 - theta, |1 - theta - theta rho|)``;
@@ -67,7 +68,8 @@ def advise_run(theta: Numeric, ratio: Numeric, *, tied: bool = False, friction: 
     Returns
     -------
     Advice
-        Without roles while several readings are left.
+        Without roles while several readings are left: ``best`` then raises ValueError, and ``next.theta`` is the theta
+        of the run to make.
 
     Raises
     ------

@@ -204,7 +204,7 @@ def _settling(tail: Floats, relative: bool, limit: float, steps: int) -> dict[st
 
 
 def _slopes(logs: Floats, lag: int) -> Floats:
-    """Logarithms of the mean ratio over so many steps."""
+    """Logarithms of the mean ratio over ``lag`` steps."""
     return (logs[lag:] - logs[:-lag]) / lag
 
 

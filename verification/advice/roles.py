@@ -430,7 +430,7 @@ class Advice(Document):
         found = {name: to_plain(getattr(self, name)) for name in names}
         same = "both roles have the same bounds"
         missing = {
-            "neumann_body": same if self.moduli else "one run tells nothing of the other assignment",
+            "neumann_body": same if self.moduli else "one run gives no information about the exchanged roles",
             "run": "logs were given" if self.logs else "no run was given",
             "next": "no run was given",
             "interval": "no logs were given",
@@ -463,6 +463,8 @@ def advise(problem: Problem | ContactPair | Path | str, *, tied: bool = False, p
     Returns
     -------
     Advice
+        ``neumann_body`` is the body to read forces; ``best.theta_predicted``, ``best.rate_predicted`` and ``best.rho``
+        belong to it; ``roles`` has both assignments.
 
     Raises
     ------

@@ -201,7 +201,7 @@ class SeenLog:
 
     @property
     def made(self) -> Made:
-        """Input of the choice of the next run."""
+        """Data from which the next run is chosen."""
         most = None if self.slowest is None else self.slowest.most
         return Made(theta=self.theta, falls=self.falls, rises=self.diverges, ratio=most)
 

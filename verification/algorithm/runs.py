@@ -64,7 +64,7 @@ class Run(Document):
     start : Start
         g_0 and where it comes from.
     iterates : tuple of Iterate
-        At least one.
+        At least one; ``iterations``, ``history``, ``observed_rate`` and ``contact`` follow from them.
     outcome : {'converged', 'stalled', 'limit', 'diverged', 'interrupted'}
     interrupted : bool
         True if Ctrl-C ended the run, or what was to be worked out after it: nothing is linearised then.
@@ -144,7 +144,10 @@ class Run(Document):
 
     @property
     def observed_rate(self) -> ObservedRate | None:
-        """The rate at the end of the run; None where too few steps are clear of the noise, or the run diverged."""
+        """Factor of the error per step at the end of the run: ``value``, between ``lo`` and ``hi``.
+
+        None where too few steps are clear of the noise, or the run diverged.
+        """
         return None if self.outcome == "diverged" else self._at_the_end
 
     @property
@@ -331,6 +334,10 @@ def _finite(value: float) -> float | None:
     return value if np.isfinite(value) else None
 
 
+def unwatched(iterate: Iterate) -> None:
+    """Show nothing."""
+
+
 def check_memory(pair: ContactPair) -> None:
     """Refuse, by a ProblemError, a run whose iterates would not fit into memory: every one is kept."""
     most, asked = MOST_BYTES // (ITERATE_BYTES + 4 * 8 * pair.neumann.grid.size), pair.settings.max_iterations
@@ -347,19 +354,20 @@ def run(
     rule: Rule | str | None = None,
     start: ArrayLike | None = None,
     solver: Solver = "auto",
-    watch: Callable[[Iterate], None] = lambda iterate: None,
+    watch: Callable[[Iterate], None] = unwatched,
     measured: Measured | None = None,
 ) -> Run:
     """Run the algorithm until it converges, stalls, diverges, reaches its limit, or Ctrl-C ends it.
 
-    It has converged where ``|||T g - g|||`` is at most the tolerance times the larger of ``|||g|||`` and ``|||T g|||``,
-    and the joined state satisfies the contact laws (:func:`verification.algorithm.ending.arrived`).
+    g are the forces that the bodies exchange, T g those after one step without relaxation. The run has converged
+    where ``|||T g - g|||`` is at most the tolerance times the larger of ``|||g|||`` and ``|||T g|||``, and the
+    joined state satisfies the contact laws (:func:`verification.algorithm.ending.arrived`).
 
     Parameters
     ----------
     problem : Problem, ContactPair or path
-    theta : number or 'auto', optional
-        Relaxation factor, 0 < theta < 1; the problem's by default.
+    theta : number, str or 'auto', optional
+        Relaxation factor, 0 < theta < 1; the problem's by default.  A text such as "0.6" is read exactly.
     rule : Rule or str, optional
         The relaxation rule, or the name of one; the problem's by default.
     start : array, shape (2 n,), optional

@@ -151,7 +151,7 @@ def automatic(energy: EnergyBounds, outside: Sequence[str] = (), tolerance: floa
     if of_proved > TOO_SLOW * of_predicted:
         why = f"{of_predicted} steps predicted, against {of_proved} at the proved theta {float(proved):.4g}"
         return Choice(theta=predicted, source="predicted", rho=rho, why=why)
-    why = f"{of_proved} steps predicted, at most twice the {of_predicted} at the predicted theta {float(predicted):.4g}"
+    why = f"{of_proved} steps expected, at most twice the {of_predicted} of the predicted theta {float(predicted):.4g}"
     if energy.friction_multiple is None:
         why = "without friction the predicted one is proved"
     return Choice(theta=proved, source="proved", rho=rho, why=why)

@@ -143,7 +143,9 @@ def check_plane(pair: ContactPair, measured: Measured) -> None:
     if measured.constants() is None and measured.energy_constants() is None:
         raise ProblemError(problem.source, "contact", None, measured.why_no_constants)
     if measured.friction_threshold is None or measured.friction_limit is None:
-        raise ProblemError(problem.source, "contact.radius", None, "needed a law of friction to vary k")
+        raise ProblemError(
+            problem.source, "contact.radius", None, "needed a law of friction, with its radius, to vary k"
+        )
 
 
 def _point(row: Row) -> Point:

@@ -206,7 +206,7 @@ class SemidefiniteBound(Bound):
 def _why_not(
     interval: tuple[float, float] | None, threshold: Number | None, friction: float, theta: float | None
 ) -> str:
-    """Why a bound has no conclusion at a theta."""
+    """Reason why a bound has no conclusion at a theta."""
     if interval is not None and theta is not None:
         return f"theta = {theta:g} is outside ({interval[0]:.2g}, {interval[1]:.2g})"
     scale = threshold.value if threshold is not None else float("inf")

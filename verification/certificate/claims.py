@@ -95,7 +95,9 @@ class Confirmation:
         if pair.problem is None:
             raise NoCertificate(FROM_MATRICES)
         if pair.problem.dimension != 2:
-            raise NoCertificate("needed a plane problem: in 1D rho is a ratio of exact numbers")
+            raise NoCertificate(
+                "needed a plane problem (dimension = 2): in 1D rho is a ratio of stiffnesses, which needs no proof"
+            )
         if pair.outside:
             raise NoCertificate(f"outside the theorem: {pair.outside[0]}")
         try:

@@ -40,7 +40,7 @@ ANY_RADIUS = Fraction(1)
 
 #: Claims that no number here makes.
 NOT_CLAIMED = (
-    "contraction on a mesh, which may need a smaller theta for good, however fine it is; the local Coulomb law, other"
+    "contraction on a mesh, which may need a smaller theta however fine it is; the local Coulomb law, other"
     " kernels than the hat, unloading, rounding and discretisation errors of a run; that the iteration diverges at a"
     " larger friction or theta"
 )

@@ -153,7 +153,10 @@ def certify(
     if edition not in certifying():
         raise ValueError(f"edition {edition!r}: needed one of {', '.join(certifying())}")
     if problem.dimension != 2:
-        raise refuse("dimension", "needed a plane problem: in 1D rho is a ratio of exact numbers")
+        raise refuse(
+            "dimension",
+            "needed a plane problem (dimension = 2): in 1D rho is a ratio of stiffnesses, which needs no proof",
+        )
     pair = pair_from(problem)
     measured = measure(pair)
     if pair.outside:

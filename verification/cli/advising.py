@@ -233,7 +233,7 @@ def run(
     snippets: str | None,
     as_json: bool,
 ) -> None:
-    """What do runs of any other code say of rho?
+    """Bound rho from runs of any other code.
 
     Runs with constant theta (no unit), as logs or as the ratio of the residuals of one run: what these can mean, and
     which theta to run next.  Without --friction they are read as runs without friction.  Give the ratio of the absolute
@@ -303,7 +303,7 @@ def moduli(
     flat: bool,
     as_json: bool,
 ) -> None:
-    """What do material data alone say, before there is a mesh?
+    """Bound rho from the moduli, before there is a mesh.
 
     The moduli of both bodies bound rho (no unit) from below, in both roles.  E is in any one unit of stress.  A theta
     to start with is proved only where the mirror image of one body fits into the other: say so with --mirror.

@@ -35,8 +35,18 @@ OPTIONS = {key: f"--{key.replace('_', '')}" for key in (*SECTION_5, *ENERGY)}
     help="Editions of Section 5.",
 )
 @click.option("--rho", metavar="NUMBER", help="Bound in energy norms: stiffness ratio of the bodies on Gamma_c.")
-@click.option("--kappa1", "kappa_1", metavar="NUMBER", help="Bound in energy norms: k C_s C_t1; 0 without friction.")
-@click.option("--kappa2", "kappa_2", metavar="NUMBER", help="Bound in energy norms: k C_s C_t2; 0 without friction.")
+@click.option(
+    "--kappa1",
+    "kappa_1",
+    metavar="NUMBER",
+    help="Bound in energy norms: k C_s_energy C_t1, see `constants`; 0 without friction.",
+)
+@click.option(
+    "--kappa2",
+    "kappa_2",
+    metavar="NUMBER",
+    help="Bound in energy norms: k C_s_energy C_t2, see `constants`; 0 without friction.",
+)
 @click.option("--check", is_flag=True, help="Exit 1 unless contraction at theta is proved.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout.")
 def bounds(edition: str, theta: str | None, check: bool, as_json: bool, **given: str | None) -> int:

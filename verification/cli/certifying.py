@@ -30,7 +30,7 @@ def _editions() -> Sequence[str]:
 @SWAP
 @click.option("--edition", type=Registered(_editions), help="Bound that proposes the factor; the strongest by default.")
 @click.option(
-    "--continuum", is_flag=True, help="Of FILE without its mesh: two rectangles, each held at its outer side."
+    "--continuum", is_flag=True, help="Prove it without a mesh, for two rectangles, each held at its outer side."
 )
 @one_file(".json", words="File of the certificate")
 @click.option(
@@ -54,9 +54,9 @@ def certify(
 ) -> int:
     """Prove that one step contracts on the meshes of FILE in exact numbers, or in the continuum.
 
-    The certificate of a mesh holds the bodies in rational numbers and the multipliers that prove the factor.  Whoever
-    doubts it checks it with a script of some 200 lines, verification/certificate/check.py, which imports nothing of
-    this program (only python-flint, for balls).  Exit 1 where contraction is not proved.
+    The certificate of a mesh holds the bodies in rational numbers and the multipliers that prove the factor.  Anyone
+    can check it with a script of some 200 lines, verification/certificate/check.py, which imports nothing of this
+    program (only python-flint, for interval arithmetic).  Exit 1 where contraction is not proved.
 
     \b
     Examples:

@@ -27,9 +27,9 @@ from verification.cli.options import FOLDER, JOBS, JSON, STORE, OneOf, check_pla
 def verify(ids: tuple[str, ...], level: Any, target: Path | None, folder: Path | None, as_json: bool) -> int:
     """Check every numbered statement of the paper, or those named by ID.
 
-    Each gets a verdict that was earned: by exact arithmetic, on random problems, by reading, or as a definition; the
-    units of both sides are compared too.  Exit status 1 if one differs from its recorded verdict.  -o writes the ledger
-    as JSON and Markdown, and of all statements the errata sheet.
+    Each verdict rests on exact arithmetic, random problems, reading or definition; units of both sides are compared.
+    Exit status 1 if a verdict differs from the recorded one.  -o writes the ledger as JSON and Markdown and, if all
+    statements are checked, the errata sheet.
 
     --map draws each ID, or all statements, below what its proof leans on.  An edge is as wide as the powers of ten that
     its step loses for the built-in problem section6.  With nothing but IDs beside it no statement is checked, and the
@@ -98,7 +98,7 @@ def _named(id: str) -> list[str]:
         context = click.get_current_context()
         from verification.problem.tables import short
 
-        raise click.UsageError(f"{short(id)!r}: no such statement; needed one like {', '.join(near)}", context)
+        raise click.UsageError(f"{short(id)!r}: no such statement; similar: {', '.join(near)}", context)
     return parts
 
 
@@ -112,7 +112,7 @@ NAMES = ("fig5", "fig10", "fig11", "fig12", "all")
 @FOLDER
 @JSON
 def reproduce(figure: str, jobs: int | None, store: Path | None, folder: Path | None, as_json: bool) -> None:
-    """Run the experiment behind a figure of Section 6, beside what the paper says of it.
+    """Run the experiment behind a figure of Section 6, and compare it with the paper.
 
     The text leaves open where the upper body sits (2 x 0.3 mm and 1.2 x 0.3 mm, E in MPa), whether its top may slide,
     and names the roles of the bodies in two ways.  Half models and exchanged moduli, which depart from the text, are

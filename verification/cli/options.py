@@ -74,16 +74,16 @@ RELAXATION = click.option(
     "--relaxation",
     type=Registered(_rules),
     metavar="RULE",  # a list of the names would import the rules, and arrays with them
-    help="Rule of relaxation, over the file's; all but constant are outside the theorem.  A wrong name lists them.",
+    help="Rule of relaxation, instead of the file's; all but constant are outside the theorem. A wrong name lists all.",
 )
-THETA = click.option("--theta", metavar="NUMBER", help="Relaxation factor, 0 < theta < 1, over the file's.")
-SWAP = click.option("--swap-roles", "swap", is_flag=True, help="Give the Neumann problem to the other body.")
+THETA = click.option("--theta", metavar="NUMBER", help="Relaxation factor, 0 < theta < 1, instead of the file's.")
+SWAP = click.option("--swap-roles", "swap", is_flag=True, help="Exchange the roles of the bodies.")
 SOLVER = click.option(
     "--solver",
     type=OneOf(["auto", "cvxpy", "active-set"]),
     default="auto",
     show_default=True,
-    help="Who solves step II.",
+    help="Solver of step II, the contact problem.",
 )
 
 
@@ -136,7 +136,7 @@ def check_place(target: Path, option: str = "-o") -> None:
 FOLDER = click.option("-o", "--output", "folder", callback=folder_name, metavar="DIR", help="Folder for the results.")
 
 JOBS = click.option(
-    "--jobs", type=click.IntRange(1), metavar="N", help="How many processes run at once; one for each core by default."
+    "--jobs", type=click.IntRange(1), metavar="N", help="Number of processes; one for each core by default."
 )
 STORE = click.option(
     "--store", type=click.Path(path_type=Path), metavar="STORE", help="File that keeps the rows of runs (SQLite)."

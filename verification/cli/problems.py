@@ -209,7 +209,9 @@ def _bounds(context: click.Context, parameter: click.Parameter, value: str | Non
 
 @click.command()
 @of_a_run
-@click.option("--exact", is_flag=True, help="Bring the semidefinite bound within 0.1 % of a factor that occurs.")
+@click.option(
+    "--exact", is_flag=True, help="Tighten the semidefinite bound to within 0.1 % of a factor that some loads attain."
+)
 @click.option("--verified", is_flag=True, help="Prove constants and bounds, for the exact data of FILE on its mesh.")
 @click.option(
     "--bounds",
@@ -229,7 +231,7 @@ def compare(
     as_json: bool,
     **changes: Any,
 ) -> int:
-    """Constants, bounds, a run, and one verdict for each bound.
+    """Measure the constants, evaluate the bounds, run, and judge each bound.
 
     Exit 1 where a proved bound is violated or the run stalls or diverges, 3 where rounding hides the answer.  Reaching
     max_iterations is no failure here: the verdicts judge single steps.

@@ -73,7 +73,7 @@ def sweep(
     folder: Path | None,
     as_json: bool,
 ) -> None:
-    """Run a problem at every point of a grid, and write a CSV file of one row a run.
+    """Run a problem at every point of a grid, and write a CSV file with one row per run.
 
     FILE names the problem, beside it or built in, and the values of each axis: theta, friction, radius (length of the
     file), young (pairs E1, E2, stress of the file), neumann_body, refine (halvings of the mesh), law, rule.  The rows
@@ -258,7 +258,7 @@ def every(
 @STORE
 @JSON
 def region(file: Path, keys: dict[str, str], swap: bool, target: Path, store: Path | None, as_json: bool) -> None:
-    """Draw the plane of theta and k: where one step is proved to contract, and what runs do there.
+    """Plot, over theta and k, where each bound proves contraction and how runs end.
 
     Both axes are logarithmic; theta and k have no unit.  The regions are those of all bounds for the bodies of FILE;
     the points are runs, coloured by outcome.

@@ -50,6 +50,7 @@ def measure(
     Returns
     -------
     Measured
+        For theta ``rho_max.value`` matters most; without friction ``rho_normal.value``.
 
     Raises
     ------

@@ -12,8 +12,8 @@ shift s a little above, by solves with
 
 a sparse matrix whose elimination leaves ``s S_n - S_c`` on the interface.  K has as many negative eigenvalues as body c
 has unknowns inside, and one more for each eigenvalue of (S_c, S_n) above s.  They are counted by the pivots of K: a
-shift below rho is seen and raised.  So that the value is the largest eigenvalue is more than the word of Lanczos, up to
-the rounding of the pivots: none lies above s, and nearest to s is the one that is found.
+shift below rho is seen and raised.  So the value is known to be the largest eigenvalue, up to the rounding of the
+pivots: none lies above s, and the Lanczos iteration finds the one nearest to s.
 """
 
 from __future__ import annotations

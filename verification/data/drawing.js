@@ -148,25 +148,31 @@ window.nd = (() => {
     return toggle;
   }
 
-  // A frame for a widget: a question to answer first, controls, pictures, what they say, the numbers, a link.
-  function build(figure, { name, question, answers, reveal, draw }) {
-    const widget = { name, sliders: {}, buttons: {}, revealed: false, controls: html("div", { class: "controls" }),
+  // A frame for a widget: a question to answer first, controls, pictures, what they say, the numbers, a link.  Where the
+  // right answer is given, the outcome is hidden until somebody answers: what is not in `pictures` waits, and draw() leaves
+  // out what `revealed` is for. Then the words say why, and show() moves the widget to the state that shows it.
+  function build(figure, { name, question, answers, right = null, reveal, show = () => {}, draw }) {
+    const given = right !== null && Object.keys(remembered(name)).length > 0; // a link to a state was made after the answer
+    const widget = { name, sliders: {}, buttons: {}, revealed: given, controls: html("div", { class: "controls" }),
       pictures: html("div", { class: "pictures" }), says: html("p", { class: "says", "aria-live": "polite" }),
       table: html("table"), link: html("a", { href: "#" }, "link to this state") };
-    const told = html("p", { class: "told", hidden: "" });
+    const told = html("p", { class: "told", hidden: "", "aria-live": "polite" });
     const ask = html("fieldset", { class: "ask" }, html("legend", {}, `Predict first. ${question}`));
+    const outcome = [widget.controls, widget.says, html("details", {}, html("summary", {}, "The numbers of this picture"), widget.table),
+      html("p", { class: "link" }, widget.link)];
+    const open = (words) => {
+      told.textContent = words; told.hidden = false; widget.revealed = true; ask.hidden = true;
+      for (const part of outcome) part.hidden = false;
+      show(); widget.update();
+    };
+    const verdict = (answer) => (right === null ? `You said: ${answer}.` : answer === right ? "Right:" : "Not quite:");
     for (const answer of answers) {
-      ask.append(html("button", { type: "button", onclick: () => {
-        told.textContent = `You said: ${answer}. ${reveal()}`;
-        told.hidden = false; widget.revealed = true; ask.hidden = true; widget.update();
-      } }, answer));
+      ask.append(html("button", { type: "button", onclick: () => open(`${verdict(answer)} ${reveal()}`) }, answer));
     }
-    ask.append(html("button", { type: "button", class: "reveal", onclick: () => {
-      told.textContent = reveal(); told.hidden = false; widget.revealed = true; ask.hidden = true; widget.update();
-    } }, "Just show me"));
-    figure.replaceChildren(ask, told, widget.controls, widget.pictures, widget.says,
-      html("details", {}, html("summary", {}, "The numbers of this picture"), widget.table),
-      html("p", { class: "link" }, widget.link));
+    ask.append(html("button", { type: "button", class: "reveal", onclick: () => open(`${right === null ? "" : "Answer: "}${reveal()}`) }, "Just show me"));
+    ask.hidden = given;
+    for (const part of outcome) part.hidden = right !== null && !given;
+    figure.replaceChildren(ask, told, outcome[0], widget.pictures, ...outcome.slice(1));
     widget.update = () => {
       if (!widget.ready) return;
       draw(widget);

@@ -129,7 +129,9 @@ nd.onPage("explore", (figure) => {
     });
     stage.append(marks);
     const count = (name) => now.states.filter((state) => state === name).length;
-    legend.textContent = `Squares stick (${count("stick")}), triangles slip (${count("slip")}), circles are open (${count("open")}). `
+    const frictionless = data.friction[friction.value] === 0;
+    legend.textContent = (frictionless ? `Triangles are closed (${count("slip") + count("stick")}), circles open (${count("open")}). `
+      : `Squares stick (${count("stick")}), triangles slip (${count("slip")}), circles are open (${count("open")}). `)
       + `Blue: body 1, orange: body 2; the ${role.name} one is the Neumann body. Displacements times ${scale}.`;
   }
 
@@ -190,9 +192,9 @@ nd.onPage("explore", (figure) => {
     stepText.textContent = last < 0 ? "none" : `${run.shown[i]} of ${run.steps}`;
     stepInput.setAttribute("aria-valuetext", `step ${stepText.textContent}`);
     const best = data.bounds.map(({ name }, b) => [name, run.factors[b]]).filter(([, factor]) => factor !== null).sort((a, b) => a[1] - b[1])[0];
-    const rate = run.rate === null || run.outcome !== "converged" ? "" : `, error times ${number(run.rate)} per step`;
+    const rate = run.rate === null || run.outcome !== "converged" ? "" : `, each leaving ${number(run.rate)} of the error`;
     says.textContent = `theta = ${number(data.theta[t])}, k = ${number(data.friction[k])}, Neumann body ${role.neumann} (${role.name}): ${ended(run)}${rate}. `
-      + (best ? `Bound for any loads (${best[0]}, in doubles): error times ${number(best[1])} at most per step.` : "No bound proves that a step contracts here.");
+      + (best ? `Bound for any loads (${best[0]}, in doubles): at most ${number(best[1])} of the error is left by a step.` : "No bound proves that a step contracts here.");
     stageTitle.textContent = last < 0 ? "The bodies" : `The bodies at step ${run.shown[i]}`;
     drawBodies(role, run, i);
     drawResiduals(run, i);

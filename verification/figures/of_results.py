@@ -51,7 +51,7 @@ def _(result: Measured) -> Figure:
     """The factor of one step over theta: predicted, and proved in energy norms."""
     energy = result.energy_constants()
     if energy is None:
-        raise ValueError("the theorem in energy norms does not speak of it: " + result.why_no_energy)
+        raise ValueError("the theorem in energy norms does not apply: " + result.why_no_energy)
     return draw_factor({"": energy})
 
 

@@ -505,7 +505,7 @@ def decide(bodies: EnclosedBodies, id: str, of: Form) -> Evidence | None:
                 where += f", k just below C_2, theta at {float(CONTRACTION[key]):g} of the interval"
         elif key not in OF_BODIES:
             subject = bodies.slides_much if key in OF_MUCH else bodies.slides
-            where += ", all nodes open and slipping one way"
+            where += ", all nodes open and sliding one way"
             if key in OF_MUCH:
                 where += f", k = {float(share * bodies.problem.contact.friction):g}"
         sides = both_sides(subject, reading, key)

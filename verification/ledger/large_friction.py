@@ -38,7 +38,7 @@ STEP = 1e-4
 
 @dataclass(frozen=True, kw_only=True)
 class Witness:
-    """Two forces that break what is printed, for loads made for them.
+    """Two forces that violate the printed inequality, for loads made for them.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ def loaded(pair: ContactPair, g: Floats, v: Floats, force: Floats) -> ContactPai
 
 
 def witness(case: Trial, random: np.random.Generator) -> Witness:
-    """Friction, a unit, loads and two forces that break what is printed; the problem has a law of friction."""
+    """Friction, a unit, loads and two forces that violate the printed inequality; the problem has a law of friction."""
     one = case.measured.with_friction(1.0)
     reading = Reading.of(one)
     steep = reading.C_K * reading.M**2 / reading.m**3  # of the printed bound in k, where the bracket is 1

@@ -188,7 +188,7 @@ def _grounded(rows: Sequence[Row]) -> list[Row]:
         if not fallen:
             return list(result.values())
         for id, grounds in fallen.items():
-            text = f"it leans on {', '.join(f'{ground} ({verdicts[ground]})' for ground in grounds)}"
+            text = f"it uses {', '.join(f'{ground} ({verdicts[ground]})' for ground in grounds)}"
             missing = Evidence(method="reading", of="step", holds=None, text=text)
             row = result[id]
             result[id] = replace(row, evidence=(*row.evidence, missing), verdict="INCONCLUSIVE", method="reading")

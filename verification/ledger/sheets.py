@@ -24,11 +24,11 @@ FAULTS = {
     "false as printed": "False as printed",
     "does not follow": "Steps that do not follow",
     "gap": "Gaps",
-    "typo": "Slips of notation",
+    "typo": "Errors of notation",
 }
 
 WORDS = {
-    "PROVED": "derived in exact arithmetic for all admissible values, from the rows it leans on",
+    "PROVED": "derived in exact arithmetic for all admissible values, from the rows it uses",
     "REPAIRED": "wrong or incomplete as printed; the repaired form is proved, exactly or in words",
     "REFUTED": "wrong as printed, and no repaired form is known",
     "NUMERICAL": "holds in floating point on every problem tried, or in readings that the row names",
@@ -116,7 +116,7 @@ def _entry(row: Row) -> Iterable[str]:
     yield ""
     yield f"`{s.id}`. {s.claims}"
     if s.leans_on:
-        yield "Leans on " + ", ".join(f"`{id}`" for id in s.leans_on) + "."
+        yield "Uses " + ", ".join(f"`{id}`" for id in s.leans_on) + "."
     if s.fault:
         yield ""
         inherited = f" (inherited from `{s.same_as}`)" if s.same_as else ""
@@ -130,7 +130,7 @@ def _entry(row: Row) -> Iterable[str]:
         yield s.note
 
 
-OUTCOME = {True: "holds", False: "fails", None: "undecided"}
+OUTCOME = {True: "holds", False: "false", None: "undecided"}
 
 
 def _shown(evidence: Evidence) -> str:

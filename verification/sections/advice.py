@@ -51,7 +51,7 @@ def _sections(found: Advice) -> Iterator[Section]:
     if found.interval is not None:
         yield from of_logs(found, found.interval)
         if found.roles:
-            others = "Predicted for the roles that the bodies have; logs tell nothing of the other assignment."
+            others = "Predicted for the roles that the bodies have; logs give no information about the exchanged roles."
             yield _paste(found, others)
     if found.roles and not found.logs:
         yield _which_body(found)
@@ -95,7 +95,7 @@ def _which_body(found: Advice) -> Section:
     """The body that gets the Neumann problem, the effect of exchanging the roles, and the data each solver reads."""
     best, other = found.best, found.other
     if found.neumann_body is None:
-        said = ["One run tells nothing of the other assignment."]
+        said = ["One run gives no information about the exchanged roles."]
         neumann, contact = "the Neumann body", "the contact body"
     else:
         rate = found.chosen(best)[1]
@@ -139,21 +139,21 @@ def _which_theta(found: Advice) -> Section:
             rows.append(("", "", "if tied", *numbers, _at_predicted(role)))
         elif found.tied:
             why[name] = role.why_not_tied
-    said = [*_together(why), "predicted: theta = 2/(2 + rho); proved: by the energy bound"]
+    said = [*_together(why), "predicted: theta = 2/(2 + rho); proved: energy bound, doubles unless marked v"]
     ends = [
         f"{figures(role.rho_min)}, {figures(role.rho_tied)} ({NAMES[role.neumann_body]})"
         for role in possible
         if role.ends is not None
     ]
     if ends:
-        said.append(f"if tied, nothing opens or slips: 2/(2+rho_min+rho) of {', '.join(ends)}")
-    said.append(f"steps: to 1e-9{'; last column: of the predicted theta, if tied' * bool(ends)}")
+        said.append(f"if tied (nothing opens or slips): 2/(2+rho_min+rho), with {', '.join(ends)}")
+    said.append(f"steps: to an error of 1e-9{'; last column: if tied, at the predicted theta' * bool(ends)}")
     for role in possible:
         auto = role.theta_auto
         if auto is not None:
             takes = f'theta = "auto" takes {float(auto.theta):.4g}, the {auto.source} one: {auto.why}'
             said.append(f"{NAMES[role.neumann_body]}: {takes}")
-    lines = table(("Neumann", "rho", "", "theta", "rate", "steps", ""), rows)
+    lines = table(("Neumann", "rho", "", "theta", "per step", "steps", ""), rows)
     return section("theta", "WHICH THETA?", lines, *said)
 
 
@@ -274,7 +274,9 @@ def assumed(found: Advice) -> Section:
 
 def of_a_run(found: Advice, run: SeenRun) -> Sections:
     """The readings of a run as values of rho, and the run to make next."""
-    given = f"theta = {float(run.theta):.4g}; the residual |Tg - g| changes by {float(run.ratio):.4g} a step"
+    given = (
+        f"theta = {float(run.theta):.4g}; the residual |Tg - g| is multiplied by {float(run.ratio):.4g} in each step"
+    )
     notes = (
         f"{given}, absolute and unrelaxed, steadily over {run.steps} steps or more.",
         "A residual that rises and falls has no steady ratio: give 1.",
@@ -287,7 +289,7 @@ def of_a_run(found: Advice, run: SeenRun) -> Sections:
 def of_logs(found: Advice, interval: RhoInterval) -> Sections:
     """The values of rho that each log and all logs together allow, and the run to make next."""
     read = [_readings(found.readings)] if found.readings else []
-    notes = [] if read else ["Nothing: no residual falls, grows or stays steadily."]
+    notes = [] if read else ["Nothing: no time window shows a steady ratio or level over enough steps."]
     if interval.contradiction is not None:
         notes.append(f"CONTRADICTION: {interval.contradiction}.")
     else:

@@ -36,12 +36,15 @@ def answer(finished: Run, bounds: Sequence[BoundResult]) -> Section:
 
 def _seen(finished: Run) -> str:
     """How the run ended, and its rate."""
-    steps = f"{ended(finished)} after {finished.iterations} steps"
+    count = f"{finished.iterations} step{'s' * (finished.iterations != 1)}"
+    steps = f"{ended(finished)} after {count}"
     if finished.observed_growth is not None:
-        return f"{steps}, error times {finished.observed_growth:.4g} per step"
-    if finished.observed_rate is None:
+        return f"{steps}; each multiplies the error by {finished.observed_growth:.4g}"
+    if finished.observed_rate is None and finished.converged:
         return f"{steps}, too few to see a rate"
-    return f"{steps}, error times {near_one(finished.observed_rate.value)} per step"
+    if finished.observed_rate is None or finished.outcome == "stalled":
+        return steps
+    return f"{steps}, each leaving {near_one(finished.observed_rate.value)} of the error"
 
 
 def _bound(finished: Run, bounds: Sequence[BoundResult]) -> str:
@@ -61,7 +64,7 @@ def _bound(finished: Run, bounds: Sequence[BoundResult]) -> str:
         return f"none at this friction{reach}"
     best = min(found, key=lambda bound: bound.factor.value if bound.factor is not None else 1.0)
     how = "in doubles" if best.level == "float" else best.level
-    return f"error times {factor(best.factor, best.one_minus_factor)} at most per step ({best.name}, {how})"
+    return f"at most {factor(best.factor, best.one_minus_factor)} of the error is left ({best.name}, {how})"
 
 
 def _theta(bounds: Sequence[BoundResult], allowed: BoundResult | None) -> list[Labelled]:
@@ -71,7 +74,7 @@ def _theta(bounds: Sequence[BoundResult], allowed: BoundResult | None) -> list[L
         if isinstance(detail, EnergyBounds):
             words.append(f"{figures(detail.theta_predicted)} predicted best")
     if allowed is not None:
-        words.append(f"a bound allows {interval(allowed.interval, allowed.interval_level)}")
+        words.append(f"the {allowed.name} bound allows {interval(allowed.interval, allowed.interval_level)}")
     return [Labelled("theta", "; ".join(words))] if words else []
 
 

@@ -50,9 +50,11 @@ def bounds(rows: Sequence[BoundResult], unit: str) -> list[Shown | str]:
         lines.append((*line, *("no conclusion" if row.factor is None else marked("contracts", row.level) for _ in at)))
     heads = (
         ("", "every small", "some", "", "", *("" for _ in at)),
-        ("bound", f"theta {friction} <", f"theta {friction} <", "theta allowed", "factor", *at),
+        ("bound", f"theta: {friction}<", f"theta: {friction}<", "theta allowed", "factor", *at),
     )
     notes = [words for row in results for words in named(row.name).remarks(row, unit)]
+    if any(row.friction.on == "multiple" for row in found):
+        notes.append("x given: times the friction that gave kappa_1 and kappa_2")
     notes += [LEGEND] * any(row.marked for row in found)
     return [Table(heads, tuple(lines)), *notes]
 
@@ -61,7 +63,7 @@ def _allowed(row: BoundResult) -> list[Cell]:
     """The two thresholds on friction."""
     friction = row.friction
     if friction.on == "any":
-        return ["any", "any"]
+        return ["any k", "any k"]
     every = at_least(friction.every)  # where every small theta contracts some theta does
     cells = [every, every if friction.some is None else at_least(friction.some)]
     if friction.on != "multiple":
@@ -125,7 +127,7 @@ def thetas(details: Iterable[object]) -> Sections:
         rest = "proved too: there is no friction" if energy.friction_multiple is None else "2/(2 + rho), not a bound"
         predicted = ("predicted", figures(energy.theta_predicted), figures(energy.rate_predicted), rest)
         proved = ("proved", theta, NONE if energy.theta_proved is None else least, why)
-        lines = table(("", "theta", "factor", ""), (proved, predicted))
-        caption = "The theta with the least proved factor, and the one that rho alone suggests."
+        lines = table(("", "theta", "per step", ""), (proved, predicted))
+        caption = "The theta with the least proved factor per step, and the one that rho suggests."
         found.append(section("thetas", "WHICH THETA?", lines, caption=caption))
     return tuple(found)

@@ -118,7 +118,7 @@ def _used(found: ContinuumCertificate, constants: Mapping[str, Any], of_stress: 
         ("C_t1", "C_t1", _at_most, of_trace, f"trace, contact body; segments, {first}"),
         ("C_t2", "C_t2", _at_most, of_trace, f"trace, Neumann body; segments, {second}"),
         ("R", "strips", _at_most, "", "ratio of stiffness of two strips"),
-        ("eps", "cut_off", _at_most, "", "for the bodies beside Gamma_c; segments"),
+        ("eps", "cut_off", _at_most, "", "loss by the cut-off beside Gamma_c"),
         ("rho", "rho", _at_most, "", "(1 + eps) R"),
         ("rho", "rho_least", _at_least, "", "half-planes"),
         ("rho", "rho_ends", _at_least, "", "wedges at the ends of Gamma_c"),
@@ -127,16 +127,16 @@ def _used(found: ContinuumCertificate, constants: Mapping[str, Any], of_stress: 
         ("kappa_2", "kappa_2", _at_most, "", "k C_s C_t2"),
     )
     rows = [(name, bound(constants[key], unit), unit, by) for name, key, bound, unit, by in used]
-    return section("used", "WHAT WAS USED?", table(("bound", "", "unit", "of what, and by what"), rows))
+    return section("used", "WHICH BOUNDS ENTER THE PROOF?", table(("bound", "", "unit", "meaning; method"), rows))
 
 
 def _contracts(found: ContinuumCertificate, document: Mapping[str, Any]) -> list[str]:
     k, threshold = float(found.friction), _few(document["friction_threshold"]["lo"], False)
-    said = [f"Every small theta contracts for k < {threshold}: one fixed point, and contact has exactly one solution."]
+    said = [f"Every small theta contracts for k < {threshold}: one fixed point, and exactly one solution."]
     if document["friction_limit"] is not None:
         said.append(f"Some theta contracts for k < {_few(document['friction_limit']['lo'], False)}.")
     if found.energy is None:
-        said.append(f"For no single theta is anything proved. {document['reason']['rho']}.")
+        said.append(f"Nothing is proved for any particular theta. {document['reason']['rho']}.")
     elif document["interval"] is None:
         said.append(f"At k = {k:g} no theta is proved to contract: no conclusion.")
     else:
@@ -174,7 +174,7 @@ def _on_the_mesh(found: ContinuumCertificate, document: Mapping[str, Any]) -> li
         elif found.contracts:
             said.append(
                 f"{judged} contracts in the continuum (guaranteed), and NOT on this mesh (float). Finer meshes of such"
-                " cells may need a smaller theta for good, too."
+                " cells may need a smaller theta, too."
             )
         else:
             said.append(f"{judged} does not contract on this mesh (float).")

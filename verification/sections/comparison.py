@@ -94,7 +94,7 @@ class Parts(Listener):
         if reference is not None:
             rate = "no rate" if reference.observed_rate is None else f"rate {near_one(reference.observed_rate)}"
             what = f"{rate}, {reference.steps - 1} steps" if reference.whole else "first and last step"
-            part = Labelled("cvxpy alone", f"{what}; T differs by {reference.largest_difference:.0e} at most")
+            part = Labelled("check by cvxpy", f"{what}; forces differ by {reference.largest_difference:.0e} at most")
         self.show((section("run", "", part),))
 
     def losses(self, losses: Losses | None, why: str) -> None:

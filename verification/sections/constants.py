@@ -44,7 +44,7 @@ def sections(measured: Measured) -> Sections:
     parts: list[Shown] = []
     if measured.unverified is not None:
         parts += [part for level in levels for part in _between_bounds(level, (*NAMES, *ENERGY_NAMES))]
-        ends = "exact, verified: proved for the exact data of the file on this mesh, all rounding errors bounded."
+        ends = "verified: between two bounds proved for the exact data of the file on this mesh, rounding included."
     else:
         unit = _units(measured)
         words = WORDS if len(levels) == 1 else {}  # there is no room beside several columns
@@ -59,14 +59,14 @@ def sections(measured: Measured) -> Sections:
         ]
         head = ("nodes", *(str(level.nodes) for level in levels), "unit", *([""] if words else []))
         parts.append(table(head, rows, right=range(1, len(levels) + 1)))
-        ends = "Exact for this mesh, up to rounding."
+        ends = "For this mesh: no discretisation error, but rounding. For theta only rho_max matters."
     for reason in dict.fromkeys(measured.reason.values()):
         names = ", ".join(name for name, why in measured.reason.items() if why == reason)
         parts.append(Note(f"{names}: {reason}"))
     mesh = "On a mesh m is above and M below its continuous value"
     unsafe = "for the continuous theorem both err on the unsafe side"
     then = following("advise" if measured.interface_nodes > assembly.MOST_CONTACT_NODES else "compare")
-    title = "WHAT DOES THE THEOREM NEED TO KNOW?"
+    title = "WHICH CONSTANTS DOES THE THEOREM USE?"
     caption = "The constants on this mesh: those of Section 5, then rho and those of the theorem in energy norms."
     return (
         setting(problem, measured.nodes, measured.interface_nodes),

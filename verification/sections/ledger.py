@@ -19,7 +19,8 @@ def sections(found: Ledger) -> Sections:
 
 
 def _summary(found: Ledger) -> Sections:
-    about = "Bayada, Sabil, Sassi (2008), statement by statement"
+    about = "Bayada, Sabil, Sassi (2008)"
+    own = sum(row.statement.kind == "own" for row in found.rows)
     verdicts = [(verdict, count(rows), WORDS[verdict]) for verdict, rows in found.counts().items()]
     faults = {
         name.lower(): [row.statement.id for row in found.rows if row.statement.fault == fault]
@@ -27,14 +28,16 @@ def _summary(found: Ledger) -> Sections:
     }
     wrong = [f"{name}: {', '.join(ids)}" for name, ids in faults.items() if ids]
     sections = [
-        section("setting", "", Facts(about, (f"{len(found.rows)} rows", found.level))),
-        section("stands", "WHAT STANDS?", table(("verdict", "rows", "means"), verdicts, right=[1])),
+        section(
+            "setting", "", Facts(about, (f"{len(found.rows) - own} of its statements, {own} of our own", found.level))
+        ),
+        section("stands", "HOW MANY STATEMENTS HOLD?", table(("verdict", "number", "means"), verdicts, right=[1])),
         section("wrong", "WHAT IS WRONG IN THE PAPER?", *wrong),
     ]
     if found.changed:
         changed = [(row.statement.id, row.recorded or "-", row.verdict) for row in found.changed]
         sections.append(section("changed", "WHAT HAS CHANGED?", table(("statement", "recorded", "now"), changed)))
-    claims = "that a numerical row is proved, or a proof beyond what it leans on"
+    claims = "that a numerical row is proved, or a proof of the statements that it uses"
     return (*sections, closing(claims, then="ndtheory verify 5.30"))
 
 
@@ -60,9 +63,10 @@ def _said(row: Row) -> Iterator[Note | str]:
         yield f"repaired: {plain(s.repair)}"
         yield f"because: {plain(s.proof)}"
     if s.leans_on:
-        yield f"leans on {', '.join(s.leans_on)}"
+        yield f"uses {', '.join(s.leans_on)}"
     for e in row.evidence:
-        yield f"{e.method}, {e.of}: {OUTCOME[e.holds]}.  {plain(e.text)}"
+        method = f"{e.method}, {e.of}" if s.fault else e.method
+        yield f"{method}: {OUTCOME[e.holds]}.  {plain(e.text)}"
         if at := e.data.get("counterexample"):
             yield Note("at " + ", ".join(f"{name} = {value}" for name, value in at.items()), 4)
     if s.note:

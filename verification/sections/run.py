@@ -65,6 +65,8 @@ def happened(finished: Run, *, alone: bool) -> Section:
         needed = count(steps(linear.rate, problem.iteration.tolerance))
         rows.append(("linearised at the solution", near_one(linear.rate), needed, "computed after the run"))
     seen: Cell = NONE if rate is None else near_one(rate.value)
+    if finished.outcome == "stalled":
+        seen = NONE  # no rate of convergence
     if finished.observed_growth is not None:
         seen = Quantity(finished.observed_growth, f"grows by {finished.observed_growth:.4g}")
     if alone or not rows:
@@ -137,7 +139,10 @@ def _contact(problem: Problem, contact: ContactFields, solved: str = "") -> list
     """States and forces along Gamma_c, in totals, and the residual of step II."""
     units, total = problem.units, contact.force
     normal = f"{figures(total['normal'], 6)} normal"
-    nodes = Labelled("nodes", ", ".join(f"{number} {name}" for name, number in contact.pattern.items()))
+    states = contact.pattern
+    if not problem.contact.friction:
+        states = {"closed": states["stick"] + states["slip"], "open": states["open"]}
+    nodes = Labelled("nodes", ", ".join(f"{number} {name}" for name, number in states.items()))
     if problem.dimension == 1:
         return [nodes, Labelled("force", f"{normal}, {units['stress']}{solved}")]
     rounding = 1e-12 * max(abs(total["normal"]), abs(total["tangential"]))

@@ -225,6 +225,7 @@ def sweep(
     Returns
     -------
     Sweep
+        ``rows`` has a dictionary for each run.
 
     Raises
     ------

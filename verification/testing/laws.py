@@ -217,6 +217,6 @@ def _maps_into_L2(kit: Kit, law: Law, length: float) -> Finding:
     if law.outside:
         return Finding(property=property, verdict="not asked", detail=f"it is {law.outside!r}; {shown}")
     if not growth <= GROWS:
-        how = f"the norm of S grows with the mesh, so that the theorem does not speak of it: {shown}"
+        how = f"the norm of S grows with the mesh, so that the theorem does not apply: {shown}"
         raise kit.refused(property, how, length=length)
     return Finding(property=property, verdict="holds", detail=shown)

@@ -58,7 +58,7 @@ def test_an_unknown_id_is_refused_in_one_line_before_anything_is_computed(call, 
     assert repr(id) in complaint or (len(id) > 1000 and repr(id)[:60] in complaint)
     assert len(complaint) < 500
     assert complaint.isprintable()
-    offered = complaint.partition("needed one like ")[2].split(", ")
+    offered = complaint.partition("similar: ")[2].split(", ")
     assert offered
     assert set(offered) <= set(STATEMENTS)
     assert call("verify", id, "--json").complaint == complaint
@@ -77,7 +77,7 @@ def test_one_unknown_id_among_known_ones_is_refused(call, never, arguments):
     ],
 )
 def test_an_id_in_odd_case_is_refused_with_the_id_that_was_meant(call, never, id, meant):
-    assert meant in call("verify", id).complaint.partition("needed one like ")[2].split(", ")
+    assert meant in call("verify", id).complaint.partition("similar: ")[2].split(", ")
 
 
 def test_case_tells_no_two_ids_apart_that_a_reader_could_confuse():

@@ -37,13 +37,13 @@ def test_the_screen_shows_what_is_claimed_what_is_wrong_and_what_was_found(call,
     s = row.statement
     for text in (s.title, s.claims, s.wrong, s.repair, s.proof, *(e.text for e in row.evidence)):
         assert one_line(plain(text)) in screen
-    assert f"leans on {', '.join(s.leans_on)}" in screen
+    assert f"uses {', '.join(s.leans_on)}" in screen
     assert screen.count("kappa = 10000") == 1
 
 
 @pytest.mark.parametrize("id", [s.id for s in STATEMENTS.values() if s.fault])
 def test_no_label_on_the_screen_of_a_fault_stands_without_its_text(call, kept, id):
-    assert re.findall(r"(?m)^ +(?:repaired|because|leans on):?$", call("verify", id).out) == []
+    assert re.findall(r"(?m)^ +(?:repaired|because|uses):?$", call("verify", id).out) == []
 
 
 @pytest.mark.parametrize("id", [EXACT, "5.30", "2.1", "sec-6.3"])
@@ -61,7 +61,7 @@ def test_the_summary_is_one_screen_that_counts_every_row(call, kept, whole):
     assert len(lines) <= 40
     assert RAW.findall(answer.out) == []
     assert [line for line in lines if line.isupper() and line.endswith("?")] == [
-        "WHAT STANDS?",
+        "HOW MANY STATEMENTS HOLD?",
         "WHAT IS WRONG IN THE PAPER?",
     ]
     counts = {line.split()[0]: int(line.split()[1]) for line in lines if line[2:].split(" ")[0] in VERDICTS}

@@ -138,7 +138,7 @@ def test_a_premise_that_was_not_checked_now_counts_as_recorded(call, found, reco
     assert answer.status == 1
     screen = one_line(answer.out)
     assert "INCONCLUSIVE (recorded: " in screen
-    assert f"reading, step: undecided. it leans on 5.11 ({verdict})" in screen
+    assert f"reading: undecided. it uses 5.11 ({verdict})" in screen
     (row,) = call("verify", "prop-5.4", "--json").document["statements"]
     assert (row["verdict"], row["method"]) == ("INCONCLUSIVE", "reading")
     assert row["evidence"][-1]["holds"] is None

@@ -1,0 +1,226 @@
+"""Decks of slides cut from pages: titles, first sentences, formulas, figures, widgets and exercises."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from html import escape
+from typing import Any
+
+from docutils import nodes
+from sphinx.application import Sphinx
+from sphinx.util.docutils import SphinxRole
+from sphinx.util.osutil import relative_uri
+from sphinx_design.dropdown import dropdown_main
+from sphinx_proof.nodes import theorem_node
+
+from builder import widgets
+
+#: What follows the first sentences of a section on its slide: the first of these.
+SHOWN = (nodes.math_block, nodes.table, nodes.enumerated_list, theorem_node)
+
+#: A comment in the source that puts the block below it on a slide, and one that leaves a section out.
+MARK, NONE = "slide", "no slide"
+
+SENTENCE = re.compile(r"[.?!:](?=\s|$)")
+LONGEST = 240  # characters of the first sentences, where there is more than one
+
+
+@dataclass(kw_only=True)
+class Slide:
+    """A slide.
+
+    Attributes
+    ----------
+    title : list of nodes
+        What its heading says.
+    anchor : str
+        The section of the page from which it is taken.
+    blocks : list of nodes
+        What stands below the heading.
+    """
+
+    title: list[nodes.Node]
+    anchor: str
+    blocks: list[nodes.Node] = field(default_factory=list)
+
+
+class SlidesRole(SphinxRole):
+    """``{slides}`examples/spectrum, examples/which_side```: a link to the deck of these pages, which is then made."""
+
+    def run(self) -> tuple[list[nodes.Node], list[nodes.system_message]]:
+        pages = [name.strip() for name in self.text.split(",")]
+        for name in pages:
+            if name not in self.env.found_docs:
+                raise ValueError(f"{self.env.docname}, line {self.lineno}: no page {name!r} for slides")
+        self.env.metadata[self.env.docname].setdefault("slides", []).append(pages)
+        link = self.env.app.builder.get_relative_uri(self.env.docname, deck(pages[0]))
+        return [nodes.reference("", "slides", internal=True, refuri=link)], []
+
+
+def deck(page: str) -> str:
+    """The name of the deck that begins with a page, beside the page, so that its relative links hold."""
+    return f"{page}-slides"
+
+
+def opening(paragraph: nodes.Node) -> nodes.paragraph:
+    """The first sentence of a paragraph, and those after it while they are short."""
+    whole = paragraph.astext()
+    ends = [end.end() for end in SENTENCE.finditer(whole)] or [len(whole)]
+    left = max(end for end in ends if end <= max(ends[0], LONGEST))
+    kept = nodes.paragraph()
+    for child in paragraph.children:
+        if left > 0:
+            kept += nodes.Text(child.astext()[:left]) if isinstance(child, nodes.Text) else child.deepcopy()
+        left -= len(child.astext())
+    return kept
+
+
+def blocks(section: nodes.Element) -> Iterator[nodes.Node]:
+    """The parts of a section, the outputs of its cells among them, without sections below it."""
+    for child in section.children:
+        if isinstance(child, nodes.container) and "cell" in child["classes"]:
+            for part in child.children:
+                if "cell_output" in part["classes"]:
+                    yield from part.children
+        elif isinstance(child, nodes.container) and "table-wrapper" in child["classes"]:  # of the theme
+            yield from child.children
+        elif not isinstance(child, nodes.section | nodes.title):
+            yield child
+
+
+def is_widget(block: nodes.Node) -> bool:
+    """True for the frame of a widget."""
+    return isinstance(block, nodes.raw) and "data-widget" in block.astext()
+
+
+def exercise(block: nodes.Node) -> Slide | None:
+    """An exercise without its solution."""
+    if not (isinstance(block, nodes.admonition) and "exercise" in block["classes"]):
+        return None
+    title, *body = block.children
+    return Slide(title=title.children, anchor="", blocks=[part for part in body if not isinstance(part, dropdown_main)])
+
+
+def cut(page: nodes.document) -> Iterator[Slide]:
+    """The slides of a page, in its order.
+
+    Each section has a slide with its title, its first sentences and its first formula, table, list or theorem, or the
+    output of a cell; each figure and widget has one; each exercise has one.
+    """
+    for section in page.findall(nodes.section):
+        if not isinstance(section[0], nodes.title):  # what a theorem says
+            continue
+        found = list(blocks(section))
+        marks = {block.astext(): i for i, block in enumerate(found) if isinstance(block, nodes.comment)}
+        if NONE in marks:
+            continue
+        title, anchor = section[0].children, section["ids"][0]
+        first = Slide(title=title, anchor=anchor)
+        paragraph = next((block for block in found if isinstance(block, nodes.paragraph)), None)
+        pictures = [block for block in found if isinstance(block, nodes.figure) or is_widget(block)]
+        if paragraph is not None:
+            first.blocks.append(opening(paragraph))
+            shown = [block for block in found if isinstance(block, SHOWN)]
+            shown += [block for block in found if isinstance(block, nodes.literal_block)]
+            marked = [found[i + 1] for text, i in marks.items() if text == MARK]
+            if marked or shown:
+                first.blocks.append((marked or shown)[0])
+            elif pictures and not is_widget(pictures[0]):
+                first.blocks.append(pictures.pop(0))
+            yield first
+        yield from (Slide(title=title, anchor=anchor, blocks=[picture]) for picture in pictures)
+        for slide in filter(None, map(exercise, found)):
+            slide.anchor = anchor
+            yield slide
+
+
+class Decks:
+    """The decks of a site, written before its images are copied.
+
+    Parameters
+    ----------
+    app : Sphinx
+    """
+
+    def __init__(self, app: Sphinx) -> None:
+        self.app, self.builder = app, app.builder
+
+    def html(self, page: str, block: nodes.Node) -> str:
+        """A part of a page; links within the page lead to the page."""
+        block = block.deepcopy()
+        if isinstance(block, theorem_node):  # which docutils takes for an admonition that it does not have
+            title, *body = block.children
+            name = nodes.paragraph("", "", nodes.strong("", "Theorem ", *title.children))
+            block = nodes.container("", name, *(part for one in body for part in one.children), classes=["proof"])
+        for link in block.findall(nodes.reference):
+            here = link["refid"] if "refid" in link else link.get("refuri", "").partition("#")[2]
+            if "refid" in link or link.get("refuri", "").startswith("#"):
+                link["refuri"] = f"{self.builder.get_relative_uri(deck(page), page)}#{here}"
+        return str(self.builder.render_partial(block)["fragment"])
+
+    def slides(self, page: str) -> Iterator[str]:
+        """The slides of a page as HTML."""
+        self.builder.imgpath = relative_uri(self.builder.get_target_uri(page), "_images")
+        self.builder.current_docname = page
+        tree = self.app.env.get_and_resolve_doctree(page, self.builder)
+        self.builder.post_process_images(tree)
+        for slide in cut(tree):
+            title = self.html(page, nodes.paragraph("", "", *(node.deepcopy() for node in slide.title))).strip()
+            title = title.removeprefix("<p>").removesuffix("</p>")
+            body = "".join(self.html(page, block) for block in slide.blocks)
+            link = f"{self.builder.get_relative_uri(deck(page), page)}#{slide.anchor}"
+            yield (
+                f'<section class="slide"><div><h2>{title}</h2>{body}</div>'
+                f'<footer><a href="{link}">on the page</a></footer></section>'
+            )
+
+    def write(self, pages: list[str], following: list[str] | None) -> None:
+        """The deck of some pages in one folder, with a link to the deck that follows."""
+        name = deck(pages[0])
+        static = relative_uri(self.builder.get_target_uri(name), "_static/x")[: -len("/x")]
+        parts = [slide for page in pages for slide in self.slides(page)]
+        shown = [widget for page in pages for widget in self.app.env.metadata[page].get("widgets", ())]
+        links = {"the plan": self.builder.get_relative_uri(name, "lecturers")}
+        if following:
+            links["next deck"] = self.builder.get_relative_uri(name, deck(following[0]))
+        scripts = [*widgets.scripts(shown), self.app.config.mathjax_path, "deck.js"]
+        text = PAGE.format(
+            title=escape(self.app.env.titles[pages[0]].astext()),
+            styles="".join(f'<link rel="stylesheet" href="{static}/{file}">' for file in STYLES),
+            mathjax=json.dumps(self.app.config.mathjax3_config),
+            scripts="".join(f'<script defer src="{static}/{file}"></script>' for file in scripts),
+            slides="\n".join(parts),
+            links="".join(f'<a href="{link}">{words}</a>' for words, link in links.items()),
+        )
+        path = self.builder.get_outfilename(name)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+
+
+STYLES = ("pygments.css", "widgets.css", "map.css", "deck.css")
+
+PAGE = """<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">
+<title>{title} - slides</title>
+{styles}<script>window.MathJax = {mathjax}</script>
+{scripts}</head>
+<body>
+<main>
+{slides}
+</main>
+<nav><button type="button" name="back" aria-label="previous slide">‹</button><output></output>\
+<button type="button" name="on" aria-label="next slide">›</button>{links}</nav>
+</body></html>
+"""
+
+
+def write_decks(app: Sphinx) -> Iterable[tuple[str, dict[str, Any], str]]:
+    """Write the decks to which the pages link; there is nothing left for the theme to write."""
+    decks = [pages for page in sorted(app.env.found_docs) for pages in app.env.metadata[page].get("slides", ())]
+    made = Decks(app)
+    for pages, following in zip(decks, [*decks[1:], None], strict=False):
+        made.write(pages, following)
+    return ()

@@ -1,0 +1,317 @@
+"""The slides of a lecture are cut from its pages, work by keys and by clicks, and fit.
+
+Run on a built site: ``PYTHONPATH=tests python tests/docs/test_slides.py docs/_build/html`` prints what is wrong and
+exits with 1.
+"""
+
+from __future__ import annotations
+
+import base64
+import re
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+from browser import BROWSER, DRIVER, chromium, needs_browser
+from processes import sites
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+#: At least so many slides in each deck: a title, the sections, three exercises.
+FEWEST = 9
+
+SLIDE = re.compile(r'<section class="slide">.*?</section>', re.DOTALL)
+WIDGET = re.compile(r'data-widget="(\w+)"')
+
+
+def links(page: Path) -> list[Path]:
+    """The decks to which a page leads, without those of its navigation."""
+    found = re.findall(r'href="([^"#]+-slides\.html)"', page.read_text("utf-8"))
+    return list(dict.fromkeys((page.parent / link).resolve() for link in found))
+
+
+def pages_of(deck: Path) -> list[Path]:
+    """The pages from which a deck is cut."""
+    found = re.findall(r'<footer><a href="([^"#]+)#', deck.read_text("utf-8"))
+    return list(dict.fromkeys(deck.parent / link for link in found))
+
+
+def faults(site: Path, lectures: int) -> list[str]:
+    """Lines ``deck: what is wrong``: lectures without a deck, few slides, missing files, pages and widgets."""
+    decks, found = links(site / "lecturers.html"), []
+    if len(decks) != lectures:
+        found.append(f"lecturers.html: {len(decks)} decks for {lectures} lectures")
+    for deck in decks:
+        if not deck.exists():
+            found.append(f"{deck.name}: no such deck")
+            continue
+        text = deck.read_text("utf-8")
+        slides = SLIDE.findall(text)
+        if len(slides) < FEWEST:
+            found.append(f"{deck.name}: {len(slides)} slides")
+        found += [f"{deck.name}: a slide without a title" for slide in slides if "<h2></h2>" in slide]
+        for file in re.findall(r'(?:src|href)="([^"#:]+)', text):
+            if not (deck.parent / file).exists():
+                found.append(f"{deck.name}: {file} is missing")
+        shown = {name for page in pages_of(deck) for name in WIDGET.findall(page.read_text("utf-8"))}
+        if shown != set(WIDGET.findall(text)):
+            found.append(f"{deck.name}: needed the widgets {sorted(shown)}")
+        found += [f"{deck.name}: no script of {name}" for name in shown if f'/{name}.js"' not in text]
+    return found
+
+
+#: The slides that leave the window, before and after all questions of widgets are answered.
+BEYOND = """
+const beyond = () => [...document.querySelectorAll(".slide")].flatMap((slide, i) => {
+  const inner = slide.firstElementChild, room = slide.clientHeight - 2 * inner.offsetTop;
+  const wide = [...inner.children].some((part) => part.getBoundingClientRect().right > innerWidth + 1);
+  return inner.scrollHeight > room + 1 || inner.scrollWidth > inner.clientWidth + 1 || wide ? [i + 1] : [];
+});
+const before = beyond();
+document.querySelectorAll(".ask .reveal").forEach((button) => button.click());
+return [...new Set([...before, ...beyond()])];
+"""
+
+
+def overflowing(decks: list[Path]) -> list[str]:
+    """Lines ``deck: slide`` for all slides that leave a window of 1280 x 720 pixels."""
+    from selenium.webdriver.support.ui import WebDriverWait
+
+    found = []
+    with chromium("--window-size=1280,720") as browser:
+        size = {"width": 1280, "height": 720, "deviceScaleFactor": 1, "mobile": False}
+        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        for deck in decks:
+            browser.get(deck.as_uri())
+            WebDriverWait(browser, 120).until(lambda b: b.execute_script("return document.body.dataset.ready"))
+            found += [f"{deck.name}: slide {n} overflows" for n in browser.execute_script(BEYOND)]
+    return found
+
+
+def lectures() -> int:
+    """The rows of the plan."""
+    return len(re.findall(r"^\| \d+ \| \{doc\}", (DOCS / "lecturers.md").read_text("utf-8"), re.MULTILINE))
+
+
+def test_each_row_of_the_plan_links_the_deck_of_its_pages() -> None:
+    rows = re.findall(r"^\| \d+ \| (.*?) \|", (DOCS / "lecturers.md").read_text("utf-8"), re.MULTILINE)
+    assert len(rows) == lectures() == 10
+    for row in rows:
+        (deck,) = re.findall(r"\{slides\}`([^`]+)`", row)
+        assert deck.split(", ") == re.findall(r"\{doc\}`([^`]+)`", row)
+
+
+#: A site of two pages and a plan.
+CONF = """
+import sys
+
+sys.path.append({docs!r})
+from builder import slides
+from builder.pages import WidgetDirective
+
+project, extensions = "slides", ["myst_parser", "sphinx.ext.mathjax", "sphinx_design", "sphinx_proof"]
+myst_enable_extensions, mathjax_path = ["colon_fence", "dollarmath"], "mathjax.js"
+html_static_path = [{static!r}, {own!r}, "mathjax.js", *{widgets!r}]
+
+
+def setup(app):
+    app.add_directive("widget", WidgetDirective)
+    app.add_role("slides", slides.SlidesRole())
+    app.connect("html-collect-pages", slides.write_decks)
+"""
+
+PLAN = "# The plan\n\n{slides}`first`, then {slides}`second`\n\n```{toctree}\nfirst\nsecond\n```\n"
+
+FIRST = """\
+# A page about $x$
+
+It begins. A second sentence is short. A third one is long, because it has to be so long that the three sentences
+together have more characters than a slide takes, which are two hundred and forty of them, and that is a lot of
+characters for a sentence that says nothing at all.
+
+```{widget} cobweb
+```
+
+## A formula
+
+The formula is {math}`y = x`, as a {ref}`picture <fig-dot>` shows. More.
+
+$$ y = x $$
+
+:::{figure} dot.svg
+:name: fig-dot
+:alt: A dot and nothing else
+
+A dot.
+:::
+
+## A theorem
+
+It is true.
+
+:::{prf:theorem} Small
+:label: thm-small
+
+Then $K < 1$.
+:::
+
+## Left out
+
+% no slide
+
+It is not on a slide.
+
+## Marked
+
+A section with a list that is marked.
+
+$$ z = 1 $$
+
+% slide
+
+- The list.
+
+## Exercises
+
+::::{admonition} Exercise 1: try
+:class: exercise
+
+Do it. (5 min)
+
+:::{dropdown} Solution
+Done.
+:::
+::::
+"""
+
+SECOND = "# Too long\n\nA screen.\n\n```text\n" + "a line\n" * 90 + "```\n"
+
+SAID = [
+    "A page about \\(x\\) It begins. A second sentence is short.",
+    "A page about \\(x\\) [widget]",
+    "A formula The formula is \\(y = x\\), as a picture shows. More. \\[ y = x \\]",
+    "A formula [picture] A dot.",
+    "A theorem It is true. Theorem (Small) Then \\(K &lt; 1\\) .",
+    "Marked A section with a list that is marked. The list.",
+    "Exercise 1: try Do it. (5 min)",
+]
+
+
+@pytest.fixture(scope="module")
+def small(site_tools, builder, tmp_path_factory):
+    """A small site with decks."""
+    folder = tmp_path_factory.mktemp("slides")
+    builder.widgets.write(folder / "own")
+    static, own = str(DOCS / "slides"), str(folder / "own")
+    conf = CONF.format(docs=str(DOCS), static=static, own=own, widgets=[str(DOCS / "widgets")])
+    dot = '<svg xmlns="http://www.w3.org/2000/svg" width="1" height="1"/>'
+    files = {
+        "conf.py": conf,
+        "index.md": PLAN,
+        "first.md": FIRST,
+        "second.md": SECOND,
+        "dot.svg": dot,
+        "mathjax.js": "",
+    }
+    for path, text in files.items():
+        (folder / path).write_text(text, encoding="utf-8")
+    assert sites(folder) == f"{folder.name} 0\n"
+    shutil.copy(folder / "built" / "index.html", folder / "built" / "lecturers.html")
+    return folder / "built"
+
+
+def test_slides_have_titles_first_sentences_formulas_figures_widgets_and_exercises(small):
+    said = []
+    for slide in SLIDE.findall((small / "first-slides.html").read_text("utf-8")):
+        text = re.sub(
+            r'<figure class="widget".*?</figure>', "[widget]", slide.partition("<footer>")[0], flags=re.DOTALL
+        )
+        text = re.sub(r"<a class=\"headerlink.*?</a>", "", re.sub(r"<img[^>]*>", "[picture]", text))
+        said.append(re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", text)).replace(" ,", ",").strip())
+    assert said == SAID
+
+
+def test_links_of_slides_lead_to_the_page(small):
+    text = (small / "first-slides.html").read_text("utf-8")
+    assert 'href="first.html#fig-dot"' in text
+    assert text.count('<footer><a href="first.html#') == len(SAID)
+    assert '<a href="second-slides.html">next deck</a>' in text
+
+
+def test_a_deck_with_few_slides_and_one_without_its_files_are_found(small, tmp_path):
+    expected = [f"first-slides.html: {len(SAID)} slides", "second-slides.html: 1 slides"]
+    decks = [line for line in faults(small, 2) if "lecturers.html is missing" not in line]
+    assert decks == expected
+    shutil.copytree(small, tmp_path / "site")
+    for file in ("_images/dot.svg", "_static/cobweb.js", "second-slides.html"):
+        (tmp_path / "site" / file).unlink()
+    found = faults(tmp_path / "site", 3)
+    assert "lecturers.html: 2 decks for 3 lectures" in found
+    assert "first-slides.html: _images/dot.svg is missing" in found
+    assert "first-slides.html: _static/cobweb.js is missing" in found
+    assert "second-slides.html: no such deck" in found
+
+
+@needs_browser
+def test_a_slide_that_overflows_is_found_and_the_others_fit(small):
+    decks = [small / "first-slides.html", small / "second-slides.html"]
+    assert overflowing(decks) == ["second-slides.html: slide 1 overflows"]
+
+
+@needs_browser
+def test_a_deck_goes_on_by_keys_clicks_and_buttons_and_keeps_its_place(small):
+    from selenium.webdriver import ActionChains, Keys
+
+    def number():
+        return browser.find_element("css selector", "nav output").text
+
+    with chromium("--window-size=1280,800") as browser:
+        browser.get((small / "first-slides.html").as_uri())
+        body = browser.find_element("css selector", "body")
+        assert number() == "1/7"
+        for key, expected in ((Keys.ARROW_RIGHT, 2), (" ", 3), (Keys.ARROW_LEFT, 2), (Keys.END, 7), (Keys.HOME, 1)):
+            body.send_keys(key)
+            assert number() == f"{expected}/7"
+        ActionChains(browser).move_by_offset(900, 600).click().perform()
+        assert number() == "2/7"
+        widget = browser.find_element("css selector", "figure.widget")
+        widget.find_element("css selector", ".ask .reveal").click()
+        slider = widget.find_element("css selector", "input[name=theta]")
+        slider.send_keys(Keys.ARROW_LEFT)  # moves theta, not the deck
+        assert (slider.get_attribute("value"), number()) == ("0.99", "2/7")
+        browser.find_element("css selector", "nav button[name=on]").click()
+        assert number() == "3/7"
+        assert browser.current_url.endswith("#3")
+        shown = [slide.is_displayed() for slide in browser.find_elements("css selector", ".slide h2")]
+        assert shown == [False, False, True, False, False, False, False]
+        browser.refresh()
+        assert number() == "3/7"
+        assert [entry["message"] for entry in browser.get_log("browser")] == []
+
+
+@needs_browser
+def test_on_a_phone_and_on_paper_all_slides_are_shown(small):
+    with chromium() as browser:
+        phone = {"width": 390, "height": 800, "deviceScaleFactor": 1, "mobile": True}
+        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", phone)
+        browser.get((small / "first-slides.html").as_uri())
+        titles = browser.find_elements("css selector", ".slide h2")
+        assert all(title.is_displayed() for title in titles)
+        assert browser.execute_script("return document.documentElement.scrollWidth") <= 390
+        browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+        printed = browser.execute_cdp_cmd("Page.printToPDF", {"preferCSSPageSize": True})["data"]
+        assert base64.b64decode(printed).count(b"/Type /Page\n") == len(SAID)
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 2 or not (Path(sys.argv[1]) / "lecturers.html").exists():
+        sys.exit("usage: PYTHONPATH=tests python tests/docs/test_slides.py DIRECTORY, the directory of a built site")
+    site = Path(sys.argv[1]).resolve()
+    wrong = faults(site, lectures())
+    if BROWSER and DRIVER:
+        wrong += overflowing(links(site / "lecturers.html"))
+        print("\n".join(wrong) or "each lecture has a deck, and every slide fits")
+    else:
+        print("\n".join([*wrong, "no Chromium here: whether slides fit was not looked at"]))
+    sys.exit(bool(wrong))
