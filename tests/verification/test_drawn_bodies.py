@@ -74,6 +74,7 @@ def test_the_frames_of_all_panels_line_up_over_one_x_axis(runs, name, options):
     for ax in others:
         assert (ax.get_position().x0, ax.get_position().x1) == pytest.approx((box.x0, box.x1), abs=1e-6)
         assert ax.get_xlim() == first.get_xlim()
+    assert box.height * size[1] <= 0.81 * box.width * size[0]  # tall bodies get room at both sides
     per_mm = [ends / np.ptp(limits) for ends, limits in (
         (box.width * size[0], first.get_xlim()), (box.height * size[1], first.get_ylim()))]  # fmt: skip
     assert per_mm[0] == pytest.approx(per_mm[1], rel=1e-6)  # as long as it is high
