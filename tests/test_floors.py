@@ -104,7 +104,7 @@ BUDGET = {
     "verification.algorithm": 2165,
     "verification.bounds": 3200,
     "verification.certificate": 1100,
-    "verification.cli": 2300,
+    "verification.cli": 2310,
     "verification.constants": 1100,
     "verification.contact": 860,
     "verification.exploration": 600,
