@@ -5,7 +5,7 @@ A small core in which every matrix is exact for its mesh.  Contact and the theor
 
 from fem1d2d.assembly import body_load, facet_weights, gram, side_load, stiffness
 from fem1d2d.condense import FEW, Condensation, Lifted, Uncoupled, elimination_order, solver, solver_with_inertia
-from fem1d2d.element import largest_strains
+from fem1d2d.element import largest_strains, stresses, von_mises
 from fem1d2d.material import Material, bar, plane_strain
 from fem1d2d.mesh import Mesh, MeshError, interval, rectangle, rectangle_points, sector
 from fem1d2d.mesh_files import from_file
@@ -49,7 +49,9 @@ __all__ = [
     "solver",
     "solver_with_inertia",
     "stiffness",
+    "stresses",
     "supports",
     "surface",
     "trapezoid",
+    "von_mises",
 ]

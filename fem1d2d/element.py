@@ -1,4 +1,4 @@
-"""Element matrices and strains: P1 in closed form, one formula for floats and exact rationals; others by quadrature.
+"""Element matrices, strains, stresses: P1 in closed form, one formula for floats and rationals; others by quadrature.
 
 All arrays have the cells first.  d is the dimension, k the number of nodes of a cell.
 """
@@ -6,7 +6,7 @@ All arrays have the cells first.  d is the dimension, k the number of nodes of a
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -117,11 +117,50 @@ def largest_strains(mesh: Cells, displacement: Floats) -> Floats:
     0.5
     """
     found = []
-    for _, gradients in element_of(mesh).points(mesh):
-        slopes = np.einsum("cip,ciq->cpq", gradients, displacement[mesh.cells])
+    for _, slopes in _slopes(mesh, displacement):
         if mesh.dimension == 1:
             found.append(np.abs(slopes[:, 0, 0]))
             continue
         (xx, xy), (yx, yy) = np.moveaxis(slopes, 0, -1)
         found.append(np.abs(xx + yy) / 2 + np.hypot((xx - yy) / 2, (xy + yx) / 2))
     return np.asarray(np.max(found, axis=0))
+
+
+def stresses(mesh: Cells, material: Material, displacement: Floats) -> Floats:
+    """Mean stress tensor of each cell, shape (c, 3, 3), in the unit of the material.
+
+    ``lame_lambda tr(eps) I + 2 lame_mu eps`` of the displacement of the nodes, shape (n, d): in plane strain with
+    ``sigma_zz = lame_lambda tr(eps)``; a bar has only ``sigma_xx``.
+
+    Examples
+    --------
+    >>> from fem1d2d import plane_strain, rectangle
+    >>> mesh = rectangle((0.0, 1.0), (0.0, 1.0), (1, 1))
+    >>> stresses(mesh, plane_strain(2.5, 0.25), mesh.points * [0.0, 0.5])[0].diagonal()
+    array([0.5, 1.5, 0.5])
+    """
+    d, whole = mesh.dimension, measures(mesh.points, mesh.cells)
+    strain = np.zeros((len(mesh.cells), 3, 3))
+    for size, slopes in _slopes(mesh, displacement):
+        strain[:, :d, :d] += (size / whole)[:, None, None] * (slopes + slopes.transpose(0, 2, 1)) / 2
+    trace = np.trace(strain, axis1=1, axis2=2)[:, None, None]
+    held = np.diag([1.0, 1.0, 1.0] if d == 2 else [1.0, 0.0, 0.0])
+    return np.asarray(material.lame_lambda * trace * held + 2 * material.lame_mu * strain)
+
+
+def von_mises(stress: Floats) -> Floats:
+    """Equivalent stress ``sqrt(3/2 s : s)`` of tensors, shape (c, 3, 3), with s the part of trace zero.
+
+    Examples
+    --------
+    >>> float(von_mises(np.diag([3.0, 0.0, 0.0])[None])[0])
+    3.0
+    """
+    mean = np.trace(stress, axis1=1, axis2=2)[:, None, None] / 3
+    return np.asarray(np.sqrt(1.5 * ((stress - mean * np.eye(3)) ** 2).sum(axis=(1, 2))))
+
+
+def _slopes(mesh: Cells, displacement: Floats) -> Iterator[tuple[Floats, Floats]]:
+    """The measure of each quadrature point, (c,), and the gradient of a displacement there, shape (c, d, d)."""
+    for size, gradients in element_of(mesh).points(mesh):
+        yield size, np.einsum("cip,ciq->cpq", gradients, displacement[mesh.cells])

@@ -19,7 +19,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -33,6 +33,9 @@ from verification.interface.fields import ContactFields
 from verification.interface.pair import ContactPair
 from verification.problem import Problem, load
 from verification.threads import one_thread
+
+if TYPE_CHECKING:
+    from verification.document import Figure
 
 __all__ = ["ContactSystem", "Solution", "SolveError", "contact_system", "solution_force", "solve"]
 
@@ -104,6 +107,14 @@ class Solution(Document):
         """Reasons why the numbers may be wrong."""
         return [*self.bodies.warnings, *self.checks.warnings]
 
+    def plot(self, **options: Any) -> Figure:
+        """Draw the deformed bodies above pressure, shear, friction bound and states along Gamma_c.
+
+        Options: ``stress="mises"`` or ``"sigma_yy"`` colours the cells, ``motions=True`` adds a panel with gap and
+        slip, ``zoom=True`` draws only the part where the bodies touch.
+        """
+        return self.drawn(**options)
+
     def content(self) -> dict[str, Any]:
         return {
             "title": self.bodies.problem.title,
@@ -160,7 +171,13 @@ def solve(problem: Problem | TwoBodies | ContactPair | Path | str) -> Solution:
         bodies=bodies,
         force=found.force,
         motion=found.motion,
-        contact=ContactFields.of(bodies.interface.contact, force=found.force, jump=jump, state=found.branches),
+        contact=ContactFields.of(
+            bodies.interface.contact,
+            force=found.force,
+            bound=system.bound(found.force),
+            jump=jump,
+            state=found.branches,
+        ),
         kkt_residual=residual,
         linear_solves=system.linear_solves,
     )

@@ -407,6 +407,8 @@ def test_the_demo_compares_section_6_and_leaves_problem_report_figures_and_json(
         "history.csv",
         "interface.npz",
         "compare.json",
+        "body1.vtu",
+        "body2.vtu",
         *(f"{figure}.{ending}" for figure in ("bodies", "residuals", "waterfall") for ending in ("svg", "png")),
     }
     assert (folder / "problem.toml").read_text(encoding="utf-8") == examples()["section6"]

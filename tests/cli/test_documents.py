@@ -199,7 +199,7 @@ def test_levels_repeat_the_constants_of_each_mesh(call, write):
 def assert_contact(found, nodes):
     """The objects `contact`, `pattern` and `force` that runs and solutions share."""
     contact, pattern = found["contact"], found["pattern"]
-    assert set(contact) == {"x", "pressure", "shear", "gap", "slip", "state"}
+    assert set(contact) == {"x", "pressure", "shear", "bound", "gap", "slip", "state"}
     assert {len(values) for values in contact.values()} == {nodes}
     assert {state: contact["state"].count(state) for state in ("stick", "slip", "open")} == pattern
     assert set(found["force"]) == {"normal", "tangential"}

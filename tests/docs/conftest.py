@@ -23,7 +23,7 @@ def builder():
     """The modules of ``docs/builder`` that need no Sphinx; they lie in a folder of scripts, not in a package."""
     sys.path.append(str(DOCS))
     try:
-        names = ("api", "cheat_sheet", "course", "equations", "notebooks", "widgets")
+        names = ("algorithm", "api", "cheat_sheet", "course", "equations", "notebooks", "widgets")
         return SimpleNamespace(**{name: import_module(f"builder.{name}") for name in names})
     finally:
         sys.path.remove(str(DOCS))

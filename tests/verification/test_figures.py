@@ -8,7 +8,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from matplotlib.collections import PolyCollection
-from matplotlib.colors import to_rgb
+from readable import contrast, grey
 from strategies import AT_NIGHT
 
 import verification as vf
@@ -163,22 +163,6 @@ def test_powers_of_ten_are_written_as_text(tmp_path):
 
 
 # --- read by everyone, on paper too -----------------------------------------------------------------------------------
-
-
-def grey(colour) -> float:
-    """Lightness in grey print, 0 to 1."""
-    return float(np.dot(to_rgb(colour), (0.299, 0.587, 0.114)))
-
-
-def contrast(one, other) -> float:
-    """Ratio of relative luminances, 1 to 21, as the guidelines for accessible pages define it."""
-
-    def luminance(colour):
-        channels = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in to_rgb(colour)]
-        return float(np.dot(channels, (0.2126, 0.7152, 0.0722)))
-
-    high, low = sorted((luminance(one), luminance(other)), reverse=True)
-    return (high + 0.05) / (low + 0.05)
 
 
 @pytest.fixture(scope="module")

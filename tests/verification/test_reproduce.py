@@ -83,7 +83,9 @@ def fields(*states: str) -> ContactFields:
     """A contact of 13 nodes over 1.2 mm in given states."""
     x = np.linspace(0.4, 1.6, 13)
     zero = np.zeros(13)
-    return ContactFields(x=x, weights=zero + 0.1, pressure=zero, shear=zero, gap=zero, slip=zero, status=states)
+    return ContactFields(
+        x=x, weights=zero + 0.1, pressure=zero, shear=zero, bound=zero, gap=zero, slip=zero, status=states
+    )
 
 
 PRINTED = ("stick",) * 6 + ("slip",) * 4 + ("open",) * 3

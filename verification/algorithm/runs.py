@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -36,6 +36,9 @@ from verification.monolithic import SolveError
 from verification.problem import Problem
 from verification.problem.tables import ProblemError
 from verification.threads import one_thread
+
+if TYPE_CHECKING:
+    from verification.document import Figure
 
 R = TypeVar("R")
 
@@ -197,7 +200,9 @@ class Run(Document):
         turned = np.ones(len(solved.v))
         turned[pair.contact.grid.tangential] = pair.normal_sign  # to body 1 against body 2
         force, jump = turned * solved.force, turned * solved.v
-        return ContactFields.of(pair.contact.grid, force=force, jump=jump, state=solved.pattern)
+        return ContactFields.of(
+            pair.contact.grid, force=force, bound=pair.bound(iterate.g), jump=jump, state=solved.pattern
+        )
 
     @property
     def bodies(self) -> TwoBodies:
@@ -268,6 +273,13 @@ class Run(Document):
         """Facts that a user should know before trusting the numbers."""
         tied = [self.start.why] if self.start.source == "tied" else []
         return self.pair.warnings + self.choice.warnings + tied + (list(self.checks.warnings) if self.converged else [])
+
+    def plot(self, view: str = "residuals", **options: Any) -> Figure:
+        """Draw the "residuals" over the steps, or the "bodies" at the last iterate; ValueError for another word.
+
+        The bodies take the options of :meth:`Solution.plot`: ``run.plot("bodies", stress="mises", zoom=True)``.
+        """
+        return self.drawn(view=view, **options)
 
     def content(self) -> dict[str, Any]:
         """Return the values of ``ndtheory.run/1``; each null has a reason beside it."""

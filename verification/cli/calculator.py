@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 
 import click
 
@@ -11,7 +12,7 @@ from ndtheory.constants import take
 from verification.bounds.bound import NOT_ASKED, Subject
 from verification.bounds.table import BOUNDS, ENERGY, SECTION_5, Calculated, Energy, Section5
 from verification.cli.console import deliver
-from verification.cli.options import OneOf
+from verification.cli.options import OneOf, check_place, one_file
 from verification.sections.bounds import sections
 
 #: The options by the constants that they give.
@@ -47,9 +48,12 @@ OPTIONS = {key: f"--{key.replace('_', '')}" for key in (*SECTION_5, *ENERGY)}
     metavar="NUMBER",
     help="Bound in energy norms: k C_s_energy C_t2, see `constants`; 0 without friction.",
 )
+@one_file(".svg", ".png", words="Figure of h_1 and h_2 over theta, which bound the squared factor")
 @click.option("--check", is_flag=True, help="Exit 1 unless contraction at theta is proved.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout.")
-def bounds(edition: str, theta: str | None, check: bool, as_json: bool, **given: str | None) -> int:
+def bounds(
+    edition: str, theta: str | None, target: Path | None, check: bool, as_json: bool, **given: str | None
+) -> int:
     """For which theta and friction does one step contract?
 
     Numbers may be rationals (1/3).  m, M, Cs and CK are in any one unit of stress; the printed theorem depends on
@@ -59,6 +63,7 @@ def bounds(edition: str, theta: str | None, check: bool, as_json: bool, **given:
     \b
     Examples, m and M in MPa:
       ndtheory bounds --m 3084 --M 153229 --CR 1.70 --CK 1e-8 --theta 1e-4
+      ndtheory bounds --m 1 --M 1 --CR 1 --CK 0.1 -o h.svg
       ndtheory bounds --rho 0.475 --kappa1 0.986 --kappa2 0.427 --theta 0.7
     """
     of_section_5 = {key: given[key] for key in SECTION_5}
@@ -69,6 +74,12 @@ def bounds(edition: str, theta: str | None, check: bool, as_json: bool, **given:
         of_section_5[key] is not None for key in ("m", "M", "C_R", "C_K", "C_s", "C_tr")
     )
     constants = None if alone else _constants(of_section_5)
+    if target is not None:
+        if constants is None:
+            raise click.UsageError(
+                "-o draws h_1 and h_2: it needs --m, --M, --CR and --CK", click.get_current_context()
+            )
+        check_place(target)
     friction = (
         take("k", 0 if given["k"] is None else given["k"], "a number k >= 0", lambda k: k >= 0)
         if constants is None
@@ -88,9 +99,17 @@ def bounds(edition: str, theta: str | None, check: bool, as_json: bool, **given:
         else:
             results[name] = bound.evaluate(subject, theta)
     found = Calculated(constants=constants, energy=energy, theta=theta, results=results)
-    deliver(found, sections, as_json)
+    deliver(found, sections, as_json, None if target is None else lambda found: _draw(found, target), target)
     proved = any(result.factor is not None and result.proved for result in results.values())
     return 1 if check and not proved else 0
+
+
+def _draw(found: Calculated, target: Path) -> None:
+    from verification.figures import save
+    from verification.output.files import staged
+
+    with staged(target.parent, shown=target) as room:
+        save(found.plot(), room / target.name)
 
 
 def _constants(given: Mapping[str, str | None]) -> Constants:

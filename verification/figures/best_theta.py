@@ -72,7 +72,7 @@ def _draw(ax: Axes, panel: Panel) -> None:
         ax.plot(*_points(thetas), linestyle=style, color=colour, linewidth=1.2, label=plain(label))
     free, rubbing = panel.without, panel.with_friction
     exact = {ratio: found.energy.theta for ratio, found in free.items() if found.energy}
-    ax.plot(*_points(exact), "-", color="#56B4E9", linewidth=4, zorder=1.5, label="proved without friction")
+    ax.plot(*_points(exact), "-", color="#2E86C1", linewidth=4, zorder=1.5, label="proved without friction")
     for name, label, colour, style in PROVED:
         proved = {ratio: getattr(found, name) for ratio, found in rubbing.items()}
         thetas = {ratio: least.theta for ratio, least in proved.items() if least}

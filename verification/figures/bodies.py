@@ -1,40 +1,93 @@
-"""The deformed bodies with the contact stresses along Gamma_c."""
+"""The deformed bodies, in colours or with their stresses, above what happens along Gamma_c."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
+from fem1d2d import depths, stresses, von_mises
 from fem1d2d.mesh import Floats
 from verification.algorithm.runs import Run
-from verification.figures.style import BODY1, BODY2, PRESSURE, SHEAR, STATES, legend_beside, new_figure, plain, styled
+from verification.figures import style
+from verification.figures.style import BODIES, FILLS, PRESSURE, SHEAR, legend_beside, mark_states, plain
 from verification.interface.assembly import TwoBodies
 from verification.interface.fields import ContactFields
 from verification.monolithic import Solution
 
+#: Stresses that colour the cells: what the colour bar calls them, and their values from the tensors.
+STRESSES = {"mises": ("von Mises stress", von_mises), "sigma_yy": (r"$\sigma_{yy}$", lambda tensors: tensors[:, 1, 1])}
+
 #: Displacements are drawn so that the largest is about this fraction of the picture.
 SHARE = 0.06
 
+#: The deepest that one drawn body may reach into the other, relative to the width: a pixel or two.
+DENT = 0.002
 
-def draw_bodies(result: Run | Solution) -> Figure:
-    """Deformed meshes above, pressure, shear and states along Gamma_c below; of a run the last iterate is drawn."""
-    bodies = result.bodies
-    moved = [float(np.abs(u).max()) for u in result.displacements if u is not None]
-    size = max(float(np.ptp(body.mesh.points[:, 0])) for body in bodies.elastic)
-    scale = _round_down(SHARE * size / max(moved)) if max(moved) > 0 else 1.0
-    plane = bodies.problem.dimension == 2
-    with styled():
-        figure = new_figure(7.2, 5.2 if plane else 2.6)
-        axes = figure.subplots(2, 1, height_ratios=[1.2, 1], sharex=True) if plane else [figure.subplots()]
-        _draw_meshes(axes[0], bodies, result.displacements, scale)
-        if plane:
-            _draw_stresses(axes[1], result.contact, bodies.problem.units)
+#: Inches: the widest that a panel becomes beside its legend, and the height of those along Gamma_c.
+WIDE, HIGH = 5.1, 2.3
+
+#: A picture of the bodies is at most this many times as high as wide: x reaches further on both sides of tall ones.
+TALL = 0.8
+
+BOTH = np.array([-1.0, 1.0])
+
+
+def draw_bodies(result: Run | Solution, *, stress: str = "", motions: bool = False, zoom: bool = False) -> Figure:
+    """Deformed meshes above, pressure, shear and states along Gamma_c below; of a run the last iterate is drawn.
+
+    All panels have one x axis.  Displacements are enlarged as far as the drawn bodies do not overlap.
+
+    Parameters
+    ----------
+    stress : {'', 'mises', 'sigma_yy'}
+        Stress that colours the cells, if any; ValueError for another name.
+    motions : bool
+        Whether a further panel has gap and slip along Gamma_c.
+    zoom : bool
+        Whether only the part where the bodies touch is drawn; all of Gamma_c where they touch nowhere.
+    """
+    if stress not in ("", *STRESSES):
+        raise ValueError(f"stress {stress!r}: needed one of {', '.join(STRESSES)}")
+    bodies, contact = result.bodies, result.contact
+    moved = [u for u in result.displacements if u is not None]
+    scale = _scale(bodies, moved)
+    drawn, plane = _placed(bodies, moved, scale), bodies.problem.dimension == 2
+    x, y = _ends(bodies, drawn, scale, contact if zoom and plane else None)
+    panels = (_draw_stresses, _draw_motions)[: 1 + motions] if plane else ()
+    heights = [WIDE * float(np.ptp(y) / np.ptp(x)), *[HIGH for _ in panels]]
+    with style.styled():
+        figure = style.new_figure(7.2, 1.1 + sum(heights))
+        axes = figure.subplots(len(heights), 1, height_ratios=heights, sharex=True, squeeze=False)[:, 0]
+        axes[0].set(xlim=x, ylim=y, title=f"{plain(bodies.problem.title)}: deformed, displacements x {scale:g}")
+        cells = _draw_meshes(axes[0], bodies, drawn, scale)
+        if stress:
+            tensors = (stresses(body.mesh, body.material, u) for body, u in zip(bodies.elastic, moved, strict=True))
+            _colour(axes[0], cells, stress, [STRESSES[stress][1](tensor) for tensor in tensors], bodies)
+        else:
+            legend_beside(axes[0])
+        if isinstance(result, Run) and not result.converged:
+            style.mark_unfinished(axes[0], result.outcome)
+        for ax, draw in zip(axes[1:], panels, strict=True):
+            draw(ax, contact.between(*x), bodies)
+            legend_beside(ax)
+        where = "x along $\\Gamma_c$" if plane else "x"
+        axes[-1].set_xlabel(f"{where} [{plain(bodies.problem.units['length'])}]")
     return figure
+
+
+def _scale(bodies: TwoBodies, moved: Sequence[Floats]) -> float:
+    """The largest round factor of displacements at which the drawn bodies do not overlap; 1 if they do at any above."""
+    largest = max(float(np.abs(u).max()) for u in moved)
+    size = max(float(np.ptp(body.mesh.points[:, 0])) for body in bodies.elastic)
+    scale = _round_down(SHARE * size / largest) if largest > 0 else 1.0
+    while scale > 1 and _overlap(bodies, _placed(bodies, moved, scale), scale) > DENT * size:
+        scale = _round_down(0.6 * scale)
+    return scale
 
 
 def _round_down(value: float) -> float:
@@ -43,62 +96,111 @@ def _round_down(value: float) -> float:
     return float(max(factor for factor in (1.0, 2.0, 5.0) if factor * power <= value * (1 + 1e-12)) * power)
 
 
-def _lift(bodies: TwoBodies, scale: float) -> float:
-    """The shift of body 2 in the drawing: a flat gap is scaled as displacements are, so that contact looks closed."""
-    if bodies.body1 is None or bodies.body2 is None or np.ptp(bodies.interface.gap) > 0:
+def _placed(bodies: TwoBodies, moved: Sequence[Floats], scale: float) -> list[Floats]:
+    """The drawn places of the nodes of each elastic body; a flat gap is scaled too, so that contact looks closed."""
+    found = [body.mesh.points + scale * u for body, u in zip(bodies.elastic, moved, strict=True)]
+    if len(found) == 2 and np.ptp(bodies.interface.gap) == 0:
+        below, above = (float(body.mesh.points[body.nodes[0], -1]) for body in bodies.elastic)
+        found[1][:, -1] += scale * float(bodies.interface.gap[0]) - (above - below)
+    return found
+
+
+def _obstacle(bodies: TwoBodies, scale: float) -> float:
+    """The height at which the face of the obstacle is drawn: a flat gap is scaled."""
+    (body,), gap = bodies.elastic, bodies.interface.gap
+    sign = -1.0 if bodies.body1 is None else 1.0
+    return float(body.mesh.points[body.nodes[0], 1] + sign * gap[0] * (scale if np.ptp(gap) == 0 else 1.0))
+
+
+def _overlap(bodies: TwoBodies, drawn: list[Floats], scale: float) -> float:
+    """Greatest depth of one drawn body in the other, or in the obstacle."""
+    if bodies.problem.dimension == 1:
         return 0.0
-    levels = [float(body.mesh.points[body.nodes[0], -1]) for body in (bodies.body1, bodies.body2)]
-    return scale * float(bodies.interface.gap[0]) - (levels[1] - levels[0])
+    if len(drawn) == 1:
+        beyond = drawn[0][bodies.elastic[0].nodes, 1] - _obstacle(bodies, scale)
+        return float((-beyond if bodies.body1 is None else beyond).max())
+    edges = [points[body.mesh.boundary.T] for body, points in zip(bodies.elastic, drawn, strict=True)]
+    return max(float(depths(own[0], *other).max()) for own, other in (edges, edges[::-1]))
 
 
-def _draw_meshes(ax: Axes, bodies: TwoBodies, displacements: tuple[Floats | None, Floats | None], scale: float) -> None:
-    length = bodies.problem.units["length"]
-    colours, lifts = (BODY1, BODY2), (0.0, _lift(bodies, scale))
-    for i, (body, u) in enumerate(zip((bodies.body1, bodies.body2), displacements, strict=True)):
-        if body is None or u is None:
-            continue
-        points = body.mesh.points + scale * u
-        points[:, -1] += lifts[i]
-        if bodies.problem.dimension == 2:
-            style: dict[str, Any] = {"facecolor": colours[i] + "30", "edgecolor": colours[i], "linewidth": 0.4}
-            ax.add_collection(PolyCollection(list(points[body.mesh.cells]), label=f"body {i + 1}", **style))
-        else:
-            line = np.column_stack([points[:, 0], np.full(len(points), 0.2 * i)])
-            bar = LineCollection([line], colors=colours[i], linewidths=6, alpha=0.5, label=f"body {i + 1}")
-            ax.add_collection(bar)
-            ax.plot(line[:, 0], line[:, 1], "|", color=colours[i])
-    if bodies.problem.dimension == 2 and len(bodies.elastic) == 1:
-        ax.axhline(_obstacle(bodies), color="0.3", linewidth=2, label="obstacle")
-    ax.autoscale_view()
-    if bodies.problem.dimension == 2:
-        ax.set_aspect("equal")
-        ax.set_ylabel(f"y [{plain(length)}]")
+def _ends(bodies: TwoBodies, drawn: list[Floats], scale: float, contact: ContactFields | None) -> tuple[Floats, Floats]:
+    """The ends of both axes: around all bodies, or around what touches of a contact that is zoomed."""
+    points = np.concatenate(drawn)
+    x = np.array([points[:, 0].min(), points[:, 0].max()])
+    if bodies.problem.dimension == 1:
+        return x + 0.04 * np.ptp(x) * BOTH, 0.1 + 0.15 * np.ptp(x) * BOTH
+    heights = [*points[:, 1], _obstacle(bodies, scale)] if len(drawn) == 1 else points[:, 1]
+    y = np.array([np.min(heights), np.max(heights)])
+    if contact is None:
+        x, y = x + 0.04 * np.ptp(x) * BOTH, y + 0.06 * np.ptp(y) * BOTH
     else:
-        ax.set_ylim(-0.4, 0.8)
+        touching = np.array(contact.status) != "open"
+        ends = contact.x[touching] if touching.any() else contact.x
+        x = np.array([ends.min(), ends.max()]) + 3 * np.diff(contact.x).max() * BOTH
+        surface = drawn[0][bodies.elastic[0].nodes]
+        y = surface[(surface[:, 0] > x[0]) & (surface[:, 0] < x[1]), 1].mean() + 0.2 * np.ptp(x) * BOTH
+    return x + max(0.0, np.ptp(y) / TALL - np.ptp(x)) / 2 * BOTH, y
+
+
+def _draw_meshes(ax: Axes, bodies: TwoBodies, drawn: list[Floats], scale: float) -> list[PolyCollection]:
+    """Draw the cells of each body, those of bars as boxes at two heights."""
+    found, length = [], plain(bodies.problem.units["length"])
+    for body, points in zip(bodies.elastic, drawn, strict=True):
+        i = int(body.name[-1]) - 1
+        cells = points[body.mesh.cells]
+        if bodies.problem.dimension == 1:
+            high = 0.02 * np.ptp(ax.get_xlim())
+            box = 0.1 + 3 * high * (2 * i - 1) + high * np.array([-1, -1, 1, 1])
+            cells = np.stack([cells[:, [0, 1, 1, 0], 0], np.tile(box, (len(cells), 1))], axis=-1)
+        found.append(PolyCollection(list(cells), facecolor=FILLS[i], edgecolor=BODIES[i], linewidth=0.4))
+        found[-1].set_label(f"body {i + 1}")
+        ax.add_collection(found[-1])
+    ax.set_aspect("equal")
+    if bodies.problem.dimension == 1:
         ax.set_yticks([])
-        ax.set_xlabel(f"x [{plain(length)}]")
-    ax.set_title(f"{plain(bodies.problem.title)}: deformed, displacements x {scale:g}")
-    legend_beside(ax)
+        return found
+    ax.set_ylabel(f"y [{length}]")
+    if len(drawn) == 1:
+        ax.axhline(_obstacle(bodies, scale), color="0.3", linewidth=2, label="obstacle")
+    return found
 
 
-def _obstacle(bodies: TwoBodies) -> float:
-    """The height of the face of the obstacle."""
-    body, sign = (bodies.body2, -1.0) if bodies.body1 is None else (bodies.body1, 1.0)
-    assert body is not None
-    return float(body.mesh.points[body.nodes[0], 1] + sign * bodies.interface.gap[0])
+def _colour(ax: Axes, cells: list[PolyCollection], stress: str, values: list[Floats], bodies: TwoBodies) -> None:
+    """Colour the cells by a stress, name the bodies in the middle of what is seen of them, and add the colour bar."""
+    every = np.concatenate(values)
+    low, high = (float(end(0.0, value)) for end, value in zip((min, max), np.percentile(every, (1, 99)), strict=True))
+    above, below = (distance > 1e-6 * (high - low) for distance in (every.max() - high, low - every.min()))
+    beyond = ("neither", "max", "min", "both")[int(above) + 2 * int(below)]
+    corner, opposite = zip(ax.get_xlim(), ax.get_ylim(), strict=True)
+    for collection, colours in zip(cells, values, strict=True):
+        collection.set(array=colours, clim=(low, high), cmap="viridis", edgecolor="0.5")
+        points = np.concatenate([path.vertices for path in collection.get_paths()])
+        seen = points[((points > corner) & (points < opposite)).all(axis=1)]
+        if len(seen):
+            look: Any = {"ha": "center", "va": "center", "bbox": {"facecolor": "white", "linewidth": 0, "pad": 1.5}}
+            ax.text(float(seen[:, 0].mean()), float(seen[:, 1].mean()), str(collection.get_label()), **look)
+    words = f"{STRESSES[stress][0]}\n[{plain(bodies.problem.units['stress'])}]"
+    ax.figure.colorbar(cells[0], ax.inset_axes((1.03, 0.0, 0.025, 1.0)), extend=beyond, label=words)
 
 
-def _draw_stresses(ax: Axes, contact: ContactFields, units: Mapping[str, str]) -> None:
+def _draw_stresses(ax: Axes, contact: ContactFields, bodies: TwoBodies) -> None:
+    law = bodies.interface.law
+    if law is not None and contact.bound.any():
+        look: Any = {"facecolor": "0.9", "edgecolor": "0.4", "linestyle": ":"}
+        ax.fill_between(contact.x, -contact.bound, contact.bound, label=f"friction bound\n({plain(law.words)})", **look)
+    curves = ("pressure $-\\sigma_N$", contact.pressure), ("shear $\\sigma_T$ on body 2", contact.shear)
+    _draw_along(ax, contact, curves, f"stress [{plain(bodies.problem.units['stress'])}]")
+
+
+def _draw_motions(ax: Axes, contact: ContactFields, bodies: TwoBodies) -> None:
+    curves = ("gap", contact.gap), ("slip $u^1_T - u^2_T$", contact.slip)
+    _draw_along(ax, contact, curves, f"gap, slip [{plain(bodies.problem.units['length'])}]")
+
+
+def _draw_along(ax: Axes, contact: ContactFields, curves: Sequence[tuple[str, Floats]], label: str) -> None:
+    """A normal and a tangential quantity along Gamma_c, the states on the latter."""
     ax.axhline(0, color="0.8", linewidth=0.8)
-    ax.plot(contact.x, contact.pressure, "-", color=PRESSURE, label="pressure $-\\sigma_N$")
-    ax.plot(contact.x, contact.shear, "--", color=SHEAR, label="shear $\\sigma_T$ on body 2")
-    states = np.array(contact.status)
-    for name, marker in (("stick", "s"), ("slip", "o"), ("open", "x")):
-        here = states == name
-        if here.any():
-            ax.plot(
-                contact.x[here], contact.shear[here], marker, color=STATES[name], markersize=4, label=name, linestyle=""
-            )
-    ax.set_xlabel(f"x along $\\Gamma_c$ [{plain(units['length'])}]")
-    ax.set_ylabel(f"stress [{plain(units['stress'])}]")
-    legend_beside(ax)
+    for (name, values), look, colour in zip(curves, ("-", "--"), (PRESSURE, SHEAR), strict=True):
+        ax.plot(contact.x, values, look, color=colour, label=name)
+    mark_states(ax, contact.status, contact.x, curves[1][1])
+    ax.set_ylabel(label)

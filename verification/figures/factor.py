@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from ndtheory import EnergyConstants, evaluate_energy
 from ndtheory.energy_norms import predicted_factor
-from verification.figures.style import BODY1, BODY2, THETA, legend_beside, new_figure, styled
+from verification.figures.style import BODIES, THETA, legend_beside, new_figure, styled
 
 #: Thetas of a curve.
 POINTS = 80
@@ -21,14 +22,15 @@ def draw_factor(roles: Mapping[str, EnergyConstants]) -> Figure:
     with styled():
         figure = new_figure(7.2, 3.4)
         ax = figure.subplots()
-        for (label, energy), colour in zip(roles.items(), (BODY1, BODY2), strict=False):
+        for (label, energy), colour, marker in zip(roles.items(), BODIES, ("", "s"), strict=False):
+            look: Any = {"color": colour, "marker": marker, "markevery": 8, "markersize": 3.5}
             name, rho = f"{label}: " if label else "", float(energy.at_work)
             predicted = [predicted_factor(theta, rho) for theta in thetas]
-            ax.plot(thetas, predicted, "--", color=colour, label=f"{name}predicted, rho = {rho:.3g}")
+            ax.plot(thetas, predicted, "--", **look, label=f"{name}predicted, rho = {rho:.3g}")
             found = [evaluate_energy(energy, float(theta)).factor for theta in thetas]
             proved = [(theta, q.value) for theta, q in zip(thetas, found, strict=True) if q is not None]
             if proved:
-                ax.plot(*zip(*proved, strict=True), "-", color=colour, label=f"{name}proved")
+                ax.plot(*zip(*proved, strict=True), "-", **look, label=f"{name}proved")
             best = evaluate_energy(energy)
             if best.theta_proved is not None and best.factor_proved is not None:
                 ax.plot([best.theta_proved], [best.factor_proved.value], "o", color=colour, markersize=5)

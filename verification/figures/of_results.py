@@ -5,15 +5,17 @@ Another type of result gets its figure by ``draw.register``.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import singledispatch
 from typing import Any
 
 from matplotlib.figure import Figure
 
-from ndtheory import EnergyConstants
+from ndtheory import EDITIONS, EnergyConstants
 from verification.advice.roles import Advice
 from verification.algorithm.runs import Run
 from verification.bounds.region import Plane
+from verification.bounds.table import Calculated
 from verification.comparison import Comparison
 from verification.constants import Measured
 from verification.figures.bodies import draw_bodies
@@ -21,6 +23,7 @@ from verification.figures.factor import draw_factor
 from verification.figures.region import draw_region
 from verification.figures.reproduction import draw_reproduction
 from verification.figures.residuals import draw_residuals
+from verification.figures.squares import draw_squares
 from verification.figures.sweep import draw_sweep
 from verification.monolithic import Solution
 from verification.reproduce.experiments import Reproduction
@@ -35,15 +38,32 @@ def draw(result: Any, **options: Any) -> Figure:
 
 draw.register(Plane, draw_region)
 draw.register(Reproduction, draw_reproduction)
-draw.register(Run, draw_residuals)
 draw.register(Solution, draw_bodies)
 draw.register(Sweep, draw_sweep)
+
+
+@draw.register
+def _(result: Run, view: str = "residuals", **options: Any) -> Figure:
+    """The residuals, or the bodies with the options of their figure."""
+    views: dict[str, Callable[..., Figure]] = {"residuals": draw_residuals, "bodies": draw_bodies}
+    if view not in views:
+        raise ValueError(f"{view!r}: needed one of {', '.join(views)}")
+    return views[view](result, **options)
 
 
 @draw.register
 def _(result: Comparison) -> Figure:
     """The residuals beside what each bound proves of them."""
     return draw_residuals(result.run, result.computed)
+
+
+@draw.register
+def _(result: Calculated) -> Figure:
+    """h_1 and h_2 over theta, of the editions that were asked for."""
+    if result.constants is None:
+        raise ValueError("h_1 and h_2 need the constants m, M, C_R and C_K")
+    chosen = [edition for edition in EDITIONS if not result.results[edition.name].not_computed]
+    return draw_squares(result.constants, chosen)
 
 
 @draw.register

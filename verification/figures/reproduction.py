@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from textwrap import fill
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from verification.figures.style import STATES, THETA, legend_beside, new_figure, styled
+from verification.figures.style import THETA, legend_beside, mark_states, new_figure, styled
 from verification.reproduce.claims import PRINTED_THETA, ZONES
 from verification.reproduce.experiments import Reproduction, Result
 
@@ -22,7 +23,7 @@ def draw_reproduction(found: Reproduction) -> Figure:
         figure = new_figure(7.2, 2.9 * len(results))
         for result, ax in zip(results, np.atleast_1d(figure.subplots(len(results), 1)), strict=True):
             (_zones if result.figure == "fig5" else _curves)(result, ax)
-            ax.set_title(f"{result.figure}, {result.verdict}; nearest: {result.closest.reading.name}")
+            ax.set_title(fill(f"{result.figure}, {result.verdict}; nearest: {result.closest.reading.name}", 72))
     return figure
 
 
@@ -32,18 +33,16 @@ def _zones(result: Result, ax: Any) -> None:
         return
     x = contact.x - contact.x[0]
     ax.plot(x, contact.pressure, color="0.3", linewidth=0.8)
-    for state, colour in STATES.items():
-        here = np.array([status == state for status in contact.status])
-        ax.plot(x[here], contact.pressure[here], "o", color=colour, markersize=4, label=state)
+    mark_states(ax, contact.status, x, contact.pressure)
     for _, end in ZONES[:-1]:
-        ax.axvline(end, color="0.6", linestyle=":", label="printed ends of zones" if end == ZONES[0][1] else None)
+        ax.axvline(end, color="0.5", linestyle=":", label="printed ends of zones" if end == ZONES[0][1] else None)
     ax.set_xlabel("x from the left end of Gamma_c (mm)")
     ax.set_ylabel("pressure (MPa)")
     legend_beside(ax)
 
 
 def _curves(result: Result, ax: Any) -> None:
-    ax.axvline(PRINTED_THETA, color="0.6", linestyle=":", label="printed best theta")
+    ax.axvline(PRINTED_THETA, color="0.5", linestyle=":", label="printed best theta")
     for curve, marker, shade in zip(result.closest.curves, MARKERS, SHADES, strict=False):
         points = [(theta, n) for theta, n in curve.steps.items() if n is not None]
         if points:

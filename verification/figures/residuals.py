@@ -12,7 +12,7 @@ from verification.algorithm.rates import noise
 from verification.algorithm.runs import Run
 from verification.bounds.bound import BoundResult
 from verification.bounds.table import named
-from verification.figures.style import PRESSURE, legend_beside, new_figure, plain, styled
+from verification.figures.style import PRESSURE, legend_beside, mark_unfinished, new_figure, plain, styled
 
 
 def draw_residuals(run: Run, bounds: Sequence[BoundResult] = ()) -> Figure:
@@ -36,11 +36,13 @@ def draw_residuals(run: Run, bounds: Sequence[BoundResult] = ()) -> Figure:
                 ax.semilogy(steps, line, linestyle=bound.dashes, color=bound.colour, label=f"{row.name} bound")
         if run.last.scale > 0:
             floor = noise(run.pair, run.last) / run.last.scale
-            ax.axhline(floor, color="0.7", linewidth=0.8, linestyle=":", label="rounding")
-        ax.axhline(run.pair.settings.tolerance, color="0.4", linewidth=0.8, linestyle=":", label="tolerance")
+            ax.axhline(floor, color="0.55", linewidth=0.8, linestyle=":", label="rounding")
+        ax.axhline(run.pair.settings.tolerance, color="0.2", linewidth=0.8, linestyle=":", label="tolerance")
         ax.set_xlabel("evaluations of T")
         ax.set_ylabel("residual |||T g - g|||, relative to the forces")
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
         ax.set_title(f"{plain(run.pair.title)}: theta = {float(run.theta):g}")
         legend_beside(ax)
+        if not run.converged:
+            mark_unfinished(ax, run.outcome)
     return figure

@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 import threading
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
@@ -18,12 +19,16 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.ticker import LogFormatterSciNotation
 
+from fem1d2d.mesh import Floats
 from ndtheory.texts import clean, printable
 
 #: Blue, vermilion and their kin from the palette of Okabe and Ito; they differ in lightness too.
-BODY1, BODY2 = "#0072B2", "#D55E00"
+BODIES = BODY1, BODY2 = "#0072B2", "#D55E00"
+#: Light areas of both bodies, which differ in grey print.
+FILLS = "#A6CBE3", "#FBE6D6"
 PRESSURE, SHEAR = "#000000", "#CC79A7"
 STATES = {"stick": "#009E73", "slip": "#E69F00", "open": "#999999"}
+STATE_MARKERS = {"stick": "s", "slip": "o", "open": "x"}
 #: Colour and marker of a run by its outcome.
 OUTCOMES = {
     "converged": ("#0072B2", "o"),
@@ -81,6 +86,22 @@ def ink(fill: str) -> str:
 def legend_beside(ax: Axes) -> None:
     """The legend to the right of the axes, where it covers nothing."""
     ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+
+def mark_states(ax: Axes, status: Sequence[str], x: Floats, y: Floats) -> None:
+    """The state of each contact node as a marker on a curve."""
+    for name, marker in STATE_MARKERS.items():
+        here = np.array(status) == name
+        if here.any():
+            look: Any = {"color": STATES[name], "markeredgecolor": "0.15", "markeredgewidth": 0.6, "markersize": 4}
+            ax.plot(x[here], y[here], marker, label=name, **look)
+
+
+def mark_unfinished(ax: Axes, outcome: str) -> None:
+    """A mark across the axes: the run did not converge."""
+    box = {"facecolor": "white", "edgecolor": "#A00000", "linewidth": 1.5}
+    words = f"not converged ({outcome})"
+    ax.text(0.5, 0.5, words, color="#A00000", weight="bold", size=12, ha="center", transform=ax.transAxes, bbox=box)
 
 
 def plain(text: str) -> str:

@@ -24,6 +24,9 @@ WORDS = {
 }
 MARKERS = "osD^vPX*"
 
+#: The end of the colour map: what follows is too light on white.
+DARK = 0.6
+
 
 def draw_sweep(sweep: Sweep, x: str, y: str, curves: str | None = None) -> Figure:
     """One column over another; a row without a number there has no point.
@@ -52,7 +55,7 @@ def draw_sweep(sweep: Sweep, x: str, y: str, curves: str | None = None) -> Figur
     with styled():
         figure = new_figure(7.2, 4.2)
         ax = figure.subplots()
-        shades = mpl.colormaps["viridis"](np.linspace(0, 0.85, max(len(colours), 1)))
+        shades = mpl.colormaps["viridis"](np.linspace(0, DARK, max(len(colours), 1)))
         for i, (key, shade) in enumerate(zip(colours, shades, strict=True)):
             label: str | None = ", ".join(
                 f"{name} = {_text(value)}" for name, value in zip([curves] if curves else others, key, strict=True)
@@ -97,7 +100,7 @@ def draw_rules(panels: Mapping[str, Sequence[Row]], *, columns: int = 2) -> Figu
         lines = -(-len(panels) // columns)
         figure = new_figure(7.2, 0.8 + 2.4 * lines)
         grid = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False)
-        shades = mpl.colormaps["viridis"](np.linspace(0, 0.85, len(names)))
+        shades = mpl.colormaps["viridis"](np.linspace(0, DARK, len(names)))
         for ax, (title, rows) in zip(grid.flat, panels.items(), strict=False):
             for name, shade, marker in zip(names, shades, MARKERS, strict=False):
                 found = sorted((row["young1"] / row["young2"], row["iterations"], row["proved_rate"] is not None)

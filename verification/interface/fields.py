@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,8 @@ class ContactFields(Value):
         ``-sigma_N >= 0``: nodal force over w_j, unit of stress.
     shear : array
         Tangential force on body 2 over w_j, unit of stress; 0 in 1D.
+    bound : array
+        Friction bound ``k |S sigma_N|``, unit of stress; 0 in 1D.  In a run it belongs to the g before step II.
     gap : array
         Distance of the bodies, >= 0, unit of length.
     slip : array
@@ -39,6 +41,7 @@ class ContactFields(Value):
     weights: Floats
     pressure: Floats
     shear: Floats
+    bound: Floats
     gap: Floats
     slip: Floats
     status: tuple[str, ...]
@@ -48,13 +51,15 @@ class ContactFields(Value):
         return ", ".join(f"{count} {name}" for name, count in self.pattern.items())
 
     @classmethod
-    def of(cls, grid: Grid, *, force: Floats, jump: Floats, state: Pattern) -> ContactFields:
+    def of(cls, grid: Grid, *, force: Floats, bound: Floats, jump: Floats, state: Pattern) -> ContactFields:
         """Make the fields from interface vectors on the contact grid, tangential components first.
 
         Parameters
         ----------
         force : array
             Nodal forces: tangential on body 2, normal compressive.
+        bound : array, shape (t,)
+            Friction bound on nodal forces.
         jump : array
             ``u1_T - u2_T`` and ``[u_N] - gap <= 0``.
         state : Pattern
@@ -67,10 +72,18 @@ class ContactFields(Value):
             weights=grid.weights,
             pressure=force[grid.normal] / grid.weights,
             shear=force[grid.tangential] / grid.weights if plane else zero,
+            bound=bound / grid.weights if plane else zero,
             gap=-jump[grid.normal] + 0.0,
             slip=jump[grid.tangential].copy() if plane else zero,
             status=tuple(str(name) for name in names),
         )
+
+    def between(self, low: float, high: float) -> ContactFields:
+        """Return the part of Gamma_c from one position to another."""
+        kept = np.flatnonzero((self.x >= low) & (self.x <= high))
+        status = tuple(self.status[i] for i in kept)
+        arrays = {name: value[kept] for name, value in vars(self).items() if isinstance(value, np.ndarray)}
+        return replace(self, **arrays, status=status)
 
     @property
     def pattern(self) -> dict[str, int]:
@@ -84,10 +97,10 @@ class ContactFields(Value):
 
     def table(self) -> dict[str, list[Any]]:
         """Return Gamma_c as plain columns, one row a contact node: ``pandas.DataFrame(contact.table())`` reads it."""
-        names = ("x", "weights", "pressure", "shear", "gap", "slip")
+        names = ("x", "weights", "pressure", "shear", "bound", "gap", "slip")
         return {name: getattr(self, name).tolist() for name in names} | {"status": list(self.status)}
 
     def to_dict(self) -> dict[str, Any]:
         """Return the objects ``force``, ``pattern`` and ``contact`` that runs and solutions share."""
-        arrays = {name: getattr(self, name).tolist() for name in ("x", "pressure", "shear", "gap", "slip")}
+        arrays = {name: getattr(self, name).tolist() for name in ("x", "pressure", "shear", "bound", "gap", "slip")}
         return {"force": self.force, "pattern": self.pattern, "contact": {**arrays, "state": list(self.status)}}

@@ -24,18 +24,22 @@ Kind = Literal["run", "solve", "compare", "verify", "reproduce"]
 
 _PICTURES = ("bodies.svg", "bodies.png", "residuals.svg", "residuals.png")
 
+_LOSSES = ("waterfall.svg", "waterfall.png")
+
 _TABLES = ("contact.csv", "history.csv")
 
 #: The rows behind each figure of Section 6.
 _ROWS = ("fig5.csv", "fig10.csv", "fig11.csv", "fig12.csv")
 
+_FIELDS = ("body1.vtu", "body2.vtu")
+
 _MATRICES = ("interface.npz", "P.npz")
 
 #: The files that each command writes, beside the problem.
 FILES: dict[Kind, tuple[str, ...]] = {
-    "run": ("run.json", *_TABLES, *_MATRICES, *_PICTURES),
-    "solve": ("solve.json", *_TABLES[:1], *_MATRICES[1:], *_PICTURES[:2]),
-    "compare": ("compare.json", *_TABLES, *_MATRICES, *_PICTURES, "waterfall.svg", "waterfall.png", "report.html"),
+    "run": ("run.json", *_TABLES, *_MATRICES, *_FIELDS, *_PICTURES),
+    "solve": ("solve.json", *_TABLES[:1], *_MATRICES[1:], *_FIELDS, *_PICTURES[:2]),
+    "compare": ("compare.json", *_TABLES, *_MATRICES, *_FIELDS, *_PICTURES, *_LOSSES, "report.html"),
     "reproduce": ("reproduce.json", "reproduce.svg", "reproduce.png", *_ROWS),
     "verify": ("ledger.json", "ledger.md", "errata.md", "verdicts.json"),
 }
@@ -45,6 +49,7 @@ MARKS = {
     ".json": b'"schema": "ndtheory.',
     ".svg": b"<dc:title>ndtheory</dc:title>",
     ".png": b"Software\x00ndtheory",
+    ".vtu": b"<!-- ndtheory ",
     ".html": b'name="generator" content="ndtheory ',
     ".md": b"<!-- ndtheory verify -->",
     ".csv": b"# ndtheory ",

@@ -11,6 +11,7 @@ from verification.algorithm.runs import Run
 from verification.interface.files import write_interface, write_transfer
 from verification.interrupts import undisturbed
 from verification.ledger import sheets
+from verification.output.fields import write_fields
 from verification.output.files import FILES, MARKS, MOST_BYTES, Kind, check_folder, check_ours, check_place, staged
 from verification.problem.tables import ProblemError, unreadable
 from verification.spreadsheet import as_csv
@@ -81,9 +82,9 @@ class Folder:
         _text(room / "report.html", report(comparison, figures))
 
     def _tables(self, room: Path, result: Run | Solution) -> None:
-        """Gamma_c and the history as CSV, the interface as matrices, and the problem where a user has none there."""
+        """Gamma_c and the history as CSV, the interface as matrices, the fields, the problem where a user has none."""
         length, stress = result.units["length"], result.units["stress"]
-        units = f"x, gap, slip in {length}; pressure, shear in {stress}"
+        units = f"x, gap, slip in {length}; pressure, shear, bound in {stress}"
         _csv(room / "contact.csv", units, result.contact.table())
         if isinstance(result, Run):
             _csv(room / "history.csv", "residuals in the norm (5.21), relative ones without unit", result.table())
@@ -91,6 +92,7 @@ class Folder:
         interface = result.pair.interface if isinstance(result, Run) else result.bodies.interface
         if interface.transfer is not None:
             write_transfer(interface, room / "P.npz")
+        write_fields(result, room)
         there = self.path / "problem.toml"
         ours = not there.exists() or (not unreadable(there, MOST_BYTES) and MARKS[".toml"] in there.read_bytes())
         if result.problem is not None and ours:

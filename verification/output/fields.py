@@ -1,0 +1,51 @@
+"""The fields of each body as a VTU file, which ParaView opens."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from fem1d2d import stresses, von_mises
+from fem1d2d.mesh import Floats
+from ndtheory import __version__
+from ndtheory.texts import printable
+from verification.algorithm.runs import Run
+from verification.interface.body import Body
+from verification.monolithic import Solution
+
+#: The cells of a mesh by its dimension, as VTK calls them.
+CELLS = {1: "line", 2: "triangle"}
+
+#: Rows and columns of a stress tensor in the order of VTK.
+SIX = (0, 1, 2, 0, 1, 0), (0, 1, 2, 1, 2, 2)
+
+
+def write_fields(result: Run | Solution, room: Path) -> None:
+    """Write ``body1.vtu`` and ``body2.vtu``: displacement at the nodes, stresses on the cells; none where rigid.
+
+    A run is written at its last iterate.
+    """
+    bodies, units = result.bodies, result.units
+    for body, u in zip((bodies.body1, bodies.body2), result.displacements, strict=True):
+        if body is not None and u is not None:
+            _write(room / f"{body.name}.vtu", body, u, f"lengths in {units['length']}, stresses in {units['stress']}")
+
+
+def _write(path: Path, body: Body, u: Floats, says: str) -> None:
+    import meshio
+
+    mesh = body.mesh
+    spatial = lambda vectors: np.pad(vectors, ((0, 0), (0, 3 - mesh.dimension)))
+    tensor = stresses(mesh, body.material, u)
+    written = meshio.Mesh(
+        spatial(mesh.points),
+        [(CELLS[mesh.dimension], mesh.cells)],
+        point_data={"displacement": spatial(u)},
+        cell_data={"stress": [tensor[:, *SIX]], "von_mises": [von_mises(tensor)]},
+    )
+    meshio.write(path, written, file_format="vtu")
+    first, _, rest = path.read_text("utf-8").partition("\n")
+    comment = re.sub("-+", "-", f"ndtheory {__version__}: {body.name}, {printable(says)}")  # XML has no -- in one
+    path.write_text(f"{first}\n<!-- {comment} -->\n{rest}", encoding="utf-8")
