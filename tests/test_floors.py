@@ -140,6 +140,7 @@ INSIDE = (
     ("verification.ledger.rows", "verification.ledger.sources", "records are read without sympy, which takes a second"),
     ("verification.output.folder", "verification.figures", "matplotlib is loaded once there is something to draw"),
     ("verification.output.fields", "meshio", "half a second; only a folder needs it"),
+    ("verification.exploration.page", "jinja2", "it is loaded once there is a page"),
     ("verification.output.folder", "verification.output.report", "jinja2 is loaded once there is a comparison"),
     ("verification.contact.step", "verification.contact.model", "cvxpy takes a second, and few steps need it"),
     ("verification.contact.step", "scipy.optimize", "heavy; only bodies that contact alone holds need it"),

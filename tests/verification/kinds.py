@@ -74,6 +74,7 @@ KINDS: dict[str, Callable[[vf.Problem], object]] = {
 
 #: The others, which tell nothing of the problem or differ in what they show.
 OTHERS: dict[str, Callable[[vf.Problem], object]] = {
+    "Exploration": lambda given: vf.explore(vf.example("two-bars")),
     "Measured with proofs": partial(vf.measure, verified=True),
     "Comparison with proofs": partial(vf.compare, verified=True),
     "Advice from a run": lambda given: vf.advise_run("0.1", "1.4"),

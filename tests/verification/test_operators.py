@@ -146,7 +146,7 @@ def test_beyond_the_limit_rho_m_and_M_are_measured_and_the_rest_tells_why_not(mo
     assert (large.nodes, large.interface_nodes) == (dense.nodes, dense.interface_nodes)
     assert pickle.loads(pickle.dumps(large)).rho_max == large.rho_max
     assert large.to_dict().keys() == dense.to_dict().keys()
-    with pytest.raises(ValueError, match="energy norms does not speak of it: 41 contact nodes"):
+    with pytest.raises(ValueError, match="energy norms does not apply: 41 contact nodes"):
         large.plot()
 
 

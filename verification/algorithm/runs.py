@@ -277,7 +277,7 @@ class Run(Document):
     def plot(self, view: str = "residuals", **options: Any) -> Figure:
         """Draw the "residuals" over the steps, or the "bodies" at the last iterate; ValueError for another word.
 
-        The bodies take the options of :meth:`Solution.plot`: ``run.plot("bodies", stress="mises", zoom=True)``.
+        The bodies take the options of :meth:`verification.Solution.plot`: ``stress="mises"``, ``zoom=True``.
         """
         return self.drawn(view=view, **options)
 

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ndtheory import __version__
 from ndtheory.energy_norms import one_minus_square, predicted_factor, predicted_theta
@@ -93,6 +92,8 @@ class Exploration(Document):
 
     def page(self) -> str:
         """Return the page: HTML that loads nothing from other files or hosts."""
+        from jinja2 import Environment, PackageLoader, StrictUndefined
+
         environment = Environment(
             loader=PackageLoader("verification", "data"), autoescape=True, undefined=StrictUndefined
         )

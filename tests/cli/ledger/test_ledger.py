@@ -30,7 +30,7 @@ def test_the_help_names_the_statuses_and_has_an_example_for_one_id_and_for_all(c
     ids = [id for line in examples for id in shlex.split(line)[2:] if not id.startswith("-")]
     assert {"5.30"} <= set(ids)
     named = {id for id in ids if any(known == id or known.startswith(f"{id}.") for known in STATEMENTS)}
-    assert set(ids) - named <= {"full", "ledger"}
+    assert set(ids) - named <= {"full", "ledger", "proof.svg"}
     assert "Exit status 1" in one_line(answer.out)
     assert all(option in answer.out for option in ("--level", "-o, --output", "--json"))
     assert wide(answer) == []
