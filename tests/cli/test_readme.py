@@ -27,6 +27,11 @@ def test_the_page_on_the_first_run_shows_the_output_of_demo(
     assert steady(shown[1].rstrip()) == steady(printed.rstrip())
 
 
+def test_no_line_of_prose_is_wider_than_120_columns() -> None:
+    prose = re.sub(r"```.*?```", "", README, flags=re.S).splitlines()
+    assert [line for line in prose if len(line) > 120 and not line.startswith(("    ", "!["))] == []
+
+
 def test_the_python_example_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from verification.cli.problems import examples
 

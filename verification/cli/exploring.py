@@ -35,6 +35,9 @@ def explore(file: Path, keys: dict[str, str], swap: bool, target: Path, as_json:
     check_place(target)
     with stages() as tell:
         found = page.explore(problem, progress=tell)
-    with staged(target.parent, shown=target) as room:
-        (room / target.name).write_text(found.page(), encoding="utf-8")
-    deliver(found, lambda shown: sections(shown, target), as_json)
+
+    def write(shown: page.Exploration) -> None:
+        with staged(target.parent, shown=target) as room:
+            (room / target.name).write_text(shown.page(), encoding="utf-8")
+
+    deliver(found, lambda shown: sections(shown, target), as_json, write, target)

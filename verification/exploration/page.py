@@ -23,6 +23,7 @@ from verification.exploration.javascript import function
 from verification.interface.build import pair_of
 from verification.interface.pair import ContactPair
 from verification.problem.specification import Problem
+from verification.problem.specs import PLACES
 from verification.problem.tables import ProblemError
 from verification.progress import Progress, silent
 
@@ -35,9 +36,6 @@ FORMULAS = (
     ("predictedFactor", predicted_factor, ("theta", "rho")),
     ("energyOneMinusSquare", one_minus_square, ("theta", "rho", "kappa1", "kappa2")),
 )
-
-#: The names of the bodies of a file.
-BODIES = {1: "lower", 2: "upper"}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -132,7 +130,7 @@ class Exploration(Document):
         per_friction = energy is not None and k > 0
         return {
             "neumann": found.pair.neumann_body,
-            "name": BODIES[found.pair.neumann_body],
+            "name": PLACES[found.pair.neumann_body],
             "contactNodes": found.pair.contact.grid.n,
             "rho": None if energy is None else float(energy.rho),
             "kappa": [float(energy.kappa_1) / k, float(energy.kappa_2) / k] if per_friction and energy else None,

@@ -20,6 +20,9 @@ Components = tuple[Fraction | None, ...]
 #: A relaxation factor, or ``auto`` for the one that the theory chooses.
 Theta = Fraction | Literal["auto"]
 
+#: Where the bodies of a file are.
+PLACES = {1: "lower", 2: "upper"}
+
 RECTANGLE_SIDES = ("left", "right", "bottom", "top")
 INTERVAL_SIDES = ("left", "right")
 

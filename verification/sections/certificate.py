@@ -13,6 +13,7 @@ from verification.bounds.table import named
 from verification.certificate import check
 from verification.certificate.continuum import ContinuumCertificate
 from verification.certificate.contraction import Certificate, Checked
+from verification.problem.specs import PLACES
 from verification.sections.numbers import figures, near_one
 from verification.sections.parts import (
     Cell,
@@ -27,7 +28,6 @@ from verification.sections.parts import (
     section,
     table,
 )
-from verification.sections.setting import NAMES
 
 CLAIMS = "anything about the continuum"
 
@@ -99,7 +99,7 @@ def continuum(found: ContinuumCertificate) -> Sections:
     stress, length = problem.units["stress"], problem.units["length"]
     radius = [] if problem.contact.radius is None else [f"r = {float(problem.contact.radius):g} {length}"]
     number = problem.iteration.neumann_body
-    body = f"Neumann body: {number} ({NAMES[number]})"
+    body = f"Neumann body: {number} ({PLACES[number]})"
     friction = ", ".join([f"k = {float(found.friction):g}", *radius])
     return (
         section("setting", "", Facts(f"{problem.title}: the continuous problem, no mesh"), Facts(body, (friction,))),

@@ -7,9 +7,9 @@ from shlex import quote
 
 from verification.exploration.film import Shown
 from verification.exploration.page import Exploration
+from verification.problem.specs import PLACES
 from verification.sections.numbers import NONE, count, figures, near_one
 from verification.sections.parts import Cell, Facts, Section, Sections, closing, of, section, table
-from verification.sections.setting import NAMES
 
 
 @of.register
@@ -19,7 +19,7 @@ def sections(found: Exploration, target: Path | None = None) -> Sections:
     for each in found.films:
         body = each.pair.neumann_body
         for line in each.runs:
-            rows.append((f"{body} ({NAMES[body]})", figures(line[0].friction, 2), *_best(line)))
+            rows.append((f"{body} ({PLACES[body]})", figures(line[0].friction, 2), *_best(line)))
     head = ("Neumann body", "k", "theta", "steps", "rate", "converged")
     caption = "For each role and friction the theta with the fewest steps, and how many of the thetas converged."
     grid = f"{len(found.thetas)} thetas, {len(found.frictions)} frictions"

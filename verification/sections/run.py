@@ -8,6 +8,7 @@ from verification.interface.fields import ContactFields
 from verification.interface.interface import Interface
 from verification.monolithic import Solution
 from verification.problem.specification import Problem
+from verification.problem.specs import PLACES
 from verification.sections.numbers import NONE, count, figures, near_one
 from verification.sections.parts import (
     Cell,
@@ -22,7 +23,7 @@ from verification.sections.parts import (
     section,
     table,
 )
-from verification.sections.setting import NAMES, limits, setting
+from verification.sections.setting import limits, setting
 
 #: What the table of a run shows, and its figures.
 RATES = (
@@ -130,7 +131,7 @@ def _grids(contact_body: int, interface: Interface) -> list[Shown]:
     """The body that carries the contact grid, if there are two grids."""
     if interface.transfer is None:
         return []
-    own, other = NAMES[contact_body], NAMES[3 - contact_body]
+    own, other = PLACES[contact_body], PLACES[3 - contact_body]
     counts = f"{interface.contact.n} nodes of the {own} body, Neumann grid: {interface.neumann.n} of the {other}"
     return [Labelled("contact grid", counts)]
 

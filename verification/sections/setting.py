@@ -6,11 +6,9 @@ from collections.abc import Iterable
 
 from verification.interface.friction import LAWS
 from verification.problem.specification import Problem
+from verification.problem.specs import PLACES
 from verification.sections.numbers import figures
 from verification.sections.parts import Facts, Next, Note, Section, closing, section
-
-#: Where the bodies of a file are.
-NAMES = {1: "lower", 2: "upper"}
 
 
 def setting(problem: Problem, nodes: int | None, interface: int) -> Section:
@@ -27,7 +25,7 @@ def setting(problem: Problem, nodes: int | None, interface: int) -> Section:
     if any(one.rigid for one in bodies):
         facts = [f"Obstacle: {'lower' if problem.body1.rigid else 'upper'} body", friction]
     else:
-        facts = [f"Neumann body: {body} ({NAMES[body]})", friction, _how(problem)]
+        facts = [f"Neumann body: {body} ({PLACES[body]})", friction, _how(problem)]
     first = Facts(problem.title, (*counts, f"E {moduli} {units['stress']}"))
     return section("setting", "", first, Facts("", tuple(facts)))
 
