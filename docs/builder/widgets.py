@@ -15,7 +15,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 import verification as vf
-from builder import equations, stills
+from builder import equations, questions, scenes, stills
 from ndtheory import bounds, energy_norms
 from ndtheory.scalar import maximum, minimum
 from ndtheory.statements import Statement, proof_of, statements
@@ -253,6 +253,10 @@ WIDGETS = {
         script="map",
         style="map.css",
     ),
+    **{
+        page: Widget(label=module.LABEL, data=module.data, still=scenes.still, script="scenes")
+        for page, module in ((page, questions.of(page)) for page in questions.PAGES)
+    },
 }
 
 
