@@ -2,7 +2,8 @@
 
 A rule gets the iterates one by one and returns the next g at which T is evaluated.  Only the constant factor is
 covered by the theorem; momentum has a proved rate without friction; the others have none.  Inner products are those of
-the norm (5.21), so that no rule depends on the units.
+the norm (5.21), so that no rule depends on the units.  Rules that need only g and T g work on the vectors of any
+coupling as well, there with the inner product of these vectors.
 """
 
 from __future__ import annotations
@@ -26,6 +27,9 @@ from verification.interface.pair import ContactPair
 #: Number of earlier steps that Anderson mixing uses.
 DEPTH = 10
 
+#: Number of earlier steps that IQN-ILS uses.
+REMEMBERED = 40
+
 #: Columns of the least-squares problem of Anderson mixing are dropped below this share of the largest.
 RANK = 1e-8
 
@@ -34,6 +38,35 @@ SHORTEST, LONGEST, TOO_SHORT = 0.1, 0.7, 1e-2
 
 #: A rule within one run: from an iterate to the next g.
 Step = Callable[[Iterate], Floats]
+
+#: A rule within one run of any coupling: from g and T g to the next g, all of one shape (n,).
+VectorStep = Callable[[Floats, Floats], Floats]
+
+
+@dataclass(frozen=True)
+class Metric:
+    """The inner product by which a rule measures vectors: ``<a, b> = coordinates(a)' coordinates(b)``.
+
+    Attributes
+    ----------
+    inner : callable
+        From two vectors to their inner product.
+    coordinates : callable
+        From a vector, or columns of vectors, to their coordinates in an orthonormal basis.
+    """
+
+    inner: Callable[[Floats, Floats], float]
+    coordinates: Callable[[Floats], Floats]
+
+    @classmethod
+    def of(cls, pair: ContactPair) -> Metric:
+        """The norm (5.21) of a pair."""
+        neumann = pair.neumann
+        return cls(lambda a, b: inner(pair, a, b), lambda columns: neumann.root.T @ neumann.flexibility(columns))
+
+
+#: The inner product of vectors of which nothing else is known.
+EUCLIDEAN = Metric(lambda a, b: float(a @ b), lambda columns: columns)
 
 
 class Rule(ABC):
@@ -77,6 +110,16 @@ class Rule(ABC):
             A :class:`Relaxation` where (III) has one factor: its steps take one solve with the Neumann body less.
         """
 
+    def on_vectors(self, theta: float, metric: Metric = EUCLIDEAN) -> VectorStep:
+        """Begin a run of a coupling of which only g and T g are known.
+
+        Raises
+        ------
+        ValueError
+            The rule needs more than these vectors.
+        """
+        raise ValueError(f"relaxation {self.name!r} needs both bodies: needed a rule that works on vectors")
+
     def own_step(self, rho: float) -> float | None:
         """Return the step length that takes the place of theta; None where the rule takes the given theta."""
         return None
@@ -116,57 +159,102 @@ class Constant(Rule):
     def begin(self, pair: ContactPair, theta: float, rho: float | None) -> Step:
         return Relaxation(theta)
 
+    def on_vectors(self, theta: float, metric: Metric = EUCLIDEAN) -> VectorStep:
+        return lambda g, image: theta * image + (1 - theta) * g
+
     def outside(self, friction: Fraction) -> str:
         return ""
 
 
+class OfVectors(Rule):
+    """A rule that needs only g, T g and an inner product."""
+
+    @abstractmethod
+    def on_vectors(self, theta: float, metric: Metric = EUCLIDEAN) -> VectorStep:
+        """Begin a run of a coupling of which only g and T g are known."""
+
+    def begin(self, pair: ContactPair, theta: float, rho: float | None) -> Step:
+        following = self.on_vectors(theta, Metric.of(pair))
+        return lambda iterate: following(iterate.g, iterate.image)
+
+
 @dataclass(frozen=True)
-class Aitken(Rule):
+class Aitken(OfVectors):
     """Aitken's factor ``theta <- -theta <r', r - r'> / |r - r'|^2`` from the last two residuals ``r = T g - g``."""
 
     name = "aitken"
     words = "Aitken relaxation"
 
-    def begin(self, pair: ContactPair, theta: float, rho: float | None) -> Step:
+    def on_vectors(self, theta: float, metric: Metric = EUCLIDEAN) -> VectorStep:
         last: Floats | None = None
 
-        def step(iterate: Iterate) -> Floats:
+        def step(g: Floats, image: Floats) -> Floats:
             nonlocal theta, last
-            r = iterate.image - iterate.g
+            r = image - g
             if last is not None:
                 change = r - last
-                size = inner(pair, change, change)
+                size = metric.inner(change, change)
                 if size > 0:
-                    theta *= -inner(pair, last, change) / size
+                    theta *= -metric.inner(last, change) / size
             last = r
-            return iterate.g + theta * r
+            return g + theta * r
 
         return step
 
 
 @dataclass(frozen=True)
-class Anderson(Rule):
+class Anderson(OfVectors):
     """Anderson mixing: the combination of the last g whose residuals have the least sum, relaxed by theta."""
 
     name = "anderson"
     words = "Anderson mixing"
 
-    def begin(self, pair: ContactPair, theta: float, rho: float | None) -> Step:
+    def on_vectors(self, theta: float, metric: Metric = EUCLIDEAN) -> VectorStep:
         gs: deque[Floats] = deque(maxlen=DEPTH + 1)
         rs: deque[Floats] = deque(maxlen=DEPTH + 1)
 
-        def step(iterate: Iterate) -> Floats:
-            r = iterate.image - iterate.g
-            gs.append(iterate.g)
+        def step(g: Floats, image: Floats) -> Floats:
+            r = image - g
+            gs.append(g)
             rs.append(r)
-            following: Floats = iterate.g + theta * r
+            following: Floats = g + theta * r
             if len(gs) > 1:
-                coordinates = pair.neumann.root.T @ pair.neumann.flexibility(np.column_stack(rs))
+                coordinates = metric.coordinates(np.column_stack(rs))
                 changes = np.diff(coordinates, axis=1)
                 shares = np.linalg.lstsq(changes, coordinates[:, -1], rcond=RANK)[0]
                 moved = np.diff(np.column_stack(gs), axis=1) + theta * np.diff(np.column_stack(rs), axis=1)
                 following -= moved @ shares
             return following
+
+        return step
+
+
+@dataclass(frozen=True)
+class InverseLeastSquares(OfVectors):
+    """IQN-ILS of Degroote, Bathe and Vierendeels (2009): T g corrected by the changes of T g seen so far.
+
+    The next g is ``T g - W c``, where V and W are the last changes of ``r = T g - g`` and of T g, and c minimises
+    ``|r - V c|``.  It is Anderson mixing with the factor 1 and a longer memory, but for its first step, which has only
+    the factor theta.
+    """
+
+    name = "iqn-ils"
+    words = "IQN-ILS"
+
+    def on_vectors(self, theta: float, metric: Metric = EUCLIDEAN) -> VectorStep:
+        changes: deque[tuple[Floats, Floats]] = deque(maxlen=REMEMBERED)
+        last: tuple[Floats, Floats] | None = None
+
+        def step(g: Floats, image: Floats) -> Floats:
+            nonlocal last
+            r = metric.coordinates(image - g)
+            if last is not None and (size := float(np.linalg.norm(r - last[0]))) > 0:
+                changes.append(((r - last[0]) / size, (image - last[1]) / size))  # each as long as any other
+            last = r, image
+            if not changes:
+                return g + theta * (image - g)
+            V, W = (np.column_stack(columns) for columns in zip(*changes, strict=True))
+            return np.asarray(image - W @ np.linalg.lstsq(V, r, rcond=RANK)[0])
 
         return step
 
@@ -273,7 +361,9 @@ def momentum_step(rho: float) -> float:
 
 
 #: The rules of problem files, by name.
-RULES: dict[str, Rule] = {rule.name: rule for rule in (Constant(), Aitken(), Anderson(), Newton(), Momentum())}
+RULES: dict[str, Rule] = {
+    rule.name: rule for rule in (Constant(), Aitken(), Anderson(), InverseLeastSquares(), Newton(), Momentum())
+}
 
 
 def rule_of(rule: Rule | str) -> Rule:
