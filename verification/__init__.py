@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from verification.advice.from_matrices import advise_matrices as advise_matrices
     from verification.advice.from_moduli import advise_moduli as advise_moduli
     from verification.advice.from_runs import advise_run as advise_run
+    from verification.advice.from_vectors import advise_vectors as advise_vectors
     from verification.advice.roles import Advice as Advice
     from verification.advice.roles import advise as advise
     from verification.algorithm.iterate import Iterate as Iterate
@@ -42,6 +43,8 @@ if TYPE_CHECKING:
     from verification.constants.measured import Measured as Measured
     from verification.constants.measuring import measure as measure
     from verification.contact import ContactError as ContactError
+    from verification.coupling import Coupling as Coupling
+    from verification.coupling import couple as couple
     from verification.exploration.page import Exploration as Exploration
     from verification.exploration.page import explore as explore
     from verification.interface.build import build as build
@@ -65,6 +68,7 @@ _HOME = {
     "Comparison": "comparison",
     "ContactError": "contact",
     "ContactPair": "interface.pair",
+    "Coupling": "coupling",
     "Exploration": "exploration.page",
     "Law": "interface.interface",
     "Ledger": "ledger",
@@ -82,10 +86,12 @@ _HOME = {
     "advise_matrices": "advice.from_matrices",
     "advise_moduli": "advice.from_moduli",
     "advise_run": "advice.from_runs",
+    "advise_vectors": "advice.from_vectors",
     "build": "interface.build",
     "certify": "certificate.contraction",
     "check_again": "certificate.contraction",
     "compare": "comparison",
+    "couple": "coupling",
     "example": "problem.examples",
     "explore": "exploration.page",
     "iterate": "algorithm.start",

@@ -8,7 +8,7 @@ from collections import Counter
 import pytest
 
 import verification as vf
-from verification.advice.snippets import SNIPPETS, Coupling, snippet
+from verification.advice.snippets import SNIPPETS, CouplingScheme, snippet
 
 #: Tags of the coupling scheme with their attributes, and how often each may be there, as preCICE 3.4.1 has them.
 PRECICE = {
@@ -31,7 +31,7 @@ CONTROLLER |= {"relative tolerance", "absolute tolerance"}
 CONTACT = {"side set", "source", "source side set", "friction type"}
 
 COUPLINGS = [
-    Coupling(neumann_body=body, theta=theta, steps=count, tied=tied)
+    CouplingScheme(neumann_body=body, theta=theta, steps=count, tied=tied)
     for body, theta, count, tied in ((1, 0.808, 13, False), (2, 0.1172, 167, True), (None, 1e-05, None, False))
 ]
 

@@ -15,7 +15,7 @@ from fem1d2d import extremes_by_solves, largest
 from fem1d2d.mesh import Floats
 from ndtheory import Number
 from verification.advice import BodyNumber
-from verification.advice.roles import Advice, Role, advise, plain_role, with_both_ends
+from verification.advice.roles import ALL, Advice, Role, advise, plain_role, with_both_ends
 from verification.advice.sides import (
     BODIES,
     ORDERING,
@@ -30,6 +30,7 @@ from verification.advice.sides import (
     read_transfer,
     rows_of,
 )
+from verification.advice.spectrum import Spectrum
 from verification.interface.build import build
 from verification.interface.friction import Nonlocal, hat
 from verification.interface.matrices import ASYMMETRY, real_array, size
@@ -212,6 +213,9 @@ def _by_eigenvalues(body: BodyNumber, sides: Sides, P: Transfer | None) -> Role:
     unit = Fraction(units[0]) / Fraction(units[1])
     with one_thread():
         role = plain_role(body, Fraction(largest(S_c, S_n).value) * unit)
+        if len(S_n) <= ALL:
+            values = eigh(S_c, S_n, eigvals_only=True)
+            role = replace(role, spectrum=Spectrum.of(np.maximum(values, 0.0) * float(unit)))
         if P is None and not contact.motions.size:
             return role  # the eigenvalues of both roles are reciprocal
         least = max(float(eigh(S_c, S_n, eigvals_only=True, subset_by_index=[0, 0])[0]), 0.0)

@@ -9,6 +9,7 @@ from typing import Any
 from ndtheory.constants import LARGEST, SMALLEST, take
 from ndtheory.energy_norms import predicted_theta
 from ndtheory.number import Numeric
+from verification.advice import methods
 from verification.advice.readings import (
     LARGEST_TO_PASTE,
     OF_OPEN_NODES,
@@ -25,7 +26,7 @@ from verification.advice.readings import (
     rounded_down,
     spread,
 )
-from verification.advice.roles import Advice, role_of
+from verification.advice.roles import Advice, role_of, table_of
 from verification.advice.runs_with_friction import friction_bounds, next_with_friction, readings_with_friction
 from verification.interface.pair import UNITS
 
@@ -134,8 +135,11 @@ def advice_of_runs(
     if rho is not None:
         reason = {"neumann_body": "whichever body had the Neumann problem in that run", "rho_min": ONE_END}
         roles.append(role_of(None, rho, nothing="an observed ratio proves nothing", reason=reason))
+    table = table_of(roles, tied=tied, bound="at most")  # the smallest eigenvalue may be anything
     return Advice(
         neumann_body=None,
+        methods=table,
+        method=methods.advised(table),
         roles=tuple(roles),
         units=UNITS,
         readings=tuple(one for one in readings if not (tied and one.kind in OF_OPEN_NODES)),

@@ -9,17 +9,23 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, ClassVar
 
+import numpy as np
+from scipy.linalg import eigh
+
 from ndtheory import EnergyBounds, EnergyConstants, Number, evaluate_energy
 from ndtheory.energy_norms import predicted_rate, predicted_theta, tied_factor, tied_rate, tied_theta
-from verification.advice import BodyNumber
+from verification.advice import BodyNumber, methods
+from verification.advice.methods import Advised, MethodRow
 from verification.advice.readings import LARGEST_TO_PASTE, NextRun, RunReading, SeenRun, rounded_down
 from verification.advice.runs_with_friction import FrictionBounds
 from verification.advice.seen import RhoInterval, SeenLog
 from verification.advice.seen_moduli import SeenModuli
 from verification.advice.sides import SeenMatrices
-from verification.advice.snippets import Coupling, snippet
+from verification.advice.snippets import CouplingScheme, snippet
+from verification.advice.spectrum import SeenVectors, Spectrum
 from verification.algorithm.theta import Choice, automatic, by_prediction, energy_bounds
 from verification.constants import measure
+from verification.constants.measuring import normal_pencil, pencil
 from verification.constants.operators import Pencils, needs_matrices, pair_or_bodies
 from verification.document import Document
 from verification.interface.assembly import SingularRole, TwoBodies
@@ -28,6 +34,7 @@ from verification.interface.pair import UNITS, ContactPair
 from verification.problem import Problem, load
 from verification.problem.tables import ProblemError
 from verification.progress import Progress, silent
+from verification.threads import one_thread
 from verification.value import to_plain
 
 #: Exchanging the roles makes no difference where it changes the number of steps by no more than this share of it.
@@ -36,8 +43,15 @@ SAME = 0.02
 #: The entries of a role that rest on an upper bound of rho.
 PROVED = ("theta_proved", "factor_proved", "theta_max_proved")
 
+#: Up to so many unknowns all eigenvalues are found, for the predictions of methods; beyond only their ends.
+ALL = 600
+
 #: The entries of a role for a tied interface, in this order.
 TIED = ("rho_min", "rho_tied", "theta_tied", "rate_tied")
+
+
+#: Attributes of a role that its document leaves out.
+UNSEEN = ("energy", "spectrum")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,6 +83,8 @@ class Role:
     rho_min, rho_tied : Number or None
         Both ends of the spectrum of (S of the contact body, S of the Neumann body): rho_tied is rho, except where rho
         is rho_normal.  None where they are not known, and ``reason["rho_min"]`` says why.
+    spectrum : Spectrum or None
+        Eigenvalues for predictions of methods; None where rho is only bounded from below.
     """
 
     neumann_body: BodyNumber | None
@@ -85,6 +101,7 @@ class Role:
     energy: EnergyConstants | None = None
     rho_min: Number | None = None
     rho_tied: Number | None = None
+    spectrum: Spectrum | None = None
 
     @property
     def ends(self) -> tuple[Fraction, Fraction] | None:
@@ -129,11 +146,15 @@ class Role:
     def advised(self, *, tied: bool = False) -> tuple[float, float]:
         """theta and the rate by which it is chosen: the predicted ones, or those for a tied interface.
 
+        Where eigenvalues are complex, or estimated, they are those of the whole spectrum.
+
         Raises
         ------
         ValueError
             The role is refused, or the ends of its spectrum are not known.
         """
+        if self.spectrum is not None and (self.spectrum.source == "vectors" or not self.spectrum.real):
+            return self.spectrum.theta, self.spectrum.factor(self.spectrum.theta)
         if not tied:
             return self.predicted
         if self.theta_tied is None or self.rate_tied is None:
@@ -148,7 +169,7 @@ class Role:
 
     def to_dict(self) -> dict[str, Any]:
         """A member of ``roles``."""
-        names = dict.fromkeys((*(field.name for field in fields(self) if field.name != "energy"), *TIED))
+        names = dict.fromkeys((*(field.name for field in fields(self) if field.name not in UNSEEN), *TIED))
         values = {name: to_plain(getattr(self, name)) for name in names}
         values["reason"] = dict(self.reason)
         if self.theta_auto is None:
@@ -161,7 +182,7 @@ class Role:
     def refused(cls, neumann_body: BodyNumber, error: ValueError) -> Role:
         """A role that is refused: no value but the reason."""
         why = error.needed if isinstance(error, ProblemError) else str(error)
-        given = ("neumann_body", "reason", "singular", "energy")
+        given = ("neumann_body", "reason", "singular", *UNSEEN)
         values = [field.name for field in fields(cls) if field.name not in given]
         return cls(
             neumann_body=neumann_body,
@@ -227,6 +248,27 @@ def plain_role(neumann_body: BodyNumber, rho: Fraction, **settings: Any) -> Role
     return role_of(neumann_body, bounds.rho, bounds=bounds, **settings)
 
 
+def table_of(roles: Sequence[Role], *, tied: bool, bound: str | None = None) -> tuple[MethodRow, ...]:
+    """The methods in all roles that are not refused, the first role's own ones first.
+
+    Contact that may open has a mode with lambda = 0 besides; ``bound`` tells which bound the steps are, if any.
+    """
+    found: list[MethodRow] = []
+    for role in roles:
+        if role.rho is None:
+            continue
+        spectrum = role.spectrum or Spectrum.between(float(role.ends[0] if role.ends else 0), role.rho.value)
+        theta = min(role.advised(tied=tied and role.ends is not None)[0], float(LARGEST_TO_PASTE))
+        found += methods.rows(
+            spectrum if tied else spectrum.with_open_nodes(),
+            theta=theta,
+            neumann_body=role.neumann_body,
+            exchanged=role is not roles[0],
+            bound=bound,
+        )
+    return tuple(found)
+
+
 def with_both_ends(roles: Sequence[Role], rho: Sequence[Number | None] = ()) -> tuple[Role, ...]:
     """Both roles of a pair on the same unknowns, with the ends of the spectrum where neither is refused.
 
@@ -239,6 +281,14 @@ def with_both_ends(roles: Sequence[Role], rho: Sequence[Number | None] = ()) -> 
     least = [Number.of_float(1 / Fraction(number.value)) for number in (other, one)]
     ends = zip(roles, least, (one, other), strict=True)
     return tuple(replace(role, rho_min=low, rho_tied=high) for role, low, high in ends)
+
+
+def spectrum_of(pair: ContactPair, *, normal: bool) -> Spectrum | None:
+    """All eigenvalues of (P' S_c P, S_n), or those of the normal components; None beyond ALL unknowns."""
+    if pair.neumann.grid.size > ALL:
+        return None
+    with one_thread():
+        return Spectrum.of(np.maximum(eigh(*(normal_pencil(pair) if normal else pencil(pair)), eigvals_only=True), 0.0))
 
 
 def steps(rate: float, tolerance: float = 1e-9) -> int | None:
@@ -300,6 +350,13 @@ class Advice(Document):
         The assumption under which runs were read; None where none were given.
     friction_bounds : FrictionBounds or None
         Bounds that runs prove with friction; None unless friction was given.
+    vectors : SeenVectors or None
+        The iterates and images that were given.
+    methods : tuple of MethodRow
+        Steps of a constant theta, of Aitken and of IQN-ILS in each role, predicted on the spectrum; empty where nothing
+        decides it.
+    method : Advised or None
+        The one that is advised.
     """
 
     schema: ClassVar[str] = "ndtheory.advice/1"
@@ -320,11 +377,22 @@ class Advice(Document):
     tied: bool = False
     assumes: str | None = None
     friction_bounds: FrictionBounds | None = None
+    vectors: SeenVectors | None = None
+    methods: tuple[MethodRow, ...] = ()
+    method: Advised | None = None
 
     @classmethod
     def between(cls, roles: Sequence[Role], *, tied: bool, **known: Any) -> Advice:
         """The advice for the role that takes fewer steps; one of them at least must not be refused."""
-        return cls(neumann_body=best_of(roles, tied=tied).neumann_body, roles=tuple(roles), tied=tied, **known)
+        best, table = best_of(roles, tied=tied), table_of(roles, tied=tied)
+        return cls(
+            neumann_body=best.neumann_body,
+            roles=tuple(roles),
+            tied=tied,
+            methods=table,
+            method=methods.advised(table, exchanged=best is not roles[0]),
+            **known,
+        )
 
     @property
     def summary(self) -> str:
@@ -336,6 +404,11 @@ class Advice(Document):
         who = "" if self.neumann_body is None else f"Neumann problem to body {self.neumann_body}, "
         who = who if self.assumes is None else f"assumed: {self.assumes}; "
         return f"{who}theta = {theta:.4g} {'if tied' if self.tied else 'predicted'}, rate {rate:.4g}"
+
+    @property
+    def spectrum(self) -> Spectrum | None:
+        """The eigenvalues in the role that is advised; None where they are not known."""
+        return self.best.spectrum if self.roles else None
 
     def chosen(self, role: Role) -> tuple[float, float]:
         """theta and rate by which this advice judges a role."""
@@ -390,7 +463,7 @@ class Advice(Document):
         if tied and best.rho_min is not None:
             formula = "2/(2+rho_min+rho)"
             first += f"; rho_min (at best) is {best.rho_min.value:.3g}"
-        bound = "at most " * (tied or best.proved)
+        bound = "about " if self.vectors is not None else "at most " * (tied or best.proved)
         then = f"So relax by {formula} = {theta:.3g}: {bound}{in_steps(rate)} to 1e-9"
         then += " if nothing opens or slips" if tied else " without friction" if best.proved else " are predicted"
         if other is not None:
@@ -409,7 +482,9 @@ class Advice(Document):
         if self.theta is None:
             raise ValueError(self.why_no_theta)
         count = steps(self.chosen(self.best)[1])
-        return snippet(library, Coupling(neumann_body=self.neumann_body, theta=self.theta, steps=count, tied=self.tied))
+        return snippet(
+            library, CouplingScheme(neumann_body=self.neumann_body, theta=self.theta, steps=count, tied=self.tied)
+        )
 
     @property
     def best(self) -> Role:
@@ -425,9 +500,11 @@ class Advice(Document):
         return next((r for r in self.roles if r.neumann_body == self.neumann_body), self.roles[0])
 
     def content(self) -> dict[str, Any]:
-        origins = ("run", "readings", "next", "logs", "interval", "friction_bounds", "moduli", "matrices")
-        names = ("neumann_body", "theta", "tied", "assumes", "quote", "roles", *origins)
+        origins = ("run", "readings", "next", "logs", "interval", "friction_bounds", "moduli", "matrices", "vectors")
+        names = ("neumann_body", "theta", "tied", "assumes", "quote", "methods", "method", "roles", *origins)
         found = {name: to_plain(getattr(self, name)) for name in names}
+        known = self.spectrum
+        found["spectrum"] = None if known is None else {"low": known.low, "high": known.high}
         same = "both roles have the same bounds"
         missing = {
             "neumann_body": same if self.moduli else "one run gives no information about the exchanged roles",
@@ -438,6 +515,9 @@ class Advice(Document):
             "assumes": "no run was given",
             "friction_bounds": "no run with friction was given",
             "matrices": "no matrices were given",
+            "vectors": "no vectors were given",
+            "method": self.why_no_theta or "no method arrives in the steps that are simulated",
+            "spectrum": self.why_no_theta or "only bounds of it are known",
             "theta": self.why_no_theta,
             "quote": self.why_no_theta,
         }
@@ -484,12 +564,12 @@ def advise(problem: Problem | ContactPair | Path | str, *, tied: bool = False, p
         if isinstance(pair, TwoBodies):
             roles = _roles_without_matrices(pair, tied, progress)
         else:
-            roles = (_role(pair), _exchanged(pair))
+            roles = (_role(pair, tied), _exchanged(pair, tied))
     except SingularRole as error:
         assert not isinstance(problem, ContactPair)  # made with roles that are not singular
         given = problem if isinstance(problem, Problem) else load(problem)
         pair = build(given.swapped())  # refused itself where contact holds that body, too
-        roles = (Role.refused(given.iteration.neumann_body, error), _role(pair))
+        roles = (Role.refused(given.iteration.neumann_body, error), _role(pair, tied))
     return Advice.between(
         roles,
         tied=tied,
@@ -500,15 +580,15 @@ def advise(problem: Problem | ContactPair | Path | str, *, tied: bool = False, p
     )
 
 
-def _exchanged(pair: ContactPair) -> Role:
+def _exchanged(pair: ContactPair, tied: bool) -> Role:
     """The other assignment of the roles, which may be refused."""
     try:
-        return _role(pair.swapped())
+        return _role(pair.swapped(), tied)
     except ValueError as error:
         return Role.refused(pair.contact_body, error)
 
 
-def _role(pair: ContactPair) -> Role:
+def _role(pair: ContactPair, tied: bool) -> Role:
     measured = measure(pair)
     energy = energy_bounds(measured)
     if measured.rho_max is None:
@@ -530,6 +610,7 @@ def _role(pair: ContactPair) -> Role:
         energy=None if nothing else measured.energy_constants(),
         rho_min=measured.rho_min,
         rho_tied=measured.rho_max,
+        spectrum=spectrum_of(pair, normal=not (pair.friction or tied)),
     )
 
 

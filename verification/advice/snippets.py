@@ -19,7 +19,7 @@ ROOM, UNKNOWN = 2, 200
 
 
 @dataclass(frozen=True, kw_only=True)
-class Coupling:
+class CouplingScheme:
     """Content of a snippet.
 
     Attributes
@@ -53,7 +53,7 @@ class Coupling:
         return UNKNOWN if self.steps is None else max(10, ROOM * self.steps)
 
 
-def snippet(library: str, coupling: Coupling) -> str:
+def snippet(library: str, coupling: CouplingScheme) -> str:
     """The snippet for a library.
 
     Raises
@@ -63,7 +63,7 @@ def snippet(library: str, coupling: Coupling) -> str:
 
     Examples
     --------
-    >>> print(snippet("Norma", Coupling(neumann_body=1, theta=0.8, steps=14)).splitlines()[3])
+    >>> print(snippet("Norma", CouplingScheme(neumann_body=1, theta=0.8, steps=14)).splitlines()[3])
     domains: ["body2.yaml", "body1.yaml"]
     """
     if library not in SNIPPETS:
@@ -71,7 +71,7 @@ def snippet(library: str, coupling: Coupling) -> str:
     return SNIPPETS[library](coupling)
 
 
-def precice(c: Coupling) -> str:
+def precice(c: CouplingScheme) -> str:
     """The coupling scheme; the relaxed data are those that the second participant sends to the first.
 
     Both fields live on the mesh of the Neumann body, to which the other participant maps: displacements consistently,
@@ -104,7 +104,7 @@ def precice(c: Coupling) -> str:
 -->"""
 
 
-def kratos(c: Coupling) -> str:
+def kratos(c: CouplingScheme) -> str:
     """The members of ``solver_settings`` beside ``solvers``, in which each body has the data displacement and force."""
     one, other = c.neumann, c.contact
     force: dict[str, Any] = {"solver": one, "data_name": "force"}
@@ -130,7 +130,7 @@ def kratos(c: Coupling) -> str:
     return json.dumps({"solver_settings": settings}, indent=2)
 
 
-def norma(c: Coupling) -> str:
+def norma(c: CouplingScheme) -> str:
     """The controller file and a boundary condition for each body; the domain listed first reads displacements."""
     one, other = c.neumann.lower(), c.contact.lower()
     contact = lambda source: (
@@ -174,4 +174,4 @@ def _with_point(number: float) -> str:
 
 
 #: The snippets by the name of the library.
-SNIPPETS: dict[str, Callable[[Coupling], str]] = {"preCICE": precice, "Kratos": kratos, "Norma": norma}
+SNIPPETS: dict[str, Callable[[CouplingScheme], str]] = {"preCICE": precice, "Kratos": kratos, "Norma": norma}

@@ -336,7 +336,46 @@ def moduli(
     _show(found, None, as_json)
 
 
-advise = AdviseGroup(of_file, [matrices, run, moduli])
+@click.command(cls=AdviseCommand)
+@click.argument("iterates", metavar="X", type=click.Path(path_type=Path))
+@click.argument("images", metavar="TX", type=click.Path(path_type=Path), required=False)
+@TIED
+@SNIPPETS_OF
+@JSON
+def vectors(iterates: Path, images: Path | None, tied: bool, snippets: str | None, as_json: bool) -> None:
+    """Read the spectrum off a few iterates and their images.
+
+    X has a row for each iterate of a run, TX the row that T made of it before relaxation, in any one unit; three to ten
+    iterates of a run by any method are enough.  Files are .npy, .npz (one file with X and TX too), .mtx, .mat, .csv or
+    .txt.  The answer has the ends of the spectrum (no unit), theta, and the steps of a constant theta, Aitken
+    and IQN-ILS.
+
+    \b
+    Examples:
+      ndtheory advise vectors X.npy TX.npy
+      ndtheory advise vectors run.npz
+      ndtheory advise vectors X.npy TX.npy --tied --snippets preCICE
+    """
+    context = click.get_current_context()
+    _no_document_of(snippets, as_json)
+    from verification.advice.from_vectors import advise_vectors
+    from verification.advice.matrix_files import names_in, read_array, read_matrix
+
+    if images is None:
+        if not {"X", "TX"} <= set(names_in(iterates)):
+            raise click.UsageError(f"{iterates}: needed X and TX, or one file with arrays X and TX", context)
+        given = [read_array(iterates, name) for name in ("X", "TX")]
+    else:
+        given = [read_matrix(iterates, "X"), read_matrix(images, "TX")]
+    try:
+        found = advise_vectors(*given, tied=tied)
+    except ValueError as error:
+        files = ", ".join(map(str, dict.fromkeys([iterates, images or iterates])))
+        raise click.UsageError(f"{files}: {error}", context) from None
+    _show(found, snippets, as_json)
+
+
+advise = AdviseGroup(of_file, [matrices, run, moduli, vectors])
 
 
 def _no_document_of(snippets: str | None, as_json: bool) -> None:

@@ -246,23 +246,19 @@ def of_section_5(pair: ContactPair, tangential: NDArray[np.bool_]) -> dict[str, 
 def of_energy(pair: ContactPair, tangential: NDArray[np.bool_]) -> dict[str, float | None]:
     """rho and the constants of friction in energy norms, with P between the grids."""
     interface, grid, kernel = pair.interface, pair.contact.grid, pair.interface.kernel
-    contact, neumann = _free(pair.contact), _free(pair.neumann)
-    normal = ~tangential
-    carried = interface.carry_form(contact)
+    contact = _free(pair.contact)
+    carried, neumann = pencil(pair)
     values: dict[str, float | None] = {
         "rho_max": largest(carried, neumann).value,
         "rho_min": _smallest(pair, carried, neumann, contact),
+        "rho_normal": largest(*normal_pencil(pair)).value,
     }
-    normal_contact = _condense_tangential(contact, normal, _motions(pair.contact))
-    if interface.transfer is not None:
-        normal_contact = interface.transfer.T @ normal_contact @ interface.transfer
-        normal = np.arange(pair.neumann.grid.size) >= pair.neumann.grid.t
-    values["rho_normal"] = largest(normal_contact, _condense_tangential(neumann, normal)).value
     if not tangential.any():
         return values | dict.fromkeys(("C_s_energy", "C_t1", "C_t2"), 0.0)
     B_T = _tangential_mass(pair, tangential)
     if kernel is not None:
         # sup |S g_N|^2 / g' S_2^-1 g over g = S_2 phi is the largest eigenvalue of S (S_2)_NN S' in the weights
+        normal = np.arange(pair.neumann.grid.size)[pair.neumann.free] >= pair.neumann.grid.t
         root = np.sqrt(grid.weights)[:, None] * kernel
         stress = root @ neumann[np.ix_(normal, normal)] @ root.T
         values["C_s_energy"] = float(np.sqrt(np.linalg.eigvalsh((stress + stress.T) / 2)[-1]))
@@ -272,6 +268,22 @@ def of_energy(pair: ContactPair, tangential: NDArray[np.bool_]) -> dict[str, flo
         values["C_t1"] = float(np.sqrt(largest(B_T, definite).value))
     values["C_t2"] = float(np.sqrt(largest(interface.carry_form(B_T), neumann).value))
     return values
+
+
+def pencil(pair: ContactPair) -> tuple[Floats, Floats]:
+    """``P' S_c P`` and S_n on the components that both bodies leave free: rho is the largest eigenvalue."""
+    return pair.interface.carry_form(_free(pair.contact)), _free(pair.neumann)
+
+
+def normal_pencil(pair: ContactPair) -> tuple[Floats, Floats]:
+    """The same of the normal components, the tangential ones condensed out: rho_normal is the largest eigenvalue."""
+    grid, transfer = pair.contact.grid, pair.interface.transfer
+    normal = np.arange(grid.size)[pair.contact.free] >= grid.t
+    contact = _condense_tangential(_free(pair.contact), normal, _motions(pair.contact))
+    if transfer is not None:
+        contact = transfer.T @ contact @ transfer
+        normal = np.arange(pair.neumann.grid.size) >= pair.neumann.grid.t
+    return contact, _condense_tangential(_free(pair.neumann), normal)
 
 
 def _smallest(pair: ContactPair, carried: Floats, neumann: Floats, contact: Floats) -> float:

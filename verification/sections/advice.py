@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
+from verification.advice.methods import NAMES as METHOD_NAMES
 from verification.advice.readings import LARGEST_TO_PASTE, NextRun, RunReading, SeenRun
 from verification.advice.roles import Advice, Role, in_steps, steps
 from verification.advice.runs_with_friction import FrictionBounds
@@ -12,6 +13,7 @@ from verification.advice.seen import LogBound, RhoInterval, SeenLog
 from verification.advice.seen_moduli import Corners, ModuliRole, SeenModuli, excluded_from
 from verification.advice.sides import SeenMatrices
 from verification.advice.snippets import SNIPPETS
+from verification.advice.spectrum import SeenVectors
 from verification.problem.reading import takes_theta
 from verification.sections.numbers import NONE, count, figures, near_one, rounded
 from verification.sections.parts import (
@@ -46,16 +48,21 @@ def _sections(found: Advice) -> Iterator[Section]:
         yield assumed(found)
     if found.matrices is not None:
         yield given(found.matrices)
+    if found.vectors is not None:
+        yield from of_vectors(found, found.vectors)
     if found.run is not None:
         yield from of_a_run(found, found.run)
     if found.interval is not None:
         yield from of_logs(found, found.interval)
         if found.roles:
             others = "Predicted for the roles that the bodies have; logs give no information about the exchanged roles."
+            yield from _which_method(found)
             yield _paste(found, others)
     if found.roles and not found.logs:
-        yield _which_body(found)
-        yield _which_theta(found)
+        if found.vectors is None:
+            yield _which_body(found)
+            yield _which_theta(found)
+        yield from _which_method(found)
         yield from _friction(found)
         yield _paste(found)
         if found.quote is not None:
@@ -155,6 +162,49 @@ def _which_theta(found: Advice) -> Section:
             said.append(f"{NAMES[role.neumann_body]}: {takes}")
     lines = table(("Neumann", "rho", "", "theta", "per step", "steps", ""), rows)
     return section("theta", "WHICH THETA?", lines, *said)
+
+
+def _which_method(found: Advice) -> Iterator[Section]:
+    """Steps of each method in each role, and the one that is advised."""
+    if not found.methods:
+        return
+    rows: list[tuple[Cell, ...]] = []
+    named = found.methods[0].neumann_body is not None
+    for row in found.methods:
+        roles = NAMES[row.neumann_body] if named else "exchanged" if row.exchanged else "as they are"
+        few = {"at most": "<= ", "at least": ">= ", None: ""}[row.bound]
+        rows.append((roles, METHOD_NAMES[row.method], figures(row.theta), count(row.steps, few)))
+    head = ("Neumann" if named else "roles", "method", "theta, or the first", "steps")
+    said = ["steps: evaluations until |Tg - g| < 1e-6 |Tg|, predicted with all modes in the first error"]
+    if found.methods[0].bound is not None:
+        said.append("only one end of the spectrum is known: a constant theta takes no more, the others may")
+    if found.method is not None:
+        who = ", with the roles exchanged" * (found.method.exchanged and not named)
+        said.insert(0, f"Advised: {METHOD_NAMES[found.method.name]}{who}: {found.method.reason}.")
+    said.append("Aitken and IQN-ILS are outside the theorem: no proof says that they converge in contact.")
+    yield section("method", "WHICH METHOD?", table(head, rows, right=(3,)), *said)
+
+
+def of_vectors(found: Advice, seen: SeenVectors) -> Iterator[Section]:
+    """The eigenvalues that vectors show, and the theta for them."""
+    spectrum = seen.spectrum
+    said = [f"{seen.iterates} iterates of {seen.unknowns} unknowns, {seen.directions} independent directions"]
+    kinds = ["real: the coupling looks symmetric" if seen.symmetric else "complex: the coupling is not symmetric"]
+    if seen.changing:
+        kinds.append("contact changes between the iterates, so that they belong to several linear pieces")
+    said.append(f"eigenvalues are {'; '.join(kinds)}")
+    if seen.noise is not None:
+        said.append(f"images of dependent directions differ by {figures(seen.noise, 2)} of the largest: noise")
+    yield section("given", "WHAT WAS GIVEN?", *said)
+    rows = [
+        ("least lambda", figures(spectrum.low), figures(spectrum.error_low, 2)),
+        ("largest lambda, rho", figures(spectrum.high), figures(spectrum.error_high, 2)),
+    ]
+    theta, rate = found.chosen(found.best)
+    formula = "2/(2 + least + largest)" if spectrum.real else "the theta of least factor over the spectrum"
+    best = f"theta = {theta:.4g} = {formula}, with both errors: factor {near_one(rate)} a step"
+    notes = ["Ritz values: eigenvalues as these vectors show them, from inside; the errors are estimates.", best]
+    yield section("theta", "WHICH EIGENVALUES, AND WHICH THETA?", table(("", "lambda", "error"), rows), *notes)
 
 
 def _at_predicted(role: Role) -> str:

@@ -1,0 +1,99 @@
+"""Advice from iterates of a run and their images, by any method of relaxation."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from ndtheory import Number
+from verification.advice import methods
+from verification.advice.roles import Advice, Role, role_of, table_of
+from verification.advice.spectrum import SeenVectors, Spectrum, seen_in
+from verification.interface.matrices import real_array
+from verification.interface.pair import UNITS
+
+#: Why nothing is proved.
+ESTIMATED = "eigenvalues were estimated from a few vectors, which proves nothing"
+
+
+def advise_vectors(X: Any, TX: Any, *, tied: bool = False) -> Advice:
+    """Advice from a few iterates x of a run and their images T x, the run being relaxed by any method.
+
+    T x is what the contact body answers to the displacement that the Neumann body has under the force x, before it is
+    relaxed; or any other quantity that is exchanged, as temperatures and fluxes.  Three to ten iterates are enough for
+    most couplings.  While contact does not change, the differences of these vectors show eigenvalues of ``T``:
+    :func:`verification.advice.spectrum.seen_in`.
+
+    Parameters
+    ----------
+    X, TX : array, shape (k, n)
+        A row for each of k >= 2 iterates, in the order of the run.
+    tied : bool
+        True if nothing opens or slips.  Otherwise, where the vectors show that contact changes, theta is chosen for
+        open nodes as well.
+
+    Returns
+    -------
+    Advice
+        ``spectrum.low`` and ``spectrum.high`` are the ends as estimated, ``theta`` is to paste, ``methods`` compares
+        constant relaxation, Aitken and IQN-ILS, also with the roles exchanged.
+
+    Raises
+    ------
+    ValueError
+        Arrays of other shapes, entries that are not finite, or iterates that do not differ.
+
+    Examples
+    --------
+    >>> image = lambda x: 1 - np.array([0.5, 3.0]) * (x - 1)
+    >>> X = [np.zeros(2)]
+    >>> for _ in range(3):
+    ...     X.append(0.6 * X[-1] + 0.4 * image(X[-1]))
+    >>> found = advise_vectors(X, [image(x) for x in X])
+    >>> round(found.spectrum.low, 9), round(found.spectrum.high, 9), found.theta
+    (0.5, 3.0, 0.3636)
+    """
+    given = []
+    for name, rows in (("X", X), ("TX", TX)):
+        try:
+            array = np.asarray(rows, dtype=None)
+        except ValueError:
+            raise ValueError(f"{name} has rows of different lengths: needed one length for all iterates") from None
+        if array.ndim != 2 or len(array) < 2 or array.shape[1] == 0:
+            shape = " x ".join(map(str, array.shape)) or "a number"
+            raise ValueError(f"{name} is {shape}: needed a row for each iterate, two rows or more")
+        given.append(array)
+    if given[0].shape != given[1].shape:
+        shapes = " and ".join(f"{a.shape[0]} x {a.shape[1]}" for a in given)
+        raise ValueError(f"X and TX are {shapes}: needed an image for each iterate, of the same length")
+    found = [real_array(name, array, array.shape) for name, array in zip(("X", "TX"), given, strict=True)]
+    return advice_of(seen_in(*found), tied=tied)
+
+
+def advice_of(seen: SeenVectors, *, tied: bool = False) -> Advice:
+    """The advice for a spectrum that vectors show."""
+    linear = tied or not seen.changing
+    spectrum = seen.spectrum if linear else seen.spectrum.with_open_nodes()
+    roles = [_role(spectrum)]
+    if spectrum.low - spectrum.error_low > 0:
+        roles.append(_role(spectrum.exchanged()))
+    table = table_of(roles, tied=True)  # open nodes are in the spectrum already
+    return Advice(
+        neumann_body=None,
+        roles=tuple(roles[:1]),
+        units=UNITS,
+        tied=linear,
+        vectors=seen,
+        methods=table,
+        method=methods.advised(table),
+    )
+
+
+def _role(spectrum: Spectrum) -> Role:
+    """The role of an estimated spectrum."""
+    ends = [Number.of_float(max(end, 0.0)) for end in (spectrum.low, spectrum.high)]
+    reason = {"neumann_body": "vectors do not tell which body had the Neumann problem"}
+    known = {"rho_min": ends[0], "rho_tied": ends[1], "spectrum": spectrum}
+    return role_of(None, Fraction(ends[1].value), nothing=ESTIMATED, reason=reason, **known)

@@ -1,0 +1,202 @@
+"""Methods of relaxation compared on a spectrum: steps of each in both roles, and the one to take."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from fem1d2d.mesh import Floats
+from verification.advice import BodyNumber
+from verification.advice.spectrum import Spectrum
+from verification.algorithm.relaxation import RULES
+
+#: The methods, from the simplest one on.
+METHODS = ("constant", "aitken", "iqn-ils")
+
+#: Steps are those until ``|T x - x| < 1e-6 |T x|``, as coupling libraries stop, from x = 0.
+TOLERANCE = 1e-6
+
+#: The most evaluations of T that are simulated, and those that a formula counts for a constant theta.
+MOST, COUNTED = 1000, 10**9
+
+#: A method that takes at most so many times the fewest steps is kept, if it is simpler.
+NEAR = 1.3
+
+
+@dataclass(frozen=True, kw_only=True)
+class MethodRow:
+    """A method in one assignment of the roles.
+
+    Attributes
+    ----------
+    method : {'constant', 'aitken', 'iqn-ils'}
+    neumann_body : {1, 2} or None
+        None where the bodies have no numbers.
+    exchanged : bool
+        True if the roles are the other ones than those of the file or of the run.
+    theta : float
+        The factor, or the first one.
+    steps : int or None
+        Evaluations of T; None where it does not arrive within MOST of them.
+    bound : {'at most', 'at least'} or None
+        Which bound ``steps`` is, where only one end of the spectrum is known; None if it is a prediction.
+    """
+
+    method: str
+    neumann_body: BodyNumber | None
+    exchanged: bool
+    theta: float
+    steps: int | None
+    bound: str | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """A member of ``methods``."""
+        why = {} if self.steps is not None else {"steps": f"more than {MOST}"}
+        return {**vars(self), "reason": why}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Advised:
+    """The method that is advised, the body that gets the Neumann problem with it, and the reason in a sentence."""
+
+    name: str
+    neumann_body: BodyNumber | None
+    exchanged: bool
+    reason: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object ``method``."""
+        return dict(vars(self))
+
+
+def rows(
+    spectrum: Spectrum, *, theta: float, neumann_body: BodyNumber | None, exchanged: bool, bound: str | None = None
+) -> tuple[MethodRow, ...]:
+    """The methods in one assignment of the roles, simulated on its spectrum with theta as the factor."""
+    return tuple(
+        MethodRow(
+            method=method,
+            neumann_body=neumann_body,
+            exchanged=exchanged,
+            theta=theta,
+            steps=steps(spectrum, method, theta),
+            bound=bound,
+        )
+        for method in METHODS
+    )
+
+
+def steps(spectrum: Spectrum, method: str, theta: float) -> int | None:
+    """Evaluations of T from x = 0 until the relative residual is below TOLERANCE; None beyond what is simulated.
+
+    The modes have equal weight in the first error.
+
+    Examples
+    --------
+    >>> one = Spectrum.of([3.0])
+    >>> [steps(one, "constant", theta) for theta in (0.25, 0.2, 0.5)], steps(one, "aitken", 0.1)
+    ([2, 11, None], 3)
+    """
+    values = tuple(complex(value) for value in spectrum.values)
+    return _counted(values, theta) if method == "constant" else _simulated(values, method, theta)
+
+
+def _counted(values: tuple[complex, ...], theta: float) -> int | None:
+    """Evaluations with a constant factor: the error of a mode is ``-(1 - theta (1 + lambda))^n``."""
+    factors, sizes = 1 - theta * (1 + np.array(values)), 1 + np.array(values)
+
+    def arrived(n: int) -> bool:
+        with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+            error = -(factors**n)
+            residual, image = -sizes * error, 1 - np.array(values) * error
+            return bool(np.linalg.norm(residual) < TOLERANCE * np.linalg.norm(image))
+
+    if not np.abs(factors).max() < 1:
+        return None
+    last = 1
+    while not arrived(last):
+        last *= 2
+        if last > COUNTED:
+            return None
+    low, high = last // 2, last
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (low, middle) if arrived(middle) else (middle, high)
+    return high + 1  # n steps have n + 1 evaluations
+
+
+@lru_cache(maxsize=256)
+def _simulated(values: tuple[complex, ...], method: str, theta: float) -> int | None:
+    """Evaluations of a rule of the library on the modes, complex ones as their real and imaginary parts."""
+    lambdas, m = np.array(values), len(values)
+    real = bool((lambdas.imag == 0).all())
+    solution = np.concatenate([np.ones(m), np.zeros(0 if real else m)])
+
+    def image(x: Floats) -> Floats:
+        error = x - solution
+        if real:
+            return solution - lambdas.real * error
+        moved = lambdas * (error[:m] + 1j * error[m:])
+        return np.asarray(solution - np.concatenate([moved.real, moved.imag]))
+
+    following, x = RULES[method].on_vectors(theta), np.zeros(len(solution))
+    for n in range(1, MOST + 1):
+        y = image(x)
+        size = float(np.linalg.norm(y - x))
+        if size < TOLERANCE * float(np.linalg.norm(y)):
+            return n
+        if not size < 1e60:
+            return None
+        x = following(x, y)
+    return None
+
+
+def advised(
+    table: Sequence[MethodRow], *, neumann_body: BodyNumber | None = None, exchanged: bool | None = None
+) -> Advised | None:
+    """The simplest method within NEAR times the fewest steps of the table, or of one assignment of it.
+
+    To exchange the roles is less simple than any method.  None where no method arrives.
+    """
+    own = [row for row in table if exchanged is None or row.exchanged == exchanged]
+    arriving = [row for row in own if row.steps is not None]
+    if not arriving:
+        return None
+    fewest = min(arriving, key=_count)
+    taken = min(
+        (row for row in arriving if _count(row) <= NEAR * _count(fewest)),
+        key=lambda row: (row.exchanged, METHODS.index(row.method), _count(row)),
+    )
+    same = [row for row in own if row.exchanged == taken.exchanged]
+    return Advised(
+        name=taken.method,
+        neumann_body=taken.neumann_body,
+        exchanged=taken.exchanged,
+        reason=_reason(taken, same, fewest),
+    )
+
+
+def _count(row: MethodRow) -> float:
+    return math.inf if row.steps is None else row.steps
+
+
+def _reason(taken: MethodRow, same: Iterable[MethodRow], fewest: MethodRow) -> str:
+    constant = next(row for row in same if row.method == "constant")
+    others = f"{NAMES[fewest.method]} takes {fewest.steps}"
+    if taken.method == "constant" == fewest.method:
+        return f"{taken.steps} steps, and no method takes fewer"
+    if taken.method == "constant":
+        return f"{taken.steps} steps; {others}, hardly fewer, and a constant theta has a factor known before the run"
+    known = "more than can be counted" if constant.steps is None else f"{constant.steps}"
+    times = "" if constant.steps is None else f", {constant.steps / _count(taken):.2g} times as many"
+    hardly = "" if taken.method == fewest.method else f"; {others}, hardly fewer"
+    return f"{taken.steps} steps; a constant theta takes {known}{times}{hardly}"
+
+
+#: The methods in sentences.
+NAMES = {"constant": "constant theta", "aitken": "Aitken", "iqn-ils": "IQN-ILS"}

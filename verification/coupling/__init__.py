@@ -1,0 +1,5 @@
+"""Two solvers of any code coupled by vectors: the loop, or the next vector for a loop of one's own."""
+
+from verification.coupling.driver import Coupled, Coupling, CouplingError, CouplingState, couple
+
+__all__ = ["Coupled", "Coupling", "CouplingError", "CouplingState", "couple"]

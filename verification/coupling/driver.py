@@ -1,0 +1,307 @@
+"""Two solvers of any kind driven to one force: from a force to a displacement, and from a displacement to a force."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from fem1d2d.mesh import Floats
+from ndtheory.constants import take
+from verification.advice.from_vectors import advice_of
+from verification.advice.roles import Advice
+from verification.advice.spectrum import Spectrum, seen_in
+from verification.algorithm.relaxation import Rule, rule_of
+from verification.interface.matrices import real_array
+from verification.value import Value
+
+#: The factor of the first step where none is given.
+FIRST = Fraction(1, 2)
+
+#: Number of iterates, with their images, from which eigenvalues are read.
+REMEMBERED = 20
+
+#: Number of steps over which the pace of the residual is measured.
+PACE = 4
+
+Solver = Callable[[Floats], Any]
+
+
+class CouplingError(RuntimeError):
+    """A solver returned what is no vector of finite numbers."""
+
+
+class Coupling:
+    """The next force of a coupling whose loop is yours, and what its vectors show.
+
+    Parameters
+    ----------
+    rule : {'constant', 'aitken', 'anderson', 'iqn-ils'} or Rule
+        One that works on vectors.
+    theta : number, optional
+        The constant factor, or that of the first step, 0 < theta <= 1; by default 1/2.
+
+    Raises
+    ------
+    ValueError
+        A rule that needs both bodies, or no such rule; a theta outside its range.
+
+    Examples
+    --------
+    >>> coupling, g = Coupling(rule="aitken", theta=0.5), np.zeros(2)
+    >>> for _ in range(9):
+    ...     Tg = 1 - np.array([0.5, 3.0]) * (g - 1)
+    ...     g = coupling.next(g, Tg)
+    >>> round(coupling.spectrum.low, 6), round(coupling.spectrum.high, 6), coupling.advice.theta
+    (0.5, 3.0, 0.3636)
+    """
+
+    def __init__(self, rule: Rule | str = "iqn-ils", theta: float | Fraction | str | None = None) -> None:
+        self.rule = rule_of(rule)
+        needed = "the relaxation factor, 0 < theta <= 1"
+        self.theta = float(FIRST if theta is None else take("theta", theta, needed, lambda value: 0 < value <= 1))
+        self._following = self.rule.on_vectors(self.theta)
+        self._seen: deque[tuple[Floats, Floats]] = deque(maxlen=REMEMBERED)
+        self._advice: Advice | None = None
+
+    def next(self, g: Any, Tg: Any) -> Floats:
+        """The force with which T is evaluated next.
+
+        Parameters
+        ----------
+        g : array, shape (n,), or number
+            The force of this evaluation: the one that was returned before, or any other.
+        Tg : array, shape (n,), or number
+            What the contact body answered, not relaxed.
+
+        Raises
+        ------
+        ValueError
+            Other shapes, or numbers that are not finite.
+        """
+        g = _vector("g", g, len(self._seen[-1][0]) if self._seen else None)
+        image = _vector("Tg", Tg, len(g))
+        self.see(g, image)
+        return self._following(g, image)
+
+    def see(self, g: Floats, image: Floats) -> None:
+        """Take in an evaluation without asking for the next force."""
+        self._seen.append((g, image))
+        self._advice = None
+
+    @property
+    def advice(self) -> Advice | None:
+        """The advice from the vectors seen so far; None before two of them differ."""
+        if self._advice is None and len(self._seen) > 1:
+            X, TX = map(np.array, zip(*self._seen, strict=True))
+            try:
+                self._advice = advice_of(seen_in(X, TX))
+            except ValueError:  # they do not differ above rounding
+                return None
+        return self._advice
+
+    @property
+    def spectrum(self) -> Spectrum | None:
+        """The eigenvalues as the vectors show them; None before two of them differ."""
+        return None if self.advice is None else self.advice.spectrum
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class CouplingState(Value):
+    """A coupling after an evaluation of T, as a listener receives it; as text it is one line.
+
+    Attributes
+    ----------
+    iterations : int
+        Evaluations of T so far.
+    residual : float
+        ``|Tg - g| / |Tg|``.
+    steps_left : int or None
+        Steps to the tolerance at the pace of the last few; None while the residual does not fall.
+    advice : Advice or None
+        From the vectors so far.
+    """
+
+    iterations: int
+    residual: float
+    steps_left: int | None
+    advice: Advice | None
+
+    @property
+    def spectrum(self) -> Spectrum | None:
+        """The eigenvalues seen so far."""
+        return None if self.advice is None else self.advice.spectrum
+
+    def __str__(self) -> str:
+        return self.summary
+
+    @property
+    def summary(self) -> str:
+        parts = [f"{self.iterations}: residual {self.residual:.1e}"]
+        if self.spectrum is not None:
+            parts.append(f"lambda {self.spectrum.low:.3g} to {self.spectrum.high:.3g}")
+        if self.steps_left is not None:
+            parts.append(f"about {self.steps_left} steps left")
+        parts += [] if self.advice is None else exchange(self.advice)
+        return ", ".join(parts)
+
+
+def exchange(advice: Advice) -> list[str]:
+    """A sentence where the exchanged roles take fewer steps by the method that is advised."""
+    if advice.method is None or not advice.method.exchanged:
+        return []
+    own = [row.steps for row in advice.methods if not row.exchanged and row.steps is not None]
+    there = next(row for row in advice.methods if row.exchanged and row.method == advice.method.name)
+    return [f"exchange the roles: {there.steps} instead of {min(own) if own else 'no end of'} steps"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Coupled(Value):
+    """The end of a coupling.
+
+    Attributes
+    ----------
+    converged : bool
+        True if the last residual is below the tolerance.
+    iterations : int
+        Evaluations of T.
+    force : array, shape (n,)
+        g of the last evaluation.
+    displacement : array, shape (n,)
+        What the Neumann body answered to it.
+    history : tuple of float
+        ``|Tg - g| / |Tg|`` of each evaluation.
+    spectrum : Spectrum or None
+        The eigenvalues as the vectors show them, ``low`` and ``high`` at its ends.
+    advice : Advice or None
+        For the next coupling of the same solvers; None where no two vectors differ.
+    """
+
+    converged: bool
+    iterations: int
+    force: Floats
+    displacement: Floats
+    history: tuple[float, ...]
+    spectrum: Spectrum | None
+    advice: Advice | None
+
+    @property
+    def summary(self) -> str:
+        end = "converged" if self.converged else "not converged"
+        return f"{end}, {self.iterations} evaluations, residual {self.history[-1]:.1e}"
+
+
+def couple(
+    neumann: Solver,
+    contact: Solver,
+    *,
+    start: Any,
+    rule: Rule | str = "iqn-ils",
+    theta: float | Fraction | str | None = None,
+    tolerance: float = 1e-6,
+    max_iterations: int = 100,
+    listen: Callable[[CouplingState], Any] | None = None,
+) -> Coupled:
+    """Couple two solvers: ``T g = contact(neumann(g))``, relaxed by a rule until g and T g agree.
+
+    Parameters
+    ----------
+    neumann, contact : callable
+        From a force to the displacement of the Neumann body, and from a displacement to the force that the contact body
+        answers, arrays of shape (n,); any other pair of quantities, as fluxes and temperatures.  They are called one
+        after the other, once for each evaluation of T, with arrays that they may change; what they raise reaches the
+        caller, and nothing is called after it.
+    start : array, shape (n,), or number
+        The first force.
+    rule, theta
+        As for :class:`Coupling`.
+    tolerance : float
+        The coupling ends where ``|Tg - g| < tolerance |Tg|``, in the Euclidean norm.
+    max_iterations : int
+        The most evaluations of T.
+    listen : callable, optional
+        Called with a :class:`CouplingState` after each evaluation: ``print`` shows one line each.
+
+    Returns
+    -------
+    Coupled
+
+    Raises
+    ------
+    ValueError
+        As :class:`Coupling`; a start, a tolerance or a number of iterations that is none.
+    CouplingError
+        A solver returned numbers that are not finite, or not as many as the start has.
+
+    Examples
+    --------
+    >>> found = couple(lambda g: g / 2, lambda u: 3 - 1.5 * u, start=0.0, theta=0.5)
+    >>> found.converged, found.iterations, round(float(found.force[0]), 6), round(found.spectrum.high, 6)
+    (True, 3, 1.714286, 0.75)
+    """
+    coupling, g = Coupling(rule, theta), _vector("start", start)
+    if not 0 < tolerance < math.inf:
+        raise ValueError(f"tolerance {tolerance!r}: needed a number > 0")
+    if not (isinstance(max_iterations, int) and max_iterations > 0):
+        raise ValueError(f"max_iterations {max_iterations!r}: needed a whole number > 0")
+    history: list[float] = []
+    for iterations in range(1, max_iterations + 1):
+        displacement = _answer("neumann", neumann, g, iterations)
+        image = _answer("contact", contact, displacement, iterations)
+        size, change = float(np.linalg.norm(image)), float(np.linalg.norm(image - g))
+        history.append(change / size if size else math.inf if change else 0.0)
+        converged = change < tolerance * size or not change
+        last = converged or iterations == max_iterations
+        following = g
+        if last:
+            coupling.see(g, image)
+        else:
+            following = coupling.next(g, image)
+        if listen is not None:
+            left = 0 if converged else _steps_left(history, tolerance)
+            state = CouplingState(iterations=iterations, residual=history[-1], steps_left=left, advice=coupling.advice)
+            listen(state)
+        if last:
+            break
+        g = following
+    return Coupled(
+        converged=converged,
+        iterations=iterations,
+        force=g,
+        displacement=displacement,
+        history=tuple(history),
+        spectrum=coupling.spectrum,
+        advice=coupling.advice,
+    )
+
+
+def _vector(name: str, given: Any, size: int | None = None) -> Floats:
+    """A copy as an array of shape (n,); ValueError where it is none."""
+    array = np.atleast_1d(np.asarray(given))
+    if array.ndim != 1 or not len(array) or len(array) != (size or len(array)):
+        shape = " x ".join(map(str, array.shape))
+        raise ValueError(f"{name} has the shape {shape}: needed a vector{f' of {size} numbers' * (size is not None)}")
+    return real_array(name, array, array.shape).copy()
+
+
+def _answer(name: str, solver: Solver, given: Floats, iterations: int) -> Floats:
+    """What a solver makes of a copy of a vector."""
+    answer = solver(given.copy())
+    try:
+        return _vector(f"what {name} returned", answer, len(given))
+    except (ValueError, TypeError) as error:
+        raise CouplingError(f"evaluation {iterations}: {error}") from None
+
+
+def _steps_left(history: list[float], tolerance: float) -> int | None:
+    """Steps to the tolerance at the pace of the last ones."""
+    some = history[-1 - PACE :]
+    if len(some) < 2 or not 0 < some[-1] < some[0] < math.inf:
+        return None
+    pace = math.log(some[-1] / some[0]) / (len(some) - 1)
+    return max(math.ceil(math.log(tolerance / some[-1]) / pace), 1)
