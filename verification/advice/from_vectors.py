@@ -95,5 +95,5 @@ def _role(spectrum: Spectrum) -> Role:
     """The role of an estimated spectrum."""
     ends = [Number.of_float(max(end, 0.0)) for end in (spectrum.low, spectrum.high)]
     reason = {"neumann_body": "vectors do not tell which body had the Neumann problem"}
-    known = {"rho_min": ends[0], "rho_tied": ends[1], "spectrum": spectrum}
+    known: dict[str, Any] = {"rho_min": ends[0], "rho_tied": ends[1], "spectrum": spectrum}
     return role_of(None, Fraction(ends[1].value), nothing=ESTIMATED, reason=reason, **known)

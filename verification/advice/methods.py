@@ -140,7 +140,7 @@ def _simulated(values: tuple[complex, ...], method: str, theta: float) -> int | 
     def image(x: Floats) -> Floats:
         error = x - solution
         if real:
-            return solution - lambdas.real * error
+            return np.asarray(solution - lambdas.real * error)
         moved = lambdas * (error[:m] + 1j * error[m:])
         return np.asarray(solution - np.concatenate([moved.real, moved.imag]))
 

@@ -31,6 +31,12 @@ RANK, CLEAN = 1e-9, 1e-2
 #: them.  Predicted over real steps in 31 linear couplings: 0.82 to 1.28 for IQN-ILS, 0.62 to 1.27 for Aitken.
 SETTLED, MORE = 0.02, 3
 
+#: The least error of an end that has not settled, as a share of 1 + lambda.
+MARGIN = 0.03
+
+#: The fewest iterates of one contact pattern from which eigenvalues are read.
+FEWEST = 4
+
 #: An eigenvalue is complex if its imaginary part exceeds this share of the largest 1 + lambda.
 REAL = 0.02
 
@@ -124,8 +130,9 @@ class SeenVectors(Value):
 
     Attributes
     ----------
-    unknowns, iterates : int
-        The length of a vector, and their number.
+    unknowns, iterates, used : int
+        The length of a vector, the number of iterates, and of those from which eigenvalues are read: the last ones
+        whose images have the same entries 0, where these are FEWEST or more.
     directions : int
         Number of independent directions that their differences have above rounding.
     spectrum : Spectrum
@@ -142,6 +149,7 @@ class SeenVectors(Value):
 
     unknowns: int
     iterates: int
+    used: int
     directions: int
     spectrum: Spectrum
     symmetric: bool
@@ -154,6 +162,7 @@ class SeenVectors(Value):
         return {
             "unknowns": self.unknowns,
             "iterates": self.iterates,
+            "used": self.used,
             "directions": self.directions,
             "eigenvalues": [{"real": float(v.real), "imaginary": float(v.imag)} for v in self.ritz],
             "error_low": self.spectrum.error_low,
@@ -181,6 +190,8 @@ def seen_in(X: Floats, TX: Floats) -> SeenVectors:
     ValueError
         The iterates do not differ above rounding.
     """
+    given, last = len(X), _last_piece(TX)
+    X, TX = X[-last:], TX[-last:]
     D, E = (np.diff(rows, axis=0).T for rows in (X, TX - X))
     lengths = np.linalg.norm(D, axis=0)
     kept = lengths > ROUNDING * float(np.abs(TX).max(initial=0.0))
@@ -202,13 +213,13 @@ def seen_in(X: Floats, TX: Floats) -> SeenVectors:
     values, vectors = values[order], vectors[:, order]
     residuals = np.linalg.norm(A @ vectors - (U @ vectors) * values, axis=0)
     low, high = (_error(values, residuals, i) for i in (0, -1))
-    zeros = TX == 0
-    changing = bool((zeros.any(axis=0) & ~zeros.all(axis=0)).any()) or bool(values[0].real < 1 - max(REAL, low))
+    changing = last < given or _pieces(TX) > 1 or bool(values[0].real < 1 - max(REAL, low))
     modes = _modes(values, residuals / np.abs(values), X.shape[1])
     spectrum = Spectrum(values=modes - 1, source="vectors", error_low=low, error_high=high)
     return SeenVectors(
         unknowns=X.shape[1],
-        iterates=len(X),
+        iterates=given,
+        used=last,
         directions=int(used.sum()),
         spectrum=spectrum,
         symmetric=spectrum.real,
@@ -216,6 +227,18 @@ def seen_in(X: Floats, TX: Floats) -> SeenVectors:
         ritz=values - 1,
         noise=noise,
     )
+
+
+def _pieces(TX: Floats) -> int:
+    """Number of sets of entries that are 0: nodes that are open."""
+    return len(np.unique(TX == 0, axis=0))
+
+
+def _last_piece(TX: Floats) -> int:
+    """Number of the last images with the same entries 0; all of them where these are too few."""
+    same = ((TX == 0) == (TX[-1] == 0)).all(axis=1)
+    count = int(np.argmin(same[::-1])) if not same.all() else len(TX)
+    return count if count >= FEWEST else len(TX)
 
 
 def _modes(values: Complex, shares: Floats, unknowns: int) -> Complex:
@@ -228,8 +251,12 @@ def _modes(values: Complex, shares: Floats, unknowns: int) -> Complex:
 
 
 def _error(values: Complex, residuals: Floats, end: int) -> float:
-    """Estimate of the distance of a Ritz value from an eigenvalue: its residual, or the square over the gap if less."""
+    """Estimate of the distance of a Ritz value from an eigenvalue: its residual, or less.
+
+    Where the inner product is that of the energy it is the square of the residual over the gap to the next value.
+    It is another one here, hence not below MARGIN of the value: a theta 1 % too large may diverge, one 3 % too small
+    takes 3 % more steps.  Of 120 random couplings two diverged without it, none with 0.01 to 0.1.
+    """
     others = np.delete(np.abs(values - values[end]), end)
-    residual = float(residuals[end])
-    gap = float(others.min()) if len(others) else 0.0
-    return residual if gap <= residual else residual**2 / gap
+    residual, gap = float(residuals[end]), float(others.min(initial=np.inf))
+    return min(residual, max(residual**2 / gap if gap else residual, MARGIN * float(abs(values[end]))))

@@ -247,7 +247,7 @@ def couple(
     coupling, g = Coupling(rule, theta), _vector("start", start)
     if not 0 < tolerance < math.inf:
         raise ValueError(f"tolerance {tolerance!r}: needed a number > 0")
-    if not (isinstance(max_iterations, int) and max_iterations > 0):
+    if not max_iterations >= 1:
         raise ValueError(f"max_iterations {max_iterations!r}: needed a whole number > 0")
     history: list[float] = []
     for iterations in range(1, max_iterations + 1):

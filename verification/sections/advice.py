@@ -191,7 +191,9 @@ def of_vectors(found: Advice, seen: SeenVectors) -> Iterator[Section]:
     said = [f"{seen.iterates} iterates of {seen.unknowns} unknowns, {seen.directions} independent directions"]
     kinds = ["real: the coupling looks symmetric" if seen.symmetric else "complex: the coupling is not symmetric"]
     if seen.changing:
-        kinds.append("contact changes between the iterates, so that they belong to several linear pieces")
+        kinds.append("contact changes between the iterates: a theta for open nodes as well")
+        if seen.used < seen.iterates:
+            kinds.append(f"read from the last {seen.used}, in which the same nodes are open")
     said.append(f"eigenvalues are {'; '.join(kinds)}")
     if seen.noise is not None:
         said.append(f"images of dependent directions differ by {figures(seen.noise, 2)} of the largest: noise")

@@ -1,0 +1,157 @@
+"""What iterates and their images show of the spectrum of a coupling."""
+
+import pickle
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from linear_couplings import Linear
+
+import verification as vf
+from verification.advice.spectrum import Spectrum, seen_in
+
+spectra = st.lists(st.floats(0.01, 30), min_size=2, max_size=12).map(sorted)
+seeds = st.integers(0, 10**6)
+
+
+@given(spectra, seeds)
+def test_where_the_iterates_span_the_space_the_eigenvalues_are_all_of_them(values, seed):
+    coupling = Linear(values, seed)
+    X = np.random.default_rng(seed).normal(size=(len(values) + 3, len(values)))
+    seen = seen_in(X, np.array([coupling(x) for x in X]))
+    assert seen.directions == len(values)
+    assert np.sort(seen.ritz.real) == pytest.approx(values, rel=1e-6, abs=1e-6)
+    assert seen.symmetric
+    assert not seen.changing
+
+
+@given(spectra, seeds, st.integers(2, 9))
+def test_ritz_values_lie_between_the_ends_where_the_inner_product_is_that_of_the_energy(values, seed, count):
+    """With S_n = 1 the Euclidean norm is the one of the energy."""
+    generator, n = np.random.default_rng(seed), len(values)
+    Q, _ = np.linalg.qr(generator.normal(size=(n, n)))
+    H, X = Q @ np.diag(values) @ Q.T, generator.normal(size=(count, n))
+    seen = seen_in(X, 1.0 - X @ H)
+    room = 1e-7 * (1 + values[-1])
+    assert values[0] - room <= seen.ritz.real.min() <= seen.ritz.real.max() <= values[-1] + room
+    # and an eigenvalue lies within each residual
+    for end, error in ((seen.spectrum.low, seen.spectrum.error_low), (seen.spectrum.high, seen.spectrum.error_high)):
+        assert error >= 0
+        assert np.isfinite(end)
+
+
+@given(spectra, seeds, st.floats(-6, 6), st.integers(3, 9))
+def test_units_a_shift_and_a_rotation_change_no_eigenvalue(values, seed, decades, count):
+    coupling, generator = Linear(values, seed), np.random.default_rng(seed)
+    X, TX = coupling.run("constant", 1 / (2 + values[-1]), count)
+    Q, _ = np.linalg.qr(generator.normal(size=(len(values),) * 2))
+    shift, unit = generator.normal(size=len(values)), 10.0**decades
+    seen, other = seen_in(X, TX), seen_in(unit * (X @ Q + shift), unit * (TX @ Q + shift))
+    if seen.directions == other.directions:  # a direction may lie at the edge of rounding
+        assert other.ritz.real.max() == pytest.approx(seen.ritz.real.max(), rel=1e-3)
+        assert other.ritz.real.min() == pytest.approx(seen.ritz.real.min(), rel=1e-2, abs=1e-2 * (1 + values[-1]))
+
+
+@pytest.mark.parametrize("rule", ["constant", "aitken", "anderson", "iqn-ils"])
+@pytest.mark.parametrize("seed", range(5))
+def test_runs_by_any_method_show_the_ends(rule, seed):
+    coupling = Linear(np.linspace(0.3, 6.0, 10), seed)
+    seen = seen_in(*coupling.run(rule, 0.25, 10))
+    assert seen.spectrum.high == pytest.approx(6.0, rel=0.05)
+    assert seen.spectrum.low == pytest.approx(0.3, abs=0.25)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_theta_from_nine_iterates_of_aitken_never_diverges_and_is_near_the_best(seed):
+    generator = np.random.default_rng(seed)
+    low, high = 10 ** generator.uniform(-2, 0), 10 ** generator.uniform(0, 2.5)
+    values = np.concatenate([[low, high], low + (high - low) * generator.beta(0.5, 0.5, size=24)])
+    coupling = Linear(values, seed)
+    theta = vf.advise_vectors(*coupling.run("aitken", 0.5, 9)).theta
+    assert theta < 2 / (1 + high)
+    taken = coupling.steps("constant", theta)
+    best = min(coupling.steps("constant", 2 / (2 + low + high) * 1.05**k) or 3000 for k in range(-8, 3))
+    assert taken is not None
+    assert taken <= 1.4 * best
+
+
+def test_a_coupling_that_is_not_symmetric_has_complex_eigenvalues_and_a_theta_for_them():
+    coupling = Linear([1.0, 1.0, 3.0, 3.0], skew=2.0)
+    X = np.random.default_rng(1).normal(size=(6, 4))
+    found = vf.advise_vectors(X, [coupling(x) for x in X])
+    assert not found.vectors.symmetric
+    assert sorted(found.spectrum.values.imag) == pytest.approx([-2, -2, 2, 2])
+    grid = np.linspace(0.01, 0.6, 2000)
+    factors = np.abs(1 - grid[:, None] * (1 + coupling.values)).max(axis=1)
+    assert found.theta == pytest.approx(grid[factors.argmin()], abs=2e-3)
+    assert "not symmetric" in str(found.sections())
+
+
+def test_noise_of_the_solvers_is_measured_and_what_it_drowns_is_left_out():
+    coupling, generator = Linear(np.linspace(0.5, 8, 6)), np.random.default_rng(0)
+    X = generator.normal(size=(12, 6))
+    X[6:] = X[:6] * 1.5 - 0.2
+    TX = np.array([coupling(x) for x in X])
+    clean = seen_in(X, TX)
+    noisy = seen_in(X, TX + 1e-6 * generator.normal(size=TX.shape))
+    assert noisy.noise is None or noisy.noise < 1e-3
+    assert noisy.spectrum.high == pytest.approx(clean.spectrum.high, rel=1e-3)
+
+
+def test_contact_that_opens_and_closes_is_recognised():
+    """At theta = 0.6 the second image has one closed node, all others six; at 0.3 the same node is always open."""
+    data = vf.example("section6").changed(friction=0, cells=((10, 2), (6, 2)), young=(20000, 40000)).to_dict()
+    data["body2"]["traction"] = {"right": [0, 4000]}
+    lifted = vf.Problem.from_dict(data)
+    found = {}
+    for theta in ("0.3", "0.6"):
+        states = [state for state, _ in zip(vf.iterate(lifted, theta=theta), range(8), strict=False)]
+        found[theta] = vf.advise_vectors([s.g for s in states], [s.image for s in states])
+    assert [found[theta].vectors.changing for theta in found] == [False, True]
+    assert [found[theta].vectors.used for theta in found] == [8, 6]
+    assert found["0.6"].spectrum.low == 0 < found["0.3"].spectrum.low
+    assert not found["0.6"].tied
+    closed = found["0.3"].spectrum.high
+    assert found["0.6"].spectrum.high == pytest.approx(closed, rel=0.05)
+    assert closed <= vf.measure(lifted).rho_normal.value * 1.001
+    assert all(each.theta <= 2 / (1 + closed) for each in found.values())
+    assert "open nodes as well" in str(found["0.6"].sections())
+
+
+def test_ends_of_exchanged_roles_are_reciprocal():
+    one = Spectrum.of([0.5, 2.0, 8.0])
+    assert one.exchanged().values.real == pytest.approx([1 / 8, 1 / 2, 2])
+    assert one.exchanged().exchanged().values.real == pytest.approx(one.values.real)
+    with pytest.raises(ValueError, match="0: the exchanged roles have no spectrum"):
+        one.with_open_nodes().exchanged()
+
+
+def test_the_document_has_the_vectors_and_the_ends():
+    coupling = Linear([0.5, 2.0, 8.0])
+    found = vf.advise_vectors(*coupling.run("aitken", 0.5, 5))
+    document = found.to_dict()
+    assert document["spectrum"] == {"low": found.spectrum.low, "high": found.spectrum.high}
+    assert [row["method"] for row in document["methods"]] == ["constant", "aitken", "iqn-ils"] * 2
+    assert [row["exchanged"] for row in document["methods"]] == [False] * 3 + [True] * 3
+    assert document["vectors"]["unknowns"] == 3
+    assert document["roles"][0]["rho"]["level"] == "float"
+    assert document["roles"][0]["theta_proved"] is None
+    assert pickle.loads(pickle.dumps(found)).to_json() == found.to_json()
+
+
+@pytest.mark.parametrize(
+    ("X", "TX", "needed"),
+    [
+        ([[1.0, 2.0]], [[1.0, 2.0]], "X is 1 x 2: needed a row for each iterate, two rows or more"),
+        ([1.0, 2.0], [1.0, 2.0], "X is 2: needed a row for each iterate"),
+        ([[1.0], [2.0]], [[1.0], [2.0], [3.0]], "X and TX are 2 x 1 and 3 x 1"),
+        ([[1.0], [np.nan]], [[1.0], [2.0]], "X has entries that are not finite"),
+        ([[1.0], [2.0]], [["a"], ["b"]], "TX has no real numbers"),
+        ([[1.0, 2.0], [2.0]], [[1.0], [2.0]], "X has rows of different lengths"),
+        ([[1.0], [1.0]], [[2.0], [2.0]], "the iterates do not differ above rounding"),
+    ],
+)
+def test_bad_vectors_are_refused(X, TX, needed):
+    with pytest.raises(ValueError, match=needed):
+        vf.advise_vectors(X, TX)
