@@ -66,6 +66,13 @@ def test_iterations_count_evaluations_and_the_limit_is_kept():
     assert (len(calls), found.iterations, found.converged) == (7, 7, False)
 
 
+def test_a_coupling_that_runs_away_ends():
+    found = vf.couple(lambda g: g, lambda u: 1 - 30 * u, start=0.0, rule="constant", theta=0.9, max_iterations=1000)
+    assert not found.converged
+    assert found.iterations < 60
+    assert found.spectrum.high == pytest.approx(30)
+
+
 @pytest.mark.parametrize("at", [1, 4])
 @pytest.mark.parametrize("who", [0, 1])
 @pytest.mark.parametrize("error", [ZeroDivisionError, KeyboardInterrupt, TypeError, ValueError])

@@ -16,6 +16,7 @@ from ndtheory.constants import take
 from verification.advice.from_vectors import advice_of
 from verification.advice.roles import Advice
 from verification.advice.spectrum import Spectrum, seen_in
+from verification.algorithm.ending import RUNAWAY
 from verification.algorithm.relaxation import Rule, rule_of
 from verification.interface.matrices import real_array
 from verification.value import Value
@@ -146,7 +147,7 @@ class CouplingState(Value):
         if self.spectrum is not None:
             parts.append(f"lambda {self.spectrum.low:.3g} to {self.spectrum.high:.3g}")
         if self.steps_left is not None:
-            parts.append(f"about {self.steps_left} steps left")
+            parts.append(f"about {self.steps_left} step{'s' * (self.steps_left != 1)} left")
         parts += [] if self.advice is None else exchange(self.advice)
         return ", ".join(parts)
 
@@ -223,7 +224,7 @@ def couple(
     tolerance : float
         The coupling ends where ``|Tg - g| < tolerance |Tg|``, in the Euclidean norm.
     max_iterations : int
-        The most evaluations of T.
+        The most evaluations of T; fewer where the residual runs away.
     listen : callable, optional
         Called with a :class:`CouplingState` after each evaluation: ``print`` shows one line each.
 
@@ -249,14 +250,15 @@ def couple(
         raise ValueError(f"tolerance {tolerance!r}: needed a number > 0")
     if not max_iterations >= 1:
         raise ValueError(f"max_iterations {max_iterations!r}: needed a whole number > 0")
-    history: list[float] = []
+    history, first = list[float](), math.inf
     for iterations in range(1, max_iterations + 1):
         displacement = _answer("neumann", neumann, g, iterations)
         image = _answer("contact", contact, displacement, iterations)
         size, change = float(np.linalg.norm(image)), float(np.linalg.norm(image - g))
         history.append(change / size if size else math.inf if change else 0.0)
+        first = change if iterations == 1 else first
         converged = change < tolerance * size or not change
-        last = converged or iterations == max_iterations
+        last = converged or iterations == max_iterations or change > RUNAWAY * first
         following = g
         if last:
             coupling.see(g, image)
