@@ -15,10 +15,10 @@ from verification.cli.main import cli
 def test_the_group_has_its_forms_and_the_default_is_one_of_them():
     group = cli.commands["advise"]
     assert isinstance(group, click.Group)
-    assert list(group.forms()) == ["advise FILE", "advise matrices", "advise run", "advise moduli"]
+    assert list(group.forms()) == ["advise FILE", "advise matrices", "advise run", "advise moduli", "advise vectors"]
 
 
-@pytest.mark.parametrize("name", ["advise FILE", "advise matrices", "advise run", "advise moduli"])
+@pytest.mark.parametrize("name", ["advise FILE", "advise matrices", "advise run", "advise moduli", "advise vectors"])
 def test_a_form_has_at_most_ten_options_that_may_be_given_or_not(name):
     form = cli.commands["advise"].forms()[name]
     options = [p for p in form.params if isinstance(p, click.Option) and not p.required and p.name != "as_json"]
@@ -31,7 +31,7 @@ def test_the_help_of_advise_lists_its_commands_and_the_options_of_a_file(call):
     assert screen.startswith("Usage: ndtheory advise [OPTIONS] FILE\n   or: ndtheory advise COMMAND [OPTIONS]\n")
     options, listed = screen.partition("Options:\n")[2].split("Commands:\n")
     assert all(f"  {option}" in options for option in ("--set", "--swap-roles", "--tied", "--snippets", "--json"))
-    assert [line.split()[0] for line in listed.splitlines()] == ["matrices", "run", "moduli"]
+    assert [line.split()[0] for line in listed.splitlines()] == ["matrices", "run", "moduli", "vectors"]
     assert "--S1" not in screen
     assert "./run" in screen
 
@@ -108,12 +108,12 @@ def test_an_option_of_no_form_is_answered_with_the_nearest(call):
 def test_advise_without_a_file_says_what_it_takes(call):
     for words in ((), ("--tied",)):
         complaint = call("advise", *words).complaint
-        assert "received nothing: needed one FILE, or one of the commands matrices, run, moduli first" in complaint
+        assert "received nothing: needed one FILE, or one of the commands matrices, run, moduli, vectors first" in complaint
 
 
 def test_more_than_one_file_is_refused_with_what_is_needed(call):
-    complaint = call("advise", "vectors", "X.npy", "TX.npy").complaint
-    assert_names(complaint, "received vectors X.npy TX.npy: needed one FILE, or one of the commands matrices,")
+    complaint = call("advise", "iterates", "X.npy", "TX.npy").complaint
+    assert_names(complaint, "received iterates X.npy TX.npy: needed one FILE, or one of the commands matrices,")
 
 
 def test_a_misspelt_command_of_advise_is_no_missing_file(call, write, tmp_path, monkeypatch):

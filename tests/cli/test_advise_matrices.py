@@ -95,7 +95,10 @@ BAD = {
     "a vector": (np.ones(3), ["square"]),
     "a number": (np.float64(3), ["square"]),
     "a stack": (np.ones((2, 2, 2)), ["2 x 2 x 2", "square"]),
-    "not symmetric": (np.array([[1.0, 0.5, 0], [0, 1, 0], [0, 0, 1]]), ["symmetric"]),
+    "not symmetric": (
+        np.array([[1.0, 2.5, 0], [0, 1, 0], [0, 0, 1]]),
+        ["symmetric", "u'Su = -0.25", "positive definite"],
+    ),
     "indefinite": (np.diag([1.0, -1.0, 1.0]), ["indefinite", "-1", "positive definite"]),
     "of the other sign": (-GOOD, ["indefinite", "-3", "positive definite"]),
     "zero": (np.zeros((3, 3)), ["singular"]),

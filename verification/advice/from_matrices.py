@@ -15,10 +15,11 @@ from fem1d2d import extremes_by_solves, largest
 from fem1d2d.mesh import Floats
 from ndtheory import Number
 from verification.advice import BodyNumber
-from verification.advice.roles import ALL, Advice, Role, advise, plain_role, with_both_ends
+from verification.advice.roles import ALL, Advice, Role, advise, plain_role, role_of, with_both_ends
 from verification.advice.sides import (
     BODIES,
     ORDERING,
+    TOLD,
     SeenLanczos,
     SeenMatrices,
     Side,
@@ -43,6 +44,9 @@ ENOUGH = 1e-4
 
 #: Why Lanczos proves no theta.
 WORD_OF_LANCZOS = "rho is a value that Lanczos found: the largest eigenvalue may be larger, so that nothing is proved"
+
+#: Why nothing is proved of matrices that are not symmetric.
+WORD_OF_ASYMMETRY = "the matrices are not symmetric: no theorem applies"
 
 Sides = dict[BodyNumber, Side]
 
@@ -78,8 +82,10 @@ def advise_matrices(
     Parameters
     ----------
     S1, S2 : array, sparse array, LinearOperator or callable
-        Schur complements of bodies 1 and 2 on the interface, or ``u -> S u``.  Symmetric, positive semidefinite; a
-        matrix may be asymmetric by 0.001 of its largest entry.
+        Schur complements of bodies 1 and 2 on the interface, or ``u -> S u``.  Symmetric, positive semidefinite; of a
+        matrix that is asymmetric by up to 0.001 of its largest entry the symmetric part is taken.  Without friction a
+        matrix may be asymmetric by more, as with convection, if its symmetric part is positive definite: eigenvalues
+        are complex then, exact for a linear coupling, and nothing is proved.
     solve1, solve2 : callable, LinearOperator or matrix, optional
         ``f -> S1^-1 f`` and ``f -> S2^-1 f``, as a solver with the Neumann problem of that body does them: S1 and
         solve2 suffice for the role in which body 2 has the Neumann problem.  A matrix S needs none.
@@ -143,7 +149,7 @@ def advise_matrices(
         rows = rows_of(given, unknowns, transfer)
         sides = {body: of_solver(body, S, solve, rows[body]) for body, (S, solve) in given.items()}
     else:
-        sides = {body: of_matrix(body, S) for body, (S, _) in given.items()}
+        sides = {body: of_matrix(body, S, general=friction is None) for body, (S, _) in given.items()}
     P = read_transfer(transfer, {body: side.seen.rows for body, side in sides.items()}, neumann_body)
     refused = _refused(sides, P, functions)
     lanczos: list[SeenLanczos] = []
@@ -154,7 +160,8 @@ def advise_matrices(
                 roles[body], seen = _by_lanczos(body, sides, P, progress)
                 lanczos.append(seen)
         both = [(refused | roles)[body] for body in BODIES]
-        if not functions and P is None and not refused:
+        symmetric = all(side.seen.asymmetry is None or side.seen.asymmetry <= TOLD for side in sides.values())
+        if not functions and P is None and not refused and symmetric:
             both = list(with_both_ends(both))
         found = Advice.between(both, tied=tied, units=UNITS)
     else:
@@ -207,10 +214,12 @@ def _by_eigenvalues(body: BodyNumber, sides: Sides, P: Transfer | None) -> Role:
     assert neumann is not None
     units = [float(np.abs(S.matrix).max()) for S in (contact, neumann)]
     S_c, S_n = contact.matrix / units[0], neumann.matrix / units[1]
+    unit = Fraction(units[0]) / Fraction(units[1])
+    if max(side.asymmetry for side in (contact, neumann)) > TOLD:
+        return _of_asymmetric(body, S_c if P is None else P.carry_back(P.carry_back(S_c.T).T), S_n, float(unit))
     if P is not None:
         S_c = P.carry_back(P.carry_back(S_c).T)
         S_c = (S_c + S_c.T) / 2
-    unit = Fraction(units[0]) / Fraction(units[1])
     with one_thread():
         role = plain_role(body, Fraction(largest(S_c, S_n).value) * unit)
         if len(S_n) <= ALL:
@@ -220,6 +229,15 @@ def _by_eigenvalues(body: BodyNumber, sides: Sides, P: Transfer | None) -> Role:
             return role  # the eigenvalues of both roles are reciprocal
         least = max(float(eigh(S_c, S_n, eigvals_only=True, subset_by_index=[0, 0])[0]), 0.0)
     return replace(role, rho_min=Number.of_float(Fraction(least) * unit), rho_tied=role.rho)
+
+
+def _of_asymmetric(body: BodyNumber, S_c: Floats, S_n: Floats, unit: float) -> Role:
+    """The role by the complex eigenvalues of ``S_n^-1 S_c``."""
+    with one_thread():
+        spectrum = Spectrum.of(np.linalg.eigvals(np.linalg.solve(S_n, S_c)) * unit)
+    ends = [Number.of_float(max(end, 0.0)) for end in (spectrum.low, spectrum.high)]
+    known: dict[str, Any] = {"rho_min": ends[0], "rho_tied": ends[1], "spectrum": spectrum}
+    return role_of(body, Fraction(ends[1].value), nothing=WORD_OF_ASYMMETRY, **known)
 
 
 def _by_lanczos(body: BodyNumber, sides: Sides, P: Transfer | None, progress: Progress) -> tuple[Role, SeenLanczos]:

@@ -38,7 +38,7 @@ class MethodRow:
     neumann_body : {1, 2} or None
         None where the bodies have no numbers.
     exchanged : bool
-        True if the roles are the other ones than those of the file or of the run.
+        True if the roles are exchanged, compared with the file or the run.
     theta : float
         The factor, or the first one.
     steps : int or None
@@ -56,8 +56,12 @@ class MethodRow:
 
     def to_dict(self) -> dict[str, Any]:
         """A member of ``methods``."""
-        why = {} if self.steps is not None else {"steps": f"more than {MOST}"}
-        return {**vars(self), "reason": why}
+        why = {
+            "steps": f"not in {COUNTED if self.method == 'constant' else MOST:g} steps",
+            "bound": "a prediction, no bound",
+            "neumann_body": "the bodies have no numbers",
+        }
+        return {**vars(self), "reason": {name: words for name, words in why.items() if getattr(self, name) is None}}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -191,7 +195,7 @@ def _reason(taken: MethodRow, same: Iterable[MethodRow], fewest: MethodRow) -> s
     if taken.method == "constant" == fewest.method:
         return f"{taken.steps} steps, and no method takes fewer"
     if taken.method == "constant":
-        return f"{taken.steps} steps; {others}, hardly fewer, and a constant theta has a factor known before the run"
+        return f"{taken.steps} steps; {others}, hardly fewer"
     known = "more than can be counted" if constant.steps is None else f"{constant.steps}"
     times = "" if constant.steps is None else f", {constant.steps / _count(taken):.2g} times as many"
     hardly = "" if taken.method == fewest.method else f"; {others}, hardly fewer"

@@ -146,7 +146,7 @@ class Role:
     def advised(self, *, tied: bool = False) -> tuple[float, float]:
         """theta and the rate by which it is chosen: the predicted ones, or those for a tied interface.
 
-        Where eigenvalues are complex, or estimated, they are those of the whole spectrum.
+        Where eigenvalues are complex, or estimated, the whole spectrum decides.
 
         Raises
         ------
@@ -284,7 +284,7 @@ def with_both_ends(roles: Sequence[Role], rho: Sequence[Number | None] = ()) -> 
 
 
 def spectrum_of(pair: ContactPair, *, normal: bool) -> Spectrum | None:
-    """All eigenvalues of (P' S_c P, S_n), or those of the normal components; None beyond ALL unknowns."""
+    """All eigenvalues of (P' S_c P, S_n), of the normal components if asked; None beyond ALL unknowns."""
     if pair.neumann.grid.size > ALL:
         return None
     with one_thread():

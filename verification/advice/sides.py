@@ -65,6 +65,8 @@ class SeenMatrix:
         found = []
         if self.asymmetry is not None and self.asymmetry > rounding:
             taken = "its symmetric part is taken" if self.form == "matrix" else "no residual means less than that"
+            if self.form == "matrix" and self.asymmetry > TOLD:
+                taken = "eigenvalues may be complex, and no theorem applies"
             found.append(f"{name} is asymmetric by {self.asymmetry:.2g} of its largest entry: {taken}")
         if self.zeros is not None and self.zeros >= SPARSE:
             found.append(
@@ -175,8 +177,8 @@ class Side:
         return f"singular ({free} free motion{'s' * (free > 1)})" if free else ""
 
 
-def of_matrix(body: BodyNumber, S: Any) -> Side:
-    """A body by its matrix.
+def of_matrix(body: BodyNumber, S: Any, *, general: bool = False) -> Side:
+    """A body by its matrix; a ``general`` one may be asymmetric.
 
     Raises
     ------
@@ -184,7 +186,7 @@ def of_matrix(body: BodyNumber, S: Any) -> Side:
         No stiffness.
     """
     name = f"S{body}"
-    S = stiffness(name, dense(name, S), asymmetry=TOLD)
+    S = stiffness(name, dense(name, S), asymmetry=TOLD, general=general)
     n, free = len(S.matrix), S.motions.shape[1]
     seen = SeenMatrix(rows=n, form="matrix", asymmetry=S.asymmetry, zeros=S.zeros, free_motions=free)
     return Side(matrix=S, apply=S.matrix.__matmul__, seen=seen)

@@ -234,8 +234,8 @@ class InverseLeastSquares(OfVectors):
     """IQN-ILS of Degroote, Bathe and Vierendeels (2009): T g corrected by the changes of T g seen so far.
 
     The next g is ``T g - W c``, where V and W are the last changes of ``r = T g - g`` and of T g, and c minimises
-    ``|r - V c|``.  It is Anderson mixing with the factor 1 and a longer memory, but for its first step, which has only
-    the factor theta.
+    ``|r - V c|``.  It is Anderson mixing with the factor 1 and a longer memory, except for its first step, which has
+    only the factor theta.
     """
 
     name = "iqn-ils"

@@ -1,4 +1,4 @@
-"""Two solvers of any code coupled by vectors: the loop, or the next vector for a loop of one's own."""
+"""Two solvers of any code coupled by vectors: the loop, or the next vector for your loop."""
 
 from verification.coupling.driver import Coupled, Coupling, CouplingError, CouplingState, couple
 

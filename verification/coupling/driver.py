@@ -45,7 +45,7 @@ class Coupling:
     rule : {'constant', 'aitken', 'anderson', 'iqn-ils'} or Rule
         One that works on vectors.
     theta : number, optional
-        The constant factor, or that of the first step, 0 < theta <= 1; by default 1/2.
+        The constant factor, or the first one, 0 < theta <= 1; by default 1/2.
 
     Raises
     ------
@@ -292,7 +292,7 @@ def _vector(name: str, given: Any, size: int | None = None) -> Floats:
 
 
 def _answer(name: str, solver: Solver, given: Floats, iterations: int) -> Floats:
-    """What a solver makes of a copy of a vector."""
+    """The answer of a solver to a copy of a vector."""
     answer = solver(given.copy())
     try:
         return _vector(f"what {name} returned", answer, len(given))

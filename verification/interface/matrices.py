@@ -68,7 +68,7 @@ class Stiffness(Value):
     Attributes
     ----------
     matrix : array, shape (n, n)
-        Its symmetric part.
+        Its symmetric part; all of it where asymmetry is allowed.
     asymmetry : float
         ``max |A - A'| / max |A|`` of the given matrix A.
     zeros : float
@@ -90,10 +90,10 @@ class Stiffness(Value):
         return size(self.matrix)
 
 
-def stiffness(name: str, matrix: Floats, *, asymmetry: float = ASYMMETRY) -> Stiffness:
+def stiffness(name: str, matrix: Floats, *, asymmetry: float = ASYMMETRY, general: bool = False) -> Stiffness:
     """Check an interface stiffness matrix, which may be singular where rigid motions are left.
 
-    ``asymmetry`` is the largest one allowed.
+    ``asymmetry`` is the largest one that counts as rounding; a ``general`` matrix may have more, and is definite then.
 
     Raises
     ------
@@ -112,6 +112,15 @@ def stiffness(name: str, matrix: Floats, *, asymmetry: float = ASYMMETRY) -> Sti
         raise ValueError(f"{name} is singular: all its entries are 0")
     scaled = matrix / unit  # entries of order 1, whatever the unit
     skew = float(np.abs(scaled - scaled.T).max())
+    zeros = 1 - (np.count_nonzero(matrix) - np.count_nonzero(np.diag(matrix))) / (n * n - n) if n > 1 else 0.0
+    if skew > asymmetry and general:
+        with one_thread():
+            least = float(np.linalg.eigvalsh((scaled + scaled.T) / 2)[0])
+        if not least > MOTIONLESS:
+            needed = "needed one whose symmetric part is positive definite"
+            raise ValueError(f"{name} is not symmetric, and u'Su = {least * unit:.3g} u'u for some u: {needed}")
+        found = {"asymmetry": skew, "zeros": zeros, "least": least * unit}
+        return Stiffness(matrix=scaled * unit, motions=np.zeros((n, 0)), **found)
     if not skew <= asymmetry:
         needed = f"needed a Schur complement of a stiffness matrix, with at most {asymmetry:g}"
         raise ValueError(f"{name} is not symmetric (|A - A'| is {skew:.2g} of its largest entry): {needed}")
@@ -126,13 +135,7 @@ def stiffness(name: str, matrix: Floats, *, asymmetry: float = ASYMMETRY) -> Sti
                 )
             values, vectors = np.linalg.eigh(scaled)
             motions = vectors[:, values <= max(n * np.finfo(float).eps, MOTIONLESS, -least)]
-    return Stiffness(
-        matrix=scaled * unit,
-        asymmetry=skew,
-        zeros=1 - (np.count_nonzero(matrix) - np.count_nonzero(np.diag(matrix))) / (n * n - n) if n > 1 else 0.0,
-        motions=motions,
-        least=least * unit,
-    )
+    return Stiffness(matrix=scaled * unit, asymmetry=skew, zeros=zeros, motions=motions, least=least * unit)
 
 
 def check_matrix(name: str, matrix: Floats) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from verification.advice.methods import NAMES as METHOD_NAMES
-from verification.advice.readings import LARGEST_TO_PASTE, NextRun, RunReading, SeenRun
+from verification.advice.readings import NextRun, RunReading, SeenRun
 from verification.advice.roles import Advice, Role, in_steps, steps
 from verification.advice.runs_with_friction import FrictionBounds
 from verification.advice.seen import LogBound, RhoInterval, SeenLog
@@ -153,13 +153,13 @@ def _which_theta(found: Advice) -> Section:
         if role.ends is not None
     ]
     if ends:
-        said.append(f"if tied (nothing opens or slips): 2/(2+rho_min+rho), with {', '.join(ends)}")
+        said.append(f"if tied: 2/(2 + rho_min + rho), {'; '.join(ends)}")
     said.append(f"steps: to an error of 1e-9{'; last column: if tied, at the predicted theta' * bool(ends)}")
-    for role in possible:
-        auto = role.theta_auto
-        if auto is not None:
-            takes = f'theta = "auto" takes {float(auto.theta):.4g}, the {auto.source} one: {auto.why}'
-            said.append(f"{NAMES[role.neumann_body]}: {takes}")
+    auto = found.best.theta_auto
+    if auto is not None:
+        said.append(
+            f'{NAMES[found.best.neumann_body]}: theta = "auto" takes {float(auto.theta):.4g}, the {auto.source} one'
+        )
     lines = table(("Neumann", "rho", "", "theta", "per step", "steps", ""), rows)
     return section("theta", "WHICH THETA?", lines, *said)
 
@@ -168,21 +168,20 @@ def _which_method(found: Advice) -> Iterator[Section]:
     """Steps of each method in each role, and the one that is advised."""
     if not found.methods:
         return
-    rows: list[tuple[Cell, ...]] = []
     named = found.methods[0].neumann_body is not None
-    for row in found.methods:
-        roles = NAMES[row.neumann_body] if named else "exchanged" if row.exchanged else "as they are"
-        few = {"at most": "<= ", "at least": ">= ", None: ""}[row.bound]
-        rows.append((roles, METHOD_NAMES[row.method], figures(row.theta), count(row.steps, few)))
-    head = ("Neumann" if named else "roles", "method", "theta, or the first", "steps")
-    said = ["steps: evaluations until |Tg - g| < 1e-6 |Tg|, predicted with all modes in the first error"]
-    if found.methods[0].bound is not None:
-        said.append("only one end of the spectrum is known: a constant theta takes no more, the others may")
+    rows: list[tuple[Cell, ...]] = []
+    for exchanged in dict.fromkeys(row.exchanged for row in found.methods):
+        own = [row for row in found.methods if row.exchanged == exchanged]
+        few = {"at most": "<= ", "at least": ">= ", None: ""}[own[0].bound]
+        roles = NAMES[own[0].neumann_body] if named else "exchanged" if exchanged else "as they are"
+        rows.append((roles, figures(own[0].theta), *(count(row.steps, few) for row in own)))
+    heads = ("Neumann" if named else "roles", "theta", *(METHOD_NAMES[row.method] for row in own))
+    said = []
     if found.method is not None:
         who = ", with the roles exchanged" * (found.method.exchanged and not named)
-        said.insert(0, f"Advised: {METHOD_NAMES[found.method.name]}{who}: {found.method.reason}.")
-    said.append("Aitken and IQN-ILS are outside the theorem: no proof says that they converge in contact.")
-    yield section("method", "WHICH METHOD?", table(head, rows, right=(3,)), *said)
+        said.append(f"Advised: {METHOD_NAMES[found.method.name]}{who}: {found.method.reason}.")
+    caption = "steps until |Tg - g| < 1e-6 |Tg|, predicted; Aitken and IQN-ILS without proof"
+    yield section("method", "WHICH METHOD?", table(heads, rows), *said, caption)
 
 
 def of_vectors(found: Advice, seen: SeenVectors) -> Iterator[Section]:
@@ -220,7 +219,7 @@ def _at_predicted(role: Role) -> str:
 
 def _friction(found: Advice) -> Iterator[Section]:
     """The friction for which contraction is proved."""
-    if found.friction is None:
+    if found.friction is None or not (found.friction or any(role.friction_threshold for role in found.roles)):
         return
     said = {}
     for role in found.roles:
@@ -244,19 +243,7 @@ def _together(said: Mapping[str, str]) -> list[str]:
 def _paste(found: Advice, *more: str) -> Section:
     """Lines to paste, and notes on them."""
     said = [f"Whole blocks: --snippets {', '.join(SNIPPETS)} or all."]
-    auto = found.best.theta_auto
-    if auto is not None and found.theta is not None:
-        if found.theta == float(LARGEST_TO_PASTE) <= auto.theta:
-            said.append(f'theta = "auto" takes {float(auto.theta):.4g}; {found.theta:g} is the largest to paste.')
-        elif abs(found.theta - float(auto.theta)) <= 1e-3 * found.theta:
-            said.append('This is what theta = "auto" takes, rounded.')
-        elif found.tied:
-            said.append('theta = "auto" takes another one, since contact may open and slip.')
-        elif auto.source == "proved":
-            said.append('theta = "auto" uses the proved theta unless it needs more than twice the predicted steps.')
-    same = "The same theta for forces and displacements (heat: fluxes and temperatures) in serial coupling"
-    said.append(f"{same}, not in parallel coupling.")
-    said.append("Transient: rho is that of K + c M/dt^2; the better role may change with dt.")
+    said.append("For displacements (heat: temperatures) the same, but not in parallel coupling.")
     return pasted(found.neumann_body, found.theta, *said, *more)
 
 
