@@ -108,7 +108,10 @@ def test_an_option_of_no_form_is_answered_with_the_nearest(call):
 def test_advise_without_a_file_says_what_it_takes(call):
     for words in ((), ("--tied",)):
         complaint = call("advise", *words).complaint
-        assert "received nothing: needed one FILE, or one of the commands matrices, run, moduli, vectors first" in complaint
+        assert (
+            "received nothing: needed one FILE, or one of the commands matrices, run, moduli, vectors first"
+            in complaint
+        )
 
 
 def test_more_than_one_file_is_refused_with_what_is_needed(call):

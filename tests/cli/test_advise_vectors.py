@@ -1,0 +1,61 @@
+"""``advise vectors``: files of iterates and images, the screen, and bad files."""
+
+import numpy as np
+import pytest
+
+IMAGE = lambda x: 1 - np.array([0.5, 1.0, 3.0]) * (x - 1)
+
+
+@pytest.fixture
+def files(tmp_path):
+    X = np.random.default_rng(2).normal(size=(6, 3))
+    TX = np.array([IMAGE(x) for x in X])
+    np.save(tmp_path / "X.npy", X)
+    np.save(tmp_path / "TX.npy", TX)
+    np.savez(tmp_path / "run.npz", X=X, TX=TX)
+    np.savetxt(tmp_path / "X.csv", X, delimiter=",", fmt="%.17g")
+    np.savetxt(tmp_path / "TX.csv", TX, delimiter=",", fmt="%.17g")
+    return tmp_path
+
+
+@pytest.mark.parametrize("names", [["X.npy", "TX.npy"], ["run.npz"], ["X.csv", "TX.csv"]])
+def test_files_of_any_kind_show_the_ends_of_the_spectrum(call, files, names):
+    document = call("advise", "vectors", *(files / name for name in names), "--json").document
+    assert document["spectrum"]["low"] == pytest.approx(0.5)
+    assert document["spectrum"]["high"] == pytest.approx(3.0)
+    assert document["theta"] == pytest.approx(2 / 5.5, abs=1e-4)
+    assert document["vectors"]["directions"] == 3
+
+
+def test_the_screen_fits_and_says_what_it_advises(call, files):
+    answer = call("advise", "vectors", files / "run.npz")
+    lines = answer.out.splitlines()
+    assert max(map(len, lines)) <= 80
+    assert len(lines) <= 46
+    assert "6 iterates of 3 unknowns, 3 independent directions" in answer.out
+    assert "WHICH METHOD?" in answer.out
+    assert "theta = 0.3636" in answer.out
+
+
+def test_blocks_to_paste_have_the_theta_of_the_vectors(call, files):
+    assert 'value="0.3636"' in call("advise", "vectors", files / "run.npz", "--snippets", "preCICE").out
+
+
+@pytest.mark.parametrize(
+    ("words", "parts"),
+    [
+        (["missing.npy", "TX.npy"], ["missing.npy", "no such file"]),
+        (["X.npy"], ["X.npy", "needed X and TX, or one file with arrays X and TX"]),
+        (["X.npy", "short.npy"], ["X.npy", "short.npy", "6 x 3 and 5 x 3", "an image for each iterate"]),
+        (["X.npy", "nan.npy"], ["TX has entries that are not finite"]),
+        (["one.npy", "one.npy"], ["one.npy", "two rows or more"]),
+        (["X.npy", "TX.npy", "--snippets", "preCICE", "--json"], ["--snippets with --json"]),
+    ],
+)
+def test_bad_files_get_one_line(call, files, monkeypatch, words, parts):
+    np.save(files / "short.npy", np.zeros((5, 3)))
+    np.save(files / "nan.npy", np.full((6, 3), np.nan))
+    np.save(files / "one.npy", np.zeros((1, 3)))
+    monkeypatch.chdir(files)
+    complaint = call("advise", "vectors", *words).complaint
+    assert [part for part in parts if part not in complaint] == []
