@@ -1,9 +1,11 @@
-"""Thirty couplings whose spectrum is known, and what the advice from their logs costs.
+"""Couplings whose spectrum is known, and what the advice from their logs, vectors and matrices costs.
 
 Bodies are those of scikit-fem, blocks with a curved outer side in the plane and bricks in space, and two plates of this
-project where there is friction.  They are tied, or in contact that is pressed and may open.  In each coupling a run
+project where there is friction; they are tied, or in contact that is pressed and may open.  Walls that exchange heat,
+tubes and membranes with added mass, masses on springs and bodies with convection are tied, too.  In each coupling a run
 writes the log that preCICE would write, `advise_logs` reads it, and the runs that the advice asks for are made, three
-at most.  The theta that it ends with is compared with the best one of a scan.
+at most; `advise_vectors` reads nine iterates of Aitken, and `advise_matrices` both matrices.  Each theta is compared
+with the best one of a scan, and the methods with each other.
 """
 
 from __future__ import annotations
@@ -25,13 +27,16 @@ from scipy.sparse.linalg import splu
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 import verification as vf
+from verification.advice.methods import METHODS, NEAR
+from verification.advice.methods import advised as methods_advised
 from verification.advice.readings import steps_needed
+from verification.algorithm.relaxation import RULES
 
 #: A run has arrived where its residual is this share of the force.
 ARRIVED = 1e-8
 
 #: Runs that the advice may ask for after the first one, and steps after which a run is given up.
-ASKED_FOR, LONGEST = 3, 2000
+ASKED_FOR, LONGEST = 3, 6000
 
 #: A residual is multiplied by ``exp(NOISE z)`` with a normal z in every second coupling.
 NOISE = 0.01
@@ -122,19 +127,26 @@ class Tied:
     contact: Body
     neumann: Body
     tied = True
+    linear = True
 
     @cached_property
     def spectrum(self) -> Floats:
         """The eigenvalues of (S_c, S_n)."""
         return eigh(self.contact.stiffness, self.neumann.stiffness, eigvals_only=True)
 
-    def forces(self, theta: float) -> Iterator[tuple[Floats, Floats]]:
+    @cached_property
+    def solve(self) -> Callable[[Floats], Floats]:
+        """``f -> S_n^-1 f``."""
+        factor = cho_factor(self.neumann.stiffness)
+        return lambda force: cho_solve(factor, force)
+
+    def forces(self, theta: float, rule: str = "constant") -> Iterator[tuple[Floats, Floats]]:
         """g and T g, step by step."""
-        factor, g = cho_factor(self.neumann.stiffness), np.zeros(len(self.neumann.load))
+        following, g = RULES[rule].on_vectors(theta), np.zeros(len(self.neumann.load))
         while True:
-            image = self.image(cho_solve(factor, g + self.neumann.load))
+            image = self.image(self.solve(g + self.neumann.load))
             yield g, image
-            g = g + theta * (image - g)
+            g = following(g, image)
 
     def image(self, u: Floats) -> Floats:
         """What the contact body answers to the displacement of the Neumann body."""
@@ -147,6 +159,7 @@ class Contact(Tied):
 
     side: int
     tied = False
+    linear = False
 
     @cached_property
     def _root(self) -> Floats:
@@ -160,21 +173,36 @@ class Contact(Tied):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Asymmetric(Tied):
+    """The same of matrices that are not symmetric."""
+
+    @cached_property
+    def spectrum(self) -> Floats:
+        values = np.linalg.eigvals(np.linalg.solve(self.neumann.stiffness, self.contact.stiffness))
+        return values[np.argsort(values.real)]
+
+    @cached_property
+    def solve(self) -> Callable[[Floats], Floats]:
+        return lambda force: np.linalg.solve(self.neumann.stiffness, force)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Plates:
     """Two plates of this project in contact with friction."""
 
     name: str
     pair: vf.ContactPair
     tied = False
+    linear = False
 
     @cached_property
     def spectrum(self) -> Floats:
         """The eigenvalues of the matrices of both bodies, all unknowns."""
         return eigh(self.pair.contact.schur, self.pair.neumann.schur, eigvals_only=True)
 
-    def forces(self, theta: float) -> Iterator[tuple[Floats, Floats]]:
+    def forces(self, theta: float, rule: str = "constant") -> Iterator[tuple[Floats, Floats]]:
         """g and T g, step by step."""
-        return ((state.g, state.image) for state in vf.iterate(self.pair, theta=repr(float(theta))))
+        return ((s.g, s.image) for s in vf.iterate(self.pair, theta=repr(float(theta)), rule=rule))
 
 
 Coupling = Tied | Contact | Plates
@@ -190,9 +218,9 @@ def residuals(coupling: Coupling, theta: float, most: int) -> list[tuple[float, 
     return found
 
 
-def steps(coupling: Coupling, theta: float, most: int = LONGEST) -> float:
+def steps(coupling: Coupling, theta: float, most: int = LONGEST, rule: str = "constant") -> float:
     """Steps until the residual is ARRIVED of the force; inf where that takes more than ``most``."""
-    for n, (g, image) in enumerate(islice(coupling.forces(theta), most)):
+    for n, (g, image) in enumerate(islice(coupling.forces(theta, rule), most)):
         size = float(np.linalg.norm(image - g))
         if size <= ARRIVED * float(np.linalg.norm(image)):
             return max(n, 1)
@@ -203,7 +231,8 @@ def steps(coupling: Coupling, theta: float, most: int = LONGEST) -> float:
 
 def fewest(coupling: Coupling) -> tuple[int, float]:
     """The fewest steps of a scan over theta, and the theta that takes them."""
-    middle = 2 / (1 + min(coupling.spectrum[0], 1) + coupling.spectrum[-1])
+    low, high = float(coupling.spectrum[0].real), float(coupling.spectrum[-1].real)
+    middle = 2 / (1 + min(low, 1) + high)
     thetas = sorted({min(middle * 1.06**k, 0.999) for k in range(-16, 31)}, key=lambda theta: abs(theta - middle))
     best, at = LONGEST, middle
     for theta in thetas:
@@ -291,8 +320,8 @@ def follow(coupling: Coupling, first: float, folder: Path, seed: int | None) -> 
     taken = steps(coupling, theta)
     return Followed(
         name=coupling.name,
-        least=float(coupling.spectrum[0]),
-        largest=float(coupling.spectrum[-1]),
+        least=float(coupling.spectrum[0].real),
+        largest=float(coupling.spectrum[-1].real),
         noise=seed is not None,
         runs=tuple(runs),
         theta=theta,
@@ -323,3 +352,143 @@ def couplings() -> Iterator[Coupling]:
         plates = vf.example("section6").changed(young=(E1, E2), cells=((10, 2), (6, 2)), friction="0.2")
         plates = plates.changed(neumann_body=neumann)
         yield Plates(name=f"friction 0.2, {E1 // 1000}/{E2 // 1000}, 2D, Neumann body {neumann}", pair=vf.build(plates))
+
+
+# --- other kinds ------------------------------------------------------------------------------------------------------
+
+
+def _of_modes(name: str, contact: Floats, neumann: Floats, seed: int) -> Tied:
+    """A coupling of given stiffnesses of sine modes, as matrices of values at the nodes of a line, with random loads."""
+    n, loads = len(contact), np.random.default_rng(seed).normal(size=(2, len(contact)))
+    i = np.arange(1, n + 1)
+    V = np.sqrt(2 / (n + 1)) * np.sin(np.outer(i, i) * np.pi / (n + 1))
+    bodies = (Body(stiffness=V @ np.diag(S) @ V, load=load) for S, load in zip((contact, neumann), loads, strict=True))
+    return Tied(name=name, contact=next(bodies), neumann=next(bodies))
+
+
+def _conducts(q: Floats, conductivity: float, depth: float, capacity_by_dt: float) -> Floats:
+    """The flux that a wall of this depth, held at its other side, answers to a temperature of wave number q."""
+    p = np.sqrt(q**2 + capacity_by_dt / conductivity)
+    return conductivity * p / np.tanh(p * depth)
+
+
+def heat(seed: int) -> Tied:
+    """Two walls in the plane, in the steady state or in a step in time."""
+    r = np.random.default_rng(seed)
+    q = np.arange(1, 31) * np.pi / 2
+    walls = 10 ** r.uniform(-1, 1, size=(2, 2))
+    step = 10 ** r.uniform(0, 3, size=2) * (seed % 2)
+    of = [_conducts(q, k, d, c) for (k, d), c in zip(walls, step, strict=True)]
+    return _of_modes(f"heat, k {walls[0, 0]:.2g}/{walls[1, 0]:.2g}{', in time' * (seed % 2)}", *of, seed)
+
+
+def membrane(seed: int) -> Tied:
+    """A stretched wall that a fluid without compressibility loads: added mass of more or less weight."""
+    r = np.random.default_rng(seed)
+    q = np.arange(1, 41) * np.pi / r.uniform(1, 10)
+    weight = 10 ** r.uniform(-1, 1.5)
+    of = weight / (q * np.tanh(q * 0.5)), 1 + 10 ** r.uniform(-4, -1) * q**2
+    return _of_modes(f"added mass {weight:.2g}", *of, seed)
+
+
+def tube(seed: int) -> Tied:
+    """An elastic tube with a fluid that flows along it."""
+    r = np.random.default_rng(seed)
+    q = 2 * 61 * np.sin(np.arange(1, 61) * np.pi / 122)
+    stiff = 10 ** r.uniform(-1, 1)
+    of = 10 ** r.uniform(1, 4) / q**2, stiff + 10 ** r.uniform(-4, -2) * q**2
+    return _of_modes(f"tube {stiff:.2g}", *of, seed)
+
+
+def lumped(seed: int) -> Tied:
+    """One to four masses on springs."""
+    r = np.random.default_rng(seed)
+    n = 1 + seed % 4
+    bodies = []
+    for _ in range(2):
+        A = r.normal(size=(n, n))
+        bodies.append(Body(stiffness=A @ A.T + 0.3 * np.eye(n), load=r.normal(size=n)))
+    return Tied(name=f"lumped, {n} unknown{'s' * (n > 1)}", contact=bodies[0], neumann=bodies[1])
+
+
+def convection(seed: int) -> Asymmetric:
+    """Two regions with diffusion and a flow along the interface."""
+    r = np.random.default_rng(seed)
+    n = 30
+    second = (2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)) * (n + 1)
+    first = np.eye(n) - np.eye(n, k=-1)
+    bodies = []
+    for _ in range(2):
+        a, b, c = 10 ** r.uniform(-1.5, 0.5), r.uniform(0, 3), 10 ** r.uniform(-1, 1)
+        bodies.append(Body(stiffness=a * second / (n + 1) + b * first + c * np.eye(n), load=r.normal(size=n)))
+    return Asymmetric(name="convection", contact=bodies[0], neumann=bodies[1])
+
+
+#: The kinds, and the seeds: half of them were made after the rules were fixed.
+KINDS, SEEDS, UNSEEN = (heat, membrane, tube, lumped, convection), (1, 2), (101, 102)
+
+
+def others() -> Iterator[tuple[Coupling, bool]]:
+    """Twenty couplings of other kinds, and whether the rules were fixed before they were made."""
+    for seed in (*SEEDS, *UNSEEN):
+        for kind in KINDS:
+            yield kind(seed), seed in UNSEEN
+
+
+@dataclass(frozen=True, kw_only=True)
+class Advised:
+    """What other advice than that from logs costs, and the methods.
+
+    Attributes
+    ----------
+    vectors, matrices : float or None
+        theta from nine iterates of Aitken, and from both matrices; None where none is advised.
+    vectors_steps, matrices_steps : int or None
+        What it takes; None where the run does not arrive.
+    methods : mapping
+        Steps of a constant theta, Aitken and IQN-ILS with the theta from the matrices.
+    method : str or None
+        The one that the vectors advise, in the roles as they are.
+    """
+
+    vectors: float | None
+    vectors_steps: int | None
+    matrices: float | None
+    matrices_steps: int | None
+    methods: dict[str, int | None]
+    method: str | None
+
+    @property
+    def method_good(self) -> bool:
+        """Whether the method takes at most 1.3 times the fewest steps of all three."""
+        known = [count for count in self.methods.values() if count is not None]
+        taken = None if self.method is None else self.methods[self.method]
+        return taken is not None and taken <= NEAR * min(known)
+
+
+def advised(coupling: Coupling) -> Advised:
+    """The advice from vectors and from matrices, and the steps of each."""
+    count = lambda theta, rule="constant": None if theta is None else _whole(steps(coupling, theta, rule=rule))
+    states = list(islice(coupling.forces(0.5, "aitken"), 9))
+    found = vf.advise_vectors([g for g, _ in states], [image for _, image in states], tied=coupling.tied)
+    if isinstance(coupling, Plates):
+        role = vf.advise(coupling.pair).roles[0]
+        matrices = role.advised()[0]
+    else:
+        of = vf.advise_matrices(coupling.contact.stiffness, coupling.neumann.stiffness, tied=coupling.tied)
+        role = next(role for role in of.roles if role.neumann_body == 2)
+        matrices = role.advised(tied=coupling.tied)[0]
+    own = [row for row in found.methods if not row.exchanged]
+    best = methods_advised(own)
+    return Advised(
+        vectors=found.theta,
+        vectors_steps=count(found.theta),
+        matrices=matrices,
+        matrices_steps=count(matrices),
+        methods={rule: count(matrices, rule) for rule in METHODS},
+        method=None if best is None else best.name,
+    )
+
+
+def _whole(count: float) -> int | None:
+    return int(count) if math.isfinite(count) else None

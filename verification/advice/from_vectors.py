@@ -38,7 +38,8 @@ def advise_vectors(X: Any, TX: Any, *, tied: bool = False) -> Advice:
     -------
     Advice
         ``spectrum.low`` and ``spectrum.high`` are the ends as estimated, ``theta`` is to paste, ``methods`` compares
-        constant relaxation, Aitken and IQN-ILS, also with the roles exchanged.
+        constant relaxation, Aitken and IQN-ILS, also with the roles exchanged.  No theta and no spectrum while
+        contact still changes in the last iterates.
 
     Raises
     ------
@@ -74,6 +75,8 @@ def advise_vectors(X: Any, TX: Any, *, tied: bool = False) -> Advice:
 
 def advice_of(seen: SeenVectors, *, tied: bool = False) -> Advice:
     """The advice for a spectrum that vectors show."""
+    if not (seen.settled or tied):
+        return Advice(neumann_body=None, roles=(), units=UNITS, vectors=seen)
     linear = tied or not seen.changing
     spectrum = seen.spectrum if linear else seen.spectrum.with_open_nodes()
     roles = [_role(spectrum)]

@@ -398,6 +398,8 @@ class Advice(Document):
     def summary(self) -> str:
         if self.moduli is not None:
             return self.moduli.summary
+        if not self.roles and self.vectors is not None:
+            return self.why_no_theta
         if not self.roles:
             return f"assumed: {self.assumes}; {len(self.readings)} readings of {'logs' if self.logs else 'a run'}"
         theta, rate = self.chosen(self.best)
@@ -430,6 +432,8 @@ class Advice(Document):
             return ""
         if self.moduli is not None:
             return "moduli bound rho from below: a theta to start with stands in moduli.roles.start, where there is one"
+        if self.vectors is not None:
+            return "contact still changes in the last iterates: continue the run, and give more of its vectors"
         if self.friction_bounds is not None:
             return "with friction no run decides theta: make the run that `next` names"
         return "several readings are left: make the run that `next` names"
@@ -496,7 +500,7 @@ class Advice(Document):
             The ratio of a run has several readings: ``next`` is the run to make.
         """
         if not self.roles:
-            raise ValueError("several readings are left: make the run that `next` names")
+            raise ValueError(self.why_no_theta)
         return next((r for r in self.roles if r.neumann_body == self.neumann_body), self.roles[0])
 
     def content(self) -> dict[str, Any]:

@@ -37,6 +37,9 @@ MARGIN = 0.03
 #: The fewest iterates of one contact pattern from which eigenvalues are read.
 FEWEST = 4
 
+#: Entries of an image below this share of the largest are 0, by rounding: the force of an open node.
+OPEN = 1e-10
+
 #: An eigenvalue is complex if its imaginary part exceeds this share of the largest 1 + lambda.
 REAL = 0.02
 
@@ -141,6 +144,8 @@ class SeenVectors(Value):
     changing : bool
         True if contact opens or closes: entries of T x are 0 in some images and not in others, or an eigenvalue is
         below 0.
+    settled : bool
+        False if contact still changes in the last FEWEST iterates: then no theta follows.
     ritz : array, shape (directions,)
         The Ritz values less 1: eigenvalues as the vectors show them.
     noise : float or None
@@ -154,6 +159,7 @@ class SeenVectors(Value):
     spectrum: Spectrum
     symmetric: bool
     changing: bool
+    settled: bool
     ritz: Complex
     noise: float | None
 
@@ -169,6 +175,7 @@ class SeenVectors(Value):
             "error_high": self.spectrum.error_high,
             "symmetric": self.symmetric,
             "contact_changes": self.changing,
+            "settled": self.settled,
             "noise": self.noise,
             "reason": {} if self.noise is not None else {"noise": "the directions of the iterates are independent"},
         }
@@ -191,7 +198,8 @@ def seen_in(X: Floats, TX: Floats) -> SeenVectors:
         The iterates do not differ above rounding.
     """
     given, last = len(X), _last_piece(TX)
-    X, TX = X[-last:], TX[-last:]
+    changing, read = last < given, last if last >= FEWEST else given
+    X, TX = X[-read:], TX[-read:]
     D, E = (np.diff(rows, axis=0).T for rows in (X, TX - X))
     lengths = np.linalg.norm(D, axis=0)
     kept = lengths > ROUNDING * float(np.abs(TX).max(initial=0.0))
@@ -213,32 +221,28 @@ def seen_in(X: Floats, TX: Floats) -> SeenVectors:
     values, vectors = values[order], vectors[:, order]
     residuals = np.linalg.norm(A @ vectors - (U @ vectors) * values, axis=0)
     low, high = (_error(values, residuals, i) for i in (0, -1))
-    changing = last < given or _pieces(TX) > 1 or bool(values[0].real < 1 - max(REAL, low))
+    negative = bool(values[0].real < 1 - max(REAL, low))
     modes = _modes(values, residuals / np.abs(values), X.shape[1])
     spectrum = Spectrum(values=modes - 1, source="vectors", error_low=low, error_high=high)
     return SeenVectors(
         unknowns=X.shape[1],
         iterates=given,
-        used=last,
+        used=read,
         directions=int(used.sum()),
         spectrum=spectrum,
         symmetric=spectrum.real,
-        changing=changing,
+        changing=changing or negative,
+        settled=not changing or last >= FEWEST,
         ritz=values - 1,
         noise=noise,
     )
 
 
-def _pieces(TX: Floats) -> int:
-    """Number of sets of entries that are 0: nodes that are open."""
-    return len(np.unique(TX == 0, axis=0))
-
-
 def _last_piece(TX: Floats) -> int:
-    """Number of the last images with the same entries 0; all of them where these are too few."""
-    same = ((TX == 0) == (TX[-1] == 0)).all(axis=1)
-    count = int(np.argmin(same[::-1])) if not same.all() else len(TX)
-    return count if count >= FEWEST else len(TX)
+    """Number of the last images with the same entries 0."""
+    zero = np.abs(TX) <= OPEN * float(np.abs(TX).max(initial=0.0))
+    same = (zero == zero[-1]).all(axis=1)
+    return len(TX) if same.all() else int(np.argmin(same[::-1]))
 
 
 def _modes(values: Complex, shares: Floats, unknowns: int) -> Complex:

@@ -73,6 +73,8 @@ def _sections(found: Advice) -> Iterator[Section]:
 def _end(found: Advice) -> Section:
     """The limits of the advice, and the command to type next."""
     outside = map(outside_the_theorem, found.outside)
+    if not found.roles and found.vectors is not None:
+        return closing("a theta", then="ndtheory advise vectors X.npy TX.npy (with more iterates)")
     if found.next is None:
         tied = "that nothing opens or slips"
         claims = tied if found.tied else "that the predicted theta is the best one for other loads or meshes"
@@ -196,6 +198,9 @@ def of_vectors(found: Advice, seen: SeenVectors) -> Iterator[Section]:
     said.append(f"eigenvalues are {'; '.join(kinds)}")
     if seen.noise is not None:
         said.append(f"images of dependent directions differ by {figures(seen.noise, 2)} of the largest: noise")
+    if not found.roles:
+        yield section("given", "WHAT WAS GIVEN?", *said, f"No theta: {found.why_no_theta}.")
+        return
     yield section("given", "WHAT WAS GIVEN?", *said)
     rows = [
         ("least lambda", figures(spectrum.low), figures(spectrum.error_low, 2)),
