@@ -358,7 +358,7 @@ def couplings() -> Iterator[Coupling]:
 
 
 def _of_modes(name: str, contact: Floats, neumann: Floats, seed: int) -> Tied:
-    """A coupling of given stiffnesses of sine modes, as matrices of values at the nodes of a line, with random loads."""
+    """A coupling of given stiffnesses of sine modes, as matrices of values at nodes on a line, with random loads."""
     n, loads = len(contact), np.random.default_rng(seed).normal(size=(2, len(contact)))
     i = np.arange(1, n + 1)
     V = np.sqrt(2 / (n + 1)) * np.sin(np.outer(i, i) * np.pi / (n + 1))
