@@ -49,6 +49,7 @@ HEADINGS = {
     "advise": [
         "WHICH BODY GETS THE NEUMANN PROBLEM?",
         "WHICH THETA?",
+        "WHICH METHOD?",
         "HOW MUCH FRICTION DOES THE ENERGY BOUND ALLOW?",
         "TO PASTE",
     ],

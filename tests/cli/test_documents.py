@@ -104,6 +104,8 @@ def unexplained(part, explained=frozenset(), path=""):
         if set(part) == NUMBER:
             return
         reasons = part.get("reason") or {}
+        if isinstance(reasons, str):  # the reason of a method that is advised
+            reasons = {}
         assert all(isinstance(reason, str) and reason for reason in reasons.values())
         explained = explained | set(reasons)
         for key, value in part.items():

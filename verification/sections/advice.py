@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from verification.advice.methods import NAMES as METHOD_NAMES
-from verification.advice.readings import NextRun, RunReading, SeenRun
+from verification.advice.readings import LARGEST_TO_PASTE, NextRun, RunReading, SeenRun
 from verification.advice.roles import Advice, Role, in_steps, steps
 from verification.advice.runs_with_friction import FrictionBounds
 from verification.advice.seen import LogBound, RhoInterval, SeenLog
@@ -155,13 +155,8 @@ def _which_theta(found: Advice) -> Section:
         if role.ends is not None
     ]
     if ends:
-        said.append(f"if tied: 2/(2 + rho_min + rho), {'; '.join(ends)}")
+        said.append(f"if tied: 2/(2+rho_min+rho), {'; '.join(ends)}")
     said.append(f"steps: to an error of 1e-9{'; last column: if tied, at the predicted theta' * bool(ends)}")
-    auto = found.best.theta_auto
-    if auto is not None:
-        said.append(
-            f'{NAMES[found.best.neumann_body]}: theta = "auto" takes {float(auto.theta):.4g}, the {auto.source} one'
-        )
     lines = table(("Neumann", "rho", "", "theta", "per step", "steps", ""), rows)
     return section("theta", "WHICH THETA?", lines, *said)
 
@@ -224,7 +219,7 @@ def _at_predicted(role: Role) -> str:
 
 def _friction(found: Advice) -> Iterator[Section]:
     """The friction for which contraction is proved."""
-    if found.friction is None or not (found.friction or any(role.friction_threshold for role in found.roles)):
+    if found.friction is None:
         return
     said = {}
     for role in found.roles:
@@ -248,6 +243,17 @@ def _together(said: Mapping[str, str]) -> list[str]:
 def _paste(found: Advice, *more: str) -> Section:
     """Lines to paste, and notes on them."""
     said = [f"Whole blocks: --snippets {', '.join(SNIPPETS)} or all."]
+    auto = found.best.theta_auto
+    if auto is not None and found.theta is not None:
+        if found.theta == float(LARGEST_TO_PASTE) <= auto.theta:
+            said.append(f'theta = "auto" takes {float(auto.theta):.4g}; {found.theta:g} is the largest to paste.')
+        elif abs(found.theta - float(auto.theta)) <= 1e-3 * found.theta:
+            said.append('This is what theta = "auto" takes, rounded.')
+        elif found.tied:
+            said.append('theta = "auto" takes another one, since contact may open and slip.')
+        elif auto.source == "proved":
+            takes = f'theta = "auto" takes the proved {float(auto.theta):.4g}'
+            said.append(f"{takes}: at most twice the predicted steps.")
     said.append("For displacements (heat: temperatures) the same, but not in parallel coupling.")
     return pasted(found.neumann_body, found.theta, *said, *more)
 
