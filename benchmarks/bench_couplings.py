@@ -1,4 +1,4 @@
-"""What the advice from logs costs in thirty couplings whose spectrum is known.
+"""What the advice from logs, vectors and matrices costs in fifty couplings whose spectrum is known.
 
 python benchmarks/bench_couplings.py [--full [--record FOLDER]]
 
@@ -13,13 +13,13 @@ from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 
-from couplings import ARRIVED, ASKED_FOR, NOISE, Followed, couplings, followed
+from couplings import ADVICE, ARRIVED, ASKED_FOR, NOISE, Followed, advised, couplings, followed, others
 from recording import options
 
 from ndtheory import __version__
 
 #: The theta of the first run; with --full others are tried, too.
-FIRST, MORE = 0.5, (0.1, 0.3, 0.9)
+FIRST, MORE = 0.5, (0.1, 0.3, 0.9, 0.99)
 
 #: Records of another form than those of times have a folder of their own.
 FOLDER = "advice"
@@ -38,12 +38,22 @@ def line(one: Followed) -> str:
 
 def main() -> None:
     chosen = options(__doc__).parse_args()
+    kinds = [(coupling, False) for coupling in couplings()] + list(others())
+    each = []
+    for coupling, unseen in kinds:
+        each.append(advised(coupling, unseen))
+        print(f"  {coupling.name:45}  {each[-1].verdicts}  methods {each[-1].methods}: {each[-1].method}", flush=True)
+    linear = [one for one in each if one.linear]
+    for name in ADVICE:
+        right = sum(one.verdicts[name] == "right" for one in linear)
+        print(f"  {name}: {right} of {len(linear)} linear ones within 1.4 times the fewest steps")
+    print(f"  methods: {sum(one.method_good for one in linear)} of {len(linear)} within 1.3 times the best")
     tried = {}
     for first in (FIRST, *MORE) if chosen.full else (FIRST,):
         print(f"first theta {first}")
         tried[first] = []
         with tempfile.TemporaryDirectory() as folder:
-            for one in followed(couplings(), first, Path(folder)):
+            for one in followed((coupling for coupling, _ in kinds), first, Path(folder)):
                 tried[first].append(one)
                 print(line(one), flush=True)
         good = sum(one.good for one in tried[first])
@@ -62,6 +72,7 @@ def main() -> None:
                 {"theta": first, "couplings": [asdict(one) | {"good": one.good} for one in rows]}
                 for first, rows in tried.items()
             ],
+            "advice": [asdict(one) | {"verdicts": one.verdicts, "method_good": one.method_good} for one in each],
         }
         folder = chosen.record / FOLDER
         folder.mkdir(parents=True, exist_ok=True)

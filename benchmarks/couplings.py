@@ -437,10 +437,15 @@ def others() -> Iterator[tuple[Coupling, bool]]:
 
 @dataclass(frozen=True, kw_only=True)
 class Advised:
-    """What other advice than that from logs costs, and the methods.
+    """The cost of the advice from vectors and from matrices, and of the methods.
 
     Attributes
     ----------
+    name : str
+    unseen, linear : bool
+        Whether the rules were fixed before it was made; whether it is linear.
+    fewest : int
+        The fewest steps of the scan over theta.
     vectors, matrices : float or None
         theta from nine iterates of Aitken, and from both matrices; None where none is advised.
     vectors_steps, matrices_steps : int or None
@@ -451,12 +456,29 @@ class Advised:
         The one that the vectors advise, in the roles as they are.
     """
 
+    name: str
+    unseen: bool
+    linear: bool
+    fewest: int
     vectors: float | None
     vectors_steps: int | None
     matrices: float | None
     matrices_steps: int | None
     methods: dict[str, int | None]
     method: str | None
+
+    def verdict(self, theta: float | None, count: int | None) -> str:
+        """``right`` within 1.4 times the fewest steps, ``dear``, ``wrong`` if it does not arrive, ``silent``."""
+        if theta is None:
+            return "silent"
+        if count is None:
+            return "slow" if self.fewest >= LONGEST else "wrong"
+        return "right" if 5 * count <= 7 * self.fewest else "dear"
+
+    @property
+    def verdicts(self) -> dict[str, str]:
+        """Of the theta from vectors, and of the one from matrices."""
+        return {name: self.verdict(getattr(self, name), getattr(self, f"{name}_steps")) for name in ADVICE}
 
     @property
     def method_good(self) -> bool:
@@ -466,7 +488,11 @@ class Advised:
         return taken is not None and taken <= NEAR * min(known)
 
 
-def advised(coupling: Coupling) -> Advised:
+#: The other sources of advice, as Advised names them.
+ADVICE = ("vectors", "matrices")
+
+
+def advised(coupling: Coupling, unseen: bool = False) -> Advised:
     """The advice from vectors and from matrices, and the steps of each."""
     count = lambda theta, rule="constant": None if theta is None else _whole(steps(coupling, theta, rule=rule))
     states = list(islice(coupling.forces(0.5, "aitken"), 9))
@@ -481,6 +507,10 @@ def advised(coupling: Coupling) -> Advised:
     own = [row for row in found.methods if not row.exchanged]
     best = methods_advised(own)
     return Advised(
+        name=coupling.name,
+        unseen=unseen,
+        linear=coupling.linear,
+        fewest=fewest(coupling)[0],
         vectors=found.theta,
         vectors_steps=count(found.theta),
         matrices=matrices,

@@ -137,6 +137,11 @@ def test_a_method_that_saves_steps_is_advised_with_what_it_saves():
     assert found.reason == "14 steps; a constant theta takes 237, 17 times as many"
 
 
+def test_aitken_is_preferred_to_iqn_ils_where_both_are_about_as_fast():
+    assert advised([row("constant", 60), row("aitken", 22), row("iqn-ils", 20)]).name == "aitken"
+    assert advised([row("constant", 60), row("aitken", 25), row("iqn-ils", 20)]).name == "iqn-ils"
+
+
 def test_roles_are_exchanged_only_where_no_method_serves_in_these():
     own = [row("constant", 100), row("aitken", 30), row("iqn-ils", 12)]
     near = [row("constant", 11, exchanged=True), row("aitken", 11, exchanged=True), row("iqn-ils", 10, exchanged=True)]
