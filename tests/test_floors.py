@@ -102,7 +102,7 @@ BUDGET = {
     "fem1d2d": 3020,
     "ndtheory": 5600,
     "verification": 1230,
-    "verification.advice": 5150,
+    "verification.advice": 5160,
     "verification.algorithm": 2250,
     "verification.bounds": 3220,
     "verification.certificate": 1100,
@@ -117,7 +117,7 @@ BUDGET = {
     "verification.output": 470,
     "verification.problem": 1510,
     "verification.reproduce": 630,
-    "verification.sections": 2160,
+    "verification.sections": 2180,
     "verification.sweeps": 2360,
     "verification.testing": 1570,
 }

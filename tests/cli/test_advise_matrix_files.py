@@ -160,7 +160,8 @@ def test_an_asymmetry_is_rounded_told_or_taken(call, tmp_path, skew):
     assert ("asymmetric by" in call(*words).out) == (skew > 1e-8)
     c = saved(tmp_path, "c", (given + given.T) / 2)
     symmetric = call("advise", "matrices", "--S1", c, "--S2", b, "--json").document
-    assert document["roles"][0]["rho"]["value"] == pytest.approx(symmetric["roles"][0]["rho"]["value"], rel=1e-14)
+    same = 1e-14 if skew < 1e-3 else 1e-6  # of a larger asymmetry the eigenvalues of the matrix as it is
+    assert document["roles"][0]["rho"]["value"] == pytest.approx(symmetric["roles"][0]["rho"]["value"], rel=same)
 
 
 def test_an_assembled_matrix_is_told_from_a_condensed_one(call, tmp_path):
@@ -337,6 +338,6 @@ def test_the_screen_says_which_ordering_is_assumed_and_fits(call, tmp_path, matr
     out = call("advise", "matrices", "--S1", S1, "--S2", S2, *words, *rest).out
     folded = " ".join(out.split())
     assert ("Ordering: any" in folded) == (not words)
-    assert ("tangential, from left to right" in folded) == bool(words)
+    assert ("tangential components from left to right" in folded) == bool(words)
     assert max(map(len, out.splitlines())) <= 80
     assert len(out.splitlines()) <= 46

@@ -48,8 +48,7 @@ HEADINGS = {
     "bounds": ["DOES ONE STEP CONTRACT?", "THE CONSTANTS OF SECTION 5"],
     "advise": [
         "WHICH BODY GETS THE NEUMANN PROBLEM?",
-        "WHICH THETA?",
-        "WHICH METHOD?",
+        *("WHICH THETA?", "WHICH METHOD?"),
         "HOW MUCH FRICTION DOES THE ENERGY BOUND ALLOW?",
         "TO PASTE",
     ],

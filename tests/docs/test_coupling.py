@@ -25,6 +25,9 @@ def folder(tmp_path, monkeypatch, capsys):
     Path("my.toml").write_text(capsys.readouterr().out, encoding="utf-8")
     for name, values in (("a", [3.0, 2.0]), ("b", [1.0, 4.0])):
         np.savez(f"{name}.npz", np.diag(values))
+    X = np.random.default_rng(1).normal(size=(5, 2))
+    np.save("X.npy", X)
+    np.save("TX.npy", 1 - X * (0.5, 2.0))
     for name, theta in (("precice-Solid-convergence", 0.5), ("a", 0.3), ("b", 0.6)):
         precice(Path(f"{name}.log"), [{"ResAbs(Mesh:Force)": linear_run((0.2, 1.1), theta, 60)[0]}])
     return tmp_path

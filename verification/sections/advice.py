@@ -56,8 +56,7 @@ def _sections(found: Advice) -> Iterator[Section]:
         yield from of_logs(found, found.interval)
         if found.roles:
             others = "Predicted for the roles that the bodies have; logs give no information about the exchanged roles."
-            yield from _which_method(found)
-            yield _paste(found, others)
+            yield _paste(found, *_few_methods(found), others)
     if found.roles and not found.logs:
         if found.vectors is None:
             yield _which_body(found)
@@ -105,7 +104,7 @@ def _which_body(found: Advice) -> Section:
     best, other = found.best, found.other
     if found.neumann_body is None:
         said = ["One run gives no information about the exchanged roles."]
-        neumann, contact = "the Neumann body", "the contact body"
+        neumann, contact = "the Neumann body", "the other"
     else:
         rate = found.chosen(best)[1]
         kind = "rate if tied" if found.tied else "predicted rate"
@@ -118,9 +117,8 @@ def _which_body(found: Advice) -> Section:
         else:
             away = found.chosen(other)[1]
             said.append(f"against {near_one(away)} with the roles exchanged, {in_steps(away)}")
-        neumann, contact = NAMES[found.neumann_body], f"{NAMES[3 - found.neumann_body]}, the contact body,"
-    writes = "reads forces and writes displacements", "reads displacements and writes forces"
-    said.append(f"The solver of {neumann} {writes[0]}, that of {contact} {writes[1]}.")
+        neumann, contact = NAMES[found.neumann_body], NAMES[3 - found.neumann_body]
+    said.append(f"The solver of {neumann} reads forces and writes displacements, of {contact} the reverse.")
     return which_body(*said)
 
 
@@ -172,13 +170,21 @@ def _which_method(found: Advice) -> Iterator[Section]:
         few = {"at most": "<= ", "at least": ">= ", None: ""}[own[0].bound]
         roles = NAMES[own[0].neumann_body] if named else "exchanged" if exchanged else "as they are"
         rows.append((roles, figures(own[0].theta), *(count(row.steps, few) for row in own)))
-    heads = ("Neumann" if named else "roles", "theta", *(METHOD_NAMES[row.method] for row in own))
+    first, *others = (METHOD_NAMES[row.method] for row in own)
+    heads = ("Neumann" if named else "roles", "theta", f"steps to 1e-6: {first}", *others)
     said = []
     if found.method is not None:
         who = ", with the roles exchanged" * (found.method.exchanged and not named)
         said.append(f"Advised: {METHOD_NAMES[found.method.name]}{who}: {found.method.reason}.")
-    caption = "steps until |Tg - g| < 1e-6 |Tg|, predicted; Aitken and IQN-ILS without proof"
-    yield section("method", "WHICH METHOD?", table(heads, rows), *said, caption)
+        if found.method.name != "constant":
+            said.append("Predicted: no proof says that it converges in contact.")
+    yield section("method", "WHICH METHOD?", table(heads, rows), *said)
+
+
+def _few_methods(found: Advice) -> list[str]:
+    """The same in one line, where only one end of the spectrum is known."""
+    each = [f"{METHOD_NAMES[row.method]} {count(row.steps, '<= ')}" for row in found.methods]
+    return [f"Steps to 1e-6: {', '.join(each)}, by the largest eigenvalue alone."] if each else []
 
 
 def of_vectors(found: Advice, seen: SeenVectors) -> Iterator[Section]:
