@@ -53,8 +53,8 @@ def test_it_says_how_many_steps_both_roles_take_and_who_reads_what(call, write, 
     other = by_body(document)[3 - document["neumann_body"]]
     assert f"{steps(best[rate])} steps to 1e-9, against" in said
     assert f"with the roles exchanged, {steps(other[rate])} steps" in said
-    reads = f"reads forces and writes displacements, of body {3 - document['neumann_body']} the reverse."
-    assert f"The solver of body {document['neumann_body']} {reads}" in said
+    reads = f"solver reads forces and writes displacements, body {3 - document['neumann_body']}'s the reverse."
+    assert f"Body {document['neumann_body']}'s {reads}" in said
     assert "For displacements (heat: temperatures) the same, but not in parallel coupling." in said
 
 

@@ -28,7 +28,7 @@ INVERSE = 1e-3
 SPARSE = 0.75
 
 #: The ordering that is assumed where it matters.
-ORDERING = "all tangential components from left to right, then all normal ones"
+ORDERING = "tangential components from left to right, then normal ones"
 
 #: The Neumann bodies of the roles, in their order.
 BODIES: tuple[BodyNumber, BodyNumber] = (2, 1)

@@ -104,7 +104,7 @@ def _which_body(found: Advice) -> Section:
     best, other = found.best, found.other
     if found.neumann_body is None:
         said = ["One run gives no information about the exchanged roles."]
-        neumann, contact = "the Neumann body", "the other"
+        neumann, contact = "the Neumann body", "the other one"
     else:
         rate = found.chosen(best)[1]
         kind = "rate if tied" if found.tied else "predicted rate"
@@ -118,7 +118,7 @@ def _which_body(found: Advice) -> Section:
             away = found.chosen(other)[1]
             said.append(f"against {near_one(away)} with the roles exchanged, {in_steps(away)}")
         neumann, contact = NAMES[found.neumann_body], NAMES[3 - found.neumann_body]
-    said.append(f"The solver of {neumann} reads forces and writes displacements, of {contact} the reverse.")
+    said.append(f"{neumann}'s solver reads forces and writes displacements, {contact}'s the reverse.".capitalize())
     return which_body(*said)
 
 
