@@ -196,6 +196,17 @@ def transient(folder: Path) -> list[tuple[Path, str]]:
     return [(precice(folder / "transient.log", [window] * 12), "0.9")]
 
 
+def vectors() -> Iterator[tuple[Any, Any]]:
+    """Iterates and their images: independent ones, ones of a stiff coupling that depend on each other, open contact."""
+    X = np.random.default_rng(1).normal(size=(4, 2))
+    for some, image in (
+        (X[:2], lambda x: 1 - x),
+        (X, lambda x: 1 - np.array([1.0, 1e9]) * x),
+        (X, lambda x: np.maximum(x, 0.0)),
+    ):
+        yield some, [image(x) for x in some]
+
+
 def certified(*problems: vf.Problem) -> Iterator[Any]:
     """Certificates, and what comes of checking them again."""
     for problem in problems:
@@ -243,6 +254,7 @@ def documents(folder: Path, small: vf.Problem) -> list[dict[str, Any]]:
         vf.measure(matrices, verified=True),
         *(vf.advise(problem) for problem in (small, bars)),
         vf.advise_matrices(np.diag([2.0, 3.0]), np.eye(2)),
+        *(vf.advise_vectors(X, TX) for X, TX in vectors()),
         vf.advise_matrices(np.diag([2.0, 3.0]), np.eye(2), transfer=np.eye(1)),
         vf.advise_matrices(lambda u: 2 * u, solve2=lambda f: f, unknowns=3),
         *(vf.advise_run(theta, ratio) for theta, ratio in (("0.1", "1.4"), ("0.6", "0.7"), ("0.2", "0.5"))),

@@ -184,7 +184,7 @@ def _which_method(found: Advice) -> Iterator[Section]:
 def _few_methods(found: Advice) -> list[str]:
     """The same in one line, where only one end of the spectrum is known."""
     each = [f"{METHOD_NAMES[row.method]} {count(row.steps, '<= ')}" for row in found.methods]
-    return [f"Steps to 1e-6: {', '.join(each)}, by the largest eigenvalue alone."] if each else []
+    return [f"Steps to 1e-6: {', '.join(each)} (only the largest eigenvalue is known)."] if each else []
 
 
 def of_vectors(found: Advice, seen: SeenVectors) -> Iterator[Section]:
