@@ -30,7 +30,7 @@ def missing(wheel):
 
 
 needs_kratos = pytest.mark.skipif(
-    any(map(missing, WHEELS)), reason=f"Kratos is not installed: pip install {' '.join(filter(missing, WHEELS))}"
+    any(map(missing, WHEELS)), reason=f"no {', '.join(filter(missing, WHEELS))} here: `make kratos` runs these tests"
 )
 
 #: With friction the models are tied, as the table of ``advise --tied`` has it.
