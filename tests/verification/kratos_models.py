@@ -95,13 +95,14 @@ def material(body) -> dict[str, Any]:
     return {"properties": [{"model_part_name": "Structure", "properties_id": 1, "Material": settings}]}
 
 
-def written(folder: Path, pair, snippet: str, accelerator: dict[str, Any] | None = None) -> Path:
+def written(folder: Path, pair, snippet: str, accelerator: dict[str, Any] | None = None, **members: Any) -> Path:
     """The files of a coupling, with the parameters of CoSimulation as a snippet has them.
 
     The contact body of a frictionless pair may open; with friction the interface is tied.  ``accelerator`` replaces the
-    convergence accelerator.
+    convergence accelerator, ``members`` are further ones of ``solver_settings``.
     """
     settings = json.loads(snippet)
+    settings["solver_settings"].update(members)
     solvers = settings["solver_settings"]["solvers"]
     for k, condensed in enumerate((pair.body1, pair.body2), 1):
         body, name = condensed.mesh_body, f"ProjectParametersBody{k}"
