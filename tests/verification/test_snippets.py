@@ -2,6 +2,8 @@
 
 import json
 import re
+import shutil
+import subprocess
 import xml.etree.ElementTree as ET
 from collections import Counter
 
@@ -10,6 +12,9 @@ import pytest
 import verification as vf
 from verification.advice.methods import METHODS
 from verification.advice.snippets import SNIPPETS, CouplingScheme, snippet
+
+#: The checker of configurations that preCICE installs.
+VALIDATE = shutil.which("precice-config-validate")
 
 #: Tags of the coupling scheme with their attributes, and how often each may be there, as preCICE 3.4.1 has them.
 PRECICE = {
@@ -84,6 +89,43 @@ def test_the_preCICE_scheme_relaxes_the_forces_that_the_neumann_body_reads(coupl
     assert float(factor.get("value")) == coupling.theta
     assert int(scheme.find("max-iterations").get("value")) >= (coupling.steps or 1)
     assert f"{neumann}, the Neumann body, reads Force and writes Displacement" in " ".join(comments[0].split())
+
+
+#: A configuration of preCICE around a coupling scheme: both bodies with a mesh each, forces mapped conservatively.
+AROUND = """\
+<precice-configuration>
+  <data:vector name="Force" />
+  <data:vector name="Displacement" />
+  <mesh name="{0}-Mesh" dimensions="2"><use-data name="Force" /><use-data name="Displacement" /></mesh>
+  <mesh name="{1}-Mesh" dimensions="2"><use-data name="Force" /><use-data name="Displacement" /></mesh>
+  <participant name="{0}">
+    <provide-mesh name="{0}-Mesh" />
+    <read-data name="Force" mesh="{0}-Mesh" />
+    <write-data name="Displacement" mesh="{0}-Mesh" />
+  </participant>
+  <participant name="{1}">
+    <provide-mesh name="{1}-Mesh" />
+    <receive-mesh name="{0}-Mesh" from="{0}" />
+    <mapping:nearest-neighbor direction="read" from="{0}-Mesh" to="{1}-Mesh" constraint="consistent" />
+    <mapping:nearest-neighbor direction="write" from="{1}-Mesh" to="{0}-Mesh" constraint="conservative" />
+    <read-data name="Displacement" mesh="{1}-Mesh" />
+    <write-data name="Force" mesh="{1}-Mesh" />
+  </participant>
+  <m2n:sockets acceptor="{0}" connector="{1}" />
+  {2}
+</precice-configuration>
+"""
+
+
+@pytest.mark.skipif(VALIDATE is None, reason="no precice-config-validate here, which comes with preCICE")
+@pytest.mark.parametrize("coupling", COUPLINGS, ids=str)
+@pytest.mark.parametrize("method", METHODS)
+def test_preCICE_itself_accepts_its_block(tmp_path, coupling, method):
+    block = snippet("preCICE", coupling, method)
+    file = tmp_path / "precice-config.xml"
+    for text, accepted in ((block, True), (block.replace("acceleration:", "acceleration:in"), False)):
+        file.write_text(AROUND.format(*named(coupling), text), "utf-8")
+        assert (subprocess.run([VALIDATE, file], capture_output=True).returncode == 0) == accepted
 
 
 @pytest.mark.parametrize("coupling", COUPLINGS, ids=str)
