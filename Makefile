@@ -2,6 +2,7 @@
 # make check  what CI runs: lint, types, tests, docs   make docs   the site, into docs/_build/html
 # make lowest a sample of the tests with the lowest versions that pyproject.toml allows
 # make nightly  the tests with many more random cases, PART=cli one part of them; notes in CONTRIBUTING.md what passed
+# make kratos the tests that couple two models in Kratos Multiphysics, with its wheels in an environment of their own
 # make bench  the times on the site's page on speed; FULL=1 adds the long sizes
 # Needs Python >= 3.11 with pip, make and git; everything else goes into .venv, pinned by requirements.lock.
 
@@ -17,7 +18,7 @@ NEEDS  := pyproject.toml $(LOCKS) ndtheory/__init__.py
 # Tests and pages start many processes: each would compile the packages anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check lint docs nightly lowest bench lock clean
+.PHONY: demo test check lint docs nightly lowest kratos bench lock clean
 .NOTPARALLEL:  # one pip at a time; pytest uses the processors itself
 
 demo: $(VENV)/.run
@@ -56,6 +57,17 @@ lowest: $(VENV)/.venv
 	$(BIN)/uv venv --quiet --clear --python $(BIN)/python $(LOWEST)
 	$(BIN)/uv pip install --quiet --python $(LOWEST)/bin/python --resolution lowest-direct --editable '.[test]'
 	$(LOWEST)/bin/python -m pytest -n auto --dist worksteal -p no:cacheprovider $(addprefix tests/,$(SAMPLE))
+
+# No dependency: the tests are skipped without it.
+APPLICATIONS := CoSimulation StructuralMechanics ConstitutiveLaws Mapping LinearSolvers
+WHEELS := KratosMultiphysics==10.4.4 $(patsubst %,Kratos%Application==10.4.4,$(APPLICATIONS))
+KRATOS := $(VENV)/kratos
+
+kratos: $(VENV)/.venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check $(UV)
+	$(BIN)/uv venv --quiet --clear --python $(BIN)/python $(KRATOS)
+	$(BIN)/uv pip install --quiet --python $(KRATOS)/bin/python --requirement requirements-test.lock --editable . $(WHEELS)
+	$(KRATOS)/bin/python -m pytest -n auto -p no:cacheprovider tests/verification/test_kratos.py
 
 bench: $(VENV)/.test
 	for b in benchmarks/bench_*.py; do $(BIN)/python $$b --record benchmarks/records $(if $(FULL),--full) || exit 1; done

@@ -44,6 +44,18 @@ def contact_run(pair: object, theta: float, steps: int) -> tuple[list[float], li
     return absolute, relative
 
 
+def tied_run(pair: object, theta: float, steps: int) -> tuple[list[float], list[float]]:
+    """The same of two bodies that are tied to each other."""
+    neumann, contact = pair.neumann, pair.contact
+    g, absolute, relative = np.zeros(neumann.grid.size), [], []
+    for _ in range(steps):
+        image = contact.load - contact.schur @ (neumann.known + neumann.flexibility(g + neumann.load))
+        absolute.append(float(np.linalg.norm(image - g)))
+        relative.append(absolute[-1] / float(np.linalg.norm(image)))
+        g = g + theta * (image - g)
+    return absolute, relative
+
+
 def noisy(series: Series, share: float, seed: int) -> list[float]:
     """A series with multiplicative noise."""
     noise = np.random.default_rng(seed).normal(0, share, len(series))

@@ -23,6 +23,7 @@ DOORS = {
     "sqlite3": ("verification.sweeps.store",),
     "distributed": ("verification.sweeps.cluster",),
     "xarray": ("verification.sweeps.export",),
+    "KratosMultiphysics": ("verification.coupling.kratos",),
 }
 #: what the theory may know beside the standard library and itself
 THEORY = {"ndtheory.symbolic": "sympy"}

@@ -72,12 +72,16 @@ def test_a_lock_holds_what_its_extras_need_in_the_versions_of_the_whole_lock(loc
     assert (named(chain.from_iterable(optional.values())) - needed) & set(found) <= {"mpmath"}  # sympy needs it too
 
 
+#: Modules of a program that loads one of ours: it is there wherever that runs.
+HOSTS = {"KratosMultiphysics"}
+
+
 def needs(path: Path) -> set[str]:
     """The distributions whose modules a file imports, wherever the statement stands."""
     tree = ast.parse(path.read_text("utf-8"))
     found = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
     found |= {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module}
-    tops = {name.partition(".")[0] for name in found} - {"mpl_toolkits", *PACKAGES, *sys.stdlib_module_names}
+    tops = {name.partition(".")[0] for name in found} - {"mpl_toolkits", *HOSTS, *PACKAGES, *sys.stdlib_module_names}
     return {DISTRIBUTIONS[name][0].lower() for name in tops}
 
 

@@ -1,11 +1,13 @@
 """Convergence logs of other codes: every form they are written in is read, and a broken one is refused in one line."""
 
 import math
+from pathlib import Path
 
 import pytest
-from coupling_logs import kratos, linear_run, precice
+from coupling_logs import kratos, linear_run, precice, tied_run
 from strategies import AT_NIGHT
 
+import verification as vf
 from ndtheory import HypothesisError
 from verification.advice.from_logs import advise_logs
 from verification.advice.log_files import read_log
@@ -96,6 +98,45 @@ def test_what_kratos_prints_is_read_by_window_and_label(tmp_path):
     assert [[len(one) for one in column.windows] for column in log.columns] == [[40, 40]] * 2
     found = advise_logs([(log.path, "0.45")])
     assert found.best.rho.value == pytest.approx(3, rel=0.02)  # three figures
+
+
+#: Logs of Kratos 10.4.4, without what it prints of models: the plates of Section 6 with 13 contact nodes, tied, body 2
+#: as Neumann body, theta or the first factor 0.11.
+REAL = Path(__file__).parent / "kratos_logs"
+
+
+def test_the_residuals_in_a_log_of_kratos_are_those_of_this_project():
+    (column,) = read_log(REAL / "constant.log").columns
+    (window,) = column.windows
+    assert (column.name, len(window)) == ("abs-norm of Body2.force", 28)
+    pair = vf.build(vf.example("section6").changed(cells=((20, 3), (12, 3)), neumann_body=2))
+    own, _ = tied_run(pair, 0.11, len(window))
+    assert math.sqrt(pair.neumann.grid.size) * window == pytest.approx(
+        own, rel=column.digits
+    )  # three figures are written
+
+
+def test_the_factor_in_a_log_of_kratos_has_one_figure_and_a_theta_must_agree_with_it():
+    log = read_log(REAL / "constant.log")
+    assert (log.theta, log.theta_rounding) == (0.1, 0.05)
+    found = advise_logs([(log.path, "0.11")], tied=True)
+    high = next(reading for reading in found.readings if reading.kind == "mode-high")
+    assert high.value == pytest.approx(13.5354, rel=0.03)  # of the matrices
+    with pytest.raises(ProblemError, match=r"names a relaxation factor of 0\.1: needed the same theta, received 0\.3"):
+        advise_logs([(log.path, "0.3")], tied=True)
+
+
+@pytest.mark.parametrize(("name", "label"), [("aitken", "Aitken"), ("iqn-ils", "IQNILS")])
+def test_a_log_of_kratos_names_the_accelerator_that_was_not_constant(name, label):
+    with pytest.raises(ProblemError, match=rf"{name}\.log, line \d+: {label}ConvergenceAccelerator changes"):
+        read_log(REAL / f"{name}.log")
+
+
+def test_a_log_of_kratos_that_was_cut_off_in_a_number_ends_with_the_number_before(tmp_path):
+    whole = (REAL / "constant.log").read_text("utf-8")
+    cut = whole.rindex("e-", 0, whole.rindex("abs-tol"))
+    (window,) = read_log(written(tmp_path / "cut.log", whole[: cut + 2])).columns[0].windows
+    assert len(window) == 27
 
 
 @pytest.mark.parametrize("cut", [1, 5, 9, 14, 20])

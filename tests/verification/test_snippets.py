@@ -2,13 +2,19 @@
 
 import json
 import re
+import shutil
+import subprocess
 import xml.etree.ElementTree as ET
 from collections import Counter
 
 import pytest
 
 import verification as vf
+from verification.advice.methods import METHODS
 from verification.advice.snippets import SNIPPETS, CouplingScheme, snippet
+
+#: The checker of configurations that preCICE installs.
+VALIDATE = shutil.which("precice-config-validate")
 
 #: Tags of the coupling scheme with their attributes, and how often each may be there, as preCICE 3.4.1 has them.
 PRECICE = {
@@ -20,6 +26,7 @@ PRECICE = {
     "relative-convergence-measure": ({"data", "mesh", "limit"}, 1),
     "acceleration:constant": (set(), 1),
     "acceleration:aitken": (set(), 1),
+    "acceleration:IQN-ILS": (set(), 1),
     "relaxation": ({"value"}, 1),
     "initial-relaxation": ({"value"}, 1),
     "data": ({"name", "mesh"}, 1),
@@ -54,15 +61,12 @@ def plain(tag):
 
 
 @pytest.mark.parametrize("coupling", COUPLINGS, ids=str)
-@pytest.mark.parametrize("relaxation", ["constant", "aitken"])
-def test_the_preCICE_scheme_relaxes_the_forces_that_the_neumann_body_reads(coupling, relaxation):
+@pytest.mark.parametrize("method", METHODS)
+def test_the_preCICE_scheme_relaxes_the_forces_that_the_neumann_body_reads(coupling, method):
     neumann, contact = named(coupling)
-    text = snippet("preCICE", coupling)
+    text = snippet("preCICE", coupling, method)
     comments = re.findall(r"<!--(.*?)-->", text, flags=re.S)
     scheme = element(re.sub(r"<!--.*?-->", "", text, flags=re.S))
-    if relaxation == "aitken":  # put in the place of the constant one
-        scheme.remove(scheme.find("acceleration..constant"))
-        scheme.append(element(comments[-1].partition(",\n")[2]))
     assert plain(scheme.tag) == "coupling-scheme:serial-implicit"
     found = [child for child in scheme.iter() if child is not scheme]
     for child in found:
@@ -77,32 +81,72 @@ def test_the_preCICE_scheme_relaxes_the_forces_that_the_neumann_body_reads(coupl
     assert (first, second) == (neumann, contact)
     measure = scheme.find("relative-convergence-measure")
     assert (measure.get("data"), measure.get("mesh")) == ("Force", f"{neumann}-Mesh")
-    if relaxation == "constant":
-        factor = scheme.find("acceleration..constant/relaxation")
-    else:
-        factor = scheme.find("acceleration..aitken/initial-relaxation")
-        data = scheme.find("acceleration..aitken/data")
-        assert (data.get("name"), data.get("mesh")) == ("Force", f"{neumann}-Mesh")
+    (acceleration,) = (child for child in scheme if child.tag.startswith("acceleration.."))
+    assert acceleration.tag.removeprefix("acceleration..").lower() == method
+    factor = acceleration.find("relaxation" if method == "constant" else "initial-relaxation")
+    relaxed = [(data.get("name"), data.get("mesh")) for data in acceleration.findall("data")]
+    assert relaxed == ([] if method == "constant" else [("Force", f"{neumann}-Mesh")])
     assert float(factor.get("value")) == coupling.theta
     assert int(scheme.find("max-iterations").get("value")) >= (coupling.steps or 1)
     assert f"{neumann}, the Neumann body, reads Force and writes Displacement" in " ".join(comments[0].split())
 
 
+#: A configuration of preCICE around a coupling scheme: both bodies with a mesh each, forces mapped conservatively.
+AROUND = """\
+<precice-configuration>
+  <data:vector name="Force" />
+  <data:vector name="Displacement" />
+  <mesh name="{0}-Mesh" dimensions="2"><use-data name="Force" /><use-data name="Displacement" /></mesh>
+  <mesh name="{1}-Mesh" dimensions="2"><use-data name="Force" /><use-data name="Displacement" /></mesh>
+  <participant name="{0}">
+    <provide-mesh name="{0}-Mesh" />
+    <read-data name="Force" mesh="{0}-Mesh" />
+    <write-data name="Displacement" mesh="{0}-Mesh" />
+  </participant>
+  <participant name="{1}">
+    <provide-mesh name="{1}-Mesh" />
+    <receive-mesh name="{0}-Mesh" from="{0}" />
+    <mapping:nearest-neighbor direction="read" from="{0}-Mesh" to="{1}-Mesh" constraint="consistent" />
+    <mapping:nearest-neighbor direction="write" from="{1}-Mesh" to="{0}-Mesh" constraint="conservative" />
+    <read-data name="Displacement" mesh="{1}-Mesh" />
+    <write-data name="Force" mesh="{1}-Mesh" />
+  </participant>
+  <m2n:sockets acceptor="{0}" connector="{1}" />
+  {2}
+</precice-configuration>
+"""
+
+
+@pytest.mark.skipif(VALIDATE is None, reason="no precice-config-validate here, which comes with preCICE")
 @pytest.mark.parametrize("coupling", COUPLINGS, ids=str)
-def test_the_Kratos_settings_relax_the_forces_that_the_neumann_body_reads(coupling):
+@pytest.mark.parametrize("method", METHODS)
+def test_preCICE_itself_accepts_its_block(tmp_path, coupling, method):
+    block = snippet("preCICE", coupling, method)
+    file = tmp_path / "precice-config.xml"
+    for text, accepted in ((block, True), (block.replace("acceleration:", "acceleration:in"), False)):
+        file.write_text(AROUND.format(*named(coupling), text), "utf-8")
+        assert (subprocess.run([VALIDATE, file], capture_output=True).returncode == 0) == accepted
+
+
+@pytest.mark.parametrize("coupling", COUPLINGS, ids=str)
+@pytest.mark.parametrize("method", METHODS)
+def test_the_Kratos_settings_relax_the_forces_that_the_neumann_body_reads(coupling, method):
     neumann, contact = named(coupling)
-    settings = json.loads(snippet("Kratos", coupling))["solver_settings"]
+    settings = json.loads(snippet("Kratos", coupling, method))["solver_settings"]
     assert settings["type"] == "coupled_solvers.gauss_seidel_strong"  # serial; the parallel one is jacobi_strong
     (accelerator,) = settings["convergence_accelerators"]
-    assert accelerator == {
-        "type": "constant_relaxation",
-        "alpha": coupling.theta,
-        "solver": neumann,
-        "data_name": "force",
-    }
+    kind, factors = {
+        "constant": ("constant_relaxation", ["alpha"]),
+        "aitken": ("aitken", ["init_alpha", "init_alpha_max"]),
+        "iqn-ils": ("iqnils", ["alpha"]),
+    }[method]
+    of_force = {"solver": neumann, "data_name": "force"}
+    # level 4 names the accelerator in the log, level 3 prints residuals
+    assert accelerator == {"type": kind, **of_force, **dict.fromkeys(factors, coupling.theta), "echo_level": 4}
     (criterion,) = settings["convergence_criteria"]
     assert (criterion["solver"], criterion["data_name"]) == (neumann, "force")
-    assert set(criterion) - {"solver", "data_name"} == {"type", "abs_tolerance", "rel_tolerance"}
+    assert set(criterion) - set(of_force) == {"type", "abs_tolerance", "rel_tolerance", "echo_level"}
+    assert criterion["echo_level"] == 3
     first, second = settings["coupling_sequence"]
     # the second solver fetches displacements and sends forces, which the first one then has
     assert (first["name"], first["input_data_list"], first["output_data_list"]) == (neumann, [], [])
@@ -115,6 +159,12 @@ def test_the_Kratos_settings_relax_the_forces_that_the_neumann_body_reads(coupli
         settings["data_transfer_operators"]
     )
     assert settings["num_coupling_iterations"] >= (coupling.steps or 1)
+    # structural models read loads on points, and answer with the reactions of what holds them
+    variables = {name: solver["data"]["force"]["variable_name"] for name, solver in settings["solvers"].items()}
+    assert variables == {neumann: "POINT_LOAD", contact: "REACTION"}
+    assert {solver["data"]["displacement"]["variable_name"] for solver in settings["solvers"].values()} == {
+        "DISPLACEMENT"
+    }
 
 
 @pytest.mark.parametrize("coupling", COUPLINGS, ids=str)
@@ -134,10 +184,13 @@ def test_the_Norma_files_put_the_body_that_reads_displacements_first(coupling):
         assert condition["friction type"] == ("tied" if coupling.tied else "frictionless")
 
 
-@pytest.mark.parametrize("library", SNIPPETS)
+@pytest.mark.parametrize(
+    ("library", "method"),
+    [(library, method) for library in SNIPPETS for method in METHODS if library != "Norma" or method == "constant"],
+)
 @pytest.mark.parametrize("coupling", COUPLINGS, ids=str)
-def test_every_snippet_fits_on_a_screen_of_80_columns(library, coupling):
-    assert max(map(len, snippet(library, coupling).splitlines())) <= 80
+def test_every_snippet_fits_on_a_screen_of_80_columns(library, method, coupling):
+    assert max(map(len, snippet(library, coupling, method).splitlines())) <= 80
 
 
 @pytest.mark.parametrize("tied", [False, True])
@@ -152,3 +205,11 @@ def test_there_is_no_snippet_while_several_readings_are_left_or_for_another_libr
         vf.advise_run("0.1", "1.4").snippet("preCICE")
     with pytest.raises(ValueError, match="needed one of preCICE, Kratos, Norma"):
         vf.advise_run("0.45", "0.8").snippet("precise")
+
+
+def test_a_method_that_does_not_exist_or_that_a_library_lacks_is_refused():
+    with pytest.raises(ValueError, match="method 'atiken': needed one of constant, aitken, iqn-ils"):
+        snippet("Kratos", COUPLINGS[0], "atiken")
+    for method in ("aitken", "iqn-ils"):
+        with pytest.raises(ValueError, match=f"Norma, method '{method}': needed 'constant'"):
+            snippet("Norma", COUPLINGS[0], method)

@@ -129,7 +129,8 @@ def advise_logs(logs: Iterable[tuple[Path | str, Any]], *, tied: bool = False, f
 
 def seen_log(log: Log, theta: Fraction, friction: bool = False) -> SeenLog:
     """One log as it was seen, with its readings."""
-    if log.theta is not None and abs(log.theta - float(theta)) > 1e-3 * float(theta):
+    off = max(log.theta_rounding, 1e-3 * float(theta))
+    if log.theta is not None and abs(log.theta - float(theta)) > off * (1 + 1e-9):
         named = f"the log names a relaxation factor of {log.theta:g}: needed the same theta, received {float(theta):g}"
         raise ProblemError(str(log.path), "", None, named)
     columns = tuple(seen_column(column, theta) for column in log.columns)

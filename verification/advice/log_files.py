@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
 from typing import Literal
 
@@ -59,13 +60,21 @@ class Column:
 class Log:
     """A log as it was read.
 
-    ``theta`` is the relaxation factor that the log itself names, ``notes`` are about lines that were left out.
+    Attributes
+    ----------
+    theta : float or None
+        The relaxation factor that the log itself names.
+    theta_rounding : float
+        Rounding of theta as it is written there; 0 if it has all its digits.
+    notes : tuple of str
+        About lines that were left out.
     """
 
     path: Path
     form: Literal["preCICE", "Kratos CoSimulation", "columns"]
     columns: tuple[Column, ...]
     theta: float | None = None
+    theta_rounding: float = 0.0
     notes: tuple[str, ...] = ()
 
 
@@ -161,22 +170,30 @@ _ANSI = re.compile(r"\x1b\[[0-9;]*m")
 _LINE = re.compile(
     r"Coupling iteration:\s*(?P<iteration>\d+)\s*/"
     r"|Convergence for \"(?P<field>[^\"]+)\""
-    r"|abs[-_]norm\s*=\s*(?P<residual>[^\s|]+)"
-    r"|relaxation[^\d=]*factor\s*=\s*(?P<theta>[^\s,]+)"
+    r"|abs[-_]norm\s*=\s*(?P<residual>[^\s|]+)(?=[\s|])"  # a last line may be cut off in a number
+    r"|relaxation[^\d=]*factor\s*=\s*(?P<theta>[^\s,]+)(?=[\s,])"
 )
 _WORDS = ("abs-norm", "abs_norm", "Coupling iteration", "Convergence for", "factor")
-_NOT_CONSTANT = ("Aitken", "aitken", "Anderson", "anderson", "MVQN", "mvqn", "IBQN", "ibqn", "IQN", "iqn")
+
+#: The name with which an accelerator begins a line, but that of constant relaxation; a path may have any of the words.
+_NOT_CONSTANT = re.compile(
+    r"^(?:\[WARNING\] )?(?!ConstantRelaxation)(\w*(?:Aitken|Anderson|MVQN|IBQN|IQN|ConvergenceAccelerator)\w*)\s*:",
+    re.IGNORECASE | re.MULTILINE,
+)
 
 
 def _read_kratos(path: Path, text: str) -> Log:
-    """The residuals that Kratos CoSimulation prints; its absolute norm is the norm of the residual over a constant."""
+    """The residuals that Kratos CoSimulation prints; its absolute norm is the norm of the residual over a constant.
+
+    With an ``echo_level`` below 4 accelerators do not name themselves, and any is taken for constant relaxation.
+    """
     text = _ANSI.sub("", text)
-    other = next((word for word in _NOT_CONSTANT if word in text), None)
+    other = _NOT_CONSTANT.search(text)
     if other is not None:
-        raise _refused(path, f"{other} changes the relaxation: {RUN_AGAIN}", text.count("\n", 0, text.index(other)) + 1)
+        raise _refused(path, f"{other[1]} changes the relaxation: {RUN_AGAIN}", text.count("\n", 0, other.start()) + 1)
     windows: dict[str, list[list[float]]] = {}
     written: dict[str, list[str]] = {}
-    thetas: set[str] = set()
+    thetas: set[str] = set()  # Kratos 10 writes one figure
     field, before = "residual", 0
     fresh: set[str] = set()  # fields that have begun the window
     for line, match in _matches(text):
@@ -186,14 +203,15 @@ def _read_kratos(path: Path, text: str) -> Log:
             before = int(match["iteration"])
         elif match["field"]:
             field = match["field"].strip()
-        elif match["theta"]:
-            thetas.add(match["theta"])
         else:
-            word = match["residual"]
+            word = match["theta"] or match["residual"]
             try:
                 value = _number(word)
             except ValueError:
                 raise _refused(path, "needed a number", line, word) from None
+            if match["theta"]:
+                thetas.add(word)
+                continue
             if value < 0:
                 raise _refused(path, "needed a residual >= 0", line, word)
             if field not in fresh:
@@ -215,11 +233,15 @@ def _read_kratos(path: Path, text: str) -> Log:
         )
         for name, found in windows.items()
     )
-    return Log(path=path, form="Kratos CoSimulation", columns=columns)  # it prints one figure of a constant theta
+    if not thetas:
+        return Log(path=path, form="Kratos CoSimulation", columns=columns)
+    theta, rounding = _number(min(thetas)), _rounding([min(thetas)])
+    off = rounding["digits"] * theta + rounding["decimals"]
+    return Log(path=path, form="Kratos CoSimulation", columns=columns, theta=theta, theta_rounding=off)
 
 
 def _matches(text: str) -> Iterator[tuple[int, re.Match[str]]]:
-    for line, content in enumerate(text.split("\n"), 1):
+    for line, content in enumerate(StringIO(text), 1):
         if any(word in content for word in _WORDS):  # the others are many, and searched slowly
             for match in _LINE.finditer(content):
                 yield line, match

@@ -11,6 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from verification.advice.methods import METHODS
+
 #: The residual at which a snippet stops the iteration, over the size of the forces.
 TOLERANCE = 1e-6
 
@@ -53,13 +55,20 @@ class CouplingScheme:
         return UNKNOWN if self.steps is None else max(10, ROOM * self.steps)
 
 
-def snippet(library: str, coupling: CouplingScheme) -> str:
+def snippet(library: str, coupling: CouplingScheme, method: str = "constant") -> str:
     """The snippet for a library.
+
+    Parameters
+    ----------
+    library : {'preCICE', 'Kratos', 'Norma'}
+    coupling : CouplingScheme
+    method : {'constant', 'aitken', 'iqn-ils'}
+        How the exchange is relaxed; theta is the first factor of the last two, which adapt.
 
     Raises
     ------
     ValueError
-        No snippet has that name.
+        No snippet has that name, or the library has no such method.
 
     Examples
     --------
@@ -68,16 +77,28 @@ def snippet(library: str, coupling: CouplingScheme) -> str:
     """
     if library not in SNIPPETS:
         raise ValueError(f"{library}: needed one of {', '.join(SNIPPETS)}")
-    return SNIPPETS[library](coupling)
+    if method not in METHODS:
+        raise ValueError(f"method {method!r}: needed one of {', '.join(METHODS)}")
+    return SNIPPETS[library](coupling, method)
 
 
-def precice(c: CouplingScheme) -> str:
+#: The accelerations of preCICE, and their tag of the factor, or of the first one.
+ACCELERATIONS: dict[str, tuple[str, str]] = {
+    "constant": ("constant", "relaxation"),
+    "aitken": ("aitken", "initial-relaxation"),
+    "iqn-ils": ("IQN-ILS", "initial-relaxation"),
+}
+
+
+def precice(c: CouplingScheme, method: str) -> str:
     """The coupling scheme; the relaxed data are those that the second participant sends to the first.
 
     Both fields live on the mesh of the Neumann body, to which the other participant maps: displacements consistently,
     forces conservatively, which is the transposed map.
     """
     mesh = f"{c.neumann}-Mesh"
+    tag, factor = ACCELERATIONS[method]
+    data = "" if method == "constant" else f'\n    <data name="Force" mesh="{mesh}" />'
     return f"""\
 <!-- {c.neumann}, the Neumann body, reads Force and writes Displacement;
      {c.contact}, the contact body, reads Displacement and writes Force. -->
@@ -92,32 +113,47 @@ def precice(c: CouplingScheme) -> str:
             from="{c.contact}" to="{c.neumann}" />
   <relative-convergence-measure data="Force" mesh="{mesh}"
                                 limit="{TOLERANCE:g}" />
-  <acceleration:constant>
-    <relaxation value="{c.theta:g}" />
-  </acceleration:constant>
-</coupling-scheme:serial-implicit>
-<!-- or, with a factor that adapts and no proof of convergence,
-  <acceleration:aitken>
-    <initial-relaxation value="{c.theta:g}" />
-    <data name="Force" mesh="{mesh}" />
-  </acceleration:aitken>
--->"""
+  <acceleration:{tag}>
+    <{factor} value="{c.theta:g}" />{data}
+  </acceleration:{tag}>
+</coupling-scheme:serial-implicit>"""
 
 
-def kratos(c: CouplingScheme) -> str:
-    """The members of ``solver_settings`` beside ``solvers``, in which each body has the data displacement and force."""
+#: The convergence accelerators of Kratos, and their names of the factor, or of the first one and its upper limit.
+ACCELERATORS: dict[str, tuple[str, tuple[str, ...]]] = {
+    "constant": ("constant_relaxation", ("alpha",)),
+    "aitken": ("aitken", ("init_alpha", "init_alpha_max")),
+    "iqn-ils": ("iqnils", ("alpha",)),
+}
+
+
+def kratos(c: CouplingScheme, method: str) -> str:
+    """The parameters of CoSimulation for two plane structural models, each with an input file and a part Interface.
+
+    With these levels of output the log has what ``advise run --log`` reads: residuals and the names of accelerators.
+    """
     one, other = c.neumann, c.contact
     force: dict[str, Any] = {"solver": one, "data_name": "force"}
+    accelerator, factors = ACCELERATORS[method]
     mapped: dict[str, Any] = {"data_transfer_operator": "mapper"}
     reads = {"data": "displacement", "from_solver": one, "from_solver_data": "displacement", **mapped}
     writes = {"data": "force", "to_solver": one, "to_solver_data": "force", **mapped}
     writes["data_transfer_operator_options"] = ["use_transpose", "swap_sign"]
     settings = {
         "type": "coupled_solvers.gauss_seidel_strong",
+        "echo_level": 1,
         "num_coupling_iterations": c.iterations,
-        "convergence_accelerators": [{"type": "constant_relaxation", **force, "alpha": c.theta}],
+        "convergence_accelerators": [
+            {"type": accelerator, **force, **dict.fromkeys(factors, c.theta), "echo_level": 4}
+        ],
         "convergence_criteria": [
-            {"type": "relative_norm_previous_residual", **force, "abs_tolerance": 1e-12, "rel_tolerance": TOLERANCE}
+            {
+                "type": "relative_norm_previous_residual",
+                **force,
+                "abs_tolerance": 1e-12,
+                "rel_tolerance": TOLERANCE,
+                "echo_level": 3,
+            }
         ],
         "data_transfer_operators": {
             "mapper": {"type": "kratos_mapping", "mapper_settings": {"mapper_type": "nearest_neighbor"}}
@@ -126,12 +162,26 @@ def kratos(c: CouplingScheme) -> str:
             {"name": one, "input_data_list": [], "output_data_list": []},
             {"name": other, "input_data_list": [reads], "output_data_list": [writes]},
         ],
+        "solvers": {one: _kratos_solver(one, "POINT_LOAD"), other: _kratos_solver(other, "REACTION")},
     }
-    return json.dumps({"solver_settings": settings}, indent=2)
+    problem = {"start_time": 0.0, "end_time": 1.0, "parallel_type": "OpenMP", "echo_level": 1}
+    return json.dumps({"problem_data": problem, "solver_settings": settings}, indent=2)
 
 
-def norma(c: CouplingScheme) -> str:
+def _kratos_solver(name: str, force: str) -> dict[str, Any]:
+    """A solver with the data displacement and force; ``force`` is the variable of the latter."""
+    data = lambda variable: {"model_part_name": "Structure.Interface", "variable_name": variable, "dimension": 2}
+    return {
+        "type": "solver_wrappers.kratos.structural_mechanics_wrapper",
+        "solver_wrapper_settings": {"input_file": f"ProjectParameters{name}"},
+        "data": {"displacement": data("DISPLACEMENT"), "force": data(force)},
+    }
+
+
+def norma(c: CouplingScheme, method: str) -> str:
     """The controller file and a boundary condition for each body; the domain listed first reads displacements."""
+    if method != "constant":
+        raise ValueError(f"Norma, method {method!r}: needed 'constant', its relaxation has no other")
     one, other = c.neumann.lower(), c.contact.lower()
     contact = lambda source: (
         f"""\
@@ -174,4 +224,4 @@ def _with_point(number: float) -> str:
 
 
 #: The snippets by the name of the library.
-SNIPPETS: dict[str, Callable[[CouplingScheme], str]] = {"preCICE": precice, "Kratos": kratos, "Norma": norma}
+SNIPPETS: dict[str, Callable[[CouplingScheme, str], str]] = {"preCICE": precice, "Kratos": kratos, "Norma": norma}
