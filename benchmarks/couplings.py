@@ -505,7 +505,7 @@ def advised(coupling: Coupling, unseen: bool = False) -> Advised:
         role = next(role for role in of.roles if role.neumann_body == 2)
         matrices = role.advised(tied=coupling.tied)[0]
     own = [row for row in found.methods if not row.exchanged]
-    best = methods_advised(own)
+    best = methods_advised(own, tied=coupling.tied)
     return Advised(
         name=coupling.name,
         unseen=unseen,

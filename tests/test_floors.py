@@ -102,7 +102,7 @@ BUDGET = {
     "fem1d2d": 3020,
     "ndtheory": 5600,
     "verification": 1230,
-    "verification.advice": 5230,
+    "verification.advice": 5270,
     "verification.algorithm": 2250,
     "verification.bounds": 3220,
     "verification.certificate": 1100,

@@ -124,7 +124,7 @@ def row(method, count, *, exchanged=False):
 
 def test_the_simplest_method_is_kept_where_it_costs_little():
     table = [row("constant", 12), row("aitken", 11), row("iqn-ils", 10)]
-    found = advised(table)
+    found = advised(table, tied=True)
     assert found.name == "constant"
     assert found.reason.startswith("12 steps; IQN-ILS takes 10, hardly fewer")
     assert NEAR * 10 >= 12
@@ -132,27 +132,34 @@ def test_the_simplest_method_is_kept_where_it_costs_little():
 
 def test_a_method_that_saves_steps_is_advised_with_what_it_saves():
     table = [row("constant", 237), row("aitken", 52), row("iqn-ils", 14)]
-    found = advised(table)
+    found = advised(table, tied=True)
     assert found.name == "iqn-ils"
     assert found.reason == "14 steps; a constant theta takes 237, 17 times as many"
 
 
+def test_in_contact_iqn_ils_is_shown_and_not_advised():
+    table = [row("constant", 237), row("aitken", 52), row("iqn-ils", 14)]
+    found = advised(table, tied=False)
+    assert found.name == "aitken"
+    assert "IQN-ILS takes 14" in found.reason
+
+
 def test_aitken_is_preferred_to_iqn_ils_where_both_are_about_as_fast():
-    assert advised([row("constant", 60), row("aitken", 22), row("iqn-ils", 20)]).name == "aitken"
-    assert advised([row("constant", 60), row("aitken", 25), row("iqn-ils", 20)]).name == "iqn-ils"
+    assert advised([row("constant", 60), row("aitken", 22), row("iqn-ils", 20)], tied=True).name == "aitken"
+    assert advised([row("constant", 60), row("aitken", 25), row("iqn-ils", 20)], tied=True).name == "iqn-ils"
 
 
 def test_roles_are_exchanged_only_where_no_method_serves_in_these():
     own = [row("constant", 100), row("aitken", 30), row("iqn-ils", 12)]
     near = [row("constant", 11, exchanged=True), row("aitken", 11, exchanged=True), row("iqn-ils", 10, exchanged=True)]
     far = [row("constant", 6, exchanged=True), row("aitken", 6, exchanged=True), row("iqn-ils", 6, exchanged=True)]
-    assert (advised(own + near).name, advised(own + near).exchanged) == ("iqn-ils", False)
-    assert (advised(own + far).name, advised(own + far).exchanged) == ("constant", True)
-    assert advised(own + far, exchanged=False).name == "iqn-ils"
+    assert (advised(own + near, tied=True).name, advised(own + near, tied=True).exchanged) == ("iqn-ils", False)
+    assert (advised(own + far, tied=True).name, advised(own + far, tied=True).exchanged) == ("constant", True)
+    assert advised(own + far, tied=True, exchanged=False).name == "iqn-ils"
 
 
 def test_without_a_method_that_arrives_none_is_advised():
-    assert advised([row("constant", None), row("aitken", None), row("iqn-ils", None)]) is None
+    assert advised([row("constant", None), row("aitken", None), row("iqn-ils", None)], tied=True) is None
 
 
 def test_rows_have_the_theta_of_the_role():

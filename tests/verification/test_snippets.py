@@ -7,6 +7,7 @@ import subprocess
 import xml.etree.ElementTree as ET
 from collections import Counter
 
+import numpy as np
 import pytest
 
 import verification as vf
@@ -213,3 +214,16 @@ def test_a_method_that_does_not_exist_or_that_a_library_lacks_is_refused():
     for method in ("aitken", "iqn-ils"):
         with pytest.raises(ValueError, match=f"Norma, method '{method}': needed 'constant'"):
             snippet("Norma", COUPLINGS[0], method)
+
+
+def test_the_block_has_the_method_that_is_advised_where_the_library_has_it():
+    S, X = np.diag(np.linspace(5.0, 200.0, 12)), np.random.default_rng(3).normal(size=(13, 12))
+    stiff = vf.advise_vectors(X, 1 - X @ S)
+    assert stiff.method is not None
+    assert "<acceleration:IQN-ILS>" in stiff.snippet("preCICE")
+    assert "<acceleration:constant>" in stiff.snippet("preCICE", "constant")
+    assert '"iqnils"' in stiff.snippet("Kratos")
+    assert f"relaxation parameter: {stiff.theta:g}" in stiff.snippet("Norma")
+    soft = vf.advise_vectors(X, 1 - X @ S / 1e4)
+    assert soft.method.name == "constant"
+    assert "<acceleration:constant>" in soft.snippet("preCICE")

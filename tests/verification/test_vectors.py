@@ -99,6 +99,30 @@ def test_noise_of_the_solvers_is_measured_and_what_it_drowns_is_left_out():
     assert noisy.spectrum.high == pytest.approx(clean.spectrum.high, rel=1e-3)
 
 
+@pytest.mark.parametrize("written", [np.float32, lambda a: np.vectorize(lambda v: float(f"{v:.6e}"))(a)])
+@pytest.mark.parametrize("seed", range(6))
+def test_vectors_of_few_digits_show_what_their_digits_hold(written, seed):
+    coupling = Linear(np.linspace(2.5, 13.5, 12), seed)
+    exact = coupling.run("aitken", 0.1, 9)
+    X, TX = (np.asarray(written(rows)) for rows in exact)
+    found, whole = vf.advise_vectors(X, TX), vf.advise_vectors(*exact)
+    assert found.spectrum.high == pytest.approx(whole.spectrum.high, rel=0.02)
+    assert 1.5 < found.spectrum.low < 4.5
+    assert found.theta == pytest.approx(whole.theta, rel=0.05)
+
+
+def test_zeros_of_a_tied_coupling_show_no_open_node():
+    values = np.array([0.5, 1.0, 3.0])
+    X = np.random.default_rng(0).normal(size=(6, 3))
+    TX = 1 - X * values
+    TX[3:, 0] = 0.0
+    X[3:, 0] = 2.0  # 1 - 0.5 * 2 = 0
+    assert vf.advise_vectors(X, TX).vectors.changing
+    found = vf.advise_vectors(X, TX, tied=True)
+    assert not found.vectors.changing
+    assert found.spectrum.high == pytest.approx(3.0)
+
+
 def test_contact_that_opens_and_closes_is_recognised():
     """At theta = 0.6 the second image has one closed node, all others six; at 0.3 the same node is always open."""
     data = vf.example("section6").changed(friction=0, cells=((10, 2), (6, 2)), young=(20000, 40000)).to_dict()

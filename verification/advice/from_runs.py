@@ -139,7 +139,7 @@ def advice_of_runs(
     return Advice(
         neumann_body=None,
         methods=table,
-        method=methods.advised(table),
+        method=methods.advised(table, tied=tied),
         roles=tuple(roles),
         units=UNITS,
         readings=tuple(one for one in readings if not (tied and one.kind in OF_OPEN_NODES)),

@@ -70,7 +70,7 @@ def advise_vectors(X: Any, TX: Any, *, tied: bool = False) -> Advice:
         shapes = " and ".join(f"{a.shape[0]} x {a.shape[1]}" for a in given)
         raise ValueError(f"X and TX are {shapes}: needed an image for each iterate, of the same length")
     found = [real_array(name, array, array.shape) for name, array in zip(("X", "TX"), given, strict=True)]
-    return advice_of(seen_in(*found), tied=tied)
+    return advice_of(seen_in(*found, tied=tied), tied=tied)
 
 
 def advice_of(seen: SeenVectors, *, tied: bool = False) -> Advice:
@@ -90,7 +90,7 @@ def advice_of(seen: SeenVectors, *, tied: bool = False) -> Advice:
         tied=linear,
         vectors=seen,
         methods=table,
-        method=methods.advised(table),
+        method=methods.advised(table, tied=linear),
     )
 
 

@@ -21,7 +21,7 @@ from verification.advice.runs_with_friction import FrictionBounds
 from verification.advice.seen import RhoInterval, SeenLog
 from verification.advice.seen_moduli import SeenModuli
 from verification.advice.sides import SeenMatrices
-from verification.advice.snippets import CouplingScheme, snippet
+from verification.advice.snippets import ONLY_CONSTANT, CouplingScheme, snippet
 from verification.advice.spectrum import SeenVectors, Spectrum
 from verification.algorithm.theta import Choice, automatic, by_prediction, energy_bounds
 from verification.constants import measure
@@ -390,7 +390,7 @@ class Advice(Document):
             roles=tuple(roles),
             tied=tied,
             methods=table,
-            method=methods.advised(table, exchanged=best is not roles[0]),
+            method=methods.advised(table, tied=tied, exchanged=best is not roles[0]),
             **known,
         )
 
@@ -475,20 +475,29 @@ class Advice(Document):
             then += ", the same with the roles exchanged" if self.no_difference else f", against {away}"
         return f"{first}. {then}."
 
-    def snippet(self, library: str) -> str:
+    def snippet(self, library: str, method: str | None = None) -> str:
         """Lines for the configuration of a coupling library: preCICE, Kratos or Norma.
+
+        Parameters
+        ----------
+        library : str
+        method : {'constant', 'aitken', 'iqn-ils'}, optional
+            By default the one that is advised for these roles, where the library has it.
 
         Raises
         ------
         ValueError
-            Several readings are left, or no such library.
+            Several readings are left, no such library, or a method that the library does not have.
         """
         if self.theta is None:
             raise ValueError(self.why_no_theta)
+        if method is None:
+            exchanged = self.best is not self.roles[0]
+            own = methods.advised(self.methods, tied=self.tied, exchanged=exchanged)
+            method = "constant" if own is None or library in ONLY_CONSTANT else own.name
         count = steps(self.chosen(self.best)[1])
-        return snippet(
-            library, CouplingScheme(neumann_body=self.neumann_body, theta=self.theta, steps=count, tied=self.tied)
-        )
+        scheme = CouplingScheme(neumann_body=self.neumann_body, theta=self.theta, steps=count, tied=self.tied)
+        return snippet(library, scheme, method)
 
     @property
     def best(self) -> Role:

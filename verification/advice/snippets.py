@@ -223,5 +223,8 @@ def _with_point(number: float) -> str:
     return f"{mantissa}.0{e}{power}" if e and "." not in mantissa else f"{mantissa}{e}{power}"
 
 
+#: The libraries whose relaxation is constant.
+ONLY_CONSTANT = ("Norma",)
+
 #: The snippets by the name of the library.
 SNIPPETS: dict[str, Callable[[CouplingScheme, str], str]] = {"preCICE": precice, "Kratos": kratos, "Norma": norma}

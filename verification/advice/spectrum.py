@@ -20,12 +20,18 @@ from verification.value import Value
 #: Number of modes that stand for a spectrum of which only the ends are known.
 BETWEEN = 20
 
-#: Differences of iterates count above this share of the largest force: rounding is below it.
-ROUNDING = 1e-10
+#: The accuracy of vectors that a solver computed in doubles, and of those in single precision, over the largest entry.
+DOUBLE, SINGLE = 1e-12, 1e-7
 
-#: Directions of the iterates count above this share of the first one, and where what is known to be noise changes an
-#: image by less than this share of it.
+#: Differences of iterates count above so many times that accuracy.
+ROUNDING = 100.0
+
+#: Directions of the iterates count above this share of the first one, and where noise changes an image by less than
+#: this share of it.
 RANK, CLEAN = 1e-9, 1e-2
+
+#: Most decimal digits of vectors that were written as texts, and the number of entries in which they are looked for.
+DIGITS, SOME = 12, 1000
 
 #: Ritz values with a larger share as residual stand for several eigenvalues: so many modes more are put between two of
 #: them.  Predicted over real steps in 31 linear couplings: 0.82 to 1.28 for IQN-ILS, 0.62 to 1.27 for Aitken.
@@ -181,7 +187,7 @@ class SeenVectors(Value):
         }
 
 
-def seen_in(X: Floats, TX: Floats) -> SeenVectors:
+def seen_in(X: Floats, TX: Floats, *, tied: bool = False) -> SeenVectors:
     """The spectrum by Ritz values: iterates x and their images T x as rows, of a run by any method.
 
     With an orthonormal basis U of the differences of the iterates, the eigenvalues of ``U' (1 + H) U`` lie between the
@@ -191,18 +197,21 @@ def seen_in(X: Floats, TX: Floats) -> SeenVectors:
     ----------
     X, TX : array, shape (k, n)
         k >= 2 vectors and what T makes of them.
+    tied : bool
+        True if an entry that is 0 shows no open node.
 
     Raises
     ------
     ValueError
         The iterates do not differ above rounding.
     """
-    given, last = len(X), _last_piece(TX)
+    given, last = len(X), len(X) if tied else _last_piece(TX)
     changing, read = last < given, last if last >= FEWEST else given
     X, TX = X[-read:], TX[-read:]
     D, E = (np.diff(rows, axis=0).T for rows in (X, TX - X))
     lengths = np.linalg.norm(D, axis=0)
-    kept = lengths > ROUNDING * float(np.abs(TX).max(initial=0.0))
+    accuracy = _accuracy(X, TX) * float(np.abs(TX).max(initial=0.0))
+    kept = lengths > ROUNDING * accuracy
     if not kept.any():
         raise ValueError("the iterates do not differ above rounding: needed two different ones")
     D, E = D[:, kept] / lengths[kept], E[:, kept] / lengths[kept]
@@ -212,7 +221,8 @@ def seen_in(X: Floats, TX: Floats) -> SeenVectors:
     largest = float((sizes[sigma > RANK * sigma[0]] / sigma[sigma > RANK * sigma[0]]).max())
     rest = sigma <= RANK * sigma[0]
     noise = float(sizes[rest].max()) / largest if rest.any() else None
-    used = ~rest if noise is None else ~rest & (sigma >= noise / CLEAN)
+    rounding = np.sqrt(((Vt * (accuracy / lengths[kept])) ** 2).sum(axis=1)) / largest
+    used = ~rest & (sigma * CLEAN >= np.maximum(rounding, noise or 0.0))
     if not used.any():
         used = sigma == sigma[0]
     U, A = U[:, used], images[:, used] / sigma[used]
@@ -236,6 +246,18 @@ def seen_in(X: Floats, TX: Floats) -> SeenVectors:
         ritz=values - 1,
         noise=noise,
     )
+
+
+def _accuracy(X: Floats, TX: Floats) -> float:
+    """Accuracy of vectors relative to the largest entry: as they were computed in doubles, or rounded to be written."""
+    some = np.concatenate([TX.ravel()[:SOME], X.ravel()[:SOME]])
+    if (some == some.astype(np.float32)).all():
+        whole = (some == np.rint(some)).all()  # numbers that any format holds
+        return DOUBLE if whole else SINGLE
+    for digits in range(1, DIGITS):
+        if all(float(f"{value:.{digits - 1}e}") == value for value in some):
+            return float(10.0 ** (1 - digits))
+    return DOUBLE
 
 
 def _last_piece(TX: Floats) -> int:

@@ -176,8 +176,10 @@ def _which_method(found: Advice) -> Iterator[Section]:
     if found.method is not None:
         who = ", with the roles exchanged" * (found.method.exchanged and not named)
         said.append(f"Advised: {METHOD_NAMES[found.method.name]}{who}: {found.method.reason}.")
-        if found.method.name != "constant":
-            said.append("Predicted: no proof says that it converges in contact.")
+        if not found.tied:
+            said.append("Aitken and IQN-ILS: while no node changes; contact may need more, IQN-ILS may fail.")
+        elif found.method.name != "constant":
+            said.append("Predicted, not proved.")
     yield section("method", "WHICH METHOD?", table(heads, rows), *said)
 
 
