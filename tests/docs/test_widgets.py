@@ -144,6 +144,27 @@ def test_errors_of_open_or_closed_shrink_as_the_v_says(builder):
                     assert float(size) == pytest.approx(factor**step, rel=6e-3, abs=1e-7)
 
 
+@pytest.mark.parametrize("position", [2, 9])
+def test_which_side_shows_what_the_advice_says_and_what_the_roles_cost(builder, position):
+    """2/7 and 7/2, from moduli and thetas as the page writes them."""
+    young = {2: (20000, 70000), 9: (70000, 20000)}[position]
+    problem = vf.example("section6").changed(cells=((20, 3), (12, 3)), young=young)
+    shown = builder.questions.of("which_side").data()["scenes"][str(position)]
+    curves = [mark["points"] for mark in shown["marks"][1] if mark["kind"] == "line" and len(mark["points"]) > 2]
+    roles = {role.neumann_body: role for role in vf.advise(problem).roles}
+    for body, row, residuals in zip((1, 2), shown["rows"], curves, strict=True):
+        run = vf.run(problem.changed(neumann_body=body), theta=f"{roles[body].theta_predicted:.3f}")
+        assert run.converged
+        name, *numbers = row
+        assert name == {1: "lower plate", 2: "upper plate"}[body]
+        rho, theta, factor, steps = map(float, numbers)
+        assert rho == pytest.approx(roles[body].rho.value, rel=1e-3)
+        assert theta == pytest.approx(roles[body].theta_predicted, abs=1e-4)
+        assert factor == pytest.approx(roles[body].rate_predicted, abs=1e-4)
+        assert len(residuals) - 1 == steps == pytest.approx(run.iterations, abs=1)
+        assert residuals[1][1] == pytest.approx(run.iterates[1].relative_residual, rel=1e-2)
+
+
 def test_each_widget_weighs_little_and_has_a_picture(page, builder):
     folder = page.parent
     shared = sum((folder / name).stat().st_size for name in ("formulas.js", "drawing.js", "widgets.css"))
@@ -163,6 +184,10 @@ ANSWERS = {
     "plane": ("the printed one", "In this unit m = 3.08"),
     "spectrum": ("it does not converge", "upper body Neumann, rho = 11.3, theta = 0.60: the largest factor is 6.41"),
     "open_or_closed": ("2/(2+rho) = 0.500", "theta = 0.500: one step multiplies the error of the open node by 0.500"),
+    "which_side": (
+        "12 times as many, 140",
+        "E1/E2 = 3.5. With the lower plate as Neumann body rho = 0.38, theta = 0.840",
+    ),
 }
 
 #: Those without a script of their own.
