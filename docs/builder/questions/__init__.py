@@ -8,7 +8,7 @@ from importlib import import_module
 from types import ModuleType
 
 #: The pages, by name.
-PAGES = ("open_or_closed", "which_side")
+PAGES = ("open_or_closed", "which_side", "constants")
 
 
 def of(page: str) -> ModuleType:
