@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import random
 import re
-from fractions import Fraction
 from math import log10
 from pathlib import Path
 
-import numpy as np
 import pytest
 from browser import needs_browser
-from widget_page import drawn, frame, move, place, rows, says
+from widget_page import frame, move, rows, says
 
 import verification as vf
 from ndtheory import PRINTED, REPAIRED, evaluate, evaluate_energy
 from ndtheory.energy_norms import predicted_factor
 from verification.algorithm.fixed_point import FixedPointMap
-from verification.bounds.bound import Subject
-from verification.bounds.table import BOUNDS
 from verification.exploration.javascript import function
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -132,95 +128,6 @@ def test_runs_of_the_spectrum_are_runs_of_the_library(builder):
     assert shown["residuals"][: run.iterations] == pytest.approx(list(run.history)[: run.iterations], rel=1e-3)
 
 
-def test_errors_of_open_or_closed_shrink_as_the_v_says(builder):
-    pressed = vf.example("section6").changed(friction=0, young=(20000, 40000), cells=((10, 2), (6, 2)))
-    rho = vf.measure(pressed).rho_normal.value
-    for scene in builder.questions.of("open_or_closed").data()["scenes"].values():
-        ((theta, closed),), ((_, opened),) = (mark["points"] for mark in scene["marks"][0] if mark["kind"] == "dots")
-        assert opened == pytest.approx(1 - theta, abs=1e-5)
-        assert closed == pytest.approx(abs(1 - theta * (1 + rho)), abs=1e-5)
-        assert max(opened, closed) == pytest.approx(predicted_factor(theta, rho), abs=1e-5)
-        for step, *sizes in scene["rows"]:
-            for size, factor in zip(sizes, (closed, opened), strict=True):
-                if size == "below 1e-06":
-                    assert factor**step < 1.1e-6
-                else:
-                    assert float(size) == pytest.approx(factor**step, rel=6e-3, abs=1e-7)
-
-
-def exact_solutions(k):
-    """The states of all solutions at the node of the page on friction, in rational numbers.
-
-    v = v0 - F c is the jump and minus the gap, c the force; F is the sum of the flexibilities of both bodies.
-    """
-    (F_TT, F_TN, F_NN), (v_T, v_N) = (Fraction(3, 2), Fraction(-1, 2), Fraction(3, 2)), (Fraction(12), Fraction(-1))
-    found = {"open"} if v_N <= 0 else set()
-    for sign in (1, -1):
-        c = v_N / (F_NN + sign * k * F_TN)
-        if c > 0 and sign * (v_T - (sign * k * F_TT + F_TN) * c) > 0:
-            found.add("slip")
-    det = F_TT * F_NN - F_TN**2
-    c_T, c_N = (F_NN * v_T - F_TN * v_N) / det, (F_TT * v_N - F_TN * v_T) / det
-    return found | ({"stick"} if c_N > 0 and abs(c_T) <= k * c_N else set())
-
-
-def test_the_node_with_friction_has_the_solutions_of_the_picture_and_its_runs_end_there(builder):
-    asked = builder.questions.of("friction")
-    data = asked.data()
-    for (i,), scene in ((map(int, key.split(",")), scene) for key, scene in data["scenes"].items()):
-        k = Fraction(data["sliders"][0]["values"][i])
-        named = {mark["text"] for mark in scene["marks"][0] if mark["kind"] == "note"}
-        assert named - {"edge"} == exact_solutions(k), k
-        for start, (_, state, force) in zip(asked.STARTS, scene["rows"], strict=True):
-            end = vf.run(asked.node(float(k)), theta="0.4", start=start).last.g
-            assert force == "({:.2f}, {:.2f})".format(*(end.round(4) + 0.0))
-            assert state == ("open" if np.abs(end).max() < 1e-6 else "stick"), k
-    assert exact_solutions(Fraction(34, 9)) == {"open"}
-    assert exact_solutions(Fraction(36, 9)) == {"open", "slip", "stick"}
-    measured = vf.measure(asked.node(4))
-    assert f"Below k = {measured.friction_limit.value:.2f} it is proved" in data["why"]
-
-
-@pytest.mark.parametrize("swapped", [False, True])
-def test_runs_and_proofs_of_the_plane_of_dots_are_those_of_the_library(builder, swapped):
-    """Each run by itself instead of in a sweep, and the factors of the bounds instead of their intervals."""
-    data = builder.questions.of("theorem_and_experiment").data()
-    problem = vf.example("section6").changed(cells=((20, 3), (12, 3)))
-    problem = problem.swapped() if swapped else problem
-    subject = Subject.of(vf.build(problem), vf.measure(problem))
-    for k, row in [(1, 5), (2, 9), (3, 7), (4, 3), (4, 4), (5, 1)]:
-        scene = data["scenes"][f"{int(swapped)},{k}"]
-        friction = data["sliders"][1]["values"][k]
-        theta, proved, q, outcome, rate = scene["rows"][row]
-        run = vf.run(problem.changed(theta=str(theta), friction=friction, max_iterations=500))
-        assert run.outcome == outcome, (theta, friction)
-        assert rate == (f"{run.observed_rate.value:.3f}" if run.converged else "")
-        here = subject.at(float(friction))
-        bounds = {name: BOUNDS[name].evaluate(here, str(theta)).factor for name in ("energy", "lmi")}
-        assert (proved == "yes") == any(bounds.values()), (theta, friction)
-        assert (float(q) < 1) == (bounds["energy"] is not None)
-        if bounds["energy"] is not None:
-            assert float(q) == pytest.approx(bounds["energy"].value, abs=6e-4)
-
-
-def test_predicted_rates_are_those_of_the_forecast_and_digits_come_at_the_last_change(builder):
-    asked = builder.questions.of("prediction")
-    data = asked.data()
-    for i, k in enumerate(data["sliders"][0]["values"]):
-        run = vf.run(asked.plates(k)).linearise()
-        patterns = [iterate.contact.pattern for iterate in run.iterates]
-        states = [(pattern.touching.tolist(), pattern.sliding.tolist()) for pattern in patterns]
-        for n in (0, 1, 12, 15, 20):
-            row = data["scenes"][f"{i},{n}"]["rows"][i]
-            said, seen = float(row[2]), float(row[3])
-            assert seen == pytest.approx(run.observed_rate.value, abs=6e-10)
-            assert row[1] == max(m for m in range(1, len(states)) if states[m] != states[m - 1])
-            assert (abs(said / seen - 1) < 1e-7) == (n >= row[1])
-            if n >= row[1] and run.forecast:
-                assert said == pytest.approx(run.forecast.rate, rel=1e-8)
-    assert vf.run(asked.plates("0.2")).linearise().forecast
-
-
 def test_each_widget_weighs_little_and_has_a_picture(page, builder):
     folder = page.parent
     shared = sum((folder / name).stat().st_size for name in ("formulas.js", "drawing.js", "widgets.css"))
@@ -240,13 +147,14 @@ ANSWERS = {
     "plane": ("the printed one", "In this unit m = 3.08"),
     "spectrum": ("it does not converge", "upper body Neumann, rho = 11.3, theta = 0.60: the largest factor is 6.41"),
     "open_or_closed": ("2/(2+rho) = 0.500", "theta = 0.500: one step multiplies the error of the open node by 0.500"),
+    "which_side": (
+        "12 times as many, 140",
+        "E1/E2 = 3.5. With the lower plate as Neumann body rho = 0.38, theta = 0.840",
+    ),
     "friction": ("A opens, B sticks", "k = 4: this load has 3 solutions: open, slip, stick"),
     "theorem_and_experiment": ("all of them", "lmi for theta below 0.38. Of 10 runs 4 are proved to converge"),
     "prediction": ("nearly all at one step", "k = 0.2: the matrix of step 4 predicts the rate 0.50078235"),
 }
-
-#: Those without a script of their own.
-SCENES = [name for name in ANSWERS if not (DOCS / "widgets" / f"{name}.js").exists()]
 
 
 def test_each_widget_with_a_right_answer_is_answered_below(builder):
@@ -254,7 +162,6 @@ def test_each_widget_with_a_right_answer_is_answered_below(builder):
     asks = {name for name, text in scripts.items() if re.search(r"^ +right: ", text, re.MULTILINE)}
     found = builder.widgets.WIDGETS.items()
     assert {name for name, one in found if (one.script or name) in asks} == set(ANSWERS)
-    assert set(SCENES) == set(builder.questions.PAGES)
 
 
 @needs_browser
@@ -276,122 +183,6 @@ def test_the_outcome_is_hidden_until_a_choice_is_made_which_is_then_judged(unans
     assert all(part.is_displayed() for part in hidden)
     assert not answer.is_displayed()
     assert shown in says(unanswered, name)
-
-
-def test_a_page_asks_its_question_before_its_first_section():
-    for name in SCENES:
-        introduction = (DOCS / "examples" / f"{name}.md").read_text("utf-8").partition("\n## ")[0]
-        assert f"```{{widget}} {name}\n" in introduction
-
-
-def test_the_right_answer_is_found_neither_by_its_length_nor_by_its_place(builder):
-    questions = [builder.questions.of(name).data() for name in SCENES]
-    for asked in questions:
-        assert len(set(asked["answers"])) == 3
-        assert len(asked["right"]) <= max(len(answer) for answer in asked["answers"] if answer != asked["right"])
-    assert len({asked["answers"].index(asked["right"]) for asked in questions}) > 1 or len(questions) == 1
-
-
-def of_marks(marks):
-    """The tags of the marks of a chart, from its data."""
-    tags = {"line": ["path"], "note": ["text"]}
-    each = {"dots": "circle", "crosses": "path"}
-    return [tag for mark in marks for tag in tags.get(mark["kind"]) or [each[mark["kind"]]] * len(mark["points"])]
-
-
-@needs_browser
-@pytest.mark.parametrize("name", SCENES)
-def test_before_the_answer_a_chart_has_its_fixed_marks_and_those_of_the_question_alone(unanswered, builder, name):
-    data = builder.questions.of(name).data()
-    charts = frame(unanswered, name).find_elements("css selector", "svg.chart")
-    fixed = [chart["fixed"] for chart in data["charts"]]
-    asked = [[*chart["fixed"], *chart["before"]] for chart in data["charts"]]
-    assert [chart.is_displayed() for chart in charts] == [bool(marks) for marks in asked]
-    assert [drawn(chart) for chart in charts] == [of_marks(marks) for marks in asked]
-    frame(unanswered, name).find_element("css selector", ".reveal").click()
-    scene = data["scenes"][",".join(str(slider["start"]) for slider in data["sliders"])]
-    assert all(chart.is_displayed() for chart in charts)
-    shown = [of_marks([*before, *after]) for before, after in zip(fixed, scene["marks"], strict=True)]
-    assert [drawn(chart) for chart in charts] == shown
-    assert frame(unanswered, name).find_element("css selector", ".told").text == f"Answer: {data['why']}"
-
-
-@needs_browser
-@pytest.mark.parametrize("name", SCENES)
-def test_each_position_of_the_sliders_shows_its_scene(browser, builder, name):
-    data = builder.questions.of(name).data()
-    for key, scene in random.Random(name).sample(sorted(data["scenes"].items()), k=min(6, len(data["scenes"]))):
-        positions = [int(position) for position in key.split(",")]
-        place(browser, name, data, positions)
-        shown = [slider["values"][i] for slider, i in zip(data["sliders"], positions, strict=True)]
-        assert [output.text for output in frame(browser, name).find_elements("css selector", "output")] == shown
-        assert says(browser, name) == scene["says"]
-        assert rows(browser, name) == [[str(cell) for cell in row] for row in scene["rows"]]
-
-
-#: Words of any scene that leave their chart, or lie on other words, a curve or a dot; the size of the smallest.
-UNREADABLE = """
-const [name] = arguments, frame = document.querySelector(`[data-widget=${name}]`), found = new Set();
-const inputs = [...frame.querySelectorAll("input")];
-const extent = (text) => { // without the room for accents
-  const { x, y, width, height } = text.getBBox();
-  return { left: x, right: x + width, top: y + 2, bottom: y + height - 2 };
-};
-const inside = (a, b) => a.left > b.left && a.right < b.right && a.top > b.top && a.bottom < b.bottom;
-const meet = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
-const dot = (x, y) => ({ left: x, right: x, top: y, bottom: y });
-let smallest = Infinity;
-for (const key of Object.keys(ndData[name].scenes)) {
-  key.split(",").forEach((value, i) => { inputs[i].value = value; inputs[i].dispatchEvent(new Event("input")); });
-  for (const chart of frame.querySelectorAll("svg.chart")) {
-    const rect = chart.querySelector("clipPath rect").getBBox(), marks = chart.lastElementChild;
-    const room = { left: rect.x, right: rect.x + rect.width, top: rect.y, bottom: rect.y + rect.height };
-    const words = [...marks.querySelectorAll("text")].map((text) => [text.textContent, extent(text)]);
-    const points = [...marks.querySelectorAll("circle")].map((one) => dot(one.cx.baseVal.value, one.cy.baseVal.value));
-    for (const curve of marks.querySelectorAll("path.curve")) {
-      for (let along = 0; along <= curve.getTotalLength(); along += 2) {
-        const { x, y } = curve.getPointAtLength(along);
-        points.push(dot(x, y));
-      }
-    }
-    smallest = Math.min(smallest, 11 * chart.getBoundingClientRect().width / chart.viewBox.baseVal.width);
-    words.forEach(([text, box], i) => {
-      const say = (what) => found.add(`${key}: "${text}" ${what}`);
-      if (!inside(box, room)) say("leaves its chart");
-      if (points.some((point) => inside(point, box))) say("lies on a curve or a dot");
-      for (const [other, its] of words.slice(i + 1)) if (meet(box, its)) say(`lies on "${other}"`);
-    });
-  }
-}
-return [[...found], smallest, document.documentElement.scrollWidth];
-"""
-
-
-@needs_browser
-@pytest.mark.parametrize("name", SCENES)
-def test_the_words_of_a_scene_lie_free_in_their_chart_and_are_read_on_a_phone(browser, name):
-    metrics = {"width": 390, "height": 800, "deviceScaleFactor": 1, "mobile": False}
-    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
-    try:
-        found, smallest, wide = browser.execute_script(UNREADABLE, name)
-    finally:
-        browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
-    assert found == []
-    assert smallest >= 9
-    assert wide <= 390
-
-
-@needs_browser
-def test_words_that_cannot_be_read_are_found(browser):
-    browser.execute_script(
-        "const scene = Object.values(ndData.open_or_closed.scenes)[0];"
-        "for (const [x, y, text] of [[0.4, 0.6, 'on a curve'], [0.74, 0.2, 'outside'], [0.39, 0.6, 'on words']])"
-        "  scene.marks[0].push({ kind: 'note', points: [[x, y]], text, colour: '', anchor: 'start' });"
-    )
-    found = "; ".join(browser.execute_script(UNREADABLE, "open_or_closed")[0])
-    assert '0: "on a curve" lies on a curve or a dot' in found
-    assert '0: "outside" leaves its chart' in found
-    assert '0: "on a curve" lies on "on words"' in found
 
 
 @needs_browser
