@@ -143,7 +143,7 @@ def data() -> dict[str, Any]:
         ],
         charts=[
             chart(
-                "Residual of the run, and as the matrix of one step continues it",
+                "Residual, and what one matrix predicts",
                 axis("step", -1, STEPS),
                 axis("residual, the first = 1", LEAST, 10, log=True),
                 before=[dots(_short(enumerate(first.residuals)), "grey", hollow=True)],
