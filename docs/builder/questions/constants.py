@@ -59,7 +59,7 @@ def data() -> dict[str, Any]:
         answers=list(LOOKS),
         right="m",
         why=f"m falls by a factor of {fall['m']:.0f}: a large plate can move far as a whole with little strain. "
-        f"M falls by {fall['M']:.1f}, but because the cells are large too: move the halvings, and M is back at "
+        f"M falls by {fall['M']:.1f} because the cells are large too: with {HALVINGS[-1]} halvings it is back at "
         f"{100 * back:.0f} % of its value at size 1, while m stays low.",
         sliders=[
             slider("size", "size", [f"{float(size):g}" for size in SIZES], large),
