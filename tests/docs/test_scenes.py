@@ -6,12 +6,15 @@ import random
 from fractions import Fraction
 from pathlib import Path
 
+import numpy as np
 import pytest
 from browser import needs_browser
 from widget_page import drawn, frame, place, rows, says
 
 import verification as vf
 from ndtheory.energy_norms import predicted_factor
+from verification.bounds.bound import Subject
+from verification.bounds.table import BOUNDS
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -40,17 +43,19 @@ def test_the_right_answer_is_found_neither_by_its_length_nor_by_its_place(builde
 def of_marks(marks):
     """The tags of the marks of a chart, from its data."""
     tags = {"line": ["path"], "note": ["text"]}
-    return [tag for mark in marks for tag in tags.get(mark["kind"], ["circle"] * len(mark["points"]))]
+    each = {"dots": "circle", "crosses": "path"}
+    return [tag for mark in marks for tag in tags.get(mark["kind"]) or [each[mark["kind"]]] * len(mark["points"])]
 
 
 @needs_browser
 @pytest.mark.parametrize("name", SCENES)
-def test_before_the_answer_a_chart_has_its_fixed_marks_alone(unanswered, builder, name):
+def test_before_the_answer_a_chart_has_its_fixed_marks_and_those_of_the_question_alone(unanswered, builder, name):
     data = builder.questions.of(name).data()
     charts = frame(unanswered, name).find_elements("css selector", "svg.chart")
     fixed = [chart["fixed"] for chart in data["charts"]]
-    assert [chart.is_displayed() for chart in charts] == [bool(marks) for marks in fixed]
-    assert [drawn(chart) for chart in charts] == [of_marks(marks) for marks in fixed]
+    asked = [[*chart["fixed"], *chart["before"]] for chart in data["charts"]]
+    assert [chart.is_displayed() for chart in charts] == [bool(marks) for marks in asked]
+    assert [drawn(chart) for chart in charts] == [of_marks(marks) for marks in asked]
     frame(unanswered, name).find_element("css selector", ".reveal").click()
     scene = data["scenes"][",".join(str(slider["start"]) for slider in data["sliders"])]
     assert all(chart.is_displayed() for chart in charts)
@@ -196,3 +201,76 @@ def test_constants_of_larger_plates_are_those_of_the_scenes(builder):
         assert float(ratio) == pytest.approx(of_large / of_one, rel=1e-2)
         ratios[name] = max(of_large / of_one, of_one / of_large)
     assert max(ratios, key=lambda name: ratios[name]) == builder.questions.of("constants").data()["right"]
+
+
+def exact_solutions(k):
+    """The states of all solutions at the node of the page on friction, in rational numbers.
+
+    v = v0 - F c is the jump and minus the gap, c the force; F is the sum of the flexibilities of both bodies.
+    """
+    (F_TT, F_TN, F_NN), (v_T, v_N) = (Fraction(3, 2), Fraction(-1, 2), Fraction(3, 2)), (Fraction(12), Fraction(-1))
+    found = {"open"} if v_N <= 0 else set()
+    for sign in (1, -1):
+        c = v_N / (F_NN + sign * k * F_TN)
+        if c > 0 and sign * (v_T - (sign * k * F_TT + F_TN) * c) > 0:
+            found.add("slip")
+    det = F_TT * F_NN - F_TN**2
+    c_T, c_N = (F_NN * v_T - F_TN * v_N) / det, (F_TT * v_N - F_TN * v_T) / det
+    return found | ({"stick"} if c_N > 0 and abs(c_T) <= k * c_N else set())
+
+
+def test_the_node_with_friction_has_the_solutions_of_the_picture_and_its_runs_end_there(builder):
+    asked = builder.questions.of("friction")
+    data = asked.data()
+    for (i,), scene in ((map(int, key.split(",")), scene) for key, scene in data["scenes"].items()):
+        k = Fraction(data["sliders"][0]["values"][i])
+        named = {mark["text"] for mark in scene["marks"][0] if mark["kind"] == "note"}
+        assert named - {"edge"} == exact_solutions(k), k
+        for start, (_, state, force) in zip(asked.STARTS, scene["rows"], strict=True):
+            end = vf.run(asked.node(float(k)), theta="0.4", start=start).last.g
+            assert force == "({:.2f}, {:.2f})".format(*(end.round(4) + 0.0))
+            assert state == ("open" if np.abs(end).max() < 1e-6 else "stick"), k
+    assert exact_solutions(Fraction(34, 9)) == {"open"}
+    assert exact_solutions(Fraction(36, 9)) == {"open", "slip", "stick"}
+    measured = vf.measure(asked.node(4))
+    assert f"Below k = {measured.friction_limit.value:.2f} it is proved" in data["why"]
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_runs_and_proofs_of_the_plane_of_dots_are_those_of_the_library(builder, swapped):
+    """Each run by itself instead of in a sweep, and the factors of the bounds instead of their intervals."""
+    data = builder.questions.of("theorem_and_experiment").data()
+    problem = vf.example("section6").changed(cells=((20, 3), (12, 3)))
+    problem = problem.swapped() if swapped else problem
+    subject = Subject.of(vf.build(problem), vf.measure(problem))
+    for k, row in [(1, 5), (2, 9), (3, 7), (4, 3), (4, 4), (5, 1)]:
+        scene = data["scenes"][f"{int(swapped)},{k}"]
+        friction = data["sliders"][1]["values"][k]
+        theta, proved, q, outcome, rate = scene["rows"][row]
+        run = vf.run(problem.changed(theta=str(theta), friction=friction, max_iterations=500))
+        assert run.outcome == outcome, (theta, friction)
+        assert rate == (f"{run.observed_rate.value:.3f}" if run.converged else "")
+        here = subject.at(float(friction))
+        bounds = {name: BOUNDS[name].evaluate(here, str(theta)).factor for name in ("energy", "lmi")}
+        assert (proved == "yes") == any(bounds.values()), (theta, friction)
+        assert (float(q) < 1) == (bounds["energy"] is not None)
+        if bounds["energy"] is not None:
+            assert float(q) == pytest.approx(bounds["energy"].value, abs=6e-4)
+
+
+def test_predicted_rates_are_those_of_the_forecast_and_digits_come_at_the_last_change(builder):
+    asked = builder.questions.of("prediction")
+    data = asked.data()
+    for i, k in enumerate(data["sliders"][0]["values"]):
+        run = vf.run(asked.plates(k)).linearise()
+        patterns = [iterate.contact.pattern for iterate in run.iterates]
+        states = [(pattern.touching.tolist(), pattern.sliding.tolist()) for pattern in patterns]
+        for n in (0, 1, 12, 15, 20):
+            row = data["scenes"][f"{i},{n}"]["rows"][i]
+            said, seen = float(row[2]), float(row[3])
+            assert seen == pytest.approx(run.observed_rate.value, abs=6e-10)
+            assert row[1] == max(m for m in range(1, len(states)) if states[m] != states[m - 1])
+            assert (abs(said / seen - 1) < 1e-7) == (n >= row[1])
+            if n >= row[1] and run.forecast:
+                assert said == pytest.approx(run.forecast.rate, rel=1e-8)
+    assert vf.run(asked.plates("0.2")).linearise().forecast

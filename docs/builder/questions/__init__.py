@@ -8,7 +8,7 @@ from importlib import import_module
 from types import ModuleType
 
 #: The pages, by name.
-PAGES = ("open_or_closed", "which_side", "constants")
+PAGES = ("open_or_closed", "which_side", "constants", "friction", "theorem_and_experiment", "prediction")
 
 
 def of(page: str) -> ModuleType:
