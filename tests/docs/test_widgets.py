@@ -151,6 +151,9 @@ ANSWERS = {
         "12 times as many, 140",
         "E1/E2 = 3.5. With the lower plate as Neumann body rho = 0.38, theta = 0.840",
     ),
+    "grids": ("59 percent", "Nearest node, 80 cells below and 60 above: the pressure varies by 58.6 percent"),
+    "beyond_constant": ("39 percent of it", "the test stops it at step 4. There the residual is 71 percent"),
+    "other_code": ("rho is 3 or more", "theta = 0.5: the residual stays at a level"),
 }
 
 

@@ -117,16 +117,13 @@ def data() -> dict[str, Any]:
                 "Residual and change of the force over the steps",
                 axis("step", 0, STEPS),
                 axis("relative residual, relative change", LEAST, 1e5, log=True),
-                [
+                fixed=[
                     line([(0, TOLERANCE), (STEPS, TOLERANCE)], "grey", dashed=True),
-                    note(0.97 * STEPS, TOLERANCE / 100, "the test stops a run below", "grey", anchor="end"),
-                    dots(enumerate(asked.changes[: asked.stop], 1), "grey", hollow=True),
-                    note(
-                        asked.stop + 2,
-                        asked.changes[asked.stop - 1] / 2,
-                        "circles: change in the run of the question",
-                        "grey",
-                    ),
+                    note(0.97 * STEPS, TOLERANCE / 100, "stop below", "grey", anchor="end"),
+                ],
+                before=[
+                    dots(enumerate(asked.changes[: asked.stop], 1), "red", hollow=True),
+                    note(asked.stop + 2, asked.changes[asked.stop - 1] / 2, "change of the force", "red"),
                 ],
             ),
             chart(

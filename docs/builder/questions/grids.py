@@ -119,10 +119,10 @@ def data() -> dict[str, Any]:
                 "Pressure along Gamma_c",
                 axis("position along Gamma_c", -0.03, 1.03),
                 axis("pressure, the exact one = 1", 0.6, 1.4),
-                [
-                    line([(0, 1), (1, 1)], "grey", dashed=True),
-                    dots(zip(grids[0][0], found["nearest node"][0], strict=True), "grey", hollow=True),
-                    note(0.03, 0.63, f"grey circles: nearest node, {cells[0][0]} and {cells[0][1]} cells", "grey"),
+                fixed=[line([(0, 1), (1, 1)], "grey", dashed=True), note(0, 1.35, "dashed: exact", "grey")],
+                before=[
+                    dots(zip(grids[0][0], found["nearest node"][0], strict=True), "red", hollow=True),
+                    note(1, 1.35, "circles: nearest node", "red", anchor="end"),
                 ],
             ),
             chart(

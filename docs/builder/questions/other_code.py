@@ -103,13 +103,13 @@ def data() -> dict[str, Any]:
         f"rho is {bound:g} or more. Here it is {rho:.2f}. Contact opens and closes alternately, which keeps the "
         "residual near one value at every theta that is too large. Move theta: between which thetas does a log show "
         "rho itself?",
-        sliders=[slider("theta", "theta of the log", [f"{theta:g}" for theta in THETAS], THETAS.index(ASKED))],
+        sliders=[slider("theta", "theta", [f"{theta:g}" for theta in THETAS], THETAS.index(ASKED))],
         charts=[
             chart(
                 "Residual over the steps",
                 axis("step", 0, MOST + 5),
                 axis("residual, the first = 1", 1e-9, 10, log=True),
-                [line(curve(logs[ASKED]), "grey", dashed=True)],
+                before=[line(curve(logs[ASKED]))],
             ),
             chart("rho that each log shows", axis("theta of the log", 0, 1), axis("rho", 1, 100, log=True)),
         ],
