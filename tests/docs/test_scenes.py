@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import re
+from fractions import Fraction
 from itertools import islice, pairwise
 from pathlib import Path
 
@@ -180,6 +181,27 @@ def test_which_side_shows_what_the_advice_says_and_what_the_roles_cost(builder, 
         assert factor == pytest.approx(roles[body].rate_predicted, abs=1e-4)
         assert len(residuals) - 1 == steps == pytest.approx(run.iterations, abs=1)
         assert residuals[1][1] == pytest.approx(run.iterates[1].relative_residual, rel=1e-2)
+
+
+def test_constants_of_larger_plates_are_those_of_the_scenes(builder):
+    """Plates of which each length is 100 times as long, where the scenes take a shorter length in the norm."""
+    plates = vf.example("section6").changed(cells=((20, 3), (12, 3))).refined(1)
+    one = vf.measure(plates)
+    text = plates.to_dict()
+    for body in ("body1", "body2"):
+        text[body] |= {axis: [100 * Fraction(str(end)) for end in text[body][axis]] for axis in ("x", "y")}
+    text["contact"] |= {"radius": 100 * Fraction(str(text["contact"]["radius"]))}
+    large = vf.measure(vf.Problem.from_dict(text))
+    shown = builder.questions.of("constants").data()["scenes"]["3,1"]
+    ratios = {}
+    for name, here, before, ratio in shown["rows"]:
+        constant = "rho_max" if name == "rho" else name
+        of_large, of_one = (getattr(measured, constant).value for measured in (large, one))
+        assert float(here) == pytest.approx(of_large, rel=1e-3)
+        assert float(before) == pytest.approx(of_one, rel=1e-3)
+        assert float(ratio) == pytest.approx(of_large / of_one, rel=1e-2)
+        ratios[name] = max(of_large / of_one, of_one / of_large)
+    assert max(ratios, key=lambda name: ratios[name]) == builder.questions.of("constants").data()["right"]
 
 
 def normal_stiffness(body):

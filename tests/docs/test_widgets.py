@@ -147,6 +147,7 @@ ANSWERS = {
     "plane": ("the printed one", "In this unit m = 3.08"),
     "spectrum": ("it does not converge", "upper body Neumann, rho = 11.3, theta = 0.60: the largest factor is 6.41"),
     "open_or_closed": ("2/(2+rho) = 0.500", "theta = 0.500: one step multiplies the error of the open node by 0.500"),
+    "constants": ("m", "Size 100, mesh halved 0 times: m = 19.2 MPa, M = 21711 MPa, C_R = 3.20, which are"),
     "which_side": (
         "12 times as many, 140",
         "E1/E2 = 3.5. With the lower plate as Neumann body rho = 0.38, theta = 0.840",

@@ -8,7 +8,7 @@ from importlib import import_module
 from types import ModuleType
 
 #: The pages, by name.
-PAGES = ("open_or_closed", "which_side", "grids", "beyond_constant", "other_code")
+PAGES = ("open_or_closed", "which_side", "constants", "grids", "beyond_constant", "other_code")
 
 
 def of(page: str) -> ModuleType:

@@ -63,14 +63,14 @@ def data() -> dict[str, Any]:
             chart(
                 "Factor of one step",
                 axis("theta", 0, 0.75),
-                axis("factor a step", 0, 1.3),
+                axis("factor a step", -0.05, 1.3),
                 [
                     line([(0, 1), (0.75, 1)], "grey"),
                     note(0.02, 1.04, "above 1: grows", "grey"),
                     line([(0, 1), (0.75, 0.25)], "red", dashed=True),
                     note(0.2, 0.85, "open", "red"),
                     dots([(once, 0)]),
-                    note(once - 0.07, 0.03, "closed", anchor="end"),
+                    note(once - 0.07, 0.02, "closed", anchor="end"),
                 ],
             ),
             chart(

@@ -55,7 +55,7 @@ def data() -> dict[str, Any]:
     }
     return widget(
         question=f"The lower plate is {stiffer:g} times as stiff as the upper one. With the lower plate as Neumann "
-        f"body, {good.steps} steps reach a residual of 1e-9. How many do it with the upper plate as Neumann body? Each "
+        f"body, {good.steps} steps reach a residual of 1e-9. How many are needed with the upper plate? Each "
         "choice has the theta that is predicted as best for it.",
         answers=[f"as many, {good.steps}", f"{stiffer:g} times as many, {guess}", times],
         right=times,
