@@ -13,6 +13,9 @@ from verification.figures import style
 #: The colours of ``verification/data/drawing.js``.
 COLOURS = {"blue": "#0072b2", "red": "#d55e00", "green": "#009e73", "orange": "#e69f00", "grey": "#777777"}
 
+#: The size of words in the still picture, in points: as large beside the axes as in the page.
+WORDS = 7
+
 
 def axis(name: str, low: float, high: float, *, log: bool = False) -> dict[str, Any]:
     """An axis of a chart; with ``log`` a logarithmic one."""
@@ -124,7 +127,7 @@ def _draw(ax: Any, mark: Mapping[str, Any]) -> None:
         ax.plot(xs, ys, "x", color=colour, markersize=4)
     else:
         sides = {"start": "left", "middle": "center", "end": "right"}
-        ax.text(xs[0], ys[0], mark["text"], color=colour, ha=sides[mark["anchor"]], clip_on=True)
+        ax.text(xs[0], ys[0], mark["text"], ha=sides[mark["anchor"]], clip_on=True, fontsize=WORDS)
 
 
 def _rounded(points: Iterable[Sequence[float]]) -> list[list[float]]:
