@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import random
+import re
 from fractions import Fraction
+from itertools import islice, pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 from browser import needs_browser
+from scipy.linalg import eigh
 from widget_page import drawn, frame, place, rows, says
 
 import verification as vf
 from ndtheory.energy_norms import predicted_factor
+from verification.algorithm.fixed_point import FixedPointMap
 from verification.bounds.bound import Subject
 from verification.bounds.table import BOUNDS
 
@@ -274,3 +278,88 @@ def test_predicted_rates_are_those_of_the_forecast_and_digits_come_at_the_last_c
             if n >= row[1] and run.forecast:
                 assert said == pytest.approx(run.forecast.rate, rel=1e-8)
     assert vf.run(asked.plates("0.2")).linearise().forecast
+
+
+def normal_stiffness(body):
+    """Stiffness and load of the normal unknowns, the tangential ones free."""
+    free = np.flatnonzero(body.free)
+    flexibility = np.linalg.inv(body.schur[np.ix_(free, free)])
+    normal = free >= body.grid.normal.start
+    stiffness = np.linalg.inv(flexibility[np.ix_(normal, normal)])
+    return stiffness, stiffness @ (flexibility @ body.load[free])[normal]
+
+
+def test_the_pressures_of_three_transfers_solve_the_problem_in_displacements(builder):
+    """Forces are computed from flexibilities there, here from the stiffness of both bodies, tied by the transfer."""
+    page = builder.questions.of("grids")
+    data = page.data()
+    for j, finer in enumerate(page.FINER):
+        pair = vf.build(page.blocks(finer))
+        (S1, l1), (S2, l2) = normal_stiffness(pair.contact), normal_stiffness(pair.neumann)
+        x, y = pair.interface.contact.x, pair.interface.neumann.x
+        exact = vf.solve(page.blocks(finer)).contact.pressure
+        for i, (name, (transfer, _)) in enumerate(page.TRANSFERS.items()):
+            P = transfer(x, y)
+            u2 = np.linalg.solve(S2 + P.T @ S1 @ P, l2 + P.T @ l1)
+            p = (l1 - S1 @ P @ u2) / pair.interface.contact.weights / exact
+            scene = data["scenes"][f"{i},{j}"]
+            assert [float(row[1]) for row in scene["rows"]] == pytest.approx(p, abs=1e-4)
+            varies = "the pressure is constant" if name == "mortar" else f"varies by {100 * np.ptp(p):.1f} percent"
+            assert varies in scene["says"]
+
+
+def test_the_run_that_the_test_of_the_paper_stops_is_that_of_mixing_by_hand(builder):
+    """Shares by a pseudo-inverse in the Cholesky coordinates of the norm, the solution by the global method."""
+    page = builder.questions.of("beyond_constant")
+    problem = page.plates()
+    T, theta = FixedPointMap(vf.build(problem)), 0.5
+    size = T.pair.neumann.grid.size
+    root = np.linalg.cholesky(T.pair.neumann.flexibility(np.eye(size))).T
+    gs, rs = [np.zeros(size)], []
+    for _ in range(4):
+        rs.append(T.contact(gs[-1], T.displacement(gs[-1])).force - gs[-1])
+        G, R = np.diff(gs, axis=0).T.reshape(size, -1), np.diff(rs, axis=0).T.reshape(size, -1)
+        shares = np.linalg.pinv(root @ R, rcond=1e-6) @ root @ rs[-1]
+        gs.append(gs[-1] + theta * rs[-1] - (G + theta * R) @ shares)
+    solution = vf.solve(problem).contact
+    exact = solution.pressure * T.pair.interface.contact.weights
+    error = gs[-1][T.pair.neumann.grid.normal] - exact
+    wrong = np.linalg.norm(error) / np.linalg.norm(exact)
+    changes = [np.linalg.norm(b - a) / np.linalg.norm(b) for a, b in pairwise(gs)]
+    assert changes[3] < 1e-9 < 0.1 < min(changes[:3])
+    data = page.data()
+    assert data["right"] == f"{100 * wrong:.0f} percent of it"
+    ends = gs[-1][T.pair.neumann.grid.normal][0] / exact[0]
+    assert f"the pressure is {ends:.1f} times that of the solution" in data["why"]
+
+
+def test_the_ratios_of_the_logs_are_factors_of_the_modes_of_the_closed_nodes(builder):
+    page = builder.questions.of("other_code")
+    data = page.data()
+    pair = vf.build(page.plates())
+    closed = np.flatnonzero(vf.run(pair, theta="0.5", rule="newton").last.contact.pattern.touching)
+    soft, hard = (
+        np.linalg.inv(normal_stiffness(body)[0])[np.ix_(closed, closed)] for body in (pair.neumann, pair.contact)
+    )
+    values = eigh(soft, hard, eigvals_only=True)
+    steady = 0
+    for i, theta in enumerate(page.THETAS):
+        says = data["scenes"][str(i)]["says"]
+        slowest = max(abs(1 - theta * (1 + value)) for value in (values[0], values[-1]))
+        assert ("at a level" in says) == (slowest > 1), theta
+        if slowest < 1:
+            steady += 1
+            ratio = float(re.search(r"by (0\.\d+)\.", says)[1])
+            assert ratio == pytest.approx(slowest, abs=5e-3)  # eight soft modes, 3.50 to 3.54, share the pace
+    assert 0 < steady < len(page.THETAS)
+    rho = eigh(*(normal_stiffness(body)[0] for body in (pair.contact, pair.neumann)), eigvals_only=True)[-1]
+    assert values[-1] < rho
+    assert f"Here it is {rho:.2f}." in data["why"]
+
+
+def test_contact_opens_and_closes_where_a_log_stays_at_a_level(builder):
+    page = builder.questions.of("other_code")
+    iterates = list(islice(vf.iterate(vf.build(page.plates()), theta=page.ASKED), page.MOST))
+    patterns = [tuple(iterate.contact.pattern.touching) for iterate in iterates[-20:]]
+    assert len(set(patterns)) > 1
+    assert all(a != b for a, b in pairwise(patterns))
