@@ -174,7 +174,7 @@ MUTANTS: dict[str, list[tuple[str, ...]]] = {
         ("for corner in constants.corners or ()", "for corner in ()"),
     ],
     "verification/advice/from_logs.py": [
-        ("abs(log.theta - float(theta)) > 1e-3 * float(theta)", "False"),
+        ("abs(log.theta - float(theta)) > off * (1 + 1e-9)", "False"),
         ("if not bare.converges and all(reading.kind", "if False and all(reading.kind"),
         ("ratio is not None and grows:", "False:"),
         ("one_mode(theta, ratio, plateau):", "True:"),

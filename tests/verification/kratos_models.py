@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from processes import PATIENCE
 
 #: The wrapper of a contact body, :mod:`kratos_contact`, is loaded from here.
 HERE = Path(__file__).parent
@@ -125,6 +126,6 @@ def run(file: Path) -> str:
     path = os.pathsep.join([str(HERE), str(HERE.parents[1])])
     environment = os.environ | {"PYTHONPATH": path, "OMP_NUM_THREADS": "1"}
     command = [sys.executable, "-m", "KratosMultiphysics.CoSimulationApplication.co_simulation_analysis", file.name]
-    done = subprocess.run(command, cwd=file.parent, env=environment, capture_output=True, text=True, timeout=300)
+    done = subprocess.run(command, cwd=file.parent, env=environment, capture_output=True, text=True, timeout=PATIENCE)
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
     return done.stdout

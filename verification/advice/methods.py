@@ -11,12 +11,9 @@ from typing import Any
 import numpy as np
 
 from fem1d2d.mesh import Floats
-from verification.advice import BodyNumber
+from verification.advice import METHODS, BodyNumber
 from verification.advice.spectrum import Spectrum
 from verification.algorithm.relaxation import RULES
-
-#: The methods, from the simplest one on.
-METHODS = ("constant", "aitken", "iqn-ils")
 
 #: Steps are those until ``|T x - x| < 1e-6 |T x|``, as coupling libraries stop, from x = 0.
 TOLERANCE = 1e-6

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from verification.advice.methods import METHODS
+from verification.advice import METHODS
 
 #: The residual at which a snippet stops the iteration, over the size of the forces.
 TOLERANCE = 1e-6
