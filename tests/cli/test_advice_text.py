@@ -80,7 +80,7 @@ def test_the_table_has_a_row_for_a_tied_interface_with_the_steps_of_both_thetas(
         )
         assert f"<= {steps(role['rate_tied'])} " in row
         at = max(abs(1 - role["theta_predicted"] * (1 + role[end]["value"])) for end in ("rho_min", "rho_tied"))
-        assert row.endswith(f"{steps(at)} at {role['theta_predicted']:.3f}")
+        assert row.endswith(f"{steps(at)} steps at {role['theta_predicted']:.3f}")
 
 
 def test_tied_advice_says_what_it_assumes_and_pastes_the_tied_theta(call, write):

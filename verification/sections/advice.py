@@ -154,8 +154,7 @@ def _which_theta(found: Advice) -> Section:
     ]
     if ends:
         said.append(f"if tied: 2/(2+rho_min+rho), {'; '.join(ends)}")
-    said.append(f"steps: to an error of 1e-9{'; last column: if tied, at the predicted theta' * bool(ends)}")
-    lines = table(("Neumann", "rho", "", "theta", "per step", "steps", ""), rows)
+    lines = table(("Neumann", "rho", "", "theta", "per step", "to 1e-9", "remark"), rows)
     return section("theta", "WHICH THETA?", lines, *said)
 
 
@@ -177,7 +176,7 @@ def _which_method(found: Advice) -> Iterator[Section]:
         who = ", with the roles exchanged" * (found.method.exchanged and not named)
         said.append(f"Advised: {METHOD_NAMES[found.method.name]}{who}: {found.method.reason}.")
         if not found.tied:
-            said.append("Aitken and IQN-ILS: while no node changes; contact may need more, IQN-ILS may fail.")
+            said.append("In contact Aitken and IQN-ILS may take more, and IQN-ILS may not arrive.")
         elif found.method.name != "constant":
             said.append("Predicted, not proved.")
     yield section("method", "WHICH METHOD?", table(heads, rows), *said)
@@ -222,7 +221,7 @@ def _at_predicted(role: Role) -> str:
     rate = role.factor_where_tied(theta)
     if rate is None or rate >= 1:
         return f"grows at {figures(theta)}"
-    return f"{count(steps(rate))} at {figures(theta)}"
+    return f"{count(steps(rate))} steps at {figures(theta)}"
 
 
 def _friction(found: Advice) -> Iterator[Section]:
