@@ -9,7 +9,7 @@ from typing import Any
 
 from ndtheory.number import above, below
 from verification.advice.log_files import Column
-from verification.advice.pace import MOST_WINDOWS, Pace, pace, pooled, together
+from verification.advice.pace import MOST_WINDOWS, RELATIVE, Pace, pace, pooled, together
 from verification.advice.readings import FEWEST_STEPS, Made, NextRun, Observed, RunReading, few, steps_needed
 from verification.value import to_plain
 
@@ -104,7 +104,7 @@ def seen_column(column: Column, theta: Fraction) -> SeenColumn:
     windows = ([window for window in column.windows if len(window) > FEWEST_STEPS] or column.windows)[-MOST_WINDOWS:]
     paces = tuple(pace(window, column, theta) for window in windows)
     short = all(one.kind == "short" for one in paces)
-    relative, steps = column.residual == "relative", steps_needed(theta)
+    relative, steps = column.residual in RELATIVE, steps_needed(theta)
     return SeenColumn(
         name=column.name,
         residual=column.residual,

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
+from verification.advice.accelerated import Accelerated
 from verification.advice.methods import NAMES as METHOD_NAMES
 from verification.advice.readings import LARGEST_TO_PASTE, NextRun, RunReading, SeenRun
+from verification.advice.readings import assumed as assumption
 from verification.advice.roles import Advice, Role, in_steps, steps
 from verification.advice.runs_with_friction import FrictionBounds
 from verification.advice.seen import LogBound, RhoInterval, SeenLog
@@ -55,9 +57,12 @@ def _sections(found: Advice) -> Iterator[Section]:
     if found.interval is not None:
         yield from of_logs(found, found.interval)
         if found.roles:
-            others = "Predicted for the roles that the bodies have; logs give no information about the exchanged roles."
-            yield _paste(found, *_few_methods(found), others)
-    if found.roles and not found.logs:
+            if any(row.bound is None for row in found.methods):
+                yield from _which_method(found)
+                yield _paste(found)
+            else:
+                yield _paste(found, *_few_methods(found))
+    if found.roles and found.interval is None:
         if found.vectors is None:
             yield _which_body(found)
             yield _which_theta(found)
@@ -82,7 +87,7 @@ def _end(found: Advice) -> Section:
     assumed = "--tied " * found.tied + "--friction " * (found.friction_bounds is not None)
     if found.next.kept and not found.roles:
         then = f"no run; keep theta = {theta}"
-    elif found.logs:
+    elif found.interval is not None:
         then = f"the same with --log LOG --theta {theta} (LOG: the log of that run)"
     else:
         then = f"ndtheory advise run {assumed}--theta {theta} --ratio R (R: its ratio)"
@@ -319,15 +324,14 @@ def given(seen: SeenMatrices) -> Section:
 MOST_COLUMNS = 8
 
 #: Words for kinds of residuals; the others are called by their names.
-RESIDUALS = {"assumed": "taken as absolute", "drop": "over the first one"}
+RESIDUALS = {"assumed": "taken as absolute", "drop": "over the first or largest one", "previous": "over |x|"}
 
 
 def assumed(found: Advice) -> Section:
     """The assumption under which runs are read, before all else."""
-    notes = [Note(f"Assumed: {found.assumes}.", 0)]
-    if not found.tied and found.friction_bounds is None:
-        notes.append(Note("With friction what follows may be false: add --friction.", 0))
-    return section("assumed", "", *notes)
+    free = not found.tied and found.assumes == assumption(tied=False, friction=False)
+    otherwise = " With friction add --friction." if free else ""
+    return section("assumed", "", Note(f"Assumed: {found.assumes}.{otherwise}", 0))
 
 
 def of_a_run(found: Advice, run: SeenRun) -> Sections:
@@ -347,20 +351,24 @@ def of_a_run(found: Advice, run: SeenRun) -> Sections:
 def of_logs(found: Advice, interval: RhoInterval) -> Sections:
     """The values of rho that each log and all logs together allow, and the run to make next."""
     read = [_readings(found.readings)] if found.readings else []
-    notes = [] if read else ["Nothing: no time window shows a steady ratio or level over enough steps."]
+    notes = [f"Aitken's {log.factors.says}." for log in found.accelerated if log.factors is not None]
+    if not read and found.logs:
+        notes.append("Nothing: no time window shows a steady ratio or level over enough steps.")
+    elif not read and not notes:
+        notes.append("Nothing: residuals show rho only where the relaxation is constant.")
     if interval.contradiction is not None:
         notes.append(f"CONTRADICTION: {interval.contradiction}.")
     else:
         notes += _bound("least", interval.lo, found.logs) + _bound("most", interval.hi, found.logs)
     return (
-        _seen(found.logs),
+        _seen(found.logs, found.accelerated),
         section("rho", "WHAT DO THEY SAY OF RHO?", *read, *notes),
         *_with_friction(found.friction_bounds),
         *next_run(found.next),
     )
 
 
-def _seen(logs: Sequence[SeenLog]) -> Section:
+def _seen(logs: Sequence[SeenLog], accelerated: Sequence[Accelerated]) -> Section:
     """The logs, column by column."""
     parts: list[Note | str] = []
     room = MOST_COLUMNS
@@ -373,8 +381,12 @@ def _seen(logs: Sequence[SeenLog]) -> Section:
     left = sum(len(log.columns) for log in logs) - MOST_COLUMNS
     if left > 0:
         parts.append(f"and {left} columns more, see --json")
-    steps = " and ".join(f"{n}" for n in sorted({log.steps for log in logs})) + " steps"
-    parts.append(f"Assumed: theta constant in each run, no Aitken or quasi-Newton.  A ratio counts over {steps}.")
+    for one in accelerated:
+        parts.append(f"{one.accelerator}, {one.form}, {one.file}")
+        parts += [Note(words, 4) for words in (one.says if one.factors is None else one.counted, *one.notes)]
+    if logs:
+        steps = " and ".join(f"{n}" for n in sorted({log.steps for log in logs})) + " steps"
+        parts.append(f"Assumed: theta constant in each run, no Aitken or quasi-Newton.  A ratio counts over {steps}.")
     return section("logs", "WHAT DO THE LOGS SHOW?", *parts)
 
 
@@ -382,7 +394,7 @@ def _readings(readings: Sequence[RunReading]) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for reading in readings:
         low = reading.lo
-        rho = NONE if low is None else Quantity(float(low), f">= {rounded(low, 3, up=False)}")
+        rho = NONE if low is None else Quantity(float(low), f">= {rounded(low, 4, up=False)}")
         rows.append((reading.kind, rho, reading.says))
     return table(("reading", "rho", "if it is the right one"), rows)
 
@@ -391,7 +403,7 @@ def _bound(which: str, bound: LogBound | None, logs: Sequence[SeenLog]) -> list[
     if bound is None:
         return []
     source = f"theta = {float(bound.log.theta):.4g}: {bound.says}" if len(logs) > 1 else bound.says
-    value = rounded(float(bound.value), 3, up=which == "most")
+    value = rounded(float(bound.value), 4, up=which == "most")
     return [f"rho is at {which} {value} given {bound.assumes} ({source})"]
 
 
