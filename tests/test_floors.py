@@ -103,7 +103,7 @@ BUDGET = {
     "fem1d2d": 3020,
     "ndtheory": 5600,
     "verification": 1230,
-    "verification.advice": 5740,
+    "verification.advice": 5750,
     "verification.algorithm": 2250,
     "verification.bounds": 3220,
     "verification.certificate": 1100,

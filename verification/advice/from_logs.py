@@ -21,6 +21,7 @@ from verification.advice.from_vectors import advice_on
 from verification.advice.log_files import Log, read_log
 from verification.advice.pace import CONVERGED, RELATIVE, Pace
 from verification.advice.readings import (
+    AT_ONE,
     LARGEST_TO_PASTE,
     SHORTEST_STEP,
     NextRun,
@@ -30,6 +31,7 @@ from verification.advice.readings import (
     few,
     kept,
     level,
+    pasted_or_not,
     read_observed,
     read_plateau,
     rounded_down,
@@ -150,8 +152,10 @@ def advise_logs(
     )
     if found.roles or not tied or spectrum is None or interval.contradiction is not None:
         return found
-    following = after_accelerated(spectrum, tied)
-    known |= {"logs": seen, "readings": found.readings, "interval": interval, "next": following}
+    paste = pasted_or_not(after_accelerated(spectrum, tied), [log.made for log in seen])
+    if paste is None:
+        return found
+    known |= {"logs": seen, "readings": found.readings, "interval": interval, "next": paste}
     return _of_factors(spectrum, tied=tied, **known)
 
 
@@ -213,9 +217,9 @@ def seen_log(log: Log, theta: Fraction, friction: bool = False) -> SeenLog:
 
 
 def of_pooled(theta: Fraction, ratio: Observed) -> NextRun:
-    """The run to make where the windows of a transient are too short one by one."""
+    """The run to make where the windows of a transient show no ratio one by one."""
     why = (
-        f"windows are too short one by one; their second halves have a ratio of {ratio} together, which bounds nothing"
+        f"windows show no ratio one by one; their second halves have a ratio of {ratio} together, which bounds nothing"
     )
     if ratio.most <= ends.SWIFT:
         return kept(theta, f"{why}, and none much faster is to be found")
@@ -240,7 +244,7 @@ def longer(columns: tuple[SeenColumn, ...], theta: Fraction) -> NextRun:
     steps = f"{steps_needed(theta)} steps or more in one time window"
     again = f"the same again, constant and without Aitken or quasi-Newton, {steps}"
     if all(one.kind == "short" for one in paces):
-        why = f"{again}: smaller limits of convergence and a larger number of iterations"
+        why = f"{again}: smaller limits of convergence and a larger number of iterations. {AT_ONE}"
     else:
         why = f"{again}, until the residual falls or grows steadily; a relative one must fall below 0.1 first"
     return NextRun(theta=float(theta), why=why, again=True)

@@ -184,6 +184,9 @@ def pace(residuals: Floats, column: Column, theta: Fraction) -> Pace:
         return before
     if height < CONVERGED and (settles := _settling(tail, relative, limit, steps)) is not None:
         return Pace(kind="steady", **settles, **known)
+    small = int(np.argmax(values[::-1] > SMALL)) if relative and values.max() > SMALL else taken + 1
+    if 0 < small <= steps:  # that a relative residual shows; windows of a few of them can be pooled
+        return Pace(kind="short", **(known | {"steps": small - 1, "lost": lost}))
     return Pace(kind="unsteady", lost=lost, **known)
 
 

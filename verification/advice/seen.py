@@ -52,7 +52,7 @@ class SeenColumn:
     ratio, plateau : Observed or None
         Of the windows put together.
     pooled : Observed or None
-        The pace of windows that are all too short, which bounds nothing.
+        The pace of windows of which none shows a ratio, which bounds nothing.
     """
 
     name: str
@@ -100,10 +100,10 @@ class SeenColumn:
 
 
 def seen_column(column: Column, theta: Fraction) -> SeenColumn:
-    """Read the windows of one field one by one and put them together; pool them where all are too short."""
+    """Read the windows of one field one by one and put them together; pool them where none shows a ratio."""
     windows = ([window for window in column.windows if len(window) > FEWEST_STEPS] or column.windows)[-MOST_WINDOWS:]
     paces = tuple(pace(window, column, theta) for window in windows)
-    short = all(one.kind == "short" for one in paces)
+    short = all(one.kind in ("short", "unsteady") for one in paces)
     relative, steps = column.residual in RELATIVE, steps_needed(theta)
     return SeenColumn(
         name=column.name,

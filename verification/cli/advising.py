@@ -97,6 +97,9 @@ def _words(context: click.Context, parameter: click.Parameter, begun: str) -> li
 def of_file(file: Path, keys: dict[str, str], swap: bool, tied: bool, snippets: str | None, as_json: bool) -> None:
     """Which body gets the Neumann problem, and which theta?
 
+    For two solvers coupled along an interface: elastic contact, tied bodies, heat (temperature and flux), and a fluid
+    with a structure (FSI, added mass).
+
     FILE is a problem file, or the interface.npz that a run has written.  Both assignments of the roles are compared:
     theta (no unit) and the factor of a step, predicted and proved, and lines to paste into a coupling configuration.
 

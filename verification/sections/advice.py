@@ -49,7 +49,7 @@ def _sections(found: Advice) -> Iterator[Section]:
     if found.assumes is not None:
         yield assumed(found)
     if found.matrices is not None:
-        yield given(found.matrices)
+        yield given(found.matrices, found.friction)
     if found.vectors is not None:
         yield from of_vectors(found, found.vectors)
     if found.run is not None:
@@ -160,7 +160,7 @@ def _which_theta(found: Advice) -> Section:
     if ends:
         said.append(f"if tied: 2/(2+rho_min+rho), {'; '.join(ends)}")
     said.append(f"steps: to an error of 1e-9{'; last column: if tied, at the predicted theta' * bool(ends)}")
-    lines = table(("Neumann", "rho", "", "theta", "per step", "steps", ""), rows)
+    lines = table(("Neumann", "rho", "theta is", "theta", "per step", "steps", "note"), rows)
     return section("theta", "WHICH THETA?", lines, *said)
 
 
@@ -299,13 +299,15 @@ def pasted(neumann_body: int | None, theta: float | None, *notes: str) -> Sectio
     return section("paste", "TO PASTE", Block(tuple(lines), 2), *notes)
 
 
-def given(seen: SeenMatrices) -> Section:
+def given(seen: SeenMatrices, friction: float | None) -> Section:
     """The matrices that were given."""
     of = [f"S{body}: {one.rows} unknowns" for body, one in ((1, seen.S1), (2, seen.S2))]
     if seen.transfer is not None and seen.neumann_body is not None:
         rows, columns = seen.transfer
         of.append(f"P: {rows} x {columns}, from body {seen.neumann_body} to body {3 - seen.neumann_body}")
     said = ["; ".join(of)]
+    if not friction:
+        said.append("Assumed: no friction.")
     if seen.ordering is None:
         said.append("Ordering: any, so long as both have the same.")
     else:
@@ -443,7 +445,7 @@ def _of_moduli(found: Advice, seen: SeenModuli) -> Sections:
     if found.next is not None:
         theta = f"{found.next.theta:g}"
         then = f"ndtheory advise run --theta {theta} --ratio R (R: the ratio of that run)"
-    last = next_run(found.next)
+    last: Sections = ()
     if tried is not None and tried.start is not None:
         last = (pasted(tried.neumann_body, tried.start.theta_guess),)
     return (
@@ -451,7 +453,7 @@ def _of_moduli(found: Advice, seen: SeenModuli) -> Sections:
         _least_rho(seen),
         _excluded(seen),
         _who(found, seen),
-        _start(started),
+        _start(started, None if last else found.next),
         *last,
         closing("a bound of rho from above with friction, or where no image fits", then=then),
     )
@@ -497,7 +499,7 @@ def _who(found: Advice, seen: SeenModuli) -> Section:
     return which_body(says)
 
 
-def _start(started: Sequence[ModuliRole]) -> Section:
+def _start(started: Sequence[ModuliRole], first: NextRun | None) -> Section:
     notes = []
     for role in started:
         start, body = role.start, f"body {role.neumann_body}"
@@ -509,7 +511,9 @@ def _start(started: Sequence[ModuliRole]) -> Section:
             f"{body}, with friction: theta = {start.theta_guess:.4g}, a guess: rho at most {figures(start.guess)}, as"
             f" with {start.guessed_from}",
         ]
+    if first is not None:
+        notes.append(f"theta = {first.theta:g}, a guess: {first.why}")
     if not started:
-        notes.append("None: a lower bound of rho gives no theta, 2/(2 + bound) can diverge.")
-        notes.append("If the mirror image of a body fits into the other one, say --mirror.")
+        notes.append("A lower bound of rho proves no theta. If the mirror image of a body fits into the other one, say")
+        notes[-1] += " --mirror."
     return section("start", "WHICH THETA TO START WITH?", *notes)
