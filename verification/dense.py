@@ -28,6 +28,8 @@ def vanishing(motions: Floats, rows: Ints) -> Floats:
     k = motions.shape[1]
     if not k or not len(rows):
         return motions
+    if k == 1:  # the decomposition of one column is its length
+        return motions[:, int(np.linalg.norm(motions[rows]) > STILL) :]
     _, values, right = np.linalg.svd(np.linalg.qr(motions[rows], mode="r"))
     rank = int((values > STILL).sum())
     return np.asarray(motions @ right[rank:].T)
@@ -40,8 +42,10 @@ def pinned(S: Floats, rows: Ints, motions: Floats) -> Floats:
     S, shape (n, n), is symmetric positive semidefinite, and ``motions``, shape (n, k), an orthonormal basis of its
     kernel.
     """
-    N = vanishing(motions, np.setdiff1d(np.arange(len(S)), rows))[rows]
-    return np.asarray(S[np.ix_(rows, rows)] + float(np.diag(S).max()) * N @ N.T)
+    others = np.ones(len(S), dtype=bool)
+    others[rows] = False
+    N, block = vanishing(motions, np.flatnonzero(others))[rows], S[np.ix_(rows, rows)]
+    return np.asarray(block + float(np.diag(S).max()) * N @ N.T) if N.size else block
 
 
 def worst(values: Floats) -> float:

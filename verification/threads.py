@@ -56,10 +56,11 @@ def one_thread() -> Iterator[None]:
     try:
         _set([(library, 1) for library, _ in own])
         with _lock:
+            if not _inside:  # else it is 1 already
+                several = {library: threads for library in shared if (threads := library.num_threads) != 1}
+                _before.update(several)
+                _set([(library, 1) for library in several])
             _inside.add(token)
-            several = {library: threads for library in shared if (threads := library.num_threads) != 1}
-            _before.update(several)
-            _set([(library, 1) for library in several])
         yield
     finally:
         with _lock:

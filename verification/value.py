@@ -7,6 +7,9 @@ from typing import Any, TypeVar
 
 T = TypeVar("T")
 
+#: Types without arrays.
+PLAIN = frozenset((bool, int, float, str, type(None)))
+
 
 class Value:
     """Base of a frozen dataclass that holds arrays, declared with ``repr=False``.
@@ -39,6 +42,8 @@ class Value:
 
 def freeze(value: T) -> T:
     """Make an array, or all arrays of a sparse matrix or a tuple, read-only, and return the same object."""
+    if type(value) in PLAIN:  # most values of an iterate: it is made at every step
+        return value
     held: Any = value
     if hasattr(held, "setflags"):  # numpy is not imported: the calculator starts without it
         held.setflags(write=False)

@@ -13,6 +13,9 @@ from verification.figures import style
 #: The colours of ``verification/data/drawing.js``.
 COLOURS = {"blue": "#0072b2", "red": "#d55e00", "green": "#009e73", "orange": "#e69f00", "grey": "#777777"}
 
+#: The size of words in the still picture, in points: as large beside the axes as in the page.
+WORDS = 7
+
 
 def axis(name: str, low: float, high: float, *, log: bool = False) -> dict[str, Any]:
     """An axis of a chart; with ``log`` a logarithmic one."""
@@ -29,14 +32,21 @@ def dots(points: Iterable[Sequence[float]], colour: str = "blue", *, hollow: boo
     return {"kind": "dots", "points": _rounded(points), "colour": colour, "hollow": hollow}
 
 
+def crosses(points: Iterable[Sequence[float]], colour: str = "red") -> dict[str, Any]:
+    """A cross at each point (x, y)."""
+    return {"kind": "crosses", "points": _rounded(points), "colour": colour}
+
+
 def note(x: float, y: float, text: str, colour: str = "", *, anchor: str = "start") -> dict[str, Any]:
     """Words beside (x, y), which is their ``start``, ``middle`` or ``end``."""
     return {"kind": "note", "points": _rounded([(x, y)]), "text": text, "colour": colour, "anchor": anchor}
 
 
-def chart(label: str, x: Mapping[str, Any], y: Mapping[str, Any], fixed: Iterable[Any] = ()) -> dict[str, Any]:
-    """A chart; ``fixed`` are the marks that belong to every scene and are seen before the answer."""
-    return {"label": label, "x": x, "y": y, "fixed": list(fixed)}
+def chart(
+    label: str, x: Mapping[str, Any], y: Mapping[str, Any], fixed: Iterable[Any] = (), before: Iterable[Any] = ()
+) -> dict[str, Any]:
+    """A chart; ``fixed`` are the marks that belong to every scene, ``before`` those of the question only."""
+    return {"label": label, "x": x, "y": y, "fixed": list(fixed), "before": list(before)}
 
 
 def slider(name: str, label: str, values: Iterable[Any], start: int) -> dict[str, Any]:
@@ -113,11 +123,14 @@ def _draw(ax: Any, mark: Mapping[str, Any]) -> None:
         ax.plot(xs, ys, "--" if mark["dashed"] else "-", color=colour)
     elif mark["kind"] == "dots":
         ax.plot(xs, ys, "o", color=colour, markersize=4, mfc="none" if mark["hollow"] else colour)
+    elif mark["kind"] == "crosses":
+        ax.plot(xs, ys, "x", color=colour, markersize=4)
     else:
         sides = {"start": "left", "middle": "center", "end": "right"}
-        ax.text(xs[0], ys[0], mark["text"], color=colour, ha=sides[mark["anchor"]], clip_on=True)
+        ax.text(xs[0], ys[0], mark["text"], ha=sides[mark["anchor"]], clip_on=True, fontsize=WORDS)
 
 
 def _rounded(points: Iterable[Sequence[float]]) -> list[list[float]]:
-    """Six digits: a pixel needs four."""
-    return [[float(f"{value:.6g}") for value in point] for point in points]
+    """Six digits, as a pixel needs four; whole numbers without a point, as each character is loaded."""
+    short = lambda value: int(value) if value == int(value) else value
+    return [[short(float(f"{value:.6g}")) for value in point] for point in points]

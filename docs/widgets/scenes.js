@@ -18,6 +18,8 @@ for (const [name, data] of Object.entries(ndData).filter(([, one]) => one.scenes
       line: (chart, { points, colour, dashed }) => chart.line(points, { stroke: nd.COLOURS[colour], ...(dashed ? { "stroke-dasharray": "5 3" } : {}) }),
       dots: (chart, { points, colour, hollow }) => points.forEach(([x, y]) => chart.dot(x, y,
         hollow ? { fill: "none", stroke: nd.COLOURS[colour], "stroke-width": 1.5, r: 3.5 } : { fill: nd.COLOURS[colour], r: 3.5 })),
+      crosses: (chart, { points, colour }) => points.forEach(([x, y]) => chart.marks.append(nd.svg("path", { class: "curve",
+        d: `M${chart.toX(x) - 3},${chart.toY(y) - 3}l6,6m0,-6l-6,6`, stroke: nd.COLOURS[colour] }))),
       note: (chart, { points, text, colour, anchor }) => chart.note(...points[0], text,
         { "text-anchor": anchor, ...(colour ? { class: colour } : {}) }),
     };
@@ -25,10 +27,10 @@ for (const [name, data] of Object.entries(ndData).filter(([, one]) => one.scenes
     function draw() {
       const scene = data.scenes[sliders.map((slider) => Math.round(slider.value)).join(",")];
       charts.forEach((chart, i) => {
-        const { fixed } = data.charts[i];
-        chart.root.toggleAttribute("hidden", !widget.revealed && fixed.length === 0);
+        const { fixed, before } = data.charts[i], shown = [...fixed, ...(widget.revealed ? scene.marks[i] : before)];
+        chart.root.toggleAttribute("hidden", shown.length === 0);
         chart.clear();
-        for (const mark of widget.revealed ? [...fixed, ...scene.marks[i]] : fixed) marks[mark.kind](chart, mark);
+        for (const mark of shown) marks[mark.kind](chart, mark);
       });
       widget.says.textContent = scene.says;
       nd.fill(widget.table, data.head, scene.rows);

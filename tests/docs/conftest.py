@@ -23,7 +23,7 @@ def builder():
     """The modules of ``docs/builder`` that need no Sphinx; they lie in a folder of scripts, not in a package."""
     sys.path.append(str(DOCS))
     try:
-        names = ("algorithm", "api", "cheat_sheet", "course", "equations", "notebooks", "widgets")
+        names = ("algorithm", "api", "cheat_sheet", "course", "equations", "notebooks", "questions", "widgets")
         return SimpleNamespace(**{name: import_module(f"builder.{name}") for name in names})
     finally:
         sys.path.remove(str(DOCS))
@@ -61,9 +61,11 @@ def unanswered(driver, page):
 
 
 @pytest.fixture
-def browser(driver, page):
+def browser(driver, page, builder):
     """The page with an address that holds a state of each widget, so that no question is asked."""
+    first = {name: builder.questions.of(name).data()["sliders"][0] for name in builder.questions.PAGES}
+    states = [f"{name}.{slider['name']}={slider['start']}" for name, slider in first.items()]
     driver.get("about:blank")
-    driver.get(f"{page.as_uri()}#cobweb.theta=1&plane.unit=0&spectrum.step=0")
+    driver.get(f"{page.as_uri()}#{'&'.join(['cobweb.theta=1', 'plane.unit=0', 'spectrum.step=0', *states])}")
     yield driver
     assert [entry["message"] for entry in driver.get_log("browser")] == []

@@ -37,6 +37,11 @@ def pages_of(deck: Path) -> list[Path]:
     return list(dict.fromkeys(deck.parent / link for link in found))
 
 
+def script(widget: str) -> str:
+    """The script that fills a widget."""
+    return widget if (DOCS / "widgets" / f"{widget}.js").exists() else "scenes"
+
+
 def faults(site: Path, lectures: int) -> list[str]:
     """Lines ``deck: what is wrong``: lectures without a deck, few slides, missing files, pages and widgets."""
     decks, found = links(site / "lecturers.html"), []
@@ -57,7 +62,7 @@ def faults(site: Path, lectures: int) -> list[str]:
         shown = {name for page in pages_of(deck) for name in WIDGET.findall(page.read_text("utf-8"))}
         if shown != set(WIDGET.findall(text)):
             found.append(f"{deck.name}: needed the widgets {sorted(shown)}")
-        found += [f"{deck.name}: no script of {name}" for name in shown if f'/{name}.js"' not in text]
+        found += [f"{deck.name}: no script of {name}" for name in shown if f'/{script(name)}.js"' not in text]
     return found
 
 

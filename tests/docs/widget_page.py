@@ -21,6 +21,17 @@ def move(browser, name, slider, value):
     )
 
 
+def place(browser, name, data, positions):
+    """Move all sliders of a widget made of scenes."""
+    for slider, position in zip(data["sliders"], positions, strict=True):
+        move(browser, name, slider["name"], position)
+
+
+def drawn(chart):
+    """The tags of the marks of a chart."""
+    return [mark.tag_name for mark in chart.find_elements("css selector", ":scope > g:last-child > *")]
+
+
 def rows(browser, name):
     table = frame(browser, name).find_element("css selector", "table").get_attribute("innerHTML")
     return [re.findall(r"<td>(.*?)</td>", row) for row in table.split("<tr>") if "<td>" in row]

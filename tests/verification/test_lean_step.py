@@ -135,8 +135,8 @@ def test_what_the_active_set_gets_wrong_is_not_certified(part, monkeypatch):
     """The certificate multiplies by the whole matrix itself: no product of the solver enters it."""
     solve = ActiveSet.solve
 
-    def wrong(self, q, bound, start):
-        found = solve(self, q, bound, start)
+    def wrong(self, q, bound, start, hint=None):
+        found = solve(self, q, bound, start, hint)
         return tuple(x * (1 + 1e-9) if i == part else x for i, x in enumerate(found))
 
     pair = sheared()
@@ -202,6 +202,24 @@ def test_the_moving_block_is_factorised_only_where_the_pattern_changes(monkeypat
     assert len(calls) == found
     T(np.zeros_like(start))
     assert len(calls) > found
+
+
+def test_no_digit_depends_on_the_pattern_that_is_tried_first():
+    """Where both settle; also the direction of a node without friction, which nothing mends, is that of the start."""
+    random, settled = np.random.default_rng(3), 0
+    A = random.normal(size=(8, 8))
+    S = A @ A.T + np.eye(8)
+    solver = ActiveSet(S, np.ones(8, dtype=bool), 4)
+    draw = lambda: Pattern(touching=random.random(4) < 0.5, sliding=random.integers(-1, 2, 4).astype(np.int8))
+    for _ in range(200):
+        q, bound, start = random.normal(size=8), random.choice([0.0, 0.3, 1.0], 4), draw()
+        alone, hinted = solver.solve(q, bound, start), solver.solve(q, bound, start, draw())
+        if alone is not None and hinted is not None:
+            settled += 1
+            assert alone[2] == hinted[2]
+            assert np.array_equal(alone[0], hinted[0])
+            assert np.array_equal(alone[1], hinted[1])
+    assert settled > 150
 
 
 def test_the_kept_system_is_that_of_the_pattern_it_is_asked_for():

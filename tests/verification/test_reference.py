@@ -121,9 +121,9 @@ def test_auto_asks_the_program_only_where_the_active_set_does_not_close(run, mon
 def test_where_the_active_set_does_not_close_auto_takes_the_program(run, monkeypatch):
     solve, calls = ActiveSet.solve, []
 
-    def cycling(self, q, bound, start):
+    def cycling(self, q, bound, start, hint=None):
         calls.append(start)
-        return None if len(calls) == 1 else solve(self, q, bound, start)
+        return None if len(calls) == 1 else solve(self, q, bound, start, hint)
 
     monkeypatch.setattr(ActiveSet, "solve", cycling)
     state = next(vf.iterate(run.pair))

@@ -12,8 +12,11 @@ from verification.interface.fields import ContactFields
 from verification.output.folder import Folder
 from verification.reproduce import FIGURES, READINGS, reproduce
 from verification.reproduce.claims import CLAIMS, OPTIMUM, Curve, curves_hold, share_as_printed, zones, zones_hold
-from verification.reproduce.experiments import THETAS, Outcome, Reproduction, Result, outcome_of
+from verification.reproduce.experiments import THETAS, Outcome, Reproduction, Result, outcome_of, shared
 from verification.reproduce.refutation import Runs, decide
+from verification.sweeps.grid import SweepGrid
+from verification.sweeps.sweep import sweep_grid
+from verification.sweeps.workers import alone
 
 LITERAL = [reading for reading in READINGS if not reading.departs]
 HELD_BY_CONTACT = [
@@ -213,6 +216,21 @@ def test_figures_share_the_runs_of_the_curve_that_they_have_in_common():
     runs = Runs(CLAMPED, made)
     assert [decide(claim, runs).holds for claim in (*CURVES, OPTIMUM)] == [False] * 4
     assert len(made.asked) == 2
+
+
+def test_figures_make_the_rows_of_that_curve_once_and_they_are_those_that_each_would_make():
+    problem, made = CLAMPED.problem(60), []
+
+    def counted(start, wanted):
+        made.extend(wanted)
+        yield from alone(start, wanted)
+
+    work = shared(counted, problem)
+    axes = [CLAIMS["fig10"].axes | {"refine": [1]}, CLAIMS["fig11"].axes, CLAIMS["fig12"].axes]
+    for given in axes:
+        grid = SweepGrid.of({**given, "theta": ["0.3"]})
+        assert sweep_grid(problem, grid, work=work).rows == sweep_grid(problem, grid).rows
+    assert len(made) == 1 + 2 + 2
 
 
 def test_meshes_that_are_not_run_leave_a_figure_undecided_and_refute_it_as_well():

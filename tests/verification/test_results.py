@@ -74,6 +74,17 @@ def test_a_run_that_was_pickled_still_has_its_displacements_and_is_linearised_al
     assert other.linearise().linearised == run.linearised
 
 
+def test_a_body_is_pickled_without_its_stiffness_and_assembles_it_again_to_the_last_bit(results):
+    run = results["Run"]
+    for body in (run.pair.body1.body, run.pair.body2.body):
+        written = pickle.dumps(body)
+        assert len(written) < body.stiffness.data.nbytes + body.stiffness.indices.nbytes
+        there = pickle.loads(written).stiffness
+        for name in ("data", "indices", "indptr"):
+            assert np.array_equal(getattr(there, name), getattr(body.stiffness, name))
+            assert not getattr(there, name).flags.writeable
+
+
 def arrays(value: Any, seen: set[int], path: str = "") -> list[tuple[str, np.ndarray]]:
     """Every array that can be reached from a result by its fields, and by what is worked out from them and kept."""
     if id(value) in seen:

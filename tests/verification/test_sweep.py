@@ -4,7 +4,10 @@ import csv
 import io
 import pickle
 import tomllib
+import tracemalloc
+from fractions import Fraction
 from itertools import islice, pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,9 +18,11 @@ import verification as vf
 from ndtheory import evaluate_energy
 from verification.algorithm.relaxation import RULES
 from verification.contact import ContactError, active_set
+from verification.contact.step import contact_model
 from verification.interface import body
 from verification.sweeps import course, grid, workers
-from verification.sweeps.course import KnownPieces
+from verification.sweeps import row as of_rows
+from verification.sweeps.course import KnownPieces, Shelf
 from verification.sweeps.row import RESULTS, SharedBodies, row
 
 SMALL = vf.example("section6").changed(cells=((10, 2), (8, 2)), radius="0.2", max_iterations=200)
@@ -358,6 +363,55 @@ def test_a_figure_has_a_curve_for_each_value_of_a_third_column(wide):
         wide.plot("nonsense")
     with pytest.raises(ValueError, match="no row has a number"):
         wide.plot("theta", "law")
+
+
+def test_what_sixteen_frictions_keep_at_121_contact_nodes_stays_below_100_megabytes(capfd):
+    """Beside the pair; with all pieces of each friction it was 0.7 GB, and processes were ended for it."""
+    contact_model()  # importing it takes memory of its own
+    fine = vf.example("section6").changed(cells=((200, 3), (120, 3)))
+    bodies = SharedBodies(fine)
+    assert bodies.setting({}).pair.contact.grid.n == 121
+    frictions, theta, most = [Fraction(i, 20) for i in range(1, 17)], Fraction(3, 10), []
+    tracemalloc.start()
+    try:
+        before = tracemalloc.get_traced_memory()[0]
+        for k in frictions:
+            assert row(fine, {"friction": k, "theta": theta}, bodies)["outcome"] == "converged"
+            most.append(tracemalloc.get_traced_memory()[1] - before)
+    finally:
+        tracemalloc.stop()
+    assert max(most) < 100e6
+    vf.sweep(fine, friction=frictions, theta=[theta], jobs=2)
+    assert capfd.readouterr().err == ""
+
+
+def test_a_shelf_keeps_the_last_used_within_its_bytes_and_at_least_one():
+    shelf, made = Shelf(2 * 800), []
+
+    def get(key, size=100):
+        return shelf.get(key, lambda: made.append(key) or SimpleNamespace(array=np.zeros(size)))
+
+    for key in "aabacabd":
+        get(key)
+        assert shelf.nbytes <= 3 * 800
+    assert made == list("abcd")  # a was used again and again: b goes before it
+    assert get("d") is get("d")
+    get("large", 1000)
+    get("e")
+    get("large", 1000)
+    assert made[4:] == ["large", "e", "large"]
+
+
+def test_rows_that_are_refused_for_one_reason_find_it_once(monkeypatch):
+    made, condense = [], of_rows.pair_from
+    monkeypatch.setattr(of_rows, "pair_from", lambda *args, **named: made.append(args) or condense(*args, **named))
+    sliding = SMALL.changed(neumann_body=2)
+    data = sliding.to_dict()
+    data["body2"]["prescribed"] = {"top": ["free", "-0.015"]}
+    found = vf.sweep(vf.Problem.from_dict(data), theta=[0.1, 0.2, 0.3])
+    assert {entry["outcome"] for entry in found.rows} == {"refused"}
+    assert len({entry["reason"] for entry in found.rows}) == 1
+    assert len(made) == 1
 
 
 def test_ctrl_c_keeps_the_rows_that_are_done(monkeypatch):

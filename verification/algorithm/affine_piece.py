@@ -176,10 +176,16 @@ class Piece(Value):
 
 def piece_of(pair: ContactPair, g: Floats, pattern: Pattern) -> Piece:
     """Return the affine piece around g, whose contact pattern is known."""
+    sign, still = signs_of(pair, g, pattern)
+    return Piece(pair=pair, pattern=pattern, sign=sign, still=still)
+
+
+def signs_of(pair: ContactPair, g: Floats, pattern: Pattern) -> tuple[NDArray[np.int8], NDArray[np.bool_]]:
+    """Return ``sign`` and ``still`` of that piece."""
     neumann = pair.neumann.grid
     sign, still = np.zeros(pair.contact.grid.t, dtype=np.int8), np.zeros(neumann.n, dtype=bool)
     if pair.rubs:
         sign = np.sign(pair.interface.stress(g)).astype(np.int8)
         if not sign.all():
             still = ~pair.interface.pressed(pattern.touching) & (g[neumann.normal] == 0)
-    return Piece(pair=pair, pattern=pattern, sign=sign, still=still)
+    return sign, still

@@ -57,6 +57,10 @@ class FixedPointMap:
         u = self.displacement(g)
         return u, self.contact(g, u)
 
+    def restart(self) -> None:
+        """Begin another run, with the same iterates as a new map would give; what this one has met saves time."""
+        self._step.restart()
+
     def displacement(self, g: Floats) -> Floats:
         """Solve (I): ``S2 u2 = g + l2``."""
         neumann = self.pair.neumann

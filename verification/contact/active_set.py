@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fem1d2d.mesh import Floats
-from verification.dense import Cholesky, worst
+from verification.dense import STILL, Cholesky, vanishing, worst
 from verification.value import Value
 
 #: Signs are read with this slack relative to the largest force, so that rounding does not flip a node for ever.
@@ -42,7 +42,7 @@ class Pattern(Value):
     def summary(self) -> str:
         return f"{int(self.touching.sum())} of {len(self.touching)} nodes touch, {int((self.sliding != 0).sum())} slide"
 
-    @property
+    @cached_property
     def key(self) -> bytes:
         """Bytes that are equal for equal patterns."""
         return self.touching.tobytes() + self.sliding.tobytes()
@@ -72,14 +72,17 @@ class System:
 
     v = 0 where a node touches or sticks, the force is 0 where it is open and the friction bound where it slides.
     ``motions``, shape (t + n, k), is the kernel of S, where only contact holds the body.  Motions that the pattern
-    leaves free are pinned: the force does not depend on them, and where the loads work in one the equilibrium fails.
+    leaves free, the columns of ``loose``, are pinned: the force does not depend on them, and where the loads work in
+    one the equilibrium fails.
     """
 
     def __init__(self, S: Floats, free: NDArray[np.bool_], pattern: Pattern, motions: Floats | None = None) -> None:
         self.pattern = pattern
         self._slides, self._open = pattern.sliding != 0, ~pattern.touching
         self.sign = pattern.sliding.astype(float)
-        self._rows = np.flatnonzero(np.concatenate([self._slides, self._open]) & free)
+        moves = np.concatenate([self._slides, self._open])
+        self.loose = None if motions is None else vanishing(motions, np.flatnonzero(~moves))
+        self._rows = np.flatnonzero(moves & free)
         self._columns, self._factor = S[self._rows], Cholesky(S, self._rows, motions)
 
     def solve(self, q: Floats, bound: Floats) -> tuple[Floats, Floats]:
@@ -131,19 +134,30 @@ class ActiveSet:
         self._held = None if free[:tangential].all() else ~free[:tangential]
         self._stiffness = float(np.diag(S).max())
 
-    def _begin(self, start: Pattern, smooth: NDArray[np.bool_]) -> Pattern:
-        """Return the first guess: no held node slides, every node whose bound is zero does."""
+    def _begin(self, start: Pattern, smooth: NDArray[np.bool_], hint: Pattern | None) -> Pattern:
+        """Return the first guess: no held node slides, every node whose bound is zero does.
+
+        A hint takes the place of the start, except for the direction of nodes whose bound is zero: nothing mends that.
+        """
         sliding = start.sliding
+        if hint is not None:
+            sliding = np.where(smooth, sliding, hint.sliding)
+            start = Pattern(touching=hint.touching, sliding=sliding)
         if self._held is not None:
             sliding = np.where(self._held, 0, sliding)
         if np.count_nonzero(smooth):
             sliding = np.where(smooth & (sliding == 0), 1, sliding)
         return start if sliding is start.sliding else Pattern(touching=start.touching, sliding=sliding.astype(np.int8))
 
-    def solve(self, q: Floats, bound: Floats, start: Pattern) -> tuple[Floats, Floats, Pattern] | None:
-        """Correct the pattern until every sign agrees: v, the force and the pattern; None where it does not settle."""
+    def solve(
+        self, q: Floats, bound: Floats, start: Pattern, hint: Pattern | None = None
+    ) -> tuple[Floats, Floats, Pattern] | None:
+        """Correct the pattern until every sign agrees: v, the force and the pattern; None where it does not settle.
+
+        The first guess is ``hint`` where there is one.
+        """
         seen: set[bytes] = set()
-        for v, force, pattern, agrees in islice(self._guesses(q, bound, start), LIMIT):
+        for v, force, pattern, agrees in islice(self._guesses(q, bound, start, hint), LIMIT):
             if agrees:
                 return v, force, pattern
             if pattern.key in seen:
@@ -160,18 +174,21 @@ class ActiveSet:
             seen.add(pattern.key)
             yield v, force, pattern
 
-    def _guesses(self, q: Floats, bound: Floats, pattern: Pattern) -> Iterator[tuple[Floats, Floats, Pattern, bool]]:
+    def _guesses(
+        self, q: Floats, bound: Floats, pattern: Pattern, hint: Pattern | None = None
+    ) -> Iterator[tuple[Floats, Floats, Pattern, bool]]:
         """Yield v and force of each guess and whether every sign agrees; the next guess is the last one mended.
 
         A touching node that pulls opens, an open one that penetrates touches; a sticking node above its bound slides
         the way it is pushed; a sliding one of the wrong sign goes to stick, never straight to the opposite slip, which
-        would cycle.  A node whose bound is zero slides.
+        would cycle.  A node whose bound is zero slides.  Where all nodes slide along a rigid motion :func:`_shifted`
+        says which of them sticks.
         """
         t = self._t
         force_slack = SLACK * max(worst(np.abs(q)), worst(bound))
         length_slack = force_slack / self._stiffness
         smooth = bound == 0 if self._held is None else (bound == 0) & ~self._held
-        pattern = self._begin(pattern, smooth)
+        pattern = self._begin(pattern, smooth, hint)
         while True:
             system = self._systems.of(pattern)
             v, force = system.solve(q, bound)
@@ -183,5 +200,32 @@ class ActiveSet:
             if self._held is not None:
                 pushed &= ~self._held
             yield v, force, system.pattern, not any(map(np.count_nonzero, (pulls, enters, pushed, back)))
-            sliding = np.where(pushed, np.sign(force[:t]), np.where(back, 0, pattern.sliding)).astype(np.int8)
-            pattern = Pattern(touching=pattern.touching & ~pulls | enters, sliding=sliding)
+            sliding = _shifted(system, q, bound, v)
+            if sliding is None:
+                sliding = np.where(pushed, np.sign(force[:t]), np.where(back, 0, pattern.sliding))
+            pattern = Pattern(touching=pattern.touching & ~pulls | enters, sliding=sliding.astype(np.int8))
+
+
+def _shifted(system: System, q: Floats, bound: Floats, v: Floats) -> Floats | None:
+    """Return the slips after the shift in a rigid motion that lessens the energy most; None where there is none.
+
+    If every node slides, nothing in the system of the pattern resists a motion z along Gamma_c, and v is known up to a
+    multiple of it.  The energy ``sum_j bound_j |v_j + s z_j| - s q' z`` is least where the friction of the nodes whose
+    slip s has reversed outweighs the loads: the node at which it does sticks.
+    """
+    if system.loose is None or system.loose.shape[1] != 1:
+        return None
+    t, z = len(bound), system.loose[:, 0]
+    if np.abs(z[t:]).max() > STILL:
+        return None
+    rubs = np.flatnonzero((bound > 0) & (np.abs(z[:t]) > STILL))
+    shifts, friction = -v[rubs] / z[rubs], bound[rubs] * np.abs(z[rubs])
+    order = np.argsort(shifts)
+    slope = 2 * np.cumsum(friction[order]) - friction.sum() - float(q @ z)
+    if not len(rubs) or slope[-1] < 0 or slope[0] - 2 * friction[order[0]] > 0:
+        return None  # the loads move the body off
+    last = order[int(np.argmax(slope >= 0))]
+    sliding = system.sign.copy()
+    sliding[rubs] = np.sign(v[rubs] + shifts[last] * z[rubs])
+    sliding[rubs[last]] = 0
+    return sliding

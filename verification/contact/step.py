@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fem1d2d.mesh import Floats
 from verification.contact.active_set import ActiveSet, Pattern, Systems
 from verification.contact.kkt import KKT, TOLERANCE, KKTCertificate
+from verification.dense import STILL
 from verification.interrupts import undisturbed
 from verification.value import Value
 
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
     from verification.contact.model import ContactModel
 
 Solver = Literal["auto", "cvxpy", "active-set"]
+
+#: Number of the last steps whose loads and patterns are remembered.
+KEPT = 128
 
 
 class ContactError(RuntimeError):
@@ -94,7 +98,12 @@ class ContactStep:
         self._active = ActiveSet(S, free, tangential, self._motions, systems)
         self._certificate = KKTCertificate(S, free)
         self._model: ContactModel | None = None
-        self._pattern = Pattern.sticking(len(S) - tangential, tangential)
+        self._first = self._pattern = Pattern.sticking(len(S) - tangential, tangential)
+        self._loads, self._patterns, self._solved = np.zeros((KEPT, len(S))), [self._first] * KEPT, 0
+
+    def restart(self) -> None:
+        """Forget the last pattern, as for the first step of a run; no digit depends on what else is kept."""
+        self._pattern = self._first
 
     def solve(self, q: Floats, bound: Floats) -> ContactSolution:
         """Solve and certify.
@@ -106,24 +115,43 @@ class ContactStep:
         NoMinimiser, ContactError
             Without a minimiser, or a certificate.
         """
-        found = None if self._solver == "cvxpy" else self._by_active_set(q, bound, self._pattern, "active-set")
+        start, found = self._pattern, None
+        if self._solver != "cvxpy":
+            hint = self._nearest(q)
+            if hint != start:
+                found = self._by_active_set(q, bound, start, "active-set", hint)
+            found = found or self._by_active_set(q, bound, start, "active-set")
         if found is None and (way := way_out(self._motions, q, bound)):
             raise NoMinimiser(f"step II has no minimiser: the loads move {self._body} {way}")
         if found is None and self._solver != "active-set" and (answer := self._of_program(q, bound)):
             found = self._by_active_set(q, bound, answer.pattern, "cvxpy")
         if found is None:
-            sticking = Pattern.sticking(len(self._S) - self._t, self._t)
+            sticking = self._first
             found = self._by_active_set(q, bound, sticking, "active-set") or self._by_a_guess(q, bound, sticking)
         if found is None:
             why = f": {self._near} is too near 1/2 for doubles" if self._near else ""
             raise ContactError(f"the contact step did not reach a KKT residual of {TOLERANCE:g}{why}")
         self._pattern = found.pattern
+        place = self._solved % KEPT
+        self._loads[place], self._patterns[place], self._solved = q, found.pattern, self._solved + 1
         return found
 
+    def _nearest(self, q: Floats) -> Pattern:
+        """Return the pattern of the step whose loads were nearest to these: a run comes back to where it was."""
+        if not self._solved:
+            return self._pattern
+        off = self._loads[: self._solved] - q
+        return self._patterns[int(np.argmin(np.einsum("ij,ij->i", off, off)))]
+
     def _by_active_set(
-        self, q: Floats, bound: Floats, start: Pattern, solver: Literal["cvxpy", "active-set"]
+        self,
+        q: Floats,
+        bound: Floats,
+        start: Pattern,
+        solver: Literal["cvxpy", "active-set"],
+        hint: Pattern | None = None,
     ) -> ContactSolution | None:
-        closed = self._active.solve(q, bound, start)
+        closed = self._active.solve(q, bound, start, hint)
         return None if closed is None else self._certified(q, bound, closed, solver)
 
     def _by_a_guess(self, q: Floats, bound: Floats, start: Pattern) -> ContactSolution | None:
@@ -207,13 +235,18 @@ def way_out(motions: Floats, q: Floats, bound: Floats) -> str:
 
 def _work(motions: Floats, q: Floats, bound: Floats, *, sliding: bool) -> bool:
     """Return True if the loads do more work in some motion (tangential only, if ``sliding``) than friction takes."""
-    from scipy.optimize import linprog  # slow to import and seldom needed
-
     t, k = len(bound), motions.shape[1]
     size = max(float(np.abs(q).max()), float(bound.max(initial=0.0)))
     if size == 0.0:
         return False
     slip, normal, one = motions[:t], motions[t:], np.eye(t)
+    if k == 1:  # the work grows in proportion to the motion, either way
+        up, down = normal.max() > STILL, normal.min() < -STILL
+        ways = ([] if up or (sliding and down) else [1]) + ([] if down or (sliding and up) else [-1])
+        friction = float(bound @ np.abs(slip[:, 0]))
+        return any(way * float(motions[:, 0] @ q) - friction > TOLERANCE * size for way in ways)
+    from scipy.optimize import linprog  # slow to import and seldom needed
+
     moves = np.hstack([normal, np.zeros((len(normal), t))])
     rubs = np.block([[slip, -one], [-slip, -one]])
     kept = {"A_ub": rubs, "b_ub": np.zeros(len(rubs)), "A_eq": moves, "b_eq": np.zeros(len(moves))}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,10 +38,10 @@ class Branches(Pattern):
 
     threshold: NDArray[np.int8]
 
-    @property
+    @cached_property
     def key(self) -> bytes:
         """Bytes that are equal for equal branches only."""
-        return super().key + self.threshold.tobytes()
+        return self.touching.tobytes() + self.sliding.tobytes() + self.threshold.tobytes()
 
 
 class ContactSystem:

@@ -6,14 +6,26 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.linalg import cholesky, qr
 
-from fem1d2d import FEW, Condensation, Lifted, Material, Mesh, Supports, Uncoupled, elimination_order, gram, solver
+from fem1d2d import (
+    FEW,
+    Condensation,
+    Lifted,
+    Material,
+    Mesh,
+    Supports,
+    Uncoupled,
+    elimination_order,
+    gram,
+    solver,
+    stiffness,
+)
 from fem1d2d.mesh import Floats, Ints
 from verification.dense import STILL, Cholesky
 from verification.interface.interface import Grid
@@ -72,6 +84,16 @@ class Body(Value):
     @property
     def summary(self) -> str:
         return f"{self.name}, {len(self.mesh.points)} nodes, {len(self.nodes)} on Gamma_c"
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out the stiffness matrix, most of its bytes: it is assembled again."""
+        return {name: value for name, value in super().__getstate__().items() if name != "stiffness"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        super().__setstate__(state)
+        if "stiffness" not in state:
+            matrix = stiffness(self.mesh, self.material)[self.positions][:, self.positions]
+            object.__setattr__(self, "stiffness", freeze(matrix.tocsc()))
 
     @cached_property
     def gram_matrix(self) -> sp.csc_array:

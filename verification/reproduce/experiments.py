@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
 from verification.document import Document
 from verification.interface.fields import ContactFields
+from verification.interface.pair import ContactPair
 from verification.monolithic import SolveError, solve
+from verification.problem import Problem
 from verification.problem.tables import ProblemError
 from verification.progress import Progress, silent
 from verification.reproduce.claims import (
@@ -25,8 +27,10 @@ from verification.reproduce.claims import (
     zones_hold,
 )
 from verification.reproduce.readings import READINGS, ModelReading
-from verification.sweeps.row import FAILED
-from verification.sweeps.sweep import sweep
+from verification.sweeps.grid import SweepGrid
+from verification.sweeps.row import FAILED, Row
+from verification.sweeps.sweep import sweep_grid, work_of
+from verification.sweeps.workers import Placed, Work
 
 FIGURES = tuple(CLAIMS)
 
@@ -177,17 +181,20 @@ def reproduce(
     for name in figures:
         if name not in CLAIMS:
             raise ValueError(f"no figure {name!r}; there are {', '.join(CLAIMS)}")
-    results, done, total = [], 0, len(figures) * len(readings)
-    for name in figures:
-        outcomes, rows = [], []
-        for reading in readings:
+    outcomes: dict[str, list[Outcome]] = {name: [] for name in figures}
+    rows: dict[str, list[dict[str, Any]]] = {name: [] for name in figures}
+    done, total = 0, len(outcomes) * len(readings)
+    for reading in readings:
+        work = shared(work_of(jobs), reading.problem(60))
+        for name in outcomes:
             progress(f"{name}: {reading.name}", done / total)
-            outcome, behind = _zones(reading) if name == "fig5" else _curves(name, reading, jobs, store)
-            outcomes.append(outcome)
-            rows += [{"reading": reading.name, **row} for row in behind]
+            outcome, behind = _zones(reading) if name == "fig5" else _curves(name, reading, work, store)
+            outcomes[name].append(outcome)
+            rows[name] += [{"reading": reading.name, **row} for row in behind]
             done += 1
-        results.append(Result(figure=name, outcomes=tuple(outcomes), rows=tuple(rows)))
-    return Reproduction(results=tuple(results))
+    return Reproduction(
+        results=tuple(Result(figure=name, outcomes=tuple(outcomes[name]), rows=tuple(rows[name])) for name in figures)
+    )
 
 
 def _zones(reading: ModelReading) -> tuple[Outcome, list[dict[str, Any]]]:
@@ -203,10 +210,34 @@ def _zones(reading: ModelReading) -> tuple[Outcome, list[dict[str, Any]]]:
     ), rows
 
 
-def _curves(name: str, reading: ModelReading, jobs: int, store: Path | None) -> tuple[Outcome, list[dict[str, Any]]]:
+def changed(problem: Problem, values: Mapping[str, Any]) -> dict[str, Any]:
+    """The values of a grid that the problem does not have: a row with these alone is the same."""
+    own = {"friction": problem.contact.friction, "young": (problem.body1.young, problem.body2.young)}
+    return {name: value for name, value in values.items() if own.get(name) != value}
+
+
+def shared(work: Work, problem: Problem) -> Work:
+    """Work for the sweeps of one problem in turn, which makes each row once: figures have curves in common."""
+    known: dict[tuple[tuple[str, Any], ...], Row] = {}
+
+    def made(start: Problem | ContactPair, wanted: Sequence[tuple[int, Row]]) -> Generator[Placed, None, None]:
+        keys = {place: tuple(changed(problem, values).items()) for place, values in wanted}
+        ready = [(place, known[key]) for place, key in keys.items() if key in known]
+        if ready:
+            yield ready
+        left = dict(wanted).keys() - dict(ready).keys()
+        for rows in work(start, [one for one in wanted if one[0] in left]):
+            known.update((keys[place], row) for place, row in rows)
+            yield rows
+
+    return made
+
+
+def _curves(name: str, reading: ModelReading, work: Work, store: Path | None) -> tuple[Outcome, list[dict[str, Any]]]:
     """A figure of steps over theta."""
     claim = CLAIMS[name]
-    found = sweep(reading.problem(60), theta=THETAS, jobs=jobs, store=store, **claim.axes)
+    grid = SweepGrid.of({**claim.axes, "theta": THETAS})
+    found = sweep_grid(reading.problem(60), grid, work=work, store=store)
     if found.interrupted:
         raise KeyboardInterrupt
     rows = [dict(row) for row in found.rows]

@@ -13,7 +13,7 @@ from typing import Any
 
 from verification.interface.pair import ContactPair
 from verification.reproduce.claims import NODES, PRINTED_THETA, SERVES, Claim
-from verification.reproduce.experiments import THETAS, Outcome, curve_of, outcome_of
+from verification.reproduce.experiments import THETAS, Outcome, changed, curve_of, outcome_of
 from verification.reproduce.readings import ModelReading
 from verification.sweeps.grid import SweepGrid
 from verification.sweeps.row import FAILED, REFUSED, Row, SharedBodies, row
@@ -34,14 +34,14 @@ class Runs:
 
     def __init__(self, reading: ModelReading, run: Callable[[Mapping[str, Any]], Row] | None = None) -> None:
         self.reading = reading
-        self._problem = reading.problem(NODES[0])
-        self._run = run or (lambda values: row(self._problem, values, self.bodies))
+        self.problem = reading.problem(NODES[0])
+        self._run = run or (lambda values: row(self.problem, values, self.bodies))
         self._rows: dict[tuple[tuple[str, Any], ...], Row] = {}
 
     @cached_property
     def bodies(self) -> SharedBodies:
         """The condensed bodies that the runs share."""
-        return SharedBodies(self._problem)
+        return SharedBodies(self.problem)
 
     def pair(self, **values: Any) -> ContactPair:
         """The bodies on the mesh of 190 nodes with other values of a grid; ProblemError if the reading is refused."""
@@ -49,16 +49,10 @@ class Runs:
 
     def row(self, values: Mapping[str, Any], theta: Fraction) -> Row:
         """The run at one theta; values that the problem has need not be given."""
-        key = (*self.changed(values).items(), ("theta", theta))
+        key = (*changed(self.problem, values).items(), ("theta", theta))
         if key not in self._rows:
             self._rows[key] = self._run(dict(key))
         return self._rows[key]
-
-    def changed(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """The values that the problem does not have."""
-        of = self._problem
-        own = {"friction": of.contact.friction, "young": (of.body1.young, of.body2.young)}
-        return {name: value for name, value in values.items() if own.get(name) != value}
 
     def until_refuted(self, values: Mapping[str, Any]) -> list[Row]:
         """A curve from 0.6 on, then outwards from 2/(2 + rho), up to the theta that refutes it, if one does."""
@@ -85,7 +79,7 @@ def decide(claim: Claim, runs: Runs, meshes: Collection[int] | None = None) -> O
     """
     curves = list(zip(claim.labels, SweepGrid.of(claim.axes).rows(), strict=True))
     chosen = [(label, values) for label, values in curves if meshes is None or values["refine"] in meshes]
-    chosen.sort(key=lambda curve: runs.changed(curve[1]) != COMMON)  # it may be known from another figure
+    chosen.sort(key=lambda curve: changed(runs.problem, curve[1]) != COMMON)  # it may be known from another figure
     rows: dict[str, Sequence[Row]] = {}
     for label, values in chosen:
         rows[label] = some = runs.until_refuted(values)

@@ -9,15 +9,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fem1d2d.mesh import Floats
-from verification.algorithm.affine_piece import Piece, piece_of
+from verification.algorithm.affine_piece import Piece, signs_of
 from verification.algorithm.ending import NO_FORCE, PATIENCE, RUNAWAY, Ending, Outcome, arrived, coupled_residual
 from verification.algorithm.fixed_point import FixedPointMap, iterate_at, iterates
 from verification.algorithm.iterate import Iterate
@@ -43,8 +44,8 @@ TIE = 1e-6
 #: Number of steps that are taken together: few at first, as the pattern changes most then.
 FEWEST, MOST = 4, 64
 
-#: Number of pieces of one pair that are kept.
-KEPT = 64
+#: Bytes of the pieces of one pair that are kept, besides the one in use.
+KEPT = 48_000_000
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -84,7 +85,8 @@ class Affine:
     def __init__(self, piece: Piece, systems: Systems) -> None:
         pair = piece.pair
         contact, interface = pair.contact, pair.interface
-        self.piece, self.key = piece, key_of(piece)
+        self.piece, self.key = replace(piece), key_of(piece.pattern, piece.sign, piece.still)
+        piece = replace(piece)  # neither copy hands on the matrices that it has: they are not kept twice
         unloaded = interface.carry(pair.neumann.unloaded)
         obstacle = unloaded.copy()
         obstacle[contact.grid.normal] += interface.gap
@@ -100,16 +102,15 @@ class Affine:
         ]
         self._matrix = np.vstack([matrix for matrix, _ in parts])
         self._offset = np.concatenate([offset for _, offset in parts])[:, None]
-        self._image = parts[-1]
+        self._image = -len(parts[-1][1])  # the rows of T g
         self._stiffness = float(np.diag(contact.schur).max())
         self._sliding = piece.pattern.sliding.astype(float)[:, None]
 
     def relaxed(self, theta: float) -> tuple[Floats, Floats]:
         """Return T_theta as a matrix and its value at 0."""
-        matrix, offset = self._image
-        relaxed = theta * matrix
+        relaxed = theta * self._matrix[self._image :]
         relaxed[np.diag_indices_from(relaxed)] += 1 - theta
-        return relaxed, theta * offset
+        return relaxed, theta * self._offset[self._image :, 0]
 
     def on(self, g: Floats, norm: Norm) -> tuple[Steps, int]:
         """Evaluate T at the columns of g, and count those, from the first on, that the signs of the piece admit."""
@@ -159,9 +160,46 @@ def lengths(columns: Floats) -> Floats:
     return found
 
 
-def key_of(piece: Piece) -> tuple[bytes, ...]:
+def key_of(pattern: Pattern, sign: NDArray[np.int8], still: NDArray[np.bool_]) -> tuple[bytes, ...]:
     """Return a key that is equal for equal pieces of one pair; its first member is the pattern."""
-    return piece.pattern.key, piece.sign.tobytes(), piece.still.tobytes()
+    return pattern.key, sign.tobytes(), still.tobytes()
+
+
+K = TypeVar("K")
+
+
+class Shelf(Generic[K]):
+    """Values by their keys, of which the last used are kept: as many as have so many bytes in their own arrays."""
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._held: dict[object, K] = {}
+
+    def get(self, key: object, make: Callable[[], K]) -> K:
+        """Return the value of a key, and make it where it is not kept."""
+        if key in self._held:
+            value = self._held.pop(key)
+            self._held[key] = value
+            return value
+        value = make()
+        while self._held and self.nbytes > self._most:
+            del self._held[next(iter(self._held))]
+        self._held[key] = value
+        return value
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the arrays of all values that are kept; they may have got some since they were made."""
+        arrays = [array for value in self._held.values() for array in _arrays(tuple(vars(value).values()))]
+        return sum({id(array): array.nbytes for array in arrays}.values())
+
+
+def _arrays(value: object) -> Iterator[NDArray[Any]]:
+    if isinstance(value, np.ndarray):
+        yield value
+    elif isinstance(value, tuple):
+        for member in value:
+            yield from _arrays(member)
 
 
 class KnownPieces:
@@ -171,8 +209,8 @@ class KnownPieces:
         self.pair = pair
         contact = pair.contact
         self._systems = Systems(contact.schur, contact.free, contact.motions)
-        self._found: dict[tuple[bytes, ...], Piece] = {}
-        self._affine: dict[tuple[bytes, ...], Affine] = {}
+        self._pieces: Shelf[Piece] = Shelf(KEPT // 2)
+        self._affine: Shelf[Affine] = Shelf(KEPT // 2)
 
     def map(self) -> FixedPointMap:
         """Return T for one run: the pattern it tries first depends on the steps before."""
@@ -180,18 +218,19 @@ class KnownPieces:
 
     def piece(self, g: Floats, pattern: Pattern) -> Piece:
         """Return the piece around g."""
-        new = piece_of(self.pair, g, pattern)
-        if len(self._found) >= KEPT:
-            self._found.clear()
-            self._affine.clear()
-        return self._found.setdefault(key_of(new), new)
+        sign, still = signs_of(self.pair, g, pattern)
+        make = lambda: Piece(pair=self.pair, pattern=pattern, sign=sign, still=still)
+        return self._pieces.get(key_of(pattern, sign, still), make)
+
+    def key(self, found: Iterate) -> tuple[bytes, ...]:
+        """Return the key of the piece of an iterate."""
+        pattern = found.contact.pattern
+        return key_of(pattern, *signs_of(self.pair, found.g, pattern))
 
     def affine(self, piece: Piece) -> Affine:
         """Return T on a piece."""
-        key = key_of(piece)
-        if key not in self._affine:
-            self._affine[key] = Affine(piece, self._systems)
-        return self._affine[key]
+        key = key_of(piece.pattern, piece.sign, piece.still)
+        return self._affine.get(key, lambda: Affine(piece, self._systems))
 
     @cached_property
     def norm(self) -> Norm:
@@ -223,13 +262,17 @@ class KnownPieces:
 
     def steps(self, T: FixedPointMap, theta: float) -> Iterator[Steps]:
         """Yield the run of a new :meth:`map` with constant relaxation from its start, without end."""
-        g = self.start.g
+        found = iterate_at(T, self.start.g)
         while True:
-            found = iterate_at(T, g)
-            piece = self.piece(g, found.contact.pattern)
-            yield replace(self.single(found), found=None)
-            g = theta * found.image + (1 - theta) * g
-            affine, count = self.affine(piece), FEWEST
+            taken = self.single(found)
+            yield replace(taken, found=None)
+            g = theta * found.image + (1 - theta) * found.g
+            with suppress(ContactError):  # which steps on the piece need not meet
+                following = iterate_at(T, g)
+                if self.key(following) != taken.piece:  # without the matrices of the piece, which take longer
+                    found = following
+                    continue
+            affine, count = self.affine(self.piece(found.g, found.contact.pattern)), FEWEST
             relaxed, kept = affine.relaxed(theta), count
             while kept == count:
                 with np.errstate(over="ignore", invalid="ignore"):  # of a run that diverges; no sign admits it
@@ -239,10 +282,11 @@ class KnownPieces:
                     g = theta * taken.image[:, kept - 1] + (1 - theta) * taken.g[:, kept - 1]
                 if kept == count:
                     kept = count = min(2 * count, MOST)
+            found = iterate_at(T, g)
 
     def single(self, found: Iterate) -> Steps:
         """Return one evaluation of T with its piece."""
-        key = key_of(self.piece(found.g, found.contact.pattern))
+        key = self.key(found)
         g, u, image = (column[:, None] for column in (found.g, found.displacement, found.image))
         residual, scale = np.array([found.residual]), np.array([found.scale])
         return Steps(g=g, u=u, image=image, residual=residual, scale=scale, pattern=key[0], piece=key, found=found)
@@ -289,7 +333,7 @@ def course(
     if isinstance(step, Relaxation) and not pair.held:
         went = _follow(pieces, pieces.steps(T, step.theta), T, lean=True)
     if went is None:  # any rule, and where rounding decides: a residual that wanders, or meets the tolerance exactly
-        T = pieces.map()
+        T.restart()
         went = _follow(pieces, map(pieces.single, iterates(T, step, pieces.start.g)), T, lean=False)
     assert went is not None  # only lean steps leave it to others
     steps = len(went.residuals) - 1
@@ -431,6 +475,8 @@ def _evaluated(T: FixedPointMap, taken: Steps, i: int) -> Iterate:
 
 def _paper(g: Floats, before: Floats, last: int) -> int | None:
     """Return n of the first column of g at which :func:`meets_paper_test` is true; ``last`` is n of the one before."""
+    if len(before) and g.shape[1] == 1:
+        return last + 1 if meets_paper_test(g, before[:, None])[0] else None
     columns = np.column_stack([before, g]) if len(before) else g
     met = np.flatnonzero(meets_paper_test(columns[:, 1:], columns[:, :-1]))
     return None if not len(met) else last + int(met[0]) + (1 if len(before) else 2)

@@ -33,7 +33,7 @@ OF_BODIES = ("young", "neumann_body", "law", "radius")
 #: Values of those axes, as pairs of name and value.
 Changes = tuple[tuple[str, Any], ...]
 
-#: Number of pairs and constants that are kept: rows that share them are neighbours.
+#: Number of constants that are kept.  Of what holds matrices the last one is kept: rows that share it are neighbours.
 KEPT = 16
 
 #: The columns of a row that the grid may vary.
@@ -87,13 +87,22 @@ class SharedBodies:
         self.problem = start if isinstance(start, Problem) else start.problem
         self._law: Law | None = None if isinstance(start, Problem) else start.interface.law
         self._base = lru_cache(maxsize=2)(self._condense)
-        self._pair = lru_cache(maxsize=KEPT)(self._change)
+        self._pair = lru_cache(maxsize=1)(self._change)
         self._constants = lru_cache(maxsize=KEPT)(self._measure)
-        self._setting = lru_cache(maxsize=KEPT)(self._set)
+        self._setting = lru_cache(maxsize=1)(self._tried)
 
     def setting(self, values: Mapping[str, Any]) -> RowSetting:
         """Return the data that a row shares with the rows of the same bodies and friction."""
-        return self._setting(*self._key(values), values.get("friction"))
+        found = self._setting(*self._key(values), values.get("friction"))
+        if isinstance(found, Exception):
+            raise found.with_traceback(None)
+        return found
+
+    def _tried(self, refine: int, changes: Changes, friction: Fraction | None) -> RowSetting | Exception:
+        try:
+            return self._set(refine, changes, friction)
+        except (ProblemError, HypothesisError) as error:  # the next rows are refused for the same reason
+            return error
 
     def _set(self, refine: int, changes: Changes, friction: Fraction | None) -> RowSetting:
         pair = self._pair(refine, changes)

@@ -8,7 +8,10 @@ from importlib import import_module
 from types import ModuleType
 
 #: The pages, by name.
-PAGES = ("open_or_closed",)
+PAGES = (
+    *("open_or_closed", "which_side", "constants", "friction", "theorem_and_experiment", "prediction"),
+    *("grids", "beyond_constant", "other_code"),
+)
 
 
 def of(page: str) -> ModuleType:

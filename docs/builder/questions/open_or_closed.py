@@ -17,6 +17,9 @@ LABEL = (
     "Factor of one step over theta for an open node and for the stiffest closed shape, and both errors over the steps"
 )
 
+#: The steps of a run, and the least error that is drawn.
+STEPS, LEAST = 12, 1e-6
+
 
 @cache
 def data() -> dict[str, Any]:
@@ -25,33 +28,26 @@ def data() -> dict[str, Any]:
     lifted = pressed.to_dict()
     lifted["body2"]["traction"] = {"right": [0, 4000]}
     errors = {"closed": _Error(pressed, of_node=False), "open": _Error(vf.Problem.from_dict(lifted), of_node=True)}
-    rho, steps = errors["closed"].rho, 12
+    rho = errors["closed"].rho
     once, best, limit = 1 / (1 + rho), predicted_theta(rho), 2 / (1 + rho)
-    thetas = [n / 40 for n in range(2, 29)]
-    opened = [[0, 1], [1, 0]]
+    thetas = [n / 24 for n in range(1, 19)]  # rho is nearly 2: one of them is near each answer
     closed = [[t, abs(1 - t * (1 + rho))] for t in (0, once, 1)]
     scenes = {}
     for i, theta in enumerate(thetas):
-        seen = {name: error.over(theta, steps) for name, error in errors.items()}
+        seen = {name: error.over(theta, STEPS) for name, error in errors.items()}
         first = {name: sizes[1] for name, sizes in seen.items()}
         worse = max(first, key=lambda name: first[name])
+        if abs(first["open"] - first["closed"]) < 1e-3:
+            decides = "Both are equal"
+        else:
+            decides = "The open node decides" if worse == "open" else "The closed shape decides"
         scenes[(i,)] = scene(
-            f"theta = {theta:g}: one step multiplies the error of the open node by {first['open']:.3f} and that of the "
-            f"stiffest closed shape by {first['closed']:.3f}. The {worse} one decides"
-            + (": it grows." if first[worse] > 1 else f"; after {steps} steps it has fallen to {seen[worse][-1]:.1e}."),
-            [
-                line(opened, "red", dashed=True),
-                line(closed),
-                dots([(theta, first["open"])], "red"),
-                dots([(theta, first["closed"])]),
-                note(0.04, 0.82, "open", "red"),
-                note(0.17, 0.36, "closed"),
-            ],
-            [
-                line([(n, max(size, 1e-9)) for n, size in enumerate(seen["open"])], "red", dashed=True),
-                line([(n, max(size, 1e-9)) for n, size in enumerate(seen["closed"])]),
-            ],
-            rows=[(n, f"{a:.2e}", f"{b:.2e}") for n, (a, b) in enumerate(zip(*seen.values(), strict=True))],
+            f"theta = {theta:.3f}: one step multiplies the error of the open node by {first['open']:.3f} and that of "
+            f"the stiffest closed shape by {first['closed']:.3f}. {decides}: the error after {STEPS} steps is "
+            f"{seen[worse][-1]:.2g} times the first.",
+            [line(closed), dots([(theta, first["closed"])]), dots([(theta, first["open"])], "red", hollow=True)],
+            [line(enumerate(seen["closed"])), line(enumerate(seen["open"]), "red", dashed=True), *_ends(seen)],
+            rows=[(n, *map(_number, sizes)) for n, sizes in enumerate(zip(*seen.values(), strict=True))],
         )
     return widget(
         question="The error of an open node is multiplied by 1 - theta in each step, and "
@@ -67,18 +63,39 @@ def data() -> dict[str, Any]:
             chart(
                 "Factor of one step",
                 axis("theta", 0, 0.75),
-                axis("factor a step", 0, 1.3),
-                [line([(0, 1), (0.75, 1)], "grey", dashed=True), note(0.02, 1.03, "above: grows", "grey")],
+                axis("factor a step", -0.05, 1.3),
+                [
+                    line([(0, 1), (0.75, 1)], "grey"),
+                    note(0.02, 1.04, "above 1: grows", "grey"),
+                    line([(0, 1), (0.75, 0.25)], "red", dashed=True),
+                    note(0.2, 0.85, "open", "red"),
+                    dots([(once, 0)]),
+                    note(once - 0.07, 0.02, "closed", anchor="end"),
+                ],
             ),
             chart(
                 "Size of both errors over the steps",
-                axis("step", 0, steps),
-                axis("error, the first = 1", 1e-9, 10, log=True),
+                axis("step", 0, 16),
+                axis("error, the first = 1", LEAST, 100, log=True),
             ),
         ],
         head=("step", "closed", "open"),
         scenes=scenes,
     )
+
+
+def _number(size: float) -> str:
+    """An error for the table; a smaller one is rounding."""
+    return f"{size:.2e}" if size >= LEAST else f"below {LEAST:.0e}"
+
+
+def _ends(seen: dict[str, list[float]]) -> list[dict[str, Any]]:
+    """The name of each curve right of where it ends or leaves the chart, a single one for curves that end together."""
+    low, high = sorted(sizes[-1] for sizes in seen.values())
+    if high < 10 * low:
+        return [note(STEPS + 0.4, (low * high) ** 0.5, "both")]
+    ends = {name: max(n for n, size in enumerate(sizes) if size > 5 * LEAST) for name, sizes in seen.items()}
+    return [note(end + 0.4, seen[name][end], name) for name, end in ends.items()]
 
 
 class _Error:
@@ -91,7 +108,7 @@ class _Error:
         values, shapes = eigh(contact, neumann)
         self.rho = float(values[-1])
         shape = neumann[:, -1] if of_node else neumann @ shapes[:, -1]
-        self.change = np.concatenate([np.zeros(len(shape)), 1e-6 * shape / np.abs(shape).max()])
+        self.change = np.concatenate([np.zeros(len(shape)), 1e-4 * shape / np.abs(shape).max()])
 
     @staticmethod
     def _normal(S: Any) -> Any:
