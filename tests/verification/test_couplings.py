@@ -204,7 +204,7 @@ def test_a_record_of_some_first_thetas_alone_never_takes_the_place_of_all(made, 
     monkeypatch.setattr("sys.argv", ["bench_couplings.py", "--record", str(tmp_path), *["--full"] * full])
     bench.main()
     found = [json.loads(path.read_text("utf-8")) for path in tmp_path.glob("advice/*.json")]
-    assert [[row["theta"] for row in record["first"]] for record in found] == [[0.5, 0.1, 0.3, 0.9]] * full
+    assert [[row["theta"] for row in record["first"]] for record in found] == [[0.5, 0.1, 0.3, 0.9, 0.99]] * full
     assert ("no record" in capsys.readouterr().out) != full
 
 

@@ -156,13 +156,12 @@ def seen_factors(log: Log) -> SeenFactors | None:
 
 
 def spectrum_of(logs: Iterable[Accelerated]) -> Spectrum | None:
-    """The spectrum between the ends that the factors of all logs show; None where none of them is without a doubt."""
+    """The spectrum between the ends that the factors of all logs show, MARGIN added; None where each has a doubt."""
     known = [log.factors for log in logs if log.factors is not None and not log.factors.doubt]
     if not known:
         return None
     low, high = min(found.low for found in known), max(found.high for found in known)
-    between = Spectrum.between(low, high)
-    return Spectrum(values=between.values, source="ends", error_low=0.0, error_high=MARGIN * (1 + high))
+    return Spectrum.between(low, high + MARGIN * (1 + high))
 
 
 def after_accelerated(spectrum: Spectrum | None, tied: bool) -> NextRun:
@@ -173,6 +172,6 @@ def after_accelerated(spectrum: Spectrum | None, tied: bool) -> NextRun:
     theta = rounded_down(min(Fraction(spectrum.theta), LARGEST_TO_PASTE))
     ends = f"2/(2 + least + largest) with lambda from {few(spectrum.low)} to {few(spectrum.high)} by Aitken's factors"
     if tied:
-        return NextRun(theta=theta, why=f"{ends}, the largest {100 * MARGIN:g} % above: an estimate")
+        return NextRun(theta=theta, why=f"{ends}, the largest with {100 * MARGIN:g} % added: an estimate")
     why = f"{ends}, an estimate for one contact pattern; its log, with constant relaxation, shows whether it holds"
     return NextRun(theta=theta, why=why)
