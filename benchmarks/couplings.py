@@ -128,6 +128,7 @@ class Tied:
     neumann: Body
     tied = True
     linear = True
+    largest = 1.0  # the largest theta that may be run
 
     @cached_property
     def spectrum(self) -> Floats:
@@ -194,6 +195,7 @@ class Plates:
     pair: vf.ContactPair
     tied = False
     linear = False
+    largest = 0.99  # the iteration needs theta < 1
 
     @cached_property
     def spectrum(self) -> Floats:
@@ -255,6 +257,21 @@ def log(coupling: Coupling, theta: float, path: Path, seed: int | None) -> Path:
     return path
 
 
+def aitken_log(coupling: Coupling, first: float, path: Path, tolerance: float = 1e-6) -> Path:
+    """A run of Aitken as columns: its residuals, and the factor after each."""
+    rows, before = ["iteration,res,omega"], None
+    for n, (g, image) in enumerate(islice(coupling.forces(first, "aitken"), LONGEST), 1):
+        residual = image - g
+        if before is not None:
+            x, r, size = before
+            rows.append(f"{n - 1},{size:.8e},{float((g - x) @ r) / size**2:.8e}")
+        before = g, residual, float(np.linalg.norm(residual))
+        if before[2] < tolerance * float(np.linalg.norm(image)):
+            break
+    path.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    return path
+
+
 @dataclass(frozen=True, kw_only=True)
 class Followed:
     """What following the advice has led to.
@@ -306,7 +323,7 @@ def followed(chosen: Iterable[Coupling], first: float, folder: Path) -> Iterator
 def follow(coupling: Coupling, first: float, folder: Path, seed: int | None) -> Followed:
     """Make the first run and those that the advice asks for, and take the theta that it ends with."""
     logs: list[tuple[Path, str]] = []
-    theta, runs = first, []
+    theta, runs = min(first, coupling.largest), []
     for n in range(1 + ASKED_FOR):
         runs.append(theta)
         logs.append((log(coupling, theta, folder / f"{n}.log", None if seed is None else 97 * seed + n), repr(theta)))

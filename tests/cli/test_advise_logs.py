@@ -71,11 +71,14 @@ def test_each_theta_belongs_to_the_log_of_its_place(call, log):
 @pytest.mark.parametrize(
     ("words", "fragment"),
     [
-        (["--log", "LOG"], "Missing option '--theta'"),
+        (["--log", "LOG"], "--theta = None: needed the relaxation factor of"),
+        (["--log", "LOG", "--theta", "0.5", "--pattern", "("], "--pattern = (: needed a regular expression"),
+        (["--theta", "0.5", "--ratio", "0.9", "--pattern", "(x)"], "--pattern without --log"),
+        (["--ratio", "0.9"], "received 0 --theta with 0 --log"),
         (["--log", "LOG", "--log", "LOG", "--theta", "0.5"], "received 1 --theta with 2 --log"),
         (["--log", "LOG", "--theta", "0.5", "--theta", "0.4"], "received 2 --theta with 1 --log"),
         (["--theta", "0.5", "--theta", "0.4", "--ratio", "1.4"], "received 2 --theta with 0 --log"),
-        (["--theta", "0.5"], "--theta without --log or --ratio"),
+        (["--theta", "0.5"], "neither --log nor --ratio"),
         (["--log", "LOG", "--theta", "0.5", "--ratio", "0.9"], "--log with --ratio"),
         (["--log", "LOG", "--theta", "0.5", "--S1", "a.npz"], "--S1 is an option of ndtheory advise matrices"),
         (
@@ -114,10 +117,7 @@ def test_a_column_name_cannot_steer_the_terminal(call, tmp_path):
 def test_the_first_line_says_what_is_assumed_and_friction_takes_the_theta_away(call, log, words):
     words = [str(log(0.45)[1]) if word == "LOG" else word for word in words]
     plain, document = call("advise", "run", *words), call("advise", "run", *words, "--json").document
-    assert plain.out.splitlines()[:2] == [
-        "Assumed: no friction, or a tied interface.",
-        "With friction what follows may be false: add --friction.",
-    ]
+    assert plain.out.startswith("Assumed: no friction, or a tied interface. With friction add --friction.\n")
     assert pasted(plain.out)
     assert document["assumes"] == "no friction, or a tied interface"
     assert document["friction_bounds"] is None
@@ -161,3 +161,26 @@ def test_a_run_to_keep_is_no_run_to_make(call, tmp_path):
     answer = call("advise", "run", "--log", path, "--theta", "0.3")
     assert "theta = 0.3: keep it: the run converges within 1 step" in answer.out
     assert answer.out.endswith("Next: no run; keep theta = 0.3\n")
+
+
+def test_the_screen_of_an_aitken_log_shows_both_ends_as_estimates_and_pastes_when_tied(call, tmp_path):
+    rows, residual, factor = ["it,res,omega"], [1 + mode for mode in MODES], 0.5
+    for n in range(1, 14):
+        rows.append(f"{n},{sum(r * r for r in residual) ** 0.5:.9g},{factor:.9g}")
+        moved = [(1 + mode) * r for mode, r in zip(MODES, residual, strict=True)]
+        after = sum(r * m for r, m in zip(residual, moved, strict=True)) / sum(m * m for m in moved)
+        residual, factor = [r - factor * m for r, m in zip(residual, moved, strict=True)], after
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(rows) + "\n", "utf-8")
+    for tied in ([], ["--tied"]):
+        answer = call("advise", "run", "--log", path, *tied)
+        lines, flat = answer.out.splitlines(), " ".join(answer.out.split())
+        assert (answer.status, answer.err) == (0, "")
+        assert max(map(len, lines)) <= 80
+        assert len(lines) <= 46
+        assert "Aitken's factors, 12 of 13: lambda from 0." in flat
+        assert "estimates" in flat
+        assert ("TO PASTE" in answer.out) == bool(tied)
+        document = call("advise", "run", "--log", path, *tied, "--json").document
+        assert document["accelerated"][0]["factors"]["high"] == pytest.approx(3, rel=0.05)
+        assert document["interval"]["lo"] is None

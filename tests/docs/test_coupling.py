@@ -30,6 +30,13 @@ def folder(tmp_path, monkeypatch, capsys):
     np.save("TX.npy", 1 - X * (0.5, 2.0))
     for name, theta in (("precice-Solid-convergence", 0.5), ("a", 0.3), ("b", 0.6)):
         precice(Path(f"{name}.log"), [{"ResAbs(Mesh:Force)": linear_run((0.2, 1.1), theta, 60)[0]}])
+    residuals, _ = linear_run((0.2, 1.1), 0.5, 30)
+    Path("out.txt").write_text("".join(f"residual = {r:.8e}\n" for r in residuals), encoding="utf-8")
+    lines = []
+    for k, residual in enumerate(residuals[:8], 1):  # by a fixed factor
+        lines += [f"Time = 1, iteration: {k}", "Current fsi under-relaxation factor (fixed): 0.5"]
+        lines.append(f"Current fsi relative residual norm: {residual / residuals[0]:.6g}")
+    Path("log.solids4Foam").write_text("\n".join(lines) + "\n", encoding="utf-8")
     return tmp_path
 
 

@@ -196,6 +196,12 @@ def transient(folder: Path) -> list[tuple[Path, str]]:
     return [(precice(folder / "transient.log", [window] * 12), "0.9")]
 
 
+#: An Aitken run whose factors are named, and a quasi-Newton run.
+LOGS_OF_KRATOS = [
+    Path(__file__).parents[1] / "verification" / "kratos_logs" / f"{name}.log" for name in ("aitken", "iqn-ils")
+]
+
+
 def vectors() -> Iterator[tuple[Any, Any]]:
     """Iterates and their images: independent ones, ones of a stiff coupling that depend on each other, open contact."""
     X = np.random.default_rng(1).normal(size=(4, 2))
@@ -259,6 +265,7 @@ def documents(folder: Path, small: vf.Problem) -> list[dict[str, Any]]:
         vf.advise_matrices(lambda u: 2 * u, solve2=lambda f: f, unknowns=3),
         *(vf.advise_run(theta, ratio) for theta, ratio in (("0.1", "1.4"), ("0.6", "0.7"), ("0.2", "0.5"))),
         vf.advise_logs(transient(folder)),
+        vf.advise_logs([(accelerator, None) for accelerator in LOGS_OF_KRATOS]),
         *(vf.advise_run("0.45", ratio, friction=True) for ratio in ("0.8", "1.4")),
         *(vf.advise_logs(logs) for logs in (diverging(folder), falling(folder), diverging(folder) + falling(folder))),
         vf.advise_moduli(young=(7, 2), poisson=("0.3", "0.3"), mirror=[2]),

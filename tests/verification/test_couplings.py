@@ -220,3 +220,32 @@ def test_bodies_of_the_record_are_of_both_dimensions_roles_and_kinds_with_noise_
 def test_a_log_that_cannot_be_read_is_refused_with_tied_too(tmp_path):
     with pytest.raises(ProblemError):
         vf.advise_logs([(tmp_path / "none.log", "0.5")], tied=True)
+
+
+# --- Aitken, friction ------------------------------------------------------------------------------------------------
+
+
+def test_one_log_of_aitken_gives_a_theta_for_tied_couplings_of_every_kind(made, tmp_path):
+    chosen = [coupling for coupling in islice(made.couplings(), 9) if coupling.tied]
+    chosen += [kind(seed) for kind in (made.heat, made.lumped, made.convection) for seed in (2, 101)]
+    for coupling in chosen:
+        log = made.aitken_log(coupling, 0.5, tmp_path / "a.csv")
+        found = vf.advise_logs([(log, None)], tied=True)
+        assert not found.accelerated[0].factors.doubt
+        fewest, _ = made.fewest(coupling)
+        assert 5 * made.steps(coupling, found.theta) <= 7 * fewest, coupling.name
+        assert vf.advise_logs([(log, None)]).theta is None  # contact may change: a run to make
+
+
+@pytest.mark.parametrize("first", [0.5, 1.0])
+def test_a_frictional_coupling_gets_no_theta_that_costs_more_than_twice_the_best(made, tmp_path, first):
+    plates = [coupling for coupling in made.couplings() if isinstance(coupling, made.Plates)]
+    assert len(plates) == 6
+    for coupling in plates:
+        log = made.log(coupling, min(first, coupling.largest), tmp_path / "f.log", None)
+        rubbing = vf.advise_logs([(log, repr(min(first, coupling.largest)))], friction=True)
+        assert (rubbing.theta, rubbing.roles) == (None, ())
+        followed = made.follow(coupling, first, tmp_path, None)  # as if nobody had said that there is friction
+        if followed.decided:
+            assert followed.steps is not None, coupling.name
+            assert followed.steps <= 2 * followed.fewest, coupling.name

@@ -128,8 +128,7 @@ def test_the_factor_in_a_log_of_kratos_has_one_figure_and_a_theta_must_agree_wit
 
 @pytest.mark.parametrize(("name", "label"), [("aitken", "Aitken"), ("iqn-ils", "IQNILS")])
 def test_a_log_of_kratos_names_the_accelerator_that_was_not_constant(name, label):
-    with pytest.raises(ProblemError, match=rf"{name}\.log, line \d+: {label}ConvergenceAccelerator changes"):
-        read_log(REAL / f"{name}.log")
+    assert read_log(REAL / f"{name}.log").accelerator == f"{label}ConvergenceAccelerator"
 
 
 def test_a_log_of_kratos_that_was_cut_off_in_a_number_ends_with_the_number_before(tmp_path):
@@ -185,9 +184,9 @@ def test_a_broken_log_is_refused_in_one_line_that_names_where(tmp_path, name):
     assert "\n" not in line
 
 
-def test_relaxation_that_was_not_constant_is_refused_where_the_log_tells_it(tmp_path):
+def test_a_factor_that_changes_by_no_rule_that_is_named_is_refused(tmp_path):
     refused = lambda: pytest.raises(ProblemError, match=r"constant relaxation|same theta")
-    changing = written(tmp_path / "a.csv", "it,res,omega\n1,1.0,0.5\n2,0.5,0.6\n3,0.2,0.5\n")
+    changing = written(tmp_path / "a.csv", "it,res,theta\n1,1.0,0.5\n2,0.5,0.6\n3,0.2,0.5\n")
     with refused():
         advise_logs([(changing, "0.5")])
     constant = written(tmp_path / "b.csv", "it,res,omega\n" + "".join(f"{n},{0.8**n},0.5\n" for n in range(40)))
@@ -199,17 +198,16 @@ def test_relaxation_that_was_not_constant_is_refused_where_the_log_tells_it(tmp_
         advise_logs([(kratos(tmp_path / "k.log", [{"f": absolute}], lambda k: f"{0.1 + k / 100}"), "0.45")])
     aitken = kratos(tmp_path / "k.log", [{"f": absolute}])
     aitken.write_text(aitken.read_text("utf-8") + "AitkenConvergenceAccelerator: reset\n", "utf-8")
-    with refused():
-        advise_logs([(aitken, "0.45")])
+    assert advise_logs([(aitken, "0.45")]).theta is None
 
 
-def test_quasi_newton_is_refused_by_the_log_of_iteration_counts_beside(tmp_path):
+def test_quasi_newton_is_recognised_by_the_log_of_iteration_counts_beside(tmp_path):
     log, theta = of(tmp_path, 0.45, name="precice-Solid-convergence.log")
     beside = written(tmp_path / "precice-Solid-iterations.log", ITERATIONS + "1 40 40 1 0 0 0\n")
     assert advise_logs([(log, theta)]).roles  # constant relaxation has the column, too
     written(beside, ITERATIONS + "1 40 40 1 0 0 0\n2 44 4 1 3 0 0\n")
-    with pytest.raises(ProblemError, match=r"iterations.log, line 3: QNColumns = 3"):
-        advise_logs([(log, theta)])
+    found = advise_logs([(log, theta)])
+    assert (found.roles, found.accelerated[0].accelerator) == ((), "quasi-Newton, up to 3 columns")
 
 
 @pytest.mark.parametrize("theta", ["0", "-1", "1.1", "nan", "x", "1e-9"])

@@ -296,3 +296,18 @@ def test_following_the_logs_of_two_bodies_in_contact_ends_in_a_theta_that_conver
             theta = found.next.theta
         final = contact_run(pair, found.next.theta, 400)[0]
         assert final[-1] <= 1e-6 * max(final)
+
+
+@pytest.mark.parametrize("column", ["ResRel(M:F)", "ResAbs(M:F)"])
+def test_a_longer_log_never_shows_less(tmp_path, column):
+    """Nothing, a pooled ratio, a ratio: by the steps of the windows."""
+    for theta in (0.3, 0.45):
+        absolute, relative = linear_run(MODES, theta, 60)
+        series = relative if "Rel" in column else absolute
+        shown = []
+        for steps in range(4, 60):
+            log = precice(tmp_path / "a.log", [{column: series[:steps]}] * 12)
+            (seen,) = advise_logs([(log, str(theta))]).logs[0].columns
+            shown.append(2 if seen.ratio is not None else 1 if seen.pooled is not None else 0)
+        assert shown == sorted(shown), shown
+        assert shown[-1] == 2

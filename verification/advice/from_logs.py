@@ -9,15 +9,19 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+from ndtheory import HypothesisError
 from ndtheory.constants import SMALLEST, take
 from ndtheory.energy_norms import predicted_rate, predicted_theta
 from ndtheory.number import below
 from verification.advice import ends
+from verification.advice.accelerated import after_accelerated, seen_accelerated, spectrum_of
 from verification.advice.ends import DEAR, SETTLED, Box
 from verification.advice.from_runs import advice_of_runs
+from verification.advice.from_vectors import advice_on
 from verification.advice.log_files import Log, read_log
-from verification.advice.pace import CONVERGED, Pace
+from verification.advice.pace import CONVERGED, RELATIVE, Pace
 from verification.advice.readings import (
+    AT_ONE,
     LARGEST_TO_PASTE,
     SHORTEST_STEP,
     NextRun,
@@ -27,6 +31,7 @@ from verification.advice.readings import (
     few,
     kept,
     level,
+    pasted_or_not,
     read_observed,
     read_plateau,
     rounded_down,
@@ -35,6 +40,8 @@ from verification.advice.readings import (
 from verification.advice.roles import Advice
 from verification.advice.runs_with_friction import by_kind, friction_bounds, readings_with_friction, with_friction
 from verification.advice.seen import LogBound, RhoInterval, SeenColumn, SeenLog, bounds, seen_column
+from verification.advice.spectrum import Spectrum
+from verification.interface.pair import UNITS
 from verification.problem.tables import ProblemError
 
 #: Readings that are left, the run to make next, and rho where the logs decide it.
@@ -50,8 +57,10 @@ NARROW = Fraction(5, 4)
 SMALLEST_THETA = Fraction(1, 10**6)
 
 
-def advise_logs(logs: Iterable[tuple[Path | str, Any]], *, tied: bool = False, friction: bool = False) -> Advice:
-    """Advice from the convergence logs of runs of any code, each with a constant theta.
+def advise_logs(
+    logs: Iterable[tuple[Path | str, Any]], *, tied: bool = False, friction: bool = False, pattern: str | None = None
+) -> Advice:
+    """Advice from the convergence logs of runs of any code, with a constant theta or with Aitken.
 
     A log whose residual changes by a steady ratio r a step is read as
     :func:`verification.advice.from_runs.advise_run` reads r.  A residual that stays at a level belongs to a run that
@@ -68,18 +77,26 @@ def advise_logs(logs: Iterable[tuple[Path | str, Any]], *, tied: bool = False, f
     converged.  Where a single log decides rho, the smallest eigenvalue is taken to be at most half of the largest.
     The prediction is for couplings of about five modes and more: one or two modes may need fewer steps.
 
+    A log that prints the factor of Aitken for each iteration shows both ends of the spectrum, as estimates
+    (:mod:`verification.advice.accelerated`), and with ``tied`` they decide theta where no log with constant theta does.
+    Logs of quasi-Newton runs show only how many iterations they took.
+
     The run to make next has a theta that no log has, unless its reason begins with "keep it" or "the same again".
 
     Parameters
     ----------
     logs : iterable of tuple
-        Logs of one coupling with the same roles: the path and the relaxation factor of each, 0 < theta <= 1.
+        Logs of one coupling with the same roles: the path and the relaxation factor of each, 0 < theta <= 1; None
+        where the log names its factor, or the relaxation was not constant.
     tied : bool
         True if the interface is tied, so that nothing opens or slips.  A run is linear then, and the softest or the
         stiffest mode sets its steady ratio: two logs mostly show both, and so the best theta,
         ``2/(2 + lambda_min + rho)``.
     friction : bool
         True if there is friction.  Otherwise the advice assumes that there is none, or that the interface is tied.
+    pattern : str, optional
+        A regular expression for logs of another form: its one group is a residual, or its groups are named
+        ``residual``, ``iteration``, ``theta`` and ``omega``, a factor of Aitken.
 
     Returns
     -------
@@ -89,11 +106,11 @@ def advise_logs(logs: Iterable[tuple[Path | str, Any]], *, tied: bool = False, f
     Raises
     ------
     ProblemError
-        A log that cannot be read, or whose relaxation was not constant.
+        A log that cannot be read.
     HypothesisError
-        A theta outside its range.
+        A theta outside its range, or none for a log that names none.
     ValueError
-        No log, or friction of a tied interface.
+        No log, friction of a tied interface, or a pattern that is none.
 
     Examples
     --------
@@ -107,24 +124,55 @@ def advise_logs(logs: Iterable[tuple[Path | str, Any]], *, tied: bool = False, f
     """
     needed = "the theta of a log, 0 < theta <= 1 (1e-6 or more)"
     allowed = lambda value: max(SMALLEST, SMALLEST_THETA) <= value <= 1
-    given = [(Path(path), take("theta", theta, needed, allowed)) for path, theta in logs]
+    number = lambda theta: None if theta is None else take("theta", theta, needed, allowed)
+    given = [(Path(path), number(theta)) for path, theta in logs]
     if not given:
         raise ValueError("needed one log or more")
     assumes = assumed(tied, friction)
-    seen = tuple(seen_log(read_log(path), theta, friction) for path, theta in given)
+    read = [(read_log(path, pattern), theta) for path, theta in given]
+    accelerated = tuple(seen_accelerated(log) for log, _ in read if log.accelerator is not None)
+    seen = tuple(seen_log(log, _theta_of(log, theta), friction) for log, theta in read if log.accelerator is None)
+    spectrum = spectrum_of(accelerated)
+    known: dict[str, Any] = {"assumes": assumes, "accelerated": accelerated}
+    if not seen:
+        known |= {"interval": interval_of([], []), "next": after_accelerated(spectrum, tied)}
+        return _of_factors(spectrum if tied else None, tied=tied, **known)
     interval = interval_of(*(([], []) if friction else bounds(seen)))
     readings, following, rho = with_friction(seen) if friction else decide(seen, interval, tied)
-    return advice_of_runs(
+    found = advice_of_runs(
         [log.made for log in seen],
         readings,
         following,
         rho,
         tied=tied,
-        assumes=assumes,
         friction_bounds=friction_bounds(*by_kind(seen)) if friction else None,
         logs=seen,
         interval=interval,
+        **known,
     )
+    if found.roles or not tied or spectrum is None or interval.contradiction is not None:
+        return found
+    paste = pasted_or_not(after_accelerated(spectrum, tied), [log.made for log in seen])
+    if paste is None:
+        return found
+    known |= {"logs": seen, "readings": found.readings, "interval": interval, "next": paste}
+    return _of_factors(spectrum, tied=tied, **known)
+
+
+def _of_factors(spectrum: Spectrum | None, *, tied: bool, **known: Any) -> Advice:
+    """The advice on what Aitken's factors show; only a run to make where that is None."""
+    if spectrum is None:
+        return Advice(neumann_body=None, roles=(), units=UNITS, tied=tied, **known)
+    return advice_on(spectrum, tied=tied, of="Aitken's factors", **known)
+
+
+def _theta_of(log: Log, theta: Fraction | None) -> Fraction:
+    """The theta that was given for a log, or that it names in all its digits."""
+    if theta is not None:
+        return theta
+    if log.theta is None or log.theta_rounding > 1e-3 * log.theta:
+        raise HypothesisError("theta", None, f"the relaxation factor of {log.path}, which does not name it")
+    return Fraction(repr(log.theta))
 
 
 def seen_log(log: Log, theta: Fraction, friction: bool = False) -> SeenLog:
@@ -155,7 +203,7 @@ def seen_log(log: Log, theta: Fraction, friction: bool = False) -> SeenLog:
         readings, following = read_plateau(theta, plateau)
     elif bare.stays:
         readings, following, _ = read_observed(theta, Observed.known(Fraction(1)))
-        if all(column.residual == "relative" for column in columns if column.count("level")):
+        if all(column.residual in RELATIVE for column in columns if column.count("level")):
             readings = (level(theta),)  # of a relative residual also a run that grows
     elif ratio is not None:
         readings, following, rho = read_observed(theta, ratio)
@@ -169,9 +217,9 @@ def seen_log(log: Log, theta: Fraction, friction: bool = False) -> SeenLog:
 
 
 def of_pooled(theta: Fraction, ratio: Observed) -> NextRun:
-    """The run to make where the windows of a transient are too short one by one."""
+    """The run to make where the windows of a transient show no ratio one by one."""
     why = (
-        f"windows are too short one by one; their second halves have a ratio of {ratio} together, which bounds nothing"
+        f"windows show no ratio one by one; their second halves have a ratio of {ratio} together, which bounds nothing"
     )
     if ratio.most <= ends.SWIFT:
         return kept(theta, f"{why}, and none much faster is to be found")
@@ -196,7 +244,7 @@ def longer(columns: tuple[SeenColumn, ...], theta: Fraction) -> NextRun:
     steps = f"{steps_needed(theta)} steps or more in one time window"
     again = f"the same again, constant and without Aitken or quasi-Newton, {steps}"
     if all(one.kind == "short" for one in paces):
-        why = f"{again}: smaller limits of convergence and a larger number of iterations"
+        why = f"{again}: smaller limits of convergence and a larger number of iterations. {AT_ONE}"
     else:
         why = f"{again}, until the residual falls or grows steadily; a relative one must fall below 0.1 first"
     return NextRun(theta=float(theta), why=why, again=True)

@@ -13,7 +13,7 @@ from ndtheory.energy_norms import predicted_rate, predicted_theta
 from ndtheory.moduli import Moduli, Plane, column, end, free_end, half_planes, layer, mirror
 from ndtheory.number import below
 from verification.advice import BodyNumber
-from verification.advice.readings import NextRun, rounded_down
+from verification.advice.readings import AT_ONE, NextRun, rounded_down
 from verification.advice.roles import PROVED, Advice, Role
 from verification.advice.seen_moduli import Corners, LowerBounds, ModuliRole, SeenModuli, StartTheta, exactly
 from verification.interface.pair import UNITS
@@ -206,6 +206,6 @@ def _next(seen: SeenModuli, tried: BodyNumber | None) -> NextRun:
     among = "the largest bound above" if seen.corners is None else "the bound above"
     why = (
         f"the Neumann problem on {who}, 1/(2 + {largest:.4g}) with {among}, which contracts without friction or tied "
-        f"if rho is below {3 + 2 * largest:.4g}; halve it if the residual does not fall"
+        f"if rho is below {3 + 2 * largest:.4g}; halve it if the residual does not fall. {AT_ONE}"
     )
     return NextRun(theta=rounded_down(1 / (2 + Fraction(largest))), why=why)

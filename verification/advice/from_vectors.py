@@ -15,7 +15,7 @@ from verification.interface.matrices import real_array
 from verification.interface.pair import UNITS
 
 #: Why nothing is proved.
-ESTIMATED = "eigenvalues were estimated from a few vectors, which proves nothing"
+ESTIMATED = "from which eigenvalues were estimated, prove nothing"
 
 
 def advise_vectors(X: Any, TX: Any, *, tied: bool = False) -> Advice:
@@ -79,24 +79,29 @@ def advice_of(seen: SeenVectors, *, tied: bool = False) -> Advice:
         return Advice(neumann_body=None, roles=(), units=UNITS, vectors=seen)
     linear = tied or not seen.changing
     spectrum = seen.spectrum if linear else seen.spectrum.with_open_nodes()
-    roles = [_role(spectrum)]
+    return advice_on(spectrum, tied=linear, of="vectors", vectors=seen)
+
+
+def advice_on(spectrum: Spectrum, *, tied: bool, of: str, **known: Any) -> Advice:
+    """The advice on an estimated spectrum, in which open nodes are already; ``of`` names what it was read from."""
+    roles = [_role(spectrum, of)]
     if spectrum.low - spectrum.error_low > 0:
-        roles.append(_role(spectrum.exchanged()))
-    table = table_of(roles, tied=True)  # open nodes are in the spectrum already
+        roles.append(_role(spectrum.exchanged(), of))
+    table = table_of(roles, tied=True)
     return Advice(
         neumann_body=None,
         roles=tuple(roles[:1]),
         units=UNITS,
-        tied=linear,
-        vectors=seen,
+        tied=tied,
         methods=table,
-        method=methods.advised(table, tied=linear),
+        method=methods.advised(table, tied=tied),
+        **known,
     )
 
 
-def _role(spectrum: Spectrum) -> Role:
+def _role(spectrum: Spectrum, of: str) -> Role:
     """The role of an estimated spectrum."""
     ends = [Number.of_float(max(end, 0.0)) for end in (spectrum.low, spectrum.high)]
-    reason = {"neumann_body": "vectors do not tell which body had the Neumann problem"}
+    reason = {"neumann_body": f"{of} do not tell which body had the Neumann problem"}
     known: dict[str, Any] = {"rho_min": ends[0], "rho_tied": ends[1], "spectrum": spectrum}
-    return role_of(None, Fraction(ends[1].value), nothing=ESTIMATED, reason=reason, **known)
+    return role_of(None, Fraction(ends[1].value), nothing=f"{of}, {ESTIMATED}", reason=reason, **known)

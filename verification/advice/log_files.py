@@ -1,7 +1,7 @@
 """Residuals in the convergence log of another code, by field and time window.
 
-Three forms are read: ``precice-<participant>-convergence.log`` of preCICE, the output of Kratos CoSimulation with an
-``echo_level`` of 3 or more for its convergence criteria, and plain columns of numbers.
+Two kinds are read: columns of numbers, as ``precice-<participant>-convergence.log`` of preCICE, and what codes print
+line by line (:mod:`verification.advice.log_lines`).
 """
 
 from __future__ import annotations
@@ -10,14 +10,14 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import StringIO
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
 from fem1d2d.mesh import Floats
+from verification.advice.log_lines import Form, Residual, form_of, form_of_pattern
 from verification.problem.tables import ProblemError, short, unreadable
 
 #: Largest log that is read; a million lines of preCICE with four fields have 80 MB.
@@ -29,8 +29,6 @@ LOOKED_AT = 200
 #: Advice for a log whose relaxation was not constant.
 RUN_AGAIN = "run again with constant relaxation: where it changes, the ratios of residuals say nothing about rho"
 
-Residual = Literal["absolute", "relative", "drop", "assumed"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Column:
@@ -39,9 +37,9 @@ class Column:
     Attributes
     ----------
     name : str
-    residual : {'absolute', 'relative', 'drop', 'assumed'}
-        ``|T x - x|``; the same over ``|T x|``; over the first one of its window, so that it has the ratios of the
-        absolute residual; taken as absolute because nothing says otherwise.
+    residual : {'absolute', 'relative', 'previous', 'drop', 'assumed'}
+        ``|T x - x|``; the same over ``|T x|``; over ``|x|``; over the first or the largest one of its window, so that
+        it has the ratios of the absolute residual; taken as absolute because nothing says otherwise.
     windows : tuple of array
         The residuals of each time window in their order.
     digits, decimals : float
@@ -66,37 +64,51 @@ class Log:
         The relaxation factor that the log itself names.
     theta_rounding : float
         Rounding of theta as it is written there; 0 if it has all its digits.
+    accelerator : str or None
+        The rule that the log names where it is not constant relaxation.
+    factors : tuple of array
+        Of each window, the factor of the relaxation after each residual of the first column, nan where none is named.
+    counts : tuple of int
+        Iterations of each window, of a log that has no residuals.
     notes : tuple of str
         About lines that were left out.
     """
 
     path: Path
-    form: Literal["preCICE", "Kratos CoSimulation", "columns"]
+    form: str
     columns: tuple[Column, ...]
     theta: float | None = None
     theta_rounding: float = 0.0
+    accelerator: str | None = None
+    factors: tuple[Floats, ...] = ()
+    counts: tuple[int, ...] = ()
     notes: tuple[str, ...] = ()
 
 
-def read_log(path: Path) -> Log:
-    """Read the residuals in a log.
+def read_log(path: Path, pattern: str | None = None) -> Log:
+    """Read the residuals in a log, by its form or by a regular expression.
 
     Raises
     ------
     ProblemError
-        No such log, one that is damaged other than in its last line, or one whose relaxation was not constant.
+        No such log, or one that is damaged other than in its last line.
+    ValueError
+        A pattern that is none (:func:`verification.advice.log_lines.form_of_pattern`).
     """
+    form = None if pattern is None else form_of_pattern(pattern)
     why = unreadable(path, MOST_BYTES)
     if why:
         raise _refused(path, why)
-    text = _text(path)
+    text = _ANSI.sub("", _text(path))
     if not text.strip():
         raise _refused(path, "needed residuals, this file is empty")
-    log = _read_kratos(path, text) if any(word in text for word in KRATOS) else _LogTable(path, text).log()
+    form = form or form_of(text)
+    log = _LogTable(path, text).log() if form is None else _read_lines(path, text, form)
     if not any(np.isfinite(window).any() for column in log.columns for window in column.windows):
+        if not log.columns:
+            return log
         raise _refused(path, "needed residuals, every number of its columns is inf or nan")
-    _check_quasi_newton(path)
-    return log
+    return replace(log, accelerator=log.accelerator or _quasi_newton_beside(path))
 
 
 def _refused(path: Path, needed: str, line: int = 0, received: str | None = None) -> ProblemError:
@@ -120,18 +132,21 @@ def _text(path: Path) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
-def _check_quasi_newton(path: Path) -> None:
-    """Refuse a log of preCICE if the log of iteration counts beside it has quasi-Newton columns."""
+def _quasi_newton_beside(path: Path) -> str | None:
+    """The name of the rule if the log of iteration counts of preCICE beside a log has quasi-Newton columns."""
     beside = path.with_name(path.name.replace("-convergence.log", "-iterations.log"))
     if beside == path or unreadable(beside, MOST_BYTES):
-        return
+        return None
     names, *lines = (line.split() for line in _text(beside).split("\n"))
     if "QNColumns" not in names:
-        return
+        return None
     i = names.index("QNColumns")
-    for line, words in enumerate(lines, 2):
-        if len(words) == len(names) and words[i].isdigit() and int(words[i]) > 0:
-            raise _refused(beside, f"QNColumns = {words[i]} tells of a quasi-Newton rule: {RUN_AGAIN}", line)
+    counts = [int(words[i]) for words in lines if len(words) == len(names) and words[i].isdigit()]
+    return _quasi_newton(max(counts, default=0))
+
+
+def _quasi_newton(columns: int) -> str | None:
+    return f"quasi-Newton, up to {columns} columns" if columns else None
 
 
 def _number(word: str) -> float:
@@ -161,89 +176,120 @@ def _rounding(words: Sequence[str]) -> dict[str, float]:
     return {"digits": 0.0, "decimals": 0.5 * 10.0 ** -max(decimals, default=0)}
 
 
-# --- Kratos -----------------------------------------------------------------------------------------------------------
-
-#: Signs of a log of Kratos; the third one before its colours are taken out.
-KRATOS = ("abs-norm =", "abs_norm =", "abs_norm\x1b", "Coupling iteration:")
+# --- lines ------------------------------------------------------------------------------------------------------------
 
 _ANSI = re.compile(r"\x1b\[[0-9;]*m")
-_LINE = re.compile(
-    r"Coupling iteration:\s*(?P<iteration>\d+)\s*/"
-    r"|Convergence for \"(?P<field>[^\"]+)\""
-    r"|abs[-_]norm\s*=\s*(?P<residual>[^\s|]+)(?=[\s|])"  # a last line may be cut off in a number
-    r"|relaxation[^\d=]*factor\s*=\s*(?P<theta>[^\s,]+)(?=[\s,])"
-)
-_WORDS = ("abs-norm", "abs_norm", "Coupling iteration", "Convergence for", "factor")
-
-#: The name with which an accelerator begins a line, but that of constant relaxation; a path may have any of the words.
-_NOT_CONSTANT = re.compile(
-    r"^(?:\[WARNING\] )?(?!ConstantRelaxation)(\w*(?:Aitken|Anderson|MVQN|IBQN|IQN|ConvergenceAccelerator)\w*)\s*:",
-    re.IGNORECASE | re.MULTILINE,
-)
 
 
-def _read_kratos(path: Path, text: str) -> Log:
-    """The residuals that Kratos CoSimulation prints; its absolute norm is the norm of the residual over a constant.
+def _read_lines(path: Path, text: str, form: Form) -> Log:
+    """The residuals that a code prints line by line.
 
-    With an ``echo_level`` below 4 accelerators do not name themselves, and any is taken for constant relaxation.
+    With an ``echo_level`` below 4 accelerators of Kratos do not name themselves, and any is taken for constant
+    relaxation.
     """
-    text = _ANSI.sub("", text)
-    other = _NOT_CONSTANT.search(text)
-    if other is not None:
-        raise _refused(path, f"{other[1]} changes the relaxation: {RUN_AGAIN}", text.count("\n", 0, other.start()) + 1)
-    windows: dict[str, list[list[float]]] = {}
-    written: dict[str, list[str]] = {}
-    thetas: set[str] = set()  # Kratos 10 writes one figure
-    field, before = "residual", 0
-    fresh: set[str] = set()  # fields that have begun the window
-    for line, match in _matches(text):
-        if match["iteration"]:
-            if int(match["iteration"]) <= before:
-                fresh.clear()
-            before = int(match["iteration"])
-        elif match["field"]:
-            field = match["field"].strip()
-        else:
-            word = match["theta"] or match["residual"]
-            try:
-                value = _number(word)
-            except ValueError:
-                raise _refused(path, "needed a number", line, word) from None
-            if match["theta"]:
-                thetas.add(word)
-                continue
-            if value < 0:
-                raise _refused(path, "needed a residual >= 0", line, word)
-            if field not in fresh:
-                fresh.add(field)
-                windows.setdefault(field, []).append([])
-            windows[field][-1].append(value)
-            written.setdefault(field, []).append(word)
-    if not windows:
-        raise _refused(path, "needed residuals: set echo_level to 3 or more in the convergence criteria")
-    if len(thetas) > 1:
-        some = ", ".join(sorted(thetas)[:2])
-        raise _refused(path, f"the relaxation factor takes {len(thetas)} values, as {some}: {RUN_AGAIN}")
+    other = None if form.accelerator is None else form.accelerator.search(text)
+    found = _Lines(path, form)
+    for line, match in _matches(text, form):
+        found.add(line, match)
+    if not found.windows:
+        raise _refused(path, form.needed)
+    first = next(iter(found.windows.values()))
+    windows = {name: _last_of(series) if form.again else series for name, series in found.windows.items()}
+    factors = () if form.again else found.aligned([len(window) for window in first])
+    accelerator = None if other is None else other[1]
+    values = found.factors
+    if accelerator is None and form.every_step and len(values) + len(first) < sum(map(len, first)):
+        accelerator = "quasi-Newton"  # which prints no factor
+    if accelerator is None and len(set(values)) > 1:
+        if not found.omega:
+            some = ", ".join(sorted(set(values))[:2])
+            raise _refused(path, f"the relaxation factor takes {len(set(values))} values, as {some}: {RUN_AGAIN}")
+        accelerator = "Aitken"
     columns = tuple(
         Column(
-            name=f"abs-norm of {name}",
-            residual="absolute",
-            windows=tuple(map(np.array, found)),
-            **_rounding(written[name][:LOOKED_AT]),
+            name=form.label.format(name),
+            residual=form.residual,
+            windows=tuple(map(np.array, series)),
+            **_rounding(found.written[name][:LOOKED_AT]),
         )
-        for name, found in windows.items()
+        for name, series in windows.items()
     )
-    if not thetas:
-        return Log(path=path, form="Kratos CoSimulation", columns=columns)
-    theta, rounding = _number(min(thetas)), _rounding([min(thetas)])
-    off = rounding["digits"] * theta + rounding["decimals"]
-    return Log(path=path, form="Kratos CoSimulation", columns=columns, theta=theta, theta_rounding=off)
+    if accelerator is not None or not values:
+        return Log(path=path, form=form.name, columns=columns, accelerator=accelerator, factors=factors)
+    theta, rounding = _number(values[0]), _rounding(values[:1])
+    off = (rounding["digits"] * theta + rounding["decimals"]) * form.rounded
+    return Log(path=path, form=form.name, columns=columns, theta=theta, theta_rounding=off)
 
 
-def _matches(text: str) -> Iterator[tuple[int, re.Match[str]]]:
+class _Lines:
+    """Residuals by field and window, and factors, as lines are read."""
+
+    def __init__(self, path: Path, form: Form) -> None:
+        self.path, self.form = path, form
+        self.windows: dict[str, list[list[float]]] = {}
+        self.written: dict[str, list[str]] = {}
+        self.factors: list[str] = []  # Kratos 10 writes one figure of a constant one
+        self.omega = False
+        self.after: list[dict[int, list[float]]] = [{}]  # of each window, by the number of residuals before
+        self.field, self.before = "residual", 0
+        self.fresh: set[str] = set()  # fields that have begun the window
+
+    def add(self, line: int, match: re.Match[str]) -> None:
+        """Take what a match has: the factor last, as it comes after the residual."""
+        found = match.groupdict() or {"residual": match[1]}
+        if found.get("iteration"):
+            iteration = int(self._value(line, found["iteration"]))
+            if self.fresh and iteration <= self.before:
+                self.fresh.clear()
+                self.after.append({})
+            self.before = iteration
+        if found.get("field"):
+            self.field = found["field"].strip()
+        if word := found.get("residual"):
+            value = self._value(line, word)
+            if value < 0:
+                raise _refused(self.path, "needed a residual >= 0", line, word)
+            if self.field not in self.fresh:
+                self.fresh.add(self.field)
+                self.windows.setdefault(self.field, []).append([])
+            self.windows[self.field][-1].append(value)
+            self.written.setdefault(self.field, []).append(word)
+        for name in ("theta", "omega"):
+            if word := found.get(name):
+                self.omega = self.omega or name == "omega"
+                self.factors.append(word)
+                self.after[-1].setdefault(self._steps, []).append(self._value(line, word))
+
+    @property
+    def _steps(self) -> int:
+        """Number of residuals of the first field in this window."""
+        first = next(iter(self.windows), None)
+        return len(self.windows[first][-1]) if first in self.fresh and first is not None else 0
+
+    def _value(self, line: int, word: str) -> float:
+        try:
+            return _number(word)
+        except ValueError:
+            raise _refused(self.path, "needed a number", line, word) from None
+
+    def aligned(self, lengths: Sequence[int]) -> tuple[Floats, ...]:
+        """The factor after each residual, nan where there is none; nothing where an iteration has several."""
+        if any(len(values) > 1 for window in self.after for values in window.values()) or not self.factors:
+            return ()
+        pairs = zip(lengths, self.after, strict=False)  # a last window may have no residual yet
+        return tuple(np.array([after.get(n + 1, [math.nan])[0] for n in range(length)]) for length, after in pairs)
+
+
+def _last_of(blocks: list[list[float]]) -> list[list[float]]:
+    """Blocks without those that the next one repeats and continues."""
+    pairs = zip(blocks, [*blocks[1:], []], strict=True)
+    return [block for block, after in pairs if after[: len(block)] != block]
+
+
+def _matches(text: str, form: Form) -> Iterator[tuple[int, re.Match[str]]]:
     for line, content in enumerate(StringIO(text), 1):
-        if any(word in content for word in _WORDS):  # the others are many, and searched slowly
-            for match in _LINE.finditer(content):
+        if not form.words or any(word in content for word in form.words):  # the others are many, and searched slowly
+            for match in form.line.finditer(content):
                 yield line, match
 
 
@@ -305,6 +351,16 @@ class _LogTable:
         """The log that the table is."""
         data = self._rows()
         names = self.names or self._commented(data.shape[1])
+        if {"Iterations", "QNColumns"} <= set(names) and len(names) == data.shape[1]:
+            counts, modes = (data[:, names.index(name)] for name in ("Iterations", "QNColumns"))
+            if modes.max() > 0:
+                return Log(
+                    path=self.path,
+                    form="preCICE",
+                    columns=(),
+                    accelerator=_quasi_newton(int(modes.max())),
+                    counts=tuple(int(count) for count in counts),
+                )
         iteration, window, theta, residuals = self._roles(names, data.shape[1])
         starts = self._starts(data, iteration, window)
         ends = self.numbers
@@ -319,11 +375,16 @@ class _LogTable:
                 raise _refused(self.path, f"needed a residual >= 0 in {names[i]}", self.numbers[wrong[0]], received)
             split = tuple(np.split(data[:, i], starts))
             columns.append(Column(name=names[i], residual=_kind(names[i]), windows=split, **_rounding(words[i])))
+        factors = None if theta is None else data[:, theta]
+        omega = theta is not None and factors is not None and "omega" in names[theta].lower()
+        changes = omega and factors is not None and bool((factors != factors[0]).any())
         return Log(
             path=self.path,
             form="preCICE" if any(_PRECICE.fullmatch(name) for name in names) else "columns",
             columns=tuple(columns),
-            theta=None if theta is None else self._theta(data[:, theta]),
+            theta=None if factors is None or changes else self._theta(factors),
+            accelerator="Aitken" if changes else None,
+            factors=tuple(np.split(factors, starts)) if changes and factors is not None else (),
             notes=tuple(self.notes),
         )
 

@@ -22,6 +22,9 @@ STEADY = 0.03
 #: without friction, or tied, ``|T x - T y| <= |T x - x|`` in the norm (5.21): ``|T x|`` is ``|y|`` within this share.
 SMALL = 0.1
 
+#: The residuals that are relative to a size which changes.
+RELATIVE = ("relative", "previous")
+
 #: A plateau P is flat where it varies by less than this share of P - 1, which tells rho.  A tied run comes as close to
 #: it as its numbers have digits; a run whose contact opens and closes has been seen at 1.0018, within 4 % of P - 1.
 FLAT = 0.01
@@ -106,7 +109,7 @@ def pace(residuals: Floats, column: Column, theta: Fraction) -> Pace:
     mean.  It is steady where these means scatter little between their deciles, and their medians in both halves agree.
     It must be steady over the steps that theta needs; over fewer where the residual has fallen to CONVERGED.
     """
-    relative, steps = column.residual == "relative", steps_needed(theta)
+    relative, steps = column.residual in RELATIVE, steps_needed(theta)
     usable = np.flatnonzero(np.isfinite(residuals) & (residuals > 0))
     end = int(usable[-1]) + 1 if usable.size else 0
     lost = end < len(residuals) and not math.isfinite(float(residuals[end]))
@@ -164,7 +167,7 @@ def pace(residuals: Floats, column: Column, theta: Fraction) -> Pace:
     flat = last is not None and not last.grows and not last.falls
     if last is not None and not flat:
         return last
-    if relative and (plateau := _plateau(tail, column.digits)) is not None:
+    if column.residual == "relative" and (plateau := _plateau(tail, column.digits)) is not None:
         return Pace(kind="plateau", **plateau, **known)
     ends = range(len(values), steps, -max(1, steps // 2))[1 : TRIES + 1]
     earlier = (found for end in ends if (found := ratio(end)) is not None)
@@ -181,6 +184,9 @@ def pace(residuals: Floats, column: Column, theta: Fraction) -> Pace:
         return before
     if height < CONVERGED and (settles := _settling(tail, relative, limit, steps)) is not None:
         return Pace(kind="steady", **settles, **known)
+    small = int(np.argmax(values[::-1] > SMALL)) if relative and values.max() > SMALL else taken + 1
+    if 0 < small <= steps:  # that a relative residual shows; windows of a few of them can be pooled
+        return Pace(kind="short", **(known | {"steps": small - 1, "lost": lost}))
     return Pace(kind="unsteady", lost=lost, **known)
 
 

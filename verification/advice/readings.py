@@ -22,6 +22,9 @@ FEWEST_STEPS = 10
 #: over twenty between 0.96 and 1.06.
 WIDEST, NARROWEST = Fraction(1, 10), Fraction(3, 100)
 
+#: The run that shows most: with theta = 1 a mode is multiplied by ``-lambda``, and an open node by 0.
+AT_ONE = "A few steps with theta = 1 show most, if they may be run: if nothing slips or opens, their ratio tends to rho"
+
 #: Beyond this theta four figures would lead back to a smaller one.
 NEXT_TO_1 = Fraction(999, 1000)
 

@@ -15,6 +15,7 @@ from scipy.linalg import eigh
 from ndtheory import EnergyBounds, EnergyConstants, Number, evaluate_energy
 from ndtheory.energy_norms import predicted_rate, predicted_theta, tied_factor, tied_rate, tied_theta
 from verification.advice import BodyNumber, methods
+from verification.advice.accelerated import Accelerated
 from verification.advice.methods import Advised, MethodRow
 from verification.advice.readings import LARGEST_TO_PASTE, NextRun, RunReading, SeenRun, rounded_down
 from verification.advice.runs_with_friction import FrictionBounds
@@ -248,20 +249,23 @@ def plain_role(neumann_body: BodyNumber, rho: Fraction, **settings: Any) -> Role
     return role_of(neumann_body, bounds.rho, bounds=bounds, **settings)
 
 
-def table_of(roles: Sequence[Role], *, tied: bool, bound: str | None = None) -> tuple[MethodRow, ...]:
+def table_of(
+    roles: Sequence[Role], *, tied: bool, bound: str | None = None, theta: float | None = None
+) -> tuple[MethodRow, ...]:
     """The methods in all roles that are not refused, the first role's own ones first.
 
-    Contact that may open has a mode with lambda = 0 besides; ``bound`` tells which bound the steps are, if any.
+    Contact that may open has a mode with lambda = 0 besides; ``bound`` tells which bound the steps are, if any;
+    ``theta`` is the factor that is advised, where the role has another one.
     """
     found: list[MethodRow] = []
     for role in roles:
         if role.rho is None:
             continue
         spectrum = role.spectrum or Spectrum.between(float(role.ends[0] if role.ends else 0), role.rho.value)
-        theta = min(role.advised(tied=tied and role.ends is not None)[0], float(LARGEST_TO_PASTE))
+        own = min(role.advised(tied=tied and role.ends is not None)[0], float(LARGEST_TO_PASTE))
         found += methods.rows(
             spectrum if tied else spectrum.with_open_nodes(),
-            theta=theta,
+            theta=own if theta is None else theta,
             neumann_body=role.neumann_body,
             exchanged=role is not roles[0],
             bound=bound,
@@ -338,6 +342,8 @@ class Advice(Document):
         The run to make next.
     logs : tuple of SeenLog
         The logs of other runs as they were read.
+    accelerated : tuple of Accelerated
+        Logs of runs whose relaxation was not constant.
     interval : RhoInterval or None
         Bounds of rho from these logs together.
     moduli : SeenModuli or None
@@ -370,6 +376,7 @@ class Advice(Document):
     readings: tuple[RunReading, ...] = ()
     next: NextRun | None = None
     logs: tuple[SeenLog, ...] = ()
+    accelerated: tuple[Accelerated, ...] = ()
     interval: RhoInterval | None = None
     matrices: SeenMatrices | None = None
     problem: Problem | None = None
@@ -401,7 +408,7 @@ class Advice(Document):
         if not self.roles and self.vectors is not None:
             return self.why_no_theta
         if not self.roles:
-            return f"assumed: {self.assumes}; {len(self.readings)} readings of {'logs' if self.logs else 'a run'}"
+            return f"assumed: {self.assumes}; {len(self.readings)} readings of {'a run' if self.run else 'logs'}"
         theta, rate = self.chosen(self.best)
         who = "" if self.neumann_body is None else f"Neumann problem to body {self.neumann_body}, "
         who = who if self.assumes is None else f"assumed: {self.assumes}; "
@@ -436,6 +443,8 @@ class Advice(Document):
             return "contact still changes in the last iterates: continue the run, and give more of its vectors"
         if self.friction_bounds is not None:
             return "with friction no run decides theta: make the run that `next` names"
+        if self.accelerated and not self.readings:
+            return "the runs decide no theta: make the run that `next` names"
         return "several readings are left: make the run that `next` names"
 
     @property
@@ -467,7 +476,7 @@ class Advice(Document):
         if tied and best.rho_min is not None:
             formula = "2/(2+rho_min+rho)"
             first += f"; rho_min (at best) is {best.rho_min.value:.3g}"
-        bound = "about " if self.vectors is not None else "at most " * (tied or best.proved)
+        bound = "about " if self.vectors is not None or self.accelerated else "at most " * (tied or best.proved)
         then = f"So relax by {formula} = {theta:.3g}: {bound}{in_steps(rate)} to 1e-9"
         then += " if nothing opens or slips" if tied else " without friction" if best.proved else " are predicted"
         if other is not None:
@@ -513,15 +522,16 @@ class Advice(Document):
         return next((r for r in self.roles if r.neumann_body == self.neumann_body), self.roles[0])
 
     def content(self) -> dict[str, Any]:
-        origins = ("run", "readings", "next", "logs", "interval", "friction_bounds", "moduli", "matrices", "vectors")
-        names = ("neumann_body", "theta", "tied", "assumes", "quote", "methods", "method", "roles", *origins)
+        origins = ("run", "readings", "next", "logs", "accelerated", "interval", "friction_bounds")
+        inputs = ("moduli", "matrices", "vectors")
+        names = ("neumann_body", "theta", "tied", "assumes", "quote", "methods", "method", "roles", *origins, *inputs)
         found = {name: to_plain(getattr(self, name)) for name in names}
         known = self.spectrum
         found["spectrum"] = None if known is None else {"low": known.low, "high": known.high}
         same = "both roles have the same bounds"
         missing = {
             "neumann_body": same if self.moduli else "one run gives no information about the exchanged roles",
-            "run": "logs were given" if self.logs else "no run was given",
+            "run": "logs were given" if self.logs or self.accelerated else "no run was given",
             "next": "no run was given",
             "interval": "no logs were given",
             "moduli": "no moduli were given",

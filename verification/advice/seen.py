@@ -9,7 +9,7 @@ from typing import Any
 
 from ndtheory.number import above, below
 from verification.advice.log_files import Column
-from verification.advice.pace import MOST_WINDOWS, Pace, pace, pooled, together
+from verification.advice.pace import MOST_WINDOWS, RELATIVE, Pace, pace, pooled, together
 from verification.advice.readings import FEWEST_STEPS, Made, NextRun, Observed, RunReading, few, steps_needed
 from verification.value import to_plain
 
@@ -52,7 +52,7 @@ class SeenColumn:
     ratio, plateau : Observed or None
         Of the windows put together.
     pooled : Observed or None
-        The pace of windows that are all too short, which bounds nothing.
+        The pace of windows of which none shows a ratio, which bounds nothing.
     """
 
     name: str
@@ -100,11 +100,11 @@ class SeenColumn:
 
 
 def seen_column(column: Column, theta: Fraction) -> SeenColumn:
-    """Read the windows of one field one by one and put them together; pool them where all are too short."""
+    """Read the windows of one field one by one and put them together; pool them where none shows a ratio."""
     windows = ([window for window in column.windows if len(window) > FEWEST_STEPS] or column.windows)[-MOST_WINDOWS:]
     paces = tuple(pace(window, column, theta) for window in windows)
-    short = all(one.kind == "short" for one in paces)
-    relative, steps = column.residual == "relative", steps_needed(theta)
+    short = all(one.kind in ("short", "unsteady") for one in paces)
+    relative, steps = column.residual in RELATIVE, steps_needed(theta)
     return SeenColumn(
         name=column.name,
         residual=column.residual,

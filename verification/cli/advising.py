@@ -97,6 +97,9 @@ def _words(context: click.Context, parameter: click.Parameter, begun: str) -> li
 def of_file(file: Path, keys: dict[str, str], swap: bool, tied: bool, snippets: str | None, as_json: bool) -> None:
     """Which body gets the Neumann problem, and which theta?
 
+    For two solvers coupled along an interface: elastic contact, tied bodies, heat (temperature and flux), and a fluid
+    with a structure (FSI, added mass).
+
     FILE is a problem file, or the interface.npz that a run has written.  Both assignments of the roles are compared:
     theta (no unit) and the factor of a step, predicted and proved, and lines to paste into a coupling configuration.
 
@@ -211,14 +214,20 @@ def matrices(tied: bool, snippets: str | None, as_json: bool, **given: Any) -> N
     "thetas",
     metavar="NUMBER",
     multiple=True,
-    required=True,
-    help="Relaxation factor of the run, 0 < theta <= 1; of several logs one each, in their order.",
+    help="Relaxation factor of the run, 0 < theta <= 1; of several logs one each, in their order; none where every log "
+    "names its factor, or is of Aitken or quasi-Newton.",
 )
 @click.option(
     "--ratio",
     metavar="NUMBER",
     help="Ratio of its residual |Tg - g|, absolute and unrelaxed, from one step to the next, steady over 10 or more; "
     "1 where it rises and falls.",
+)
+@click.option(
+    "--pattern",
+    metavar="REGEX",
+    help="Lines of another log: one group, the residual, or groups named residual, iteration, theta, and omega of "
+    "Aitken.",
 )
 @click.option("--friction", is_flag=True, help="There is friction: bounds, and the run to make next.")
 @TIED
@@ -228,16 +237,20 @@ def run(
     logs: tuple[Path, ...],
     thetas: tuple[str, ...],
     ratio: str | None,
+    pattern: str | None,
     friction: bool,
     tied: bool,
     snippets: str | None,
     as_json: bool,
 ) -> None:
-    """Bound rho from runs of any other code.
+    r"""Bound rho from runs of any other code.
 
     Runs with constant theta (no unit), as logs or as the ratio of the residuals of one run: what these can mean, and
-    which theta to run next.  Without --friction they are read as runs without friction.  Give the ratio of the absolute
-    residual |Tg - g|, not of the relative one of coupling libraries; a log may hold either, in any unit.
+    which theta to run next.  Aitken's factors in a log show both ends of the spectrum.  Without --friction runs are
+    read as runs without friction.  Give the ratio of the absolute residual |Tg - g|, not of the relative one of
+    coupling libraries; a log may hold either, in any unit.
+
+    Logs of preCICE, Kratos, solids4foam, Norma.jl, Feel++ and MOOSE, columns of numbers, and others with a --pattern.
 
     \b
     Examples:
@@ -245,25 +258,32 @@ def run(
       ndtheory advise run --log precice-Solid-convergence.log --theta 0.5
       ndtheory advise run --log a.log --theta 0.3 --log b.log --theta 0.6
       ndtheory advise run --log a.log --theta 0.3 --friction
+      ndtheory advise run --log out.txt --theta 0.5 --pattern 'res = (\S+)'
     """
     context = click.get_current_context()
     _no_document_of(snippets, as_json)
     if bool(logs) == (ratio is not None):
-        received = "--log with --ratio: a log shows its own ratio" if logs else "--theta without --log or --ratio"
+        received = "--log with --ratio: a log shows its own ratio" if logs else "neither --log nor --ratio"
         raise click.UsageError(f"received {received}: needed one of --log and --ratio", context)
-    if len(thetas) != max(len(logs), 1):
+    if pattern is not None and not logs:
+        raise click.UsageError("received --pattern without --log", context)
+    given: tuple[str | None, ...] = thetas or (None,) * len(logs)
+    if len(given) != max(len(logs), 1):
         received = f"received {len(thetas)} --theta with {len(logs)} --log"
         raise click.UsageError(f"{received}: needed one --theta for each log, or one with --ratio", context)
     if tied and friction:
         raise click.UsageError("received --tied with --friction: nothing slips on a tied interface", context)
     from verification.advice.from_logs import advise_logs
     from verification.advice.from_runs import advise_run
+    from verification.advice.log_lines import PatternError
 
     try:
         if ratio is None:
-            found = advise_logs(zip(logs, thetas, strict=True), tied=tied, friction=friction)
+            found = advise_logs(zip(logs, given, strict=True), tied=tied, friction=friction, pattern=pattern)
         else:
             found = advise_run(thetas[0], ratio, tied=tied, friction=friction)
+    except PatternError as error:
+        raise click.UsageError(f"--pattern = {pattern}: {error}", context) from None
     except HypothesisError as error:
         raise click.UsageError(f"--{error}", context) from None
     _show(found, snippets, as_json)
@@ -394,5 +414,4 @@ def _show(found: Advice, snippets: str | None, as_json: bool, typed: Typed | Non
     else:
         deliver(found, sections, as_json, typing=nothing_typed if typed is None else typed.command)
     if snippets is not None and found.theta is None:
-        why = "several readings are left" if found.friction_bounds is None else "with friction no run decides theta"
-        complain(f"no snippet: {why}, make the run that is named")
+        complain(f"no snippet: {found.why_no_theta.partition(':')[0]}, make the run that is named")

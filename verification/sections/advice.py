@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
+from verification.advice.accelerated import Accelerated
 from verification.advice.methods import NAMES as METHOD_NAMES
 from verification.advice.readings import LARGEST_TO_PASTE, NextRun, RunReading, SeenRun
+from verification.advice.readings import assumed as assumption
 from verification.advice.roles import Advice, Role, in_steps, steps
 from verification.advice.runs_with_friction import FrictionBounds
 from verification.advice.seen import LogBound, RhoInterval, SeenLog
@@ -47,7 +49,7 @@ def _sections(found: Advice) -> Iterator[Section]:
     if found.assumes is not None:
         yield assumed(found)
     if found.matrices is not None:
-        yield given(found.matrices)
+        yield given(found.matrices, found.friction)
     if found.vectors is not None:
         yield from of_vectors(found, found.vectors)
     if found.run is not None:
@@ -55,9 +57,12 @@ def _sections(found: Advice) -> Iterator[Section]:
     if found.interval is not None:
         yield from of_logs(found, found.interval)
         if found.roles:
-            others = "Predicted for the roles that the bodies have; logs give no information about the exchanged roles."
-            yield _paste(found, *_few_methods(found), others)
-    if found.roles and not found.logs:
+            if any(row.bound is None for row in found.methods):
+                yield from _which_method(found)
+                yield _paste(found)
+            else:
+                yield _paste(found, *_few_methods(found))
+    if found.roles and found.interval is None:
         if found.vectors is None:
             yield _which_body(found)
             yield _which_theta(found)
@@ -82,7 +87,7 @@ def _end(found: Advice) -> Section:
     assumed = "--tied " * found.tied + "--friction " * (found.friction_bounds is not None)
     if found.next.kept and not found.roles:
         then = f"no run; keep theta = {theta}"
-    elif found.logs:
+    elif found.interval is not None:
         then = f"the same with --log LOG --theta {theta} (LOG: the log of that run)"
     else:
         then = f"ndtheory advise run {assumed}--theta {theta} --ratio R (R: its ratio)"
@@ -154,7 +159,7 @@ def _which_theta(found: Advice) -> Section:
     ]
     if ends:
         said.append(f"if tied: 2/(2+rho_min+rho), {'; '.join(ends)}")
-    lines = table(("Neumann", "rho", "", "theta", "per step", "to 1e-9", "remark"), rows)
+    lines = table(("Neumann", "rho", "theta is", "theta", "per step", "to 1e-9", "note"), rows)
     return section("theta", "WHICH THETA?", lines, *said)
 
 
@@ -293,13 +298,15 @@ def pasted(neumann_body: int | None, theta: float | None, *notes: str) -> Sectio
     return section("paste", "TO PASTE", Block(tuple(lines), 2), *notes)
 
 
-def given(seen: SeenMatrices) -> Section:
+def given(seen: SeenMatrices, friction: float | None) -> Section:
     """The matrices that were given."""
     of = [f"S{body}: {one.rows} unknowns" for body, one in ((1, seen.S1), (2, seen.S2))]
     if seen.transfer is not None and seen.neumann_body is not None:
         rows, columns = seen.transfer
         of.append(f"P: {rows} x {columns}, from body {seen.neumann_body} to body {3 - seen.neumann_body}")
     said = ["; ".join(of)]
+    if not friction:
+        said.append("Assumed: no friction.")
     if seen.ordering is None:
         said.append("Ordering: any, so long as both have the same.")
     else:
@@ -318,15 +325,14 @@ def given(seen: SeenMatrices) -> Section:
 MOST_COLUMNS = 8
 
 #: Words for kinds of residuals; the others are called by their names.
-RESIDUALS = {"assumed": "taken as absolute", "drop": "over the first one"}
+RESIDUALS = {"assumed": "taken as absolute", "drop": "over the first or largest one", "previous": "over |x|"}
 
 
 def assumed(found: Advice) -> Section:
     """The assumption under which runs are read, before all else."""
-    notes = [Note(f"Assumed: {found.assumes}.", 0)]
-    if not found.tied and found.friction_bounds is None:
-        notes.append(Note("With friction what follows may be false: add --friction.", 0))
-    return section("assumed", "", *notes)
+    free = not found.tied and found.assumes == assumption(tied=False, friction=False)
+    otherwise = " With friction add --friction." if free else ""
+    return section("assumed", "", Note(f"Assumed: {found.assumes}.{otherwise}", 0))
 
 
 def of_a_run(found: Advice, run: SeenRun) -> Sections:
@@ -346,20 +352,24 @@ def of_a_run(found: Advice, run: SeenRun) -> Sections:
 def of_logs(found: Advice, interval: RhoInterval) -> Sections:
     """The values of rho that each log and all logs together allow, and the run to make next."""
     read = [_readings(found.readings)] if found.readings else []
-    notes = [] if read else ["Nothing: no time window shows a steady ratio or level over enough steps."]
+    notes = [f"Aitken's {log.factors.says}." for log in found.accelerated if log.factors is not None]
+    if not read and found.logs:
+        notes.append("Nothing: no time window shows a steady ratio or level over enough steps.")
+    elif not read and not notes:
+        notes.append("Nothing: residuals show rho only where the relaxation is constant.")
     if interval.contradiction is not None:
         notes.append(f"CONTRADICTION: {interval.contradiction}.")
     else:
         notes += _bound("least", interval.lo, found.logs) + _bound("most", interval.hi, found.logs)
     return (
-        _seen(found.logs),
+        _seen(found.logs, found.accelerated),
         section("rho", "WHAT DO THEY SAY OF RHO?", *read, *notes),
         *_with_friction(found.friction_bounds),
         *next_run(found.next),
     )
 
 
-def _seen(logs: Sequence[SeenLog]) -> Section:
+def _seen(logs: Sequence[SeenLog], accelerated: Sequence[Accelerated]) -> Section:
     """The logs, column by column."""
     parts: list[Note | str] = []
     room = MOST_COLUMNS
@@ -372,8 +382,12 @@ def _seen(logs: Sequence[SeenLog]) -> Section:
     left = sum(len(log.columns) for log in logs) - MOST_COLUMNS
     if left > 0:
         parts.append(f"and {left} columns more, see --json")
-    steps = " and ".join(f"{n}" for n in sorted({log.steps for log in logs})) + " steps"
-    parts.append(f"Assumed: theta constant in each run, no Aitken or quasi-Newton.  A ratio counts over {steps}.")
+    for one in accelerated:
+        parts.append(f"{one.accelerator}, {one.form}, {one.file}")
+        parts += [Note(words, 4) for words in (one.says if one.factors is None else one.counted, *one.notes)]
+    if logs:
+        steps = " and ".join(f"{n}" for n in sorted({log.steps for log in logs})) + " steps"
+        parts.append(f"Assumed: theta constant in each run, no Aitken or quasi-Newton.  A ratio counts over {steps}.")
     return section("logs", "WHAT DO THE LOGS SHOW?", *parts)
 
 
@@ -381,7 +395,7 @@ def _readings(readings: Sequence[RunReading]) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for reading in readings:
         low = reading.lo
-        rho = NONE if low is None else Quantity(float(low), f">= {rounded(low, 3, up=False)}")
+        rho = NONE if low is None else Quantity(float(low), f">= {rounded(low, 4, up=False)}")
         rows.append((reading.kind, rho, reading.says))
     return table(("reading", "rho", "if it is the right one"), rows)
 
@@ -390,7 +404,7 @@ def _bound(which: str, bound: LogBound | None, logs: Sequence[SeenLog]) -> list[
     if bound is None:
         return []
     source = f"theta = {float(bound.log.theta):.4g}: {bound.says}" if len(logs) > 1 else bound.says
-    value = rounded(float(bound.value), 3, up=which == "most")
+    value = rounded(float(bound.value), 4, up=which == "most")
     return [f"rho is at {which} {value} given {bound.assumes} ({source})"]
 
 
@@ -430,7 +444,7 @@ def _of_moduli(found: Advice, seen: SeenModuli) -> Sections:
     if found.next is not None:
         theta = f"{found.next.theta:g}"
         then = f"ndtheory advise run --theta {theta} --ratio R (R: the ratio of that run)"
-    last = next_run(found.next)
+    last: Sections = ()
     if tried is not None and tried.start is not None:
         last = (pasted(tried.neumann_body, tried.start.theta_guess),)
     return (
@@ -438,7 +452,7 @@ def _of_moduli(found: Advice, seen: SeenModuli) -> Sections:
         _least_rho(seen),
         _excluded(seen),
         _who(found, seen),
-        _start(started),
+        _start(started, None if last else found.next),
         *last,
         closing("a bound of rho from above with friction, or where no image fits", then=then),
     )
@@ -484,7 +498,7 @@ def _who(found: Advice, seen: SeenModuli) -> Section:
     return which_body(says)
 
 
-def _start(started: Sequence[ModuliRole]) -> Section:
+def _start(started: Sequence[ModuliRole], first: NextRun | None) -> Section:
     notes = []
     for role in started:
         start, body = role.start, f"body {role.neumann_body}"
@@ -496,7 +510,9 @@ def _start(started: Sequence[ModuliRole]) -> Section:
             f"{body}, with friction: theta = {start.theta_guess:.4g}, a guess: rho at most {figures(start.guess)}, as"
             f" with {start.guessed_from}",
         ]
+    if first is not None:
+        notes.append(f"theta = {first.theta:g}, a guess: {first.why}")
     if not started:
-        notes.append("None: a lower bound of rho gives no theta, 2/(2 + bound) can diverge.")
-        notes.append("If the mirror image of a body fits into the other one, say --mirror.")
+        notes.append("A lower bound of rho proves no theta. If the mirror image of a body fits into the other one, say")
+        notes[-1] += " --mirror."
     return section("start", "WHICH THETA TO START WITH?", *notes)
