@@ -25,6 +25,7 @@ import numpy as np
 
 from fem1d2d.mesh import Floats
 from verification.contact.system import ContactSystem, SolveError
+from verification.dense import STILL
 from verification.document import Document
 from verification.interface.assembly import TwoBodies, discretise
 from verification.interface.body import Body
@@ -209,6 +210,7 @@ def contact_system(bodies: TwoBodies) -> ContactSystem:
             flexibility, trace = _flexibility(body)
             moves = np.zeros((len(body.unknown), body.motions.shape[1]))
             moves[body.unknown] = body.motions[body.interface]
+            moves[:, np.abs(moves).max(axis=0) <= STILL] = 0.0  # of a piece on a hinge: else rounding would hold it
             if body is bodies.neumann:  # as the contact grid sees it
                 flexibility = interface.carry(interface.carry(flexibility).T)
                 trace, moves = interface.carry(trace), interface.carry(moves)
