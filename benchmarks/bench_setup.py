@@ -1,5 +1,7 @@
 """Set-up (assembly, factorisations, Schur complements, all constants) at growing sizes, beside set-up by dense lifts.
 
+And beside the factorisations of the stiffness matrices alone, which are the limit.
+
 python benchmarks/bench_setup.py [--full] [--largest UNKNOWNS] [--lifts UNKNOWNS]
 
 Each size and path has a process of its own, because the peak of the memory belongs to the process.
@@ -18,7 +20,7 @@ from recording import Record, options, report, row
 from timing import peak, timed
 
 import verification as vf
-from fem1d2d import Condensation
+from fem1d2d import Condensation, solver
 from verification.interface import body
 from verification.interface.pair import pair_from
 
@@ -54,8 +56,8 @@ class ByLifts(Condensation):
         return load[self.interface] + self.lift.T @ load[self.inside]
 
 
-def once(factor: float, by_lifts: bool) -> tuple[int, float, float, dict[str, float]]:
-    """Unknowns, CPU seconds, peak in MB, and the constants."""
+def once(factor: float, by_lifts: bool) -> tuple[int, float, float, dict[str, float], float]:
+    """Unknowns, CPU seconds, peak in MB, the constants, and CPU seconds of the bare factorisations."""
     if by_lifts:
         body.Condensation = ByLifts  # type: ignore[misc]
     p = scaled(factor)
@@ -65,8 +67,10 @@ def once(factor: float, by_lifts: bool) -> tuple[int, float, float, dict[str, fl
         return pair, vf.measure(pair)
 
     seconds, (pair, measured) = timed(constants)
-    unknowns = sum(len(b.positions) for b in pair.on_meshes().elastic)
-    return unknowns, seconds, peak(), {name: getattr(measured, name).value for name in NAMES}
+    bodies, memory = pair.on_meshes().elastic, peak()
+    bare, _ = timed(lambda: [solver(b.stiffness) for b in bodies])
+    values = {name: getattr(measured, name).value for name in NAMES}
+    return sum(len(b.positions) for b in bodies), seconds, memory, values, bare
 
 
 def alone(function: Callable[..., tuple], *arguments: object) -> tuple:
@@ -79,23 +83,25 @@ def main() -> None:
     parser = options(__doc__)
     parser.add_argument("--lifts", type=int, default=105_000, help="dense lifts up to so many unknowns")
     chosen = parser.parse_args()
-    times, peaks = [], []
+    times, peaks, bares = [], [], []
     for factor in FACTORS + MORE * chosen.full:
         expected = 4860 * factor**2
         if expected > chosen.largest:
             break
         rounds = ROUNDS if factor in FACTORS else 1  # the long ones once
-        seconds, memory, apart = [], [], None
+        seconds, memory, beside, apart = [], [], [], None
         for _ in range(rounds):
-            unknowns, ours, our_peak, found = alone(once, factor, False)
+            unknowns, ours, our_peak, found, bare = alone(once, factor, False)
             other, other_peak = None, None
             if expected <= chosen.lifts:
-                _, other, other_peak, reference = alone(once, factor, True)
+                _, other, other_peak, reference, _ = alone(once, factor, True)
                 apart = max(abs(found[name] / value - 1) for name, value in reference.items())
             seconds.append((ours, other))
             memory.append((our_peak, other_peak))
+            beside.append((ours, bare))
         times.append(row(unknowns, seconds, apart))
         peaks.append(row(unknowns, memory))
+        bares.append(row(unknowns, beside))
     sides = {
         "ours": "assembly, Schur complements read off the sparse factors, all constants",
         "other": "the same with one inner solve for each interface unknown (dense lifts)",
@@ -123,6 +129,18 @@ def main() -> None:
         **sides,
     )
     report(memory, chosen.record)
+    limit = Record(
+        name="setup_limit",
+        place=3,
+        title="Set-up: its limit",
+        ours=sides["ours"],
+        other="the sparse factorisations of the two stiffness matrices alone, without which there is no set-up",
+        peer="factorisations",
+        size="unknowns",
+        rows=tuple(bares),
+        since=FROM,
+    )
+    report(limit, chosen.record)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,16 @@ A small core in which every matrix is exact for its mesh.  Contact and the theor
 """
 
 from fem1d2d.assembly import body_load, facet_weights, gram, side_load, stiffness
-from fem1d2d.condense import FEW, Condensation, Lifted, Uncoupled, elimination_order, solver, solver_with_inertia
+from fem1d2d.condense import (
+    FEW,
+    Condensation,
+    Lifted,
+    Response,
+    Uncoupled,
+    elimination_order,
+    solver,
+    solver_with_inertia,
+)
 from fem1d2d.element import largest_strains, stresses, von_mises
 from fem1d2d.material import Material, bar, plane_strain
 from fem1d2d.mesh import Mesh, MeshError, interval, rectangle, rectangle_points, sector
@@ -23,6 +32,7 @@ __all__ = [
     "Material",
     "Mesh",
     "MeshError",
+    "Response",
     "Supports",
     "Uncoupled",
     "bar",

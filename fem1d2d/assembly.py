@@ -15,6 +15,7 @@ from fem1d2d.mesh import Cells, Floats, Ints, Mesh
 
 def assemble(nodes: Ints, entries: NDArray[np.float64], size: int) -> sp.csc_array:
     """Sum element matrices, shape (c, k, k), of the unknowns ``nodes``, shape (c, k)."""
+    nodes = nodes.astype(sp.get_index_dtype(maxval=max(size, entries.size)))  # short ones, as SuperLU takes them
     rows = np.repeat(nodes, nodes.shape[1], axis=1).ravel()
     columns = np.tile(nodes, nodes.shape[1]).ravel()
     return sp.coo_array((entries.ravel(), (rows, columns)), shape=(size, size)).tocsc()

@@ -100,7 +100,7 @@ FLOORS: dict[str, dict[str, str]] = {
 
 #: Lines of each package at most, those of packages inside it apart: whoever needs more says here how many.
 BUDGET = {
-    "fem1d2d": 3020,
+    "fem1d2d": 3090,
     "ndtheory": 5600,
     "verification": 1240,
     "verification.advice": 5750,
@@ -113,7 +113,7 @@ BUDGET = {
     "verification.coupling": 420,
     "verification.exploration": 600,
     "verification.figures": 1520,
-    "verification.interface": 2695,
+    "verification.interface": 2725,
     "verification.ledger": 4320,
     "verification.output": 470,
     "verification.problem": 1510,

@@ -25,6 +25,7 @@ import numpy as np
 
 from fem1d2d.mesh import Floats
 from verification.contact.system import ContactSystem, SolveError
+from verification.dense import STILL
 from verification.document import Document
 from verification.interface.assembly import TwoBodies, discretise
 from verification.interface.body import Body
@@ -87,12 +88,11 @@ class Solution(Document):
         used = 0
         for i, (body, sign) in enumerate(((self.bodies.body1, -1.0), (self.bodies.body2, 1.0))):
             if body is not None:
-                load = body.load.copy()
                 force = self.force if body is not self.bodies.neumann else self.bodies.interface.carry_back(self.force)
-                load[body.interface] += sign * force[body.unknown]
+                elastic = body.response.loaded + body.response.field(sign * force[body.unknown])
                 full = body.known.values.ravel().copy()
                 k = body.motions.shape[1]
-                full[body.positions] = body.solve(load) + body.motions @ self.motion[used : used + k]
+                full[body.positions] = elastic + body.motions @ self.motion[used : used + k]
                 used += k
                 fields[i] = full.reshape(body.mesh.points.shape)
         return fields[0], fields[1]
@@ -209,6 +209,7 @@ def contact_system(bodies: TwoBodies) -> ContactSystem:
             flexibility, trace = _flexibility(body)
             moves = np.zeros((len(body.unknown), body.motions.shape[1]))
             moves[body.unknown] = body.motions[body.interface]
+            moves[:, np.abs(moves).max(axis=0) <= STILL] = 0.0  # of a piece on a hinge: else rounding would hold it
             if body is bodies.neumann:  # as the contact grid sees it
                 flexibility = interface.carry(interface.carry(flexibility).T)
                 trace, moves = interface.carry(trace), interface.carry(moves)
@@ -225,12 +226,9 @@ def contact_system(bodies: TwoBodies) -> ContactSystem:
 
 def _flexibility(body: Body) -> tuple[Floats, Floats]:
     """Return ``(A^-1)_BB`` and the trace of the solution without contact, on all interface components."""
-    columns = np.zeros((len(body.positions), len(body.interface)))
-    columns[body.interface, np.arange(len(body.interface))] = 1.0
-    inverse = body.solve(columns)[body.interface]
     rows = np.flatnonzero(body.unknown)
     flexibility = np.zeros((len(body.unknown), len(body.unknown)))
-    flexibility[np.ix_(rows, rows)] = (inverse + inverse.T) / 2
+    flexibility[np.ix_(rows, rows)] = body.response.flexibility
     trace = body.known_trace.copy()
-    trace[rows] = body.solve(body.load)[body.interface]
+    trace[rows] = body.response.loaded[body.interface]
     return flexibility, trace

@@ -10,13 +10,13 @@ import fem_oracle
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from condensed_cases import EPS, condensed_bodies, definite, either, norm
 from hypothesis import given
 from hypothesis import strategies as st
 from strategies import fewer, held_bodies, numbers, powers_of_two
 
 from fem1d2d import (
     Condensation,
-    Lifted,
     bar,
     elimination_order,
     gram,
@@ -27,35 +27,6 @@ from fem1d2d import (
     stiffness,
 )
 from fem1d2d.condense import BLOCK
-
-EPS = np.finfo(float).eps
-
-#: In sparse matrices, and in the dense ones of a body of few unknowns.
-either = pytest.mark.parametrize("kind", [Condensation, Lifted])
-
-
-def norm(A):
-    return float(np.linalg.norm(np.asarray(A, dtype=float), 2)) if A.size else 0.0
-
-
-@st.composite
-def definite(draw, most=6):
-    """Integer matrices G'G + I, as rationals and as floats, and an ordered interface."""
-    n = draw(st.integers(1, most))
-    random = np.random.default_rng(draw(st.integers(0, 2**16)))
-    G = np.where(random.random((n, n)) < 0.6, random.integers(-4, 5, (n, n)), 0)
-    A = G.T @ G + np.eye(n, dtype=int)
-    interface = random.permutation(n)[: draw(st.integers(1, n))]
-    return fem_oracle.exactly(A), sp.csc_array(A.astype(float)), interface
-
-
-@st.composite
-def condensed_bodies(draw, most=3):
-    """The stiffness or Gram matrix of a held body, and an ordered interface of one to all unknowns."""
-    mesh, material, free = draw(held_bodies(most))
-    matrix = draw(st.sampled_from([stiffness(mesh, material), gram(mesh)]))
-    random = np.random.default_rng(draw(st.integers(0, 2**16)))
-    return matrix[free][:, free].tocsc(), random.permutation(len(free))[: draw(st.integers(1, len(free)))]
 
 
 def rounding(A, lift):
@@ -197,8 +168,9 @@ def test_what_nothing_holds_is_condensed_as_in_rationals_and_keeps_its_rigid_mot
     exact = R.T @ fem_oracle.exactly(G + G.T) @ R
     slack = 1e3 * len(A) * EPS * norm(G + G.T) * norm(R) ** 2
     assert norm(fem_oracle.exactly(found.on_lifts(sp.csc_array((G + G.T).astype(float)))) - exact) <= slack
-    with pytest.raises(ValueError, match="singular: needed a definite one"):
-        found.solver()
+    for call in (found.solver, lambda: found.response(load.astype(float))):
+        with pytest.raises(ValueError, match="singular: needed a definite one"):
+            call()
 
 
 # --- on elastic bodies, against dense linear algebra ------------------------------------------------------------------

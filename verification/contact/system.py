@@ -58,7 +58,7 @@ class ContactSystem:
     bound : array, shape (t,), optional
         A given friction bound instead: the Tresca problem.
     motions : array, shape (t + n, k), optional
-        M: jumps of the rigid motions that only contact can hold.
+        M: jumps of the rigid motions that only contact can hold; a column of 0 for one that it does not feel.
     resultant : array, shape (k,), optional
         The value that ``M' lambda`` must have: the work of the loads in those motions.
     """
@@ -76,6 +76,7 @@ class ContactSystem:
         self.W, self.d0, self.friction, self.given = flexibility, jump, friction, bound
         self.M = np.zeros((len(jump), 0)) if motions is None else motions
         self.resultant = np.zeros(0) if resultant is None else resultant
+        self.reach = float(np.abs(self.M).max(initial=0.0)) or 1.0
         self.t = len(friction)
         self.flexible = (np.diag(flexibility) > 0) | self.M.any(axis=1)
         self.linear_solves = 0
@@ -204,14 +205,13 @@ class ContactSystem:
         k = self.M.shape[1]
         if not k:
             return np.zeros((0, 0))
-        size = float(np.abs(self.M).max())
         _, values, right = (
             np.linalg.svd(np.linalg.qr(self.M[rows], mode="r")) if len(rows) else (0, np.zeros(0), np.eye(k))
         )
-        free = right[int((values > STILL * size).sum()) :].T
-        if not free.size or np.abs(free.T @ works).max(initial=0.0) > STILL * size:
+        free = right[int((values > STILL * self.reach).sum()) :].T
+        if not free.size or np.abs(free.T @ works).max(initial=0.0) > STILL * self.reach:
             return np.zeros((k, k))
-        return np.asarray(free @ free.T) * size**2 / float(np.diag(self.W).max())
+        return np.asarray(free @ free.T) * self.reach**2 / float(np.diag(self.W).max())
 
     def _mend(self, branches: Branches, force: Floats, motion: Floats) -> Branches:
         """Return the branches that the signs require; a sliding node of the wrong sign goes to stick first."""
@@ -233,7 +233,7 @@ class ContactSystem:
         k = self.M.shape[1]
         if k == 0:
             return self.W, self.d0
-        c = 10 * float(np.diag(self.W).max()) / float(np.abs(self.M).max()) ** 2
+        c = 10 * float(np.diag(self.W).max()) / self.reach**2
         return self.W + c * self.M @ self.M.T, self.d0 + c * self.M @ self.resultant
 
     def _branches(self, force: Floats) -> Branches:

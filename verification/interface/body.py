@@ -19,6 +19,7 @@ from fem1d2d import (
     Lifted,
     Material,
     Mesh,
+    Response,
     Supports,
     Uncoupled,
     elimination_order,
@@ -102,25 +103,51 @@ class Body(Value):
         return freeze(whole[self.positions][:, self.positions].tocsc())
 
     @cached_property
+    def _left(self) -> Ints:
+        """The unknowns that are left where as many are pinned as rigid motions are left."""
+        _, _, order = qr(self.motions.T, pivoting=True, mode="economic")
+        return np.sort(order[self.motions.shape[1] :])
+
+    @cached_property
     def solve(self) -> Callable[[Floats], Floats]:
         """The function ``load -> A^-1 load`` on the unknowns, for one load or columns of loads.
 
         Where rigid motions are left, as many unknowns are pinned: exact, up to a motion, for loads in equilibrium.
         """
         with one_thread():
-            k = self.motions.shape[1]
-            if k == 0:
+            if self.motions.shape[1] == 0:
                 return solver(self.stiffness)
-            _, _, order = qr(self.motions.T, pivoting=True, mode="economic")
-            rest = np.sort(order[k:])
-            pinned = solver(self.stiffness[rest][:, rest])
+            left = self._left
+            pinned = solver(self.stiffness[left][:, left])
 
         def solve(load: Floats) -> Floats:
             result = np.zeros_like(load)
-            result[rest] = pinned(load[rest])
+            result[left] = pinned(load[left])
             return result
 
         return solve
+
+    @cached_property
+    def response(self) -> Response:
+        """The displacements under the loads and under forces on the interface, pinned as in :attr:`solve`."""
+        with one_thread():
+            if self.motions.shape[1] == 0:
+                return self.elastic.response(self.load)
+            left = self._left
+            felt = np.isin(self.interface, left)
+            kind = Lifted if self.few else Condensation
+            interface = np.searchsorted(left, self.interface[felt])
+            pinned = kind(self.stiffness[left][:, left].tocsc(), interface).response(self.load[left])
+        flexibility, loaded = np.zeros((len(felt), len(felt))), np.zeros(len(self.load))
+        flexibility[np.ix_(felt, felt)] = pinned.flexibility
+        loaded[left] = pinned.loaded
+
+        def field(force: Floats) -> Floats:
+            result = np.zeros(len(self.load))
+            result[left] = pinned.field(force[felt])
+            return result
+
+        return Response(flexibility=flexibility, loaded=loaded, field=field)
 
     @cached_property
     def order(self) -> Ints:
