@@ -78,7 +78,7 @@ def test_a_body_is_pickled_without_its_stiffness_and_assembles_it_again_to_the_l
     run = results["Run"]
     for body in (run.pair.body1.body, run.pair.body2.body):
         written = pickle.dumps(body)
-        assert len(written) < body.stiffness.data.nbytes + body.stiffness.indices.nbytes
+        assert body.stiffness.data.tobytes() not in written
         there = pickle.loads(written).stiffness
         for name in ("data", "indices", "indptr"):
             assert np.array_equal(getattr(there, name), getattr(body.stiffness, name))
