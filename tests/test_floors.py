@@ -98,7 +98,7 @@ FLOORS: dict[str, dict[str, str]] = {
 
 #: Lines of each package at most, those of packages inside it apart: whoever needs more says here how many.
 BUDGET = {
-    "fem1d2d": 3730,
+    "fem1d2d": 3750,
     "ndtheory": 5600,
     "verification": 1225,
     "verification.advice": 4500,

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
+from typing import Any
 
 from fem1d2d import plane_strain
 from fem1d2d.layers import Interface, Layer, peaks
@@ -14,6 +15,7 @@ from ndtheory.moduli import Moduli, half_planes
 from verification.problem import Problem
 from verification.problem.specs import BodySpec
 from verification.threads import one_thread
+from verification.value import to_plain
 
 #: Columns of cells of a body in one period up to which the waves of both grids are joined: a tenth of a second.
 MOST_COLUMNS = 8
@@ -40,6 +42,11 @@ class OfCells:
     numbers: Mapping[str, Number]
     why: str = ""
     unverified: str = ""
+
+    def objects(self) -> tuple[dict[str, Any], dict[str, str]]:
+        """Both as a document has them, and the entries of its ``reason``."""
+        numbers = {name: to_plain(self.numbers.get(name)) for name in NAMES}
+        return numbers, {} if self.numbers else dict.fromkeys(NAMES, self.why)
 
 
 def rho_of_cells(problem: Problem | None, *, verified: bool = False) -> OfCells:

@@ -246,19 +246,20 @@ class Measured(Document):
         return replace(self, friction=k, problem=None, **values)
 
     def content(self) -> dict[str, Any]:
-        numbers = {name: to_plain(getattr(self, name)) for name in (*NAMES, *cells.NAMES, *ENERGY_NAMES)}
-        float_cells = [name for name, number in self._of_cells.numbers.items() if number.level == "float"]
-        no_cells = dict.fromkeys(cells.NAMES, self.why_no_cells) if self.why_no_cells else {}
+        of_cells, no_cells = self._of_cells.objects()
+        unproved = [name for name, number in self._of_cells.numbers.items() if number.level == "float"]
         return {
             "body1": to_plain(self.body1),
             "body2": to_plain(self.body2),
-            **numbers,
+            **{name: to_plain(getattr(self, name)) for name in NAMES},
+            **of_cells,
+            **{name: to_plain(getattr(self, name)) for name in ENERGY_NAMES},
             "interface_nodes": self.interface_nodes,
             "reason": dict(self.reason) | no_cells,
             **(
                 {}
                 if self.unverified is None
-                else {"unverified": dict(self.unverified) | dict.fromkeys(float_cells, self._of_cells.unverified)}
+                else {"unverified": dict(self.unverified) | dict.fromkeys(unproved, self._of_cells.unverified)}
             ),
             **({"levels": [level.content() for level in self.levels]} if self.levels else {}),
         }
