@@ -28,8 +28,8 @@ FLOORS: dict[str, dict[str, str]] = {
     },
     "elastic bodies": {
         "fem1d2d": (
-            "__init__ assembly condense element enclosed exact loewner material mesh mesh_files mesh_reader outline "
-            "pencil proved supports trace"
+            "__init__ assembly condense element enclosed exact layers layers_proved loewner material mesh mesh_files "
+            "mesh_reader outline pencil proved supports trace"
         )
     },
     "for all of verification": {
@@ -44,7 +44,7 @@ FLOORS: dict[str, dict[str, str]] = {
         ),
         "verification.contact": "__init__ active_set kkt model step system",
     },
-    "constants": {"verification.constants": "__init__ measured measuring operators proved"},
+    "constants": {"verification.constants": "__init__ cells measured measuring operators proved"},
     "iteration": {
         "verification": "monolithic",
         "verification.algorithm": (
@@ -100,7 +100,7 @@ FLOORS: dict[str, dict[str, str]] = {
 
 #: Lines of each package at most, those of packages inside it apart: whoever needs more says here how many.
 BUDGET = {
-    "fem1d2d": 3090,
+    "fem1d2d": 3810,
     "ndtheory": 5600,
     "verification": 1240,
     "verification.advice": 5750,
@@ -108,7 +108,7 @@ BUDGET = {
     "verification.bounds": 3220,
     "verification.certificate": 1100,
     "verification.cli": 2405,
-    "verification.constants": 1110,
+    "verification.constants": 1310,
     "verification.contact": 940,
     "verification.coupling": 420,
     "verification.exploration": 600,
@@ -118,7 +118,7 @@ BUDGET = {
     "verification.output": 470,
     "verification.problem": 1510,
     "verification.reproduce": 655,
-    "verification.sections": 2200,
+    "verification.sections": 2210,
     "verification.sweeps": 2400,
     "verification.testing": 1570,
 }
@@ -145,6 +145,7 @@ INSIDE = (
     ("verification.output.fields", "meshio", "half a second; only a folder needs it"),
     ("verification.exploration.page", "jinja2", "it is loaded once there is a page"),
     ("verification.output.folder", "verification.output.report", "jinja2 is loaded once there is a comparison"),
+    ("verification.constants.cells", "fem1d2d.layers_proved", "balls take 50 ms to load; only proofs need them"),
     ("verification.contact.step", "verification.contact.model", "cvxpy takes a second, and few steps need it"),
     ("verification.contact.step", "scipy.optimize", "heavy; only bodies that contact alone holds need it"),
     ("verification.threads", "threadpoolctl", "ledger records are read without it"),

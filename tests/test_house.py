@@ -19,7 +19,7 @@ DOORS = {
     "click": ("verification.cli",),
     "rich": ("verification.cli",),
     "hypothesis": ("verification.testing",),
-    "flint": ("verification.certificate",),
+    "flint": ("verification.certificate", "fem1d2d.layers_proved"),
     "sqlite3": ("verification.sweeps.store",),
     "distributed": ("verification.sweeps.cluster",),
     "xarray": ("verification.sweeps.export",),

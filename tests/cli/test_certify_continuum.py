@@ -78,11 +78,13 @@ def test_a_theta_that_contracts_in_the_continuum_and_not_on_the_mesh_is_shown_wi
     assert "rho_normal: 4.5001 on 25 contact nodes (float); in the continuum <= 3.5, guaranteed." in said
     assert "On this mesh no theta from 0.3636 on contracts (float)." in said
     assert "theta = 0.43 contracts in the continuum (guaranteed), and NOT on this mesh (float)." in said
+    assert "rho_normal of finer meshes of such cells tends to 4.5185 or more (float): no theta above 0.3624" in said
     assert said.index("NOT on this mesh") > said.index("guaranteed. DOES IT CONTRACT ON THE MESH")
     assert max(map(len, answer.out.splitlines()[:-1])) <= 80
     document = call("certify", "--continuum", path, "--theta", "0.43", "--json").document
     assert (document["verdict"], document["mesh"]["contracts"]) == ("contraction", False)
     assert document["mesh"]["rho_normal"]["level"] == "float"
+    assert document["mesh"]["rho_normal_cells"]["value"] == pytest.approx(4.5184806, rel=1e-6)
     assert document["constants"]["rho_normal"]["level"] == "guaranteed"
     assert "a mesh, which may need a smaller theta" in document["not_claimed"]
     stalled = call("run", path, "--theta", "0.43", "--json")

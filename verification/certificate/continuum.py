@@ -28,6 +28,7 @@ from ndtheory.continuum import (
 )
 from ndtheory.intervals import Interval
 from ndtheory.moduli import Moduli, half_planes
+from verification.constants.cells import OfCells, rho_of_cells
 from verification.constants.measuring import of_energy
 from verification.document import Document
 from verification.interface.pair import pair_from
@@ -55,10 +56,14 @@ NO_THETA = "the file gives no theta, and none is proved in the continuum"
 
 @dataclass(frozen=True, kw_only=True)
 class FileMesh:
-    """Contact nodes and constants in energy norms of the mesh of a file, in doubles; ``why`` they were not computed."""
+    """Contact nodes and constants in energy norms of the mesh of a file, in doubles; ``why`` they were not computed.
+
+    ``cells`` has rho of half-planes of its cells, once halved.
+    """
 
     interface_nodes: int | None
     energy: EnergyConstants | None
+    cells: OfCells
     why: str = ""
 
     @property
@@ -81,13 +86,15 @@ class FileMesh:
         if contracts is None:
             undecided = "theta is below the limit, and the bound in energy norms does not prove contraction there"
             reason["contracts"] = self.why or (undecided if theta is not None else NO_THETA)
+        of_cells, none = self.cells.objects()
         return {
             "interface_nodes": self.interface_nodes,
             **{name: self.number(name) for name in numbers},
+            **of_cells,
             "theta_limit": self.theta_limit,
             "theta": theta,
             "contracts": contracts,
-            "reason": reason | ({} if theta is not None else {"theta": NO_THETA}),
+            "reason": reason | none | ({} if theta is not None else {"theta": NO_THETA}),
         }
 
     def number(self, name: str) -> dict[str, Any] | None:
@@ -277,11 +284,11 @@ def certify_continuum(problem: Problem, progress: Progress = silent) -> Continuu
 
 def file_mesh(problem: Problem, progress: Progress = silent) -> FileMesh:
     """Condense the two rectangles of a problem on their meshes, each held only at its outer side, and find rho."""
-    cells = [body.cells or () for body in (problem.body1, problem.body2)]
-    if max(max(own) for own in cells) > MOST_ALONG or sum(int(np.prod(own)) for own in cells) > MOST_CELLS:
+    counts, cells = [body.cells or () for body in (problem.body1, problem.body2)], rho_of_cells(problem)
+    if max(max(own) for own in counts) > MOST_ALONG or sum(int(np.prod(own)) for own in counts) > MOST_CELLS:
         needed = f"up to {MOST_ALONG} cells along a side and {MOST_CELLS} in all"
         why = f"not computed beside a bound for the continuum: {needed} are; `ndtheory constants` finds rho"
-        return FileMesh(interface_nodes=None, energy=None, why=why)
+        return FileMesh(interface_nodes=None, energy=None, cells=cells, why=why)
     progress("measuring rho on the mesh of the file", None)
     try:
         with one_thread():
@@ -289,7 +296,7 @@ def file_mesh(problem: Problem, progress: Progress = silent) -> FileMesh:
             grid = pair.contact.grid
             found = of_energy(pair, np.arange(grid.size) < grid.t)
     except ProblemError as error:
-        return FileMesh(interface_nodes=None, energy=None, why=f"the meshes are refused: {error}")
+        return FileMesh(interface_nodes=None, energy=None, cells=cells, why=f"the meshes are refused: {error}")
     rho, rho_normal, k = found["rho_max"], found["rho_normal"], pair.friction
     assert rho is not None
     assert rho_normal is not None
@@ -299,4 +306,4 @@ def file_mesh(problem: Problem, progress: Progress = silent) -> FileMesh:
         kappas = {"kappa_1": k * C_s * C_t1, "kappa_2": k * C_s * C_t2}
     # equal up to rounding where nothing slides
     energy = EnergyConstants(rho=rho, rho_normal=min(rho_normal, rho), **kappas)
-    return FileMesh(interface_nodes=grid.n, energy=energy)
+    return FileMesh(interface_nodes=grid.n, energy=energy, cells=cells)

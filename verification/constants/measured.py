@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cached_property
 from typing import Any, ClassVar
 
 from ndtheory import Constants, EnergyConstants, Number, evaluate_energy, exact
 from ndtheory.energy_norms import friction_multiple
 from ndtheory.number import above, below, weakest
+from verification.constants import cells
 from verification.document import Document
 from verification.problem import Problem
 from verification.value import to_plain
@@ -85,6 +87,10 @@ class Measured(Document):
     interface_nodes : int
     reason : mapping
         Why a value is None.
+    rho_cells, rho_normal_cells : Number or None
+        rho and rho_normal of half-planes of the file's cells, once halved: what short waves on such meshes have,
+        however fine they are.  Computed when first asked for; None where the cells are not equal or their lengths have
+        no simple ratio, and :attr:`why_no_cells` says why.
     units : mapping
         Labels ``length`` and ``stress``.
     levels : tuple of Measured
@@ -131,6 +137,25 @@ class Measured(Document):
     def nodes(self) -> int | None:
         """Nodes of both bodies; None where only matrices are known."""
         return None if self.body1 is None or self.body2 is None else self.body1.nodes + self.body2.nodes
+
+    @cached_property
+    def _of_cells(self) -> cells.OfCells:
+        return cells.rho_of_cells(self.problem, verified=self.unverified is not None)
+
+    @property
+    def rho_cells(self) -> Number | None:
+        """The largest ratio of stiffness of waves on half-planes of these cells."""
+        return self._of_cells.numbers.get("rho_cells")
+
+    @property
+    def rho_normal_cells(self) -> Number | None:
+        """The same with the tangential components condensed out."""
+        return self._of_cells.numbers.get("rho_normal_cells")
+
+    @property
+    def why_no_cells(self) -> str:
+        """Why there are none; empty where there are."""
+        return self._of_cells.why
 
     @property
     def _exact_friction(self) -> Fraction:
@@ -221,14 +246,21 @@ class Measured(Document):
         return replace(self, friction=k, problem=None, **values)
 
     def content(self) -> dict[str, Any]:
-        numbers = {name: to_plain(getattr(self, name)) for name in ALL_NAMES}
+        of_cells, no_cells = self._of_cells.objects()
+        unproved = [name for name, number in self._of_cells.numbers.items() if number.level == "float"]
         return {
             "body1": to_plain(self.body1),
             "body2": to_plain(self.body2),
-            **numbers,
+            **{name: to_plain(getattr(self, name)) for name in NAMES},
+            **of_cells,
+            **{name: to_plain(getattr(self, name)) for name in ENERGY_NAMES},
             "interface_nodes": self.interface_nodes,
-            "reason": dict(self.reason),
-            **({} if self.unverified is None else {"unverified": dict(self.unverified)}),
+            "reason": dict(self.reason) | no_cells,
+            **(
+                {}
+                if self.unverified is None
+                else {"unverified": dict(self.unverified) | dict.fromkeys(unproved, self._of_cells.unverified)}
+            ),
             **({"levels": [level.content() for level in self.levels]} if self.levels else {}),
         }
 

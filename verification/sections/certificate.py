@@ -157,8 +157,8 @@ def _on_the_mesh(found: ContinuumCertificate, document: Mapping[str, Any]) -> li
     mesh, k = document["mesh"], document["friction"]
     name, limit = "rho" if k else "rho_normal", mesh["theta_limit"]
     if limit is None:
-        finer = "The mesh may need a smaller theta than the continuum, and so may every finer one."
-        return [f"Not known. {mesh['reason']['rho']}.", finer]
+        said = [f"Not known. {mesh['reason']['rho']}."]
+        return [*said, "The mesh may need a smaller theta than the continuum.", _on_finer_meshes(mesh, name)]
     continuum = document["constants"][name] or document["constants"]["rho"]
     bound = "no bound" if continuum is None else f"{_at_most(continuum)}, guaranteed"
     nodes, where = mesh["interface_nodes"], " where all of Gamma_c sticks" if k else ""
@@ -172,10 +172,17 @@ def _on_the_mesh(found: ContinuumCertificate, document: Mapping[str, Any]) -> li
         elif mesh["contracts"] is None:
             said.append(f"{judged}: no conclusion on this mesh; `ndtheory compare` has sharper bounds.")
         elif found.contracts:
-            said.append(
-                f"{judged} contracts in the continuum (guaranteed), and NOT on this mesh (float). Finer meshes of such"
-                " cells may need a smaller theta, too."
-            )
+            said.append(f"{judged} contracts in the continuum (guaranteed), and NOT on this mesh (float).")
         else:
             said.append(f"{judged} does not contract on this mesh (float).")
-    return said
+    return [*said, _on_finer_meshes(mesh, name)]
+
+
+def _on_finer_meshes(mesh: Mapping[str, Any], name: str) -> str:
+    """The limit that short waves set on finer meshes of the file's cells."""
+    key = {"rho": "rho_cells", "rho_normal": "rho_normal_cells"}[name]
+    if mesh[key] is None:
+        return f"Every finer mesh may need a smaller theta, too; {key} is not known: {mesh['reason'][key]}."
+    rho, where = mesh[key]["value"], " where all of Gamma_c sticks" if name == "rho" else ""
+    least = f"{name} of finer meshes of such cells tends to {rho:.5g} or more (float)"
+    return f"{least}: no theta above {2 / (1 + rho):.4g} contracts on fine ones{where}."

@@ -60,6 +60,7 @@ def sections(measured: Measured) -> Sections:
         head = ("nodes", *(str(level.nodes) for level in levels), "unit", *([""] if words else []))
         parts.append(table(head, rows, right=range(1, len(levels) + 1)))
         ends = "For this mesh: no discretisation error, but rounding. For theta only rho_max matters."
+    parts.append(_cells(measured))
     for reason in dict.fromkeys(measured.reason.values()):
         names = ", ".join(name for name, why in measured.reason.items() if why == reason)
         parts.append(Note(f"{names}: {reason}"))
@@ -73,6 +74,15 @@ def sections(measured: Measured) -> Sections:
         section("all constants", title, *parts, caption=caption),
         closing("", Note(ends, 0), Note(f"{mesh}: {unsafe}.", 0), then=then),
     )
+
+
+def _cells(measured: Measured) -> Note:
+    """One line about short waves, which exist on every mesh."""
+    rho, rho_normal = measured.rho_cells, measured.rho_normal_cells
+    if rho is None or rho_normal is None:
+        return Note(f"rho_cells, rho_normal_cells: {measured.why_no_cells}")
+    both = f"rho_cells = {figures(rho, 5)}, rho_normal_cells = {figures(rho_normal, 5)}"
+    return Note(f"{both}: half-planes of these cells, once halved; limits on finer such meshes are no smaller")
 
 
 def compared(measured: Measured) -> Section:
