@@ -73,7 +73,8 @@ def test_what_needs_meshes_says_so():
     measured = measure(pair)
     assert measured.m is measured.C_R is measured.constants() is None
     assert "matrices" in measured.reason["m"]
-    assert all(name in measured.reason for name, value in measured.content().items() if value is None)
+    content = measured.content()
+    assert all(name in content["reason"] for name, value in content.items() if value is None)
     for needs in (vf.solve, lambda p: measure(p, refine=1), lambda p: vf.run(p).displacements):
         with pytest.raises(ValueError, match="matrices"):
             needs(pair)

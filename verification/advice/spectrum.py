@@ -44,7 +44,7 @@ MARGIN = 0.03
 FEWEST = 4
 
 #: Entries of an image below this share of the largest are 0, by rounding: the force of an open node.
-OPEN = 1e-10
+OPEN = 1e-12
 
 #: An eigenvalue is complex if its imaginary part exceeds this share of the largest 1 + lambda.
 REAL = 0.02
