@@ -103,7 +103,7 @@ BUDGET = {
     "verification": 1225,
     "verification.advice": 4500,
     "verification.algorithm": 2165,
-    "verification.bounds": 3220,
+    "verification.bounds": 3280,
     "verification.certificate": 1100,
     "verification.cli": 2355,
     "verification.constants": 1100,

@@ -237,7 +237,7 @@ def test_the_factor_found_on_section_6_is_the_one_that_a_search_node_by_node_com
     """Its 25 nodes in turn, each state in turn, come to 0.47632 after thousands of pieces."""
     pair = vf.build(vf.example("section6"))
     found = enclose(pair, QuadraticForms(pair, vf.measure(pair)), 0.7, gap=np.inf, programs=1)
-    search = Search(pair, factor_search(pair, 0.7)._form)
+    search = Search(pair, lambda piece: piece.relaxed(0.7).T @ piece.relaxed(0.7))
     assert found.lower >= np.sqrt(search.climb(search.found(*search.extremes()[0])).value) * (1 - 1e-9)
 
 

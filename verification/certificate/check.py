@@ -113,7 +113,7 @@ def surface_stiffness(body, both):
         near = set().union(*(rows[i] for i in block)) - set(block)
         front, reached = sorted(near - kept), sorted(near & kept)
         beside = front + reached
-        # for so few unknowns the radii of this method grow less from block to block than those of the default
+        # for so few unknowns radii grow less from block to block by this method than by default
         solved = gathered(rows, block, block).solve(gathered(rows, block, beside), algorithm="lu")
         lessen(rows, front, beside, gathered(rows, block, front).transpose() * solved)
         for i in front:

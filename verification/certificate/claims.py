@@ -102,7 +102,7 @@ class Claims:
         scale = 1 / np.sqrt(np.diag(balls[..., 0]))
         middle, radius = (scale[:, None] * balls[..., part] * scale for part in (0, 1))
         values = np.linalg.eigvalsh(middle)
-        condition = values[-1] / values[values > STILL * values[-1]][0]  # of a body that moves rigidly, beside that
+        condition = values[-1] / values[values > STILL * values[-1]][0]  # rigid motions left out
         wide = float(radius.max()) * condition**2
         return LEFT + math.log2(wide) if wide else 0.0  # no unknown off the interface, nothing is rounded
 
