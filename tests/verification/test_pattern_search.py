@@ -241,6 +241,11 @@ def test_the_factor_found_on_section_6_is_the_one_that_a_search_node_by_node_com
     assert found.lower >= np.sqrt(search.climb(search.found(*search.extremes()[0])).value) * (1 - 1e-9)
 
 
+def test_a_single_contact_node_has_no_neighbour():
+    pair = vf.build(vf.example("two-bars"))
+    assert largest_factor(pair, 0.4, random=np.random.default_rng(0)).value == pytest.approx(0.6)
+
+
 def test_a_piece_is_above_a_level_exactly_where_its_value_is():
     pair = pair_with(KERNELS["regular"])
     value = factor_search(pair, THETA).found(*factor_search(pair, THETA).extremes()[0]).value

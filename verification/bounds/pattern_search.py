@@ -175,6 +175,8 @@ class Search:
         """Patterns that differ at two nodes side by side and are better up to rounding, the most promising first."""
         assert self._factors is not None
         patterns, node = _side_by_side(best.piece.pattern, *self._neighbours(best.piece.pattern))
+        if not len(node):  # a single contact node
+            return
         beside = Neighbours(self.pair, best.piece.pattern, patterns, node, self.sign, self._factors)
         forces = self.pair.neumann.root @ best.eigenvectors
         exceeds = np.flatnonzero(beside.exceed(level, best.eigenvalues, forces))
