@@ -248,7 +248,7 @@ MUTANTS: dict[str, list[tuple[str, ...]]] = {
         ("return -1.0", "return 1.0"),
         ("    return low\n", "    return high\n"),
         ("(theta * (1 - share), theta)", "(theta, theta)"),
-        ("weight = theta * (1 - share)", "weight = theta * (1 - 2 * share)"),
+        ("definite(2.0, theta * (1 - share))", "definite(2.0, theta * (1 - 2 * share))"),
         ("if not eigvalsh(rest)[0] > 0:", "if False:"),
         ("(min(value, 1.0) for value in checked)", "checked"),
         ("else least + share * size", "else least"),

@@ -34,8 +34,8 @@ class Strict:
         self.margin, self.weight, self.proved = margin, weight, []
         self.least = None
 
-    def with_multipliers(self, multipliers, *, cross=0.0, step=None, weight=1.0):
-        def definite(square):
+    def with_multipliers(self, multipliers, *, cross=0.0, step=None):
+        def definite(square, weight=1.0):
             if self.least is None:
                 self.least = square * (1 + self.margin)
             said = square >= self.least and weight <= self.weight

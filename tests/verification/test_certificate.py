@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from flint import ctx
+from flint import ctx, fmpq
 from problem_list import blocks, changed, plates, small
 
 import verification as vf
@@ -19,9 +19,10 @@ from verification.bounds.bound import Subject
 from verification.bounds.lipschitz import enclose
 from verification.bounds.multipliers import QuadraticForms
 from verification.bounds.table import BOUNDS
-from verification.certificate import check
-from verification.certificate.claims import NoCertificate, describe
+from verification.certificate import check, claims
+from verification.certificate.claims import FEWEST, LEFT, Claims, NoCertificate, describe
 from verification.certificate.contraction import certify, check_again
+from verification.progress import silent
 
 GRIDS_DIFFER = changed(small(), body2={"cells": [5, 2]})
 PROBLEMS = {
@@ -154,7 +155,7 @@ def in_fractions(document):
     return definite(form)
 
 
-def condensed(body):
+def condensed(body, both=True):
     """The Schur complement of a body, eliminating one unknown after the other in fractions."""
     points = [[Fraction(x) for x in point] for point in body["points"]]
     E, nu = Fraction(body["young"]), Fraction(body["poisson"])
@@ -173,7 +174,7 @@ def condensed(body):
                 energy = sum(e[x] * C[x][y] * f[y] for x in range(3) for y in range(3))
                 A[s, t] = A.get((s, t), 0) + E / ((1 + nu) * (1 - 2 * nu)) * energy * two / 2
     held = {tuple(h) for h in body["held"]}
-    keep = [(node, p) for p in (0, 1) for node in body["surface"]]
+    keep = [(node, p) for p in ((0, 1) if both else (1,)) for node in body["surface"]]
     others = sorted({s for s, _ in A} - held - set(keep))
     order = others + keep
     full = [[A.get((s, t), Fraction(0)) for t in order] for s in order]
@@ -185,6 +186,43 @@ def condensed(body):
                     if full[i][m]:
                         full[j][m] -= share * full[i][m]
     return [row[len(others) :] for row in full[len(others) :]]
+
+
+@pytest.mark.parametrize("both", [True, False])
+@pytest.mark.parametrize(("block", "batch"), [(1, 1), (3, 7), (5, 5), (32, 128)])
+def test_the_balls_of_the_checker_hold_the_exact_schur_complement(monkeypatch, made, both, block, batch):
+    """However the unknowns are grouped: one by one, in batches that reach some contact nodes or all, or at once."""
+    monkeypatch.setattr(check, "BLOCK", block)
+    monkeypatch.setattr(check, "BATCH", batch)
+    body = made("grids that differ")["discrete"]["body2"]
+    exact = condensed(body, both)
+    with ctx.workprec(128):
+        balls = check.surface_stiffness(body, both)
+    assert (balls.nrows(), balls.ncols()) == (len(exact), len(exact))
+    for i, row in enumerate(balls.tolist()):
+        for j, ball in enumerate(row):
+            assert ball.contains(fmpq(*exact[i][j].as_integer_ratio()))
+            assert ball.rad() < 1e-25 * balls[i, i].mid()
+
+
+def test_the_bits_of_a_certificate_are_fitted_to_its_bodies_and_more_serve_too(made):
+    document = made("small")
+    bits = document["claim"]["bits"]
+    assert FEWEST < bits < 320, "few unknowns need less than certificates of old, which had 320, 640 or 1280"
+    for more in (320, 640, 1280):
+        assert check_again({**document, "claim": {**document["claim"], "bits": more}}).accepted
+
+
+def test_bodies_that_balls_of_few_bits_do_not_enclose_are_given_more(monkeypatch):
+    problem = vf.Problem.from_dict(small())
+    usual = Claims(describe(problem), silent).bits
+    monkeypatch.setattr(claims, "FEWEST", 1)
+    monkeypatch.setattr(claims, "STEP", 1)
+    monkeypatch.setattr(claims, "UNKNOWNS", 1e9)
+    fitted = Claims(describe(problem), silent).bits
+    assert LEFT < fitted <= usual, "from balls in which nothing can be eliminated up to those that suffice"
+    monkeypatch.setattr(claims, "LEFT", LEFT + 40)
+    assert Claims(describe(problem), silent).bits == pytest.approx(fitted + 40, abs=3)
 
 
 def inverted(matrix):

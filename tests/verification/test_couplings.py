@@ -189,18 +189,24 @@ def test_the_recorded_table_keeps_what_its_page_says():
     assert record["first"][0]["theta"] == 0.5
     for tried in record["first"]:
         rows = tried["couplings"]
-        assert len(rows) == 30
+        assert len(rows) == 50
         assert [one["name"] for one in rows if one["decided"] and one["steps"] is None] == []
         assert all(one["good"] == (one["decided"] and one["steps"] <= 1.4 * one["fewest"]) for one in rows)
         assert all(len(one["runs"]) <= 1 + record["asked_for"] for one in rows)
         assert all(one["why"] for one in rows)
-    assert sum(one["good"] for one in record["first"][0]["couplings"]) >= 27
+    assert sum(one["good"] for one in record["first"][0]["couplings"]) >= 45
+    linear = [one for one in record["advice"] if one["linear"]]
+    assert all(one["verdicts"]["vectors"] == "right" for one in linear)
+    assert sum(one["method_good"] for one in linear) >= 0.9 * len(linear)
+    assert all(one["verdicts"]["vectors"] != "wrong" for one in record["advice"])
 
 
 @pytest.mark.parametrize("full", [False, True])
 def test_a_record_of_some_first_thetas_alone_never_takes_the_place_of_all(made, tmp_path, monkeypatch, capsys, full):
     bench = import_module("bench_couplings")
     monkeypatch.setattr(bench, "followed", lambda *given: iter(()))
+    monkeypatch.setattr(bench, "couplings", lambda: iter(()))
+    monkeypatch.setattr(bench, "others", lambda: iter(()))
     monkeypatch.setattr("sys.argv", ["bench_couplings.py", "--record", str(tmp_path), *["--full"] * full])
     bench.main()
     found = [json.loads(path.read_text("utf-8")) for path in tmp_path.glob("advice/*.json")]

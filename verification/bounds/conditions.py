@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag, cho_factor, cho_solve, solve_triangular
+from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
 from fem1d2d.mesh import Floats
 from ndtheory.energy_norms import turning_theta, worst_ratio
@@ -111,7 +111,7 @@ class Conditions:
         B = np.zeros((contact.size, len(inner)))
         B[carries] = turn
         S_1 = pair.contact.schur if k else cho_solve(cho_factor(inner), np.eye(len(inner)))
-        near = block_diag(pair.neumann.flexibility(L_2), inner @ turn)
+        near = pair.neumann.flexibility(L_2), inner @ turn
         self.traces = TraceForms(pair, k, S_1=S_1, carries=carries, near=near)
         self.size = neumann.size
         self.g = np.hstack([np.eye(neumann.size), np.zeros((neumann.size, len(inner)))])

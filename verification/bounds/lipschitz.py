@@ -166,6 +166,8 @@ def enclose(
                             best = max(best, search.climb(start), key=lambda found: found.value)
                 bounded[part.key] = leaf
                 heapq.heappush(leaves, (-leaf.upper.value, next(order), leaf))
+        best = search.climb(best, side_by_side=True)
+        lower = max(lower, best.piece.factor(theta))
     return Enclosure(upper=worst.upper, whole=root.upper, lower=lower, piece=best.piece, programs=solved, why_apart=why)
 
 

@@ -200,12 +200,8 @@ class QuadraticForms(Conditions):
         if not eigvalsh(rest)[0] > 0:
             return None
         theta = 1 / float(eigvalsh(moving, rest)[-1])
-
-        def holds(share: float) -> bool:
-            weight = theta * (1 - share)
-            return self.traces.with_multipliers(multipliers, cross=2.0, step=(1.0, -1.0), weight=weight)(2.0)
-
-        share = _least_share(holds)
+        definite = self.traces.with_multipliers(multipliers, cross=2.0, step=(1.0, -1.0))
+        share = _least_share(lambda share: definite(2.0, theta * (1 - share)))
         return None if share is None else (theta * (1 - share), theta)
 
     def _least(

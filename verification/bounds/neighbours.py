@@ -102,9 +102,10 @@ def responses(pair: ContactPair, g: Floats, patterns: Patterns, sign: NDArray[np
 
 
 class Neighbours:
-    """A quadratic form on the pieces of patterns that differ from one at one node each.
+    """A quadratic form on the pieces of patterns that differ from one at one node each, or at p nodes.
 
-    ``node``, shape (c,), are these nodes, ``sign``, shape (t,), is the sign of S sigma_N, ``factors`` the form.
+    ``node``, shape (c,) or (c, p), are these nodes, ``sign``, shape (t,), is the sign of S sigma_N, ``factors`` the
+    form.
     """
 
     def __init__(
@@ -116,13 +117,16 @@ class Neighbours:
         sign: NDArray[np.int8],
         factors: Factors,
     ) -> None:
-        self._pair, self._pattern, self._node, self._sign, self._factors = pair, pattern, node, sign, factors
-        contact, row = pair.contact, np.arange(len(node))
-        each = np.arange(contact.grid.n)[:, None] + np.arange(0, contact.grid.size, contact.grid.n)
-        self._at = each[node]  # the components of the node
+        self._node = node = node.reshape(len(node), -1)
+        self._pair, self._pattern, self._sign, self._factors = pair, pattern, sign, factors
+        contact, row = pair.contact, np.arange(len(node))[:, None]
+        nodes, of = np.unique(node, axis=0, return_inverse=True)
+        components = np.arange(0, contact.grid.size, contact.grid.n)
+        each = (nodes[:, :, None] + components).reshape(len(nodes), -1)
+        self._at, self._tangential = each[of], slice(0, None, len(components))  # the components of the nodes
         here = Patterns(touching=pattern.touching[None], sliding=pattern.sliding[None])
-        self._moves, self._moved = _moves(pair, here)[0], _moves(pair, patterns)[row[:, None], self._at]
-        self._slides = patterns.sliding[row, node] if contact.grid.t else np.zeros(len(node), dtype=np.int8)
+        self._moves, self._moved = _moves(pair, here)[0], _moves(pair, patterns)[row, self._at]
+        self._slides = patterns.sliding[row, node] if contact.grid.t else np.zeros(node.shape, dtype=np.int8)
         self._swapped = self._moved != self._moves[self._at]
         self._transform = transform = _exchanged(contact, self._moves)
         block = transform[self._at[:, :, None], self._at[:, None, :]]
@@ -135,7 +139,7 @@ class Neighbours:
         size = contact.grid.size
         self._left, self._right = self._made(np.zeros((pair.neumann.grid.size, size)), np.eye(size), transform)
         squares = self._left[each] @ np.swapaxes(self._right[each], 1, 2)
-        self._squares = ((squares + np.swapaxes(squares, 1, 2)) / 2)[node]
+        self._squares = ((squares + np.swapaxes(squares, 1, 2)) / 2)[of]
 
     def _made(self, forces: Floats, inputs: Floats, answers: Floats) -> tuple[Floats, Floats]:
         """The factors of the form where step II takes columns of inputs to answers."""
@@ -144,7 +148,7 @@ class Neighbours:
         return self._factors(Responses(pair=self._pair, g=forces.T, jump=(d - carried).T, reaction=-f.T))
 
     def _changes(self, forces: Floats) -> tuple[Floats, Floats, tuple[Floats, Floats]]:
-        """Change of the answers when one node switches state, for columns of forces, shape (c, k, m), and of the form.
+        """Change of the answers when nodes switch state, for columns of forces, shape (c, k, m), and of the form.
 
         The third are the factors on the pattern itself, shape (m, ..).
         """
@@ -155,7 +159,8 @@ class Neighbours:
         wanted = np.where(self._moved[..., None], 0.0, held[at])
         if t := len(bound):
             given[:t] -= self._pattern.sliding[:, None] * bound
-            wanted[:, 0] -= (self._slides * self._moved[:, 0])[:, None] * bound[self._node]
+            tangential = self._tangential
+            wanted[:, tangential] -= (self._slides * self._moved[:, tangential])[..., None] * bound[self._node]
         asked = self._transform @ given
         change = np.linalg.solve(self._systems, wanted - np.where(self._swapped[..., None], asked[at], given[at]))
         one, two = self._made(forces, given, asked)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -129,13 +130,20 @@ class Search:
         known = self._visited[visited]
         return known if known.value > level else None
 
-    def climb(self, best: FoundFactor) -> FoundFactor:
-        """The best piece on the way up: what one node does is changed, or several do, as long as that helps."""
+    def climb(self, best: FoundFactor, *, side_by_side: bool = False) -> FoundFactor:
+        """The best piece on the way up: what one node does is changed, or several do, as long as that helps.
+
+        Where no node helps any more, ``side_by_side`` changes two neighbours together, as where a border between nodes
+        that slide to either side moves; it needs ``factors``.
+        """
         better: FoundFactor | None = best
         while better is not None:
             best = better
             level = best.value + 10.0**-DIGITS * best.size
-            tried = (self.above(level, *pattern) for pattern in self._tried(best, level))
+            patterns = self._tried(best, level)
+            if side_by_side:
+                patterns = chain(patterns, self._tried_side_by_side(best, level))
+            tried = (self.above(level, *pattern) for pattern in patterns)
             better = next((found for found in tried if found is not None), None)
         return best
 
@@ -160,6 +168,21 @@ class Search:
         several = _several(best.piece.pattern, patterns, node, exceeds)
         yield from zip(several.touching, several.sliding, strict=True)
         yield from ((patterns.touching[i], patterns.sliding[i]) for i in exceeds)
+
+    def _tried_side_by_side(
+        self, best: FoundFactor, level: float
+    ) -> Iterator[tuple[NDArray[np.bool_], NDArray[np.int8]]]:
+        """Patterns that differ at two nodes side by side and are better up to rounding, the most promising first."""
+        assert self._factors is not None
+        patterns, node = _side_by_side(best.piece.pattern, *self._neighbours(best.piece.pattern))
+        if not len(node):  # a single contact node
+            return
+        beside = Neighbours(self.pair, best.piece.pattern, patterns, node, self.sign, self._factors)
+        forces = self.pair.neumann.root @ best.eigenvectors
+        exceeds = np.flatnonzero(beside.exceed(level, best.eigenvalues, forces))
+        promised = np.round(beside.values(forces[:, -1])[exceeds] / (best.size or 1.0), DIGITS)
+        for i in exceeds[np.argsort(-promised, kind="stable")]:
+            yield patterns.touching[i], patterns.sliding[i]
 
     def _neighbours(self, pattern: Pattern) -> tuple[Patterns, NDArray[np.intp]]:
         """The patterns that differ at one node, and which."""
@@ -219,7 +242,10 @@ def factor_search(pair: ContactPair, theta: float) -> Search:
 
 def largest_factor(pair: ContactPair, theta: float, *, random: np.random.Generator, starts: int = 4) -> FoundFactor:
     """The largest ``|J|`` of T_theta over contact patterns, in the norm (5.21): attained by two forces."""
-    found = _from_starts(factor_search(pair, theta), random=random, starts=starts)
+    search = factor_search(pair, theta)
+    found = _from_starts(search, random=random, starts=starts)
+    with one_thread():
+        found = search.climb(found, side_by_side=True)
     return replace(found, value=found.piece.factor(theta))
 
 
@@ -234,3 +260,14 @@ def _several(pattern: Pattern, patterns: Patterns, node: NDArray[np.intp], helps
         touching[row, node[chosen]] = patterns.touching[chosen, node[chosen]]
         sliding[row, node[chosen]] = patterns.sliding[chosen, node[chosen]]
     return Patterns(touching=touching, sliding=sliding)
+
+
+def _side_by_side(pattern: Pattern, patterns: Patterns, node: NDArray[np.intp]) -> tuple[Patterns, NDArray[np.intp]]:
+    """A pattern changed at two nodes side by side, as others change it at one each, and these nodes, shape (c, 2)."""
+    first, second = np.nonzero(node[:, None] + 1 == node)
+    touching, sliding = patterns.touching[first], patterns.sliding[first]
+    row, at = np.arange(len(second)), node[second]
+    touching[row, at] = patterns.touching[second, at]
+    if len(pattern.sliding):
+        sliding[row, at] = patterns.sliding[second, at]
+    return Patterns(touching=touching, sliding=sliding), np.stack([node[first], at], axis=1)

@@ -8,11 +8,12 @@ has a bound.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from fem1d2d.enclosed import Enclosed, gamma, upwards
 from fem1d2d.loewner import positive_definite
@@ -48,17 +49,19 @@ class TraceForms:
     ----------
     S_1, carries : array of shape (m, m), slice
         From c to the components of p that are not 0, and these components.
-    near : array, shape (N + m, N + m)
-        Changes of (d, c), as columns, in which the forms are of size 1: the nearer, the less is lost to rounding.
+    near : arrays of shape (N, N) and (m, m)
+        Changes of d and of c, as columns, in which the forms are of size 1: the nearer, the less is lost to rounding.
     """
 
-    def __init__(self, pair: ContactPair, k: float, *, S_1: Floats, carries: slice, near: Floats) -> None:
+    def __init__(
+        self, pair: ContactPair, k: float, *, S_1: Floats, carries: slice, near: tuple[Floats, Floats]
+    ) -> None:
         contact, neumann, interface = pair.contact.grid, pair.neumann.grid, pair.interface
         S_2, size = pair.neumann.schur, neumann.size
         still = np.zeros((contact.size, len(S_1)))
         moved, pressed = still.copy(), still.copy()
         moved[carries], pressed[carries] = np.eye(len(S_1)), S_1
-        self._S_2, self._near, self._near_2 = S_2, near, near[:size, :size]
+        self._S_2, self._near = S_2, near
         none = np.zeros((size, len(S_1)))
         self._d = np.hstack([np.eye(size), none])
         self._g = np.hstack([S_2, none])
@@ -75,41 +78,45 @@ class TraceForms:
             zeta_size = weight * (np.abs(interface.kernel) @ np.abs(self._g[neumann.normal]))
         self._families = families(contact, force, jump, weight, zeta)
         self._sizes = families(contact, np.abs(force), np.abs(jump), weight, zeta_size)
-        # inner products over nodes (a transfer has them too), over traces twice, and the scalars and sums
-        self._terms = 4 * (2 * size + len(S_1)) + (2 if interface.transfer is None else 4) * contact.n + 20
-        self._free = _changed(S_2, self._near_2)
-        self._free_error = self._error(np.abs(S_2), self._near_2)
+        # inner products over nodes (a transfer has them too), over traces twice, and the scalars, weights and sums
+        self._terms = 4 * (2 * size + len(S_1)) + (2 if interface.transfer is None else 4) * contact.n + 30
+        self._free = _changed(S_2, near[:1])
+        self._free_error = self._error(np.abs(S_2), near[:1])
 
-    def _error(self, size: Floats, near: Floats) -> Floats:
+    def _error(self, size: Floats, near: Sequence[Floats]) -> Floats:
         """A bound of the rounding errors of a form in the coordinates of some columns, from the moduli of its terms."""
-        return np.asarray(upwards(gamma(self._terms) * _changed(size, np.abs(near)), self._terms))
+        return np.asarray(
+            upwards(gamma(self._terms) * _changed(size, [np.abs(columns) for columns in near]), self._terms)
+        )
 
     def with_multipliers(
-        self,
-        multipliers: Sequence[Floats],
-        *,
-        cross: float = 0.0,
-        step: tuple[float, float] | None = None,
-        weight: float = 1.0,
-    ) -> Callable[[float], bool]:
+        self, multipliers: Sequence[Floats], *, cross: float = 0.0, step: tuple[float, float] | None = None
+    ) -> Callable[..., bool]:
         """Test of ``square |g|^2 - cross <g, p> - weight |a p + b g|^2 - conditions``, ``step`` being (a, b) if any.
 
-        The result takes the square, and is True if the form is positive definite for sure.
+        The result takes the square and, with a step, its weight, 1 by default; it is True if the form is positive
+        definite for sure.
         """
         form = -cross * self._d.T @ self._p - _conditions(multipliers, self._families)
         size = abs(cross) * self._d.T @ self._p_size + _conditions([np.abs(m) for m in multipliers], self._sizes)
-        near, first = self._near, 0
+        near: tuple[Floats, ...] = self._near
+        first = 0
         if step is not None:
             a, b = step
             row, row_size = a * self._p + b * self._g, abs(a) * self._p_size + abs(b) * np.abs(self._g)
-            form = np.block([[self._S_2 / weight, row], [row.T, form]])
-            size = np.block([[np.abs(self._S_2) / weight, row_size], [row_size.T, size]])
-            near, first = block_diag(np.sqrt(weight) * self._near_2, near), len(row)
+            form = np.block([[self._S_2, row], [row.T, form]])
+            size = np.block([[np.abs(self._S_2), row_size], [row_size.T, size]])
+            near, first = (near[0], *near), len(row)
         form, size = _changed(form, near), self._error(size, near)
         d = slice(first, first + len(self._S_2))
 
-        def definite(square: float) -> bool:
+        def definite(square: float, weight: float = 1.0) -> bool:
             matrix, error = form.copy(), size.copy()
+            root = math.sqrt(weight)  # in coordinates larger by this, S_2 / weight is of size 1
+            for part in (matrix, error):
+                part[:first, :first] *= root * root / weight
+                part[:first, first:] *= root
+                part[first:, :first] *= root
             matrix[d, d] += square * self._free
             error[d, d] += abs(square) * self._free_error
             return positive_definite(Enclosed(middle=matrix, radius=error))
@@ -117,10 +124,18 @@ class TraceForms:
         return definite
 
 
-def _changed(form: Floats, near: Floats) -> Floats:
-    """A form in the coordinates of some columns, symmetric to the last digit."""
-    form = near.T @ ((form + form.T) / 2) @ near
-    return np.asarray((form + form.T) / 2)
+def _changed(form: Floats, near: Sequence[Floats]) -> Floats:
+    """A form in the coordinates of some columns, block by block on the diagonal; symmetric to the last digit."""
+    form = (form + form.T) / 2
+    ends = np.cumsum([0, *(len(columns) for columns in near)])
+    parts = [slice(*pair) for pair in pairwise(ends.tolist())]
+    result = np.empty((sum(columns.shape[1] for columns in near),) * 2)
+    for i, rows in enumerate(parts):
+        for j, columns in enumerate(parts[: i + 1]):
+            block = near[i].T @ form[rows, columns] @ near[j]
+            result[rows, columns] = block if i > j else (block + block.T) / 2
+            result[columns, rows] = result[rows, columns].T
+    return result
 
 
 def _conditions(multipliers: Sequence[Floats], families: Sequence[tuple[Floats, Floats]]) -> Floats:

@@ -7,18 +7,22 @@ is made worse by a small share until :mod:`verification.certificate.check` accep
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from decimal import ROUND_DOWN, ROUND_UP, Context, Decimal
 from fractions import Fraction
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+from flint import ctx
 from numpy.typing import NDArray
 
 from verification.bounds.interior_point import Weights
 from verification.certificate.check import check, surface_stiffness
 from verification.constants.measured import FROM_MATRICES
+from verification.dense import STILL
 from verification.interface.body import Body
 from verification.interface.exact_bodies import ExactInterface, NotExact, exact_points
 from verification.interface.pair import ContactPair, pair_from
@@ -29,8 +33,13 @@ from verification.progress import Progress, silent
 #: Shares by which 1 minus a factor is made smaller, until the multipliers prove it for the rational bodies.
 MARGINS = (1e-10, 1e-8, 1e-6, 1e-4, 1e-2)
 
-#: Bits of the balls, tried one after the other: radii grow by some twelve digits for every forty columns of a mesh.
-BITS = (320, 640, 1280)
+#: Bits of the balls to begin with: these and one for so many unknowns of the larger body, as the radii of its
+#: elimination grow by at most one for 19 on Section 6; a multiple of STEP, and never more than MOST.
+FEWEST, UNKNOWNS, STEP, MOST = 96, 24, 32, 1280
+
+#: Bits that the stiffness matrices keep beyond their condition squared: MARGINS ask the checker to tell 1e-10 of 1
+#: minus the factor, which is 2^-33 of it, and this leaves as many again.
+LEFT = 64
 
 #: Digits of a multiplier and of a factor.
 DIGITS = 12
@@ -58,23 +67,51 @@ class Claims:
 
     def accepted(self, theta: Fraction, factor: Fraction, multipliers: dict[str, Any]) -> dict[str, Any] | None:
         """The claim of a factor with the bits in which the checker accepts it; None where it does not."""
-        for bits in BITS:
+        for bits in sorted({self.bits, _allowed(1.5 * self.bits)}):
             claim = {"theta": str(theta), "factor": str(factor), "bits": bits, "multipliers": multipliers}
             words = f"checking theta = {float(theta):.6g}, factor {float(factor):.10g} in balls of {bits} bits"
             self.progress(words, None)
-
-            def eliminated(body: dict[str, Any], both: bool, bits: int = bits) -> Any:
-                key = (json.dumps(body), both, bits)
-                if key not in self.known:
-                    self.known[key] = surface_stiffness(body, both=both)
-                return self.known[key]
-
             try:
-                check(self.discrete, claim, eliminated)
+                check(self.discrete, claim, lambda body, both, bits=bits: self._eliminated(body, both, bits))
             except (ValueError, ZeroDivisionError):
                 continue
             return claim
         return None
+
+    @cached_property
+    def bits(self) -> int:
+        """The bits of balls in which both stiffness matrices keep LEFT beyond their condition squared, or MOST."""
+        bodies = self.discrete["body1"], self.discrete["body2"]
+        bits, missing = 0, FEWEST + max(2 * len(body["points"]) for body in bodies) / UNKNOWNS
+        while missing > 0 and bits < MOST:
+            bits = _allowed(bits + missing)
+            self.progress(f"eliminating the unknowns off the interface in balls of {bits} bits", None)
+            missing = max(self._missing(number, bits) for number in (1, 2))
+        return bits
+
+    def _missing(self, number: int, bits: int) -> float:
+        """The bits that a body's stiffness matrix lacks; half as many as there are where it cannot be eliminated."""
+        both = number == self.discrete["neumann_body"] or Fraction(self.discrete["friction"]) != 0
+        try:
+            S = self._eliminated(self.discrete[f"body{number}"], both, bits)
+        except (ValueError, ZeroDivisionError):
+            return bits / 2
+        balls = np.array([[(float(x.mid()), float(x.rad())) for x in row] for row in S.tolist()])
+        if not np.isfinite(balls).all():
+            return bits / 2
+        scale = 1 / np.sqrt(np.diag(balls[..., 0]))
+        middle, radius = (scale[:, None] * balls[..., part] * scale for part in (0, 1))
+        values = np.linalg.eigvalsh(middle)
+        condition = values[-1] / values[values > STILL * values[-1]][0]  # rigid motions left out
+        wide = float(radius.max()) * condition**2
+        return LEFT + math.log2(wide) if wide else 0.0  # no unknown off the interface, nothing is rounded
+
+    def _eliminated(self, body: dict[str, Any], both: bool, bits: int) -> Any:
+        key = (json.dumps(body), both, bits)
+        if key not in self.known:
+            with ctx.workprec(bits):
+                self.known[key] = surface_stiffness(body, both=both)
+        return self.known[key]
 
     def confirmed(self, theta: Fraction, spare: float, multipliers: dict[str, Any]) -> dict[str, Any] | None:
         """A claim that is accepted, its factor below 1 by nearly ``spare``; None where none is."""
@@ -174,6 +211,10 @@ def written(multipliers: Weights) -> dict[str, Any]:
         texts = [str(_decimal(value, rounding)) for value in values.tolist()]
         found[name] = texts[0] if len(set(texts)) == 1 else texts
     return found
+
+
+def _allowed(bits: float) -> int:
+    return min(STEP * math.ceil(bits / STEP), MOST)
 
 
 def _decimal(value: float, rounding: str | None = None) -> Fraction:
