@@ -330,7 +330,12 @@ def follow(coupling: Coupling, first: float, folder: Path, seed: int | None) -> 
         found = vf.advise_logs(logs, tied=coupling.tied)
         assert found.next is not None
         theta = found.next.theta
-        kept = theta in runs and found.interval is not None and found.interval.contradiction is None
+        kept = (
+            theta in runs
+            and not found.next.again
+            and found.interval is not None
+            and found.interval.contradiction is None
+        )
         if found.roles or kept:
             break
     best, at = fewest(coupling)
@@ -461,6 +466,8 @@ class Advised:
     name : str
     unseen, linear : bool
         Whether the rules were fixed before it was made; whether it is linear.
+    largest : float
+        The largest real part of an eigenvalue of (S_c, S_n).
     fewest : int
         The fewest steps of the scan over theta.
     vectors, matrices : float or None
@@ -476,6 +483,7 @@ class Advised:
     name: str
     unseen: bool
     linear: bool
+    largest: float
     fewest: int
     vectors: float | None
     vectors_steps: int | None
@@ -485,12 +493,12 @@ class Advised:
     method: str | None
 
     def verdict(self, theta: float | None, count: int | None) -> str:
-        """``right`` within 1.4 times the fewest steps, ``dear``, ``wrong`` if it does not arrive, ``silent``."""
+        """``right`` within 1.4 times the fewest steps, else ``slow``; ``wrong`` if it diverges; ``silent``."""
         if theta is None:
             return "silent"
         if count is None:
-            return "slow" if self.fewest >= LONGEST else "wrong"
-        return "right" if 5 * count <= 7 * self.fewest else "dear"
+            return "slow" if self.linear and theta * (1 + self.largest) < 2 else "wrong"
+        return "right" if 5 * count <= 7 * self.fewest else "slow"
 
     @property
     def verdicts(self) -> dict[str, str]:
@@ -527,6 +535,7 @@ def advised(coupling: Coupling, unseen: bool = False) -> Advised:
         name=coupling.name,
         unseen=unseen,
         linear=coupling.linear,
+        largest=float(coupling.spectrum[-1].real),
         fewest=fewest(coupling)[0],
         vectors=found.theta,
         vectors_steps=count(found.theta),

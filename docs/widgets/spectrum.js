@@ -56,7 +56,7 @@ nd.onPage("spectrum", (figure) => {
     const worst = ndFormulas.predictedFactor(t, rho);
     widget.says.textContent = `${role.neumann} body Neumann, rho = ${nd.short(rho)}, theta = ${t.toFixed(2)}: the largest factor is ${nd.short(worst)}; `
       + `2/(2 + rho) = ${nd.short(ndFormulas.predictedTheta(rho))}. Step ${n}: residual ${run.residuals[n].toExponential(1)}; `
-      + `${count("s")} nodes stick ●, ${count("l")} slip ▲, ${count("o")} are open ○.`;
+      + `${count("s")} node${count("s") === 1 ? " sticks" : "s stick"} ●, ${count("l")} slip ▲, ${count("o")} open ○.`;
     nd.fill(widget.table, ["step", "residual", "states"], run.residuals.map((r, i) => [i, r.toExponential(2), [...run.states[i]].map((s) => STATE[s][2]).join("")]));
   }
   nd.start(widget, figure);

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 import tomllib
 from pathlib import Path
 
@@ -68,7 +69,7 @@ def test_the_run_of_the_lecture_converges_where_lmi_alone_speaks(tmp_path, monke
     command, _, file = first.partition(" > ")
     assert main(command.split()) == 0
     Path(file).write_text(capsys.readouterr().out, "utf-8")
-    assert main([*second.split(), "--json"]) == 0
+    assert main([*shlex.split(second), "--json"]) == 0
     said = json.loads(capsys.readouterr().out)["verdicts"]
     assert said["energy"] == said["repaired"] == said["printed"] == "HYPOTHESES_NOT_MET"
     assert said["lmi"] == said["linearised"] == "CONSISTENT"

@@ -125,7 +125,7 @@ window.nd = (() => {
     const start = Number.isFinite(given) && remembered(widget.name)[name] !== undefined ? Math.min(high, Math.max(low, given)) : value;
     const output = html("output", {}, show(start));
     const input = html("input", { type: "range", min: low, max: high, step, value: start, name, "aria-label": label,
-      oninput: () => { output.textContent = show(Number(input.value)); input.setAttribute("aria-valuetext", output.textContent); widget.update(); } });
+      oninput: () => { if (widget.answered) widget.told.dataset.past = ""; output.textContent = show(Number(input.value)); input.setAttribute("aria-valuetext", output.textContent); widget.update(); } });
     input.setAttribute("aria-valuetext", output.textContent);
     widget.controls.append(html("label", {}, html("span", {}, label), input, output));
     widget.sliders[name] = input;
@@ -157,6 +157,7 @@ window.nd = (() => {
       pictures: html("div", { class: "pictures" }), says: html("p", { class: "says", "aria-live": "polite" }),
       table: html("table"), link: html("a", { href: "#" }, "link to this state") };
     const told = html("p", { class: "told", hidden: "", "aria-live": "polite" });
+    widget.told = told;
     const ask = html("fieldset", { class: "ask" }, html("legend", {}, `Predict first. ${question}`));
     const outcome = [widget.controls, widget.says, html("details", {}, html("summary", {}, "The numbers of this picture"), widget.table),
       html("p", { class: "link" }, widget.link)];
@@ -164,6 +165,7 @@ window.nd = (() => {
       told.textContent = words; told.hidden = false; widget.revealed = true; ask.hidden = true;
       for (const part of outcome) part.hidden = false;
       show(); widget.update();
+      widget.answered = true;
     };
     const verdict = (answer) => (right === null ? `You said: ${answer}.` : answer === right ? "Right:" : "Not quite:");
     for (const answer of answers) {

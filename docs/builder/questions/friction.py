@@ -85,12 +85,13 @@ def data() -> dict[str, Any]:
             ],
         )
     return widget(
-        question=f"This load opens a gap of {-APART[1]:g}, so no force at all is a solution. With friction k = {ASKED} "
-        "the iteration starts at the force A or at the force B. Where does it end?",
+        question=f"This load opens a gap of {-APART[1]:g}, so zero force, open, is one solution. "
+        f"With friction k = {ASKED} the iteration starts at the force A or at the force B, each a guess that may break "
+        "Coulomb's law. Where does it end?",
         answers=["A opens, B sticks", "both open, as the load parts the bodies", "both stick, as friction holds them"],
         right="A opens, B sticks",
         why=f"at k = {ASKED} this load has {len(solutions(node(ASKED)))} solutions, and the start decides which one "
-        f"the iteration finds. Up to k = {max(opening):g} all four starts open. "
+        f"the iteration finds. Up to k = {max(opening):g} A, B and the two other starts in the picture open. "
         f"Below k = {limit:.2f} it is proved that there is only one solution, whatever the load. Move k.",
         sliders=[slider("k", "friction k", [f"{k:g}" for k in FRICTIONS], FRICTIONS.index(ASKED))],
         charts=[

@@ -82,7 +82,11 @@ def data() -> dict[str, Any]:
             kept = varies[name][j] < 1e-6
             scenes[(i, j)] = scene(
                 f"{name.capitalize()}, {cells[j][0]} cells below and {cells[j][1]} above: "
-                + ("the pressure is constant." if kept else f"the pressure varies by {varies[name][j]:.1f} percent.")
+                + (
+                    "the pressure is constant."
+                    if kept
+                    else f"the pressure varies by {varies[name][j]:.1f} percent of the true one, largest less smallest."
+                )
                 + ("" if kept or not j else f" On {cells[0][0]} and {cells[0][1]} it was {varies[name][0]:.1f}."),
                 [line(zip(x, p, strict=True), colour), dots(zip(x, p, strict=True), colour)],
                 [

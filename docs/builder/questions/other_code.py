@@ -89,7 +89,7 @@ def data() -> dict[str, Any]:
                 line([(t, 2 / t - 1) for t in (n / 100 for n in range(2, 100))], "grey", dashed=True),
                 note(0.52, 3.4, "dashed: 2/theta - 1", "grey"),
                 dots(shown, hollow=True),
-                note(0.09, 40, "circles: a stiffest mode, by the log"),
+                note(0.09, 40, "circles: rho, if the slowest is the stiffest"),
                 dots([shown[i]]),
             ],
             rows=[(n, f"{size:.2e}") for n, size in steps[:: max(1, len(steps) // 15)]],
