@@ -11,13 +11,19 @@
     slides.forEach((slide, i) => { slide.classList.toggle("now", i === at); slide.inert = i !== at && getComputedStyle(slide).position === "absolute"; });
     nav.querySelector("output").textContent = `${at + 1}/${slides.length}`;
   }
-  function go(n) { show(n); history.replaceState(null, "", `#${at + 1}`); }
+  const single = () => getComputedStyle(slides[0]).position === "absolute"; // on a phone they are one below the other
+  function go(n) {
+    show(n);
+    history.replaceState(null, "", `#${at + 1}`);
+    if (!single()) slides[at].scrollIntoView();
+  }
 
   // The text of each slide, smaller where it would leave the slide.
   function fit() {
     for (const slide of slides) {
       const inner = slide.firstElementChild;
-      for (let size = 1; size > 0.5; size -= 0.04) {
+      inner.style.fontSize = "";
+      for (let size = 1; single() && size > 0.5; size -= 0.04) {
         inner.style.fontSize = `${size}em`;
         if (inner.scrollHeight <= slide.clientHeight - 2 * inner.offsetTop && inner.scrollWidth <= inner.clientWidth) break;
       }
@@ -41,7 +47,7 @@
     go(at + (event.key === " " && event.shiftKey ? -1 : step));
   });
   document.querySelector("main").addEventListener("click", (event) => {
-    if (!used(event) && getComputedStyle(slides[0]).position === "absolute" && !String(getSelection())) go(at + (event.clientX < innerWidth / 4 ? -1 : 1));
+    if (!used(event) && single() && !String(getSelection())) go(at + (event.clientX < innerWidth / 4 ? -1 : 1));
   });
   let from = null;
   document.addEventListener("touchstart", (event) => { from = used(event) ? null : event.changedTouches[0]; }, { passive: true });

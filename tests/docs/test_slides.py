@@ -297,6 +297,8 @@ def test_a_deck_goes_on_by_keys_clicks_and_buttons_and_keeps_its_place(small):
 
 @needs_browser
 def test_on_a_phone_and_on_paper_all_slides_are_shown(small):
+    from selenium.webdriver import Keys
+
     with chromium() as browser:
         phone = {"width": 390, "height": 800, "deviceScaleFactor": 1, "mobile": True}
         browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", phone)
@@ -304,6 +306,12 @@ def test_on_a_phone_and_on_paper_all_slides_are_shown(small):
         titles = browser.find_elements("css selector", ".slide h2")
         assert all(title.is_displayed() for title in titles)
         assert browser.execute_script("return document.documentElement.scrollWidth") <= 390
+        sizes = "return [...document.querySelectorAll(arguments[0])].map(e => parseFloat(getComputedStyle(e).fontSize))"
+        assert min(browser.execute_script(sizes, ".slide p:not(figcaption p, footer *, figure.widget *)")) >= 15
+        assert min(browser.execute_script(sizes, ".slide :is(figcaption p, pre)"), default=12) >= 11
+        browser.find_element("css selector", "body").send_keys(Keys.ARROW_RIGHT)
+        top = "return document.querySelectorAll('.slide')[1].getBoundingClientRect().top"
+        assert abs(browser.execute_script(top)) < 5
         browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
         printed = browser.execute_cdp_cmd("Page.printToPDF", {"preferCSSPageSize": True})["data"]
         assert base64.b64decode(printed).count(b"/Type /Page\n") == len(SAID)
