@@ -124,7 +124,10 @@ def cut(page: nodes.document) -> Iterator[Slide]:
         if paragraph is not None:
             first.blocks.append(opening(paragraph))
             shown = [block for block in found if isinstance(block, SHOWN)]
-            shown += [block for block in found if isinstance(block, nodes.literal_block)]
+            outputs = [block for block in found if isinstance(block, nodes.literal_block)]
+            shown += [block for block in outputs if not block.astext().startswith("<")]  # no repr of an object
+            if first.blocks[0].astext().rstrip().endswith(":"):  # what it announces comes next
+                shown = found[found.index(paragraph) + 1 :][:1] + shown
             marked = [found[i + 1] for text, i in marks.items() if text == MARK]
             if marked or shown:
                 first.blocks.append((marked or shown)[0])
