@@ -24,7 +24,7 @@ SHOWN = (nodes.math_block, nodes.table, nodes.enumerated_list, theorem_node)
 #: A comment in the source that puts the block below it on a slide, and one that leaves a section out.
 MARK, NONE = "slide", "no slide"
 
-SENTENCE = re.compile(r"[.?!:](?=\s|$)")
+SENTENCE = re.compile(r"[.?!](?=\s|$)|:$")
 LONGEST = 240  # characters of the first sentences, where there is more than one
 
 
