@@ -24,6 +24,9 @@ FENCE = re.compile(
     re.DOTALL | re.MULTILINE,
 )
 
+#: The line of what a page needs, which is emphasised as a whole.
+NEEDS = re.compile(r"^\*(Needs .*)\*$", re.MULTILINE)
+
 #: A link to another page: its words and that page.
 LINK = re.compile(r"\[([^\]\n]+)\]\(([\w./-]+)\.md(?:#[\w-]+)?\)")
 
@@ -61,6 +64,8 @@ def plain(text: str, values: Mapping[str, str], shown: Shown) -> str:
     'rho is 3, by Theorem 3 and the trace.'
     >>> plain("(5.12) is {verdict}`5.12`, see [two bars](two_bars.md).", {}, shown)
     '(5.12) is PROVED, see two bars.'
+    >>> plain("*Needs {doc}`one`.  5 minutes.*", {}, lambda role, target, title: f"*{target}*")
+    '*Needs one.  5 minutes.*'
     >>> print(plain(":::{prf:theorem} Small\\n:label: thm-zero\\n\\n$$ K < 1 $$ (eq-K)\\n:::", {}, shown))
     **Theorem 3** (Small)
     <BLANKLINE>
@@ -98,7 +103,7 @@ def plain(text: str, values: Mapping[str, str], shown: Shown) -> str:
     text = LEDGER.sub(lambda match: quote(*match[1].split()), text)
     text = EQUATION.sub(equation, text)
     text = LINK.sub(lambda match: shown("doc", match[2], match[1]), text)
-    return ROLE.sub(role, text)
+    return NEEDS.sub(lambda match: f"*{match[1].replace('*', '')}*", ROLE.sub(role, text))
 
 
 def portable(executed: Mapping[str, Any], values: Mapping[str, str], shown: Shown) -> dict[str, Any]:
