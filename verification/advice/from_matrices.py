@@ -15,7 +15,7 @@ from fem1d2d import extremes_by_solves, largest
 from fem1d2d.mesh import Floats
 from ndtheory import Number
 from verification.advice import BodyNumber
-from verification.advice.roles import ALL, Advice, Role, advise, plain_role, role_of, with_both_ends
+from verification.advice.roles import ALL, Advice, Role, advise, plain_role, role_on, with_both_ends
 from verification.advice.sides import (
     BODIES,
     ORDERING,
@@ -235,9 +235,7 @@ def _of_asymmetric(body: BodyNumber, S_c: Floats, S_n: Floats, unit: float) -> R
     """The role by the complex eigenvalues of ``S_n^-1 S_c``."""
     with one_thread():
         spectrum = Spectrum.of(np.linalg.eigvals(np.linalg.solve(S_n, S_c)) * unit)
-    ends = [Number.of_float(max(end, 0.0)) for end in (spectrum.low, spectrum.high)]
-    known: dict[str, Any] = {"rho_min": ends[0], "rho_tied": ends[1], "spectrum": spectrum}
-    return role_of(body, Fraction(ends[1].value), nothing=WORD_OF_ASYMMETRY, **known)
+    return role_on(body, spectrum, nothing=WORD_OF_ASYMMETRY)
 
 
 def _by_lanczos(body: BodyNumber, sides: Sides, P: Transfer | None, progress: Progress) -> tuple[Role, SeenLanczos]:

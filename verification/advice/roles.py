@@ -242,6 +242,15 @@ def role_of(
     )
 
 
+def role_on(
+    neumann_body: BodyNumber | None, spectrum: Spectrum, *, nothing: str, reason: Mapping[str, str] | None = None
+) -> Role:
+    """The role of a spectrum of which nothing is proved; an end below 0 counts as 0."""
+    low, high = (Number.of_float(max(end, 0.0)) for end in (spectrum.low, spectrum.high))
+    known: dict[str, Any] = {"rho_min": low, "rho_tied": high, "spectrum": spectrum}
+    return role_of(neumann_body, Fraction(high.value), nothing=nothing, reason=reason, **known)
+
+
 def plain_role(neumann_body: BodyNumber, rho: Fraction, **settings: Any) -> Role:
     """The role without friction, from rho; ``settings`` are parameters of :func:`role_of`."""
     bounds = evaluate_energy(EnergyConstants(rho=rho))
