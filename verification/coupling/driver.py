@@ -109,7 +109,8 @@ class Coupling:
     @property
     def spectrum(self) -> Spectrum | None:
         """The eigenvalues as the vectors show them; None before two of them differ."""
-        return None if self.advice is None else self.advice.spectrum
+        advice = self.advice
+        return None if advice is None else advice.spectrum
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
