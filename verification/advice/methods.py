@@ -178,7 +178,7 @@ def advised(table: Sequence[MethodRow], *, tied: bool, exchanged: bool | None = 
         key=lambda row: (METHODS.index(row.method), _count(row)),
     )
     same = [row for row in own if row.exchanged == taken.exchanged]
-    fewest = min((row for row in own if row.steps is not None and row.exchanged == taken.exchanged), key=_count)
+    fewest = min(same, key=_count)
     return Advised(
         name=taken.method,
         neumann_body=taken.neumann_body,
