@@ -206,9 +206,10 @@ def of_vectors(found: Advice, seen: SeenVectors) -> Iterator[Section]:
     if seen.noise is not None:
         said.append(f"images of dependent directions differ by {figures(seen.noise, 2)} of the largest: noise")
     if not found.roles:
-        yield section("given", "WHAT WAS GIVEN?", *said, f"No theta: {found.why_no_theta}.")
-        return
+        said.append(f"No theta: {found.why_no_theta}.")
     yield section("given", "WHAT WAS GIVEN?", *said)
+    if not found.roles:
+        return
     rows = [
         ("least lambda", figures(spectrum.low), figures(spectrum.error_low, 2)),
         ("largest lambda, rho", figures(spectrum.high), figures(spectrum.error_high, 2)),
