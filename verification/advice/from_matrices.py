@@ -222,12 +222,15 @@ def _by_eigenvalues(body: BodyNumber, sides: Sides, P: Transfer | None) -> Role:
         S_c = (S_c + S_c.T) / 2
     with one_thread():
         role = plain_role(body, Fraction(largest(S_c, S_n).value) * unit)
-        if len(S_n) <= ALL:
-            values = eigh(S_c, S_n, eigvals_only=True)
-            role = replace(role, spectrum=Spectrum.of(np.maximum(values, 0.0) * float(unit)))
-        if P is None and not contact.motions.size:
-            return role  # the eigenvalues of both roles are reciprocal
-        least = max(float(eigh(S_c, S_n, eigvals_only=True, subset_by_index=[0, 0])[0]), 0.0)
+        reciprocal = P is None and not contact.motions.size  # the eigenvalues of both roles
+        whole = len(S_n) <= ALL
+        if whole or not reciprocal:
+            values = np.maximum(eigh(S_c, S_n, eigvals_only=True, subset_by_index=None if whole else [0, 0]), 0.0)
+        if whole:
+            role = replace(role, spectrum=Spectrum.of(values * float(unit)))
+        if reciprocal:
+            return role
+    least = float(values[0])
     return replace(role, rho_min=Number.of_float(Fraction(least) * unit), rho_tied=role.rho)
 
 
