@@ -135,9 +135,7 @@ def advice_of_runs(
     if rho is not None:
         reason = {"neumann_body": "whichever body had the Neumann problem in that run", "rho_min": ONE_END}
         roles.append(role_of(None, rho, nothing="an observed ratio proves nothing", reason=reason))
-    table = table_of(
-        roles, tied=tied, bound="at most", theta=following.theta
-    )  # the smallest eigenvalue may be anything
+    table = table_of(roles, tied=tied, one_end=True, theta=following.theta)
     return Advice(
         neumann_body=None,
         methods=table,

@@ -259,11 +259,11 @@ def plain_role(neumann_body: BodyNumber, rho: Fraction, **settings: Any) -> Role
 
 
 def table_of(
-    roles: Sequence[Role], *, tied: bool, bound: str | None = None, theta: float | None = None
+    roles: Sequence[Role], *, tied: bool, one_end: bool = False, theta: float | None = None
 ) -> tuple[MethodRow, ...]:
     """The methods in all roles that are not refused, the first role's own ones first.
 
-    Contact that may open has a mode with lambda = 0 besides; ``bound`` tells which bound the steps are, if any;
+    Contact that may open has a mode with lambda = 0 besides; with ``one_end`` only the largest eigenvalue is known;
     ``theta`` is the factor that is advised, where the role has another one.
     """
     found: list[MethodRow] = []
@@ -277,7 +277,7 @@ def table_of(
             theta=own if theta is None else theta,
             neumann_body=role.neumann_body,
             exchanged=role is not roles[0],
-            bound=bound,
+            one_end=one_end,
         )
     return tuple(found)
 

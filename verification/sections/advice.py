@@ -57,11 +57,11 @@ def _sections(found: Advice) -> Iterator[Section]:
     if found.interval is not None:
         yield from of_logs(found, found.interval)
         if found.roles:
-            if any(row.bound is None for row in found.methods):
+            if any(row.bound for row in found.methods):
+                yield _paste(found, _few_methods(found))
+            else:
                 yield from _which_method(found)
                 yield _paste(found)
-            else:
-                yield _paste(found, *_few_methods(found))
     if found.roles and found.interval is None:
         if found.vectors is None:
             yield _which_body(found)
@@ -171,9 +171,8 @@ def _which_method(found: Advice) -> Iterator[Section]:
     rows: list[tuple[Cell, ...]] = []
     for exchanged in dict.fromkeys(row.exchanged for row in found.methods):
         own = [row for row in found.methods if row.exchanged == exchanged]
-        few = {"at most": "<= ", "at least": ">= ", None: ""}[own[0].bound]
         roles = NAMES[own[0].neumann_body] if named else "exchanged" if exchanged else "as they are"
-        rows.append((roles, figures(own[0].theta), *(count(row.steps, few) for row in own)))
+        rows.append((roles, figures(own[0].theta), *(count(row.steps, "<= " * bool(row.bound)) for row in own)))
     first, *others = (METHOD_NAMES[row.method] for row in own)
     heads = ("Neumann" if named else "roles", "theta", f"steps to 1e-6: {first}", *others)
     said = []
@@ -187,10 +186,10 @@ def _which_method(found: Advice) -> Iterator[Section]:
     yield section("method", "WHICH METHOD?", table(heads, rows), *said)
 
 
-def _few_methods(found: Advice) -> list[str]:
-    """The same in one line, where only one end of the spectrum is known."""
-    each = [f"{METHOD_NAMES[row.method]} {count(row.steps, '<= ')}" for row in found.methods]
-    return [f"Steps to 1e-6: {', '.join(each)} (only the largest eigenvalue is known)."] if each else []
+def _few_methods(found: Advice) -> str:
+    """The same in one line, where only the largest eigenvalue is known."""
+    each = [f"{METHOD_NAMES[row.method]} {count(row.steps, '<= ' * bool(row.bound))}" for row in found.methods]
+    return f"Steps to 1e-6: {', '.join(each)} (only the largest eigenvalue is known)."
 
 
 def of_vectors(found: Advice, seen: SeenVectors) -> Iterator[Section]:
