@@ -103,7 +103,7 @@ BUDGET = {
     "fem1d2d": 3810,
     "ndtheory": 5600,
     "verification": 1240,
-    "verification.advice": 5750,
+    "verification.advice": 5776,
     "verification.algorithm": 2260,
     "verification.bounds": 3280,
     "verification.certificate": 1100,

@@ -1,6 +1,5 @@
 """Steps of methods predicted on a spectrum, and the method that is advised."""
 
-
 import numpy as np
 import pytest
 from hypothesis import given

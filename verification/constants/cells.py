@@ -80,7 +80,7 @@ def halved_cells(problem: Problem) -> Interface:
     Raises
     ------
     NoCells
-        One dimension, bodies that are no rectangles or held along Gamma_c, lengths of cells without a simple ratio.
+        One dimension, bodies not rectangular or held along Gamma_c, lengths of cells without a simple ratio.
 
     Examples
     --------
@@ -94,7 +94,7 @@ def halved_cells(problem: Problem) -> Interface:
     bodies = {name: getattr(problem, name) for name in ("body1", "body2")}
     for (name, body), side in zip(bodies.items(), SIDES, strict=True):
         if body.shape != "rectangle":
-            raise NoCells(f"{name} is no rectangle of equal cells")
+            raise NoCells(f"{name} is not a rectangle of equal cells")
         if side in body.fixed or side in body.prescribed:
             raise NoCells(f"{name} is held along Gamma_c")
     contact, neumann = _roles(problem)

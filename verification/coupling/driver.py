@@ -34,7 +34,7 @@ Solver = Callable[[Floats], Any]
 
 
 class CouplingError(RuntimeError):
-    """A solver returned what is no vector of finite numbers."""
+    """A solver returned something other than a vector of finite numbers."""
 
 
 class Coupling:
