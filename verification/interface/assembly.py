@@ -76,7 +76,7 @@ class TwoBodies(Value):
     interface : Interface
         In the roles of the problem.
     friction : Fraction
-        k, constant along Gamma_c.
+        k, the largest one where it varies along Gamma_c.
     problem : Problem
         The problem they were made from.
     """

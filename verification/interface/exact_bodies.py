@@ -143,10 +143,14 @@ class ExactInterface:
         if isinstance(law, Nonlocal):
             law = replace(law, radius=contact.radius)  # type: ignore[arg-type]  # its formula takes any scalar
         interface = Interface(
-            contact=self.grid, neumann=self.other, gap=self.pair.interface.gap, law=law, transfer=self.exact_transfer
+            contact=self.grid,
+            neumann=self.other,
+            gap=self.pair.interface.gap,
+            transfer=self.exact_transfer,
+            profile=self.pair.interface.profile,
         )
         try:
-            return np.asarray(law.operator(interface))
+            return np.asarray(interface.operator(law))
         except (TypeError, ValueError) as error:
             raise NotExact(f"law of friction: {error}") from None
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import importlib
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from fractions import Fraction
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
@@ -23,6 +24,7 @@ from verification.problem.specs import (
     IterationSpec,
     MeshFile,
     ProblemSpec,
+    Profile,
     SidePart,
     Theta,
     read_theta,
@@ -281,7 +283,7 @@ def _read_body(table: TomlTable, dimension: int, source: str) -> BodySpec:
 
 def _read_contact(table: TomlTable, dimension: int) -> ContactSpec:
     laws = registered_laws()
-    friction = table.take("friction", coefficient, Fraction(0))
+    friction, profile = table.take("friction", lambda value: _friction(value, table), (Fraction(0), None))
     law = table.take("law", choice(*laws), "nonlocal")
     radius = table.take("radius", positive, None)
     interval = table.take("interval", ends, None)
@@ -298,7 +300,38 @@ def _read_contact(table: TomlTable, dimension: int) -> ContactSpec:
             None,
             f'this key is missing; the {laws[law].label} law needs the radius of its kernel (or law = "local")',
         )
-    return ContactSpec(interval=interval, friction=friction, law=law, radius=radius, gap=gap)
+    return ContactSpec(interval=interval, friction=friction, law=law, radius=radius, gap=gap, profile=profile)
+
+
+def _friction(value: Any, table: TomlTable) -> tuple[Fraction, Profile | None]:
+    """Read a coefficient of friction, or a table of it along Gamma_c: the largest one, and how it varies."""
+    if not isinstance(value, Mapping) or not value:
+        return coefficient(value), None
+    inside = table.within("friction", value)
+    s, k = inside.take("s", _positions), inside.take("k", _listed(coefficient))
+    inside.close()
+    if len(s) != len(k):
+        raise inside.refuse("k", list(k), f"needed as many values as s has, {len(s)}")
+    return Profile.of(s, k)
+
+
+def _listed(read: Callable[[Any], Fraction]) -> Callable[[Any], tuple[Fraction, ...]]:
+    """Return a reader of a list of two numbers or more."""
+
+    def read_all(value: Any) -> tuple[Fraction, ...]:
+        if not isinstance(value, (list, tuple)) or len(value) < 2:
+            raise Unfit("needed a list of two numbers or more")
+        return tuple(map(read, value))
+
+    return read_all
+
+
+def _positions(value: Any) -> tuple[Fraction, ...]:
+    """Read distances along Gamma_c, which begins at 0."""
+    s = _listed(number("increasing numbers, the first one at most 0"))(value)
+    if s[0] > 0 or not all(float(a) < float(b) for a, b in pairwise(s)):
+        raise Unfit("needed increasing numbers, the first one at most 0")
+    return s
 
 
 def factor(value: Any) -> Theta:
