@@ -95,8 +95,11 @@ def read_problem(data: Mapping[str, Any], source: str) -> ProblemSpec:
     units = top.table("units")
     labels = {name: units.take(name, label, default) for name, default in (("length", "mm"), ("stress", "MPa"))}
     units.close()
-    body1 = _read_body(top.table("body1", required=True), dimension, source)
-    body2 = _read_body(top.table("body2", required=True), dimension, source)
+    if dimension == 1 and "plane" in top:
+        raise top.refuse("plane", None, "a bar has none; leave it out in one dimension")
+    plane = top.take("plane", _plane, "strain")
+    body1 = _read_body(top.table("body1", required=True), dimension, plane, source)
+    body2 = _read_body(top.table("body2", required=True), dimension, plane, source)
     if body1.rigid and body2.rigid:
         raise top.refuse("body2.shape", "rigid", "needed at least one elastic body")
     if not (body1.rigid or body2.rigid or 1 / MOST_CONTRAST <= body1.young / body2.young <= MOST_CONTRAST):
@@ -226,7 +229,21 @@ def _names(table: TomlTable) -> Iterator[str]:
             raise table.refuse(str(name), None, str(error)) from None
 
 
-def _read_body(table: TomlTable, dimension: int, source: str) -> BodySpec:
+def _plane(value: Any) -> Any:
+    """Read the name of a plane model."""
+    if value == "axisymmetric":
+        raise Unfit('bodies of revolution have other matrices and no proofs here; needed "strain" or "stress"')
+    return choice("strain", "stress")(value)
+
+
+def _poisson(plane: str) -> Callable[[Any], Fraction]:
+    """Return a reader of Poisson's ratio: in plane stress the body of plane strain must be one as well."""
+    if plane == "strain":
+        return number("a number with -1 < nu < 0.5", lambda v: -1 < v < Fraction(1, 2))
+    return number("a number with -0.5 < nu <= 0.5 in plane stress", lambda v: -Fraction(1, 2) < v <= Fraction(1, 2))
+
+
+def _read_body(table: TomlTable, dimension: int, plane: Literal["strain", "stress"], source: str) -> BodySpec:
     shape = _read_shape(table, dimension, source)
     if shape["shape"] == "rigid":
         table.close()
@@ -250,7 +267,7 @@ def _read_body(table: TomlTable, dimension: int, source: str) -> BodySpec:
 
     young = table.take("young", positive)
     if dimension == 2:
-        poisson = table.take("poisson", number("a number with -1 < nu < 0.5", lambda v: -1 < v < Fraction(1, 2)))
+        poisson = table.take("poisson", _poisson(plane))
     else:
         if "poisson" in table:
             raise table.refuse("poisson", None, "a bar has no Poisson ratio; leave it out in one dimension")
@@ -278,6 +295,7 @@ def _read_body(table: TomlTable, dimension: int, source: str) -> BodySpec:
         prescribed=prescribed,
         traction=traction,
         body_force=body_force,
+        plane=plane,
     )
 
 

@@ -139,6 +139,8 @@ class BodySpec:
         A rigid body is an obstacle: of the other attributes it has at most x and y.
     young, poisson : Fraction
         E in stress; Poisson's ratio is 0 for a bar.  Both 0 where rigid.
+    plane : {'strain', 'stress'}
+        Plane strain or plane stress, the same for both bodies.
     parts : read-only mapping from name to SidePart
         Parts of sides, each with a name that is used like a side's.
     prescribed, traction : read-only mapping from side to components
@@ -159,6 +161,7 @@ class BodySpec:
     prescribed: Mapping[str, Components] = field(default_factory=ReadOnly)
     traction: Mapping[str, tuple[Fraction, ...]] = field(default_factory=ReadOnly)
     body_force: tuple[Fraction, ...] = ()
+    plane: Literal["strain", "stress"] = "strain"
 
     def __post_init__(self) -> None:
         for name in ("parts", "prescribed", "traction"):
@@ -168,6 +171,12 @@ class BodySpec:
     def rigid(self) -> bool:
         """True if the body is an obstacle."""
         return self.shape == "rigid"
+
+    @property
+    def moduli(self) -> tuple[Fraction, Fraction]:
+        """E and nu of the body of plane strain with the same law in the plane."""
+        E, nu = self.young, self.poisson
+        return (E, nu) if self.plane == "strain" else (E * (1 + 2 * nu) / (1 + nu) ** 2, nu / (1 + nu))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -296,6 +305,11 @@ class ProblemSpec:
     iteration: IterationSpec
     length: Fraction
     source: str = field(default="<dict>", compare=False)
+
+    @property
+    def plane(self) -> Literal["strain", "stress"]:
+        """Plane strain or plane stress; without a meaning in one dimension."""
+        return self.body2.plane if self.body1.rigid else self.body1.plane
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "units", ReadOnly(self.units))

@@ -29,6 +29,7 @@ def tables(problem: ProblemSpec) -> dict[str, Any]:
     return {
         "title": problem.title,
         "dimension": problem.dimension,
+        **({"plane": problem.plane} if problem.dimension == 2 else {}),
         "units": dict(problem.units),
         "body1": _body(problem.body1),
         "body2": _body(problem.body2),

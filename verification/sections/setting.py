@@ -26,7 +26,8 @@ def setting(problem: Problem, nodes: int | None, interface: int) -> Section:
         facts = [f"Obstacle: {'lower' if problem.body1.rigid else 'upper'} body", friction]
     else:
         facts = [f"Neumann body: {body} ({PLACES[body]})", friction, _how(problem)]
-    first = Facts(problem.title, (*counts, f"E {moduli} {units['stress']}"))
+    thin = ["plane stress"] if problem.plane == "stress" else []
+    first = Facts(problem.title, (*counts, f"E {moduli} {units['stress']}", *thin))
     return section("setting", "", first, Facts("", tuple(facts)))
 
 
