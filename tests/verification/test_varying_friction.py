@@ -21,8 +21,10 @@ from verification.bounds.bound import Subject, Thresholds
 from verification.bounds.table import BOUNDS
 from verification.certificate import check
 from verification.certificate.claims import describe, same
+from verification.certificate.continuum import certify_continuum
 from verification.certificate.contraction import certify, check_again
 from verification.interface.build import build
+from verification.interface.files import write_interface
 from verification.monolithic import solve
 from verification.problem.specs import Profile
 from verification.sections.layout import text
@@ -155,6 +157,25 @@ def test_matrices_take_a_coefficient_for_each_node():
     assert own.friction_threshold.value == pytest.approx(expected, rel=1e-9)
 
 
+def test_an_interface_file_keeps_the_friction_of_each_node(tmp_path):
+    pair = vf.build(section_6(RISING))
+    write_interface(pair, tmp_path / "interface.npz")
+    found = vf.build(tmp_path / "interface.npz")
+    assert np.array_equal(vf.run(found).last.g, vf.run(replace(pair, problem=None)).last.g)
+    assert vf.build(tmp_path / "interface.npz", friction="0.1").friction == F(1, 10)
+
+
+def test_an_obstacle_rubs_as_a_body_does():
+    data = small(body1={"fixed": None})
+    data["body1"] = {"shape": "rigid"}
+    problem = vf.Problem.from_dict(data).changed(friction=RISING)
+    found = solve(problem)
+    k = np.interp(found.contact.x - found.contact.x[0], [0, 0.6, 1.2], [0.1, 0.3, 0.2])
+    same = solve(problem.changed(friction="0.3", law="local")), solve(problem.changed(law="local"))
+    assert same[0].contact.bound == pytest.approx(0.3 * same[0].contact.pressure, abs=1e-9)
+    assert same[1].contact.bound == pytest.approx(k * same[1].contact.pressure, abs=1e-9)
+
+
 @pytest.mark.parametrize("friction", [lambda s: -1.0, lambda s: float("nan"), [0.1, 0.2], "some", np.full((2, 2), 0.1)])
 def test_a_friction_that_is_none_is_refused(friction):
     with pytest.raises(ValueError, match=r"friction.*needed"):
@@ -188,13 +209,6 @@ def test_the_iteration_and_the_global_method_agree_where_the_solution_is_unique(
                 assert getattr(run.contact, name) == pytest.approx(getattr(solution.contact, name), abs=1e-7 * scale)
             found += len(set(solution.contact.status))
     assert found > 6  # nodes stick and slip
-
-
-def test_both_solvers_of_step_ii_find_one_step():
-    problem = section_6(RISING)
-    own, program = (vf.run(problem.changed(max_iterations=3), solver=solver) for solver in ("auto", "cvxpy"))
-    scale = np.abs(own.last.image).max()
-    assert own.last.image == pytest.approx(program.last.image, abs=1e-6 * scale)
 
 
 def test_all_of_the_friction_is_multiplied_at_another_largest_value():
@@ -332,6 +346,14 @@ def test_screens_name_the_range_and_the_factor_by_which_friction_may_grow():
     assert f"{factor} x given" in comparison
     assert f"less than {factor} times the friction" in " ".join(advice.split())
     assert "contracts for k <" not in advice
+
+
+def test_the_continuum_takes_the_largest_coefficient():
+    found = certify_continuum(vf.example("section6").changed(friction=RISING))
+    constants = found.content()["constants"]
+    product = 0.3 * constants["C_s"]["value"] * constants["C_t1"]["value"]
+    assert constants["kappa_1"]["value"] == pytest.approx(product, rel=1e-6)
+    assert "contracts for max k < " in text(found.sections())
 
 
 def test_thresholds_over_a_friction_are_rounded_outwards():

@@ -139,13 +139,13 @@ def _contracts(found: ContinuumCertificate, document: Mapping[str, Any]) -> list
     if found.energy is None:
         said.append(f"Nothing is proved for any particular theta. {document['reason']['rho']}.")
     elif document["interval"] is None:
-        said.append(f"At k = {k:g} no theta is proved to contract: no conclusion.")
+        said.append(f"At {name} = {k:g} no theta is proved to contract: no conclusion.")
     else:
         lo, hi = document["interval"][0], "1"
         if found.energy.interval != (0.0, 1.0):
             hi = _few(document["theta_max_proved"]["lo"], False)
         best = f"{document['theta_proved']:.3f}, factor {_at_most(document['factor_proved'])}"
-        said.append(f"At k = {k:g}: {lo:.4g} < theta < {hi}; the best proved theta is {best}.")
+        said.append(f"At {name} = {k:g}: {lo:.4g} < theta < {hi}; the best proved theta is {best}.")
         if document["factor"] is not None:
             said.append(f"theta = {document['theta']:g}: factor {_at_most(document['factor'])}, guaranteed.")
         elif document["theta"] is not None:
