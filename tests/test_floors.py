@@ -100,27 +100,27 @@ FLOORS: dict[str, dict[str, str]] = {
 
 #: Lines of each package at most, those of packages inside it apart: whoever needs more says here how many.
 BUDGET = {
-    "fem1d2d": 3810,
+    "fem1d2d": 3841,
     "ndtheory": 5600,
     "verification": 1240,
-    "verification.advice": 5776,
+    "verification.advice": 5777,
     "verification.algorithm": 2260,
-    "verification.bounds": 3280,
+    "verification.bounds": 3300,
     "verification.certificate": 1100,
     "verification.cli": 2405,
-    "verification.constants": 1310,
+    "verification.constants": 1311,
     "verification.contact": 940,
     "verification.coupling": 420,
     "verification.exploration": 600,
     "verification.figures": 1520,
-    "verification.interface": 2725,
+    "verification.interface": 2811,
     "verification.ledger": 4320,
     "verification.output": 470,
-    "verification.problem": 1510,
+    "verification.problem": 1648,
     "verification.reproduce": 655,
-    "verification.sections": 2210,
-    "verification.sweeps": 2400,
-    "verification.testing": 1570,
+    "verification.sections": 2231,
+    "verification.sweeps": 2401,
+    "verification.testing": 1583,
 }
 
 #: Imports by name that go upwards, and why.

@@ -95,8 +95,9 @@ def advise_matrices(
         P: from the unknowns of the Neumann body to the unknowns of the contact body, or for one component at nodes.
     neumann_body : {1, 2}, optional
         The body from whose unknowns P leads; by default the shape of P decides, and body 2 where both have as many.
-    friction : number, optional
-        k >= 0; needs matrices of two components at each node, and ``radius`` with ``x`` or ``kernel``.
+    friction : number or array, optional
+        k >= 0, one number or one for each contact node; needs matrices of two components at each node, and ``radius``
+        with ``x`` or ``kernel``.
     x : array, optional
         Positions of the nodes of the contact body, increasing.
     x_neumann : array, optional

@@ -43,7 +43,7 @@ class Section5(Bound):
         why = ""
         if theta is not None and found.factor is None:
             friction = float(subject.constants.C_K if subject.constants.k is None else subject.constants.k)
-            why = _why_not(found.interval, found.C2, friction, found.theta)
+            why = _why_not(found.interval, found.C2, friction, found.theta, subject.varies)
             if self.of_unit and subject.measured is not None:
                 why += f" (in {subject.measured.units['stress']})"
         return BoundResult(
@@ -98,7 +98,7 @@ class Energy(Bound):
             friction = Thresholds(every=measured.friction_threshold, some=measured.friction_limit, on="k")
             without = measured.C_t1 is None  # no friction is allowed
             if theta is not None and found.factor is None:
-                why = _why_not(found.interval, friction.some, measured.friction, found.theta)
+                why = _why_not(found.interval, friction.some, measured.friction, found.theta, subject.varies)
         return BoundResult(
             name=self.name,
             proved=True,
@@ -204,12 +204,14 @@ class SemidefiniteBound(Bound):
 
 
 def _why_not(
-    interval: tuple[float, float] | None, threshold: Number | None, friction: float, theta: float | None
+    interval: tuple[float, float] | None, threshold: Number | None, friction: float, theta: float | None, varies: bool
 ) -> str:
     """Reason why a bound has no conclusion at a theta."""
     if interval is not None and theta is not None:
         return f"theta = {theta:g} is outside ({interval[0]:.2g}, {interval[1]:.2g})"
     scale = threshold.value if threshold is not None else float("inf")
+    if varies:
+        return f"needed less than {scale / friction:.2g} times the friction along Gamma_c"
     return f"friction {friction:g} is not below {scale:.2g}"
 
 

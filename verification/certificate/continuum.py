@@ -179,7 +179,7 @@ class ContinuumCertificate(Document):
         uppers["kappa_1"], uppers["kappa_2"] = c.kappa(k)
         order = 1 if self.problem.contact_body == 1 else -1  # the contact body first
         bodies = (self.problem.body1, self.problem.body2)[::order]
-        moduli = [Moduli(young=body.young, poisson=body.poisson) for body in bodies]
+        moduli = [Moduli(young=young, poisson=poisson) for young, poisson in (body.moduli for body in bodies)]
         return {
             "kind": "continuum",
             "constants": {
@@ -236,13 +236,9 @@ def two_rectangles(problem: Problem) -> TwoRectangles:
             raise refuse(f"{name}.fixed", sorted(held), f'needed a body held at "{outer}" only, fixed or prescribed')
         if None in body.prescribed.get(outer, ()):
             raise refuse(f"{name}.prescribed.{outer}", "free", "needed both components")
-        if not body.poisson < Fraction(1, 2):
-            raise refuse(f"{name}.poisson", body.poisson, "needed poisson < 1/2")
+        young, poisson = body.moduli
         found[name] = Rectangle(
-            left=body.x[0],
-            right=body.x[1],
-            thickness=body.y[1] - body.y[0],
-            body=Moduli(young=body.young, poisson=body.poisson),
+            left=body.x[0], right=body.x[1], thickness=body.y[1] - body.y[0], body=Moduli(young=young, poisson=poisson)
         )
     lower_body, upper_body = found["body1"], found["body2"]
     overlap = (max(lower_body.left, upper_body.left), min(lower_body.right, upper_body.right))

@@ -240,13 +240,17 @@ class TomlTable:
         except Unfit as error:
             raise self.refuse(name, value, str(error)) from None
 
+    def within(self, name: str, value: Mapping[str, Any]) -> TomlTable:
+        """Return the value of a key as a table."""
+        return TomlTable(value, self._file, self.key(name))
+
     def table(self, name: str, *, required: bool = False) -> TomlTable:
         """Read a sub-table; a missing one is empty unless required."""
 
         def read(value: Any) -> TomlTable:
             if not isinstance(value, Mapping):
                 raise Unfit("needed a table")
-            return TomlTable(value, self._file, self.key(name))
+            return self.within(name, value)
 
         if required:
             return self.take(name, read)

@@ -11,7 +11,7 @@ from typing import Any
 from ndtheory import exact
 from ndtheory.number import LARGEST_EXPONENT
 from ndtheory.texts import CONTROL
-from verification.problem.specs import BodySpec, MeshFile, ProblemSpec
+from verification.problem.specs import BodySpec, ContactSpec, MeshFile, ProblemSpec
 
 #: Integers up to this size are doubles: readers of JSON agree on them.
 LARGEST_INTEGER = 2**53
@@ -29,10 +29,11 @@ def tables(problem: ProblemSpec) -> dict[str, Any]:
     return {
         "title": problem.title,
         "dimension": problem.dimension,
+        **({"plane": problem.plane} if problem.dimension == 2 else {}),
         "units": dict(problem.units),
         "body1": _body(problem.body1),
         "body2": _body(problem.body2),
-        "contact": _present(vars(problem.contact)),
+        "contact": _contact(problem.contact),
         "iteration": {"neumann_body": problem.iteration.neumann_body} | vars(problem.iteration),
         "norm": {"length": problem.length},
     }
@@ -58,6 +59,13 @@ def _body(body: BodySpec) -> dict[str, Any]:
             "traction": {side: vector(values) for side, values in body.traction.items()},
             "body_force": vector(body.body_force),
         }
+    return _present(written)
+
+
+def _contact(contact: ContactSpec) -> dict[str, Any]:
+    written = vars(contact) | {"profile": None}
+    if contact.profile is not None and contact.friction:
+        written["friction"] = contact.profile.table(contact.friction)
     return _present(written)
 
 

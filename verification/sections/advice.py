@@ -240,7 +240,11 @@ def _friction(found: Advice) -> Iterator[Section]:
         said[NAMES[role.neumann_body]] = role.reason.get("friction_threshold", "")
         if role.friction_threshold is not None:
             allowed = f"every small theta contracts for k < {figures(role.friction_threshold)}"
-            said[NAMES[role.neumann_body]] = f"{allowed} (here k = {figures(found.friction, 2)})"
+            allowed += f" (here k = {figures(found.friction, 2)})"
+            if found.friction and found.problem is not None and found.problem.contact.profile is not None:
+                share = figures(role.friction_threshold.value / found.friction)
+                allowed = f"every small theta contracts for less than {share} times the friction along Gamma_c"
+            said[NAMES[role.neumann_body]] = allowed
     yield section("friction", "HOW MUCH FRICTION DOES THE ENERGY BOUND ALLOW?", *_together(said))
 
 

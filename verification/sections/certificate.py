@@ -50,7 +50,7 @@ def sections(found: Certificate, target: Path | None = None) -> Sections:
     )
     then = following("certify", "-o", "certificate.json", iteration=True)
     about = f"{found.problem.title}: {nodes} nodes, {len(discrete['weights'])} contact nodes"
-    bodies = f"k = {float(found.problem.contact.friction):g}, Neumann body {discrete['neumann_body']}"
+    bodies = f"k = {found.problem.contact.friction_words}, Neumann body {discrete['neumann_body']}"
     return (
         section("setting", "", Facts(about), Facts(bodies)),
         section("proved", "WHAT IS PROVED?", *claim),
@@ -100,7 +100,7 @@ def continuum(found: ContinuumCertificate) -> Sections:
     radius = [] if problem.contact.radius is None else [f"r = {float(problem.contact.radius):g} {length}"]
     number = problem.iteration.neumann_body
     body = f"Neumann body: {number} ({PLACES[number]})"
-    friction = ", ".join([f"k = {float(found.friction):g}", *radius])
+    friction = ", ".join([f"k = {problem.contact.friction_words}", *radius])
     return (
         section("setting", "", Facts(f"{problem.title}: the continuous problem, no mesh"), Facts(body, (friction,))),
         _used(found, document["constants"], f"sqrt({stress}/{length})", f"sqrt({length}/{stress})"),
@@ -132,19 +132,20 @@ def _used(found: ContinuumCertificate, constants: Mapping[str, Any], of_stress: 
 
 def _contracts(found: ContinuumCertificate, document: Mapping[str, Any]) -> list[str]:
     k, threshold = float(found.friction), _few(document["friction_threshold"]["lo"], False)
-    said = [f"Every small theta contracts for k < {threshold}: one fixed point, and exactly one solution."]
+    name = "k" if found.problem.contact.profile is None else "max k"
+    said = [f"Every small theta contracts for {name} < {threshold}: one fixed point, and exactly one solution."]
     if document["friction_limit"] is not None:
-        said.append(f"Some theta contracts for k < {_few(document['friction_limit']['lo'], False)}.")
+        said.append(f"Some theta contracts for {name} < {_few(document['friction_limit']['lo'], False)}.")
     if found.energy is None:
         said.append(f"Nothing is proved for any particular theta. {document['reason']['rho']}.")
     elif document["interval"] is None:
-        said.append(f"At k = {k:g} no theta is proved to contract: no conclusion.")
+        said.append(f"At {name} = {k:g} no theta is proved to contract: no conclusion.")
     else:
         lo, hi = document["interval"][0], "1"
         if found.energy.interval != (0.0, 1.0):
             hi = _few(document["theta_max_proved"]["lo"], False)
         best = f"{document['theta_proved']:.3f}, factor {_at_most(document['factor_proved'])}"
-        said.append(f"At k = {k:g}: {lo:.4g} < theta < {hi}; the best proved theta is {best}.")
+        said.append(f"At {name} = {k:g}: {lo:.4g} < theta < {hi}; the best proved theta is {best}.")
         if document["factor"] is not None:
             said.append(f"theta = {document['theta']:g}: factor {_at_most(document['factor'])}, guaranteed.")
         elif document["theta"] is not None:
