@@ -21,7 +21,6 @@ from verification.advice.from_vectors import advice_on
 from verification.advice.log_files import Log, read_log
 from verification.advice.pace import CONVERGED, RELATIVE, Pace
 from verification.advice.readings import (
-    AT_ONE,
     LARGEST_TO_PASTE,
     SHORTEST_STEP,
     NextRun,
@@ -244,7 +243,7 @@ def longer(columns: tuple[SeenColumn, ...], theta: Fraction) -> NextRun:
     steps = f"{steps_needed(theta)} steps or more in one time window"
     again = f"the same again, constant and without Aitken or quasi-Newton, {steps}"
     if all(one.kind == "short" for one in paces):
-        why = f"{again}: smaller limits of convergence and a larger number of iterations. {AT_ONE}"
+        why = f"{again}: smaller limits of convergence and a larger number of iterations"
     else:
         why = f"{again}, until the residual falls or grows steadily; a relative one must fall below 0.1 first"
     return NextRun(theta=float(theta), why=why, again=True)
