@@ -107,7 +107,7 @@ BUDGET = {
     "verification.algorithm": 2260,
     "verification.bounds": 3280,
     "verification.certificate": 1100,
-    "verification.cli": 2425,
+    "verification.cli": 2427,
     "verification.constants": 1310,
     "verification.contact": 940,
     "verification.coupling": 420,

@@ -52,6 +52,9 @@ AGREE = Fraction(103, 100)
 #: Where the bounds of rho differ by less, a theta between costs a few steps at most.
 NARROW = Fraction(5, 4)
 
+#: How a quasi-Newton run is recognised.
+UNNAMED = "a quasi-Newton run of preCICE is recognised by its iterations.log in the same folder"
+
 #: The smallest theta that a log may have: for a smaller one a ratio has to be steady over millions of steps.
 SMALLEST_THETA = Fraction(1, 10**6)
 
@@ -170,7 +173,7 @@ def _theta_of(log: Log, theta: Fraction | None) -> Fraction:
     if theta is not None:
         return theta
     if log.theta is None or log.theta_rounding > 1e-3 * log.theta:
-        raise HypothesisError("theta", None, f"the relaxation factor of {log.path}, which does not name it")
+        raise HypothesisError("theta", None, f"the relaxation factor of {log.path}, which does not name it ({UNNAMED})")
     return Fraction(repr(log.theta))
 
 

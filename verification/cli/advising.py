@@ -75,7 +75,7 @@ def _grids(transfer: Path, given: Mapping[str, Any]) -> dict[str, Any]:
     return {name: read_array(transfer, of) for name, of in wanted.items() if of in held and name not in given}
 
 
-TIED = click.option("--tied", is_flag=True, help="Advise by what holds where nothing opens or slips.")
+TIED = click.option("--tied", is_flag=True, help="Nothing opens or slips: tied bodies, heat, a fluid at a wall.")
 SNIPPETS_OF = click.option(
     "--snippets",
     type=OneOf([*SNIPPETS, "all"], case_sensitive=False),
@@ -103,13 +103,14 @@ def of_file(file: Path, keys: dict[str, str], swap: bool, tied: bool, snippets: 
     FILE is a problem file, or the interface.npz that a run has written.  Both assignments of the roles are compared:
     theta (no unit) and the factor of a step, predicted and proved, and lines to paste into a coupling configuration.
 
-    The commands below need no problem file.  A file that has the name of one of them is given as
-    ./run.
+    The commands below need no problem file; two solvers that are Python functions are coupled by verification.couple.
+    A file that has the name of a command is given as ./run.
 
     \b
     Examples:
       ndtheory advise my.toml
-      ndtheory advise my.toml --set contact.friction=0.4
+      ndtheory advise run --log precice-Solid-convergence.log --theta 0.5
+      ndtheory advise moduli --conductivity 50,0.5
       ndtheory advise my.toml --tied
       ndtheory advise my.toml --snippets preCICE
       ndtheory advise results/interface.npz
@@ -122,6 +123,8 @@ def of_file(file: Path, keys: dict[str, str], swap: bool, tied: bool, snippets: 
     changed = [option for option, given in (("--set", keys), ("--swap-roles", swap)) if given]
     if file.suffix == ".npz" and changed:
         raise click.UsageError(f"received {changed[0]} with {file}: it changes a problem file", context)
+    if file.suffix in (".log", ".csv", ".dat"):
+        raise click.UsageError(f"{file}: for a log type ndtheory advise run --log {file} --theta X", context)
     problem = file if file.suffix == ".npz" else load_problem(file, keys, swap=swap)
     from verification.advice import roles
 
@@ -290,12 +293,12 @@ def run(
 
 
 #: Words of --shape, and the parameters of advise_moduli that they set.
-SHAPES: dict[str, dict[str, Any]] = {
-    "plane-stress": {"plane": "stress"},
-    "3d": {"plane": "3d"},
-    **{f"corners-{name}": {"corners": name} for name in ("none", "1", "2", "both")},
-    **{f"mirror-{body}": {"mirror": body} for body in (1, 2)},
-    "flat": {"flat": True},
+SHAPES: dict[str, tuple[str, Any]] = {
+    "plane-stress": ("plane", "stress"),
+    "3d": ("plane", "3d"),
+    "flat": ("flat", True),
+    **{f"corners-{name}": ("corners", name) for name in ("none", "1", "2", "both")},
+    **{f"mirror-{body}": ("mirror", body) for body in (1, 2)},
 }
 
 
@@ -305,7 +308,7 @@ def _shape(context: click.Context, parameter: click.Parameter, value: str | None
         if word not in SHAPES:
             needed = f"some of {', '.join(SHAPES)}{did_you_mean(word, SHAPES)}"
             raise click.UsageError(f"--shape = {word}: needed {needed}", context)
-        ((key, meant),) = SHAPES[word].items()
+        key, meant = SHAPES[word]
         if found.get(key, meant) != meant and key != "mirror":
             raise click.UsageError(f"--shape = {value}: needed one {key}, received two", context)
         found[key] = [*found.get(key, ()), meant] if key == "mirror" else meant
@@ -366,9 +369,8 @@ def moduli(shape: dict[str, Any], parallel: bool, as_json: bool, **given: str | 
     context = click.get_current_context()
     data: dict[str, Any] = {name: value.split(",") for name, value in given.items() if value is not None}
     if not {"young", "conductivity", "density"} & data.keys():
-        received = f"--{min(data)} alone" if data else "no material"
-        needed = "--young and --poisson, --conductivity, or --density"
-        raise click.UsageError(f"received {received}: needed {needed}", context)
+        received = f"received {f'--{min(data)} alone' if data else 'no material'}"
+        raise click.UsageError(f"{received}: needed --young and --poisson, --conductivity, or --density", context)
     from verification.advice.from_moduli import advise_moduli
 
     try:

@@ -360,6 +360,8 @@ def of_logs(found: Advice, interval: RhoInterval) -> Sections:
         notes.append("Nothing: no time window shows a steady ratio or level over enough steps.")
     elif not read and not notes:
         notes.append("Nothing: residuals show rho only where the relaxation is constant.")
+    if found.logs and not found.roles and found.next is not None and not found.next.kept:
+        notes.append("A few vectors of a run decide more than its log: ndtheory advise vectors --help.")
     if interval.contradiction is not None:
         notes.append(f"CONTRADICTION: {interval.contradiction}.")
     else:
