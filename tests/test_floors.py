@@ -64,9 +64,9 @@ FLOORS: dict[str, dict[str, str]] = {
     "answers": {
         "verification": "comparison verdicts",
         "verification.advice": (
-            "__init__ accelerated best_theta ends from_logs from_matrices from_moduli from_runs from_vectors log_files "
-            "log_lines matrix_files methods pace readings roles runs_with_friction seen seen_moduli sides snippets "
-            "spectrum"
+            "__init__ accelerated best_theta ends from_logs from_matrices from_moduli from_runs from_vectors "
+            "from_waves log_files log_lines matrix_files methods pace readings roles runs_with_friction seen "
+            "seen_moduli sides snippets spectrum"
         ),
         "verification.coupling": "__init__ driver kratos",
         "verification.reproduce": "__init__ claims experiments readings refutation",
@@ -101,13 +101,13 @@ FLOORS: dict[str, dict[str, str]] = {
 #: Lines of each package at most, those of packages inside it apart: whoever needs more says here how many.
 BUDGET = {
     "fem1d2d": 3841,
-    "ndtheory": 5600,
+    "ndtheory": 5680,
     "verification": 1240,
-    "verification.advice": 5777,
+    "verification.advice": 6035,
     "verification.algorithm": 2260,
     "verification.bounds": 3300,
     "verification.certificate": 1100,
-    "verification.cli": 2405,
+    "verification.cli": 2427,
     "verification.constants": 1311,
     "verification.contact": 940,
     "verification.coupling": 420,
@@ -118,7 +118,7 @@ BUDGET = {
     "verification.output": 470,
     "verification.problem": 1648,
     "verification.reproduce": 655,
-    "verification.sections": 2231,
+    "verification.sections": 2330,
     "verification.sweeps": 2401,
     "verification.testing": 1583,
 }

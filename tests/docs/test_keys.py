@@ -271,6 +271,8 @@ def documents(folder: Path, small: vf.Problem) -> list[dict[str, Any]]:
         vf.advise_moduli(young=(7, 2), poisson=("0.3", "0.3"), mirror=[2]),
         vf.advise_moduli(young=(2, 2), poisson=("0.3", "1/3"), corners="both", mirror=[1], flat=True),
         vf.advise_moduli(young=(2, 2), poisson=("0.3", "0.3")),
+        vf.advise_moduli(conductivity=(50, "0.5"), capacity=(2, 3), thickness=(1, 1), dt=1, parallel=True),
+        vf.advise_moduli(density=(1, 2), thickness=1, length=(5, 1), young=3, poisson="0.3", dt=1),
         vf.sweep(small, theta=["0.5"], refine=[0, 8]),
         vf.sweep(matrices, theta=["0.5"], young=[(1, 2)]),
         vf.sweep(matrices, theta=["auto"], rule=["anderson"]),

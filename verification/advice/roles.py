@@ -20,7 +20,7 @@ from verification.advice.methods import Advised, MethodRow
 from verification.advice.readings import LARGEST_TO_PASTE, NextRun, RunReading, SeenRun, rounded_down
 from verification.advice.runs_with_friction import FrictionBounds
 from verification.advice.seen import RhoInterval, SeenLog
-from verification.advice.seen_moduli import SeenModuli
+from verification.advice.seen_moduli import Parallel, SeenModuli, SeenWaves
 from verification.advice.sides import SeenMatrices
 from verification.advice.snippets import ONLY_CONSTANT, CouplingScheme, snippet
 from verification.advice.spectrum import SeenVectors, Spectrum
@@ -357,6 +357,10 @@ class Advice(Document):
         Bounds of rho from these logs together.
     moduli : SeenModuli or None
         The moduli of two bodies, and bounds of rho from below.
+    waves : SeenWaves or None
+        Data of two plates that exchange heat, or of a fluid and a wall.
+    parallel : tuple of Parallel
+        theta and factor of parallel coupling for each role, where that was asked for: then `theta` is for it.
     matrices : SeenMatrices or None
         The matrices or operators that were given.
     tied : bool
@@ -396,6 +400,8 @@ class Advice(Document):
     vectors: SeenVectors | None = None
     methods: tuple[MethodRow, ...] = ()
     method: Advised | None = None
+    waves: SeenWaves | None = None
+    parallel: tuple[Parallel, ...] = ()
 
     @classmethod
     def between(cls, roles: Sequence[Role], *, tied: bool, **known: Any) -> Advice:
@@ -414,6 +420,8 @@ class Advice(Document):
     def summary(self) -> str:
         if self.moduli is not None:
             return self.moduli.summary
+        if self.theta is None and self.waves is not None and self.best.rho is not None:
+            return f"rho is at least {self.best.rho.value:.4g} with the Neumann problem on the wall"
         if not self.roles and self.vectors is not None:
             return self.why_no_theta
         if not self.roles:
@@ -430,12 +438,15 @@ class Advice(Document):
 
     def chosen(self, role: Role) -> tuple[float, float]:
         """theta and rate by which this advice judges a role."""
+        for one in self.parallel:
+            if one.neumann_body == role.neumann_body and not one.bound:
+                return one.theta, one.factor
         return role.advised(tied=self.tied and role.ends is not None)
 
     @property
     def theta(self) -> float | None:
         """The theta to paste, rounded down; None while several readings are left, or of moduli."""
-        if not self.roles or self.moduli is not None:
+        if not self.roles or self.moduli is not None or (self.waves is not None and self.next is not None):
             return None
         if self.next is not None:
             return self.next.theta
@@ -447,7 +458,9 @@ class Advice(Document):
         if self.theta is not None:
             return ""
         if self.moduli is not None:
-            return "moduli bound rho from below: a theta to start with stands in moduli.roles.start, where there is one"
+            return "moduli bound rho from below: `next` is a theta to begin with"
+        if self.waves is not None:
+            return "one wave bounds rho from below: `next` is a run to begin with"
         if self.vectors is not None:
             return "contact still changes in the last iterates: continue the run, and give more of its vectors"
         if self.friction_bounds is not None:
@@ -470,7 +483,7 @@ class Advice(Document):
     @property
     def quote(self) -> str | None:
         """The reason for the advice in two sentences, to be quoted: rho, theta and steps; None without a theta."""
-        if self.theta is None:
+        if self.theta is None or self.waves is not None:
             return None
         best, other = self.best, self.other
         tied = self.tied and best.ends is not None
@@ -509,6 +522,8 @@ class Advice(Document):
         """
         if self.theta is None:
             raise ValueError(self.why_no_theta)
+        if self.parallel:
+            raise ValueError("the blocks are for serial coupling: needed advice without parallel")
         if method is None:
             exchanged = self.best is not self.roles[0]
             own = methods.advised(self.methods, tied=self.tied, exchanged=exchanged)
@@ -532,7 +547,7 @@ class Advice(Document):
 
     def content(self) -> dict[str, Any]:
         origins = ("run", "readings", "next", "logs", "accelerated", "interval", "friction_bounds")
-        inputs = ("moduli", "matrices", "vectors")
+        inputs = ("moduli", "waves", "parallel", "matrices", "vectors")
         names = ("neumann_body", "theta", "tied", "assumes", "quote", "methods", "method", "roles", *origins, *inputs)
         found = {name: to_plain(getattr(self, name)) for name in names}
         known = self.spectrum
@@ -544,14 +559,17 @@ class Advice(Document):
             "next": "no run was given",
             "interval": "no logs were given",
             "moduli": "no moduli were given",
+            "waves": "neither heat nor a fluid was given",
             "assumes": "no run was given",
             "friction_bounds": "no run with friction was given",
             "matrices": "no matrices were given",
             "vectors": "no vectors were given",
-            "method": self.why_no_theta or "no method arrives in the steps that are simulated",
+            "method": ("parallel coupling" if self.parallel else "")
+            or self.why_no_theta
+            or "no method arrives in the steps that are simulated",
             "spectrum": self.why_no_theta or "only bounds of it are known",
             "theta": self.why_no_theta,
-            "quote": self.why_no_theta,
+            "quote": self.why_no_theta or "no stiffness was given",
         }
         reason = {name: why for name, why in missing.items() if found[name] is None}
         return {**found, "outside_theorem": list(self.outside), "reason": reason}
