@@ -16,10 +16,9 @@ import verification as vf
 from fem1d2d import plane_strain, rectangle, stiffness
 from ndtheory import HypothesisError
 from ndtheory.calibration import loss
-from ndtheory.continuum import continuum_constants, cut_off, friction_threshold, statement
+from ndtheory.continuum import continuum_constants, friction_threshold, statement
 from ndtheory.intervals import Interval
-from ndtheory.moduli import Moduli
-from verification.certificate import calibrating
+from verification.certificate import calibrating, continuum
 from verification.certificate.continuum import bounded, two_rectangles
 
 KAPPA = F(9, 5)
@@ -242,12 +241,11 @@ def test_the_cut_off_costs_every_lift_of_a_mesh_less_than_is_proved(cutting):
 def test_a_weight_that_grows_by_a_twentieth_is_no_longer_proved(tracing, cutting, which):
     proof = {"tau": tracing, "rho": cutting}[which]
     weights = getattr(proof, which)
-    assert max(weights) > 0
-    for i, weight in enumerate(weights):
-        if weight:
-            grown = (*weights[:i], weight * F(21, 20), *weights[i + 1 :])
-            with pytest.raises(HypothesisError, match="calibration"):
-                replace(proof, **{which: grown})
+    positive = [i for i, weight in enumerate(weights) if weight > 0]
+    for i in (positive[0], positive[len(positive) // 3], positive[-1]):
+        grown = (*weights[:i], weights[i] * F(21, 20), *weights[i + 1 :])
+        with pytest.raises(HypothesisError, match="calibration"):
+            replace(proof, **{which: grown})
 
 
 @given(st.data())
@@ -288,13 +286,13 @@ def test_section_6_contracts_in_the_continuum_at_the_friction_and_the_theta_of_t
     constants, closed = bounded(section6), continuum_constants(section6)
     says = statement(constants, friction="0.2", theta="0.6")
     assert (says.verdict, says.factor.level) == ("contraction", "guaranteed")
-    assert says.factor.hi < 0.8103
-    assert says.theta_max_proved.lo > 0.706
-    assert friction_threshold(constants).lo > 0.2615
+    assert says.factor.hi < 0.7917
+    assert says.theta_max_proved.lo > 0.723
+    assert friction_threshold(constants).lo > 0.267
     assert statement(closed, friction="0.2", theta="0.6").verdict == "no conclusion"
     for ours, theirs in zip(constants.K, closed.K, strict=True):
         assert ours < theirs
-    assert constants.cut_off < closed.cut_off / 3
+    assert constants.cut_off < closed.cut_off / 4
     assert constants.rho > F(18, 35)  # of half-planes, proved from below
 
 
@@ -309,16 +307,6 @@ def test_a_solver_that_fails_leaves_the_closed_forms(section6, monkeypatch):
         x = float("nan")
 
     monkeypatch.setattr(calibrating.clarabel, "DefaultSolver", Failed)
+    for name in ("for_traces", "for_cut_off"):
+        monkeypatch.setattr(continuum, name, getattr(calibrating, name).__wrapped__)  # not what the cache holds
     assert bounded(section6) == continuum_constants(section6)
-
-
-def test_the_mirror_image_of_a_body_has_the_same_bound():
-    one, other = calibrating.for_traces(F(2), F(0), F(3, 2), KAPPA), calibrating.for_traces(F(2), F(1, 2), F(2), KAPPA)
-    assert float(one.trace(F(0), F(3, 2))) == pytest.approx(float(other.trace(F(1, 2), F(2))), rel=1e-3)
-
-
-def test_a_nearly_incompressible_body_still_has_a_better_cut_off_than_the_linear_one(section6):
-    """kappa = 1.01: q is 200 times as expensive along x."""
-    hard = replace(section6.neumann, body=Moduli(young=70000, poisson=F(199, 400)))
-    model, proof = replace(section6, neumann=hard), calibrating.for_cut_off(*NEUMANN, F(101, 100))
-    assert 1 < cut_off(model, [proof]) < cut_off(model) * F(3, 5)

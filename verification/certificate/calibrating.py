@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from fractions import Fraction
+from functools import lru_cache
 from itertools import pairwise
 
 import clarabel
@@ -21,12 +22,12 @@ from ndtheory.errors import HypothesisError
 from verification.threads import one_thread
 
 #: Lines of the grid between the clamped side and Gamma_c: finer towards Gamma_c, where the fields turn fastest.
-DEPTHS = tuple(Fraction(n, 100) for n in (0, 40, 75, 92, 100))
+DEPTHS = tuple(Fraction(n, 100) for n in (0, 30, 55, 75, 88, 95, 100))
 
 #: Length of the shortest cells beside ends of the body and of Gamma_c, in thicknesses, and how fast cells grow there.
-SHORTEST, GROWTH = 0.1, 1.5
+SHORTEST, GROWTH = 0.05, 1.5
 
-#: Room in each condition, tried in turn: the solver often stops at 1e-6.
+#: Room in each condition, tried one after the other: the solver often stops at 1e-6.
 ROOMS = (1e-6, 1e-5, 1e-4)
 
 #: Binary digits after the point of a number of the field.
@@ -45,20 +46,22 @@ def lines(points: Sequence[Fraction]) -> list[Fraction]:
     Examples
     --------
     >>> [round(float(x), 2) for x in lines([Fraction(0), Fraction(1)])]
-    [0.0, 0.06, 0.15, 0.29, 0.5, 0.71, 0.85, 0.94, 1.0]
+    [0.0, 0.04, 0.09, 0.18, 0.31, 0.5, 0.69, 0.82, 0.91, 0.96, 1.0]
     """
     found = [points[0]]
     for lo, hi in pairwise(points):
-        half, step, ends = float(hi - lo) / 2, SHORTEST, [0.0]
+        half, ends = float(hi - lo) / 2, [0.0]
+        step = max(SHORTEST, half / 2**10)  # what rounding leaves apart
         while ends[-1] < half * (1 - 1e-9):  # rounding must not add a cell
             ends.append(ends[-1] + step)
             step *= GROWTH
-        shares = [Fraction(round(end / ends[-1] * 2**11), 2**12) for end in ends]
+        shares = [Fraction(round(end / ends[-1] * 2**15), 2**16) for end in ends]
         found += [lo + (hi - lo) * share for share in shares[1:]]
         found += [hi - (hi - lo) * share for share in shares[-2::-1]]
     return found
 
 
+@lru_cache(maxsize=32)
 def for_traces(length: Fraction, lo: Fraction, hi: Fraction, kappa: Fraction) -> Calibration | None:
     """A calibration with a large tau on Gamma_c, the part from lo to hi; lengths in thicknesses.
 
@@ -69,6 +72,7 @@ def for_traces(length: Fraction, lo: Fraction, hi: Fraction, kappa: Fraction) ->
     return _first(x, kappa, lambda program: program.tracing(columns))
 
 
+@lru_cache(maxsize=32)
 def for_cut_off(length: Fraction, lo: Fraction, hi: Fraction, kappa: Fraction) -> Calibration | None:
     """A calibration with a large reach of both parts beside Gamma_c, 0 < lo < hi < length; None as above."""
     x = lines([Fraction(0), lo, hi, length])
