@@ -10,7 +10,7 @@ because ``2 M w : e(w) = M_ijk d_i (w_j w_k)``.  So bounds of R in the body and 
 Here ``M = N/y`` with N bilinear on each cell of a grid.  By Bernstein's coefficients, finitely many conditions on the
 values of N at the nodes, all of them in rational numbers, prove (``docs/continuum.md``)
 
-    a(w) >= sum over the columns of  tau int w_T^2 over its part of y = 1  +  rho int q(w) over the column,
+    a(w) >= sum over the columns of  tau int w_T^2 over its part of y = 1  +  beta int q(w) over the column,
     q(w) = (kappa+1)/(kappa-1) w_x^2 + w_y^2 ,
 
 for every w that vanishes at y = 0.  q is what a cut-off along x costs: ``(lambda + 2 G) w_x^2 + G w_y^2``.
@@ -45,7 +45,7 @@ class Calibration:
         The lines of the grid, in thicknesses: x from 0 to the length of the body, y from 0 at the clamped side to 1.
     nodes : tuple of tuple of Cubic
         N at (x[i], y[j]) is ``nodes[i][j]``.
-    tau, rho : tuple of Fraction
+    tau, beta : tuple of Fraction
         The weights of each column of cells, >= 0.
 
     Examples
@@ -55,7 +55,7 @@ class Calibration:
     >>> zero, tenth = Fraction(0), Fraction(1, 10)
     >>> left, right = (-tenth, tenth, -tenth, 5 * tenth), (tenth, tenth, tenth, 5 * tenth)
     >>> grid = {"x": (zero, Fraction(4)), "y": (zero, Fraction(1)), "nodes": ((left, left), (right, right))}
-    >>> proof = Calibration(kappa=Fraction(9, 5), **grid, tau=(Fraction(1, 20),), rho=(zero,))
+    >>> proof = Calibration(kappa=Fraction(9, 5), **grid, tau=(Fraction(1, 20),), beta=(zero,))
     >>> proof.trace(zero, Fraction(4))
     Fraction(1, 20)
     """
@@ -65,14 +65,17 @@ class Calibration:
     y: tuple[Fraction, ...]
     nodes: tuple[tuple[Cubic, ...], ...]
     tau: tuple[Fraction, ...]
-    rho: tuple[Fraction, ...]
+    beta: tuple[Fraction, ...]
 
     def __post_init__(self) -> None:
-        grown = all(a < b for line in (self.x, self.y) for a, b in pairwise(line))
+        grown = len(self.x) > 1 and all(a < b for line in (self.x, self.y) for a, b in pairwise(line))
         if not (grown and self.x[0] == self.y[0] == 0 and self.y[-1] == 1 and self.kappa > 1):
             raise HypothesisError("calibration", "a grid", "lines that grow, x from 0, y from 0 to 1, and kappa > 1")
+        shape = [len(line) for line in self.nodes] == [len(self.y)] * len(self.x)
+        if not shape or {tuple(map(type, cubic)) for line in self.nodes for cubic in line} != {(Fraction,) * 4}:
+            raise HypothesisError("calibration", "a field", "four rational numbers (Fraction) at each node of the grid")
         columns = len(self.x) - 1
-        if not len(self.tau) == len(self.rho) == columns or min(*self.tau, *self.rho) < 0:
+        if not len(self.tau) == len(self.beta) == columns or min(*self.tau, *self.beta) < 0:
             raise HypothesisError("calibration", "its weights", f"numbers >= 0 for {columns} columns of cells")
         if not all(_nonnegative(form) for form in self._forms()):
             raise HypothesisError("calibration", "a field", "one that proves the inequality")
@@ -91,7 +94,7 @@ class Calibration:
                     yield from self._inside(i, j, own)
 
     def _inside(self, i: int, j: int, own: int) -> list[Form]:
-        """The forms of Bernstein's coefficients of ``y^2 (R - rho q)`` on the side x[own] of a cell."""
+        """The forms of Bernstein's coefficients of ``y^2 (R - beta q)`` on the side x[own] of a cell."""
         low, high = self.y[j], self.y[j + 1]
         width = self.x[i + 1] - self.x[i]
         left, right, lower, upper = self.nodes[i], self.nodes[i + 1], self.nodes[own][j], self.nodes[own][j + 1]
@@ -100,7 +103,7 @@ class Calibration:
         below = [(right[j][p] - left[j][p]) / width + rising[p + 1] for p in range(3)]
         above = [(right[j + 1][p] - left[j + 1][p]) / width + rising[p + 1] for p in range(3)]
         middle = tuple((a + b) / 2 for a, b in zip(lower, upper, strict=True))
-        stretched = self.rho[i] * (self.kappa + 1) / (self.kappa - 1)
+        stretched = self.beta[i] * (self.kappa + 1) / (self.kappa - 1)
         found = []
         for value, square, divergence in (
             (lower, low * low, [low * d for d in below]),
@@ -113,7 +116,7 @@ class Calibration:
                 (
                     xx - self._energy(of_x, of_x) - square * stretched,
                     xy - self._energy(of_x, of_y),
-                    yy - self._energy(of_y, of_y) - square * self.rho[i],
+                    yy - self._energy(of_y, of_y) - square * self.beta[i],
                 )
             )
         return found
@@ -128,16 +131,16 @@ class Calibration:
         return min(tau for tau, (a, b) in zip(self.tau, pairwise(self.x), strict=True) if a < hi and b > lo)
 
     def reach(self, lo: Fraction, hi: Fraction) -> Interval:
-        """``int sqrt(rho) dx`` over the columns between two numbers, at least; see :func:`loss`."""
-        columns = zip(self.rho, pairwise(self.x), strict=True)
-        parts = [(b - a) * Interval.of(rho).sqrt() for rho, (a, b) in columns if lo <= a and b <= hi]
+        """``int sqrt(beta) dx`` over the columns between two numbers, at least; see :func:`loss`."""
+        columns = zip(self.beta, pairwise(self.x), strict=True)
+        parts = [(b - a) * Interval.of(beta).sqrt() for beta, (a, b) in columns if lo <= a and b <= hi]
         return sum(parts, Interval.of(0))
 
 
 def loss(reach: Interval) -> Fraction:
     """An upper bound of ``1/sinh^2(s)`` for the lower end s > 0 of an interval: eps of the cut-off tanh.
 
-    Let ``s(x)`` be the integral of sqrt(rho) from a free side and s its value at Gamma_c.  For lifts v
+    Let ``s(x)`` be the integral of sqrt(beta) from a free side and s its value at Gamma_c.  For lifts v
 
         a(chi v) <= (1 + 1/sinh^2 s) a(v),   chi = tanh(s(x))/tanh(s) beside Gamma_c, and 1 on Gamma_c.
 

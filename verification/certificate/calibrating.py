@@ -36,7 +36,7 @@ DIGITS = 32
 #: A linear form in the unknowns: coefficients by index.
 Terms = Mapping[int, float]
 
-#: A field at the nodes, and the weights tau and rho of the columns.
+#: A field at the nodes, and the weights tau and beta of the columns.
 Proposal = tuple[tuple[tuple[Cubic, ...], ...], tuple[Fraction, ...], tuple[Fraction, ...]]
 
 
@@ -83,9 +83,9 @@ def for_cut_off(length: Fraction, lo: Fraction, hi: Fraction, kappa: Fraction) -
 def _first(x: list[Fraction], kappa: Fraction, found: Callable[[_Program], Proposal]) -> Calibration | None:
     """The calibration with the least room that passes the check."""
     for room in ROOMS:
-        nodes, tau, rho = found(_Program(x, float(kappa), room))
+        nodes, tau, beta = found(_Program(x, float(kappa), room))
         try:
-            return Calibration(kappa=kappa, x=tuple(x), y=DEPTHS, nodes=nodes, tau=tau, rho=rho)
+            return Calibration(kappa=kappa, x=tuple(x), y=DEPTHS, nodes=nodes, tau=tau, beta=beta)
         except HypothesisError:
             continue
     return None
@@ -125,7 +125,7 @@ class _Program:
                 self.row({at: scale * v for at, v in matrix[r][c].items()}, constant[c] if r == c else 0.0)
         self.cones.append(clarabel.PSDTriangleConeT(len(constant)))
 
-    def field(self, tau: Mapping[int, int], rho: Mapping[int, int]) -> None:
+    def field(self, tau: Mapping[int, int], beta: Mapping[int, int]) -> None:
         """All conditions of a calibration, with weights of columns by their unknowns."""
         last, top, tight = len(self.x) - 1, len(self.y) - 1, (-self.room, -self.room)
         for j in range(top + 1):
@@ -139,9 +139,9 @@ class _Program:
         for i in range(last):
             for j in range(top):
                 for own in (i, i + 1):
-                    self.cell(i, j, own, rho.get(i))
+                    self.cell(i, j, own, beta.get(i))
 
-    def cell(self, i: int, j: int, own: int, rho: int | None) -> None:
+    def cell(self, i: int, j: int, own: int, beta: int | None) -> None:
         """The conditions of Bernstein's coefficients on one side of a cell."""
         low, high, width = self.y[j], self.y[j + 1], self.x[i + 1] - self.x[i]
         for share, square, parts in (
@@ -162,8 +162,8 @@ class _Program:
                         (self.node(own, j, p + 1), rise),
                     ):
                         terms[at] = terms.get(at, 0.0) + more
-                if rho is not None and p != 1:
-                    terms[rho] = -square * (self.stretched if p == 0 else 1.0)
+                if beta is not None and p != 1:
+                    terms[beta] = -square * (self.stretched if p == 0 else 1.0)
                 forms.append(terms)
             xx, xy, yy = forms
             stresses = [[_sum(self.root[:, c], value[s : s + 3]) for c in range(3)] for s in (0, 1)]
@@ -179,21 +179,21 @@ class _Program:
 
     def reaching(self, sides: Sequence[Iterable[int]]) -> Proposal:
         """The field with the largest lesser reach of two sides."""
-        rho = {i: self.new() for side in sides for i in side}
-        root = {i: self.new() for i in rho}
+        beta = {i: self.new() for side in sides for i in side}
+        root = {i: self.new() for i in beta}
         least = self.new()
-        self.field({}, rho)
-        for i in rho:  # root^2 <= rho, as |(rho - 1, 2 root)| <= rho + 1
-            self.row({rho[i]: 1.0}, 1.0)
-            self.row({rho[i]: 1.0}, -1.0)
+        self.field({}, beta)
+        for i in beta:  # root^2 <= beta, as |(beta - 1, 2 root)| <= beta + 1
+            self.row({beta[i]: 1.0}, 1.0)
+            self.row({beta[i]: 1.0}, -1.0)
             self.row({root[i]: 2.0}, 0.0)
             self.cones.append(clarabel.SecondOrderConeT(3))
         for side in sides:
             self.row({root[i]: self.x[i + 1] - self.x[i] for i in side} | {least: -1.0}, 0.0)
         self.cones.append(clarabel.NonnegativeConeT(len(sides)))
-        return self.solved(least, {}, rho)
+        return self.solved(least, {}, beta)
 
-    def solved(self, goal: int, tau: Mapping[int, int], rho: Mapping[int, int]) -> Proposal:
+    def solved(self, goal: int, tau: Mapping[int, int], beta: Mapping[int, int]) -> Proposal:
         """The solution at which one unknown is largest, in rational numbers; zeros where the solver failed."""
         rows, columns, values = zip(*self.entries, strict=True)
         matrix = sparse.csc_matrix((values, (rows, columns)), (len(self.right), self.unknowns))
@@ -214,7 +214,7 @@ class _Program:
         deep, cells = len(self.y), range(len(self.x) - 1)
         nodes = tuple(tuple(cubics[i * deep : (i + 1) * deep]) for i in range(len(self.x)))
         weights = [
-            tuple(max(exact[at[i]], Fraction(0)) if i in at else Fraction(0) for i in cells) for at in (tau, rho)
+            tuple(max(exact[at[i]], Fraction(0)) if i in at else Fraction(0) for i in cells) for at in (tau, beta)
         ]
         return nodes, weights[0], weights[1]
 
