@@ -22,7 +22,7 @@ FLOORS: dict[str, dict[str, str]] = {
     "theory": {
         "ndtheory.symbolic": "__init__ checks dimension engine further mechanics quotient section5 symbols",
         "ndtheory": (
-            "__init__ bounds constants continuum energy_norms errors intervals moduli "
+            "__init__ bounds calibration constants continuum energy_norms errors intervals moduli "
             "number scalar segments statements strip texts wedges"
         ),
     },
@@ -59,7 +59,7 @@ FLOORS: dict[str, dict[str, str]] = {
             "__init__ bound conditions interior_point lipschitz losses model "
             "multipliers neighbours pattern_search region table trace_forms"
         ),
-        "verification.certificate": "__init__ check claims continuum contraction",
+        "verification.certificate": "__init__ calibrating check claims continuum contraction",
     },
     "answers": {
         "verification": "comparison verdicts",
@@ -101,12 +101,12 @@ FLOORS: dict[str, dict[str, str]] = {
 #: Lines of each package at most, those of packages inside it apart: whoever needs more says here how many.
 BUDGET = {
     "fem1d2d": 3841,
-    "ndtheory": 5680,
+    "ndtheory": 5865,
     "verification": 1240,
     "verification.advice": 6035,
     "verification.algorithm": 2260,
     "verification.bounds": 3300,
-    "verification.certificate": 1100,
+    "verification.certificate": 1315,
     "verification.cli": 2427,
     "verification.constants": 1311,
     "verification.contact": 940,

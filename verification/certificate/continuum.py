@@ -28,6 +28,7 @@ from ndtheory.continuum import (
 )
 from ndtheory.intervals import Interval
 from ndtheory.moduli import Moduli, half_planes
+from verification.certificate.calibrating import for_cut_off, for_traces
 from verification.constants.cells import OfCells, rho_of_cells
 from verification.constants.measuring import of_energy
 from verification.document import Document
@@ -184,7 +185,7 @@ class ContinuumCertificate(Document):
             "kind": "continuum",
             "constants": {
                 **{name: at_most(value) for name, value in uppers.items()},
-                "segments": [str(value) for value in c.segments],
+                "K": [str(value) for value in c.K],
                 "rho_least": at_least(half_planes(*moduli).high),
                 "rho_ends": at_least(c.rho_ends),
             },
@@ -251,6 +252,18 @@ def two_rectangles(problem: Problem) -> TwoRectangles:
     )
 
 
+def bounded(model: TwoRectangles) -> ContinuumConstants:
+    """The constants of two rectangles, with calibrations from a solver where these are better than closed forms."""
+    proofs = []
+    for body in (model.contact, model.neumann):
+        at, kappa = body.in_thicknesses(model.interval), body.body.kappa
+        found = [for_traces(*at, kappa)]
+        if body is model.neumann and min(model.margins) > 0:
+            found.append(for_cut_off(*at, kappa))
+        proofs.append([proof for proof in found if proof is not None])
+    return continuum_constants(model, contact=proofs[0], neumann=proofs[1])
+
+
 def certify_continuum(problem: Problem, progress: Progress = silent) -> ContinuumCertificate:
     """Prove contraction for two rectangles in the continuum.
 
@@ -272,7 +285,7 @@ def certify_continuum(problem: Problem, progress: Progress = silent) -> Continuu
     """
     model, theta = two_rectangles(problem), problem.iteration.theta
     progress("bounding the constants of the continuum", None)
-    constants = continuum_constants(model)
+    constants = bounded(model)
     energy = statement(constants, friction=problem.contact.friction, theta=None if theta == "auto" else theta)
     mesh = file_mesh(problem, progress)
     return ContinuumCertificate(problem=problem, constants=constants, energy=energy, mesh=mesh)

@@ -63,7 +63,7 @@ def certify(
       ndtheory certify my.toml --theta 0.5 -o certificate.json
       ndtheory certify --check certificate.json
       ndtheory certify --check certificate.json my.toml
-      ndtheory certify --continuum my.toml --theta 0.4
+      ndtheory certify --continuum my.toml --theta 0.6
     """
     context = click.get_current_context()
     for first, used, second, also in (

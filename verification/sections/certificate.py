@@ -112,11 +112,11 @@ def continuum(found: ContinuumCertificate) -> Sections:
 
 def _used(found: ContinuumCertificate, constants: Mapping[str, Any], of_stress: str, of_trace: str) -> Section:
     """The bounds behind the proof."""
-    first, second = (f"K = {figures(float(value))}" for value in found.constants.segments)
+    first, second = (f"K = {figures(float(value))}" for value in found.constants.K)
     used = (
         ("C_s", "C_s", _at_most, of_stress, "smoothed pressure, Neumann body; strip"),
-        ("C_t1", "C_t1", _at_most, of_trace, f"trace, contact body; segments, {first}"),
-        ("C_t2", "C_t2", _at_most, of_trace, f"trace, Neumann body; segments, {second}"),
+        ("C_t1", "C_t1", _at_most, of_trace, f"trace, contact body; {first}"),
+        ("C_t2", "C_t2", _at_most, of_trace, f"trace, Neumann body; {second}"),
         ("R", "strips", _at_most, "", "ratio of stiffness of two strips"),
         ("eps", "cut_off", _at_most, "", "loss by the cut-off beside Gamma_c"),
         ("rho", "rho", _at_most, "", "(1 + eps) R"),
