@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -72,6 +73,10 @@ class Pieces:
         values = getattr(self, name).copy()
         values[node] = value
         return replace(self, **{name: values})
+
+    def divided(self, name: str, node: int) -> tuple[Pieces, Pieces]:
+        """Those with 1 and those with -1 at a node: together all of them."""
+        return self.where(name, node, 1), self.where(name, node, -1)
 
 
 class Conditions:
@@ -198,6 +203,20 @@ class Conditions:
         mixed[pieces.slip > 0] = (2 * pieces.signs * self.weight)[pieces.slip > 0] * slides
         a[pieces.slip > 0] -= self.weight[pieces.slip > 0] ** 2 * slides
         return lam, tau, a, b, -1.0 * pieces.signs * tau, jump, force, shear, mixed
+
+    def apart(self, multipliers: Weights, pieces: Pieces) -> tuple[Weights, Mapping[str, Floats]]:
+        """The multipliers of the inequalities, node by node, and of equations that hold on pieces, by what is fixed.
+
+        They are what :meth:`by_node` adds up: of the squares of v_N or p_N, of ``(p_T - eps w k zeta) v_T``, and of the
+        squares of one of its factors.
+        """
+        if len(multipliers) <= 4:
+            return multipliers, {}
+        lam, tau, a, b, _, jump, force, shear, _ = multipliers
+        free = pieces.signs == 0
+        sticks = np.where(pieces.slip < 0, self.weight**2 * b, 0.0)
+        rest = {"normal": jump + force, "signs": np.where(free, 0.0, tau), "slip": shear + sticks}
+        return (lam, *(np.where(free, values, 0.0) for values in (tau, a, b))), rest
 
     def parts(self, y: Floats, pieces: Pieces) -> list[Floats]:
         """The multipliers of :meth:`rows` kind by kind, each from left to right."""
