@@ -105,7 +105,7 @@ BUDGET = {
     "verification": 1240,
     "verification.advice": 5750,
     "verification.algorithm": 2260,
-    "verification.bounds": 3350,
+    "verification.bounds": 3395,
     "verification.certificate": 1140,
     "verification.cli": 2410,
     "verification.constants": 1310,

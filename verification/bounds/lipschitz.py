@@ -253,7 +253,7 @@ def _division(forms: QuadraticForms, leaf: Leaf, lower: float) -> tuple[str, int
     signed = shear - pieces.signs[:, None] * forms.reach
     both = np.concatenate(
         [
-            np.where(pieces.normal == 0, lam * sizes(force, jump), -1.0),
+            np.where((pieces.normal == 0) & (not forms.lifts), lam * sizes(force, jump), -1.0),
             np.where(~free & (pieces.slip == 0), tau * sizes(signed, slip), -1.0),
         ]
     )
@@ -308,7 +308,7 @@ class Mirror:
     def of(cls, pair: ContactPair, forms: Conditions) -> Mirror | None:
         """The reflection; None where the pair is not its own mirror image to rounding, and without friction."""
         interface, contact, neumann = pair.interface, pair.contact, pair.neumann
-        if interface.kernel is None or len(forms.families) == 1:
+        if interface.kernel is None or len(forms.families) == 1 or forms.lifts:
             return None
         same = _alike(contact.grid.weights, contact.grid.weights[::-1]) and _alike(
             interface.kernel, interface.kernel[::-1, ::-1]

@@ -137,6 +137,8 @@ class Confirmation:
             )
         if pair.outside:
             raise NoCertificate(f"outside the theorem: {pair.outside[0]}")
+        if pair.contact.lifts:
+            raise NoCertificate("the contact body can be lifted rigidly: its form in traces is not definite")
         try:
             claims = Claims(describe(pair.problem, pair), progress)
         except NotExact as error:
