@@ -17,6 +17,7 @@ from strategies import AT_NIGHT
 import verification as vf
 from verification.bounds import lipschitz
 from verification.certificate import check
+from verification.certificate.claims import NoCertificate
 from verification.certificate.contraction import check_again
 from verification.ledger.cases import problem as random_problem
 
@@ -276,6 +277,15 @@ def test_a_tree_that_is_none_is_refused_with_what_is_needed(edit, said, divided)
     found = check_again(document)
     assert not found.accepted
     assert said in found.why
+
+
+def test_dividing_the_pieces_proves_contraction_where_one_set_does_not():
+    generator = np.random.default_rng(27)
+    drawn = random_problem(generator, matching=False)
+    theta = str(relaxation_factor(generator, vf.measure(drawn).rho_max.value))
+    with pytest.raises(NoCertificate, match=r"bound of the factor is 1\.22\d, the largest factor found 0\.592.*exact"):
+        vf.certify(drawn, theta=theta)
+    assert vf.certify(drawn, theta=theta, exact=True).factor < Fraction(6, 10)
 
 
 def test_only_the_semidefinite_bound_divides():

@@ -255,6 +255,8 @@ def _proposed(
             lower, spare = found.lower, 1 - found.upper.value
             multipliers = _of_tree(found.tree, forms, pair.neumann.upward)
             why = f"its bound of the factor is {found.upper.value:.4g}"
+            if not exact and lower < 1:
+                why += f", the largest factor found {lower:.4g}; dividing the pieces (exact) may prove more"
         else:
             result = bound.evaluate(Subject.of(pair, measured), theta)
             one_minus = result.one_minus_factor
