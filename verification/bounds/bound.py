@@ -246,6 +246,8 @@ class Bound(ABC):
     certifies : bool
         True if :func:`verification.certify` takes its factor: it is proved by multipliers that :meth:`enclose` returns,
         or by the multipliers of the theorem in energy norms.
+    divides : bool
+        True if :meth:`enclose` can divide the pieces of T into sets, with multipliers for each.
     """
 
     name: ClassVar[str]
@@ -260,6 +262,7 @@ class Bound(ABC):
     of_unit: ClassVar[bool] = False
     apart: ClassVar[bool] = False
     certifies: ClassVar[bool] = False
+    divides: ClassVar[bool] = False
 
     @abstractmethod
     def evaluate(self, subject: Subject, theta: Numeric | None = None, *, progress: Progress = silent) -> BoundResult:
@@ -288,8 +291,12 @@ class Bound(ABC):
         """Remarks to print beside figures of this bound (beside a region ``result`` is None), in a unit of stress."""
         return ()
 
-    def enclose(self, pair: ContactPair, forms: QuadraticForms, theta: float) -> Enclosure | None:
+    def enclose(
+        self, pair: ContactPair, forms: QuadraticForms, theta: float, *, exact: bool, progress: Progress
+    ) -> Enclosure | None:
         """Enclose the factor by multipliers of this bound's own, for a certificate; None where it has none.
+
+        With ``exact``, which is asked only of a bound that ``divides``, as closely as it can.
 
         Raises
         ------

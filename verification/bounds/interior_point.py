@@ -78,12 +78,14 @@ class Program:
     ----------
     fixed, free : array, shape (d, d)
         Symmetric.
-    left, right : array, shape (K, d)
+    left, right : array, shape (K, d), or (R, d) with ``tie``
         Their rows are a_i and b_i.
     cones : int array, shape (n, 3)
         Positions of (tau, a, b) among the multipliers.
     most : array, shape (K,)
         Largest multipliers; inf without a limit.
+    tie : array, shape (R, K), or None
+        1 where a row has a multiplier, if several rows share one; None: each has its own.
     s, y : float, array of shape (K,)
         A start of a search: the matrix is positive definite there, and every inequality strict.
     highest : float or None
@@ -100,6 +102,7 @@ class Program:
     y: Floats
     highest: float | None = None
     stop: Stop = USUAL
+    tie: Floats | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -134,28 +137,36 @@ class Form:
 
     def __init__(self, program: Program, left: Floats, right: Floats) -> None:
         self.fixed, self.free, self.left, self.right = program.fixed[None], program.free, left, right
-        self.rows = len(program.fixed)
+        self.rows, self.tie = len(program.fixed), program.tie
 
     def linear(self, y: Floats) -> Floats:
         """The part of the slack that is linear in (s, y), shape (1, d, d)."""
-        half = self.left.T @ (y[1:, None] * self.right)
+        by_row = y[1:] if self.tie is None else self.tie @ y[1:]
+        half = self.left.T @ (by_row[:, None] * self.right)
         return np.asarray((y[0] * self.free - (half + half.T) / 2)[None])
 
     def adjoint(self, matrix: Floats, total: Floats) -> None:
         """Add the inner products of the coefficients of (s, y) with a symmetric matrix."""
         total[0] += np.vdot(self.free, matrix[0])
-        total[1:] -= np.einsum("ij,ij->i", self.left @ matrix[0], self.right)
+        total[1:] -= self._tied(np.einsum("ij,ij->i", self.left @ matrix[0], self.right))
+
+    def _tied(self, by_row: Floats) -> Floats:
+        """The sum over the rows of each multiplier, for numbers by row or by two rows."""
+        if self.tie is None:
+            return by_row
+        total = self.tie.T @ by_row
+        return total if total.ndim == 1 else np.asarray(total @ self.tie)
 
     def schur(self, X: Floats, inverse: Floats, M: Floats) -> None:
         """Add ``tr(G_i X G_j Z^-1)`` for the coefficients G_i of (s, y)."""
         a, b, X, inverse, free = self.left, self.right, X[0], inverse[0], self.free
         X_b, Z_b = X @ b.T, inverse @ b.T
         X_ab, Z_ab = a @ X_b, a @ Z_b
-        M[1:, 1:] += ((b @ X_b) * (a @ inverse @ a.T) + (a @ X @ a.T) * (b @ Z_b)) / 4
-        M[1:, 1:] += (X_ab.T * Z_ab + X_ab * Z_ab.T) / 4
+        M[1:, 1:] += self._tied(((b @ X_b) * (a @ inverse @ a.T) + (a @ X @ a.T) * (b @ Z_b)) / 4)
+        M[1:, 1:] += self._tied((X_ab.T * Z_ab + X_ab * Z_ab.T) / 4)
         product = X @ free @ inverse
         M[0, 0] += np.vdot(product.T, free)
-        mixed = np.einsum("ij,ij->i", a @ (product + product.T), b) / 2
+        mixed = self._tied(np.einsum("ij,ij->i", a @ (product + product.T), b) / 2)
         M[0, 1:] -= mixed
         M[1:, 0] -= mixed
 
@@ -201,7 +212,12 @@ def solve(program: Program) -> Optimum:
     lengths = [np.linalg.norm(rows, axis=1) for rows in (program.left, program.right)]
     # A node that no force reaches has rows without a length: its multiplier weighs nothing.
     lengths = [np.where(length > 0, length, 1.0) for length in lengths]
-    size = lengths[0] * lengths[1]
+    if program.tie is not None:  # rows with one multiplier have one scale
+        of = program.tie.argmax(axis=1)
+        most = [np.max(program.tie * length[:, None], axis=0) for length in lengths]
+        lengths, size = [values[of] for values in most], most[0] * most[1]
+    else:
+        size = lengths[0] * lengths[1]
     form = Form(program, *(r / n[:, None] for r, n in zip((program.left, program.right), lengths, strict=True)))
     blocks: list[Form | Cones] = [form, *_cones(program, size)]
     cost = np.zeros(1 + len(size))

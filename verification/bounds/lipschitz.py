@@ -51,6 +51,10 @@ PROGRAMS = 50
 #: And never more than this: at most 8 s on a hundred random problems of up to 9 nodes.
 MOST = 160
 
+#: Programs for a certificate that divides the pieces, at most: a minute or so up to 25 contact nodes.  Section 6 needs
+#: 204 to reach CLOSE at theta = 0.7; some random problems of 8 nodes would need more than ten minutes.
+CERTIFIED = 2000
+
 #: Signs are fixed where that may save this share of what the bound is too large by.
 WORTH = 0.3
 
@@ -78,12 +82,15 @@ class Enclosure:
         Proved by multipliers for every set of pieces, and by one program for all pieces together.
     lower, piece : float, Piece
         The largest ``|J|`` found, and its piece.
+    tree : Leaf or Division
+        The sets of pieces into which all were divided, with the proof of each.
     programs, why_apart : int, str
         Number of programs that were solved; why the gap is larger than was asked for.
     """
 
     upper: Certified
     whole: Certified
+    tree: Leaf | Division
     lower: float
     piece: Piece
     programs: int
@@ -97,11 +104,21 @@ class Enclosure:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Leaf:
-    """Some pieces: the bound proved for them, and the program's answer."""
+    """Some pieces: the bound proved for them, the pieces that its multipliers are for, and the program's answer."""
 
     pieces: Pieces
     upper: Certified
+    proved_on: Pieces
     proposal: Optimum | None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Division:
+    """Some pieces in two: those with 1 at a node and those with -1, in the field of :class:`Pieces` of some name."""
+
+    name: str
+    node: int
+    cases: tuple[Leaf | Division, ...]
 
 
 def budget(n: int) -> int:
@@ -136,26 +153,29 @@ def enclose(
     """
     with one_thread():
         upper, proposal = forms.on(forms.everywhere, theta)
-        root = Leaf(pieces=forms.everywhere, upper=upper, proposal=proposal)
+        root = Leaf(pieces=forms.everywhere, upper=upper, proved_on=forms.everywhere, proposal=proposal)
         search = factor_search(pair, theta)
         patterns = [*search.extremes(), *_read_off(forms, root, search.sign)]
         best = max((search.climb(search.found(*pattern)) for pattern in patterns), key=lambda found: found.value)
         order, solved, mirror = count(), 1, Mirror.of(pair, forms)
         leaves, bounded, why = [(-upper.value, next(order), root)], {root.pieces.key: root}, ""
+        divisions: dict[bytes, tuple[str, int]] = {}
         while True:
             worst, lower = leaves[0][2], best.piece.factor(theta)
             if worst.upper.value <= (1 + gap) * lower:
                 break
-            parts = _divided(forms, worst, lower)
-            if not parts:
+            division = _division(forms, worst, lower)
+            if division is None:
                 why = "the worst set of pieces cannot be divided"
                 break
+            parts = worst.pieces.divided(*division)
             if programs is not None and solved + len(parts) > programs:
                 why = f"{solved} programs were solved"
                 break
             stop = Stop(accuracy=gap / 100, enough=((1 + gap) * lower) ** 2 * (1 - SAME_BOUND))
             progress(f"semidefinite bound: {worst.upper.value / lower - 1:.2%} above a factor that occurs", None)
             heapq.heappop(leaves)
+            divisions[worst.pieces.key] = division
             for part in parts:
                 leaf = None if mirror is None else _mirrored(forms, mirror, bounded, part, theta)
                 if leaf is None:
@@ -168,7 +188,22 @@ def enclose(
                 heapq.heappush(leaves, (-leaf.upper.value, next(order), leaf))
         best = search.climb(best, side_by_side=True)
         lower = max(lower, best.piece.factor(theta))
-    return Enclosure(upper=worst.upper, whole=root.upper, lower=lower, piece=best.piece, programs=solved, why_apart=why)
+
+    def tree(pieces: Pieces) -> Leaf | Division:
+        if pieces.key not in divisions:
+            return replace(bounded[pieces.key], proposal=None)
+        name, node = divisions[pieces.key]
+        return Division(name=name, node=node, cases=tuple(map(tree, pieces.divided(name, node))))
+
+    return Enclosure(
+        upper=worst.upper,
+        whole=root.upper,
+        tree=tree(root.pieces),
+        lower=lower,
+        piece=best.piece,
+        programs=solved,
+        why_apart=why,
+    )
 
 
 def _solved(forms: QuadraticForms, parent: Leaf, part: Pieces, theta: float, stop: Stop) -> Leaf:
@@ -180,7 +215,9 @@ def _solved(forms: QuadraticForms, parent: Leaf, part: Pieces, theta: float, sto
         upper, proposal = forms.on(part, theta, stop=stop, parent=start)
     except LMIError:
         return replace(parent, pieces=part, proposal=None)
-    return Leaf(pieces=part, upper=min(upper, parent.upper, key=lambda certified: certified.value), proposal=proposal)
+    if parent.upper.value < upper.value:
+        return replace(parent, pieces=part, proposal=proposal)
+    return Leaf(pieces=part, upper=upper, proved_on=part, proposal=proposal)
 
 
 def _mirrored(
@@ -193,17 +230,18 @@ def _mirrored(
     upper = forms.proved_by(mirror.multipliers(other.upper.multipliers), theta)
     if upper is None or upper.value > other.upper.value * (1 + SAME_BOUND):
         return None
-    return Leaf(pieces=part, upper=upper, proposal=mirror.proposal(other.proposal, forms, other.pieces))
+    proposal = mirror.proposal(other.proposal, forms, other.pieces)
+    return Leaf(pieces=part, upper=upper, proved_on=mirror.pieces(other.proved_on), proposal=proposal)
 
 
-def _divided(forms: QuadraticForms, leaf: Leaf, lower: float) -> list[Pieces]:
-    """A set of pieces in two, at the node where that promises most in the moments of the worst pairs.
+def _division(forms: QuadraticForms, leaf: Leaf, lower: float) -> tuple[str, int] | None:
+    """The division of a set of pieces, at the node where it promises most in the moments of the worst pairs.
 
     First by signs, whose relaxation costs the difference of ``tau |zeta| |v_T|`` and ``tau |zeta v_T|``; where that is
     little of the excess of the bound, by the state of a node.
     """
     if leaf.proposal is None or len(forms.families) == 1:
-        return []
+        return None
     pieces, moments, (lam, tau, *_) = leaf.pieces, leaf.proposal.moments, leaf.upper.multipliers
     (force, jump), (shear, slip), (zeta, _), (slide, _), *_ = forms.families
     of = lambda a, b: np.einsum("ij,ij->i", a @ moments, b)
@@ -211,23 +249,20 @@ def _divided(forms: QuadraticForms, leaf: Leaf, lower: float) -> list[Pieces]:
     free = pieces.signs == 0
     lost = np.where(free & (pieces.slip == 0), tau * (sizes(zeta, slide) - np.abs(of(zeta, slide))), 0.0)
     if lost.sum() >= WORTH * (leaf.upper.value**2 - lower**2):
-        node = int(np.argmax(lost))
-        return [pieces.where("signs", node, sign) for sign in (1, -1)]
+        return "signs", int(np.argmax(lost))
     signed = shear - pieces.signs[:, None] * forms.reach
     both = np.concatenate(
         [
-            np.where(pieces.normal == 0, lam * sizes(force, jump), -1.0),
+            np.where((pieces.normal == 0) & (not forms.lifts), lam * sizes(force, jump), -1.0),
             np.where(~free & (pieces.slip == 0), tau * sizes(signed, slip), -1.0),
         ]
     )
     node = int(np.argmax(both))
     if both[node] >= 0:
-        name, node = ("normal", node) if node < len(lam) else ("slip", node - len(lam))
-        return [pieces.where(name, node, value) for value in (1, -1)]
+        return ("normal", node) if node < len(lam) else ("slip", node - len(lam))
     if free.any():
-        node = int(np.argmax(np.where(free, lost, -1.0)))
-        return [pieces.where("signs", node, sign) for sign in (1, -1)]
-    return []
+        return "signs", int(np.argmax(np.where(free, lost, -1.0)))
+    return None
 
 
 def _read_off(forms: QuadraticForms, leaf: Leaf, sign: Signs) -> Iterator[tuple[NDArray[np.bool_], Signs]]:
@@ -273,7 +308,7 @@ class Mirror:
     def of(cls, pair: ContactPair, forms: Conditions) -> Mirror | None:
         """The reflection; None where the pair is not its own mirror image to rounding, and without friction."""
         interface, contact, neumann = pair.interface, pair.contact, pair.neumann
-        if interface.kernel is None or len(forms.families) == 1:
+        if interface.kernel is None or len(forms.families) == 1 or forms.lifts:
             return None
         same = _alike(contact.grid.weights, contact.grid.weights[::-1]) and _alike(
             interface.kernel, interface.kernel[::-1, ::-1]

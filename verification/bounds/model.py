@@ -21,10 +21,12 @@ def solve(program: Program, *, solver: str = cp.CLARABEL, **options: Any) -> Opt
         The solver gave up.
     """
     s, size = cp.Variable(), np.linalg.norm(program.left, axis=1) * np.linalg.norm(program.right, axis=1)
+    size = size if program.tie is None else size @ program.tie
     size = np.where(size > 0, size, 1.0)  # the solver sees numbers near one in any unit
     y = cp.Variable(len(size), nonneg=True)
     products = program.left[:, :, None] * program.right[:, None, :]
-    products = (products + products.transpose(0, 2, 1)).reshape(len(size), -1).T / (2 * size)
+    products = (products + products.transpose(0, 2, 1)).reshape(len(products), -1).T
+    products = (products if program.tie is None else products @ program.tie) / (2 * size)
     rows = len(program.fixed)
     flat: Any = program.fixed.ravel() + s * program.free.ravel() - products @ y
     definite = cp.reshape(flat, (rows, rows), order="C") >> 0

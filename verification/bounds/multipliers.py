@@ -299,7 +299,7 @@ class QuadraticForms(Conditions):
             least = self._least_value(fixed - self.conditions(self.by_node(y, pieces)))
             if least is not None:
                 s = least + max(1.0, abs(least))
-                return Program(fixed=fixed, free=self.free, left=left, right=right, cones=cones, most=most, s=s, y=y)
+                return self.program(fixed, left, right, cones, most, s, y)
         raise LMIError("the multipliers to start from are lost in rounding")
 
 

@@ -136,7 +136,7 @@ class SemidefiniteBound(Bound):
     colour, dashes, fill = "#8A5A00", "-.", "#FFF3B0"
     calculated = False
     attained = True  # without friction
-    apart = certifies = True
+    apart = certifies = divides = True
 
     def evaluate(self, subject: Subject, theta: Numeric | None = None, *, progress: Progress = silent) -> BoundResult:
         if theta is None or subject.pair is None or subject.measured is None:
@@ -182,10 +182,14 @@ class SemidefiniteBound(Bound):
             said.append(f"{self.name} is not proved: {found.not_proved}")
         return tuple(said)
 
-    def enclose(self, pair: ContactPair, forms: QuadraticForms, theta: float) -> Enclosure:
-        from verification.bounds.lipschitz import enclose
+    def enclose(
+        self, pair: ContactPair, forms: QuadraticForms, theta: float, *, exact: bool, progress: Progress
+    ) -> Enclosure:
+        from verification.bounds.lipschitz import CERTIFIED, CLOSE, budget, enclose
 
-        return enclose(pair, forms, theta, gap=float("inf"), programs=1)
+        programs = min(CERTIFIED, 20 * budget(pair.contact.grid.n)) if exact else 1
+        gap = CLOSE if exact else float("inf")
+        return enclose(pair, forms, theta, gap=gap, programs=programs, progress=progress)
 
     def region(self, subject: Subject, *, progress: Progress = silent) -> Region:
         from verification.bounds.interior_point import LMIError

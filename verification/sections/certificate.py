@@ -14,7 +14,7 @@ from verification.certificate import check
 from verification.certificate.continuum import ContinuumCertificate
 from verification.certificate.contraction import Certificate, Checked
 from verification.problem.specs import PLACES
-from verification.sections.numbers import figures, near_one
+from verification.sections.numbers import figures, rounded
 from verification.sections.parts import (
     Cell,
     Facts,
@@ -37,16 +37,23 @@ def sections(found: Certificate, target: Path | None = None) -> Sections:
     """The sections; ``target`` is where the certificate is written."""
     discrete, claim = found.discrete, []
     nodes = sum(len(discrete[name]["points"]) for name in ("body1", "body2"))
-    factor, theta = near_one(float(found.factor)), float(found.theta)
+    spare, theta = float(1 - found.factor), float(found.theta)
+    few = lambda digits: rounded(float(found.factor), digits, up=True)
+    factor = f"1 - {rounded(spare, 2, up=False)}" if 0 < spare < 1e-3 else few(4)
     claim.append(
         f"On these meshes a step with theta = {theta:g} multiplies the difference of two forces, in the norm (5.21), by"
         f" {factor} at most, for all loads and gaps: it contracts.  Level: verified."
     )
     if found.lower is not None:
-        claim.append(f"No proof can give less than {found.lower:.6g}, a factor that two forces attain (in doubles).")
+        gap = float(found.factor) / found.lower - 1
+        claim.append(
+            f"Proved factor {few(6)}, attained {found.lower:.6g} by two forces (in doubles): {max(gap, 0.0):.2%} apart."
+            "  No proof can give less than the attained factor."
+        )
+    sets = "" if found.sets == 1 else f"The pieces of T are divided into {found.sets} sets, each with its own form.  "
     proof = (
-        f"Multipliers proposed by {named(found.edition).words}; with them the quadratic form of the proof is positive"
-        f" definite for the rational data of the problem, in balls of {found.claim['bits']} bits."
+        f"{sets}Multipliers proposed by {named(found.edition).words}; with them the quadratic form of the proof is"
+        f" positive definite for the rational data of the problem, in balls of {found.claim['bits']} bits."
     )
     then = following("certify", "-o", "certificate.json", iteration=True)
     about = f"{found.problem.title}: {nodes} nodes, {len(discrete['weights'])} contact nodes"
