@@ -38,7 +38,7 @@ OPENS = re.compile(r"(?:What|Whether|Who|Whose|Where|When|Which|How|Of|That)\b")
 MOST = {
     "code that knows or speaks": 5,
     "a chain of that of": 11,
-    "alone at the end": 6,
+    "alone at the end": 5,
     "of its own": 8,
     "stands for is": 1,
     "dear": 1,

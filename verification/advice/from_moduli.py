@@ -92,7 +92,7 @@ def advise_moduli(
     Raises
     ------
     HypothesisError
-        Numbers that are no such data, data of two kinds, or a mirror image that cannot fit with these corners.
+        Numbers out of their range, data of two kinds, or a mirror image that cannot fit with these corners.
 
     Examples
     --------

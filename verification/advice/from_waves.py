@@ -25,7 +25,7 @@ WAVES = 40
 #: Reason for everything that needs an upper bound of rho for a fluid at a wall.
 ONE_WAVE = "one wave bounds rho from below"
 
-#: Reason why the fluid is no Neumann body.
+#: Reason against the fluid as the Neumann body.
 SHORT_WAVES = "short waves have less and less added mass, so that rho would grow without end as meshes are refined"
 
 
