@@ -153,9 +153,9 @@ def blocks(*, offset: str = "0", cells=((16, 4), (8, 4)), **changes) -> vf.Probl
     return vf.Problem.from_dict(data)
 
 
-def halved_by_hand(problem: vf.Problem) -> tuple[bool, bool]:
+def halved_by_hand(problem: vf.Problem, halvings: int = 1) -> tuple[bool, bool]:
     """Whether the halved surfaces are one grid near its middle node, and mirror each other there: from the meshes."""
-    pair = vf.build(problem.refined(1))
+    pair = vf.build(problem.refined(halvings))
     slopes = []
     for body in (pair.body1.mesh_body, pair.body2.mesh_body):
         points, cells = body.mesh.points, body.mesh.cells
