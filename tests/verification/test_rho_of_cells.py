@@ -123,7 +123,7 @@ def test_rho_on_fine_meshes_is_not_above_that_of_their_cells_and_tends_to_it_whe
 
 
 @pytest.mark.skipif(not AT_NIGHT, reason="ten seconds and more for each family: at night")
-@pytest.mark.parametrize("family", FAMILIES[:8], ids=str)
+@pytest.mark.parametrize("family", FAMILIES[:4], ids=str)
 def test_the_enclosure_of_a_family_is_as_narrow_as_1e_9_and_lies_at_the_value_in_doubles(family):
     """Long waves have about six digits in doubles."""
     young = (F(family.young), F(1))
