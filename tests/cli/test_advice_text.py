@@ -20,6 +20,7 @@ FORMS = {
     "other roles": ["--set", "iteration.neumann_body=2"],
     "without friction": ["--set", "contact.friction=0"],
     "much friction": ["--set", "contact.friction=3"],
+    "tall cells": ["--set", "body2.cells=[24, 3]", "--set", "contact.friction=0"],
     "local law": ["--set", 'contact.law="local"', "--set", "contact.friction=0.2"],
     "sliding top": ["--set", 'body2.prescribed={ top = ["free", -0.01] }'],
 }

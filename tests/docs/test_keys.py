@@ -258,7 +258,7 @@ def documents(folder: Path, small: vf.Problem) -> list[dict[str, Any]]:
         *(vf.measure(problem) for problem in (bars, matrices)),
         vf.measure(small, refine=1),
         vf.measure(matrices, verified=True),
-        *(vf.advise(problem) for problem in (small, bars)),
+        *(vf.advise(problem) for problem in (small, small.changed(cells=((10, 2), (6, 1))), bars)),
         vf.advise_matrices(np.diag([2.0, 3.0]), np.eye(2)),
         *(vf.advise_vectors(X, TX) for X, TX in vectors()),
         vf.advise_matrices(np.diag([2.0, 3.0]), np.eye(2), transfer=np.eye(1)),

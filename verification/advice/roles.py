@@ -16,6 +16,7 @@ from ndtheory import EnergyBounds, EnergyConstants, Number, evaluate_energy
 from ndtheory.energy_norms import predicted_rate, predicted_theta, tied_factor, tied_rate, tied_theta
 from verification.advice import BodyNumber, methods
 from verification.advice.accelerated import Accelerated
+from verification.advice.cells import Suggested, no_cells, suggest
 from verification.advice.methods import Advised, MethodRow
 from verification.advice.readings import LARGEST_TO_PASTE, NextRun, RunReading, SeenRun, rounded_down
 from verification.advice.runs_with_friction import FrictionBounds
@@ -52,7 +53,7 @@ TIED = ("rho_min", "rho_tied", "theta_tied", "rate_tied")
 
 
 #: Attributes of a role that its document leaves out.
-UNSEEN = ("energy", "spectrum")
+UNSEEN = ("energy", "spectrum", "cells")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,6 +87,8 @@ class Role:
         is rho_normal.  None where they are not known, and ``reason["rho_min"]`` says why.
     spectrum : Spectrum or None
         Eigenvalues for predictions of methods; None where rho is only bounded from below.
+    cells : Suggested or None
+        rho of the file's cells in these roles, and cells with a smaller one; None without a problem file.
     """
 
     neumann_body: BodyNumber | None
@@ -103,6 +106,7 @@ class Role:
     rho_min: Number | None = None
     rho_tied: Number | None = None
     spectrum: Spectrum | None = None
+    cells: Suggested | None = None
 
     @property
     def ends(self) -> tuple[Fraction, Fraction] | None:
@@ -177,18 +181,21 @@ class Role:
             values["reason"].setdefault("theta_auto", "no problem file")
         if self.ends is None:
             values["reason"] |= dict.fromkeys(TIED, self.why_not_tied)
-        return values
+        entries, why = ({}, {}) if self.cells is None else self.cells.entries()
+        return values | entries | {"reason": values["reason"] | why}
 
     @classmethod
-    def refused(cls, neumann_body: BodyNumber, error: ValueError) -> Role:
-        """A role that is refused: no value but the reason."""
+    def refused(cls, neumann_body: BodyNumber, error: ValueError, *, of_file: bool = False) -> Role:
+        """A role, of a problem file or of other input, that is refused: no value but the reason."""
         why = error.needed if isinstance(error, ProblemError) else str(error)
         given = ("neumann_body", "reason", "singular", *UNSEEN)
         values = [field.name for field in fields(cls) if field.name not in given]
+        why = f"these roles are refused: {why}"
         return cls(
             neumann_body=neumann_body,
             **dict.fromkeys(values),
-            reason=dict.fromkeys(values, f"these roles are refused: {why}"),
+            reason=dict.fromkeys(values, why),
+            cells=no_cells(why) if of_file else None,
             singular=isinstance(error, SingularRole),
         )
 
@@ -619,7 +626,7 @@ def advise(problem: Problem | ContactPair | Path | str, *, tied: bool = False, p
         assert not isinstance(problem, ContactPair)  # made with roles that are not singular
         given = problem if isinstance(problem, Problem) else load(problem)
         pair = build(given.swapped())  # refused itself where contact holds that body, too
-        roles = (Role.refused(given.iteration.neumann_body, error), _role(pair, tied))
+        roles = (Role.refused(given.iteration.neumann_body, error, of_file=True), _role(pair, tied))
     return Advice.between(
         roles,
         tied=tied,
@@ -635,7 +642,7 @@ def _exchanged(pair: ContactPair, tied: bool) -> Role:
     try:
         return _role(pair.swapped(), tied)
     except ValueError as error:
-        return Role.refused(pair.contact_body, error)
+        return Role.refused(pair.contact_body, error, of_file=pair.problem is not None)
 
 
 def _role(pair: ContactPair, tied: bool) -> Role:
@@ -649,9 +656,10 @@ def _role(pair: ContactPair, tied: bool) -> Role:
     else:
         nothing = f"outside the theorem: {pair.outside[0]}" if pair.outside else ""
         auto = automatic(energy, pair.outside, pair.settings.tolerance)
+    rho, normal = measured.rho_max if energy is None else energy.rho, not (pair.friction or tied)
     return role_of(
         pair.neumann_body,
-        measured.rho_max if energy is None else energy.rho,
+        rho,
         bounds=energy,
         nothing=nothing,
         threshold=None if nothing else measured.friction_threshold,
@@ -660,7 +668,10 @@ def _role(pair: ContactPair, tied: bool) -> Role:
         energy=None if nothing else measured.energy_constants(),
         rho_min=measured.rho_min,
         rho_tied=measured.rho_max,
-        spectrum=spectrum_of(pair, normal=not (pair.friction or tied)),
+        spectrum=spectrum_of(pair, normal=normal),
+        cells=None
+        if pair.problem is None
+        else suggest(pair.problem, rho if normal else measured.rho_max, normal=normal),
     )
 
 
@@ -680,7 +691,11 @@ def _roles_without_matrices(bodies: TwoBodies, tied: bool, progress: Progress) -
         reason["rho_min"] = more
     settings = {"nothing": nothing, "no_threshold": nothing or needed, "reason": reason}
     largest = lambda body, normal: pencils.largest(neumann_body=body, normal=normal).value
-    roles = [plain_role(body, Fraction(largest(body, not rubs)), **settings) for body in order]
+    roles = []
+    for body, own in zip(order, (problem, problem.swapped()), strict=True):
+        rho = Number.of_float(largest(body, not rubs))
+        cells = suggest(own, rho, normal=not rubs)
+        roles.append(plain_role(body, Fraction(rho.value), cells=cells, **settings))
     if rubs:
         return with_both_ends(roles)
     return with_both_ends(roles, [Number.of_float(largest(body, False)) for body in order]) if tied else tuple(roles)

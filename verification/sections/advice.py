@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from verification.advice.accelerated import Accelerated
+from verification.advice.cells import Suggested
 from verification.advice.methods import NAMES as METHOD_NAMES
 from verification.advice.readings import LARGEST_TO_PASTE, NextRun, RunReading, SeenRun
 from verification.advice.readings import assumed as assumption
@@ -162,8 +163,18 @@ def _which_theta(found: Advice) -> Section:
     ]
     if ends:
         said.append(f"if tied: 2/(2+rho_min+rho), {'; '.join(ends)}")
+    said += [_cells(role, role.cells) for role in possible if role.cells is not None and role.cells.found is not None]
     lines = table(("Neumann", "rho", "theta is", "theta", "per step", "to 1e-9", "note"), rows)
     return section("theta", "WHICH THETA?", lines, *said)
+
+
+def _cells(role: Role, seen: Suggested) -> str:
+    """Cells that make rho smaller."""
+    assert seen.cells is not None
+    assert seen.found is not None
+    lower, upper = ("[{}, {}]".format(*counts) for counts in seen.cells)
+    least, own = (figures(seen.value(of)) for of in (seen.found, seen.of_file))
+    return f"{NAMES[role.neumann_body]}: with cells {lower}, {upper} fine meshes have rho >= {least}, not >= {own}"
 
 
 def _which_method(found: Advice, names: Mapping[int | None, str] = NAMES) -> Iterator[Section]:
