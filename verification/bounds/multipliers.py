@@ -188,21 +188,30 @@ class QuadraticForms(Conditions):
         if energy is not None:
             highest = energy[1] * (1 - 1e-9)
             proposals += [(math.nan, inside(times((1 + more) / highest, self.known(highest)))) for more in MORE]
-        candidates = []
+        best = None
         for proposed, multipliers in proposals:
-            if (checked := self._check_theta(still - self.conditions(multipliers), moving, multipliers)) is not None:
-                safe, theta = (min(value, 1.0) for value in checked)
-                candidates.append(Certified(value=safe, evaluated=theta, proposed=proposed, multipliers=multipliers))
-        return max(candidates, key=lambda certified: certified.value, default=None)
+            least = 0.0 if best is None else best.value
+            checked = self._check_theta(still - self.conditions(multipliers), moving, multipliers, least)
+            if checked is not None and (best is None or checked[0] > best.value):
+                safe, theta = checked
+                best = Certified(value=safe, evaluated=theta, proposed=proposed, multipliers=multipliers)
+        return best
 
-    def _check_theta(self, rest: Floats, moving: Floats, multipliers: Weights) -> tuple[float, float] | None:
-        """The largest theta with ``rest - theta moving`` definite, on the safe side of rounding, and as evaluated."""
+    def _check_theta(
+        self, rest: Floats, moving: Floats, multipliers: Weights, least: float
+    ) -> tuple[float, float] | None:
+        """The largest theta <= 1 with ``rest - theta moving`` definite, on the safe side of rounding, and as evaluated.
+
+        None where it is not above ``least``, or not proved.
+        """
         if not eigvalsh(rest)[0] > 0:
             return None
         theta = 1 / float(eigvalsh(moving, rest)[-1])
+        if min(theta, 1.0) <= least:
+            return None
         definite = self.traces.with_multipliers(multipliers, cross=2.0, step=(1.0, -1.0))
         share = _least_share(lambda share: definite(2.0, theta * (1 - share)))
-        return None if share is None else (theta * (1 - share), theta)
+        return None if share is None else (min(theta * (1 - share), 1.0), min(theta, 1.0))
 
     def _least(
         self,
