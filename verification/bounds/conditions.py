@@ -93,7 +93,7 @@ class Conditions:
             raise ValueError(f"{pair.contact.grid.n} contact nodes: worked out up to {LARGEST}")
         if pair.held:
             raise ValueError("a contact node is held: the semidefinite bound needs every one free")
-        k = float(pair.friction) if friction is None else friction
+        self.k = k = float(pair.friction) if friction is None else friction
         measured = measured.with_friction(k)
         constants = measured.energy_constants()
         if constants is None:

@@ -93,6 +93,8 @@ class Program:
         A start of a search: the matrix is positive definite there, and every inequality strict.
     highest : float or None
         Where given, the largest s up to it is wanted instead of the least.
+    blocks : tuple of slices
+        The blocks of the matrix on its diagonal, the whole by default: what is beside them is 0, or does not count.
     """
 
     fixed: Floats
@@ -105,6 +107,7 @@ class Program:
     y: Floats
     highest: float | None = None
     stop: Stop = USUAL
+    blocks: tuple[slice, ...] = (slice(None),)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -132,21 +135,22 @@ class Optimum:
 
 
 class Form:
-    """The matrix of the program as one block: ``fixed + s free - sum_i y_i (a_i b_i' + b_i a_i')/2``.
+    """A block of the matrix of the program: ``fixed + s free - sum_i y_i (a_i b_i' + b_i a_i')/2``.
 
     The rows are scaled to length one, and the multipliers with them.
     """
 
-    def __init__(self, program: Program, left: Floats, right: Floats) -> None:
-        self.fixed, self.free, self.left, self.right = program.fixed[None], program.free, left, right
-        self.rows = len(program.fixed)
+    def __init__(self, program: Program, block: slice, left: Floats, right: Floats) -> None:
+        self.block, self.fixed, self.free = block, program.fixed[block, block][None], program.free[block, block]
+        self.left, self.right = left, right = left[:, block], right[:, block]
+        self.rows = len(self.free)
         both = np.vstack([left, right])
         place: dict[bytes, int] = {}  # zeta and the slip are in several products
         at = [place.setdefault(row.tobytes(), len(place)) for row in np.round(both, ALIKE) + 0.0]  # no -0
         self._distinct = both[np.unique(at, return_index=True)[1]]
         self._a, self._b = np.split(np.array(at), 2)
-        self._weighed = np.flatnonzero(program.free.any(axis=0))
-        self._weights = program.free[np.ix_(self._weighed, self._weighed)]
+        self._weighed = np.flatnonzero(self.free.any(axis=0))
+        self._weights = self.free[np.ix_(self._weighed, self._weighed)]
 
     def linear(self, y: Floats) -> Floats:
         """The part of the slack that is linear in (s, y), shape (1, d, d)."""
@@ -247,8 +251,9 @@ def solve(program: Program) -> Optimum:
     # A node that no force reaches has rows without a length: its multiplier weighs nothing.
     lengths = [np.where(length > 0, length, 1.0) for length in lengths]
     size = lengths[0] * lengths[1]
-    form = Form(program, *(r / n[:, None] for r, n in zip((program.left, program.right), lengths, strict=True)))
-    blocks: list[Form | Cones] = [form, *_cones(program, size)]
+    rows = [r / n[:, None] for r, n in zip((program.left, program.right), lengths, strict=True)]
+    forms = [Form(program, block, *rows) for block in program.blocks]
+    blocks: list[Form | Cones] = [*forms, *_cones(program, size)]
     cost = np.zeros(1 + len(size))
     cost[0] = -1.0 if maximise else 1.0
     order = sum(block.rows for block in blocks)
@@ -260,7 +265,8 @@ def solve(program: Program) -> Optimum:
     except np.linalg.LinAlgError:
         raise LMIError("no multipliers to start from: what the known ones leave is lost in rounding") from None
     inverse = [block.inverse(root) for block, root in zip(blocks, roots, strict=True)]
-    mu = abs(1 / np.vdot(program.free, inverse[0]))  # on the central path, except for the equation of s
+    weight = sum(np.vdot(form.free, z[0]) for form, z in zip(forms, inverse, strict=False))
+    mu = abs(1 / weight)  # on the central path, except for the equation of s
     X = [mu * z for z in inverse]
 
     steps, converged, early = 0, False, None
@@ -298,7 +304,10 @@ def solve(program: Program) -> Optimum:
         y, Z, X = trial, Z_trial, _moved(X, along_X, dX)
         inverse = [block.inverse(root) for block, root in zip(blocks, roots, strict=True)]
         steps += 1
-    return Optimum(s=float(y[0]), y=y[1:] / size, moments=X[0][0], steps=steps, converged=bool(converged), early=early)
+    moments = np.zeros_like(program.fixed)
+    for form, x in zip(forms, X, strict=False):
+        moments[form.block, form.block] = x[0]
+    return Optimum(s=float(y[0]), y=y[1:] / size, moments=moments, steps=steps, converged=bool(converged), early=early)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
