@@ -105,7 +105,7 @@ BUDGET = {
     "verification": 1240,
     "verification.advice": 5750,
     "verification.algorithm": 2260,
-    "verification.bounds": 3465,
+    "verification.bounds": 3445,
     "verification.certificate": 1100,
     "verification.cli": 2405,
     "verification.constants": 1310,

@@ -221,9 +221,13 @@ class Conditions:
         """
         s, y = early
         weights, squares = self._of_rows(y, parent)
-        left, right, cones, y, most = self.rows(weights, pieces)
-        rest = np.concatenate(squares)
-        y[len(y) - len(rest) :] = rest
+        program, rest = self.program(fixed, pieces, weights, s), np.concatenate(squares)
+        program.y[len(program.y) - len(rest) :] = rest
+        return program
+
+    def program(self, fixed: Floats, pieces: Pieces, multipliers: Weights, s: float = 0.0) -> Program:
+        """The program of the least s that starts from some multipliers."""
+        left, right, cones, y, most = self.rows(multipliers, pieces)
         return Program(fixed=fixed, free=self.free, left=left, right=right, cones=cones, most=most, s=s, y=y)
 
     def known(self, theta: float) -> Weights:

@@ -94,9 +94,7 @@ class Mirror:
         half = np.arange((n + 1) // 2)
         twice = np.where(2 * half == n - 1, 1.0, 2.0)  # a node in the middle is its own image
         kept = (n * np.arange(4)[:, None] + half).ravel()
-        place = np.zeros(4 * n, dtype=np.intp)
-        place[kept] = np.arange(len(kept))
-        place = np.where(np.arange(4 * n) % n < len(half), place, place.reshape(4, n)[:, ::-1].ravel())
+        place = (len(half) * np.arange(4)[:, None] + np.minimum(np.arange(n), np.arange(n)[::-1])).ravel()
         found = solve(
             replace(
                 program,

@@ -47,14 +47,19 @@ LEAST = 1e-2
 #: So many of them are tried one by one, before the rest is bisected.
 ENOUGH = 3
 
-#: How far above the least value that its multipliers prove a program of a friction nearby starts, relatively.
+#: How much larger than where another friction leaves it the value of a program begins, relatively.
 NEARBY = 0.1
+
+Start = tuple[float, Weights]
 
 #: Shares of a solver's proposal, the rest known multipliers, that are tried one after the other.
 DRAWN = (1.0, 0.9999, 0.999, 0.99, 0.9)
 
 #: By how much a is larger and b smaller than known, from one start to the next, until one is inside.
 STRETCHES = (1.0, 2.0, 4.0, 16.0, 256.0)
+
+#: The share of the largest tau that a and b allow with which a program starts.
+INSIDE = 0.95
 
 #: How much larger known multipliers are tried.
 MORE = (0.0, 1e-12, 1e-9, 1e-6)
@@ -64,18 +69,6 @@ TIGHT = 1e-10
 
 #: A value that rounding leaves undecided is moved to the safe side by these shares, to at most 0.9 %.
 SHARES = tuple(1e-11 * 2.0**k for k in range(31))
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Start:
-    """A point far from the end of a program's central path: where the program of a friction nearby may start.
-
-    ``s`` is the value there, ``multipliers`` are lambda, tau, a, b at the friction ``k``.
-    """
-
-    k: float
-    s: float
-    multipliers: Weights
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -91,8 +84,8 @@ class Certified:
         lambda, tau, a, b by node; only lambda without friction.
     gave_up : str
         Why the solver proposed nothing; empty where it did.
-    early : Start, optional
-        A start for a friction nearby.
+    early : (float, tuple of arrays), optional
+        The value and lambda, tau, k a, k b far from the end of the central path: a start for a friction nearby.
     """
 
     value: float
@@ -187,35 +180,22 @@ class QuadraticForms(Conditions):
         holds = lambda weights: self.traces.with_multipliers(weights, cross=1.0)
         fixed, start = -self.cross, None
         if near is not None:
-            weights = self._from(near)
-            least = self._least_value(fixed - self.conditions(weights))
-            if least is not None:
-                start = self._at(fixed, weights, max(near.s, least + NEARBY * abs(least)))
+            start = self.program(fixed, self.everywhere, self._from(near), (1 + NEARBY) * near[0])
         found, proposal = self._least(fixed, self.towards_zero, 1.0, holds, self.everywhere, start=start)
         return replace(found, early=self._early(proposal))
 
     def _from(self, near: Start) -> Weights:
-        """The multipliers of a start, with ``4 a b > tau^2`` and so much friction that the form stays definite.
-
-        From a larger friction it does for sure; from a smaller one where they are nearly equal.
-        """
-        lam, tau, a, b = near.multipliers
-        ratio = near.k / self.k
-        if ratio < 1:
-            return lam, ratio * tau, ratio * a, ratio * b
-        return lam, tau, math.sqrt(ratio) * a, math.sqrt(ratio) * b
+        """The multipliers of a start at another friction; of a larger one they leave the form as definite as there."""
+        lam, tau, a, b = near[1]
+        a, b = a / self.k, b / self.k
+        return lam, np.minimum(tau, 2 * INSIDE * np.sqrt(a * b)), a, b
 
     def _early(self, proposal: Optimum | None) -> Start | None:
         """A start from a solver's answer for all pieces; None where it has none, and without friction."""
         if proposal is None or proposal.early is None or not self.k:
             return None
-        s, y = proposal.early
-        return Start(k=self.k, s=s, multipliers=tuple(self.parts(y, self.everywhere)[:4]))
-
-    def _at(self, fixed: Floats, multipliers: Weights, s: float) -> Program:
-        """The program of the least s for all pieces that starts from some multipliers."""
-        left, right, cones, y, most = self.rows(multipliers, self.everywhere)
-        return Program(fixed=fixed, free=self.free, left=left, right=right, cones=cones, most=most, s=s, y=y)
+        lam, tau, a, b = self.parts(proposal.early[1], self.everywhere)[:4]
+        return proposal.early[0], (lam, tau, self.k * a, self.k * b)
 
     @one_thread()
     def largest_theta(self, near: Start | None = None) -> Certified | None:
@@ -235,17 +215,20 @@ class QuadraticForms(Conditions):
         early = None
         try:
             if near is not None:
-                start: Program | None = self._at(still, self._from(near), near.s)
+                start: Program | None = self.program(still, self.everywhere, self._from(near), near[0])
             else:
                 below = self._program(-self.cross, self.towards_zero, 1.0, self.everywhere)
                 found = self._solved(replace(below, stop=Stop(enough=1.0)))
                 start = replace(below, s=0.0, y=2 * found.y) if found.s < 1 else None
             if start is not None:
                 found = self._solved(replace(start, fixed=still, free=-moving, highest=1.01))
+                if near is not None and not found.converged:
+                    return self.largest_theta()
                 proposals.append((found.s, self.by_node(found.y, self.everywhere)))
                 early = self._early(found)
         except LMIError:  # the known multipliers may still prove something
-            pass
+            if near is not None:
+                return self.largest_theta()
         energy = contraction_interval(*self.energy_bounds, 1e-12)
         if energy is not None:
             highest = energy[1] * (1 - 1e-9)
@@ -367,12 +350,11 @@ class QuadraticForms(Conditions):
         for stretch in STRETCHES if len(start) > 1 else STRETCHES[:1]:
             if len(start) > 1:  # the less b, the more is left to d_1
                 lam, tau, a, b = start
-                start = [lam, 0.95 * tau, stretch * a, b / stretch]
-            left, right, cones, y, most = self.rows(tuple(start), pieces)
-            least = self._least_value(fixed - self.conditions(self.by_node(y, pieces)))
+                start = [lam, INSIDE * tau, stretch * a, b / stretch]
+            program = self.program(fixed, pieces, tuple(start))
+            least = self._least_value(fixed - self.conditions(self.by_node(program.y, pieces)))
             if least is not None:
-                s = least + max(1.0, abs(least))
-                return Program(fixed=fixed, free=self.free, left=left, right=right, cones=cones, most=most, s=s, y=y)
+                return replace(program, s=least + max(1.0, abs(least)))
         raise LMIError("the multipliers to start from are lost in rounding")
 
 
