@@ -187,8 +187,7 @@ class Elimination:
         for i in range(TRIES):
             factors = self.factors(self._lifted(-side * self.shift(SHIFT * MORE**i)))
             if factors is not None:
-                found = self._decided(*factors[:2], side)
-                if found is not None:
+                if (found := self._decided(*factors[:2], side)) is not None:
                     return found
             elif side == 1:  # nor is it positive definite with more taken off
                 break

@@ -2,7 +2,7 @@
 
 Each multiplier weighs a product of two rows, so in the direction of Helmberg, Rendl, Vanderbei and Wolkowicz, Kojima,
 Shindoh and Hara, and Monteiro (HKM) the Schur complement is a sum of elementwise products of parts of two Gram
-matrices, those of all rows in X and in Z^-1::
+matrices, one in X and one in Z^-1, with all rows::
 
     tr(A_i X A_j Z^-1),   A_i = (a_i b_i' + b_i a_i')/2
 

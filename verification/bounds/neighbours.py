@@ -37,8 +37,8 @@ class Patterns:
 class Responses:
     """Answers of T to changes of force: to one on several pieces, or to several on one; a row each.
 
-    ``g``, shape (c, 2 n), are the changes of the force on the Neumann grid, ``d_1`` those of the trace of the contact
-    body, ``jump`` the changes of v and ``reaction`` those of the forces on the contact grid.
+    ``g``, shape (c, 2 n), are the changes of the force on the Neumann grid, ``d_1`` and ``reaction`` the changes of
+    traces and forces on the contact grid, ``jump`` the changes of v.
     """
 
     pair: ContactPair
