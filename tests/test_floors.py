@@ -56,7 +56,7 @@ FLOORS: dict[str, dict[str, str]] = {
     },
     "bounds, proofs": {
         "verification.bounds": (
-            "__init__ bound conditions interior_point lipschitz losses model "
+            "__init__ bound conditions interior_point lipschitz losses mirror model "
             "multipliers neighbours pattern_search region table trace_forms"
         ),
         "verification.certificate": "__init__ calibrating check claims continuum contraction",
@@ -100,12 +100,12 @@ FLOORS: dict[str, dict[str, str]] = {
 
 #: Lines of each package at most, those of packages inside it apart: whoever needs more says here how many.
 BUDGET = {
-    "fem1d2d": 3841,
+    "fem1d2d": 3845,
     "ndtheory": 5865,
     "verification": 1240,
     "verification.advice": 6185,
     "verification.algorithm": 2260,
-    "verification.bounds": 3405,
+    "verification.bounds": 3570,
     "verification.certificate": 1375,
     "verification.cli": 2435,
     "verification.constants": 1311,

@@ -96,7 +96,7 @@ class Conditions:
             raise ValueError(f"{pair.contact.grid.n} contact nodes: worked out up to {LARGEST}")
         if pair.held:
             raise ValueError("a contact node is held: the semidefinite bound needs every one free")
-        k = float(pair.friction) if friction is None else friction
+        self.k = k = float(pair.friction) if friction is None else friction
         measured = measured.with_friction(k)
         constants = measured.energy_constants()
         if constants is None:
@@ -255,15 +255,13 @@ class Conditions:
         """
         s, y = early
         weights, squares = self._of_rows(y, parent)
-        left, right, cones, y, most = self.rows(weights, pieces)
-        rest = np.concatenate(squares)
-        y[len(y) - len(rest) :] = rest
-        return self.program(fixed, left, right, cones, most, s, y)
+        program, rest = self.program(fixed, pieces, weights, s), np.concatenate(squares)
+        program.y[len(program.y) - len(rest) :] = rest
+        return program
 
-    def program(
-        self, fixed: Floats, left: Floats, right: Floats, cones: Cones, most: Floats, s: float, y: Floats
-    ) -> Program:
-        """The program of the least s with the :meth:`rows` of some pieces, and a start."""
+    def program(self, fixed: Floats, pieces: Pieces, multipliers: Weights, s: float = 0.0) -> Program:
+        """The program of the least s that starts from some multipliers."""
+        left, right, cones, y, most = self.rows(multipliers, pieces)
         free, tie = self.free, self.tie(left)
         return Program(fixed=fixed, free=free, left=left, right=right, cones=cones, most=most, s=s, y=y, tie=tie)
 

@@ -29,9 +29,10 @@ def solve(program: Program, *, solver: str = cp.CLARABEL, **options: Any) -> Opt
     products = (products if program.tie is None else products @ program.tie) / (2 * size)
     rows = len(program.fixed)
     flat: Any = program.fixed.ravel() + s * program.free.ravel() - products @ y
-    definite = cp.reshape(flat, (rows, rows), order="C") >> 0
+    whole = cp.reshape(flat, (rows, rows), order="C")
+    definite = [whole[block, block] >> 0 for block in program.blocks]
     limited = np.flatnonzero(np.isfinite(program.most))
-    constraints = [definite, y[limited] <= (program.most * size)[limited]]
+    constraints = [*definite, y[limited] <= (program.most * size)[limited]]
     for tau, a, b in program.cones:
         ratio = np.sqrt(size[a] * size[b]) / size[tau]
         constraints.append(cp.SOC(y[a] + y[b], cp.hstack([ratio * y[tau], y[a] - y[b]])))
@@ -47,10 +48,13 @@ def solve(program: Program, *, solver: str = cp.CLARABEL, **options: Any) -> Opt
             raise LMIError(f"{solver} failed") from None
     if s.value is None:
         raise LMIError(f"{solver} ended {problem.status}")
+    moments = np.zeros_like(program.fixed)
+    for block, constraint in zip(program.blocks, definite, strict=True):
+        moments[block, block] = constraint.dual_value
     return Optimum(
         s=float(s.value),
         y=np.maximum(np.asarray(y.value), 0.0) / size,
-        moments=np.asarray(definite.dual_value),
+        moments=moments,
         steps=int(problem.solver_stats.num_iters or 0),
         converged=problem.status == cp.OPTIMAL,
     )
