@@ -28,8 +28,8 @@ FLOORS: dict[str, dict[str, str]] = {
     },
     "elastic bodies": {
         "fem1d2d": (
-            "__init__ assembly condense element enclosed exact layers layers_proved loewner material mesh mesh_files "
-            "mesh_reader outline pencil proved supports trace"
+            "__init__ assembly condense element enclosed exact layers layers_proved line loewner material mesh "
+            "mesh_files mesh_reader outline pencil proved supports trace"
         )
     },
     "for all of verification": {
@@ -100,23 +100,23 @@ FLOORS: dict[str, dict[str, str]] = {
 
 #: Lines of each package at most, those of packages inside it apart: whoever needs more says here how many.
 BUDGET = {
-    "fem1d2d": 3810,
+    "fem1d2d": 4030,
     "ndtheory": 5600,
     "verification": 1240,
     "verification.advice": 5750,
     "verification.algorithm": 2260,
     "verification.bounds": 3280,
-    "verification.certificate": 1100,
+    "verification.certificate": 1115,
     "verification.cli": 2405,
-    "verification.constants": 1310,
-    "verification.contact": 940,
+    "verification.constants": 1320,
+    "verification.contact": 945,
     "verification.coupling": 420,
     "verification.exploration": 600,
     "verification.figures": 1520,
-    "verification.interface": 2725,
+    "verification.interface": 3120,
     "verification.ledger": 4320,
     "verification.output": 470,
-    "verification.problem": 1510,
+    "verification.problem": 1520,
     "verification.reproduce": 655,
     "verification.sections": 2210,
     "verification.sweeps": 2400,

@@ -50,6 +50,7 @@ def check(discrete, claim, eliminated=None):
     n, m, t = len(contact["surface"]), len(neumann["surface"]), len(contact["surface"]) if k else 0
     P = matrix(discrete["transfer"], n, m) if discrete["transfer"] else identity(n)
     demand(P.ncols() == m, "a transfer between contact nodes that differ")
+    from_frames, to_frames = frames(neumann), frames(contact)
     weights = [rational(w) for w in discrete["weights"]]
     demand(len(weights) == n and all(w > 0 for w in weights), "a positive weight for each contact node")
     lam, tau, a, b = (spread(claim["multipliers"][name], n) for name in ("lambda", "tau", "a", "b"))
@@ -58,7 +59,7 @@ def check(discrete, claim, eliminated=None):
 
     # rows: forms in (d, c).  Without friction p_T = 0, and c is only the normal trace
     still = lambda rows, columns: arb_mat(rows, columns)
-    across = stacked([[P, still(n, m)], [still(n, m), P]]) if k else stacked([[still(n, m), P]])
+    across = stacked([[turned(P, to, by) for by in from_frames] for to in (to_frames if k else to_frames[1:])])
     force = stacked([[still(t + n, 2 * m), S_c]])
     jump = -stacked([[across, identity(t + n)]])
     moved = across.transpose() * S_c  # P' p
@@ -104,6 +105,8 @@ def surface_stiffness(body, both):
                             value = first * g[p] * h[q] + second * (g[q] * h[p] + (dot if p == q else 0))
                             row = rows.setdefault((i, p), {})
                             row[j, q] = row.get((j, q), 0) + value / (2 * twice)
+    for node, (x, y) in zip(body["surface"], frames(body)[1], strict=True):
+        turn(rows, (node, 0), (node, 1), x, y)
     keep = [(node, p) for p in ((0, 1) if both else (1,)) for node in body["surface"]]
     demand(len(set(keep)) == len(keep) and not held & set(keep), "contact nodes that are free, each once")
     kept, done = set(keep), []
@@ -127,6 +130,32 @@ def surface_stiffness(body, both):
             lessen(rows, reached, reached, coupling.transpose() * solved)
             done = []
     return gathered(rows, keep, keep)
+
+
+def frames(body):
+    """Tangents and normals of the contact nodes; (1, 0) and (0, 1) where the body lists none."""
+    given = body.get("normals") or [["0", "1"]] * len(body["surface"])
+    normals = [tuple(rational(x) for x in normal) for normal in given]
+    demand(len(normals) == len(body["surface"]), "a normal for each contact node")
+    demand(all(len(n) == 2 and n[0] ** 2 + n[1] ** 2 == 1 for n in normals), "normals of length 1")
+    return [(y, -x) for x, y in normals], normals
+
+
+def turned(P, to, by):
+    """A transfer of nodal values as one of components: each entry times the product of both directions."""
+    cosine = [[arb(a * c + b * d) for c, d in by] for a, b in to]
+    return arb_mat([[x * c for x, c in zip(*lines, strict=True)] for lines in zip(P.tolist(), cosine, strict=True)])
+
+
+def turn(rows, first, second, x, y):
+    """The tangential and the normal component of a node in place of those along x and y; its normal is (x, y)."""
+    if (x == 0 and y == 1) or not {first, second} <= set(rows):
+        return
+    mixed = lambda a, b: (y * a - x * b, x * a + y * b)
+    for row in (rows[i] for i in {*rows[first], *rows[second]}):
+        row[first], row[second] = mixed(row.get(first, 0), row.get(second, 0))
+    pairs = {j: mixed(rows[first].get(j, 0), rows[second].get(j, 0)) for j in {*rows[first], *rows[second]}}
+    rows[first], rows[second] = ({j: both[p] for j, both in pairs.items()} for p in (0, 1))
 
 
 def lessen(rows, wanted, columns, less):

@@ -177,6 +177,8 @@ class ContactSpec:
     ----------
     interval : pair of Fraction or None
         Ends of Gamma_c along x; None: the overlap of the two surfaces.
+    surface : pair of str or None
+        Names of the sides of body 1 and of body 2 that meet, instead of an interval: a line of any shape.
     friction : Fraction
         k, constant along Gamma_c.
     law : str
@@ -192,6 +194,7 @@ class ContactSpec:
     law: str
     radius: Fraction | None
     gap: Fraction
+    surface: tuple[str, str] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
