@@ -4,10 +4,10 @@ import json
 
 import numpy as np
 import pytest
-from mesh_writer import write_gmsh22
+from mesh_writer import read_here, write_gmsh22
 
 import verification as vf
-from fem1d2d import element, plane_strain, rectangle
+from fem1d2d import element, mesh_files, plane_strain, rectangle
 from fem1d2d.assembly import unknowns
 from fem1d2d.exact import fractions
 from fem1d2d.mesh import Cells
@@ -16,6 +16,8 @@ from verification.certificate.contraction import check_again
 from verification.interface.assembly import discretise
 from verification.interface.exact_bodies import ExactBody, exact_normals
 from verification.interface.files import read_interface, write_interface
+from verification.ledger import weak_forms
+from verification.ledger.solutions import solutions
 from verification.problem import ProblemError
 
 #: Documents of one problem in two positions agree up to this: rounding, and what conditions make of it.
@@ -89,6 +91,12 @@ PROBLEMS = {
     "shaft, without friction": lambda path, **rest: shaft(path, friction=0, **rest),
     "shaft, local law": lambda path, **rest: shaft(path, law="local", **rest),
 }
+
+
+@pytest.fixture(autouse=True)
+def in_this_process(monkeypatch):
+    """No process for each mesh file."""
+    monkeypatch.setattr(mesh_files, "read_in_process", read_here)
 
 
 @pytest.mark.parametrize("make", PROBLEMS.values(), ids=PROBLEMS)
@@ -287,3 +295,14 @@ def test_what_does_not_fit_is_refused_in_one_line(tmp_path):
         with pytest.raises(ProblemError, match=message) as caught:
             vf.solve(problem.with_keys({key: value}))
         assert "\n" not in str(caught.value)
+
+
+def test_the_weak_forms_of_whole_fields_hold_along_lines_of_any_shape(monkeypatch, tmp_path):
+    """What the ledger says of the equations of both bodies, of lifts and of the inequalities of contact."""
+    drawn = {name: PROBLEMS[name](tmp_path) for name in ("ramp", "shaft", "bush as the contact body")}
+    run = {"iteration.tolerance": 1e-13, "iteration.max_iterations": 3000}
+    made = {name: problem.with_keys(run).to_dict() for name, problem in drawn.items()}
+    monkeypatch.setattr(weak_forms, "PROBLEMS", made)
+    asked = ["2.4", "2.6", "4.4", "4.5", "4.9.1", "4.9.3", "5.1", "5.2", "lemma-5.2", "5.3", "5.5", "5.6"]
+    for statement, evidence in solutions(asked).items():
+        assert all(one.holds for one in evidence), (statement, [one.text for one in evidence])

@@ -263,7 +263,9 @@ def turning(normals: NDArray[Any], places: Ints, size: int) -> sp.csc_array:
     rows = np.concatenate([rest, single, along_x, along_x, along_y, along_y])
     columns = np.concatenate([rest, single, along_x, along_y, along_x, along_y])
     entries = [np.ones(len(rest)), (x + y)[one], y[both], -x[both], x[both], y[both]]
-    return sp.csc_array((np.concatenate(entries), (rows, columns)), shape=(size, size))
+    turned = sp.csc_array((np.concatenate(entries), (rows, columns)), shape=(size, size))
+    turned.sort_indices()  # now: it will be read-only
+    return turned
 
 
 def in_frames(matrix: sp.csc_array, turned: sp.csc_array | None) -> sp.csc_array:
@@ -271,7 +273,9 @@ def in_frames(matrix: sp.csc_array, turned: sp.csc_array | None) -> sp.csc_array
     if turned is None:
         return matrix
     result = (turned @ matrix @ turned.T).tocsc()
-    return ((result + result.T) / 2).tocsc()
+    result = ((result + result.T) / 2).tocsc()
+    result.sort_indices()  # now: it will be read-only
+    return result
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fem1d2d import Line, Mesh, MeshError, Supports, facing, mortar, smooth, surface, trapezoid
+from fem1d2d import Line, Mesh, MeshError, Supports, facing, mortar, surface, trapezoid
 from fem1d2d.mesh import Floats, Ints
 from fem1d2d.trace import SAME, extent
 from verification.interface.friction import LAWS
@@ -98,7 +98,7 @@ def _along_x(problem: Problem, meshes: list[Mesh | None], known: list[Supports |
     if problem.dimension == 2 and len(positions) == 2 and not _same(positions[0], positions[1], SAME * size):
         x, P, w = _transfer(problem, positions[contact], positions[1 - contact])
         grids = [Grid.on(positions[contact]), Grid(x=x, weights=w)]
-        levels[1 - contact] = smooth(x, levels[1 - contact], grids[0].x)
+        levels[1 - contact] = np.interp(grids[0].x, x, levels[1 - contact])  # of convex bodies never below 0
         grids = grids if contact == 0 else grids[::-1]
     at = grids[contact].x
     if problem.dimension == 2 and points[contact] is not None:
@@ -292,7 +292,7 @@ def check_slopes(problem: Problem, points: Sequence[Floats | None]) -> None:
     rise = _slopes(own)
     j = int(np.argmax(np.abs(rise)))
     (left, low), (right, high) = own[j : j + 2]
-    remedy = f"body {3 - contact} is steep too, so that no roles are possible"
+    remedy = f"body {3 - contact} is steep too: name both sides by contact.surface, which takes lines of any shape"
     if _flat(other):
         remedy = f"body {3 - contact} is flat: give body {contact} the Neumann problem"
         remedy += f" (iteration.neumann_body = {contact})"
