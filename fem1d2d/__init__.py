@@ -15,6 +15,7 @@ from fem1d2d.condense import (
     solver_with_inertia,
 )
 from fem1d2d.element import largest_strains, stresses, von_mises
+from fem1d2d.line import Line, Seen, smooth
 from fem1d2d.material import Material, bar, plane_strain, plane_stress
 from fem1d2d.mesh import Mesh, MeshError, interval, rectangle, rectangle_points, sector
 from fem1d2d.mesh_files import from_file
@@ -29,10 +30,12 @@ __all__ = [
     "Eigenvalue",
     "Extremes",
     "Lifted",
+    "Line",
     "Material",
     "Mesh",
     "MeshError",
     "Response",
+    "Seen",
     "Supports",
     "Uncoupled",
     "bar",
@@ -57,6 +60,7 @@ __all__ = [
     "rigid_motions",
     "sector",
     "side_load",
+    "smooth",
     "solver",
     "solver_with_inertia",
     "stiffness",

@@ -62,17 +62,20 @@ def side_load(mesh: Mesh, facets: Ints, traction: Sequence[float]) -> Floats:
     return np.asarray(facet_weights(mesh, facets)[:, None] * np.asarray(traction, dtype=float))
 
 
-def facet_weights(mesh: Mesh, facets: Ints, between: tuple[float, float] | None = None) -> Floats:
+def facet_weights(
+    mesh: Mesh, facets: Ints, between: tuple[float, float] | None = None, along: Floats | None = None
+) -> Floats:
     """``int v`` over facets for every hat function v, shape (n,), unit length^(d - 1).
 
     ``facets`` are the nodes of each facet, shape (f, d); in 1D a facet is a point of measure 1.  In 2D ``between`` is
-    the part of the x axis over which to integrate; no facet may be vertical then.
+    the part of the x axis over which to integrate; no facet may be vertical then.  ``along`` are other positions of all
+    nodes in place of x.
     """
     p = mesh.points[facets].astype(float)
     sizes = np.ones(len(facets)) if mesh.dimension == 1 else np.linalg.norm(p[:, 1] - p[:, 0], axis=1)
     share = np.full(facets.shape, 1 / facets.shape[1])
     if between is not None and mesh.dimension == 2:
-        x = p[..., 0]
+        x = p[..., 0] if along is None else along[facets]
         s, t = np.sort([np.clip((end - x[:, 0]) / (x[:, 1] - x[:, 0]), 0, 1) for end in between], axis=0)
         share[:, 1] = (t**2 - s**2) / 2
         share[:, 0] = t - s - share[:, 1]

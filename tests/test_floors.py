@@ -28,8 +28,8 @@ FLOORS: dict[str, dict[str, str]] = {
     },
     "elastic bodies": {
         "fem1d2d": (
-            "__init__ assembly condense element enclosed exact layers layers_proved loewner material mesh mesh_files "
-            "mesh_reader outline pencil proved supports trace"
+            "__init__ assembly condense element enclosed exact layers layers_proved line loewner material mesh "
+            "mesh_files mesh_reader outline pencil proved supports trace"
         )
     },
     "for all of verification": {
@@ -100,26 +100,26 @@ FLOORS: dict[str, dict[str, str]] = {
 
 #: Lines of each package at most, those of packages inside it apart: whoever needs more says here how many.
 BUDGET = {
-    "fem1d2d": 3845,
+    "fem1d2d": 4050,
     "ndtheory": 5865,
     "verification": 1240,
     "verification.advice": 6185,
     "verification.algorithm": 2260,
-    "verification.bounds": 3570,
-    "verification.certificate": 1375,
+    "verification.bounds": 3575,
+    "verification.certificate": 1410,
     "verification.cli": 2435,
-    "verification.constants": 1311,
-    "verification.contact": 940,
+    "verification.constants": 1325,
+    "verification.contact": 945,
     "verification.coupling": 420,
     "verification.exploration": 600,
     "verification.figures": 1520,
-    "verification.interface": 2811,
+    "verification.interface": 3180,
     "verification.ledger": 4320,
     "verification.output": 470,
-    "verification.problem": 1648,
+    "verification.problem": 1665,
     "verification.reproduce": 655,
     "verification.sections": 2345,
-    "verification.sweeps": 2401,
+    "verification.sweeps": 2405,
     "verification.testing": 1583,
 }
 

@@ -90,11 +90,9 @@ class Solution(Document):
             if body is not None:
                 force = self.force if body is not self.bodies.neumann else self.bodies.interface.carry_back(self.force)
                 elastic = body.response.loaded + body.response.field(sign * force[body.unknown])
-                full = body.known.values.ravel().copy()
                 k = body.motions.shape[1]
-                full[body.positions] = elastic + body.motions @ self.motion[used : used + k]
+                fields[i] = body.at_nodes(elastic + body.motions @ self.motion[used : used + k])
                 used += k
-                fields[i] = full.reshape(body.mesh.points.shape)
         return fields[0], fields[1]
 
     @cached_property

@@ -201,10 +201,13 @@ def test_levels_repeat_the_constants_of_each_mesh(call, write):
 def assert_contact(found, nodes):
     """The objects `contact`, `pattern` and `force` that runs and solutions share."""
     contact, pattern = found["contact"], found["pattern"]
-    assert set(contact) == {"x", "pressure", "shear", "bound", "gap", "slip", "state"}
+    assert set(contact) == {"x", "y", "s", "normal", "pressure", "shear", "bound", "gap", "slip", "state"}
     assert {len(values) for values in contact.values()} == {nodes}
     assert {state: contact["state"].count(state) for state in ("stick", "slip", "open")} == pattern
-    assert set(found["force"]) == {"normal", "tangential"}
+    assert set(found["force"]) == {"normal", "tangential", "vector"}
+    assert found["force"]["vector"] == pytest.approx([found["force"]["tangential"], found["force"]["normal"]])
+    assert {*map(tuple, contact["normal"])} == {(0.0, 1.0)}
+    assert contact["s"] == pytest.approx([x - contact["x"][0] for x in contact["x"]])
 
 
 @pytest.mark.parametrize("edits", PROBLEMS, ids=str)

@@ -32,6 +32,13 @@ BARS = {
     "body1": {"shape": "interval", "x": [0, 1], "cells": 2, "young": 3, "fixed": ["left"]},
     "body2": {"shape": "interval", "x": [1, 2], "cells": 2, "young": 2, "prescribed": {"right": "-0.1"}},
 }
+SIDE_BY_SIDE = {
+    "body1": {"shape": "rectangle", "x": [-1, 0], "y": [0, 1], "cells": [1, 2], "young": 2, "poisson": 0}
+    | {"fixed": ["left"]},
+    "body2": {"shape": "rectangle", "x": [0, 1], "y": [0, 1], "cells": [1, 2], "young": 2, "poisson": 0}
+    | {"prescribed": {"right": ["-0.1", 0]}},
+    "contact": {"surface": ["right", "left"]},
+}
 GIVEN = "bounds --m 3084 --M 153229 --CR 1.7"
 
 #: How a value of each type is told.
@@ -217,7 +224,8 @@ def certified(*problems: vf.Problem) -> Iterator[Any]:
     """Certificates, and what comes of checking them again."""
     for problem in problems:
         of_small, of_energy = vf.certify(problem), vf.certify(problem.changed(friction=0), edition="energy")
-        yield from (of_small, of_energy)
+        beside = vf.Problem.from_dict(SIDE_BY_SIDE)
+        yield from (of_small, of_energy, vf.certify(beside, theta="0.5"), vf.solve(beside))
         yield vf.check_again(of_small.to_dict())
         yield vf.check_again(of_energy.to_dict(), problem)
 

@@ -87,7 +87,7 @@ def fields(*states: str) -> ContactFields:
     x = np.linspace(0.4, 1.6, 13)
     zero = np.zeros(13)
     return ContactFields(
-        x=x, weights=zero + 0.1, pressure=zero, shear=zero, bound=zero, gap=zero, slip=zero, status=states
+        x=x, s=x - x[0], weights=zero + 0.1, pressure=zero, shear=zero, bound=zero, gap=zero, slip=zero, status=states
     )
 
 

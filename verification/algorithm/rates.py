@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -28,10 +28,7 @@ class Noise:
     """
 
     def __init__(self, pair: ContactPair) -> None:
-        interface = pair.interface
-        if interface.transfer is not None:
-            interface = replace(interface, transfer=np.abs(interface.transfer))
-        self._interface = interface
+        self._interface = pair.interface.moduli
         self._stiffness, self._flexibility = np.abs(pair.contact.schur), np.abs(pair.neumann.inverse)
         self._neumann_stiffness = np.abs(pair.neumann.schur)
         self._load, self._neumann_load = (np.abs(side.load)[:, None] for side in (pair.contact, pair.neumann))

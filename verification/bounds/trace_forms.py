@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -66,7 +65,7 @@ class TraceForms:
         self._d = np.hstack([np.eye(size), none])
         self._g = np.hstack([S_2, none])
         self._p = np.hstack([np.zeros((size, size)), interface.carry_back(pressed)])
-        moduli = interface if interface.transfer is None else replace(interface, transfer=np.abs(interface.transfer))
+        moduli = interface.moduli
         self._p_size = np.hstack([np.zeros((size, size)), moduli.carry_back(np.abs(pressed))])
         force = np.hstack([np.zeros((contact.size, size)), pressed])
         jump = -np.hstack([interface.carry(np.eye(size)), moved])

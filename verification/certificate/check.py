@@ -35,6 +35,16 @@ UNREADABLE = (OSError, ArithmeticError, AttributeError, LookupError, TypeError, 
 BLOCK, BATCH = 32, 128
 
 
+dot = lambda u, v: u[0] * v[0] + u[1] * v[1]
+identity = lambda n: arb_mat([[int(i == j) for j in range(n)] for i in range(n)])
+part = lambda whole, rows, columns: arb_mat([[whole[i, j] for j in columns] for i in rows])
+gathered = lambda rows, at, columns: arb_mat(len(at), len(columns), [rows[i].get(j, 0) for i in at for j in columns])
+scaled = lambda values, rows: arb_mat([[arb(f) * x for x in row] for f, row in zip(values, rows.tolist(), strict=True)])
+
+#: A hash of the bodies and all else that the claim is about.
+digest = lambda data: hashlib.sha256(json.dumps(data, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+
+
 class Refused(ValueError):
     """The claim is not proved by its certificate."""
 
@@ -46,7 +56,7 @@ def check(discrete, claim, eliminated=None):
     """
     stiffness = eliminated or surface_stiffness
     ctx.prec = min(int(claim["bits"]), 20000)
-    theta, factor, k = (rational(claim["theta"]), rational(claim["factor"]), rational(discrete["friction"]))
+    theta, factor, k = map(rational, (claim["theta"], claim["factor"], discrete["friction"]))
     demand(0 < theta <= 1 and factor >= 0 and k >= 0, "0 < theta <= 1, a factor and a friction that are not negative")
     demand(discrete["neumann_body"] in (1, 2), "neumann_body 1 or 2")
     neumann, contact = (discrete[f"body{i}"] for i in ((2, 1) if discrete["neumann_body"] == 2 else (1, 2)))
@@ -57,7 +67,9 @@ def check(discrete, claim, eliminated=None):
     weights = [rational(w) for w in discrete["weights"]]
     demand(len(weights) == n and all(w > 0 for w in weights), "a positive weight for each contact node")
     # rows: forms in (d, c).  Without friction p_T = 0, and c is only the normal trace
-    across = stacked([[P, arb_mat(n, m)], [arb_mat(n, m), P]]) if k else stacked([[arb_mat(n, m), P]])
+    at = lambda body, which: [(j, both[q]) for q in which for j, both in enumerate(axes(body))]
+    onto = at(contact, (0, 1) if k else (1,))
+    across = arb_mat([[P[i, j] * dot(u, w) for j, w in at(neumann, (0, 1))] for i, u in onto])
     p = stacked([[arb_mat(t + n, 2 * m), S_c]]).tolist()
     v = (-stacked([[across, identity(t + n)]])).tolist()
     moved = across.transpose() * S_c  # P' p
@@ -112,7 +124,9 @@ def surface_stiffness(body, both):
     held = {(node, p) for node, p in body["held"]}
     named = {i for cell in body["cells"] for i in cell} | set(body["surface"]) | {node for node, _ in held}
     demand(all(type(i) is int and 0 <= i < len(points) for i in named), "node numbers")
-    rows = {}
+    rows, upright = {}, ((1, 0), (0, 1))
+    turned = {node: both for node, both in zip(body["surface"], axes(body), strict=True) if both != upright}
+    demand(not any(node in turned for node, _ in held), "no support of a contact node with its own normal")
     for cell in body["cells"]:
         (x0, y0), (x1, y1), (x2, y2) = (points[i] for i in cell)
         twice = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
@@ -120,12 +134,11 @@ def surface_stiffness(body, both):
         slope = [(y1 - y2, x2 - x1), (y2 - y0, x0 - x2), (y0 - y1, x1 - x0)]  # gradients times twice the area
         for i, g in zip(cell, slope, strict=True):
             for j, h in zip(cell, slope, strict=True):
-                dot = g[0] * h[0] + g[1] * h[1]
-                for p in (0, 1):
-                    for q in (0, 1):
+                for p, u in enumerate(turned.get(i, upright)):
+                    for q, w in enumerate(turned.get(j, upright)):
                         if (i, p) not in held and (j, q) not in held:
-                            value = first * g[p] * h[q] + second * (g[q] * h[p] + (dot if p == q else 0))
-                            row = rows.setdefault((i, p), {})
+                            shear = dot(g, w) * dot(h, u) + dot(g, h) * dot(u, w)
+                            value, row = first * dot(g, u) * dot(h, w) + second * shear, rows.setdefault((i, p), {})
                             row[j, q] = row.get((j, q), 0) + value / (2 * twice)
     keep = [(node, p) for p in ((0, 1) if both else (1,)) for node in body["surface"]]
     demand(len(set(keep)) == len(keep) and not held & set(keep), "contact nodes that are free, each once")
@@ -150,6 +163,14 @@ def surface_stiffness(body, both):
             lessen(rows, reached, reached, coupling.transpose() * solved)
             done = []
     return gathered(rows, keep, keep)
+
+
+def axes(body):
+    """Tangent and normal of each contact node; along x and y where the body lists none."""
+    given = body.get("normals") or [["0", "1"]] * len(body["surface"])
+    normals = [(rational(x), rational(y)) for x, y in given]
+    demand(len(normals) == len(body["surface"]) and all(dot(n, n) == 1 for n in normals), "normals of length 1")
+    return [((y, -x), (x, y)) for x, y in normals]
 
 
 def lessen(rows, wanted, columns, less):
@@ -191,32 +212,10 @@ def matrix(rows, n, m):
     return arb_mat([[arb(rational(x)) for x in row] for row in rows])
 
 
-def scaled(values, rows):
-    """Each row of a matrix times a rational."""
-    return arb_mat([[arb(value) * x for x in row] for value, row in zip(values, rows.tolist(), strict=True)])
-
-
-def identity(n):
-    return arb_mat([[int(i == j) for j in range(n)] for i in range(n)])
-
-
-def part(whole, rows, columns):
-    return arb_mat([[whole[i, j] for j in columns] for i in rows])
-
-
-def gathered(rows, wanted, columns):
-    return arb_mat(len(wanted), len(columns), [rows[i].get(j, 0) for i in wanted for j in columns])
-
-
 def stacked(blocks):
     """A matrix from rows of matrices side by side."""
     beside = lambda row: zip(*(block.tolist() for block in row), strict=True)
     return arb_mat([[entry for line in lines for entry in line] for row in blocks for lines in beside(row)])
-
-
-def digest(discrete):
-    """A hash of the bodies and all else that the claim is about."""
-    return hashlib.sha256(json.dumps(discrete, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
 
 def words(document):

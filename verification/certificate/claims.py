@@ -24,7 +24,7 @@ from verification.certificate.check import check, surface_stiffness
 from verification.constants.measured import FROM_MATRICES
 from verification.dense import STILL
 from verification.interface.body import Body
-from verification.interface.exact_bodies import ExactInterface, NotExact, exact_points
+from verification.interface.exact_bodies import ExactInterface, NotExact, exact_normals, exact_points
 from verification.interface.pair import ContactPair, pair_from
 from verification.problem import Problem
 from verification.problem.specs import BodySpec
@@ -267,7 +267,9 @@ def same(one: Any, other: Any) -> bool:
 
 
 def _described(spec: BodySpec, body: Body, points: NDArray[Any]) -> dict[str, Any]:
+    normals = exact_normals(body.normals)
     return {
+        **({} if normals is None else {"normals": [_texts(normal) for normal in normals]}),
         "points": [_texts(point) for point in points],
         "cells": body.mesh.cells.tolist(),
         "held": np.argwhere(body.known.held).tolist(),

@@ -91,6 +91,8 @@ def halved_cells(problem: Problem) -> Interface:
     """
     if problem.dimension == 1:
         raise NoCells("bars have no waves along Gamma_c")
+    if problem.contact.surface is not None:
+        raise NoCells("Gamma_c is a named line, of any shape")
     bodies = {name: getattr(problem, name) for name in ("body1", "body2")}
     for (name, body), side in zip(bodies.items(), SIDES, strict=True):
         if body.shape != "rectangle":

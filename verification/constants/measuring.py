@@ -212,7 +212,8 @@ def of_section_5(pair: ContactPair, tangential: NDArray[np.bool_]) -> dict[str, 
     Where the grids differ P carries forms of the contact body to the Neumann grid.  Section 5 needs no way back: it
     lifts only the Neumann body's traces into the contact body.
     """
-    interface, grid, kernel = pair.interface, pair.contact.grid, pair.interface.kernel
+    grid, kernel = pair.contact.grid, pair.interface.kernel
+    interface = pair.interface_along_y
     one_grid = interface.transfer is None
     contact, neumann = pair.contact.mesh_body, pair.neumann.mesh_body
     # along y and by number, so that the constants do not depend on the roles, to the last digit
@@ -236,8 +237,8 @@ def of_section_5(pair: ContactPair, tangential: NDArray[np.bool_]) -> dict[str, 
     if kernel is not None:
         squares = {}
         for body in bodies:
-            normal = body.elastic.schur[-len(body.nodes) :]
-            z = kernel @ (normal if body is neumann else interface.onto_neumann(normal))
+            force = body.elastic.schur if body is neumann else interface.carry_back(body.elastic.schur)
+            z = kernel @ force[-pair.neumann.grid.n :]
             squares[body.name] = z.T @ (grid.weights[:, None] * z)
         values["C_s"] = float(np.sqrt(max(largest((z + z.T) / 2, E[name]).value for name, z in squares.items())))
     return values
@@ -277,9 +278,11 @@ def pencil(pair: ContactPair) -> tuple[Floats, Floats]:
 
 def normal_pencil(pair: ContactPair) -> tuple[Floats, Floats]:
     """The same of the normal components, the tangential ones condensed out: rho_normal is the largest eigenvalue."""
-    grid, transfer = pair.contact.grid, pair.interface.transfer
+    grid, transfer, turned = pair.contact.grid, pair.interface.transfer, pair.interface.on_traces
     normal = np.arange(grid.size)[pair.contact.free] >= grid.t
     contact = _condense_tangential(_free(pair.contact), normal, _motions(pair.contact))
+    if turned is not None:  # a normal force on one grid has a tangential part on the other
+        return turned[grid.normal].T @ contact @ turned[grid.normal], _free(pair.neumann)
     if transfer is not None:
         contact = transfer.T @ contact @ transfer
         normal = np.arange(pair.neumann.grid.size) >= pair.neumann.grid.t

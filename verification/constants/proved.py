@@ -205,7 +205,8 @@ class Proof:
         elif not self.pair.contact.loose:
             self._keep("rho_min", inverse(self.largest(neumann, carried)))
         contact = self.felt(self._normal(self.S[self.contact], self.contact), normal=True)
-        self._keep("rho_normal", self.largest(contact, self._normal(neumann, self.neumann)))
+        turned = self.joint.exact_on_traces is not None
+        self._keep("rho_normal", self.largest(contact, neumann if turned else self._normal(neumann, self.neumann)))
 
     def _count(self, name: Name) -> int:
         """Contact nodes of a body, which are the last of its interface components."""
@@ -270,7 +271,11 @@ class Proof:
         forces = entries(S)
         every = np.arange(len(forces.middle))
         normal = forces.block(every[-self._count(name) :], every)
-        if name == self.contact and self.joint.transfer is not None:
+        if name == self.contact and self.joint.exact_on_traces is not None:
+            P = self.joint.transfer_of_traces
+            assert P is not None
+            normal = P.block(every, np.arange(self.joint.other.size)[self.joint.other.normal]).T.times(forces)
+        elif name == self.contact and self.joint.transfer is not None:
             normal = self.joint.transfer.T.times(normal)
         z = kernel.times(normal)
         square = z.T.times(self.joint.weights).times(z).symmetric()

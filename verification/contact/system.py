@@ -53,8 +53,8 @@ class ContactSystem:
         W, symmetric positive semi-definite; zero rows where both bodies are held tangentially.
     jump : array, shape (t + n,)
         d_0, the jump without contact forces.
-    friction : array, shape (t, n)
-        ``w k S``: the friction bound is ``|friction lambda_N|``.
+    friction : array, shape (t, n) or (t, t + n)
+        ``w k S``: the friction bound is ``|friction lambda_N|``, or of all components of lambda.
     bound : array, shape (t,), optional
         A given friction bound instead: the Tresca problem.
     motions : array, shape (t + n, k), optional
@@ -83,7 +83,11 @@ class ContactSystem:
 
     def bound(self, force: Floats) -> Floats:
         """Friction bound on nodal forces, shape (t,)."""
-        return np.abs(self.friction @ force[self.t :]) if self.given is None else self.given
+        return np.abs(self._stress(force)) if self.given is None else self.given
+
+    def _stress(self, force: Floats) -> Floats:
+        """Return ``w k S lambda_N``, shape (t,)."""
+        return np.asarray(self.friction @ force[-self.friction.shape[1] :])
 
     def jump(self, force: Floats, motion: Floats) -> Floats:
         """``d_0 - W force + M motion``."""
@@ -184,7 +188,9 @@ class ContactSystem:
         spread[rows, np.arange(len(rows))] = 1.0
         if self.given is None:
             law = (branches.sliding * branches.threshold)[slides, None] * self.friction[slides]
-            spread[slides] = law @ spread[t:]
+            spread[slides] = law @ spread[-law.shape[1] :]
+            if law.shape[1] > len(force) - t:  # which has the sliding ones too
+                spread[slides] = np.linalg.solve(np.eye(len(slides)) - law[:, slides], spread[slides])
         else:
             force[slides] = branches.sliding[slides] * self.given[slides]
         works = self.M.T @ spread
@@ -224,7 +230,7 @@ class ContactSystem:
         sliding = np.where(branches.sliding == 0, pushed, kept)
         smooth = np.where(branches.sliding == 0, 1, branches.sliding)  # a node whose bound is zero slides
         sliding = np.where(self.flexible[:t], np.where(bound == 0, smooth, sliding), 0)
-        stress = self.friction @ force[t:]
+        stress = self._stress(force)
         threshold = np.where(stress != 0, np.sign(stress), branches.threshold)
         return Branches(touching=touching, sliding=sliding.astype(np.int8), threshold=threshold.astype(np.int8))
 
@@ -241,7 +247,7 @@ class ContactSystem:
         t, (W, d0) = self.t, self._sprung()
         trial = force + (d0 - W @ force) / np.where(self.flexible, np.diag(W), 1.0)
         slips = np.abs(trial[:t]) > self.bound(force)
-        sign = np.sign(self.friction @ force[t:])
+        sign = np.sign(self._stress(force))
         return Branches(
             touching=trial[t:] > 0,
             sliding=np.where(slips & self.flexible[:t], np.sign(trial[:t]), 0).astype(np.int8),

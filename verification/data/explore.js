@@ -83,7 +83,7 @@ nd.onPage("explore", (figure) => {
   const round = (value) => { const p = 10 ** Math.floor(Math.log10(value)); return Math.max(...[1, 2, 5].filter((q) => q * p <= value * (1 + 1e-12))) * p; };
   const scale = data.gap.flat && largest > 0 ? Math.max(1, round(0.06 * size / largest)) : 1;
   const heights = bodies.map((body) => (plane ? body.points[2 * body.contact[0] + 1] : body.points[body.contact[0]]));
-  const lift = data.gap.flat ? scale * data.gap.size - (heights[1] - heights[0]) : 0;  // a gap is enlarged like displacements
+  const lift = data.gap.flat && data.gap.upright ? scale * data.gap.size - (heights[1] - heights[0]) : 0;  // a gap is enlarged like displacements
 
   function positions(body, b, displacement) {
     const place = [];
@@ -114,7 +114,8 @@ nd.onPage("explore", (figure) => {
     const every = Math.max(1, Math.ceil(now.pressure.length / 60));
     now.pressure.forEach((pressure, j) => {
       const [x, y] = places[carrier][bodies[carrier].contact[j]];
-      const dx = (plane ? now.shear[j] : pressure) * arrow, dy = plane ? pressure * arrow : 0, length = Math.hypot(dx, dy) * unit;
+      const [nx, ny] = plane ? role.normals[j] : [1, 0], shear = plane ? now.shear[j] : 0;
+      const dx = (pressure * nx + shear * ny) * arrow, dy = (pressure * ny - shear * nx) * arrow, length = Math.hypot(dx, dy) * unit;
       if (length > 3 && j % every === 0) {
         const head = Math.min(9, length / 2), angle = Math.atan2(-dy, dx), tip = [Number(X(x + dx)), Number(Y(y + dy))];
         const barb = (turn) => `M${tip[0]},${tip[1]}l${(-head * Math.cos(angle + turn)).toFixed(1)},${(-head * Math.sin(angle + turn)).toFixed(1)}`;

@@ -132,6 +132,7 @@ class Exploration(Document):
             "neumann": found.pair.neumann_body,
             "name": PLACES[found.pair.neumann_body],
             "contactNodes": found.pair.contact.grid.n,
+            "normals": found.pair.contact.grid.upright.round(6).tolist(),
             "rho": None if energy is None else float(energy.rho),
             "kappa": [float(energy.kappa_1) / k, float(energy.kappa_2) / k] if per_friction and energy else None,
             "regions": [_corners(found.regions.get(name)) for name in self._bounds],
@@ -154,7 +155,8 @@ def _corners(region: Region | None) -> list[list[float]]:
 def _gap(pair: ContactPair) -> dict[str, Any]:
     """The initial gap, where it is flat: it is then enlarged like displacements, which otherwise stay as they are."""
     gap = pair.interface.gap
-    return {"flat": bool(np.ptp(gap) == 0), "size": float(gap[0])}
+    upright = pair.contact.grid.normals is None
+    return {"flat": bool(np.ptp(gap) == 0), "size": float(gap[0]), "upright": upright}
 
 
 def explore(

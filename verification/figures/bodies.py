@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -40,7 +41,8 @@ BOTH = np.array([-1.0, 1.0])
 def draw_bodies(result: Run | Solution, *, stress: str = "", motions: bool = False, zoom: bool = False) -> Figure:
     """Deformed meshes above, pressure, shear and states along Gamma_c below; of a run the last iterate is drawn.
 
-    All panels have one x axis.  Displacements are enlarged as far as the drawn bodies do not overlap.
+    All panels have one x axis; along a named line those below have s, and arrows show the tractions on body 2.
+    Displacements are enlarged as far as the drawn bodies do not overlap.
 
     Parameters
     ----------
@@ -60,9 +62,10 @@ def draw_bodies(result: Run | Solution, *, stress: str = "", motions: bool = Fal
     x, y = _ends(bodies, drawn, scale, contact if zoom and plane else None)
     panels = (_draw_stresses, _draw_motions)[: 1 + motions] if plane else ()
     heights = [WIDE * float(np.ptp(y) / np.ptp(x)), *[HIGH for _ in panels]]
+    named = plane and bodies.interface.contact.normals is not None
     with style.styled():
         figure = style.new_figure(7.2, 1.1 + sum(heights))
-        axes = figure.subplots(len(heights), 1, height_ratios=heights, sharex=True, squeeze=False)[:, 0]
+        axes = figure.subplots(len(heights), 1, height_ratios=heights, sharex=not named, squeeze=False)[:, 0]
         axes[0].set(xlim=x, ylim=y, title=f"{plain(bodies.problem.title)}: deformed, displacements x {scale:g}")
         cells = _draw_meshes(axes[0], bodies, drawn, scale)
         if stress:
@@ -72,11 +75,16 @@ def draw_bodies(result: Run | Solution, *, stress: str = "", motions: bool = Fal
             legend_beside(axes[0])
         if isinstance(result, Run) and not result.converged:
             style.mark_unfinished(axes[0], result.outcome)
+        length = plain(bodies.problem.units["length"])
+        if named:
+            _draw_tractions(axes[0], contact, bodies, drawn)
+            axes[0].set_xlabel(f"x [{length}]")
         for ax, draw in zip(axes[1:], panels, strict=True):
-            draw(ax, contact.between(*x), bodies)
+            seen = contact.between(*x)
+            draw(ax, replace(seen, x=seen.s) if named else seen, bodies)
             legend_beside(ax)
-        where = "x along $\\Gamma_c$" if plane else "x"
-        axes[-1].set_xlabel(f"{where} [{plain(bodies.problem.units['length'])}]")
+        where = ("s along $\\Gamma_c$" if named else "x along $\\Gamma_c$") if plane else "x"
+        axes[-1].set_xlabel(f"{where} [{length}]")
     return figure
 
 
@@ -99,7 +107,7 @@ def _round_down(value: float) -> float:
 def _placed(bodies: TwoBodies, moved: Sequence[Floats], scale: float) -> list[Floats]:
     """The drawn places of the nodes of each elastic body; a flat gap is scaled too, so that contact looks closed."""
     found = [body.mesh.points + scale * u for body, u in zip(bodies.elastic, moved, strict=True)]
-    if len(found) == 2 and np.ptp(bodies.interface.gap) == 0:
+    if len(found) == 2 and np.ptp(bodies.interface.gap) == 0 and bodies.interface.contact.normals is None:
         below, above = (float(body.mesh.points[body.nodes[0], -1]) for body in bodies.elastic)
         found[1][:, -1] += scale * float(bodies.interface.gap[0]) - (above - below)
     return found
@@ -163,6 +171,16 @@ def _draw_meshes(ax: Axes, bodies: TwoBodies, drawn: list[Floats], scale: float)
     if len(drawn) == 1:
         ax.axhline(_obstacle(bodies, scale), color="0.3", linewidth=2, label="obstacle")
     return found
+
+
+def _draw_tractions(ax: Axes, contact: ContactFields, bodies: TwoBodies, drawn: list[Floats]) -> None:
+    """Arrows of the tractions on body 2 from the contact nodes, the longest a tenth of the picture."""
+    body, traction = bodies.problem.contact_body - 1, contact.tractions
+    largest, size = float(np.linalg.norm(traction, axis=1).max()), float(np.ptp(ax.get_xlim()))
+    if largest:
+        look: Any = {"angles": "xy", "scale_units": "xy", "width": 0.003, "color": PRESSURE, "zorder": 3}
+        places = drawn[body][bodies.elastic[body].nodes]
+        ax.quiver(*places.T, *traction.T, scale=largest / (0.1 * size), **look)
 
 
 def _colour(ax: Axes, cells: list[PolyCollection], stress: str, values: list[Floats], bodies: TwoBodies) -> None:

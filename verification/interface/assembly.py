@@ -11,6 +11,7 @@ import numpy as np
 from fem1d2d import (
     Mesh,
     MeshError,
+    Supports,
     body_load,
     facet_weights,
     from_file,
@@ -23,8 +24,8 @@ from fem1d2d import (
 from fem1d2d.mesh import Floats, Ints
 from fem1d2d.trace import SAME, extent
 from verification.dense import STILL
-from verification.interface.body import Body, Name, material_of
-from verification.interface.interface import Interface, Law
+from verification.interface.body import Body, Name, in_frames, material_of, turning
+from verification.interface.interface import Grid, Interface, Law
 from verification.interface.joining import join
 from verification.problem.specification import Problem
 from verification.problem.specs import MOST_CELLS, BodySpec
@@ -38,6 +39,10 @@ MOST_CONTACT_NODES = 2000
 #: split by both diagonals, 72 cells along Gamma_c): at 0.48 the nodal pressures of the built-in split are off by 5 and
 #: 6 % (0.7 and 2.3 % at 0.3) and the force by 2 %, 7 to 11 % with 12 cells; at 0.499 the pressures by 40 and 11 %.
 LOCKING = 0.48
+
+
+#: Part of the length of Gamma_c up to which an overlap may come from reading the gap of curved bodies off their nodes.
+READING = 1e-6
 
 
 class TooManyContactNodes(ProblemError):
@@ -133,10 +138,10 @@ def warnings_of(interface: Interface, friction: Fraction, bodies: list[Body]) ->
             f" pressures (Section 6 at {LOCKING:g}: 5 %, at 0.499: 40 %); needed a finer mesh, or a mesh file whose"
             " rectangles are split by both diagonals"
         )
-    if interface.gap.min() < 0:
+    if interface.gap.min() < -READING * float(np.ptp(interface.contact.x)):
         j = int(np.argmin(interface.gap))
         found.append(
-            f"the initial gap is {interface.gap[j]:.4g} at x = {interface.contact.x[j]:g}: the bodies overlap as they"
+            f"the initial gap is {interface.gap[j]:.4g} at {interface.contact.place(j)}: the bodies overlap as they"
             " are drawn, and press each other apart before any load acts"
         )
     if friction and interface.law is not None and interface.contact.dimension == 2:
@@ -211,13 +216,22 @@ def discretise(problem: Problem, *, law: Law | None = None, dense: bool = True) 
         the contact body at its ends, Gamma_u holding the normal component of a contact node, an unreadable mesh.
     """
     meshes = [None if spec.rigid else _mesh(problem, name) for name, spec in _specs(problem)]
-    nodes, interface = join(problem, meshes, law)
+    known = [
+        None if mesh is None else _known(problem, name, mesh)
+        for (name, _), mesh in zip(_specs(problem), meshes, strict=True)
+    ]
+    nodes, interface = join(problem, meshes, known, law)
     if dense and interface.contact.n > MOST_CONTACT_NODES:
         needed = f"needed at most {MOST_CONTACT_NODES} contact nodes, these are {interface.contact.n}"
         raise TooManyContactNodes(problem.source, "contact", None, needed)
+    grids = (interface.contact, interface.neumann)
     body1, body2 = (
-        None if mesh is None else _body(problem, name, mesh, own, interface.contact.x[[0, -1]])
-        for (name, _), mesh, own in zip(_specs(problem), meshes, nodes, strict=True)
+        None
+        if mesh is None or held is None
+        else _body(problem, name, mesh, held, own, grid, interface.contact.x[[0, -1]])
+        for (name, _), mesh, held, own, grid in zip(
+            _specs(problem), meshes, known, nodes, grids if problem.contact_body == 1 else grids[::-1], strict=True
+        )
     )
     bodies = TwoBodies(
         body1=body1, body2=body2, interface=interface, friction=problem.contact.friction, problem=problem
@@ -295,41 +309,71 @@ def _with_parts(problem: Problem, name: Name, mesh: Mesh) -> Mesh:
     return replace(mesh, sides={**mesh.sides, **parts}) if parts else mesh
 
 
-def _body(problem: Problem, name: Name, mesh: Mesh, nodes: Ints, ends: Floats) -> Body:
+def _sides(spec: BodySpec, dimension: int) -> dict[str, list[float | None]]:
+    """Return the displacements that sides prescribe; None leaves a component free."""
+    sides: dict[str, list[float | None]] = {side: [0.0] * dimension for side in spec.fixed}
+    return sides | {side: [None if v is None else float(v) for v in values] for side, values in spec.prescribed.items()}
+
+
+def _known(problem: Problem, name: Name, mesh: Mesh) -> Supports:
+    try:
+        return supports(mesh, _sides(getattr(problem, name), mesh.dimension))
+    except MeshError as error:
+        raise problem.refuse(f"{name}.prescribed", None, str(error)) from None
+
+
+def _check_free(problem: Problem, name: Name, mesh: Mesh, known: Supports, nodes: Ints, normals: Floats | None) -> None:
+    """Refuse supports that hold more of a contact node than its tangential component."""
+    if normals is None:
+        normals = np.tile(np.eye(mesh.dimension)[-1], (len(nodes), 1))
+    wrong = (known.held[nodes] & (normals != 0)).any(axis=1)
+    if not wrong.any():
+        return
+    spec, j = getattr(problem, name), int(np.argmax(wrong))
+    holds = next(
+        side
+        for side, values in _sides(spec, mesh.dimension).items()
+        if nodes[j] in mesh.sides[side] and any(v is not None and n for v, n in zip(values, normals[j], strict=True))
+    )
+    where = ", ".join(f"{c:g}" for c in mesh.points[nodes[j]].astype(float))
+    key, value = ("fixed", list(spec.fixed)) if holds in spec.fixed else (f"prescribed.{holds}", None)
+    needed = "Gamma_u must leave the normal component of every contact node free; it holds the one at "
+    raise problem.refuse(f"{name}.{key}", value, f"{needed}({where})")
+
+
+def _body(problem: Problem, name: Name, mesh: Mesh, known: Supports, nodes: Ints, grid: Grid, ends: Floats) -> Body:
     spec: BodySpec = getattr(problem, name)
     d = mesh.dimension
     plain = lambda values: [float(v) for v in values]
-    sides: dict[str, list[float | None]] = {side: [0.0] * d for side in spec.fixed}
-    sides |= {side: [None if v is None else float(v) for v in values] for side, values in spec.prescribed.items()}
-    try:
-        known = supports(mesh, sides)
-    except MeshError as error:
-        raise problem.refuse(f"{name}.prescribed", None, str(error)) from None
-    if known.held[nodes, d - 1].any():
-        node = nodes[np.argmax(known.held[nodes, d - 1])]
-        where = mesh.points[node].astype(float)
-        holds = next(side for side, values in sides.items() if values[d - 1] is not None and node in mesh.sides[side])
-        key, value = ("fixed", list(spec.fixed)) if holds in spec.fixed else (f"prescribed.{holds}", None)
-        needed = "Gamma_u must leave the normal component of every contact node free; it holds the one at "
-        raise problem.refuse(f"{name}.{key}", value, f"{needed}({', '.join(f'{c:g}' for c in where)})")
+    _check_free(problem, name, mesh, known, nodes, grid.normals)
     motions = rigid_motions(mesh, known.held)
     material = material_of(spec)
     matrix = stiffness(mesh, material)
     load = body_load(mesh, plain(spec.body_force))
+    along = None
+    if problem.contact.surface is not None:
+        along = np.zeros(len(mesh.points))
+        along[nodes] = grid.x
     pieces = {frozenset(nodes[i : i + d].tolist()) for i in range(len(nodes) - d + 1)}  # of Gamma_c
     for side, force in spec.traction.items():
         covered = np.array([frozenset(facet) in pieces for facet in mesh.sides[side].tolist()])
         loaded = facet_weights(mesh, mesh.sides[side])
-        loaded -= facet_weights(mesh, mesh.sides[side][covered], between=(ends[0], ends[1]))
+        loaded -= facet_weights(mesh, mesh.sides[side][covered], between=(ends[0], ends[1]), along=along)
         if any(force) and loaded.max() <= SAME * extent(mesh):
             needed = "Gamma_c covers this side: a force there is lost"
             raise problem.refuse(f"{name}.traction.{side}", list(force), needed)
         load += loaded[:, None] * plain(force)
     free = np.flatnonzero(~known.held.ravel())
+    rigid = motions.reshape(known.held.size, motions.shape[2])[free]
     right = load.ravel()[free] - (matrix @ known.values.ravel())[free]
     position = np.full(known.held.size, -1)
     position[free] = np.arange(len(free))
-    interface = np.concatenate([position[d * nodes + p] for p in range(d)])
+    places = np.stack([position[d * nodes + p] for p in range(d)])
+    turned = None
+    if grid.normals is not None:
+        turned = turning(grid.normals, places, len(free))
+        places = np.where((places >= 0).all(axis=0), places, np.sort(places, axis=0))  # a single free one is normal
+    interface = places.ravel()
     unknown = interface >= 0
     return Body(
         name=name,
@@ -341,8 +385,10 @@ def _body(problem: Problem, name: Name, mesh: Mesh, nodes: Ints, ends: Floats) -
         positions=free,
         unknown=unknown,
         interface=interface[unknown],
-        stiffness=matrix[free][:, free].tocsc(),
-        load=right,
-        motions=motions.reshape(known.held.size, motions.shape[2])[free],
+        stiffness=in_frames(matrix[free][:, free].tocsc(), turned),
+        load=right if turned is None else turned @ right,
+        motions=rigid if turned is None else turned @ rigid,
         length=float(problem.length),
+        turned=turned,
+        normals=grid.normals,
     )

@@ -54,7 +54,7 @@ def material_of(spec: BodySpec, number: Callable[[Fraction], Any] = float) -> Ma
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Body(Value):
-    """An elastic body on its mesh; interface vectors have their normal components along y (along x in 1D).
+    """An elastic body on its mesh; interface vectors have their normal components from body 1 to body 2.
 
     Attributes
     ----------
@@ -64,9 +64,10 @@ class Body(Value):
     known : Supports
         Displacements known on Gamma_u.
     nodes : int array, shape (n,)
-        Contact nodes from left to right.
+        Contact nodes in the direction of s.
     positions : int array
-        Positions of the unknowns among all d * node + p.
+        Positions of the unknowns among all d * node + p.  At a contact node with another normal than (0, 1) the
+        unknowns are the tangential and the normal component, instead of those along x and y.
     unknown : bool array, shape (2 n,) or (n,) in 1D
         Interface components that Gamma_u leaves free; a False one is held tangentially.
     interface : int array
@@ -79,6 +80,10 @@ class Body(Value):
         Rigid motions that only contact can hold; in the iteration only the contact body may have some.
     length : float
         L of the norm of H1, unit length.
+    turned : sparse array or None
+        Q: values of the unknowns from their components along x and y; None where those are the unknowns.
+    normals : array, shape (n, 2), or None
+        Those of the contact nodes; None where all are (0, 1).
     """
 
     name: Name
@@ -94,6 +99,8 @@ class Body(Value):
     load: Floats
     motions: Floats
     length: float
+    turned: sp.csc_array | None = None
+    normals: Floats | None = None
 
     @property
     def summary(self) -> str:
@@ -107,13 +114,13 @@ class Body(Value):
         super().__setstate__(state)
         if "stiffness" not in state:
             matrix = stiffness(self.mesh, self.material)[self.positions][:, self.positions]
-            object.__setattr__(self, "stiffness", freeze(matrix.tocsc()))
+            object.__setattr__(self, "stiffness", freeze(in_frames(matrix.tocsc(), self.turned)))
 
     @cached_property
     def gram_matrix(self) -> sp.csc_array:
         """The Gram matrix of H1 on the unknowns; a run does not need it."""
         whole = gram(self.mesh, self.length)
-        return freeze(whole[self.positions][:, self.positions].tocsc())
+        return freeze(in_frames(whole[self.positions][:, self.positions].tocsc(), self.turned))
 
     @cached_property
     def _left(self) -> Ints:
@@ -185,6 +192,8 @@ class Body(Value):
         """The Gram matrix condensed onto the interface."""
         if self.few:
             return Lifted(self.gram_matrix, self.interface)
+        if self.turned is not None:  # which couples both components
+            return Condensation(self.gram_matrix, self.interface, self.order)
         return Uncoupled(self.gram_matrix, self.interface, self.positions % self.mesh.dimension, self.order)
 
     @cached_property
@@ -195,7 +204,9 @@ class Body(Value):
 
     def times_as_stiff(self, other: Body) -> float | None:
         """Return the ratio of its stiffness matrix to that of ``other``, if only Young's moduli and loads differ."""
-        plan = lambda body: (body.mesh.points, body.mesh.cells, body.known.held, body.nodes, body.poisson)
+        plan = lambda body: (
+            *(body.mesh.points, body.mesh.cells, body.known.held, body.nodes, body.poisson, body.normals),
+        )
         if not all(map(np.array_equal, plan(self), plan(other))):
             return None
         dimension = self.mesh.dimension
@@ -209,7 +220,11 @@ class Body(Value):
     @property
     def known_trace(self) -> Floats:
         """Interface displacements that Gamma_u prescribes, 0 where it does not."""
-        return np.concatenate([self.known.values[self.nodes, p] for p in range(self.mesh.dimension)])
+        values = self.known.values[self.nodes]
+        if self.normals is not None:
+            x, y = self.normals.T
+            return np.concatenate([values[:, 0] * y - values[:, 1] * x, values[:, 0] * x + values[:, 1] * y])
+        return np.concatenate([values[:, p] for p in range(self.mesh.dimension)])
 
     @property
     def motion_traces(self) -> Floats:
@@ -224,9 +239,56 @@ class Body(Value):
 
     def displacement(self, trace: Floats) -> Floats:
         """Return the displacement of all nodes for given interface values, shape (nodes, d), unit of length."""
+        return self.at_nodes(self.elastic.extend(trace[self.unknown], self.load))
+
+    def at_nodes(self, unknowns: Floats) -> Floats:
+        """Return the displacement of all nodes along the axes, shape (nodes, d), for values of the unknowns."""
         full = self.known.values.ravel().copy()
-        full[self.positions] = self.elastic.extend(trace[self.unknown], self.load)
+        full[self.positions] = unknowns if self.turned is None else self.turned.T @ unknowns
         return full.reshape(self.mesh.points.shape)
+
+    def of_nodes(self, displacement: Floats) -> Floats:
+        """Return the values of the unknowns of a displacement of all nodes along the axes."""
+        unknowns = displacement.ravel()[self.positions]
+        return unknowns if self.turned is None else np.asarray(self.turned @ unknowns)
+
+
+def turning(normals: NDArray[Any], places: Ints, size: int) -> sp.csc_array:
+    """Return Q of a body, from unknowns along x and y to tangential and normal ones at its contact nodes.
+
+    Where a support holds one component, the other one is normal.
+
+    Parameters
+    ----------
+    normals : array, shape (n, 2)
+        Those of the contact nodes.
+    places : int array, shape (2, n)
+        Positions of their components along x and y among the unknowns, -1 where held.
+    size : int
+        Number of unknowns.
+    """
+    x, y = normals.T
+    both = (places >= 0).all(axis=0)
+    one = ((places >= 0).any(axis=0)) & ~both
+    single = places.max(axis=0)[one]
+    along_x, along_y = places[:, both]
+    rest = np.setdiff1d(np.arange(size), np.concatenate([along_x, along_y, single]))
+    rows = np.concatenate([rest, single, along_x, along_x, along_y, along_y])
+    columns = np.concatenate([rest, single, along_x, along_y, along_x, along_y])
+    entries = [np.ones(len(rest)), (x + y)[one], y[both], -x[both], x[both], y[both]]
+    turned = sp.csc_array((np.concatenate(entries), (rows, columns)), shape=(size, size))
+    turned.sort_indices()  # now: it will be read-only
+    return turned
+
+
+def in_frames(matrix: sp.csc_array, turned: sp.csc_array | None) -> sp.csc_array:
+    """Return ``Q X Q'`` of a symmetric matrix on the unknowns along x and y, exactly symmetric."""
+    if turned is None:
+        return matrix
+    result = (turned @ matrix @ turned.T).tocsc()
+    result = ((result + result.T) / 2).tocsc()
+    result.sort_indices()  # now: it will be read-only
+    return result
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

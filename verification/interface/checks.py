@@ -117,11 +117,12 @@ def _check(bodies: TwoBodies, moved: Displacements) -> Checks:
         reason = {"penetration_outside": "bars meet at one point, which is Gamma_c"}
         return Checks(largest_strain=strain, strain_at=strain_at, reason=reason, warnings=strained)
     depth, at = _penetration(bodies, moved)
-    low, high = bodies.interface.contact.x[[0, -1]]
+    grid = bodies.interface.contact
     crossed: tuple[str, ...] = ()
-    if depth > SHARE * strain * (high - low):
+    if depth > SHARE * strain * float(np.ptp(grid.x)):
         where = f"by {depth:.3g} {bodies.problem.units['length']} at {_show(at)}"
-        short = f"Gamma_c, from x = {low:g} to {high:g}, is too short, and the forces are wrong"
+        low, high = grid.place(0), grid.place(-1).removeprefix("x = ")
+        short = f"Gamma_c, from {low} to {high}, is too short, and the forces are wrong"
         crossed = (f"outside Gamma_c the bodies lie in each other, {where}: {short}",)
     return Checks(
         penetration_outside=depth,
@@ -168,10 +169,13 @@ class _Surface(Value):
     end: Floats
 
     @classmethod
-    def of(cls, mesh: Mesh, u: Floats, contact: Ints, ends: Floats) -> _Surface:
-        """Return the surface of a mesh with these contact nodes, some of which may lie beyond the ends of Gamma_c."""
+    def of(cls, mesh: Mesh, u: Floats, contact: Ints, ends: Floats, along: Floats | None = None) -> _Surface:
+        """Return the surface of a mesh with these contact nodes, some of which may lie beyond the ends of Gamma_c.
+
+        ``along`` are their positions on Gamma_c, x by default.
+        """
         points, slack = mesh.points.astype(float), SAME * extent(mesh)
-        x = points[contact, 0]
+        x = points[contact, 0] if along is None else along
         on_contact = contact[(x >= ends[0] - slack) & (x <= ends[1] + slack)]
         outside = np.setdiff1d(mesh.boundary, on_contact)
         now = points + u
@@ -181,11 +185,16 @@ class _Surface(Value):
 
 def _penetration(bodies: TwoBodies, moved: Displacements) -> tuple[float, Place | None]:
     """Return the greatest depth of a surface node outside Gamma_c inside the other body, and where it is drawn."""
-    problem, ends = bodies.problem, bodies.interface.contact.x[[0, -1]]
-    lift = np.array([0.0, float(problem.contact.gap)])  # of body 2
+    problem, grid = bodies.problem, bodies.interface.contact
+    ends, mean = grid.x[[0, -1]], grid.upright.mean(axis=0)
+    lift = float(problem.contact.gap) * mean / np.linalg.norm(mean)  # of body 2
+    named = problem.contact.surface is not None
+    grids = (grid, bodies.interface.neumann) if problem.contact_body == 1 else (bodies.interface.neumann, grid)
     one, two = (
-        None if body is None or u is None else _Surface.of(body.mesh, u + i * lift, body.nodes, ends)
-        for i, (body, u) in enumerate(zip((bodies.body1, bodies.body2), moved, strict=True))
+        None
+        if body is None or u is None
+        else _Surface.of(body.mesh, u + i * lift, body.nodes, ends, along.x if named else None)
+        for i, (body, u, along) in enumerate(zip((bodies.body1, bodies.body2), moved, grids, strict=True))
     )
     if one is None:
         assert bodies.body2 is not None

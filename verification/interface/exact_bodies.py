@@ -2,7 +2,8 @@
 
 The topology (which nodes lie on which side, and which unknowns they hold) is taken from the bodies in doubles.  The
 numbers are not: ends, moduli, length and radius are the rationals of the problem, the nodes of a rectangle divide its
-exact sides, and the nodes of a mesh file are the doubles read from it.
+exact sides, and the nodes of a mesh file are the doubles read from it.  Along a named line lengths are irrational: its
+positions are the doubles found, and its normals the rational unit vectors nearest to those found.
 """
 
 from __future__ import annotations
@@ -16,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fem1d2d import exact, interval, mortar, rectangle_points, trapezoid
-from fem1d2d.enclosed import Enclosed, nearest
+from fem1d2d.enclosed import UNIT, Enclosed, gamma, nearest
 from fem1d2d.exact import Shapes
-from verification.interface.body import Body, material_of
+from verification.interface.body import Body, in_frames, material_of
 from verification.interface.friction import LAWS, Nonlocal
-from verification.interface.interface import Grid, Interface
+from verification.interface.interface import Grid, Interface, turned_transfer
 from verification.interface.pair import ContactPair
 from verification.problem.specification import Problem
 from verification.problem.specs import BodySpec
@@ -64,10 +65,47 @@ class ExactBody:
             gram = exact.gram(mesh, problem.length, shapes)
         except (TypeError, ValueError) as error:
             raise NotExact(f"{body.name}: {error}") from None
-        free = body.positions
-        return cls(
-            body=body, stiffness=stiffness.block(free, free), gram=gram.block(free, free), x=points[body.nodes, 0]
-        )
+        free, x = body.positions, points[body.nodes, 0]
+        matrices = (_in_frames(matrix.block(free, free), body) for matrix in (stiffness, gram))
+        return cls(body=body, stiffness=next(matrices), gram=next(matrices), x=x)
+
+
+def _in_frames(matrix: Enclosed, body: Body) -> Enclosed:
+    """Return ``Q X Q'`` of the exact normals of a body, see :func:`verification.interface.body.in_frames`."""
+    if body.turned is None or body.normals is None:
+        return matrix
+    exact_normals(body.normals)  # entries of Q are off by at most 4 units
+    middle, pattern = in_frames(matrix.middle, body.turned), (body.turned != 0).astype(float)
+    # two products of sums of two terms, an average, and Q itself; pattern has more than |Q|
+    radius = pattern @ (matrix.radius + 2 * gamma(24) * abs(matrix.middle)) @ pattern.T
+    return Enclosed(middle=middle, radius=(radius * (1 + 2 * gamma(16))).tocsc())
+
+
+def exact_normals(normals: NDArray[Any] | None) -> NDArray[Any] | None:
+    """Return rational unit vectors within 4 units of rounding of given ones; None for None.
+
+    Raises
+    ------
+    NotExact
+        Vectors whose length is not 1 to rounding.
+
+    Examples
+    --------
+    >>> x, y = exact_normals(np.array([[0.6, 0.8]]))[0]
+    >>> x * x + y * y, abs(x - Fraction(3, 5)) < 1e-15
+    (Fraction(1, 1), True)
+    """
+    if normals is None:
+        return None
+    found = []
+    for x, y in normals.tolist():
+        half = Fraction(x / (1 + abs(y)))  # the tangent of half the angle
+        square = half * half
+        found.append((2 * half / (1 + square), (1 - square) / (1 + square) * (-1 if y < 0 else 1)))
+    exact_ones = np.array(found, dtype=object)
+    if np.abs((exact_ones - exact.fractions(normals)).astype(float)).max() > 4 * UNIT:
+        raise NotExact("normals whose length is not 1 to rounding")
+    return exact_ones
 
 
 def exact_points(spec: BodySpec, body: Body) -> NDArray[Any]:
@@ -90,7 +128,9 @@ class ExactInterface:
 
     def __init__(self, pair: ContactPair, contact: NDArray[Any], neumann: NDArray[Any]) -> None:
         self.pair = pair
-        one_grid = pair.interface.transfer is None
+        one_grid, contact_grid, neumann_grid = pair.interface.transfer is None, pair.contact.grid, pair.neumann.grid
+        if pair.problem is not None and pair.problem.contact.surface is not None:
+            contact, neumann = exact.fractions(contact_grid.x), exact.fractions(neumann_grid.x)
         # one grid has the positions of body 1, as in doubles
         x = (contact if pair.contact_body == 1 else neumann) if one_grid else contact
         self.grid = Grid(x=x, weights=trapezoid(x), dimension=pair.interface.contact.dimension)
@@ -100,6 +140,8 @@ class ExactInterface:
             x[0], x[-1] = min(x[0], contact[0]), max(x[-1], contact[-1])
             self.exact_transfer = mortar(contact, x)
             self.other = Grid(x=x, weights=self.exact_transfer.T @ self.grid.weights)
+        normals = (exact_normals(grid.normals) for grid in (contact_grid, neumann_grid))
+        self.exact_on_traces = turned_transfer(self.exact_transfer, *normals)
 
     @cached_property
     def weights(self) -> Enclosed:
@@ -122,6 +164,8 @@ class ExactInterface:
         P, d = self.transfer, self.grid.dimension
         if P is None:
             return None
+        if self.exact_on_traces is not None:
+            return Enclosed.rounded(self.exact_on_traces)
         return Enclosed(middle=np.kron(np.eye(d), P.middle), radius=np.kron(np.eye(d), P.radius))
 
     @cached_property
@@ -163,8 +207,13 @@ class ExactInterface:
             raise NotExact(f"law of friction: {error}") from None
 
     def felt(self, form: Enclosed, *, normal: bool = False) -> Enclosed:
-        """Return ``P' X P``: a form of the contact body on the Neumann grid, of all components or of normal ones."""
-        P = self.transfer if normal else self.transfer_of_traces
+        """Return ``P' X P``: a form of the contact body on the Neumann grid, of all components or of normal ones.
+
+        Where normals differ, a form of normal components becomes one of all.
+        """
+        P = self.transfer if normal and self.exact_on_traces is None else self.transfer_of_traces
+        if normal and P is not None and self.exact_on_traces is not None:
+            P = P.block(np.arange(self.grid.size)[self.grid.normal], np.arange(self.other.size))
         return form if P is None else P.T.times(form).times(P).symmetric()
 
     def tangential_mass(self, tangential: NDArray[np.bool_]) -> Enclosed:

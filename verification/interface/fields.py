@@ -15,12 +15,18 @@ from verification.value import Value
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ContactFields(Value):
-    """Stresses and motions along Gamma_c from left to right.
+    """Stresses and motions along Gamma_c, in the direction of s.
 
     Attributes
     ----------
     x : array, shape (n,)
-        Position before deformation, unit of length.
+        Position before deformation along the x axis, unit of length.
+    s : array, shape (n,)
+        Distance along Gamma_c from its first node.
+    y : array, shape (n,), or None
+        Position along the y axis; None in 1D and where only matrices are known.
+    normal : array, shape (n, 2), or None
+        Unit normals from body 1 to body 2; None in 1D.
     weights : array, shape (n,)
         w_j, unit of length; 1 in 1D.
     pressure : array
@@ -38,6 +44,7 @@ class ContactFields(Value):
     """
 
     x: Floats
+    s: Floats
     weights: Floats
     pressure: Floats
     shear: Floats
@@ -45,6 +52,8 @@ class ContactFields(Value):
     gap: Floats
     slip: Floats
     status: tuple[str, ...]
+    y: Floats | None = None
+    normal: Floats | None = None
 
     @property
     def summary(self) -> str:
@@ -68,7 +77,10 @@ class ContactFields(Value):
         slides = state.sliding != 0 if plane else np.ones(grid.n, dtype=bool)
         names = np.where(state.touching, np.where(slides, "slip", "stick"), "open")
         return cls(
-            x=grid.x,
+            x=grid.x if grid.points is None else grid.points[:, 0],
+            s=grid.s,
+            y=None if grid.points is None else grid.points[:, 1],
+            normal=grid.upright if plane else None,
             weights=grid.weights,
             pressure=force[grid.normal] / grid.weights,
             shear=force[grid.tangential] / grid.weights if plane else zero,
@@ -95,12 +107,28 @@ class ContactFields(Value):
         """Total normal (compressive) and tangential (on body 2) force per unit thickness."""
         return {"normal": float(self.pressure @ self.weights), "tangential": float(self.shear @ self.weights)}
 
+    @property
+    def tractions(self) -> Floats:
+        """Stresses on body 2 along the axes, shape (n, d): pressure along the normals, shear along the tangents."""
+        if self.normal is None:
+            return self.pressure[:, None]
+        tangent = np.stack([self.normal[:, 1], -self.normal[:, 0]], axis=1)
+        return np.asarray(self.pressure[:, None] * self.normal + self.shear[:, None] * tangent)
+
     def table(self) -> dict[str, list[Any]]:
         """Return Gamma_c as plain columns, one row a contact node: ``pandas.DataFrame(contact.table())`` reads it."""
-        names = ("x", "weights", "pressure", "shear", "bound", "gap", "slip")
+        names = ("x", *(() if self.y is None else ("y",)), "s", "weights", "pressure", "shear", "bound", "gap", "slip")
         return {name: getattr(self, name).tolist() for name in names} | {"status": list(self.status)}
 
     def to_dict(self) -> dict[str, Any]:
         """Return the objects ``force``, ``pattern`` and ``contact`` that runs and solutions share."""
-        arrays = {name: getattr(self, name).tolist() for name in ("x", "pressure", "shear", "bound", "gap", "slip")}
-        return {"force": self.force, "pattern": self.pattern, "contact": {**arrays, "state": list(self.status)}}
+        names = ("x", "y", "s", "normal", "pressure", "shear", "bound", "gap", "slip")
+        arrays = {name: getattr(self, name) for name in names}
+        why = "bars meet at a point" if self.normal is None else "the pair is made from matrices, without meshes"
+        missing = {name: why for name, values in arrays.items() if values is None}
+        lists = {name: None if values is None else values.tolist() for name, values in arrays.items()}
+        return {
+            "force": {**self.force, "vector": (self.weights @ self.tractions).tolist()},
+            "pattern": self.pattern,
+            "contact": {**lists, "state": list(self.status), **({"reason": missing} if missing else {})},
+        }

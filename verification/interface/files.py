@@ -3,9 +3,10 @@
 Arrays: S1, S2, load1, load2, x, weights, gap; x_neumann and weights_neumann, the nodes of the Neumann body; kernel and
 transfer where there are such; known1, known2, free1, free2 (which interface components Gamma_u leaves free, and the
 displacement of the others); motions1 or motions2, where only contact holds a body, an orthonormal basis of the kernel
-of its matrix.  Texts: friction, neumann_body, dimension, theta, tolerance, max_iterations, with numbers as texts; law
-and outside, the words of a law of friction; ndtheory, the version.  Interface vectors list all tangential components
-from left to right, then all normal ones along y.
+of its matrix; points, normals, points_neumann, normals_neumann along a named line: coordinates of the nodes and unit
+normals from body 1 to body 2.  Texts: friction, neumann_body, dimension, theta, tolerance, max_iterations, with numbers
+as texts; law and outside, the words of a law of friction; ndtheory, the version.  Interface vectors list all tangential
+components from left to right, then all normal ones along y; along a named line in its direction and along its normals.
 """
 
 from __future__ import annotations
@@ -50,6 +51,8 @@ def write_interface(pair: ContactPair, path: Path) -> None:
             arrays[f"motions{i}"] = side.motions
     for name, grid in (("", interface.contact), ("_neumann", interface.neumann)):
         arrays |= {f"x{name}": grid.x, f"weights{name}": grid.weights}
+        if grid.normals is not None and grid.points is not None:
+            arrays |= {f"points{name}": grid.points, f"normals{name}": grid.normals}
     arrays |= {
         "gap": interface.gap,
         "friction": str(pair.friction),
@@ -72,8 +75,9 @@ def write_transfer(interface: Interface, path: Path) -> None:
     """Write P as ``scipy.sparse.load_npz`` reads it, with the positions and weights of both grids beside it.
 
     P leads from nodal values on the Neumann grid to those on the contact grid, its transpose from nodal forces back.
+    Where normals differ it acts on vectors, of both components, with normals from body 1 to body 2.
     """
-    P = sp.csr_array(interface.transfer)
+    P = sp.csr_array(interface.transfer if interface.on_traces is None else interface.on_traces)
     arrays = {"format": b"csr", "shape": P.shape, "data": P.data, "indices": P.indices, "indptr": P.indptr}
     for name, grid in (("contact", interface.contact), ("neumann", interface.neumann)):
         arrays |= {f"x_{name}": grid.x, f"weights_{name}": grid.weights}
@@ -148,14 +152,20 @@ def _pair(arrays: dict[str, np.ndarray], source: str) -> ContactPair:
     neumann_body: Literal[1, 2] = texts.take("neumann_body", choice(1, 2))
     x, n = arrays["x"], len(arrays["x"])
     transfer = arrays.get("transfer")
-    grid = Grid(x=real_array("x", x, (n,)), weights=real_array("weights", arrays["weights"], (n,)), dimension=dimension)
+    grid = Grid(
+        x=real_array("x", x, (n,)),
+        weights=real_array("weights", arrays["weights"], (n,)),
+        dimension=dimension,
+        **_line(arrays, "", n),
+    )
     other = grid
     if transfer is not None:
         m = transfer.shape[-1]
         transfer = real_array("transfer", transfer, (n, m))
         unknown = np.full(m, np.nan)
         weights = real_array("weights_neumann", arrays.get("weights_neumann", transfer.T @ grid.weights), (m,))
-        other = Grid(x=np.array(arrays.get("x_neumann", unknown), dtype=float), weights=weights, dimension=dimension)
+        x_neumann = np.array(arrays.get("x_neumann", unknown), dtype=float)
+        other = Grid(x=x_neumann, weights=weights, dimension=dimension, **_line(arrays, "_neumann", m))
     law = None
     if "kernel" in arrays:
         kernel = real_array("kernel", arrays["kernel"], (n, other.n))
@@ -175,13 +185,23 @@ def _pair(arrays: dict[str, np.ndarray], source: str) -> ContactPair:
     check_nodes(grid.x, grid.weights)
     if neumann.loose:
         raise ValueError(f"motions{neumann_body}: needed none of the body with the Neumann problem")
-    interface = Interface(
-        contact=grid, neumann=other, gap=real_array("gap", arrays["gap"], (n,)), law=law, transfer=transfer
-    )
+    interface = Interface.joining(grid, other, transfer, gap=real_array("gap", arrays["gap"], (n,)), law=law)
+    if neumann_body == 1:
+        interface = interface.reversed()
     pair = ContactPair(
         contact=contact, neumann=neumann, interface=interface, neumann_body=neumann_body, settings=settings
     )
     return pair.at(friction=texts.take("friction", non_negative))
+
+
+def _line(arrays: dict[str, np.ndarray], name: str, n: int) -> dict[str, Any]:
+    """Return the points and normals of a named line, if the file has them."""
+    if f"normals{name}" not in arrays:
+        return {}
+    found = {part: real_array(f"{part}{name}", arrays.get(f"{part}{name}"), (n, 2)) for part in ("points", "normals")}
+    if np.abs(np.linalg.norm(found["normals"], axis=1) - 1).max(initial=0.0) > ASYMMETRY:
+        raise ValueError(f"normals{name}: needed vectors of length 1")
+    return found
 
 
 def _side(arrays: dict[str, np.ndarray], i: int, grid: Grid) -> Condensed:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, ClassVar, Literal
@@ -19,22 +19,46 @@ from verification.value import Value, freeze
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Grid(Value):
-    """The contact nodes of one body, from left to right, with the trapezoid rule on them.
+    """The contact nodes of one body, in the direction of s, with the trapezoid rule on them.
 
     An interface vector on it lists all tangential components first, then all normal ones.
 
     Attributes
     ----------
     x : array, shape (n,)
-        Positions along Gamma_c, unit of length; in 1D the one point.
+        Positions along Gamma_c, unit of length: x where it lies along an interval, distances s from its first node
+        along a named line; in 1D the one point.
     weights : array, shape (n,)
         w_j of the trapezoid rule, unit of length; 1 in 1D.
     dimension : {1, 2}
+    points : array, shape (n, 2), or None
+        Coordinates of the nodes, where they are known.
+    normals : array, shape (n, 2), or None
+        Unit normals from body 1 to body 2; vectors are split into components along them and along the tangents.  None
+        where all are (0, 1).
     """
 
     x: Floats
     weights: Floats
     dimension: Literal[1, 2] = 2
+    points: Floats | None = None
+    normals: Floats | None = None
+
+    @property
+    def s(self) -> Floats:
+        """Distances from the first node along Gamma_c."""
+        return self.x - self.x[:1]
+
+    @property
+    def upright(self) -> Floats:
+        """Unit normals of the nodes from body 1 to body 2, shape (n, 2), (0, 1) without their own."""
+        return np.tile((0.0, 1.0), (self.n, 1)) if self.normals is None else self.normals
+
+    def place(self, j: int) -> str:
+        """Return the place of a node, for a message."""
+        if self.normals is None or self.points is None:
+            return f"x = {self.x[j]:g}"
+        return f"({self.points[j, 0]:g}, {self.points[j, 1]:g})"
 
     @property
     def summary(self) -> str:
@@ -46,8 +70,9 @@ class Grid(Value):
         return cls(x=x, weights=trapezoid(x), dimension=dimension)
 
     def equals(self, other: Grid) -> bool:
-        """Return True for the same nodes and weights."""
-        return all(map(np.array_equal, (self.x, self.weights), (other.x, other.weights)))
+        """Return True for the same nodes, weights and normals."""
+        parts = ((self.x, other.x), (self.weights, other.weights), (self.upright, other.upright))
+        return all(np.array_equal(mine, its) for mine, its in parts)
 
     @property
     def n(self) -> int:
@@ -155,6 +180,9 @@ class Interface(Value):
         None where both grids are one: then P is the identity.
     profile : Profile or None
         How the coefficient of friction varies along Gamma_c; None where it is constant.
+    on_traces : array, shape (contact components, Neumann components), or None
+        P on vectors, where the normals of the two grids differ: it turns each vector from one node's directions into
+        another's.  None where P acts on each component by itself.
     """
 
     contact: Grid
@@ -163,6 +191,25 @@ class Interface(Value):
     law: Law | None = None
     transfer: Floats | None = None
     profile: Profile | None = None
+    on_traces: Floats | None = None
+
+    @classmethod
+    def joining(cls, contact: Grid, neumann: Grid, transfer: Floats | None, **rest: Any) -> Interface:
+        """Return an interface with this transfer P between nodal values, each node with the normal of its grid."""
+        turning = turned_transfer(transfer, contact.normals, neumann.normals)
+        return cls(contact=contact, neumann=neumann, transfer=transfer, on_traces=turning, **rest)
+
+    def reversed(self) -> Interface:
+        """Return the interface for vectors with their normal components along the opposite direction."""
+        if self.on_traces is None:
+            return self
+        return replace(self, on_traces=self.contact.turn(self.neumann.turn(self.on_traces.T).T))
+
+    @property
+    def moduli(self) -> Interface:
+        """The interface with the moduli of all entries of P, to bound rounding."""
+        transfer, on_traces = (None if P is None else np.abs(P) for P in (self.transfer, self.on_traces))
+        return replace(self, transfer=transfer, on_traces=on_traces)
 
     @property
     def counts(self) -> dict[str, int]:
@@ -192,9 +239,9 @@ class Interface(Value):
         """``k_j / max k`` at the contact nodes, rationals where their positions are; None where k is constant."""
         if self.profile is None:
             return None
-        x = self.contact.x
-        found = [self.profile.at(Fraction(s)) for s in x - x[0]]
-        return np.array(found, dtype=x.dtype)
+        s = self.contact.s
+        found = [self.profile.at(Fraction(value)) for value in s]
+        return np.array(found, dtype=s.dtype)
 
     def operator(self, law: Law) -> Floats:
         """Return the operator of a law, each row times the share of its contact node."""
@@ -203,12 +250,15 @@ class Interface(Value):
 
     @property
     def contact_kernel(self) -> Floats | None:
-        """S as a matrix on normal nodal forces of the contact grid, shape (contact nodes, contact nodes)."""
+        """S as a matrix on normal nodal forces of the contact grid, shape (contact nodes, contact nodes).
+
+        On all its components, where normals differ: tangential forces of one grid have a normal part on the other.
+        """
         if self.transfer is not None and self.law is not None and self.law.of_contact:
             return self.operator(self.law)
         if self.transfer is None or self.kernel is None:
             return self.kernel
-        return self.kernel @ self.transfer.T
+        return self.kernel @ (self.transfer if self.on_traces is None else self.on_traces[:, self.neumann.normal]).T
 
     def stress(self, force: Floats) -> Floats:
         """Return ``S sigma_N`` at the contact nodes for a force on the Neumann grid; 0 without a law of friction."""
@@ -219,30 +269,33 @@ class Interface(Value):
         """Return ``P u``: traces on the Neumann grid, one or columns of them, on the contact grid."""
         if self.transfer is None:
             return traces
+        if self.on_traces is not None:
+            return np.asarray(self.on_traces @ traces)
         return np.concatenate([self.transfer @ block for block in self.neumann.components(traces)])
 
     def carry_back(self, forces: Floats) -> Floats:
         """Return ``P' f``: nodal forces on the contact grid, one or columns of them, on the Neumann grid."""
         if self.transfer is None:
             return forces
-        return np.concatenate([self.onto_neumann(block) for block in self.contact.components(forces)])
+        if self.on_traces is not None:
+            return np.asarray(self.on_traces.T @ forces)
+        return np.concatenate([self.transfer.T @ block for block in self.contact.components(forces)])
 
     def spread(self, forces: Floats) -> Floats:
         """Return the nodal forces on the contact grid that have the stresses of given ones on the Neumann grid."""
         if self.transfer is None:
             return forces
         stresses = self.neumann.components(forces) / self.neumann.weights
-        return np.concatenate([self.contact.weights * (self.transfer @ stress) for stress in stresses])
+        carried = self.contact.components(self.carry(stresses.reshape(-1)))
+        return np.asarray((self.contact.weights * carried).reshape(-1))
 
     def reaches(self, components: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return True for the contact components whose forces act on given components of the Neumann grid."""
         if self.transfer is None:
             return components
+        if self.on_traces is not None:
+            return np.asarray((self.on_traces != 0) @ components)
         return np.concatenate([(self.transfer != 0) @ block for block in self.neumann.components(components)])
-
-    def onto_neumann(self, forces: Floats) -> Floats:
-        """Return ``P' f`` of one component: nodal forces on the contact grid, one or columns of them."""
-        return forces if self.transfer is None else np.asarray(self.transfer.T @ forces)
 
     def pressed(self, touching: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return True for the Neumann nodes on which the forces of some contact nodes act."""
@@ -257,3 +310,17 @@ class Interface(Value):
         if self.transfer is not None:
             raise ValueError("the grids differ: needed a pair built for these roles, with its own transfer")
         return Interface(contact=self.neumann, neumann=self.contact, gap=self.gap, law=self.law, profile=self.profile)
+
+
+def turned_transfer(P: NDArray[Any] | None, contact: NDArray[Any] | None, neumann: NDArray[Any] | None) -> Any:
+    """Return P on vectors, tangential components first, between nodes with these normals; rational where they are.
+
+    None where all normals are the same, or P is the identity: then it acts on each component by itself.
+    """
+    if P is None or contact is None or neumann is None:
+        return None
+    if all((normals == contact[0]).all() for normals in (contact, neumann)):
+        return None
+    tangents = [np.stack([normals[:, 1], -normals[:, 0]], axis=1) for normals in (contact, neumann)]
+    rows, columns = ((t, n) for t, n in zip(tangents, (contact, neumann), strict=True))
+    return np.block([[P * (one @ other.T) for other in columns] for one in rows])

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from fem1d2d import Mesh, MeshError, facing, mortar, surface
+from fem1d2d import Line, Mesh, MeshError, Supports, facing, mortar, surface, trapezoid
 from fem1d2d.mesh import Floats, Ints
 from fem1d2d.trace import SAME, extent
 from verification.interface.friction import LAWS
@@ -29,7 +30,9 @@ UPPER = (True, False)
 Ends = tuple[float, float]
 
 
-def join(problem: Problem, meshes: list[Mesh | None], law: Law | None = None) -> tuple[list[Ints], Interface]:
+def join(
+    problem: Problem, meshes: list[Mesh | None], known: list[Supports | None], law: Law | None = None
+) -> tuple[list[Ints], Interface]:
     """Find Gamma_c, the nodes of each body on it, and the transfer between their grids.
 
     Gamma_c begins and ends at nodes of the body that carries the contact grid.  The surface of the other body covers
@@ -39,21 +42,41 @@ def join(problem: Problem, meshes: list[Mesh | None], law: Law | None = None) ->
     ----------
     meshes : list of Mesh or None
         Of body 1 and of body 2; None where rigid.
+    known : list of Supports or None
+        Of the same bodies.
     law : Law, optional
         A law of friction in place of the problem's.
 
     Returns
     -------
     list of int array
-        Nodes from left to right; none on a rigid body.
+        Nodes from left to right, or in the direction of a named line; none on a rigid body.
     Interface
 
     Raises
     ------
     ProblemError
         Bodies that do not lie opposite each other or lie deep in each other, an interval outside the overlap or
-        without nodes of the contact body at its ends, a surface with a hole, a steep contact body, too many nodes.
+        without nodes of the contact body at its ends, a surface with a hole, a steep contact body, too many nodes; a
+        named line that is none, with a sharp corner, or that the other body does not face everywhere.
     """
+    nodes, grids, P, gap = (_along_x if problem.contact.surface is None else _along_lines)(problem, meshes, known)
+    contact, neumann = grids if problem.contact_body == 1 else grids[::-1]
+    law = law or LAWS[problem.contact.law].of(problem.contact.radius)
+    interface = Interface.joining(contact, neumann, P, gap=gap, law=law, profile=problem.contact.profile)
+    _check_profile(problem, interface)
+    if P is not None and interface.contact_kernel is not None and not interface.contact_kernel.any():
+        needed = "needed a larger one: it reaches no node of the Neumann grid from any contact node, so that S is 0"
+        raise problem.refuse("contact.radius", problem.contact.radius, needed)
+    return nodes, interface
+
+
+#: Nodes and grids of both bodies, the transfer, and the gap.
+Joined = tuple[list[Ints], list[Grid], Floats | None, Floats]
+
+
+def _along_x(problem: Problem, meshes: list[Mesh | None], known: list[Supports | None]) -> Joined:
+    """Join two surfaces over a part of the x axis, with vertical normals."""
     size = max(extent(mesh) for mesh in meshes if mesh is not None)
     contact = problem.contact_body - 1
     nodes = _surfaces(problem, meshes, _interval(problem))
@@ -71,38 +94,104 @@ def join(problem: Problem, meshes: list[Mesh | None], law: Law | None = None) ->
     ]
     positions = [p[:, 0] for p in points if p is not None]
     # one grid has the positions of body 1, so that constants do not depend on the roles, to the last digit
-    grid = neumann = Grid.on(positions[0], problem.dimension)
-    P = None
+    grids, P = [Grid.on(positions[0], problem.dimension)] * 2, None
     if problem.dimension == 2 and len(positions) == 2 and not _same(positions[0], positions[1], SAME * size):
-        most = max(map(len, positions))
-        if most > MOST_NODES_APART:
-            needed = f"needed at most {MOST_NODES_APART} contact nodes on grids that differ, these are {most}"
-            raise problem.refuse("contact", None, needed)
-        grid, x = Grid.on(positions[contact]), positions[1 - contact].copy()
-        x[0], x[-1] = min(x[0], grid.x[0]), max(x[-1], grid.x[-1])  # ends that differ by rounding
-        P = mortar(grid.x, x)
-        neumann = Grid(x=x, weights=P.T @ grid.weights)
-        levels[1 - contact] = P @ levels[1 - contact]
-    interface = Interface(
-        contact=grid,
-        neumann=neumann,
-        gap=_gap(problem, meshes, grid, [np.broadcast_to(level, grid.x.shape) for level in levels], SAME * size),
-        law=law or LAWS[problem.contact.law].of(problem.contact.radius),
-        transfer=P,
-        profile=problem.contact.profile,
-    )
-    _check_profile(problem, interface, SAME * size)
-    if P is not None and interface.contact_kernel is not None and not interface.contact_kernel.any():
-        needed = "needed a larger one: it reaches no node of the Neumann grid from any contact node, so that S is 0"
-        raise problem.refuse("contact.radius", problem.contact.radius, needed)
-    return nodes, interface
+        x, P, w = _transfer(problem, positions[contact], positions[1 - contact])
+        grids = [Grid.on(positions[contact]), Grid(x=x, weights=w)]
+        levels[1 - contact] = np.interp(grids[0].x, x, levels[1 - contact])  # of convex bodies never below 0
+        grids = grids if contact == 0 else grids[::-1]
+    at = grids[contact].x
+    if problem.dimension == 2 and points[contact] is not None:
+        own = points[contact]
+        grids[contact] = replace(grids[contact], points=own)
+        grids[1 - contact] = grids[1 - contact] if P is not None else grids[contact]
+    gap = _gap(problem, levels[1] - levels[0], SAME * size)
+    j = int(np.argmin(gap))
+    height = min(float(np.ptp(mesh.points[:, -1].astype(float))) for mesh in meshes if mesh is not None)
+    if gap[j] < -MOST_OVERLAP * height:
+        axis = "x" if problem.dimension == 1 else "y"
+        where = "" if problem.dimension == 1 else f"at x = {at[j]:g} "
+        low, high = (np.broadcast_to(level, at.shape)[j] for level in levels)
+        needed = (
+            f"the bodies lie in each other: {where}body 1 ends at {axis} = {low:g}, body 2 begins at {axis} ="
+            f" {high:g}; needed an overlap of at most {100 * MOST_OVERLAP:g} % of the height {height:g}"
+        )
+        raise problem.refuse(f"body2.{axis}", None, needed)
+    return nodes, grids, P, np.broadcast_to(gap, at.shape).copy()
 
 
-def _check_profile(problem: Problem, interface: Interface, rounding: float) -> None:
+def _transfer(problem: Problem, contact: Floats, neumann: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return the positions of the Neumann grid, P, and its weights."""
+    most = max(len(contact), len(neumann))
+    if most > MOST_NODES_APART:
+        needed = f"needed at most {MOST_NODES_APART} contact nodes on grids that differ, these are {most}"
+        raise problem.refuse("contact", None, needed)
+    x = neumann.copy()
+    x[0], x[-1] = min(x[0], contact[0]), max(x[-1], contact[-1])  # ends that differ by rounding
+    P = mortar(contact, x)
+    return x, P, P.T @ trapezoid(contact)
+
+
+def _along_lines(problem: Problem, meshes: list[Mesh | None], known: list[Supports | None]) -> Joined:
+    """Join two named sides of any shape along the contact body's line and its normals.
+
+    Body 2 lies on the left of the direction of s, so that the normals lead from body 1 to body 2.
+    """
+    sides, lines, both = problem.contact.surface, [], []
+    assert sides is not None
+    refuse = lambda needed: problem.refuse("contact.surface", list(sides), needed)
+    for i, (side, mesh, held) in enumerate(zip(sides, meshes, known, strict=True)):
+        assert mesh is not None
+        assert held is not None
+        if side not in mesh.sides:
+            raise refuse(f"body {i + 1} has no side {side!r}; its sides: {', '.join(mesh.sides)}")
+        try:
+            lines.append(Line.along(mesh, side, left=i == 1, mirrored=held.held))
+        except MeshError as error:
+            raise refuse(f"body {i + 1}: {error}") from None
+        both.append(mesh)
+    contact = problem.contact_body - 1
+    line, other = lines[contact], lines[1 - contact]
+    try:
+        seen = line.seen_from(other)
+    except MeshError as error:
+        needed = f"side {sides[1 - contact]!r} of body {2 - contact} {error}, of {sides[contact]!r}"
+        raise refuse(f"{needed}: it must face all of the contact body's side along its normals") from None
+    size = max(map(extent, both))
+    within, s = SAME * size, seen.s
+    kept = np.append(s[1:] > within, True) & np.insert(s[:-1] < line.s[-1] - within, 0, True)
+    s, nodes = s[kept], [line.nodes, other.nodes[kept]]
+    P = None
+    normals = line.normals_at(s)
+    if _same(line.s, s, within):
+        whole = bool(kept.all()) and np.allclose(line.normals, other.normals, rtol=0, atol=SAME)
+        own = lines[0] if whole else line  # one line for both roles, so that constants have the same digits in both
+        grids = [Grid(x=own.s, weights=trapezoid(own.s), points=own.points, normals=own.normals)] * 2
+    else:
+        x, P, w = _transfer(problem, line.s, s)
+        grids = [
+            Grid(x=line.s, weights=trapezoid(line.s), points=line.points, normals=line.normals),
+            Grid(x=x, weights=w, points=other.points[kept], normals=normals),
+        ]
+    if all(
+        np.array_equal(grid.upright, [(0.0, 1.0)] * grid.n) for grid in grids
+    ):  # upright: the components are those along x and y
+        grids = [replace(grid, normals=None) for grid in grids]
+    gap = _gap(problem, seen.gap if contact == 0 else -seen.gap, within)
+    j = int(np.argmin(gap))
+    height = min(float(np.ptp(mesh.points.astype(float), axis=0).min()) for mesh in both)
+    if gap[j] < -MOST_OVERLAP * height:
+        depth = f"by {-gap[j]:.4g} at ({line.points[j, 0]:g}, {line.points[j, 1]:g})"
+        needed = f"needed an overlap of at most {100 * MOST_OVERLAP:g} % of the smaller extent {height:g}"
+        raise refuse(f"the bodies lie in each other {depth}: {needed}")
+    return nodes if contact == 0 else nodes[::-1], grids if contact == 0 else grids[::-1], P, gap
+
+
+def _check_profile(problem: Problem, interface: Interface) -> None:
     """Refuse a table of the coefficient of friction that ends before Gamma_c does."""
-    profile, x = interface.profile, interface.contact.x
-    if profile is not None and float(profile.s[-1]) < x[-1] - x[0] - rounding:
-        needed = f"needed distances up to the length of Gamma_c, {x[-1] - x[0]:g}"
+    profile, length = interface.profile, float(interface.contact.s[-1])
+    if profile is not None and float(profile.s[-1]) < length * (1 - SAME):
+        needed = f"needed distances up to the length of Gamma_c, {length:g}"
         raise problem.refuse("contact.friction.s", list(profile.s), needed)
 
 
@@ -211,7 +300,7 @@ def check_slopes(problem: Problem, points: Sequence[Floats | None]) -> None:
     rise = _slopes(own)
     j = int(np.argmax(np.abs(rise)))
     (left, low), (right, high) = own[j : j + 2]
-    remedy = f"body {3 - contact} is steep too, so that no roles are possible"
+    remedy = f"body {3 - contact} is steep too: name both sides by contact.surface, which takes lines of any shape"
     if _flat(other):
         remedy = f"body {3 - contact} is flat: give body {contact} the Neumann problem"
         remedy += f" (iteration.neumann_body = {contact})"
@@ -235,27 +324,15 @@ def _flat(points: Floats) -> bool:
     return bool(np.abs(_slopes(points)).max() <= STEEPEST + SAME)
 
 
-def _gap(problem: Problem, meshes: Sequence[Mesh | None], grid: Grid, levels: list[Floats], rounding: float) -> Floats:
+def _gap(problem: Problem, distance: Floats, rounding: float) -> Floats:
     """Return the initial distance at the contact nodes: of the surfaces as they are drawn, plus ``contact.gap``.
 
     It is negative where the bodies are drawn into each other.  Flat bodies have one distance: a value that differs
     from the least one by rounding is set to it, and one that differs from 0 by rounding is set to 0.
     """
-    distance = levels[1] - levels[0]
     least = float(distance.min())
     least = 0.0 if abs(least) <= rounding else least
-    gap = np.where(np.abs(distance - least) <= rounding, least, distance) + float(problem.contact.gap)
-    j = int(np.argmin(gap))
-    height = min(float(np.ptp(mesh.points[:, -1].astype(float))) for mesh in meshes if mesh is not None)
-    if gap[j] < -MOST_OVERLAP * height:
-        axis = "x" if problem.dimension == 1 else "y"
-        where = "" if problem.dimension == 1 else f"at x = {grid.x[j]:g} "
-        needed = (
-            f"the bodies lie in each other: {where}body 1 ends at {axis} = {levels[0][j]:g}, body 2 begins at {axis} ="
-            f" {levels[1][j]:g}; needed an overlap of at most {100 * MOST_OVERLAP:g} % of the height {height:g}"
-        )
-        raise problem.refuse(f"body2.{axis}", None, needed)
-    return gap
+    return np.asarray(np.where(np.abs(distance - least) <= rounding, least, distance) + float(problem.contact.gap))
 
 
 def _same(one: Floats, other: Floats, within: float) -> bool:

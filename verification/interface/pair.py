@@ -87,9 +87,14 @@ class ContactPair(Value):
 
     @property
     def along_y(self) -> tuple[Condensed, Condensed]:
-        """The lower body and the upper one with their normal components along y, as matrices are written and read."""
+        """Both bodies with their normal components from body 1 to body 2, as matrices are written and read."""
         lower, upper = (side if side.upward else side.turned() for side in (self.body1, self.body2))
         return lower, upper
+
+    @property
+    def interface_along_y(self) -> Interface:
+        """The interface for vectors as those of :attr:`along_y`."""
+        return self.interface if self.contact.upward else self.interface.reversed()
 
     @property
     def normal_sign(self) -> float:
@@ -166,7 +171,8 @@ class ContactPair(Value):
     def swapped(self) -> ContactPair:
         """Return the same bodies with the roles exchanged; condensed matrices are shared.
 
-        Where the grids differ the transfer is made anew, from the problem with these roles.
+        Where the grids differ, or the line is a named one, the interface is made anew, from the problem with these
+        roles.
 
         Raises
         ------
@@ -179,7 +185,8 @@ class ContactPair(Value):
         """
         if self.contact.loose:
             raise SingularRole(self.source, self.contact_body, self.contact.motions.shape[1])
-        if self.interface.transfer is not None and self.problem is not None:
+        named = self.problem is not None and self.problem.contact.surface is not None
+        if (self.interface.transfer is not None or named) and self.problem is not None:
             return pair_from(self.problem.swapped(), law=self.interface.law, like=self)
         if self.problem is not None and self.contact.grid.dimension == 2:
             bodies = [side.mesh_body for side in (self.body1, self.body2)]
@@ -206,7 +213,7 @@ class ContactPair(Value):
         return TwoBodies(
             body1=self.body1.loaded_body,
             body2=self.body2.loaded_body,
-            interface=self.interface,
+            interface=self.interface_along_y,
             friction=self.friction,
             problem=self.problem,
         )
@@ -294,7 +301,7 @@ def pair_from(problem: Problem, *, law: Law | None = None, like: ContactPair | N
     return ContactPair(
         contact=lower if upward else upper,
         neumann=upper if upward else lower,
-        interface=bodies.interface,
+        interface=bodies.interface if upward else bodies.interface.reversed(),
         friction=bodies.friction,
         neumann_body=iteration.neumann_body,
         settings=iteration.settings,

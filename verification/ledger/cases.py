@@ -119,7 +119,8 @@ def _plates(lower: Any = None, upper: Any = None, **tables: Any) -> dict[str, An
     }
 
 
-#: Both roles; nodes that stick, slip and are open; an initial gap; no friction; grids that differ; one dimension.
+#: Both roles; nodes that stick, slip and are open; an initial gap; no friction; grids that differ; an upright line that
+#: is named; one dimension.
 PROBLEMS: dict[str, dict[str, Any]] = {
     "pressed": _plates(),
     "sheared, body 2 Neumann": _plates(
@@ -146,6 +147,12 @@ PROBLEMS: dict[str, dict[str, Any]] = {
         {"young": 7, "cells": [11, 2], "prescribed": {"top": [0, "-0.006"]}, "traction": {"right": [0, "0.9"]}},
         iteration={"neumann_body": 2, "theta": "0.7"},
     ),
+    "side by side, grids that differ": {
+        "body1": rectangle(["-0.3", 0], [0, "1.2"], [2, 6], 7, "0.3", fixed=["left"]),
+        "body2": rectangle([0, "0.3"], [0, "1.2"], [2, 5], 2, "0.3", prescribed={"right": ["-0.015", "0.006"]}),
+        "contact": {"surface": ["right", "left"], "friction": "0.1", "radius": "0.3"},
+        "iteration": {"neumann_body": 1, "theta": "0.7", **RUN},
+    },
     "bars with a gap": {
         "dimension": 1,
         "body1": {"shape": "interval", "x": [0, 2], "cells": 3, "young": 1, "fixed": ["left"], "body_force": "0.1"},

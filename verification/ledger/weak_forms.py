@@ -123,7 +123,7 @@ class Weak:
     def of(self, displacements: tuple[Floats | None, Floats | None]) -> Fields:
         """The unknowns of two displacement fields, the lower body's first."""
         first, second = (
-            displacement.ravel()[body.positions] if displacement is not None else np.zeros(len(body.positions))
+            body.of_nodes(displacement) if displacement is not None else np.zeros(len(body.positions))
             for body, displacement in zip(self.pair.on_meshes().elastic, displacements, strict=True)
         )
         return Fields(one=first, two=second) if self.pair.neumann_body == 2 else Fields(one=second, two=first)

@@ -84,12 +84,12 @@ class Folder:
     def _tables(self, room: Path, result: Run | Solution) -> None:
         """Gamma_c and the history as CSV, the interface as matrices, the fields, the problem where a user has none."""
         length, stress = result.units["length"], result.units["stress"]
-        units = f"x, gap, slip in {length}; pressure, shear, bound in {stress}"
+        units = f"x, y, s, gap, slip in {length}; pressure, shear, bound in {stress}"
         _csv(room / "contact.csv", units, result.contact.table())
         if isinstance(result, Run):
             _csv(room / "history.csv", "residuals in the norm (5.21), relative ones without unit", result.table())
             write_interface(result.pair, room / "interface.npz")
-        interface = result.pair.interface if isinstance(result, Run) else result.bodies.interface
+        interface = result.pair.interface_along_y if isinstance(result, Run) else result.bodies.interface
         if interface.transfer is not None:
             write_transfer(interface, room / "P.npz")
         write_fields(result, room)

@@ -106,6 +106,10 @@ def read_problem(data: Mapping[str, Any], source: str) -> ProblemSpec:
         needed = f"needed a modulus within {float(MOST_CONTRAST):g} times that of body1, {float(body1.young):g}"
         raise top.refuse("body2.young", body2.young, f'{needed}; for `solve`, shape = "rigid" makes an obstacle')
     contact = _read_contact(top.table("contact"), dimension)
+    for name, body in (("body1", body1), ("body2", body2)):
+        if body.rigid and contact.surface:
+            needed = "needed an elastic body: an obstacle has no named sides (contact.interval takes one)"
+            raise top.refuse(f"{name}.shape", "rigid", needed)
     iteration = _read_iteration(top.table("iteration"))
     norm = top.table("norm")
     length = norm.take("length", positive, Fraction(1))
@@ -304,9 +308,14 @@ def _read_contact(table: TomlTable, dimension: int) -> ContactSpec:
     friction, profile = table.take("friction", lambda value: _friction(value, table), (Fraction(0), None))
     law = table.take("law", choice(*laws), "nonlocal")
     radius = table.take("radius", positive, None)
-    interval = table.take("interval", ends, None)
+    interval: Any = table.take("interval", ends, None)
     gap = table.take("gap", non_negative, Fraction(0))
+    names = several(label, 2, 'two names of sides, of body 1 and of body 2, as ["deck", "tip"]')
+    surface: Any = table.take("surface", names, None)
     table.close()
+    if surface is not None and (interval is not None or dimension == 1):
+        why = "needed either surface or interval, not both" if dimension == 2 else "two bars meet at a point"
+        raise table.refuse("surface", list(surface), f"{why}; leave it out")
     if dimension == 1:
         if friction:
             raise table.refuse("friction", friction, "needed 0: two bars have no friction")
@@ -318,7 +327,9 @@ def _read_contact(table: TomlTable, dimension: int) -> ContactSpec:
             None,
             f'this key is missing; the {laws[law].label} law needs the radius of its kernel (or law = "local")',
         )
-    return ContactSpec(interval=interval, friction=friction, law=law, radius=radius, gap=gap, profile=profile)
+    return ContactSpec(
+        interval=interval, surface=surface, friction=friction, law=law, radius=radius, gap=gap, profile=profile
+    )
 
 
 def _friction(value: Any, table: TomlTable) -> tuple[Fraction, Profile | None]:

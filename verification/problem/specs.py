@@ -225,6 +225,8 @@ class ContactSpec:
     ----------
     interval : pair of Fraction or None
         Ends of Gamma_c along x; None: the overlap of the two surfaces.
+    surface : pair of str or None
+        Names of the sides of body 1 and of body 2 that meet, instead of an interval: a line of any shape.
     friction : Fraction
         k, the largest one where it varies along Gamma_c.
     law : str
@@ -243,6 +245,7 @@ class ContactSpec:
     radius: Fraction | None
     gap: Fraction
     profile: Profile | None = None
+    surface: tuple[str, str] | None = None
 
     @property
     def frictions(self) -> tuple[float, ...]:

@@ -1,0 +1,197 @@
+"""A line of contact: ordered nodes along a named side, with lengths, normals, and the projection of another line on it.
+
+The positions of the rest are distances s along the line.  A line has one direction, and its normals lie on the left.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fem1d2d.mesh import Floats, Ints, Mesh, MeshError, undirected
+from fem1d2d.trace import SAME
+
+#: The largest corner between two edges, in degrees: beyond it a bisector is no normal of either, and the line is cut.
+SHARPEST = 20.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Line:
+    """A polygonal line of a body's surface.
+
+    Attributes
+    ----------
+    nodes : int array, shape (n,)
+        In the direction of s.
+    points : array, shape (n, 2)
+        Their coordinates.
+    normals : array, shape (n, 2)
+        Unit normals on the left of the line: the bisectors of its corners, at an end the normal of the edge.
+    """
+
+    nodes: Ints
+    points: Floats
+    normals: Floats
+
+    @classmethod
+    def along(cls, mesh: Mesh, side: str, *, left: bool, mirrored: NDArray[np.bool_] | None = None) -> Line:
+        """Order the nodes of a named side.
+
+        Parameters
+        ----------
+        left : bool
+            True if the body lies on the left of the direction of s, False if on the right.
+        mirrored : bool array, shape (nodes, 2), optional
+            Components that a support holds: where it holds one of an end node, the line goes on as its mirror image, as
+            in one half of a symmetric body, and that end's normal lies along the axis; not beyond a corner.
+
+        Raises
+        ------
+        MeshError
+            A side in several pieces, without ends, or with a corner of more than SHARPEST degrees.
+        """
+        on_boundary, on_side = (undirected(edges, len(mesh.points)) for edges in (mesh.boundary, mesh.sides[side]))
+        edges = mesh.boundary[np.isin(on_boundary, on_side)]
+        nodes = _chained(mesh, edges if left else edges[:, ::-1], side)
+        points = mesh.points[nodes].astype(float)
+        steps = np.diff(points, axis=0)
+        steps /= np.linalg.norm(steps, axis=1)[:, None]
+        before, after = np.vstack([steps[:1], steps]), np.vstack([steps, steps[-1:]])
+        if mirrored is not None:
+            for end, edge in ((0, before), (-1, after)):
+                held = mirrored[nodes[end]]
+                image = np.where(held, 1.0, -1.0) * steps[end]
+                if held.sum() == 1 and image @ steps[end] > np.cos(np.radians(SHARPEST)):
+                    edge[end] = image
+        turn = np.degrees(np.arctan2(_cross(before, after), (before * after).sum(axis=1)))
+        sharp = int(np.argmax(np.abs(turn)))
+        if abs(turn[sharp]) > SHARPEST:
+            raise MeshError(
+                f"the corner of side {side!r} at ({points[sharp, 0]:g}, {points[sharp, 1]:g}) has"
+                f" {abs(turn[sharp]):.3g} degrees: needed at most {SHARPEST:g}; cut the line there"
+            )
+        tangents = before + after
+        tangents /= np.linalg.norm(tangents, axis=1)[:, None]
+        tangents[np.abs(tangents) < SAME] = 0.0  # a line along an axis has that axis
+        tangents[np.abs(tangents) > 1 - SAME**2 / 2] = np.rint(tangents[np.abs(tangents) > 1 - SAME**2 / 2])
+        return cls(nodes=nodes, points=points, normals=np.stack([-tangents[:, 1], tangents[:, 0]], axis=1))
+
+    @cached_property
+    def s(self) -> Floats:
+        """Distances along the line from its first node, shape (n,)."""
+        return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(self.points, axis=0), axis=1))])
+
+    def normals_at(self, s: Floats) -> Floats:
+        """Unit normals at positions, linear between the nodes; beyond an end its own one."""
+        normals = np.stack([np.interp(s, self.s, self.normals[:, i]) for i in range(2)], axis=1)
+        sizes = np.linalg.norm(normals, axis=1)[:, None]
+        return np.asarray(np.where(np.abs(sizes - 1) > np.finfo(float).eps, normals / sizes, normals))
+
+    def seen_from(self, other: Line) -> Seen:
+        """Find where the normals of this line meet another one, of the same direction.
+
+        Raises
+        ------
+        MeshError
+            The normal at a node meets no part of the other line that faces it, or normals cross before it.
+        """
+        start, along = other.points[:-1], np.diff(other.points, axis=0)
+        tangents = np.stack([self.normals[:, 1], -self.normals[:, 0]], axis=1)
+        ahead = other.points @ tangents.T - (self.points * tangents).sum(axis=1)  # (other nodes, nodes)
+        rise = np.diff(ahead, axis=0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            place = -ahead[:-1] / rise
+        size = float(max(np.ptp(line.points, axis=0).max() for line in (self, other)))
+        slack = SAME * size / np.linalg.norm(along, axis=1)[:, None]
+        meets = (rise > 0) & (place >= -slack) & (place <= 1 + slack)
+        place = np.clip(np.where(meets, place, 0.0), 0.0, 1.0)
+        hit = start[:, None] + place[..., None] * along[:, None]  # (edges, nodes, 2)
+        far = np.abs(((hit - self.points) * self.normals).sum(axis=2))
+        edge = np.argmin(np.where(meets, far, np.inf), axis=0)
+        each = np.arange(len(self.points))
+        lost = ~meets.any(axis=0)
+        if lost.any():
+            raise MeshError(f"does not face {_at(self.points[np.argmax(lost)])}")
+        met = other.s[edge] + place[edge, each] * np.diff(other.s)[edge]
+        back = np.flatnonzero(np.diff(met) <= 0)
+        if len(back):
+            raise MeshError(f"is met by normals that cross near {_at(self.points[back[0]])}")
+        gap = ((smooth(other.s, other.points, met) - self.points) * self.normals).sum(axis=1)
+        return Seen(gap=gap, met=met, s=_onto(other.s, met, self.s))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Seen:
+    """Another line as it is seen along the normals of one.
+
+    Attributes
+    ----------
+    gap : array, shape (nodes of the one,)
+        Distance along the normal at each node, negative where it lies behind.
+    met : array, shape (nodes of the one,)
+        Position on the other line where that normal meets it.
+    s : array, shape (nodes of the other,)
+        Positions of its nodes on the one; nodes beyond the ends go on at the pace of the outermost edges.
+    """
+
+    gap: Floats
+    met: Floats
+    s: Floats
+
+
+def smooth(known: Floats, values: Floats, x: Floats) -> Floats:
+    """A smooth function through values at known positions, shape (n,) or (n, d), evaluated at x.
+
+    The nodes of a mesh lie on the curve that was meshed, and its edges beside it: an arc seen from its chords has a
+    ripple as high as each of them, and contact would feel it.  On each edge this is the cubic whose slopes at both
+    nodes are those of parabolas through three nodes: a straight line stays straight.
+
+    Examples
+    --------
+    >>> x = np.array([0.0, 1.0, 3.0, 4.0])
+    >>> smooth(x, x**2, np.array([2.0, 3.5]))
+    array([ 4.  , 12.25])
+    """
+    slopes = np.gradient(values, known, axis=0, edge_order=1 if len(known) < 3 else 2)
+    edge = np.clip(np.searchsorted(known, x, side="right") - 1, 0, len(known) - 2)
+    length, along = np.diff(known)[edge], x - known[edge]
+    if values.ndim > 1:
+        length, along = length[:, None], along[:, None]
+    u, rise = along / length, values[edge + 1] - values[edge]
+    bulge = (1 - u) * (slopes[edge] * length - rise) - u * (slopes[edge + 1] * length - rise)
+    return np.asarray(values[edge] + u * rise + u * (1 - u) * bulge)
+
+
+def _onto(x: Floats, known: Floats, values: Floats) -> Floats:
+    """A piecewise linear function at x, continued beyond the known positions by its outermost pieces."""
+    found = np.interp(x, known, values)
+    for end, beside, beyond in ((0, 1, x < known[0]), (-1, -2, x > known[-1])):
+        pace = (values[beside] - values[end]) / (known[beside] - known[end])
+        found[beyond] = values[end] + pace * (x[beyond] - known[end])
+    return found
+
+
+def _chained(mesh: Mesh, edges: Ints, side: str) -> Ints:
+    """The nodes of edges that follow each other, from the first to the last."""
+    following = dict(edges.tolist())
+    first = set(following) - set(following.values())
+    if not first:
+        raise MeshError(f"side {side!r} is closed: needed a line with two ends")
+    order = [min(first)]
+    while order[-1] in following and len(order) <= len(edges):
+        order.append(following[order[-1]])
+    if len(first) > 1 or len(order) != len(edges) + 1:
+        raise MeshError(f"side {side!r} has several pieces, one of which ends at {_at(mesh.points[order[-1]])}")
+    return np.array(order)
+
+
+def _cross(u: Floats, v: Floats) -> Floats:
+    return np.asarray(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+
+
+def _at(point: NDArray[Any]) -> str:
+    return f"({float(point[0]):g}, {float(point[1]):g})"

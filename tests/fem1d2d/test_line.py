@@ -1,0 +1,97 @@
+"""Lines of contact: order, direction, normals, corners, and another line as it is seen along the normals."""
+
+import numpy as np
+import pytest
+
+from fem1d2d import Line, Mesh, MeshError, mortar, rectangle, trapezoid
+
+
+def ring(radii, angles, *, cells=(1, 8), turn=0.0):
+    """A sector of a ring about the origin with the sides inner, outer, first and second."""
+    flat = rectangle(radii, angles, cells)
+    r, a = flat.points[:, 0], flat.points[:, 1] + turn
+    names = {"left": "inner", "right": "outer", "bottom": "first", "top": "second"}
+    points = np.column_stack([r * np.cos(a), r * np.sin(a)])
+    return Mesh(points=points, cells=flat.cells, sides={names[k]: v for k, v in flat.sides.items()})
+
+
+def test_a_line_runs_so_that_body_2_lies_on_the_left():
+    mesh = rectangle((0.0, 2.0), (0.0, 1.0), (4, 2))
+    for side, left, first, normal in (
+        ("top", False, (0, 1), (0, 1)),
+        ("top", True, (2, 1), (0, -1)),
+        ("bottom", True, (0, 0), (0, 1)),
+        ("right", False, (2, 1), (1, 0)),
+        ("right", True, (2, 0), (-1, 0)),
+    ):
+        line = Line.along(mesh, side, left=left)
+        assert line.points[0].tolist() == list(first)
+        assert (line.normals == normal).all()
+        assert line.s[0] == 0
+        assert (np.diff(line.s) > 0).all()
+
+
+def test_normals_of_an_arc_are_bisectors_and_mirrored_where_an_end_stands_on_an_axis():
+    mesh = ring((1.0, 2.0), (0.0, np.pi / 2), cells=(1, 8))
+    held = np.zeros(mesh.points.shape, dtype=bool)
+    held[mesh.points[:, 1] < 1e-12, 1] = True
+    line = Line.along(mesh, "outer", left=False, mirrored=held)
+    radial = line.points / 2
+    order = np.argsort(np.arctan2(*line.points.T[::-1]))
+    assert np.abs(line.normals - radial)[1:-1].max() <= 1e-14
+    lower, upper = order[0], order[-1]
+    assert line.normals[lower].tolist() == [1.0, 0.0]
+    half_a_chord = np.pi / 32
+    assert np.hypot(*(line.normals - radial)[upper]) == pytest.approx(2 * np.sin(half_a_chord / 2), rel=1e-9)
+
+
+def test_corners_pieces_and_closed_lines_are_refused_with_the_place():
+    mesh = rectangle((0.0, 2.0), (0.0, 1.0), (4, 2))
+    joined = lambda *names: Mesh(
+        points=mesh.points, cells=mesh.cells, sides={"line": np.concatenate([mesh.sides[n] for n in names])}
+    )
+    with pytest.raises(MeshError, match=r"corner of side 'line' at \(2, 1\) has 90 degrees: needed at most 20"):
+        Line.along(joined("top", "right"), "line", left=False)
+    with pytest.raises(MeshError, match="several pieces"):
+        Line.along(joined("top", "bottom"), "line", left=False)
+    with pytest.raises(MeshError, match="closed"):
+        Line.along(joined("top", "bottom", "left", "right"), "line", left=True)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.7, 3.0])
+def test_the_gap_of_concentric_arcs_is_that_of_the_circles_not_of_their_chords(turn):
+    inner = ring((1.0, 2.0), (0.2, 1.3), cells=(1, 11), turn=turn)
+    gaps = {}
+    for cells in (7, 14):
+        outer = ring((2.01, 3.0), (0.0, 1.5), cells=(1, cells), turn=turn)
+        seen = Line.along(inner, "outer", left=False).seen_from(Line.along(outer, "inner", left=True))
+        gaps[cells] = np.abs(seen.gap - 0.01)[1:-1].max()  # at the ends a normal is off by half a chord
+        height = 2.01 * (1 - np.cos(1.5 / cells / 2))
+        assert gaps[cells] <= 0.02 * height
+    assert gaps[14] <= gaps[7] / 10
+
+
+def test_a_constant_pressure_passes_from_line_to_line_and_positions_are_exact_on_straight_ones():
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        angle, gap = rng.uniform(0, 2 * np.pi), rng.uniform(-0.01, 0.1)
+        turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        lower = rectangle((0.0, 1.0), (-0.5, 0.0), (int(rng.integers(1, 9)), 1))
+        upper = rectangle((-0.3, 1.4), (gap, gap + 0.5), (int(rng.integers(1, 9)), 1))
+        lower, upper = (Mesh(points=m.points @ turn, cells=m.cells, sides=m.sides) for m in (lower, upper))
+        line, other = Line.along(lower, "top", left=False), Line.along(upper, "bottom", left=True)
+        seen = line.seen_from(other)
+        assert np.abs(seen.gap - gap).max() <= 1e-14
+        assert np.abs(seen.s - (other.s - 0.3)).max() <= 1e-14
+        P = mortar(line.s, seen.s)
+        assert np.abs(P @ np.ones(len(seen.s)) - 1).max() <= 1e-12
+        assert trapezoid(line.s) @ P @ seen.s == pytest.approx(0.5, abs=1e-12)
+
+
+def test_a_line_that_faces_another_only_in_part_is_refused_with_the_place():
+    lower = rectangle((0.0, 1.0), (-0.5, 0.0), (4, 1))
+    upper = rectangle((0.0, 0.6), (0.0, 0.5), (4, 1))
+    line, other = Line.along(lower, "top", left=False), Line.along(upper, "bottom", left=True)
+    assert other.seen_from(line).s[[0, -1]].tolist() == [0.0, 1.0]
+    with pytest.raises(MeshError, match=r"does not face \(0.75, 0\)"):
+        line.seen_from(other)
