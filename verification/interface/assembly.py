@@ -11,6 +11,7 @@ import numpy as np
 from fem1d2d import (
     Mesh,
     MeshError,
+    Supports,
     bar,
     body_load,
     facet_weights,
@@ -30,8 +31,9 @@ from verification.interface.interface import Interface, Law
 from verification.interface.joining import join
 from verification.problem.specification import Problem
 from verification.problem.specs import MOST_CELLS, BodySpec
+from verification.problem.steps import path_warnings
 from verification.problem.tables import ProblemError, short
-from verification.value import Value
+from verification.value import Value, copied
 
 #: Largest number of contact nodes for interface matrices, which are dense: more would fill the memory.
 MOST_CONTACT_NODES = 2000
@@ -101,6 +103,29 @@ class TwoBodies(Value):
         """The bodies that are not rigid."""
         return [body for body in (self.body1, self.body2) if body is not None]
 
+    def under(self, problem: Problem, slipped: Floats | None) -> TwoBodies:
+        """Return the bodies under the loads of another problem, which has no other difference, after they have slipped.
+
+        Nothing is assembled or factorised anew.
+
+        Raises
+        ------
+        ProblemError
+            Two sides prescribe different displacements of a node.
+        """
+
+        def loaded(body: Body | None) -> Body | None:
+            if body is None:
+                return None
+            return body.under(
+                _supports(problem, body.name, body.mesh),
+                _load(problem, body.name, body.mesh, body.nodes, self.interface.contact.x[[0, -1]]),
+            )
+
+        interface = copied(self.interface, slipped=slipped)
+        body1, body2 = loaded(self.body1), loaded(self.body2)
+        return replace(self, body1=body1, body2=body2, interface=interface, problem=problem)
+
     @property
     def outside(self) -> list[str]:
         """The reasons why the theorem does not apply to this problem; empty where it does."""
@@ -109,7 +134,7 @@ class TwoBodies(Value):
     @property
     def warnings(self) -> list[str]:
         """Facts that a user should know before trusting the numbers."""
-        return warnings_of(self.interface, self.friction, self.elastic)
+        return warnings_of(self.interface, self.friction, self.elastic) + path_warnings(self.problem)
 
 
 def reasons_outside(interface: Interface, friction: Fraction, free: list[Any]) -> list[str]:
@@ -297,16 +322,44 @@ def _with_parts(problem: Problem, name: Name, mesh: Mesh) -> Mesh:
     return replace(mesh, sides={**mesh.sides, **parts}) if parts else mesh
 
 
+def _known_sides(spec: BodySpec, dimension: int) -> dict[str, list[float | None]]:
+    """Return the displacements that the sides of Gamma_u have, by component."""
+    sides: dict[str, list[float | None]] = {side: [0.0] * dimension for side in spec.fixed}
+    return sides | {side: [None if v is None else float(v) for v in vs] for side, vs in spec.prescribed.items()}
+
+
+def _supports(problem: Problem, name: Name, mesh: Mesh) -> Supports:
+    """Return the displacements known on Gamma_u; ProblemError where two sides contradict each other."""
+    try:
+        return supports(mesh, _known_sides(getattr(problem, name), mesh.dimension))
+    except MeshError as error:
+        raise problem.refuse(f"{name}.prescribed", None, str(error)) from None
+
+
+def _load(problem: Problem, name: Name, mesh: Mesh, nodes: Ints, ends: Floats) -> Floats:
+    """Return the nodal forces of the body force and of tractions, shape (n, d); ProblemError for a force that is lost.
+
+    ``nodes`` are those of Gamma_c, which lies between the ``ends``: no traction acts there.
+    """
+    spec: BodySpec = getattr(problem, name)
+    d = mesh.dimension
+    load = body_load(mesh, [float(v) for v in spec.body_force])
+    pieces = {frozenset(nodes[i : i + d].tolist()) for i in range(len(nodes) - d + 1)}  # of Gamma_c
+    for side, force in spec.traction.items():
+        covered = np.array([frozenset(facet) in pieces for facet in mesh.sides[side].tolist()])
+        loaded = facet_weights(mesh, mesh.sides[side])
+        loaded -= facet_weights(mesh, mesh.sides[side][covered], between=(ends[0], ends[1]))
+        if any(force) and loaded.max() <= SAME * extent(mesh):
+            needed = "Gamma_c covers this side: a force there is lost"
+            raise problem.refuse(f"{name}.traction.{side}", list(force), needed)
+        load += loaded[:, None] * [float(v) for v in force]
+    return load
+
+
 def _body(problem: Problem, name: Name, mesh: Mesh, nodes: Ints, ends: Floats) -> Body:
     spec: BodySpec = getattr(problem, name)
     d = mesh.dimension
-    plain = lambda values: [float(v) for v in values]
-    sides: dict[str, list[float | None]] = {side: [0.0] * d for side in spec.fixed}
-    sides |= {side: [None if v is None else float(v) for v in values] for side, values in spec.prescribed.items()}
-    try:
-        known = supports(mesh, sides)
-    except MeshError as error:
-        raise problem.refuse(f"{name}.prescribed", None, str(error)) from None
+    sides, known = _known_sides(spec, d), _supports(problem, name, mesh)
     if known.held[nodes, d - 1].any():
         node = nodes[np.argmax(known.held[nodes, d - 1])]
         where = mesh.points[node].astype(float)
@@ -317,16 +370,7 @@ def _body(problem: Problem, name: Name, mesh: Mesh, nodes: Ints, ends: Floats) -
     motions = rigid_motions(mesh, known.held)
     material = plane_strain(float(spec.young), float(spec.poisson)) if d == 2 else bar(float(spec.young))
     matrix = stiffness(mesh, material)
-    load = body_load(mesh, plain(spec.body_force))
-    pieces = {frozenset(nodes[i : i + d].tolist()) for i in range(len(nodes) - d + 1)}  # of Gamma_c
-    for side, force in spec.traction.items():
-        covered = np.array([frozenset(facet) in pieces for facet in mesh.sides[side].tolist()])
-        loaded = facet_weights(mesh, mesh.sides[side])
-        loaded -= facet_weights(mesh, mesh.sides[side][covered], between=(ends[0], ends[1]))
-        if any(force) and loaded.max() <= SAME * extent(mesh):
-            needed = "Gamma_c covers this side: a force there is lost"
-            raise problem.refuse(f"{name}.traction.{side}", list(force), needed)
-        load += loaded[:, None] * plain(force)
+    load = _load(problem, name, mesh, nodes, ends)
     free = np.flatnonzero(~known.held.ravel())
     right = load.ravel()[free] - (matrix @ known.values.ravel())[free]
     position = np.full(known.held.size, -1)

@@ -62,8 +62,7 @@ def write_interface(pair: ContactPair, path: Path) -> None:
     }
     if interface.kernel is not None and interface.law is not None:
         arrays |= {"kernel": interface.kernel, "law": interface.law.words, "outside": interface.law.outside}
-    if interface.transfer is not None:
-        arrays["transfer"] = interface.transfer
+    arrays |= {name: v for name in ("transfer", "slipped") if (v := getattr(interface, name)) is not None}
     with path.open("wb") as file:
         np.savez(file, **arrays)
 
@@ -176,7 +175,12 @@ def _pair(arrays: dict[str, np.ndarray], source: str) -> ContactPair:
     if neumann.loose:
         raise ValueError(f"motions{neumann_body}: needed none of the body with the Neumann problem")
     interface = Interface(
-        contact=grid, neumann=other, gap=real_array("gap", arrays["gap"], (n,)), law=law, transfer=transfer
+        contact=grid,
+        neumann=other,
+        gap=real_array("gap", arrays["gap"], (n,)),
+        law=law,
+        transfer=transfer,
+        slipped=real_array("slipped", arrays["slipped"], (grid.t,)) if "slipped" in arrays else None,
     )
     pair = ContactPair(
         contact=contact, neumann=neumann, interface=interface, neumann_body=neumann_body, settings=settings

@@ -5,7 +5,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 
 from fem1d2d import trapezoid
 from fem1d2d.mesh import Floats
-from verification.value import Value, freeze
+from verification.value import Value, freeze, lent
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -152,6 +151,8 @@ class Interface(Value):
     transfer : array, shape (contact nodes, Neumann nodes), or None
         P: values on the contact grid of a function given on the Neumann grid.  Only its transpose returns the forces.
         None where both grids are one: then P is the identity.
+    slipped : array, shape (t of the contact grid,), or None
+        ``u1_T - u2_T`` before the load increment, from which friction measures slip, unit of length; None for 0.
     """
 
     contact: Grid
@@ -159,6 +160,7 @@ class Interface(Value):
     gap: Floats
     law: Law | None = None
     transfer: Floats | None = None
+    slipped: Floats | None = None
 
     @property
     def counts(self) -> dict[str, int]:
@@ -169,7 +171,13 @@ class Interface(Value):
     def summary(self) -> str:
         return f"{self.contact.n} contact nodes, {'no law of friction' if self.law is None else self.law.words}"
 
-    @cached_property
+    @property
+    def offset(self) -> Floats:
+        """The jump of body 1 against body 2 at which nothing has moved: the slip before the increment, and the gap."""
+        slipped = np.zeros(self.contact.t) if self.slipped is None else self.slipped
+        return np.concatenate([slipped, self.gap])
+
+    @lent
     def kernel(self) -> Floats | None:
         """S as a matrix: normal nodal forces on the Neumann grid to normal stress at the contact nodes.
 
@@ -236,4 +244,4 @@ class Interface(Value):
         """Return the interface with the roles of the grids exchanged; ValueError where the grids differ."""
         if self.transfer is not None:
             raise ValueError("the grids differ: needed a pair built for these roles, with its own transfer")
-        return Interface(contact=self.neumann, neumann=self.contact, gap=self.gap, law=self.law)
+        return Interface(contact=self.neumann, neumann=self.contact, gap=self.gap, law=self.law, slipped=self.slipped)
