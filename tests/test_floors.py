@@ -36,7 +36,7 @@ FLOORS: dict[str, dict[str, str]] = {
         "verification": "dense interrupts progress spreadsheet threads value",
         "verification.sections": "__init__ layout numbers parts",
     },
-    "input": {"verification.problem": "__init__ examples files reading specification specs tables writing"},
+    "input": {"verification.problem": "__init__ examples files reading specification specs steps tables writing"},
     "results, extras": {"verification": "document extras"},
     "bodies": {
         "verification.interface": (
@@ -62,7 +62,7 @@ FLOORS: dict[str, dict[str, str]] = {
         "verification.certificate": "__init__ check claims continuum contraction",
     },
     "answers": {
-        "verification": "comparison verdicts",
+        "verification": "comparison history verdicts",
         "verification.advice": (
             "__init__ accelerated best_theta ends from_logs from_matrices from_moduli from_runs from_vectors log_files "
             "log_lines matrix_files methods pace readings roles runs_with_friction seen seen_moduli sides snippets "
@@ -78,21 +78,22 @@ FLOORS: dict[str, dict[str, str]] = {
     "pages that move": {"verification.exploration": "__init__ film javascript page"},
     "parts of results": {
         "verification.sections": (
-            "advice answer bounds certificate comparison constants exploration ledger of_results reproduction run "
-            "setting sweep"
+            "advice answer bounds certificate comparison constants exploration history ledger of_results reproduction "
+            "run setting sweep"
         )
     },
     "figures": {
         "verification.figures": (
-            "__init__ best_theta bodies factor layers of_results proof_map region reproduction residuals squares style "
-            "sweep waterfall"
+            "__init__ best_theta bodies factor history layers of_results proof_map region reproduction residuals "
+            "squares style sweep waterfall"
         )
     },
     "files": {"verification.output": "__init__ fields files folder report"},
     "names for users": {"verification": "__init__"},
     "commands, test kit": {
         "verification.cli": (
-            "__init__ advising calculator certifying console exploring forms ledger main options problems sweeping"
+            "__init__ advising calculator certifying console exploring forms ledger main marching options problems "
+            "sweeping"
         ),
         "verification.testing": "__init__ bounds laws properties rules steps strategies transforms",
     },
@@ -102,23 +103,23 @@ FLOORS: dict[str, dict[str, str]] = {
 BUDGET = {
     "fem1d2d": 3810,
     "ndtheory": 5600,
-    "verification": 1240,
+    "verification": 1801,
     "verification.advice": 5750,
-    "verification.algorithm": 2260,
+    "verification.algorithm": 2265,
     "verification.bounds": 3280,
     "verification.certificate": 1100,
-    "verification.cli": 2405,
+    "verification.cli": 2470,
     "verification.constants": 1310,
     "verification.contact": 940,
     "verification.coupling": 420,
     "verification.exploration": 600,
-    "verification.figures": 1520,
-    "verification.interface": 2725,
+    "verification.figures": 1652,
+    "verification.interface": 2850,
     "verification.ledger": 4320,
-    "verification.output": 470,
-    "verification.problem": 1510,
+    "verification.output": 525,
+    "verification.problem": 1760,
     "verification.reproduce": 655,
-    "verification.sections": 2210,
+    "verification.sections": 2310,
     "verification.sweeps": 2400,
     "verification.testing": 1570,
 }

@@ -246,11 +246,13 @@ class TomlTable:
         def read(value: Any) -> TomlTable:
             if not isinstance(value, Mapping):
                 raise Unfit("needed a table")
-            return TomlTable(value, self._file, self.key(name))
+            return self.inner(value, name)
 
-        if required:
-            return self.take(name, read)
-        return self.take(name, read, TomlTable({}, self._file, self.key(name)))
+        return self.take(name, read) if required else self.take(name, read, self.inner({}, name))
+
+    def inner(self, data: Mapping[str, Any], name: str) -> TomlTable:
+        """Return a table within this one, known by that name in errors."""
+        return TomlTable(data, self._file, self.key(name))
 
     def names(self) -> Iterable[str]:
         """Return the keys not taken yet."""
