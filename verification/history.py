@@ -21,7 +21,7 @@ from ndtheory.number import Numeric
 from verification.algorithm.ending import NO_FORCE
 from verification.algorithm.fixed_point import FixedPointMap, iterate_at
 from verification.algorithm.rates import largest_step_ratio
-from verification.algorithm.relaxation import Rule, rule_of
+from verification.algorithm.relaxation import Constant, Rule, rule_of
 from verification.algorithm.runs import Run, check_memory, run_from
 from verification.algorithm.start import Start, begin_at
 from verification.algorithm.theta import choose
@@ -33,6 +33,7 @@ from verification.contact.active_set import Systems
 from verification.document import Document
 from verification.interface.assembly import TwoBodies, discretise
 from verification.interface.fields import ContactFields
+from verification.interface.interface import Interface
 from verification.interface.pair import ContactPair, pair_from
 from verification.monolithic import Solution, SolveError, solve
 from verification.problem import Problem, load
@@ -119,27 +120,36 @@ class Increment(Value):
         return self.result.contact
 
     @property
+    def run(self) -> Run | None:
+        """The run; None with the global method."""
+        return self.result if isinstance(self.result, Run) else None
+
+    @property
     def outcome(self) -> str:
         """The outcome of its run; ``converged`` of the global method, whose solutions are certified."""
-        return self.result.outcome if isinstance(self.result, Run) else "converged"
+        return "converged" if self.run is None else self.run.outcome
 
     @property
     def iterations(self) -> int | None:
         """Number of steps of its run; None with the global method."""
-        return self.result.iterations if isinstance(self.result, Run) else None
+        return None if self.run is None else self.run.iterations
+
+    @property
+    def predicted_steps(self) -> int | None:
+        """Number of steps at the rate of the Jacobian at the solution; None where it was not worked out."""
+        run = self.run
+        if run is None or run.linearised is None:
+            return None
+        return steps_to(run.iterates[0].residual, run.pair.settings.tolerance * run.last.scale, run.linearised.rate)
 
     def to_dict(self) -> dict[str, Any]:
         """Return an entry of ``increments`` in ``ndtheory.history/1``."""
-        fields, reason = self.contact.to_dict(), {}
+        run, fields = self.run, self.contact.to_dict()
         fields["contact"]["slip_increment"] = self.contact.slip_increment.tolist()
-        residual = self.result.coupled_residual if isinstance(self.result, Run) else None
-        if residual is None:
-            reason["coupled_residual"] = NO_FORCE if isinstance(self.result, Run) else NO_ITERATION
-        if self.iterations is None:
-            reason["iterations"] = NO_ITERATION
-        if self.promise is None:
-            reason["promise"] = self.why_none
-        linear = self.result.linearised if isinstance(self.result, Run) else None
+        residual = None if run is None else run.coupled_residual
+        none = {"promise": self.why_none} if self.promise is None else {}
+        none |= {"iterations": NO_ITERATION, "coupled_residual": NO_ITERATION} if run is None else {}
+        none |= {"coupled_residual": NO_FORCE} if run is not None and residual is None else {}
         return {
             "step": self.step,
             "name": self.name,
@@ -149,20 +159,12 @@ class Increment(Value):
             "coupled_residual": residual,
             "dissipated": self.dissipated,
             "predicted_steps": self.predicted_steps,
-            "linearised_rate": None if linear is None else linear.rate,
+            "linearised_rate": None if run is None or run.linearised is None else run.linearised.rate,
             "promise": None if self.promise is None else vars(self.promise),
             "verdicts": {name: judgement.verdict for name, judgement in self.verdicts.items()},
             **fields,
-            "reason": reason,
+            "reason": none,
         }
-
-    @property
-    def predicted_steps(self) -> int | None:
-        """Number of steps at the rate of the Jacobian at the solution; None where it was not worked out."""
-        if not isinstance(self.result, Run) or self.result.linearised is None:
-            return None
-        first, last = self.result.iterates[0], self.result.last
-        return steps_to(first.residual, self.result.pair.settings.tolerance * last.scale, self.result.linearised.rate)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -228,8 +230,10 @@ class History(Document):
 
     @property
     def warnings(self) -> list[str]:
-        """Facts that a user should know before trusting the numbers, each once."""
-        return list(dict.fromkeys(warning for each in self.increments for warning in each.result.warnings))
+        """Facts that a user should know before trusting the numbers: of the first increment, and the worst checks."""
+        of_checks = ("largest_strain", "penetration_outside")
+        worst = [max(self.increments, key=lambda one: getattr(one.result.checks, name) or 0.0) for name in of_checks]
+        return list(dict.fromkeys(line for each in (self.increments[0], *worst) for line in each.result.warnings))
 
     @cached_property
     def fields(self) -> Mapping[str, Floats]:
@@ -239,32 +243,25 @@ class History(Document):
 
     def linearise(self) -> History:
         """Return the same history with the Jacobian at the end of each increment, for the steps it predicts."""
-        done = tuple(
-            replace(each, result=each.result.linearise()) if isinstance(each.result, Run) else each
-            for each in self.increments
-        )
-        return replace(self, increments=done)
+        each = (one if one.run is None else replace(one, result=one.run.linearise()) for one in self.increments)
+        return replace(self, increments=tuple(each))
 
     def table(self) -> dict[str, list[Any]]:
         """Return one row for each increment as columns: ``pandas.DataFrame(history.table())`` reads it."""
         rows = [each.to_dict() for each in self.increments]
         plain = ("step", "name", "time", "iterations", "outcome", "coupled_residual", "dissipated", "predicted_steps")
-        promised = [row["promise"] or dict.fromkeys(("load", "residual", "factor", "steps")) for row in rows]
-        return {
-            **{name: [row[name] for row in rows] for name in plain},
-            **{name: [row["force"][name] for row in rows] for name in ("normal", "tangential")},
-            **{name: [row["pattern"][name] for row in rows] for name in ("stick", "slip", "open")},
-            "load": [promise["load"] for promise in promised],
-            "proved_steps": [promise["steps"] for promise in promised],
-        }
+        flat = [{name: row[name] for name in plain} | row["force"] | row["pattern"] for row in rows]
+        for row, each in zip(flat, self.increments, strict=True):
+            row["load"], row["proved_steps"] = (each.promise.load, each.promise.steps) if each.promise else (None, None)
+        return {name: [row[name] for row in flat] for name in flat[0]}
 
     def contact_table(self) -> dict[str, list[Any]]:
         """Return one row for each contact node of each increment, as columns."""
-        table: dict[str, list[Any]] = {"step": [], "time": []}
+        table: dict[str, list[Any]] = {}
         for each in self.increments:
-            rows = each.contact.table() | {"slip_increment": each.contact.slip_increment.tolist()}
-            count = len(each.contact.x)
-            for name, column in {"step": [each.step] * count, "time": [each.time] * count, **rows}.items():
+            count, increment = len(each.contact.x), {"slip_increment": each.contact.slip_increment.tolist()}
+            rows = {"step": [each.step] * count, "time": [each.time] * count, **each.contact.table(), **increment}
+            for name, column in rows.items():
                 table.setdefault(name, []).extend(column)
         return table
 
@@ -277,22 +274,20 @@ class History(Document):
         return self.drawn(view=view, **options)
 
     def content(self) -> dict[str, Any]:
-        bounds = {name: bound.to_dict() for name, bound in self.bounds.items()}
-        theta = next((each.result.theta for each in self.increments if isinstance(each.result, Run)), None)
-        reason = {} if theta is not None else dict.fromkeys(("theta", "constants"), NO_ITERATION)
+        first = self.increments[0].run
         return {
             "title": self.problem.title,
             "method": self.method,
-            "theta": None if theta is None else float(theta),
+            "theta": None if first is None else float(first.theta),
             "planned": self.planned,
             "ended": self.ended,
             "constants": None if self.measured is None else self.measured.content(),
-            "bounds": bounds,
+            "bounds": {name: bound.to_dict() for name, bound in self.bounds.items()},
             "dissipated": sum(each.dissipated for each in self.increments),
             "increments": [each.to_dict() for each in self.increments],
             "outside_theorem": self.outside,
             "warnings": self.warnings,
-            "reason": reason,
+            "reason": dict.fromkeys(("theta", "constants"), NO_ITERATION) if first is None else {},
         }
 
 
@@ -414,10 +409,31 @@ def _check_supports(bodies: TwoBodies, path: list[Moment]) -> None:
             bodies.under(moment.problem, None)
 
 
-def _dissipated(before: ContactFields | None, after: ContactFields) -> float:
-    """Return the work of friction in an increment, with the mean of the shear before and after it."""
-    shear = after.shear if before is None else after.shear + before.shear
-    return float(0.5 * (after.weights * shear) @ after.slip_increment)
+def _increment(
+    moment: Moment,
+    result: Run | Solution,
+    before: ContactFields | None,
+    promise: Promise | None = None,
+    why_none: str = NO_ITERATION,
+    verdicts: Mapping[str, Judgement] | None = None,
+) -> Increment:
+    """Return an increment; friction takes work with the mean of the shear before and after it."""
+    now = result.contact
+    shear = 0.5 * (now.shear if before is None else now.shear + before.shear)
+    return Increment(
+        step=moment.step,
+        name=moment.name,
+        time=float(moment.time),
+        result=result,
+        promise=promise,
+        why_none=why_none,
+        verdicts=verdicts or {},
+        dissipated=float((now.weights * shear) @ now.slip_increment),
+    )
+
+
+def _slipped(before: ContactFields | None, interface: Interface) -> Floats | None:
+    return None if before is None else before.slip[: interface.contact.t]
 
 
 class _Global:
@@ -433,18 +449,8 @@ class _Global:
     def increments(self, path: list[Moment]) -> Iterator[Increment]:
         before: ContactFields | None = None
         for moment in path:
-            slipped = None if before is None else before.slip[: self._bodies.interface.contact.t]
-            solution = solve(self._bodies.under(moment.problem, slipped))
-            yield Increment(
-                step=moment.step,
-                name=moment.name,
-                time=float(moment.time),
-                result=solution,
-                promise=None,
-                why_none=NO_ITERATION,
-                verdicts={},
-                dissipated=_dissipated(before, solution.contact),
-            )
+            solution = solve(self._bodies.under(moment.problem, _slipped(before, self._bodies.interface)))
+            yield _increment(moment, solution, before)
             before = solution.contact
 
 
@@ -463,14 +469,13 @@ class _Iteration:
         subject = Subject.of(pair, self.measured)
         calculated = {name: bound for name, bound in BOUNDS.items() if bound.calculated}
         self.bounds = {name: bound.evaluate(subject, self._choice.theta) for name, bound in calculated.items()}
-        outside = "; ".join(pair.outside + list(filter(None, [self._rule.outside(pair.friction)])))
-        self._outside = outside
-        proved = [
-            bound.factor.value
-            for name, bound in self.bounds.items()
-            if not outside and not named(name).finding and bound.factor is not None
-        ]
-        self._factor = min((factor for factor in proved if factor < 1), default=None)
+        other = (
+            "" if isinstance(self._rule, Constant) else f"the bounds are about a constant theta, not {self._rule.name}"
+        )
+        self._outside = "; ".join(filter(None, [*pair.outside, other]))
+        proved = [bound.factor for name, bound in self.bounds.items() if not named(name).finding]
+        below = [factor.value for factor in proved if factor is not None and factor.value < 1]
+        self._factor = min(below, default=None)
 
     def increments(self, path: list[Moment]) -> Iterator[Increment]:
         contact = self._pair.contact
@@ -479,29 +484,21 @@ class _Iteration:
         before: Run | None = None
         largest = 0.0
         for moment in path:
-            slipped = None if before is None else before.contact.slip[: contact.grid.t]
-            pair = self._pair.under(moment.problem, slipped)
+            earlier = None if before is None else before.contact
+            pair = self._pair.under(moment.problem, _slipped(earlier, self._pair.interface))
             T = FixedPointMap(pair, self._solver, systems=systems)
-            start = begin_at(T)
-            if before is not None and largest:
-                g = before.last.g
-                start = Start(g=g, source="given", why="the forces of the increment before", scale=LEAST * largest)
+            if before is None or not largest:
+                start = begin_at(T)
+            else:
+                why = "the forces of the increment before"
+                start = Start(g=before.last.g, source="given", why=why, scale=LEAST * largest)
             run = run_from(T, self._rule, self._choice, start)
             if run.outcome == "interrupted":
                 raise KeyboardInterrupt
             largest = max(largest, run.last.scale)
-            promise, why = self._promise(before, run)
             seen = largest_step_ratio(pair, run.iterates)
-            yield Increment(
-                step=moment.step,
-                name=moment.name,
-                time=float(moment.time),
-                result=run,
-                promise=promise,
-                why_none=why,
-                verdicts={name: judge_bound(bound, seen, self._outside) for name, bound in self.bounds.items()},
-                dissipated=_dissipated(None if before is None else before.contact, run.contact),
-            )
+            verdicts = {name: judge_bound(bound, seen, self._outside) for name, bound in self.bounds.items()}
+            yield _increment(moment, run, earlier, *self._promise(before, run), verdicts)
             before = run
 
     def _promise(self, before: Run | None, run: Run) -> tuple[Promise | None, str]:

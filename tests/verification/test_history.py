@@ -367,3 +367,12 @@ def test_moments_are_equal_increments_between_exact_loads():
     assert at_rest(whole).body2.prescribed["top"] == (0, 0)
     assert not every[0].problem.steps
     assert [each.time for each in every[:3]] == [Fraction(i, 6) for i in (1, 2, 3)]
+
+
+def test_warnings_name_the_worst_state_of_the_history_once():
+    path = {"press": (8, [0, "-0.04"])}
+    found = vf.march(problem(path))
+    strains = [each.result.checks.largest_strain for each in found.increments]
+    told = [line for line in found.warnings if "strain" in line]
+    assert sum(strain > 0.05 for strain in strains) > 1
+    assert told == [line for line in found.increments[-1].result.warnings if "strain" in line]

@@ -104,6 +104,16 @@ def test_outside_the_theorem_nothing_is_promised(tables, why):
     assert all(each.promise is None and why in each.why_none for each in found.increments)
 
 
+@pytest.mark.parametrize(("rule", "friction"), [("anderson", "0.2"), ("momentum", "0")])
+def test_other_rules_follow_the_same_path_without_a_promise(rule, friction):
+    whole = problem(contact={"friction": friction})
+    found, plain = vf.march(whole, rule=rule), vf.march(whole)
+    assert found.converged
+    assert np.abs(found.fields["pressure"] - plain.fields["pressure"]).max() <= 1e-7 * plain.fields["pressure"].max()
+    assert all("constant theta" in each.why_none for each in found.increments)
+    assert {each.verdicts["energy"].verdict for each in found.increments} == {"HYPOTHESES_NOT_MET"}
+
+
 def test_the_jacobian_predicts_the_steps_of_an_increment():
     found = vf.march(problem()).linearise()
     for each in found.increments[1:-3]:
