@@ -3,6 +3,7 @@
 # make lowest a sample of the tests with the lowest versions that pyproject.toml allows
 # make nightly  the tests with many more random cases, PART=cli one part of them; notes in CONTRIBUTING.md what passed
 # make kratos the tests that couple two models in Kratos Multiphysics, with its wheels in an environment of their own
+# make paper  the paper with its numbers and figures: docs/_build/paper/paper.pdf
 # make bench  the times on the site's page on speed; FULL=1 adds the long sizes
 # Needs Python >= 3.11 with pip, make and git; everything else goes into .venv, pinned by requirements.lock.
 
@@ -18,7 +19,7 @@ NEEDS  := pyproject.toml $(LOCKS) ndtheory/__init__.py
 # Tests and pages start many processes: each would compile the packages anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check lint docs nightly lowest kratos bench lock clean
+.PHONY: demo test check lint docs nightly lowest kratos paper bench lock clean
 .NOTPARALLEL:  # one pip at a time; pytest uses the processors itself
 
 demo: $(VENV)/.run
@@ -68,6 +69,11 @@ kratos: $(VENV)/.venv
 	$(BIN)/uv venv --quiet --clear --python $(BIN)/python $(KRATOS)
 	$(BIN)/uv pip install --quiet --python $(KRATOS)/bin/python --requirement requirements-test.lock --editable . $(WHEELS)
 	$(KRATOS)/bin/python -m pytest -n auto -p no:cacheprovider tests/verification/test_kratos.py
+
+paper: $(VENV)/.run
+	$(BIN)/python docs/paper/compute.py docs/_build/paper
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check $(UV)
+	$(BIN)/uv run --quiet --no-project --python $(BIN)/python --with typst==0.15.2 docs/paper/typeset.py docs/_build/paper
 
 bench: $(VENV)/.test
 	for b in benchmarks/bench_*.py; do $(BIN)/python $$b --record benchmarks/records $(if $(FULL),--full) || exit 1; done

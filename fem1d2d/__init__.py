@@ -1,4 +1,4 @@
-"""Elastic bodies on meshes: P1 elements on intervals and triangles, plane strain, condensed onto an interface.
+"""Elastic bodies on meshes: P1 on intervals and triangles, plane strain and stress, condensed onto an interface.
 
 A small core in which every matrix is exact for its mesh.  Contact and the theorem do not enter.
 """
@@ -15,7 +15,7 @@ from fem1d2d.condense import (
     solver_with_inertia,
 )
 from fem1d2d.element import largest_strains, stresses, von_mises
-from fem1d2d.material import Material, bar, plane_strain
+from fem1d2d.material import Material, bar, plane_strain, plane_stress
 from fem1d2d.mesh import Mesh, MeshError, interval, rectangle, rectangle_points, sector
 from fem1d2d.mesh_files import from_file
 from fem1d2d.outline import depths
@@ -51,6 +51,7 @@ __all__ = [
     "largest_strains",
     "mortar",
     "plane_strain",
+    "plane_stress",
     "rectangle",
     "rectangle_points",
     "rigid_motions",

@@ -102,12 +102,12 @@ def mass(mesh: Cells) -> NDArray[Any]:
     return element_of(mesh).mass(mesh)
 
 
-def largest_strains(mesh: Cells, displacement: Floats) -> Floats:
+def largest_strains(mesh: Cells, displacement: Floats, material: Material | None = None) -> Floats:
     """Largest absolute principal strain of each cell, shape (c,), a pure number.
 
     In the plane the principal strains of ``eps = (grad u + grad u') / 2``, u the displacement of the nodes, shape
-    (n, d), unit of length, are ``(eps_xx + eps_yy)/2 +- sqrt((eps_xx - eps_yy)^2/4 + eps_xy^2)``; the third one of
-    plane strain is 0.
+    (n, d), unit of length, are ``(eps_xx + eps_yy)/2 +- sqrt((eps_xx - eps_yy)^2/4 + eps_xy^2)``; the third one is 0,
+    and ``-(eps_xx + eps_yy) lame_lambda/(2 lame_mu)`` in plane stress, for which the material is needed.
 
     Examples
     --------
@@ -123,6 +123,8 @@ def largest_strains(mesh: Cells, displacement: Floats) -> Floats:
             continue
         (xx, xy), (yx, yy) = np.moveaxis(slopes, 0, -1)
         found.append(np.abs(xx + yy) / 2 + np.hypot((xx - yy) / 2, (xy + yx) / 2))
+        if material is not None and material.thin:
+            found.append(np.abs((xx + yy) * material.lame_lambda / (2 * material.lame_mu)))
     return np.asarray(np.max(found, axis=0))
 
 
@@ -130,7 +132,7 @@ def stresses(mesh: Cells, material: Material, displacement: Floats) -> Floats:
     """Mean stress tensor of each cell, shape (c, 3, 3), in the unit of the material.
 
     ``lame_lambda tr(eps) I + 2 lame_mu eps`` of the displacement of the nodes, shape (n, d): in plane strain with
-    ``sigma_zz = lame_lambda tr(eps)``; a bar has only ``sigma_xx``.
+    ``sigma_zz = lame_lambda tr(eps)``, in plane stress without it; a bar has only ``sigma_xx``.
 
     Examples
     --------
@@ -144,7 +146,7 @@ def stresses(mesh: Cells, material: Material, displacement: Floats) -> Floats:
     for size, slopes in _slopes(mesh, displacement):
         strain[:, :d, :d] += (size / whole)[:, None, None] * (slopes + slopes.transpose(0, 2, 1)) / 2
     trace = np.trace(strain, axis1=1, axis2=2)[:, None, None]
-    held = np.diag([1.0, 1.0, 1.0] if d == 2 else [1.0, 0.0, 0.0])
+    held = np.diag([1.0, float(d == 2), float(d == 2 and not material.thin)])
     return np.asarray(material.lame_lambda * trace * held + 2 * material.lame_mu * strain)
 
 

@@ -68,7 +68,7 @@ class Layer:
     def row(self, phases: Floats, columns: int) -> Complex:
         """The row of cells below the surface, shape (n, 4 N, 4 N), unit stress.
 
-        Unknowns: the N nodes above it, then those below it, x and y component of each in turn.  The lower nodes of
+        Unknowns: the N nodes above it, then those below it, both components of each together.  The lower nodes of
         alternating diagonals are counted from one column further right, so that every row has the same matrix.
 
         Parameters

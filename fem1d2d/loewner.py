@@ -184,14 +184,17 @@ class Elimination:
             return _remainder(block.middle, nothing, total(block.radius), side)
         if not np.isfinite(self.errors).all():
             return None
-        tries = (self._attempt(-side * self.shift(SHIFT * MORE**i), side) for i in range(TRIES))
-        return next((found for found in tries if found is not None), None)
+        for i in range(TRIES):
+            factors = self.factors(self._lifted(-side * self.shift(SHIFT * MORE**i)))
+            if factors is not None:
+                if (found := self._decided(*factors[:2], side)) is not None:
+                    return found
+            elif side == 1:  # nor is it positive definite with more taken off
+                break
+        return None
 
-    def _attempt(self, shift: Floats, side: Side) -> Floats | None:
-        found = self.factors(self._lifted(shift))
-        if found is None:
-            return None
-        L, pivots, _ = found
+    def _decided(self, L: Matrix, pivots: Floats, side: Side) -> Floats | None:
+        """The bound from the factors of a shifted matrix; None where their residual is not dominant."""
         scaled = L * pivots if isinstance(L, np.ndarray) else L @ sp.diags_array(pivots)
         residual = self.matrix.middle - scaled @ L.T
         errors = upwards(self._errors(L, pivots) + self.radius, 2)

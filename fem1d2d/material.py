@@ -1,4 +1,4 @@
-"""Hooke's law: the Lame parameters of a bar and of plane strain."""
+"""Hooke's law: the Lame parameters of a bar, of plane strain and of plane stress."""
 
 from __future__ import annotations
 
@@ -8,10 +8,14 @@ from typing import Any
 
 @dataclass(frozen=True, kw_only=True)
 class Material:
-    """Lame parameters in the file's unit of stress: ``sigma = lame_lambda tr(eps) I + 2 lame_mu eps``."""
+    """Lame parameters in the file's unit of stress: ``sigma = lame_lambda tr(eps) I + 2 lame_mu eps``.
+
+    ``thin`` is True in plane stress, where sigma and eps have only components in the plane.
+    """
 
     lame_lambda: Any
     lame_mu: Any
+    thin: bool = False
 
     def continuity(self, dimension: int) -> Any:
         """An upper bound of M^a (4.1) for any body of this material, unit stress.
@@ -42,10 +46,9 @@ def plane_strain(young: Any, poisson: Any) -> Material:
     Examples
     --------
     >>> plane_strain(2.5, 0.25)
-    Material(lame_lambda=1.0, lame_mu=1.0)
+    Material(lame_lambda=1.0, lame_mu=1.0, thin=False)
     """
-    if not young > 0:
-        raise ValueError(f"Young modulus {young}: a positive number is needed")
+    _check(young)
     if not -1 < poisson < 0.5:
         raise ValueError(f"Poisson ratio {poisson}: a number with -1 < nu < 0.5 is needed")
     return Material(
@@ -53,11 +56,39 @@ def plane_strain(young: Any, poisson: Any) -> Material:
     )
 
 
+def plane_stress(young: Any, poisson: Any) -> Material:
+    """Isotropic plane stress: a thin plate that nothing loads across its plane.
+
+    ``lame_lambda = E nu / (1 - nu^2)``, ``lame_mu = E / (2 (1 + nu))``; any scalar.  They are those of plane strain for
+    the moduli ``E (1 + 2 nu)/(1 + nu)^2`` and ``nu/(1 + nu)``.
+
+    Parameters
+    ----------
+    young : scalar
+        E in the unit of stress that the parameters are to have; ValueError unless E > 0.
+    poisson : scalar
+        nu; ValueError unless -1 < nu <= 1/2.
+
+    Examples
+    --------
+    >>> plane_stress(3.0, 0.5)
+    Material(lame_lambda=2.0, lame_mu=1.0, thin=True)
+    """
+    _check(young)
+    if not -1 < poisson <= 0.5:
+        raise ValueError(f"Poisson ratio {poisson}: a number with -1 < nu <= 0.5 is needed")
+    return Material(lame_lambda=young * poisson / (1 - poisson**2), lame_mu=young / (2 * (1 + poisson)), thin=True)
+
+
+def _check(young: Any) -> None:
+    if not young > 0:
+        raise ValueError(f"Young modulus {young}: a positive number is needed")
+
+
 def bar(young: Any) -> Material:
     """A bar of unit cross-section: ``sigma = E eps``, that is lame_lambda = E and lame_mu = 0 in one dimension.
 
     ``young`` is E in the unit of stress that the parameters are to have; ValueError unless E > 0.
     """
-    if not young > 0:
-        raise ValueError(f"Young modulus {young}: a positive number is needed")
+    _check(young)
     return Material(lame_lambda=young, lame_mu=young * 0)

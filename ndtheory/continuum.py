@@ -6,6 +6,7 @@ moved as given, and no other side is held.  S is the convolution with the hat ke
 * ``C_s^2 <= sup over xi of S_NN(xi) sinc^4(r xi/2)`` with the strip of the Neumann body (:mod:`ndtheory.strip`),
 * ``C_ta^2 <= (d/G) K`` with a rational K (:mod:`ndtheory.segments`),
 * ``rho <= (1 + eps) R`` with R the largest ratio of both strips' forms, and eps the energy of a cut-off,
+* K and eps are smaller where a :class:`~ndtheory.calibration.Calibration` of a body proves it,
 * ``rho`` is at least the bounds from the wedges at both ends of Gamma_c (:mod:`ndtheory.wedges`),
 * ``rho_normal <= s`` where the mirror image of the contact body fits (:func:`ndtheory.moduli.mirror`).
 
@@ -15,9 +16,11 @@ guaranteed for the continuum.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
+from ndtheory.calibration import Calibration, loss
 from ndtheory.constants import EnergyConstants
 from ndtheory.energy_norms import EnergyBounds, evaluate_energy
 from ndtheory.errors import HypothesisError
@@ -63,6 +66,11 @@ class Rectangle:
     def strip(self) -> Strip:
         """The strip that contains it."""
         return Strip(body=self.body, thickness=self.thickness)
+
+    def in_thicknesses(self, ends: tuple[Fraction, Fraction]) -> tuple[Fraction, Fraction, Fraction]:
+        """Its length, and where an interval on it begins and ends, from its left side."""
+        length, lo, hi = ((end - self.left) / self.thickness for end in (self.right, *ends))
+        return length, lo, hi
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,8 +132,8 @@ class ContinuumConstants:
         Unit stress/length.
     C_t1_square, C_t2_square : Fraction
         Contact body and Neumann body, unit length/stress.
-    segments : tuple of Fraction
-        K of both: ``C_ta^2 G/d``.
+    K : tuple of Fraction
+        Of both bodies: ``C_ta^2 G/d``.
     strips : Fraction
         R.
     cut_off : Fraction or None
@@ -143,7 +151,7 @@ class ContinuumConstants:
     C_s_square: Fraction
     C_t1_square: Fraction
     C_t2_square: Fraction
-    segments: tuple[Fraction, Fraction]
+    K: tuple[Fraction, Fraction]
     strips: Fraction
     cut_off: Fraction | None
     rho: Fraction | None
@@ -159,10 +167,11 @@ class ContinuumConstants:
         )
 
 
-def cut_off(model: TwoRectangles) -> Fraction | None:
+def cut_off(model: TwoRectangles, proofs: Sequence[Calibration] = ()) -> Fraction | None:
     """eps with ``a(chi v) <= (1 + eps) a(v)`` for lifts v into the Neumann body, chi falling to 0 beside Gamma_c.
 
-    None if Gamma_c reaches an end of the Neumann body.
+    The least one of a linear chi and, for each calibration, of the chi that it proves best.  None if Gamma_c reaches an
+    end of the Neumann body.
     """
     body, (lo, hi) = model.neumann, model.interval
     if min(model.margins) <= 0:
@@ -173,7 +182,13 @@ def cut_off(model: TwoRectangles) -> Fraction | None:
     kappa = body.body.kappa
     along = (kappa + 1) / (kappa - 1) * bound_at_end(room, kappa) / 2
     across = FOUR_OVER_PI_SQUARE * (kappa + 1) / 8
-    return (along + across) * steepest
+    found = [(along + across) * steepest]
+    length, first, last = body.in_thicknesses(model.interval)
+    for proof in proofs:
+        reach = min((proof.reach(Fraction(0), first), proof.reach(last, length)), key=lambda side: side.lo)
+        if reach.lo > 0:
+            found.append(loss(reach))
+    return min(found)
 
 
 def ends(model: TwoRectangles) -> Fraction:
@@ -196,36 +211,52 @@ def ends(model: TwoRectangles) -> Fraction:
     )
 
 
-def continuum_constants(model: TwoRectangles) -> ContinuumConstants:
+def continuum_constants(
+    model: TwoRectangles, *, contact: Sequence[Calibration] = (), neumann: Sequence[Calibration] = ()
+) -> ContinuumConstants:
     """Bound C_s, C_t1, C_t2 from above and rho from both sides for the continuum.
+
+    Parameters
+    ----------
+    model : TwoRectangles
+    contact, neumann : sequence of Calibration
+        Proofs for the bodies, where there are any: each bound is the best one of these and of the closed forms.
 
     Raises
     ------
+    HypothesisError
+        A calibration of another body.
     Unproved
         A search among intervals found no answer.
     """
     reason: dict[str, str] = {}
     factors, squares = [], []
-    for body in (model.contact, model.neumann):
-        length, lo, hi = ((end - body.left) / body.thickness for end in (body.right, *model.interval))
-        factors.append(bound(zones(length, lo, hi, body.body.kappa), body.body.kappa))
+    for body, proofs in ((model.contact, contact), (model.neumann, neumann)):
+        length, lo, hi = body.in_thicknesses(model.interval)
+        kappa = body.body.kappa
+        for proof in proofs:
+            if (proof.kappa, proof.x[-1]) != (kappa, length):
+                received = f"kappa = {proof.kappa}, length {proof.x[-1]}"
+                raise HypothesisError("calibration", received, f"one for kappa = {kappa} and length {length}")
+        weights = [proof.trace(lo, hi) for proof in proofs]
+        factors.append(min([bound(zones(length, lo, hi, kappa), kappa), *(1 / tau for tau in weights if tau > 0)]))
         squares.append(factors[-1] * body.thickness / body.body.shear)
     strips = largest_ratio_of_strips(model.contact.strip, model.neumann.strip)
-    eps = cut_off(model)
+    eps = cut_off(model, neumann)
     if eps is None:
         text = "Gamma_c reaches an end of the Neumann body: there is no room for a cut-off"
         reason |= {"cut_off": text, "rho": text}
-    contact, neumann = model.contact, model.neumann
-    mirrored = mirror(contact.body, neumann.body)
-    fits = neumann.left <= contact.left and contact.right <= neumann.right and contact.thickness >= neumann.thickness
+    inner, outer = model.contact, model.neumann
+    mirrored = mirror(inner.body, outer.body)
+    fits = outer.left <= inner.left and inner.right <= outer.right and inner.thickness >= outer.thickness
     if not fits:
         mirrored = None
         reason["rho_normal"] = "needed a contact body that is as thick and goes beyond no end of the Neumann body"
     return ContinuumConstants(
-        C_s_square=Fraction(largest_smoothed(neumann.strip, model.radius).hi),
+        C_s_square=Fraction(largest_smoothed(outer.strip, model.radius).hi),
         C_t1_square=squares[0],
         C_t2_square=squares[1],
-        segments=(factors[0], factors[1]),
+        K=(factors[0], factors[1]),
         strips=strips,
         cut_off=eps,
         rho=None if eps is None else (1 + eps) * strips,

@@ -182,6 +182,20 @@ def tied_factor(theta: Scalar, rho_min: Scalar, rho: Scalar) -> Scalar:
     return maximum(absolute(1 - theta * (1 + rho_min)), absolute(1 - theta * (1 + rho)))
 
 
+def parallel_factor(theta: Scalar, rho: Scalar) -> Scalar:
+    """``sqrt((1 - theta)^2 + theta^2 rho)``: the factor of *parallel* coupling where nothing opens or slips.
+
+    A mode is multiplied by ``1 - theta +- i theta sqrt(lambda)``.  It is least, ``sqrt(rho/(1 + rho))``, at
+    ``theta = 1/(1 + rho)``, and below 1 where ``theta (1 + rho) < 2``, as of serial coupling.
+
+    Examples
+    --------
+    >>> parallel_factor(0.8, 0.25)
+    0.4472135954999579
+    """
+    return sqrt((1 - theta) ** 2 + theta**2 * rho)
+
+
 def predicted_factor(theta: Scalar, rho: Scalar) -> Scalar:
     """``max(|1 - theta|, |1 - theta (1 + rho)|)``: q(theta) without friction, and a prediction with it.
 

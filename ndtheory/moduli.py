@@ -1,4 +1,4 @@
-"""Lower bounds of rho from the moduli of two bodies: the spectrum of their stiffnesses on a fine mesh.
+"""Bounds of rho from material data: elastic moduli, conductivities, and the densities of a fluid and of a wall.
 
 On a flat patch of Gamma_c both bodies behave like half-planes.  At the wave number xi a half-plane of shear modulus G
 resists its two circularly polarised surface displacements with the stiffnesses ``2 G |xi|`` and ``2 G |xi|/kappa``
@@ -13,11 +13,14 @@ None is an upper bound: other thicknesses, supports or unequal Poisson ratios ma
 In space a wave along a flat patch moves a half-space in the plane of the wave as in plane strain, and also across it
 (antiplane) with the stiffness ``G |xi|``.  The ratio of these, ``G_c/G_n``, lies between the two of a patch that
 sticks, because kappa >= 1.
+
+:func:`conduction` is for plates that exchange heat, :func:`added_mass` for a fluid at a wall.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Literal, get_args
@@ -265,3 +268,93 @@ def mirror(contact: Moduli, neumann: Moduli) -> Fraction | None:
     if "3d" in (contact.plane, neumann.plane):
         bulk *= (1 + contact.poisson) / (1 + neumann.poisson)  # lambda + 2 mu/3 = (lambda + mu) 2 (1 + nu)/3
     return ratio * max(Fraction(1), bulk)
+
+
+def conduction(
+    conductivity: Sequence[Fraction],
+    *,
+    capacity: Sequence[Fraction] | None = None,
+    thickness: Sequence[Fraction] | None = None,
+    dt: Fraction | None = None,
+) -> tuple[float, float]:
+    """The range of the ratio of conductances of two flat plates, contact body over Neumann body, over all waves.
+
+    Without a thickness the plates are thick.  In the steady state the others are held at their other sides; in a step
+    in time anything may hold them.  ``docs/coupling_waves.md`` has the formulas and their proofs.
+
+    Parameters
+    ----------
+    conductivity, capacity, thickness : pair
+        Of the contact body and of the Neumann body, each in any one unit; capacity is per volume, of a step in time.
+    dt : Fraction, optional
+        Needed with both capacity and thickness, in the unit of ``capacity thickness^2/conductivity``.
+
+    Examples
+    --------
+    >>> conduction((1, 4)), conduction((1, 4), capacity=(1, 1)), conduction((1, 4), thickness=(1, 1))
+    ((0.25, 0.25), (0.25, 0.5), (0.25, 0.25))
+    """
+    k, c, d, thick = conductivity, capacity, thickness, 1.0
+    short = float(Fraction(k[0]) / k[1])
+    if c is None:
+        long = short if d is None else float(Fraction(k[0] * d[1]) / (k[1] * d[0]))
+    else:
+        long = math.sqrt(Fraction(k[0] * c[0]) / (k[1] * c[1]))
+        if d is not None and dt is not None:
+            thick = math.prod(math.tanh(d[i] / math.sqrt(k[i] * dt / c[i])) for i in (0, 1))
+    return min(long, short) * thick, max(long, short) / thick if thick else math.inf
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wall:
+    """A wall beside a fluid: a plate held along two lines, ``length`` apart, or a tube; without E only masses count."""
+
+    density: Fraction
+    thickness: Fraction
+    length: Fraction
+    radius: Fraction | None = None
+    young: Fraction | None = None
+    poisson: Fraction = Fraction(0)
+
+    def stiffness(self, wave: int = 1) -> Fraction | float:
+        """Pressure per displacement of the wave ``sin(n pi x/L)``: ``D xi^4``, of a tube also ``E' h/R^2``.
+
+        ``E' = E/(1 - nu^2)``, ``D = E' h^3/12``; an upper bound for a wall whose ends may turn.
+        """
+        if self.young is None:
+            return 0
+        plane = self.young / (1 - self.poisson**2) * self.thickness
+        ring = 0 if self.radius is None else plane / self.radius**2
+        return float(ring) + float(plane * self.thickness**2 / 12) * (wave * math.pi / float(self.length)) ** 4
+
+
+def added_mass(fluid: Numeric, wall: Wall, *, dt: Fraction | None = None, wave: int = 1) -> float:
+    """The added mass of a wave of the wall over its own mass, and stiffness times ``dt^2``: rho is at least this.
+
+    The fluid, of this density, has no viscosity, is incompressible, and fills the square over the plate, or the tube.
+    Without dt it is the limit for short steps in time.  ``docs/coupling_waves.md`` has the proof.
+
+    Examples
+    --------
+    Water in a tube of silicone:
+
+    >>> tube = Wall(density=1200, thickness=Fraction(1, 1000), length=Fraction(1, 20), radius=Fraction(1, 200))
+    >>> round(added_mass(1000, tube), 1)
+    85.5
+    """
+    xi = wave * math.pi / float(wall.length)
+    m = math.tanh(wave * math.pi) / xi if wall.radius is None else bessel_ratio(xi * float(wall.radius)) / xi
+    weight = float(wall.density * wall.thickness)
+    return float(fluid) * m / (weight + float(wall.stiffness(wave)) * (0.0 if dt is None else float(dt) ** 2))
+
+
+def bessel_ratio(x: float) -> float:
+    """``I0(x)/I1(x)`` for x > 0, from their series; for x > 50 it is 1, less by about 1 %."""
+    if x > 50:
+        return 1.0
+    i0 = i1 = a = b = 1.0
+    for k in range(1, 200):
+        a *= x * x / (4 * k * k)
+        b *= x * x / (4 * k * (k + 1))
+        i0, i1 = i0 + a, i1 + b
+    return i0 / (i1 * x / 2)

@@ -82,9 +82,9 @@ def known_continuum(monkeypatch, shared):
     """The constants of the continuum are computed once for the same two rectangles."""
     from verification.certificate import continuum
 
-    compute = continuum.continuum_constants
+    compute = continuum.bounded
     known = lambda model: shared(("continuum", model), lambda: compute(model))
-    monkeypatch.setattr(continuum, "continuum_constants", known)
+    monkeypatch.setattr(continuum, "bounded", known)
 
 
 @pytest.fixture

@@ -221,7 +221,7 @@ OPTIONS: dict[str, dict[str, tuple[str, ...] | None]] = {
     "solve": {"--json": None, "--theta": NUMBERS},
     "advise": {"--json": None, "--tied": None, "--swap-roles": None},
     "advise run": {"--json": None, "--theta": NUMBERS, "--ratio": NUMBERS, "--friction": None, "--tied": None},
-    "advise moduli": {"--json": None, "--young": NUMBERS, "--poisson": NUMBERS, "--flat": None},
+    "advise moduli": {"--json": None, **dict.fromkeys(("--young", "--poisson", "--conductivity", "--dt"), NUMBERS)},
     "bounds": {
         **dict.fromkeys(("--m", "--M", "--CR", "--Cs", "--Ctr", "--k", "--CK", "--theta", "--rho"), NUMBERS),
         **dict.fromkeys(("--kappa1", "--kappa2"), NUMBERS), "--edition": ("printed", "repaired", "both", "x"),

@@ -31,6 +31,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "local law": {"contact": {"law": "local", "radius": None}},
     "local law of the contact grid": {"contact": {"law": "local-contact", "radius": None}},
     "gap": {"contact": {"gap": "0.001"}},
+    "friction that varies": {"contact": {"friction": {"s": [0, "1.2"], "k": ["0.1", "0.3"]}}},
 }
 
 

@@ -22,7 +22,7 @@ FLOORS: dict[str, dict[str, str]] = {
     "theory": {
         "ndtheory.symbolic": "__init__ checks dimension engine further mechanics quotient section5 symbols",
         "ndtheory": (
-            "__init__ bounds constants continuum energy_norms errors intervals moduli "
+            "__init__ bounds calibration constants continuum energy_norms errors intervals moduli "
             "number scalar segments statements strip texts wedges"
         ),
     },
@@ -56,17 +56,17 @@ FLOORS: dict[str, dict[str, str]] = {
     },
     "bounds, proofs": {
         "verification.bounds": (
-            "__init__ bound conditions interior_point lipschitz losses model "
+            "__init__ bound conditions interior_point lipschitz losses mirror model "
             "multipliers neighbours pattern_search region table trace_forms"
         ),
-        "verification.certificate": "__init__ check claims continuum contraction",
+        "verification.certificate": "__init__ calibrating check claims continuum contraction",
     },
     "answers": {
         "verification": "comparison history verdicts",
         "verification.advice": (
-            "__init__ accelerated best_theta ends from_logs from_matrices from_moduli from_runs from_vectors log_files "
-            "log_lines matrix_files methods pace readings roles runs_with_friction seen seen_moduli sides snippets "
-            "spectrum"
+            "__init__ accelerated best_theta cells ends from_logs from_matrices from_moduli from_runs from_vectors "
+            "from_waves log_files log_lines matrix_files methods pace readings roles runs_with_friction seen "
+            "seen_moduli sides snippets spectrum"
         ),
         "verification.coupling": "__init__ driver kratos",
         "verification.reproduce": "__init__ claims experiments readings refutation",
@@ -101,27 +101,27 @@ FLOORS: dict[str, dict[str, str]] = {
 
 #: Lines of each package at most, those of packages inside it apart: whoever needs more says here how many.
 BUDGET = {
-    "fem1d2d": 3810,
-    "ndtheory": 5600,
-    "verification": 1801,
-    "verification.advice": 5750,
-    "verification.algorithm": 2265,
-    "verification.bounds": 3280,
-    "verification.certificate": 1100,
-    "verification.cli": 2470,
-    "verification.constants": 1310,
+    "fem1d2d": 3845,
+    "ndtheory": 5865,
+    "verification": 1799,
+    "verification.advice": 6185,
+    "verification.algorithm": 2268,
+    "verification.bounds": 3570,
+    "verification.certificate": 1375,
+    "verification.cli": 2501,
+    "verification.constants": 1311,
     "verification.contact": 940,
     "verification.coupling": 420,
     "verification.exploration": 600,
     "verification.figures": 1652,
-    "verification.interface": 2850,
+    "verification.interface": 2944,
     "verification.ledger": 4320,
-    "verification.output": 525,
-    "verification.problem": 1760,
+    "verification.output": 524,
+    "verification.problem": 1903,
     "verification.reproduce": 655,
-    "verification.sections": 2310,
-    "verification.sweeps": 2400,
-    "verification.testing": 1570,
+    "verification.sections": 2438,
+    "verification.sweeps": 2401,
+    "verification.testing": 1583,
 }
 
 #: Imports by name that go upwards, and why.

@@ -37,8 +37,8 @@ OPENS = re.compile(r"(?:What|Whether|Who|Whose|Where|When|Which|How|Of|That)\b")
 #: At most so many places have it.
 MOST = {
     "code that knows or speaks": 5,
-    "a chain of that of": 11,
-    "alone at the end": 6,
+    "a chain of that of": 10,
+    "alone at the end": 5,
     "of its own": 8,
     "stands for is": 1,
     "dear": 1,

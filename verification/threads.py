@@ -47,8 +47,10 @@ def one_thread() -> Iterator[None]:
     """Return a context in which BLAS uses one thread; the former numbers return after it.
 
     Most libraries have one number of threads for the whole process: it stays 1 until the last of all threads that are
-    in such a context has left.  On matrices of a few hundred rows a second BLAS thread costs more than it gains, ten
-    times more on a busy machine.
+    in such a context has left.  A number that other code sets meanwhile counts until the next such context is entered,
+    and is the one that returns.  Libraries that are loaded after the first such context are not limited.
+
+    On matrices of a few hundred rows a second BLAS thread costs more than it gains, ten times more on a busy machine.
     """
     shared, apart = libraries()
     token = object()
@@ -56,11 +58,10 @@ def one_thread() -> Iterator[None]:
     try:
         _set([(library, 1) for library, _ in own])
         with _lock:
-            if not _inside:  # else it is 1 already
-                several = {library: threads for library in shared if (threads := library.num_threads) != 1}
-                _before.update(several)
-                _set([(library, 1) for library in several])
             _inside.add(token)
+            several = {library: threads for library in shared if (threads := library.num_threads) != 1}
+            _before.update(several)  # others may have set a number while a context is open
+            _set([(library, 1) for library in several])
         yield
     finally:
         with _lock:

@@ -20,6 +20,7 @@ FORMS = {
     "other roles": ["--set", "iteration.neumann_body=2"],
     "without friction": ["--set", "contact.friction=0"],
     "much friction": ["--set", "contact.friction=3"],
+    "tall cells": ["--set", "body2.cells=[24, 3]", "--set", "contact.friction=0"],
     "local law": ["--set", 'contact.law="local"', "--set", "contact.friction=0.2"],
     "sliding top": ["--set", 'body2.prescribed={ top = ["free", -0.01] }'],
 }
@@ -223,3 +224,11 @@ def test_a_tied_run_that_grows_gets_a_theta(call, ratio):
 
 def test_a_number_of_steps_is_none_where_nothing_falls():
     assert [steps(rate) for rate in (0, 0.1, 0.5, 1, 1.5)] == [1, 9, 30, None, None]
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_in_contact_the_table_of_methods_is_called_a_prediction_as_if_tied(call, write, form):
+    said = flat(call("advise", write(), *FORMS[form]))
+    warned = "Predicted as if tied: where contact changes, IQN-ILS may take more or not arrive." in said
+    assert "WHICH METHOD?" in said
+    assert warned == ("--tied" not in FORMS[form])

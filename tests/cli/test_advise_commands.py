@@ -69,7 +69,7 @@ def test_a_file_with_the_name_of_a_command_is_given_by_its_path(call, write, tmp
     shutil.copy(write(), tmp_path / name)
     monkeypatch.chdir(tmp_path)
     assert call("advise", f"./{name}", "--json").document["roles"]
-    needed = "neither --log nor --ratio" if name == "run" else "Missing option"
+    needed = {"run": "neither --log nor --ratio", "moduli": "no material"}.get(name, "Missing option")
     assert needed in call("advise", name).complaint
     assert call("advise", "--set", "contact.friction=0.1", f"./{name}").status == 0
 
@@ -88,7 +88,7 @@ def test_a_value_that_names_a_command_is_a_value(call, write):
         ("--tied --theta 0.1 --ratio 1.4", "advise run"),
         ("--ratio=1.4 --theta=0.1", "advise run"),
         ("--young 7e4,2e4 --poisson 0.3,0.3", "advise moduli"),
-        ("my.toml --mirror 1", "advise moduli"),
+        ("my.toml --shape mirror-1", "advise moduli"),
         ("--friction --log a.log --theta 0.3", "advise matrices and ndtheory advise run"),
         ("run --S1 a.npz", "advise matrices"),
         ("matrices --log a.log", "advise run"),
@@ -154,7 +154,6 @@ def test_an_interface_file_has_no_keys_and_no_roles_to_change(call, tmp_path):
         (["advise"], "--sw", ["--swap-roles"]),
         (["advise", "run"], "--th", ["--theta"]),
         (["advise", "matrices"], "--S", ["--S1", "--S2"]),
-        (["advise", "moduli", "--corners"], "b", ["both"]),
         (["advise", "my.toml", "--snippets"], "pre", ["preCICE"]),
     ],
 )

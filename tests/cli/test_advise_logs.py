@@ -184,3 +184,27 @@ def test_the_screen_of_an_aitken_log_shows_both_ends_as_estimates_and_pastes_whe
         document = call("advise", "run", "--log", path, *tied, "--json").document
         assert document["accelerated"][0]["factors"]["high"] == pytest.approx(3, rel=0.05)
         assert document["interval"]["lo"] is None
+
+
+@pytest.mark.parametrize(
+    ("words", "parts"),
+    [
+        (["run", "precice-A-convergence.log"], ["precice-A-convergence.log", "after --log"]),
+        (["precice-A-convergence.log"], ["ndtheory advise run --log precice-A-convergence.log --theta X"]),
+        (["run", "--log", "precice-A-convergence.log"], ["--theta = None", "does not name it", "iterations.log"]),
+    ],
+)
+def test_a_log_given_in_another_way_gets_the_call_that_reads_it(call, tmp_path, monkeypatch, words, parts):
+    monkeypatch.chdir(tmp_path)
+    precice(tmp_path / "precice-A-convergence.log", [{"ResAbs(M:F)": [0.8**n for n in range(9)]}])
+    complaint = call("advise", *words).complaint
+    assert [part for part in parts if part not in complaint] == []
+
+
+def test_a_log_that_decides_nothing_leads_to_vectors(call, tmp_path):
+    log = precice(tmp_path / "a.log", [{"ResAbs(M:F)": [0.8**n for n in range(9)]}])
+    said = " ".join(call("advise", "run", "--log", log, "--theta", "0.3").out.split())
+    assert "A few vectors of a run decide more than its log: ndtheory advise vectors --help." in said
+    assert "Or begin with a few steps with theta = 1" in said
+    again = " ".join(call("advise", "run", "--log", log, "--theta", "1").out.split())
+    assert "Or begin" not in again

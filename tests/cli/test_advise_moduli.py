@@ -10,12 +10,17 @@ from complaints import assert_names
 from verification.advice.roles import TIED
 
 GIVEN = ("--young", "7e4,2e4", "--poisson", "0.3,0.3")
-OPTIONS = [
-    (*corners, *mirror, *kind)
-    for corners in ((), ("--corners", "none"), ("--corners", "both"))
-    for mirror in ((), ("--mirror", "2"), ("--mirror", "both"), ("--mirror", "both", "--flat"))
-    for kind in ((), ("--plane-stress",), ("--three-dimensional",))
+SHAPES = [
+    ",".join(word for word in words if word)
+    for words in itertools.product(
+        ("", "corners-none", "corners-both"),
+        ("", "mirror-2", "mirror-1,mirror-2", "mirror-1,mirror-2,flat"),
+        ("", "plane-stress", "3d"),
+    )
 ]
+FLUID = ("--density", "1000,1200", "--thickness", "1e-3", "--length", "0.05")
+HEAT = ("--conductivity", "50,0.5")
+OPTIONS = [("--shape", words) if words else () for words in SHAPES]
 MODULI = [("7e4,2e4", "0.3,0.3"), ("2e4,2e4", "0.3,0.3"), ("1,2", "1/2,0.3"), ("1e-24,1e24", "0.499999999999,-0.9")]
 
 
@@ -30,6 +35,9 @@ def test_every_screen_fits_and_says_what_is_proved_and_what_is_not_claimed(call,
         assert "Proved for the continuum" in answer.out
         assert "Not claimed: a bound of rho from above with friction" in answer.out
         assert lines[-1].startswith("Next: ndtheory advise run --theta ")
+        theta = re.findall(r"theta = (\S+), a guess", answer.out)
+        assert theta  # one is named, and nothing says that there is none
+        assert "no theta" not in answer.out
 
 
 def test_the_document_has_both_roles_with_a_bound_from_below_and_nothing_predicted(call):
@@ -47,31 +55,34 @@ def test_the_document_has_both_roles_with_a_bound_from_below_and_nothing_predict
     assert found["moduli"]["poisson"] == [0.3, 0.3]
 
 
-@pytest.mark.parametrize("kind", [(), ("--plane-stress",), ("--three-dimensional",)])
+@pytest.mark.parametrize("kind", ["", "plane-stress", "3d"])
 def test_nothing_is_pasted_unless_a_mirror_image_fits_into_the_body_that_is_tried(call, kind):
-    for corners in ((), *(("--corners", name) for name in ("none", "1", "2", "both"))):
-        screen = call("advise", "moduli", *GIVEN, *corners, *kind).out
+    shaped = lambda *words: (
+        ("--shape", ",".join(word for word in (*words, kind) if word)) if any((*words, kind)) else ()
+    )
+    for corners in ("", "corners-none", "corners-1", "corners-2", "corners-both"):
+        screen = call("advise", "moduli", *GIVEN, *shaped(corners)).out
         assert "TO PASTE" not in screen
         assert "relaxation value" not in screen
         assert "a guess" in screen.partition("WHICH THETA TO START WITH?")[2]
         assert "WHICH RUN NEXT?" not in screen  # one theta, in one place
-    other = call("advise", "moduli", *GIVEN, "--mirror", "1", *kind).out  # body 2 is no good Neumann body
+    other = call("advise", "moduli", *GIVEN, *shaped("mirror-1")).out  # body 2 is no good Neumann body
     assert "TO PASTE" not in other
     assert "body 2, without friction" in other
-    fits = call("advise", "moduli", *GIVEN, "--mirror", "2", *kind)
+    fits = call("advise", "moduli", *GIVEN, *shaped("mirror-2"))
     assert "neumann_body = 1\n" in fits.out
     assert "WHICH RUN NEXT?" not in fits.out
-    document = call("advise", "moduli", *GIVEN, "--mirror", "2", *kind, "--json").document
+    document = call("advise", "moduli", *GIVEN, *shaped("mirror-2"), "--json").document
     assert (
         float(pasted(fits.out)) == document["next"]["theta"] == document["moduli"]["roles"][0]["start"]["theta_guess"]
     )
 
 
 def test_without_friction_the_start_is_proved_and_with_friction_it_is_called_a_guess(call):
-    screen = " ".join(call("advise", "moduli", *GIVEN, "--mirror", "2", "--corners", "2", "--flat").out.split())
+    screen = " ".join(call("advise", "moduli", *GIVEN, "--shape", "mirror-2,corners-2,flat").out.split())
     assert "without friction: theta = 0.875, factor 0.125 a step, proved: rho_normal <= 0.286" in screen
     assert "with friction: theta = 0.7954, a guess: rho at most 0.514, as with a layer and its ends" in screen
-    careful = " ".join(call("advise", "moduli", *GIVEN, "--mirror", "2").out.split())
+    careful = " ".join(call("advise", "moduli", *GIVEN, "--shape", "mirror-2").out.split())
     assert "theta = 0.3344, a guess: rho at most 3.98, as with a slender column" in careful
 
 
@@ -99,9 +110,9 @@ def test_the_table_of_corners_is_that_of_both_bodies_in_both_roles(call):
 
 
 def test_the_three_kinds_of_bodies_have_different_numbers(call):
-    given = ("--young", "7e4,2e4", "--poisson", "0.4,0.1", "--mirror", "both")
-    kinds = [(), ("--plane-stress",), ("--three-dimensional",)]
-    documents = [call("advise", "moduli", *given, *kind, "--json").document for kind in kinds]
+    given = ("--young", "7e4,2e4", "--poisson", "0.4,0.1", "--shape")
+    kinds = ["mirror-1,mirror-2", "mirror-1,plane-stress,mirror-2", "3d,mirror-2,mirror-1"]
+    documents = [call("advise", "moduli", *given, kind, "--json").document for kind in kinds]
     assert [document["moduli"]["plane"] for document in documents] == ["strain", "stress", "3d"]
     starts = [document["moduli"]["roles"][1]["start"]["s"]["value"] for document in documents]
     assert all(a != b for a, b in itertools.combinations(starts, 2))
@@ -110,8 +121,8 @@ def test_the_three_kinds_of_bodies_have_different_numbers(call):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("--young", "7e4"), ["Missing option", "--poisson"]),
-        (("--poisson", "0.3,0.3"), ["Missing option", "--young"]),
+        (("--young", "7e4,2e4"), ["--poisson = None", "two numbers"]),
+        (("--poisson", "0.3,0.3"), ["--poisson alone", "--young"]),
         (("--young", "7e4", "--poisson", "0.3,0.3"), ["--young = 7e4", "two numbers E1,E2"]),
         (("--young", "1,2,3", "--poisson", "0.3,0.3"), ["--young = 1,2,3", "two numbers"]),
         (("--young", "", "--poisson", "0.3,0.3"), ["--young", "two numbers"]),
@@ -121,11 +132,100 @@ def test_the_three_kinds_of_bodies_have_different_numbers(call):
         (("my.toml", *GIVEN), ["received my.toml: needed options only"]),
         ((*GIVEN, "--theta", "0.3"), ["--theta is an option of ndtheory advise run"]),
         ((*GIVEN, "--set", "contact.friction=0"), ["--set is an option of ndtheory advise FILE"]),
-        ((*GIVEN, "--plane-stress", "--three-dimensional"), ["--plane-stress with --three-dimensional"]),
-        ((*GIVEN, "--corners", "1", "--mirror", "2"), ["--mirror = 2", "ends in a corner"]),
-        ((*GIVEN, "--corners", "3"), ["--corners", "'3'"]),
-        ((*GIVEN, "--flat"), ["--flat without --mirror"]),
+        ((*GIVEN, "--shape", "plane-stress,3d"), ["--shape", "one plane"]),
+        ((*GIVEN, "--shape", "corners-1,corners-2"), ["--shape", "one corners"]),
+        ((*GIVEN, "--shape", "corners-1,mirror-2"), ["--shape, mirror = 2", "ends in a corner"]),
+        ((*GIVEN, "--shape", "corners-3"), ["--shape = corners-3", "corners-1"]),
+        ((*GIVEN, "--shape", "flat"), ["--shape = flat", "mirror-1"]),
+        ((*GIVEN, "--dt", "1"), ["--dt = 1", "conductivity or density"]),
+        ((), ["no material", "--conductivity"]),
+        (("--dt", "1"), ["--dt alone", "--density"]),
+        (("--conductivity", "1"), ["--conductivity = 1", "two numbers"]),
+        (("--conductivity", "1,0"), ["--conductivity = 0", "> 0"]),
+        (("--conductivity", "1,nan"), ["--conductivity = nan", "> 0"]),
+        (("--conductivity", "1,1e13"), ["--conductivity = 1e13", "1e12"]),
+        (("--conductivity", "1,2", "--dt", "1"), ["--capacity", "beside dt"]),
+        (
+            ("--conductivity", "1,2", "--capacity", "1,2", "--thickness", "1,1"),
+            ["--dt", "beside capacity and thickness"],
+        ),
+        (("--conductivity", "1,2", "--density", "1,2"), ["--density = 1,2", "no density beside conductivity"]),
+        (("--conductivity", "1,2", "--young", "1,2"), ["--young = 1,2", "no young beside conductivity"]),
+        (("--conductivity", "1,2", "--length", "1"), ["--length = 1", "no length beside conductivity"]),
+        (("--conductivity", "1,2", "--shape", "3d"), ["--shape, plane = 3d", "beside conductivity"]),
+        (("--density", "1,2"), ["--thickness", "beside density"]),
+        (("--density", "1,2", "--thickness", "1"), ["--length", "beside density"]),
+        ((*FLUID, "--young", "3e5"), ["--poisson", "beside young"]),
+        ((*FLUID, "--young", "3e5", "--poisson", "0.3"), ["--dt", "beside young"]),
+        ((*FLUID, "--young", "3e5", "--poisson", "0.6", "--dt", "1"), ["--poisson = 0.6", "1/2"]),
+        ((*FLUID, "--poisson", "0.3", "--dt", "1"), ["--young", "beside poisson"]),
+        ((*FLUID, "--capacity", "1,2"), ["--capacity = 1,2", "no capacity beside density"]),
+        (("--density", "1,2", "--thickness", "1,2", "--length", "1"), ["--thickness = 1,2", "one number"]),
     ],
 )
 def test_what_no_two_bodies_have_is_refused_in_one_line(call, arguments, words):
     assert_names(call("advise", "moduli", *arguments).complaint, *words)
+
+
+# --- heat and fluids -------------------------------------------------------------------------------------------------
+
+WAVES = {
+    "heat, steady": HEAT,
+    "heat, in time": (*HEAT, "--capacity", "3.6e6,1.6e6"),
+    "heat, thin plates": (*HEAT, "--capacity", "3.6e6,1.6e6", "--thickness", "0.01,0.05", "--dt", "10"),
+    "heat, thin steady plates": (*HEAT, "--thickness", "0.01,0.05"),
+    "plate": FLUID,
+    "plate, with stiffness": (*FLUID, "--young", "3e5", "--poisson", "0.3", "--dt", "1e-3"),
+    "tube": ("--density", "1000,1200", "--thickness", "1e-3", "--length", "0.05,0.005", "--dt", "1e-4"),
+    "heavy plate": ("--density", "1,7800", "--thickness", "1e-2", "--length", "1"),
+}
+
+
+@pytest.mark.parametrize("parallel", [(), ("--parallel",)], ids=["serial", "parallel"])
+@pytest.mark.parametrize("name", WAVES)
+def test_the_screens_of_heat_and_of_fluids_fit_and_have_their_words(call, name, parallel):
+    answer = call("advise", "moduli", *WAVES[name], *parallel)
+    assert (answer.status, answer.err) == (0, "")
+    lines, said = answer.out.splitlines(), " ".join(answer.out.split())
+    assert max(map(len, lines[:-1])) <= 80
+    assert len(lines) <= 46
+    heat = name.startswith("heat")
+    words = ("fluxes", "temperatures") if heat else ("pressures", "displacements")
+    assert f"solver reads {words[0]} and writes {words[1]}" in said
+    assert not {"forces", "force", "stiffness" if heat else "temperature", "Gamma_c"} & set(said.split())
+    document = call("advise", "moduli", *WAVES[name], *parallel, "--json").document
+    assert document["tied"]
+    assert document["waves"]["kind"] == ("heat" if heat else "fluid")
+    assert [bool(document["parallel"]), bool(document["methods"])] == [bool(parallel), not parallel]
+    if heat:
+        assert float(pasted(answer.out)) == document["theta"]
+        wanted = document["roles"][document["neumann_body"] - 1]["theta_tied"]
+        if parallel:
+            wanted = next(
+                one["theta"] for one in document["parallel"] if one["neumann_body"] == document["neumann_body"]
+            )
+        assert document["theta"] == pytest.approx(min(wanted, 0.99), rel=1e-3)
+    else:
+        assert "TO PASTE" not in answer.out
+        assert document["theta"] is None
+        assert (document["neumann_body"], document["roles"][1]["rho"]) == (2, None)
+        rho = document["roles"][0]["rho"]["value"]
+        assert document["next"]["theta"] == pytest.approx(1 / (2 + rho), rel=1e-3)
+        assert ("diverges" in said) == (rho > 1)
+
+
+def test_the_command_has_at_most_ten_options_beside_json_and_help(call):
+    shown = re.findall(r"^  (?:-\w, )?(--[a-z-]+)", call("advise", "moduli", "--help").out, re.M)
+    assert len(set(shown) - {"--json", "--help"}) <= 10
+    assert {"--conductivity", "--capacity", "--density", "--thickness", "--length", "--dt", "--parallel"} <= set(shown)
+
+
+def test_parallel_coupling_of_elastic_bodies_bounds_its_factor_from_below(call):
+    document = call("advise", "moduli", *GIVEN, "--parallel", "--json").document
+    for one, role in zip(document["parallel"], document["roles"], strict=True):
+        rho = role["rho"]["value"]
+        assert (one["neumann_body"], one["bound"]) == (role["neumann_body"], True)
+        assert (one["theta"], one["factor"]) == (pytest.approx(1 / (1 + rho)), pytest.approx((rho / (1 + rho)) ** 0.5))
+    screen = " ".join(call("advise", "moduli", *GIVEN, "--parallel", "--shape", "mirror-2").out.split())
+    assert "at least" in screen
+    assert "These are for serial coupling" in screen

@@ -40,6 +40,19 @@ def test_a_certificate_is_written_checked_and_held_against_its_problem(call, wri
     assert max(map(len, shown.splitlines())) <= 80
 
 
+def test_exact_divides_the_pieces_and_shows_the_proved_factor_beside_the_attained_one(call, tmp_path):
+    file, target = tmp_path / "section6.toml", tmp_path / "tree.json"
+    file.write_text(call("example", "section6-60").out, encoding="utf-8")
+    answer = call("certify", file, "--theta", "0.7", "--exact", "-o", target)
+    assert answer.status == 0
+    said = " ".join(answer.out.split())
+    for words in ("at most, for all loads", "Proved factor 0.510147, attained 0.509815", "divided into 2 sets"):
+        assert words in said
+    assert call("certify", "--check", target).status == 0
+    tree = json.loads(target.read_text(encoding="utf-8"))["claim"]["multipliers"]
+    assert (tree["divided"], len(tree["cases"])) == ("signs", 2)
+
+
 def test_a_certificate_of_other_bodies_or_of_a_false_claim_ends_with_1(call, written):
     file, target, _ = written
     assert call("certify", "--check", target, file, "--swap-roles").status == 1
@@ -80,6 +93,9 @@ def test_where_contraction_is_not_proved_a_line_says_so_and_nothing_is_written(c
         (["--check", "list.json", "--theta", "0.5"], ["--theta", "--check"]),
         (["--check", "list.json", "--continuum"], ["--continuum", "--check"]),
         (["small.toml", "--continuum", "--edition", "lmi"], ["--edition", "--continuum"]),
+        (["small.toml", "--exact", "--edition", "lmi"], ["--exact", "--edition"]),
+        (["small.toml", "--exact", "--continuum"], ["--exact", "--continuum"]),
+        (["--check", "list.json", "--exact"], ["--exact", "--check"]),
         (["--continuum"], ["FILE"]),
         (["small.toml", "--continuum", "-o", "proof.txt"], ["proof.txt", ".json"]),
         (["small.toml", "-o", "proof.txt"], ["proof.txt", ".json"]),

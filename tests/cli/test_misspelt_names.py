@@ -24,7 +24,7 @@ SWEEP = 'problem = "section6"\n[grid]\ntheta = [0.3]\n'
         ("verify --level ful", "full"),
         ("reproduce fig-12", "fig12"),
         ("advise FILE --snippets preCISE", "preCICE"),
-        ("advise moduli --young 1,2 --poisson 0,0 --corners bth", "both"),
+        ("advise moduli --young 1,2 --poisson 0,0 --shape corners-bth", "corners-both"),
     ],
 )
 def test_a_misspelt_name_is_answered_with_the_one_that_is_meant(call, write, words, meant):

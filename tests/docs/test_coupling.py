@@ -1,13 +1,16 @@
 """The page of advice for couplings: its commands run, it names the sources of its keys, and the index leads to it."""
 
+import json
 import re
 import shlex
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 from coupling_logs import linear_run, precice
 
+import verification as vf
 from verification.advice.snippets import SNIPPETS
 from verification.cli import main
 
@@ -51,6 +54,24 @@ def test_every_command_on_the_page_runs(folder, capsys, command):
     words = shlex.split(command.partition(" > ")[0])
     assert main(words) == 0
     assert capsys.readouterr().out
+
+
+def test_the_script_of_the_page_makes_files_that_the_command_reads_of_what_Kratos_wrote(tmp_path, monkeypatch, capsys):
+    """Six iterations of Aitken in Kratos 10.4.4: plates tied on 13 nodes, the Neumann problem on the upper one."""
+    shutil.copytree(DOCS.parent / "tests" / "verification" / "kratos_logs" / "vectors", tmp_path / "vectors")
+    monkeypatch.chdir(tmp_path)
+    script = re.search(r"```python\n(import meshio\n.*?)```", PAGE, re.S)[1]
+    exec(compile(script, "page", "exec"), {})
+    assert np.load("X.npy").shape == np.load("TX.npy").shape == (6, 26)
+    (command,) = {line for line in COMMANDS if line.startswith("advise vectors") and "--tied" in line}
+    assert main([*shlex.split(command), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    problem = vf.example("section6").changed(cells=((20, 3), (12, 3)), neumann_body=2)
+    own = vf.advise(problem, tied=True).roles[0]
+    assert found["spectrum"]["high"] == pytest.approx(own.rho_tied.value, rel=0.05)
+    assert found["theta"] == pytest.approx(own.theta_tied, rel=0.2)
+    assert found["theta"] * (1 + own.rho_tied.value) < 2
+    assert (found["method"]["name"], found["method"]["exchanged"]) == ("constant", True)  # 7 steps against 18
 
 
 def test_the_page_names_each_library_with_the_sources_of_its_keys():

@@ -363,3 +363,29 @@ def test_contact_opens_and_closes_where_a_log_stays_at_a_level(builder):
     patterns = [tuple(iterate.contact.pattern.touching) for iterate in iterates[-20:]]
     assert len(set(patterns)) > 1
     assert all(a != b for a, b in pairwise(patterns))
+
+
+@pytest.mark.parametrize(("rows", "heights"), [((6, 3), ("2", "1")), ((6, 6), ("1", "1")), ((3, 6), ("1", "2"))])
+def test_rho_of_fine_meshes_is_that_of_their_cells_or_a_little_less(builder, rows, heights):
+    page = builder.questions.of("constant_theta")
+    lower, upper = rows  # of two bodies 0.3 high, cells 0.05 wide
+    mesh = vf.example("section6").changed(young=(1, 1), friction=0, cells=((40, lower), (24, upper)), neumann_body=1)
+    rho = vf.measure(mesh.refined(2)).rho_max.value
+    at = ",".join(str([str(value) for value in page.HEIGHTS].index(height)) for height in heights)
+    scene = page.data()["scenes"][at]
+    shown = next(float(row[1]) for row in scene["rows"] if row[0] == heights[0])
+    assert f"rho* = {shown:.3f}" in scene["says"]
+    short = shown > 1.81
+    assert ("as short as the cells" in scene["says"]) == short
+    assert (0.999 if short else 0.9) * shown < rho < 1.0005 * shown
+
+
+def test_the_curve_of_each_scene_stays_below_rho_of_its_cells(builder):
+    page = builder.questions.of("constant_theta")
+    for scene in page.data()["scenes"].values():
+        curve, best = (np.array(mark["points"]) for mark in scene["marks"][0])
+        shown = float(re.search(r"rho\* = ([\d.]+)", scene["says"])[1])
+        assert curve[:, 1].max() <= shown * (1 + 1e-3)
+        assert curve[:, 1].max() == pytest.approx(best[0, 1])
+        assert page.RHO[0] < curve[:, 1].min()
+        assert curve[0, 1] > 0.98 * page.long_waves()  # long waves, or saw teeth of tall cells

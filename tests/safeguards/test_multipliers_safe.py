@@ -157,12 +157,12 @@ def test_a_threshold_is_a_friction_whose_number_is_below_1(section_6, monkeypatc
     """Made-up numbers ``c = k``, of which none is proved beyond 1 where ``proved_below`` says so."""
     tried = {}
 
-    def number(forms):
+    def number(forms, near):
         k = tried["last"] = forms.friction
         tried[k] = k
         if k >= proved_below:
             raise LMIError("made up")
-        return SimpleNamespace(value=k)
+        return SimpleNamespace(value=k, early=None)
 
     init = QuadraticForms.__init__
 

@@ -320,3 +320,53 @@ def test_extreme_moduli_have_finite_answers(young, poisson, plane):
     assert 0 < found.next.theta < 1
     with pytest.raises(ValueError, match="no factor"):
         found.plot()
+
+
+# --- heat ------------------------------------------------------------------------------------------------------------
+
+conductivities = st.tuples(st.integers(1, 100), st.integers(1, 100))
+
+
+@fewer(2)
+@given(conductivities, conductivities, st.tuples(st.integers(1, 9), st.integers(1, 9)), st.integers(1, 50))
+def test_plates_coupled_by_the_advised_theta_contract_by_the_proved_factor(k, c, d, hundredths):
+    """Plates with both other sides held: waves of any length, and the residual in the energy of the Neumann body."""
+    dt = Fraction(hundredths, 100)
+    found = vf.advise_moduli(conductivity=k, capacity=c, thickness=d, dt=dt)
+    q = np.array([0.0, 0.1, 0.5, 1.0, 3.0, 10.0, 100.0])
+    conductance = []
+    for of, capacity, depth in zip(k, c, d, strict=True):
+        p = np.sqrt(q**2 + capacity / (of * float(dt)))
+        conductance.append(of * p / np.tanh(p * depth))
+    contact, neumann = (conductance[body - 1] for body in (3 - found.neumann_body, found.neumann_body))
+    run = vf.couple(
+        lambda flux: flux / neumann,
+        lambda temperature: 1 - contact * temperature,
+        start=np.zeros(len(q)),
+        rule="constant",
+        theta=found.theta,
+        tolerance=1e-9,
+        max_iterations=2000,
+    )
+    assert run.converged
+    factor = np.abs(1 - found.theta * (1 + contact / neumann)).max()
+    assert factor <= found.best.rate_tied + 2e-3  # theta is rounded to four figures, and at most 0.99
+    assert found.best.rho_min.value * (1 - 1e-12) <= (contact / neumann).min()
+    assert (contact / neumann).max() <= found.best.rho_tied.value * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("k", [(50, 1), (1, 50), (3, 3)])
+def test_both_plates_run_at_once_contract_by_the_factor_of_parallel_coupling(k):
+    found = vf.advise_moduli(conductivity=k, capacity=(2, 1), parallel=True)
+    one = next(one for one in found.parallel if one.neumann_body == found.neumann_body)
+    q = np.geomspace(1e-3, 1e3, 30)
+    S = [np.sqrt(of**2 * q**2 + of * capacity) for of, capacity in zip(k, (2, 1), strict=True)]
+    contact, neumann = (S[body - 1] for body in (3 - found.neumann_body, found.neumann_body))
+    flux, temperature, sizes = np.ones(30), np.zeros(30), []
+    for _ in range(60):
+        new = flux / neumann, -contact * temperature
+        temperature, flux = (old + one.theta * (n - old) for old, n in zip((temperature, flux), new, strict=True))
+        sizes.append(np.sqrt((flux**2 / neumann + contact**2 * temperature**2 / contact).sum()))
+    assert (sizes[-1] / sizes[19]) ** (1 / 40) <= one.factor * (1 + 1e-6)
+    with pytest.raises(ValueError, match="serial coupling"):
+        found.snippet("preCICE")

@@ -258,3 +258,64 @@ def test_the_ratio_of_a_stick_patch_rises_to_that_of_half_planes():
     ratios = [sticking_on(refined(SHORT_WAVES, h), 0.7, 1.3, np.random.default_rng(0)).rho_A for h in (0, 1, 2)]
     assert 1.64 < ratios[0] < ratios[1] < ratios[2] < 1.8
     assert 1.8 - ratios[2] < 0.3 * (1.8 - ratios[0])
+
+
+# --- cells that differ: the number of the cells in place of the one of half-planes ------------------------------------
+
+#: Half-planes have the ratio 6.3; the contact body's cells are 1.5 and 3 times as high as wide, the others square.
+TALL_CELLS = {
+    6.8958510: changed(
+        body1={"young": 20000, "cells": [40, 6]}, body2={"young": 70000, "cells": [24, 4]},
+        contact={"friction": 1, "radius": "1.3"},
+    ),
+    11.1118871: changed(
+        body1={"young": 20000, "cells": [40, 6]}, body2={"young": 70000, "cells": [24, 2]},
+        contact={"friction": 1, "radius": "1.3"},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("limit", TALL_CELLS)
+@pytest.mark.parametrize("halvings", [0, 1, *([2] if AT_NIGHT else [])])
+def test_above_the_number_of_the_cells_no_stick_patch_attracts_whatever_slides(limit, halvings):
+    """At theta = 2/(1 + mu), where half-planes with 6.3 < mu say nothing yet."""
+    assert vf.measure(refined(TALL_CELLS[limit], 0)).rho_cells.value == pytest.approx(limit, rel=1e-6)
+    pair, random = refined(TALL_CELLS[limit], halvings), np.random.default_rng(halvings)
+    mu = (6.3 + limit) / 2
+    for _ in range(3):
+        lo = random.uniform(0.4, 1.2)
+        state = sticking_on(pair, lo, random.uniform(lo + 0.3, 1.6), random)
+        assert mu < state.beta[0] < limit
+        assert state.least(2 / (1 + mu)) < -1
+        assert state.run(2 / (1 + mu) * 1.1, 60, random)[0] > 1
+
+
+def test_a_number_above_that_of_the_cells_is_found_out_on_fine_meshes():
+    limit = max(TALL_CELLS)
+    states = [sticking_on(refined(TALL_CELLS[limit], h), 0.8, 1.2, np.random.default_rng(0)) for h in (0, 1)]
+    assert all(state.beta[0] < limit for state in states)
+    assert states[0].beta[0] < states[1].beta[0]
+    assert states[1].beta[0] > 0.995 * limit
+
+
+def test_many_separate_waves_have_ratios_near_that_of_the_cells():
+    """The step of the proof: p_N for A is above mu for each N on fine meshes."""
+    limit, counts = max(TALL_CELLS), []
+    for halvings in (0, 1):
+        state = sticking_on(refined(TALL_CELLS[limit], halvings), 0.8, 1.2, np.random.default_rng(0))
+        carried = state.pair.neumann.flexibility(state.pair.neumann.root)
+        p = np.linalg.eigvalsh(carried.T @ condensed(state.pair.contact.schur, state.prescribed) @ carried)
+        counts.append(int((p > 0.95 * limit).sum()))
+    assert 1 <= counts[0] < counts[1]
+
+
+@pytest.mark.parametrize("friction", ["1", "1/10", "1/100", "1/1000"])
+def test_for_small_friction_the_number_of_rho_A_is_wrong_by_a_share_of_k(friction):
+    data = LONG_WAVE | {"contact": LONG_WAVE["contact"] | {"friction": friction}}
+    changes = []
+    for way in (-1, 1):
+        state = sticking_on(refined(data, 0), 0.4, 0.8, np.random.default_rng(0), way=way)
+        changes.append((state.beta[0] - state.rho_A) / float(Fraction(friction)))
+        assert abs(changes[-1]) <= 2**0.5 * size_of_F(state) / float(Fraction(friction))
+    assert -0.16 < changes[0] < -0.11
+    assert 0.1 < changes[1] < 0.12

@@ -1,5 +1,6 @@
 """Two solvers driven by vectors."""
 
+import math
 import pickle
 
 import numpy as np
@@ -188,8 +189,12 @@ def test_an_own_rule_that_works_on_vectors_is_taken():
         ({"rule": "broyden"}, "needed one of constant, aitken, anderson, iqn-ils"),
         ({"theta": 0}, "0 < theta <= 1"),
         ({"theta": "x"}, "0 < theta <= 1"),
-        ({"tolerance": 0}, "tolerance 0: needed a number > 0"),
-        ({"max_iterations": 0}, "max_iterations 0: needed a whole number > 0"),
+        ({"tolerance": 0}, "tolerance = 0: needed a number > 0"),
+        ({"tolerance": "small"}, "tolerance = small: needed a number > 0"),
+        ({"tolerance": math.inf}, "tolerance = inf: needed a number > 0"),
+        ({"max_iterations": 0}, "max_iterations = 0: needed a whole number > 0"),
+        ({"max_iterations": 2.5}, "max_iterations = 2.5: needed a whole number > 0"),
+        ({"max_iterations": None}, "max_iterations = None: needed a whole number > 0"),
         ({"start": [[1.0]]}, "start has the shape 1 x 1: needed a vector"),
         ({"start": []}, "start has the shape 0: needed a vector"),
         ({"start": ["a"]}, "start has no real numbers"),

@@ -195,6 +195,8 @@ def test_the_recorded_table_keeps_what_its_page_says():
         assert all(one["good"] == (one["decided"] and one["steps"] <= 1.4 * one["fewest"]) for one in known)
         assert all(len(one["runs"]) <= 1 + record["asked_for"] for one in rows)
         assert all(one["why"] for one in rows)
+        rubbing = [one for one in rows if one["name"].startswith("friction") and one["decided"]]
+        assert all(one["steps"] <= 2 * one["fewest"] for one in rubbing)
     assert sum(one["good"] for one in record["first"][0]["couplings"]) >= 45
     linear = [one for one in record["advice"] if one["linear"]]
     assert all(one["verdicts"]["vectors"] == "right" for one in linear)

@@ -8,7 +8,6 @@ from fractions import Fraction as F
 import meshio
 import numpy as np
 import pytest
-import scipy.linalg
 from hypothesis import given
 from hypothesis import strategies as st
 from problem_list import blocks, changed, plates, small
@@ -327,33 +326,15 @@ def test_with_friction_the_bound_in_energy_norms_speaks_where_the_free_motion_li
     assert found.measured.C_t1.value > 0
     assert found.verdicts["energy"].verdict == "CONSISTENT"
     assert found.bounds["energy"].factor.value < 1
-    assert found.verdicts["lmi"].verdict == "NOT_COMPUTED"
-    assert "lifted rigidly" in found.verdicts["lmi"].reason
+    lmi = found.bounds["lmi"]
+    assert found.verdicts["lmi"].verdict == "CONSISTENT"
+    assert lmi.detail.lower <= lmi.factor.value < found.bounds["energy"].factor.value
+    assert lmi.detail.gap < 1e-4
     subject = Subject.of(found.run.pair, found.measured)
     assert BOUNDS["energy"].region(subject).every == found.measured.friction_threshold.value
-    for name, why in (("lmi", "lifted rigidly"), ("repaired", "m = 0")):
-        with pytest.raises(NotComputed, match=why):
-            BOUNDS[name].region(subject)
-
-
-def test_without_friction_the_refusal_of_the_semidefinite_bound_names_the_one_in_energy_norms_which_is_attained() -> (
-    None
-):
-    """At g = 0, p = 0, and at the mode of rho_N with all nodes closed, every product of (2.4) is 0."""
-    lifted = vf.Problem.from_dict(changed(LOOSE["lifted, not slid"], contact={"friction": 0}))
-    found = vf.compare(lifted)
-    pair, theta, t = found.run.pair, found.bounds["energy"].theta, found.run.pair.contact.grid.t
-    assert pair.contact.lifts
-    for words in ("lifted rigidly", "prove the bound in energy norms", "none prove less"):
-        assert words in found.verdicts["lmi"].reason
-    S1, S2, normal = pair.contact.schur, pair.neumann.schur, pair.contact.grid.normal
-    S1_normal = S1[t:, t:] - S1[t:, :t] @ np.linalg.solve(S1[:t, :t], S1[:t, t:])
-    values, modes = scipy.linalg.eigh(S1_normal, np.linalg.inv(pair.neumann.inverse[normal, normal]))
-    d = pair.neumann.inverse[:, normal] @ np.linalg.solve(pair.neumann.inverse[normal, normal], modes[:, -1])
-    p = np.r_[np.zeros(t), -S1_normal @ d[normal]]
-    assert np.abs(p + values[-1] * S2 @ d).max() <= 1e-9 * np.abs(p).max()
-    attained = max(1 - theta, abs(1 - theta - theta * values[-1]))
-    assert found.bounds["energy"].factor.value == pytest.approx(attained, rel=1e-9)
+    assert BOUNDS["lmi"].region(subject).every > 3 * found.measured.friction_threshold.value
+    with pytest.raises(NotComputed, match="m = 0"):
+        BOUNDS["repaired"].region(subject)
 
 
 @pytest.mark.parametrize("name", ["sliding top, smooth", "pressed by traction alone, smooth", "lifted, not slid"])

@@ -6,6 +6,7 @@ from itertools import count, islice
 import numpy as np
 import pytest
 from chain_problems import case
+from scipy.linalg import block_diag
 
 import verification as vf
 from verification.bounds import interior_point, model
@@ -32,7 +33,8 @@ def programs_of(pair, measured, theta, signs=0) -> list[Program]:
 
 def matrix(program: Program, s: float, y: np.ndarray) -> np.ndarray:
     products = program.left.T @ (y[:, None] * program.right)
-    return program.fixed + s * program.free - (products + products.T) / 2
+    whole = program.fixed + s * program.free - (products + products.T) / 2
+    return block_diag(*(whole[block, block] for block in program.blocks))
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -10,7 +10,6 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import kratos_models
-import meshio
 import numpy as np
 import pytest
 from coupling_logs import contact_run, tied_run
@@ -20,6 +19,7 @@ from verification.advice.from_logs import advise_logs
 from verification.advice.log_files import read_log
 from verification.advice.methods import METHODS, steps
 from verification.advice.snippets import CouplingScheme, snippet
+from verification.cli import main
 from verification.problem.specs import SidePart
 
 APPLICATIONS = ("CoSimulation", "StructuralMechanics", "ConstitutiveLaws", "Mapping", "LinearSolvers")
@@ -136,15 +136,16 @@ def test_our_accelerator_takes_the_steps_of_the_table_and_prints_the_eigenvalues
 
 
 @needs_kratos
-def test_the_vectors_that_Kratos_writes_by_the_block_of_the_page_give_theta(tmp_path, monkeypatch):
+def test_the_vectors_that_Kratos_writes_by_the_block_of_the_page_give_theta(tmp_path, monkeypatch, capsys):
     problem = PLATES.changed(neumann_body=2)
     operations = json.loads(re.search(r"```json\n(\{\n  \"coupling_operations.*?)```", PAGE, re.S)[1])
-    code = re.search(r"```python\n(def vectors.*?)\nprint", PAGE, re.S)[1]
+    code = re.search(r"```python\n(import meshio\n.*?)```", PAGE, re.S)[1]
     coupled(tmp_path, problem, predicted(problem)["aitken"].theta, "aitken", **operations)
     monkeypatch.chdir(tmp_path)
-    names = {"np": np, "meshio": meshio}
-    exec(code, names)
-    found = vf.advise_vectors(names["vectors"]("initialize"), names["vectors"]("finalize"))
+    exec(compile(code, "page", "exec"), {})
+    assert main(["advise", "vectors", "X.npy", "TX.npy", "--tied", "--json"]) == 0
+    found = vf.advise_vectors(np.load("X.npy"), np.load("TX.npy"), tied=True)
+    assert json.loads(capsys.readouterr().out)["theta"] == found.theta
     role = next(role for role in vf.advise(problem, tied=True).roles if role.neumann_body == 2)
     assert (found.spectrum.low, found.spectrum.high) == pytest.approx(
         (role.rho_min.value, role.rho_tied.value), rel=0.25

@@ -70,7 +70,7 @@ def test_without_two_vectors_it_has_no_advice_and_at_level_0_it_is_silent(echo_l
 @pytest.mark.parametrize(
     ("settings", "fragment"),
     [
-        ({"alpha": 0.5}, "'alpha' is no setting, needed rule or theta"),
+        ({"alpha": 0.5}, "'alpha' is not a setting, needed rule or theta"),
         ({"theta": 0}, "0 < theta <= 1"),
         ({"rule": "newton"}, "needs both bodies"),
         ({"rule": "iqnils"}, "iqn-ils"),

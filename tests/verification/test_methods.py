@@ -1,7 +1,5 @@
 """Steps of methods predicted on a spectrum, and the method that is advised."""
 
-import math
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,15 +7,15 @@ from hypothesis import strategies as st
 from linear_couplings import Linear
 
 import verification as vf
-from verification.advice.methods import METHODS, MOST, NEAR, MethodRow, advised, rows, steps
+from verification.advice.methods import METHODS, MOST, NEAR, MethodRow, advised, at_most, rows, steps
 from verification.advice.spectrum import Spectrum
 
 
-def by_hand(values, theta, tolerance=1e-6):
+def by_hand(values, theta, tolerance=1e-6, solution=1.0):
     """Constant relaxation of a diagonal model, one step after the other."""
     values, x = np.asarray(values), np.zeros(len(values))
     for n in range(1, 100_000):
-        y = 1 - values * (x - 1)
+        y = solution - values * (x - solution)
         if np.linalg.norm(y - x) < tolerance * np.linalg.norm(y):
             return n
         x = x + theta * (y - x)
@@ -188,8 +186,29 @@ def test_the_table_of_a_problem_is_that_of_its_matrices(tied, friction):
 
 def test_one_known_end_gives_bounds():
     found = vf.advise_run("0.45", "0.8")
-    assert {one.bound for one in found.methods} == {"at most"}
-    constant = found.methods[0]
-    rate = found.chosen(found.best)[1]
-    assert constant.steps <= math.ceil(math.log(1e-7) / math.log(rate)) + 1
-    assert "<= " in str(found.sections())
+    assert [one.bound for one in found.methods] == ["at most", None, None]
+    constant, aitken, _ = found.methods
+    rho = found.best.rho.value
+    assert constant.steps >= steps(Spectrum.of([rho]), "constant", constant.theta)
+    said = str(found.sections())
+    assert f"<= {constant.steps}" in said
+    assert f"<= {aitken.steps}" not in said
+    assert f"at most {constant.steps}" in found.method.reason
+
+
+@given(st.floats(0.01, 100), st.lists(st.floats(0, 1), min_size=1, max_size=5), st.floats(0.05, 0.999))
+def test_the_bound_of_a_constant_theta_holds_for_all_eigenvalues_and_first_errors(high, shares, share):
+    theta = share * 2 / (2 + high)
+    bound = at_most(high, theta)
+    values = np.array(shares) * high
+    assert steps(Spectrum.of(values), "constant", theta) <= bound
+    if bound < 1000:
+        solution = np.random.default_rng(len(shares)).standard_normal(len(values))
+        assert by_hand(values, theta, solution=solution) <= bound
+
+
+@pytest.mark.parametrize("high", [0.3, 1.0, 3.0, 10.0, 100.0])
+def test_the_bound_of_a_constant_theta_is_attained_at_the_largest_eigenvalue(high):
+    theta = 2 / (2 + high)
+    assert at_most(high, theta) == steps(Spectrum.of([high]), "constant", theta)
+    assert at_most(high, 2.01 / (1 + high)) is None

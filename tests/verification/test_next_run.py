@@ -199,3 +199,31 @@ def test_few_windows_are_not_pooled_nor_those_of_high_relative_residuals(tmp_pat
 def test_windows_that_converge_at_once_are_kept(tmp_path):
     found = advised(tmp_path, [("0.3", [falling(0.05, 4) for _ in range(30)])])
     assert found.next.why.startswith("keep it")
+
+
+# --- theta = 1, and runs that grow fast ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("theta", ["0.02", "0.1", "0.3", "1"])
+@pytest.mark.parametrize("tied", [False, True])
+def test_a_run_that_grows_a_millionfold_is_read_however_few_steps_it_has(tmp_path, theta, tied):
+    """33 steps at theta = 0.02 are fewer than the 250 over which a level must be steady; 67**33 is no level."""
+    found = advised(tmp_path, [(theta, falling(67.0, 33))], tied=tied)
+    exactly = 68 / F(theta) - 1
+    assert found.interval.lo.value == pytest.approx(float(exactly), rel=1e-6)
+    assert F(found.interval.lo.to_dict(up=False)["value"]) <= exactly
+    assert found.logs[0].diverges
+    assert found.next.theta < float(theta)
+    assert found.next.theta * (1 + float(exactly)) < 2  # below the limit of the stiffest mode
+    short = advised(tmp_path, [("0.02", falling(1.3, 33))])  # 6000-fold: may be the way to a level
+    assert short.logs[0].readings == ()
+
+
+@given(runs(), st.sampled_from([{}, {"tied": True}, {"friction": True}]))
+def test_theta_1_is_named_as_the_first_run_only_where_no_run_like_it_was_made_and_none_diverges(made, options):
+    with tempfile.TemporaryDirectory() as folder:
+        found = advised(Path(folder), made, **options)
+    named = found.next.why.count("Or begin with a few steps with theta = 1")
+    high, rises = any(float(theta) >= 0.9 for theta, _ in made), any(log.diverges for log in found.logs)
+    decided = bool(found.roles) or found.next.kept
+    assert named == (not (high or rises or decided or options.get("friction", False)))

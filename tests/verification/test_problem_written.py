@@ -101,7 +101,9 @@ def test_equal_problems_are_written_walked_and_keyed_alike(meshes, data):
 @pytest.mark.parametrize("problem", BUILT_IN.values(), ids=BUILT_IN)
 def test_a_dictionary_has_the_keys_of_the_file_and_the_defaults(problem):
     document = problem.to_dict()
-    assert list(document) == ["title", "dimension", "units", "body1", "body2", "contact", "iteration", "norm"]
+    plane = ["plane"] if problem.dimension == 2 else []
+    tables = ["units", "body1", "body2", "contact", "iteration", "norm"]
+    assert list(document) == ["title", "dimension", *plane, *tables]
     assert list(document["iteration"]) == ["neumann_body", "theta", "relaxation", "tolerance", "max_iterations"]
     assert document["contact"]["law"] == "nonlocal"
     assert document["body1"]["body_force"] == ([0, 0] if problem.dimension == 2 else 0)

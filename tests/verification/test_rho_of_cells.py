@@ -14,6 +14,7 @@ from strategies import AT_NIGHT
 import verification as vf
 from fem1d2d import plane_strain
 from fem1d2d.layers import Interface, Layer, peaks
+from fem1d2d.layers_proved import HalfPlane, enclosed_ratio
 from verification.constants.cells import halved_cells, rho_of_cells
 
 F = Fraction
@@ -73,15 +74,20 @@ class Family(NamedTuple):
         return np.array([top(S_c, S_n), top(normal(S_c), normal(S_n))])
 
     @property
-    def predicted(self) -> np.ndarray:
-        """rho and rho_N of the cells, from the geometry."""
+    def interface(self) -> Interface:
+        """Half-planes of the cells."""
         layers = [
             Layer(material=plane_strain(float(F(young)), float(nu)), aspect=float(aspect), rising=rising)
             for young, nu, aspect, rising in zip(
                 (self.young, "1"), self.poisson, self.aspects, (True, self.mirrored), strict=True
             )
         ]
-        return np.array([peak.ratio for peak in peaks(Interface(contact=layers[0], neumann=layers[1]))])
+        return Interface(contact=layers[0], neumann=layers[1])
+
+    @property
+    def predicted(self) -> np.ndarray:
+        """rho and rho_N of the cells, from the geometry."""
+        return np.array([peak.ratio for peak in peaks(self.interface)])
 
     @property
     def limit(self) -> np.ndarray:
@@ -114,6 +120,22 @@ def test_rho_on_fine_meshes_is_not_above_that_of_their_cells_and_tends_to_it_whe
     short = family.predicted > 1.1 * family.limit
     extrapolated = found[-1] + (found[-1] - found[-2]) / 3
     assert extrapolated[short] == pytest.approx(cells[short], rel=2e-3)
+
+
+@pytest.mark.skipif(not AT_NIGHT, reason="ten seconds and more for each family: at night")
+@pytest.mark.parametrize("family", FAMILIES[:4], ids=str)
+def test_the_enclosure_of_a_family_is_as_narrow_as_1e_9_and_lies_at_the_value_in_doubles(family):
+    """Long waves have about six digits in doubles."""
+    young = (F(family.young), F(1))
+    bodies = [
+        HalfPlane(aspect=aspect, shear=E / 2 / (1 + F(nu)), poisson=F(nu))
+        for aspect, E, nu in zip(family.aspects, young, family.poisson, strict=True)
+    ]
+    layers = family.interface
+    for normal, (peak, least) in enumerate(zip(peaks(layers, rounds=6), family.limit, strict=True)):
+        lo, hi = enclosed_ratio(*bodies, peak.phase, mirrored=family.mirrored, normal=bool(normal))
+        assert 0 < hi - lo <= 1e-9 * lo
+        assert max(peak.ratio, least) == pytest.approx(lo, rel=3e-6)
 
 
 def test_the_families_have_short_waves_that_decide_in_either_role_with_diagonals_that_mirror_or_not():
@@ -153,9 +175,9 @@ def blocks(*, offset: str = "0", cells=((16, 4), (8, 4)), **changes) -> vf.Probl
     return vf.Problem.from_dict(data)
 
 
-def halved_by_hand(problem: vf.Problem) -> tuple[bool, bool]:
+def halved_by_hand(problem: vf.Problem, halvings: int = 1) -> tuple[bool, bool]:
     """Whether the halved surfaces are one grid near its middle node, and mirror each other there: from the meshes."""
-    pair = vf.build(problem.refined(1))
+    pair = vf.build(problem.refined(halvings))
     slopes = []
     for body in (pair.body1.mesh_body, pair.body2.mesh_body):
         points, cells = body.mesh.points, body.mesh.cells

@@ -113,6 +113,15 @@ def test_blas_has_one_thread_until_the_last_thread_has_left():
         assert numbers() == {3}
 
 
+def test_a_number_that_was_set_while_a_context_is_open_is_1_again_in_the_next_one():
+    with threadpool_limits(2, user_api="blas"):
+        with one_thread():
+            threadpool_limits(3, user_api="blas")
+            with one_thread():
+                assert numbers() == {1}
+        assert numbers() == {3}
+
+
 def test_blas_has_one_thread_in_a_thread_whose_main_thread_set_several():
     def inside():
         with one_thread(), one_thread():

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from verification.advice.log_files import Log
-from verification.advice.readings import AT_ONE, LARGEST_TO_PASTE, NextRun, few, rounded_down
+from verification.advice.readings import LARGEST_TO_PASTE, SHOWS_MOST, NextRun, few, rounded_down
 from verification.advice.spectrum import MARGIN, Spectrum
 from verification.value import to_plain
 
@@ -167,7 +167,7 @@ def spectrum_of(logs: Iterable[Accelerated]) -> Spectrum | None:
 def after_accelerated(spectrum: Spectrum | None, tied: bool) -> NextRun:
     """The theta to paste of a tied interface, or the run with constant relaxation that shows more."""
     if spectrum is None:
-        why = f"{AT_ONE}. Or save some iterates of the run as it is, and type ndtheory advise vectors"
+        why = f"{SHOWS_MOST}. Or save some iterates of the run as it is, and type ndtheory advise vectors"
         return NextRun(theta=1.0, why=why)
     theta = rounded_down(min(Fraction(spectrum.theta), LARGEST_TO_PASTE))
     ends = f"2/(2 + least + largest) with lambda from {few(spectrum.low)} to {few(spectrum.high)} by Aitken's factors"

@@ -21,7 +21,6 @@ from verification.advice.from_vectors import advice_on
 from verification.advice.log_files import Log, read_log
 from verification.advice.pace import CONVERGED, RELATIVE, Pace
 from verification.advice.readings import (
-    AT_ONE,
     LARGEST_TO_PASTE,
     SHORTEST_STEP,
     NextRun,
@@ -52,6 +51,9 @@ AGREE = Fraction(103, 100)
 
 #: Where the bounds of rho differ by less, a theta between costs a few steps at most.
 NARROW = Fraction(5, 4)
+
+#: How a quasi-Newton run is recognised.
+UNNAMED = "a quasi-Newton run of preCICE is recognised by its iterations.log in the same folder"
 
 #: The smallest theta that a log may have: for a smaller one a ratio has to be steady over millions of steps.
 SMALLEST_THETA = Fraction(1, 10**6)
@@ -171,7 +173,7 @@ def _theta_of(log: Log, theta: Fraction | None) -> Fraction:
     if theta is not None:
         return theta
     if log.theta is None or log.theta_rounding > 1e-3 * log.theta:
-        raise HypothesisError("theta", None, f"the relaxation factor of {log.path}, which does not name it")
+        raise HypothesisError("theta", None, f"the relaxation factor of {log.path}, which does not name it ({UNNAMED})")
     return Fraction(repr(log.theta))
 
 
@@ -244,7 +246,7 @@ def longer(columns: tuple[SeenColumn, ...], theta: Fraction) -> NextRun:
     steps = f"{steps_needed(theta)} steps or more in one time window"
     again = f"the same again, constant and without Aitken or quasi-Newton, {steps}"
     if all(one.kind == "short" for one in paces):
-        why = f"{again}: smaller limits of convergence and a larger number of iterations. {AT_ONE}"
+        why = f"{again}: smaller limits of convergence and a larger number of iterations"
     else:
         why = f"{again}, until the residual falls or grows steadily; a relative one must fall below 0.1 first"
     return NextRun(theta=float(theta), why=why, again=True)

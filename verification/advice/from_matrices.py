@@ -15,7 +15,7 @@ from fem1d2d import extremes_by_solves, largest
 from fem1d2d.mesh import Floats
 from ndtheory import Number
 from verification.advice import BodyNumber
-from verification.advice.roles import ALL, Advice, Role, advise, plain_role, role_of, with_both_ends
+from verification.advice.roles import ALL, Advice, Role, advise, plain_role, role_on, with_both_ends
 from verification.advice.sides import (
     BODIES,
     ORDERING,
@@ -95,8 +95,9 @@ def advise_matrices(
         P: from the unknowns of the Neumann body to the unknowns of the contact body, or for one component at nodes.
     neumann_body : {1, 2}, optional
         The body from whose unknowns P leads; by default the shape of P decides, and body 2 where both have as many.
-    friction : number, optional
-        k >= 0; needs matrices of two components at each node, and ``radius`` with ``x`` or ``kernel``.
+    friction : number or array, optional
+        k >= 0, one number or one for each contact node; needs matrices of two components at each node, and ``radius``
+        with ``x`` or ``kernel``.
     x : array, optional
         Positions of the nodes of the contact body, increasing.
     x_neumann : array, optional
@@ -222,12 +223,15 @@ def _by_eigenvalues(body: BodyNumber, sides: Sides, P: Transfer | None) -> Role:
         S_c = (S_c + S_c.T) / 2
     with one_thread():
         role = plain_role(body, Fraction(largest(S_c, S_n).value) * unit)
-        if len(S_n) <= ALL:
-            values = eigh(S_c, S_n, eigvals_only=True)
-            role = replace(role, spectrum=Spectrum.of(np.maximum(values, 0.0) * float(unit)))
-        if P is None and not contact.motions.size:
-            return role  # the eigenvalues of both roles are reciprocal
-        least = max(float(eigh(S_c, S_n, eigvals_only=True, subset_by_index=[0, 0])[0]), 0.0)
+        reciprocal = P is None and not contact.motions.size  # the eigenvalues of both roles
+        whole = len(S_n) <= ALL
+        if whole or not reciprocal:
+            values = np.maximum(eigh(S_c, S_n, eigvals_only=True, subset_by_index=None if whole else [0, 0]), 0.0)
+        if whole:
+            role = replace(role, spectrum=Spectrum.of(values * float(unit)))
+        if reciprocal:
+            return role
+    least = float(values[0])
     return replace(role, rho_min=Number.of_float(Fraction(least) * unit), rho_tied=role.rho)
 
 
@@ -235,9 +239,7 @@ def _of_asymmetric(body: BodyNumber, S_c: Floats, S_n: Floats, unit: float) -> R
     """The role by the complex eigenvalues of ``S_n^-1 S_c``."""
     with one_thread():
         spectrum = Spectrum.of(np.linalg.eigvals(np.linalg.solve(S_n, S_c)) * unit)
-    ends = [Number.of_float(max(end, 0.0)) for end in (spectrum.low, spectrum.high)]
-    known: dict[str, Any] = {"rho_min": ends[0], "rho_tied": ends[1], "spectrum": spectrum}
-    return role_of(body, Fraction(ends[1].value), nothing=WORD_OF_ASYMMETRY, **known)
+    return role_on(body, spectrum, nothing=WORD_OF_ASYMMETRY)
 
 
 def _by_lanczos(body: BodyNumber, sides: Sides, P: Transfer | None, progress: Progress) -> tuple[Role, SeenLanczos]:

@@ -13,9 +13,10 @@ from ndtheory.energy_norms import predicted_rate, predicted_theta
 from ndtheory.moduli import Moduli, Plane, column, end, free_end, half_planes, layer, mirror
 from ndtheory.number import below
 from verification.advice import BodyNumber
+from verification.advice.from_waves import advise_waves, shown
 from verification.advice.readings import AT_ONE, NextRun, rounded_down
 from verification.advice.roles import PROVED, Advice, Role
-from verification.advice.seen_moduli import Corners, LowerBounds, ModuliRole, SeenModuli, StartTheta, exactly
+from verification.advice.seen_moduli import Corners, LowerBounds, ModuliRole, Parallel, SeenModuli, StartTheta, exactly
 from verification.interface.pair import UNITS
 
 #: Sizes of E, and how close nu may come to -1 and to 1/2: bounds of rho then stay between 1e-75 and 1e75.
@@ -30,14 +31,21 @@ ONE_END = "moduli bound rho from below, and no other end of the spectrum"
 
 def advise_moduli(
     *,
-    young: Sequence[Any],
-    poisson: Sequence[Any],
+    young: Any = None,
+    poisson: Any = None,
     plane: Plane = "strain",
     corners: Corners | None = None,
     mirror: Collection[int] = (),
     flat: bool = False,
+    conductivity: Sequence[Any] | None = None,
+    capacity: Sequence[Any] | None = None,
+    density: Sequence[Any] | None = None,
+    thickness: Any = None,
+    length: Any = None,
+    dt: Any = None,
+    parallel: bool = False,
 ) -> Advice:
-    """Advice from the moduli of two bodies, before there is a mesh.
+    """Advice from the material data of two bodies, before there is a mesh: elastic, with heat, or a fluid at a wall.
 
     For each role the advice has the bounds of rho from below that every geometry has in the continuum:
     ``(G_c/G_n) kappa_n`` where a piece of Gamma_c may stick, ``E*_c/E*_n`` without friction, with c for the contact
@@ -54,10 +62,14 @@ def advise_moduli(
     whose factor exceeds any layer's, or from a layer and its ends where the Neumann body is ``flat``
     (:func:`ndtheory.moduli.column`, :func:`ndtheory.moduli.layer`, :func:`ndtheory.moduli.end`).
 
+    Two flat plates that exchange heat have both ends of their spectrum, hence a theta to paste and its factor
+    (:func:`ndtheory.moduli.conduction`).  A fluid at a wall, the Neumann body, has a lower bound of rho, the added mass
+    of the longest wave over the wall's own mass (:func:`ndtheory.moduli.added_mass`).  Both are tied.
+
     Parameters
     ----------
     young, poisson : pair of numbers
-        E and nu of bodies 1 and 2; E in one unit of stress.
+        E and nu of bodies 1 and 2; E in one unit of stress.  One number each for a wall.
     plane : {'strain', 'stress', '3d'}
     corners : {'none', '1', '2', 'both'}, optional
         The body that ends in corners of 90 degrees at the ends of Gamma_c, where that is known.
@@ -65,6 +77,13 @@ def advise_moduli(
         The bodies whose mirror image fits into the other one, with the supports.
     flat : bool
         True if a body into which such an image fits is at least twice as wide as high, and held along its other side.
+    conductivity, capacity, density : pair of numbers
+        Of plates 1 and 2, the capacity per volume for a step in time; density of the fluid and of the wall.
+    thickness, length, dt : number or pair of numbers
+        Thickness of the wall, or of both plates, which are thick without it; length of the wall between the lines that
+        hold it, of a tube its length and radius; step in time.  All in one set of units.
+    parallel : bool
+        True if both solvers run at once, and both fields are relaxed.
 
     Returns
     -------
@@ -73,7 +92,7 @@ def advise_moduli(
     Raises
     ------
     HypothesisError
-        No pair of such numbers, or a mirror image that cannot fit with these corners.
+        Numbers out of their range, data of two kinds, or a mirror image that cannot fit with these corners.
 
     Examples
     --------
@@ -83,7 +102,22 @@ def advise_moduli(
     >>> fits = advise_moduli(young=(70000, 20000), poisson=("0.3", "0.3"), corners="2", mirror=[2], flat=True)
     >>> fits.best.theta_proved, fits.next.theta
     (0.875, 0.7954)
+    >>> heat = advise_moduli(conductivity=(50, "0.5"), capacity=("3.6e6", "1.6e6"))
+    >>> heat.neumann_body, heat.theta, round(heat.best.rate_tied, 4)
+    (1, 0.963, 0.0273)
+    >>> water = advise_moduli(density=(1000, 1200), thickness="1e-3", length=("0.05", "0.005"))
+    >>> round(water.best.rho.value, 1), water.method.name
+    (85.5, 'iqn-ils')
     """
+    waves = {"conductivity": conductivity, "capacity": capacity, "density": density, "length": length, "dt": dt}
+    given = {key: value for key, value in (waves | {"thickness": thickness}).items() if value is not None}
+    if conductivity is not None or density is not None:
+        elastic = {"plane": plane != "strain" and plane, "corners": corners, "mirror": [*mirror], "flat": flat}
+        given |= {key: value for key, value in elastic.items() if value}
+        given |= {key: value for key, value in (("young", young), ("poisson", poisson)) if value is not None}
+        return advise_waves("fluid" if conductivity is None else "heat", given, parallel=parallel)
+    for key, value in given.items():
+        raise HypothesisError(key, shown(value), f"no {key} beside young: it belongs to conductivity or density")
     bodies = _bodies(young, poisson, plane)
     if corners is not None and corners not in get_args(Corners):
         raise HypothesisError("corners", corners, f"one of {', '.join(get_args(Corners))}")
@@ -107,8 +141,9 @@ def advise_moduli(
         neumann_body=tried,
         roles=tuple(_as_role(role, seen.bounds(role)) for role in roles),
         units=UNITS,
-        next=_next(seen, tried),
+        next=_next(seen, tried, parallel),
         moduli=seen,
+        parallel=tuple(Parallel.of(r.neumann_body, seen.bounds(r).stick.value, bound=True) for r in roles * parallel),
     )
 
 
@@ -146,7 +181,7 @@ def _role(
             f"body {contact_body} is incompressible and body {neumann_body} is not: no multiple of its energy is enough"
         )
         if contact_body not in fits:
-            why = f"needed: the mirror image of body {contact_body} fits into body {neumann_body} (option --mirror)"
+            why = f"needed: the mirror image of body {contact_body} fits into body {neumann_body} (--shape)"
         return ModuliRole(neumann_body=neumann_body, corners=bounds, start=None, why_no_start=why)
     # the angle of an image that fits is at most the Neumann body's, which may be a corner unless `corners` excludes it
     angle = math.pi / 2 if corners is None else _opening(neumann_body, corners)
@@ -192,9 +227,14 @@ def _as_role(role: ModuliRole, bounds: LowerBounds) -> Role:
     )
 
 
-def _next(seen: SeenModuli, tried: BodyNumber | None) -> NextRun:
+def _next(seen: SeenModuli, tried: BodyNumber | None, parallel: bool) -> NextRun:
     """The theta to start with in the role that is tried, or the run to make."""
     role = seen.roles[0 if tried is None else tried - 1]
+    if role.start is not None and parallel:
+        theta = min(1 / (1 + Fraction(role.start.guess)), Fraction(role.start.theta_guess))
+        return NextRun(
+            theta=rounded_down(theta), why="a guess for parallel coupling, 1/(1 + rho) with the guess of rho"
+        )
     if role.start is not None:
         why = (
             "with friction a guess: a run at it, with its ratio of residuals, tells more; "
@@ -203,9 +243,10 @@ def _next(seen: SeenModuli, tried: BodyNumber | None) -> NextRun:
         return NextRun(theta=role.start.theta_guess, why=why)
     largest = seen.largest(role)
     who = "either body" if tried is None else f"body {tried}"
+    where = "tied" if parallel else "without friction or tied"
     among = "the largest bound above" if seen.corners is None else "the bound above"
     why = (
-        f"the Neumann problem on {who}, 1/(2 + {largest:.4g}) with {among}, which contracts without friction or tied "
+        f"the Neumann problem on {who}, 1/(2 + {largest:.4g}) with {among}, which contracts {where} "
         f"if rho is below {3 + 2 * largest:.4g}; halve it if the residual does not fall. {AT_ONE}"
     )
     return NextRun(theta=rounded_down(1 / (2 + Fraction(largest))), why=why)

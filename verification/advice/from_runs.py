@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
@@ -11,7 +12,9 @@ from ndtheory.energy_norms import predicted_theta
 from ndtheory.number import Numeric
 from verification.advice import methods
 from verification.advice.readings import (
+    AT_ONE,
     LARGEST_TO_PASTE,
+    LIKE_ONE,
     OF_OPEN_NODES,
     Made,
     NextRun,
@@ -131,13 +134,14 @@ def advice_of_runs(
         following = paste
     else:
         following, rho = anew(following, made), None
+        learns = not following.kept and known.get("friction_bounds") is None
+        if learns and not any(one.rises or one.theta >= LIKE_ONE for one in made):
+            following = replace(following, why=f"{following.why}. {AT_ONE}")
     roles = []
     if rho is not None:
         reason = {"neumann_body": "whichever body had the Neumann problem in that run", "rho_min": ONE_END}
         roles.append(role_of(None, rho, nothing="an observed ratio proves nothing", reason=reason))
-    table = table_of(
-        roles, tied=tied, bound="at most", theta=following.theta
-    )  # the smallest eigenvalue may be anything
+    table = table_of(roles, tied=tied, one_end=True, theta=following.theta)
     return Advice(
         neumann_body=None,
         methods=table,

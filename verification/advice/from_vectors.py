@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
-from ndtheory import Number
 from verification.advice import methods
-from verification.advice.roles import Advice, Role, role_of, table_of
+from verification.advice.roles import Advice, Role, role_on, table_of
 from verification.advice.spectrum import SeenVectors, Spectrum, seen_in
 from verification.interface.matrices import real_array
 from verification.interface.pair import UNITS
@@ -101,7 +99,5 @@ def advice_on(spectrum: Spectrum, *, tied: bool, of: str, **known: Any) -> Advic
 
 def _role(spectrum: Spectrum, of: str) -> Role:
     """The role of an estimated spectrum."""
-    ends = [Number.of_float(max(end, 0.0)) for end in (spectrum.low, spectrum.high)]
     reason = {"neumann_body": f"{of} do not tell which body had the Neumann problem"}
-    known: dict[str, Any] = {"rho_min": ends[0], "rho_tied": ends[1], "spectrum": spectrum}
-    return role_of(None, Fraction(ends[1].value), nothing=f"{of}, {ESTIMATED}", reason=reason, **known)
+    return role_on(None, spectrum, nothing=f"{of}, {ESTIMATED}", reason=reason)

@@ -41,8 +41,8 @@ class MethodRow:
         The factor, or the first one.
     steps : int or None
         Evaluations of T; None where it does not arrive within MOST of them.
-    bound : {'at most', 'at least'} or None
-        Which bound ``steps`` is, where only one end of the spectrum is known; None if it is a prediction.
+    bound : {'at most'} or None
+        Of a constant theta where only the largest eigenvalue is known; None if ``steps`` is a prediction.
     """
 
     method: str
@@ -77,20 +77,44 @@ class Advised:
 
 
 def rows(
-    spectrum: Spectrum, *, theta: float, neumann_body: BodyNumber | None, exchanged: bool, bound: str | None = None
+    spectrum: Spectrum, *, theta: float, neumann_body: BodyNumber | None, exchanged: bool, one_end: bool = False
 ) -> tuple[MethodRow, ...]:
-    """The methods in one assignment of the roles, simulated on its spectrum with theta as the factor."""
-    return tuple(
-        MethodRow(
-            method=method,
-            neumann_body=neumann_body,
-            exchanged=exchanged,
-            theta=theta,
-            steps=steps(spectrum, method, theta),
-            bound=bound,
+    """The methods in one assignment of the roles, simulated on its spectrum with theta as the factor.
+
+    With ``one_end`` only the largest eigenvalue is known, and the steps of a constant theta are :func:`at_most`.
+    """
+    found = []
+    for method in METHODS:
+        bounded = one_end and method == "constant"
+        found.append(
+            MethodRow(
+                method=method,
+                neumann_body=neumann_body,
+                exchanged=exchanged,
+                theta=theta,
+                steps=at_most(spectrum.high, theta) if bounded else steps(spectrum, method, theta),
+                bound="at most" if bounded else None,
+            )
         )
-        for method in METHODS
-    )
+    return tuple(found)
+
+
+def at_most(high: float, theta: float) -> int | None:
+    """Evaluations of T that suffice with constant theta for eigenvalues from 0 to ``high``, whatever the solution is.
+
+    With ``q = max(1 - theta, |1 - theta (1 + high)|)`` each mode of a solution of size 1 has ``|T x - x|`` at most
+    ``(1 + high) q^n`` after n steps, and ``|T x|`` at least ``1 - high q^n``; so have their sums of squares.
+
+    Examples
+    --------
+    >>> at_most(3.0, 0.4), steps(Spectrum.of([3.0]), "constant", 0.4), at_most(3.0, 0.5)
+    (31, 31, None)
+    """
+    q = max(1 - theta, abs(1 - theta * (1 + high)))
+    if not 0 < q < 1:
+        return None
+    steps = math.log(TOLERANCE / (1 + high * (1 + TOLERANCE))) / math.log(q)
+    return math.floor(steps) + 2 if steps < COUNTED else None
 
 
 def steps(spectrum: Spectrum, method: str, theta: float) -> int | None:
@@ -178,7 +202,7 @@ def advised(table: Sequence[MethodRow], *, tied: bool, exchanged: bool | None = 
         key=lambda row: (METHODS.index(row.method), _count(row)),
     )
     same = [row for row in own if row.exchanged == taken.exchanged]
-    fewest = min((row for row in own if row.steps is not None and row.exchanged == taken.exchanged), key=_count)
+    fewest = min(same, key=_count)
     return Advised(
         name=taken.method,
         neumann_body=taken.neumann_body,
@@ -194,11 +218,12 @@ def _count(row: MethodRow) -> float:
 def _reason(taken: MethodRow, same: Iterable[MethodRow], fewest: MethodRow) -> str:
     constant = next(row for row in same if row.method == "constant")
     others = f"{NAMES[fewest.method]} takes {fewest.steps}"
+    bound = f"{constant.bound} " if constant.bound else ""
     if taken.method == "constant" == fewest.method:
-        return f"{taken.steps} steps, and no method takes fewer"
+        return f"{bound}{taken.steps} steps, and no method takes fewer"
     if taken.method == "constant":
-        return f"{taken.steps} steps; {others}, hardly fewer"
-    known = "more than can be counted" if constant.steps is None else f"{constant.steps}"
+        return f"{bound}{taken.steps} steps; {others}, hardly fewer"
+    known = "more than can be counted" if constant.steps is None else f"{bound}{constant.steps}"
     times = "" if constant.steps is None else f", {constant.steps / _count(taken):.2g} times as many"
     hardly = "" if taken.method == fewest.method else f"; {others}, hardly fewer"
     return f"{taken.steps} steps; a constant theta takes {known}{times}{hardly}"

@@ -107,7 +107,8 @@ def pace(residuals: Floats, column: Column, theta: Fraction) -> Pace:
     The ratio is the median over the last ``steps`` steps of geometric means over an even number of consecutive ones, a
     fifth of the steps: contact that is open and closed alternately makes them alternate, and noise is smaller in a
     mean.  It is steady where these means scatter little between their deciles, and their medians in both halves agree.
-    It must be steady over the steps that theta needs; over fewer where the residual has fallen to CONVERGED.
+    It must be steady over the steps that theta needs; over fewer where the residual has fallen to CONVERGED of the
+    largest, or has grown by as much: neither is a level.
     """
     relative, steps = column.residual in RELATIVE, steps_needed(theta)
     usable = np.flatnonzero(np.isfinite(residuals) & (residuals > 0))
@@ -127,7 +128,8 @@ def pace(residuals: Floats, column: Column, theta: Fraction) -> Pace:
     height = float(values[-1] / values.max()) if taken else 1.0
     if arrived:  # at rounding or zero
         height = min(height, share)
-    if height < CONVERGED:  # no level: fewer steps show the ratio
+    grown = taken > 0 and values[0] < CONVERGED * values[-1]
+    if height < CONVERGED or grown:  # no level: fewer steps show the ratio
         steps = min(steps, max(FEWEST_STEPS, taken // 2))
     if taken < steps:
         return Pace(kind="short", steps=max(taken, int(arrived)), height=height, lost=lost, arrived=arrived)

@@ -23,7 +23,11 @@ FEWEST_STEPS = 10
 WIDEST, NARROWEST = Fraction(1, 10), Fraction(3, 100)
 
 #: The run that shows most: with theta = 1 a mode is multiplied by ``-lambda``, and an open node by 0.
-AT_ONE = "A few steps with theta = 1 show most, if they may be run: if nothing slips or opens, their ratio tends to rho"
+SHOWS_MOST = "a few steps with theta = 1, if they may be run: if nothing slips or opens, their ratio tends to rho"
+AT_ONE = f"Or begin with {SHOWS_MOST}"
+
+#: A run with this theta or a larger one shows what one with theta = 1 would.
+LIKE_ONE = Fraction(9, 10)
 
 #: Beyond this theta four figures would lead back to a smaller one.
 NEXT_TO_1 = Fraction(999, 1000)

@@ -16,11 +16,12 @@ from ndtheory import EnergyBounds, EnergyConstants, Number, evaluate_energy
 from ndtheory.energy_norms import predicted_rate, predicted_theta, tied_factor, tied_rate, tied_theta
 from verification.advice import BodyNumber, methods
 from verification.advice.accelerated import Accelerated
+from verification.advice.cells import Suggested, no_cells, suggest
 from verification.advice.methods import Advised, MethodRow
 from verification.advice.readings import LARGEST_TO_PASTE, NextRun, RunReading, SeenRun, rounded_down
 from verification.advice.runs_with_friction import FrictionBounds
 from verification.advice.seen import RhoInterval, SeenLog
-from verification.advice.seen_moduli import SeenModuli
+from verification.advice.seen_moduli import Parallel, SeenModuli, SeenWaves
 from verification.advice.sides import SeenMatrices
 from verification.advice.snippets import ONLY_CONSTANT, CouplingScheme, snippet
 from verification.advice.spectrum import SeenVectors, Spectrum
@@ -52,7 +53,7 @@ TIED = ("rho_min", "rho_tied", "theta_tied", "rate_tied")
 
 
 #: Attributes of a role that its document leaves out.
-UNSEEN = ("energy", "spectrum")
+UNSEEN = ("energy", "spectrum", "cells")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,6 +87,8 @@ class Role:
         is rho_normal.  None where they are not known, and ``reason["rho_min"]`` says why.
     spectrum : Spectrum or None
         Eigenvalues for predictions of methods; None where rho is only bounded from below.
+    cells : Suggested or None
+        rho of the file's cells in these roles, and cells with a smaller one; None without a problem file.
     """
 
     neumann_body: BodyNumber | None
@@ -103,6 +106,7 @@ class Role:
     rho_min: Number | None = None
     rho_tied: Number | None = None
     spectrum: Spectrum | None = None
+    cells: Suggested | None = None
 
     @property
     def ends(self) -> tuple[Fraction, Fraction] | None:
@@ -177,18 +181,21 @@ class Role:
             values["reason"].setdefault("theta_auto", "no problem file")
         if self.ends is None:
             values["reason"] |= dict.fromkeys(TIED, self.why_not_tied)
-        return values
+        entries, why = ({}, {}) if self.cells is None else self.cells.entries()
+        return values | entries | {"reason": values["reason"] | why}
 
     @classmethod
-    def refused(cls, neumann_body: BodyNumber, error: ValueError) -> Role:
-        """A role that is refused: no value but the reason."""
+    def refused(cls, neumann_body: BodyNumber, error: ValueError, *, of_file: bool = False) -> Role:
+        """A role, of a problem file or of other input, that is refused: no value but the reason."""
         why = error.needed if isinstance(error, ProblemError) else str(error)
         given = ("neumann_body", "reason", "singular", *UNSEEN)
         values = [field.name for field in fields(cls) if field.name not in given]
+        why = f"these roles are refused: {why}"
         return cls(
             neumann_body=neumann_body,
             **dict.fromkeys(values),
-            reason=dict.fromkeys(values, f"these roles are refused: {why}"),
+            reason=dict.fromkeys(values, why),
+            cells=no_cells(why) if of_file else None,
             singular=isinstance(error, SingularRole),
         )
 
@@ -242,6 +249,15 @@ def role_of(
     )
 
 
+def role_on(
+    neumann_body: BodyNumber | None, spectrum: Spectrum, *, nothing: str, reason: Mapping[str, str] | None = None
+) -> Role:
+    """The role of a spectrum of which nothing is proved; an end below 0 counts as 0."""
+    low, high = (Number.of_float(max(end, 0.0)) for end in (spectrum.low, spectrum.high))
+    known: dict[str, Any] = {"rho_min": low, "rho_tied": high, "spectrum": spectrum}
+    return role_of(neumann_body, Fraction(high.value), nothing=nothing, reason=reason, **known)
+
+
 def plain_role(neumann_body: BodyNumber, rho: Fraction, **settings: Any) -> Role:
     """The role without friction, from rho; ``settings`` are parameters of :func:`role_of`."""
     bounds = evaluate_energy(EnergyConstants(rho=rho))
@@ -250,11 +266,11 @@ def plain_role(neumann_body: BodyNumber, rho: Fraction, **settings: Any) -> Role
 
 
 def table_of(
-    roles: Sequence[Role], *, tied: bool, bound: str | None = None, theta: float | None = None
+    roles: Sequence[Role], *, tied: bool, one_end: bool = False, theta: float | None = None
 ) -> tuple[MethodRow, ...]:
     """The methods in all roles that are not refused, the first role's own ones first.
 
-    Contact that may open has a mode with lambda = 0 besides; ``bound`` tells which bound the steps are, if any;
+    Contact that may open has a mode with lambda = 0 besides; with ``one_end`` only the largest eigenvalue is known;
     ``theta`` is the factor that is advised, where the role has another one.
     """
     found: list[MethodRow] = []
@@ -268,7 +284,7 @@ def table_of(
             theta=own if theta is None else theta,
             neumann_body=role.neumann_body,
             exchanged=role is not roles[0],
-            bound=bound,
+            one_end=one_end,
         )
     return tuple(found)
 
@@ -348,6 +364,10 @@ class Advice(Document):
         Bounds of rho from these logs together.
     moduli : SeenModuli or None
         The moduli of two bodies, and bounds of rho from below.
+    waves : SeenWaves or None
+        Data of two plates that exchange heat, or of a fluid and a wall.
+    parallel : tuple of Parallel
+        theta and factor of parallel coupling for each role, where that was asked for: then `theta` is for it.
     matrices : SeenMatrices or None
         The matrices or operators that were given.
     tied : bool
@@ -387,6 +407,8 @@ class Advice(Document):
     vectors: SeenVectors | None = None
     methods: tuple[MethodRow, ...] = ()
     method: Advised | None = None
+    waves: SeenWaves | None = None
+    parallel: tuple[Parallel, ...] = ()
 
     @classmethod
     def between(cls, roles: Sequence[Role], *, tied: bool, **known: Any) -> Advice:
@@ -405,6 +427,8 @@ class Advice(Document):
     def summary(self) -> str:
         if self.moduli is not None:
             return self.moduli.summary
+        if self.theta is None and self.waves is not None and self.best.rho is not None:
+            return f"rho is at least {self.best.rho.value:.4g} with the Neumann problem on the wall"
         if not self.roles and self.vectors is not None:
             return self.why_no_theta
         if not self.roles:
@@ -421,12 +445,15 @@ class Advice(Document):
 
     def chosen(self, role: Role) -> tuple[float, float]:
         """theta and rate by which this advice judges a role."""
+        for one in self.parallel:
+            if one.neumann_body == role.neumann_body and not one.bound:
+                return one.theta, one.factor
         return role.advised(tied=self.tied and role.ends is not None)
 
     @property
     def theta(self) -> float | None:
         """The theta to paste, rounded down; None while several readings are left, or of moduli."""
-        if not self.roles or self.moduli is not None:
+        if not self.roles or self.moduli is not None or (self.waves is not None and self.next is not None):
             return None
         if self.next is not None:
             return self.next.theta
@@ -438,7 +465,9 @@ class Advice(Document):
         if self.theta is not None:
             return ""
         if self.moduli is not None:
-            return "moduli bound rho from below: a theta to start with stands in moduli.roles.start, where there is one"
+            return "moduli bound rho from below: `next` is a theta to begin with"
+        if self.waves is not None:
+            return "one wave bounds rho from below: `next` is a run to begin with"
         if self.vectors is not None:
             return "contact still changes in the last iterates: continue the run, and give more of its vectors"
         if self.friction_bounds is not None:
@@ -461,7 +490,7 @@ class Advice(Document):
     @property
     def quote(self) -> str | None:
         """The reason for the advice in two sentences, to be quoted: rho, theta and steps; None without a theta."""
-        if self.theta is None:
+        if self.theta is None or self.waves is not None:
             return None
         best, other = self.best, self.other
         tied = self.tied and best.ends is not None
@@ -500,6 +529,8 @@ class Advice(Document):
         """
         if self.theta is None:
             raise ValueError(self.why_no_theta)
+        if self.parallel:
+            raise ValueError("the blocks are for serial coupling: needed advice without parallel")
         if method is None:
             exchanged = self.best is not self.roles[0]
             own = methods.advised(self.methods, tied=self.tied, exchanged=exchanged)
@@ -523,7 +554,7 @@ class Advice(Document):
 
     def content(self) -> dict[str, Any]:
         origins = ("run", "readings", "next", "logs", "accelerated", "interval", "friction_bounds")
-        inputs = ("moduli", "matrices", "vectors")
+        inputs = ("moduli", "waves", "parallel", "matrices", "vectors")
         names = ("neumann_body", "theta", "tied", "assumes", "quote", "methods", "method", "roles", *origins, *inputs)
         found = {name: to_plain(getattr(self, name)) for name in names}
         known = self.spectrum
@@ -535,14 +566,17 @@ class Advice(Document):
             "next": "no run was given",
             "interval": "no logs were given",
             "moduli": "no moduli were given",
+            "waves": "neither heat nor a fluid was given",
             "assumes": "no run was given",
             "friction_bounds": "no run with friction was given",
             "matrices": "no matrices were given",
             "vectors": "no vectors were given",
-            "method": self.why_no_theta or "no method arrives in the steps that are simulated",
+            "method": ("parallel coupling" if self.parallel else "")
+            or self.why_no_theta
+            or "no method arrives in the steps that are simulated",
             "spectrum": self.why_no_theta or "only bounds of it are known",
             "theta": self.why_no_theta,
-            "quote": self.why_no_theta,
+            "quote": self.why_no_theta or "no stiffness was given",
         }
         reason = {name: why for name, why in missing.items() if found[name] is None}
         return {**found, "outside_theorem": list(self.outside), "reason": reason}
@@ -592,7 +626,7 @@ def advise(problem: Problem | ContactPair | Path | str, *, tied: bool = False, p
         assert not isinstance(problem, ContactPair)  # made with roles that are not singular
         given = problem if isinstance(problem, Problem) else load(problem)
         pair = build(given.swapped())  # refused itself where contact holds that body, too
-        roles = (Role.refused(given.iteration.neumann_body, error), _role(pair, tied))
+        roles = (Role.refused(given.iteration.neumann_body, error, of_file=True), _role(pair, tied))
     return Advice.between(
         roles,
         tied=tied,
@@ -608,7 +642,7 @@ def _exchanged(pair: ContactPair, tied: bool) -> Role:
     try:
         return _role(pair.swapped(), tied)
     except ValueError as error:
-        return Role.refused(pair.contact_body, error)
+        return Role.refused(pair.contact_body, error, of_file=pair.problem is not None)
 
 
 def _role(pair: ContactPair, tied: bool) -> Role:
@@ -622,9 +656,10 @@ def _role(pair: ContactPair, tied: bool) -> Role:
     else:
         nothing = f"outside the theorem: {pair.outside[0]}" if pair.outside else ""
         auto = automatic(energy, pair.outside, pair.settings.tolerance)
+    rho, normal = measured.rho_max if energy is None else energy.rho, not (pair.friction or tied)
     return role_of(
         pair.neumann_body,
-        measured.rho_max if energy is None else energy.rho,
+        rho,
         bounds=energy,
         nothing=nothing,
         threshold=None if nothing else measured.friction_threshold,
@@ -633,7 +668,10 @@ def _role(pair: ContactPair, tied: bool) -> Role:
         energy=None if nothing else measured.energy_constants(),
         rho_min=measured.rho_min,
         rho_tied=measured.rho_max,
-        spectrum=spectrum_of(pair, normal=not (pair.friction or tied)),
+        spectrum=spectrum_of(pair, normal=normal),
+        cells=None
+        if pair.problem is None
+        else suggest(pair.problem, rho if normal else measured.rho_max, normal=normal),
     )
 
 
@@ -653,7 +691,11 @@ def _roles_without_matrices(bodies: TwoBodies, tied: bool, progress: Progress) -
         reason["rho_min"] = more
     settings = {"nothing": nothing, "no_threshold": nothing or needed, "reason": reason}
     largest = lambda body, normal: pencils.largest(neumann_body=body, normal=normal).value
-    roles = [plain_role(body, Fraction(largest(body, not rubs)), **settings) for body in order]
+    roles = []
+    for body, own in zip(order, (problem, problem.swapped()), strict=True):
+        rho = Number.of_float(largest(body, not rubs))
+        cells = suggest(own, rho, normal=not rubs)
+        roles.append(plain_role(body, Fraction(rho.value), cells=cells, **settings))
     if rubs:
         return with_both_ends(roles)
     return with_both_ends(roles, [Number.of_float(largest(body, False)) for body in order]) if tied else tuple(roles)

@@ -1,4 +1,4 @@
-"""Bounds of rho for both roles, from the moduli of two bodies."""
+"""Data of two bodies before there is a mesh, and bounds of rho for both roles from their moduli."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fractions import Fraction
 from typing import Any, Literal
 
 from ndtheory import Number
-from ndtheory.energy_norms import predicted_theta
+from ndtheory.energy_norms import parallel_factor, predicted_theta
 from ndtheory.moduli import Moduli
 from ndtheory.number import above
 from verification.advice import BodyNumber
@@ -18,6 +18,15 @@ from verification.problem.writing import written_number
 from verification.value import to_plain
 
 Corners = Literal["none", "1", "2", "both"]
+
+#: What is exchanged: fluxes and temperatures, or pressures and displacements.
+Kind = Literal["heat", "fluid"]
+
+#: Parameters of each kind, and how many numbers they may have.
+WAVES_KEYS: dict[str, dict[str, tuple[int, ...]]] = {
+    "heat": {"conductivity": (2,), "capacity": (2,), "thickness": (2,), "dt": (1,)},
+    "fluid": {"density": (2,), "thickness": (1,), "length": (1, 2), "young": (1,), "poisson": (1,), "dt": (1,)},
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -172,6 +181,47 @@ class SeenModuli:
             "reason": ({} if self.corners else {"corners": "not told"})
             | ({} if self.smaller("slide") else {"neumann_body_frictionless": "both roles have the same bound"}),
         }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parallel:
+    """The best constant theta of *parallel* coupling where nothing opens or slips, and its factor a step.
+
+    With ``bound`` rho is only bounded from below: theta is at most, and the factor at least this.
+    """
+
+    neumann_body: BodyNumber | None
+    theta: float
+    factor: float
+    bound: bool
+
+    @classmethod
+    def of(cls, neumann_body: BodyNumber | None, rho: float, *, bound: bool = False) -> Parallel:
+        """``1/(1 + rho)`` and its factor."""
+        theta = 1 / (1 + rho)
+        return cls(neumann_body=neumann_body, theta=theta, factor=parallel_factor(theta, rho), bound=bound)
+
+    def to_dict(self) -> dict[str, Any]:
+        """A member of ``parallel``."""
+        return dict(vars(self))
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeenWaves:
+    """Data of two plates that exchange heat, or of a fluid and a wall, by their parameter of ``advise_moduli``."""
+
+    kind: Kind
+    given: dict[str, tuple[Fraction, ...]]
+
+    def one(self, key: str) -> Fraction | None:
+        """The first number of a parameter; None where it was not given."""
+        return self.given[key][0] if key in self.given else None
+
+    def to_dict(self) -> dict[str, Any]:
+        """The object ``waves``."""
+        keys = WAVES_KEYS["heat"] | WAVES_KEYS["fluid"]
+        numbers = {key: [written_number(v) for v in self.given[key]] if key in self.given else None for key in keys}
+        return {"kind": self.kind, **numbers, "reason": {key: "not given" for key, v in numbers.items() if v is None}}
 
 
 def exactly(value: Fraction) -> Number:

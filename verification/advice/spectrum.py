@@ -106,10 +106,13 @@ class Spectrum(Value):
         """The eigenvalues with the roles of both solvers exchanged: one over each; ValueError where one is not > 0."""
         if not self.low > 0:
             raise ValueError("an eigenvalue is 0: the exchanged roles have no spectrum")
-        errors = (error / size**2 for error, size in ((self.error_high, self.high), (self.error_low, self.low)))
-        low, high = errors
         found = 1 / self.values
-        return Spectrum(values=found[np.argsort(found.real)], source=self.source, error_low=low, error_high=high)
+        return Spectrum(
+            values=found[np.argsort(found.real)],
+            source=self.source,
+            error_low=self.error_high / self.high**2,
+            error_high=self.error_low / self.low**2,
+        )
 
     def with_open_nodes(self) -> Spectrum:
         """The same with a mode for nodes that are open, lambda = 0."""
@@ -218,8 +221,8 @@ def seen_in(X: Floats, TX: Floats, *, tied: bool = False) -> SeenVectors:
     U, sigma, Vt = np.linalg.svd(D, full_matrices=False)
     images = -E @ Vt.T
     sizes = np.linalg.norm(images, axis=0)
-    largest = float((sizes[sigma > RANK * sigma[0]] / sigma[sigma > RANK * sigma[0]]).max())
     rest = sigma <= RANK * sigma[0]
+    largest = float((sizes[~rest] / sigma[~rest]).max())
     noise = float(sizes[rest].max()) / largest if rest.any() else None
     rounding = np.sqrt(((Vt * (accuracy / lengths[kept])) ** 2).sum(axis=1)) / largest
     used = ~rest & (sigma * CLEAN >= np.maximum(rounding, noise or 0.0))

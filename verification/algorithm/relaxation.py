@@ -146,7 +146,11 @@ class Relaxation:
     theta: float
 
     def __call__(self, iterate: Iterate) -> Floats:
-        return self.theta * iterate.image + (1 - self.theta) * iterate.g
+        return self.mixed(iterate.g, iterate.image)
+
+    def mixed(self, g: Floats, image: Floats) -> Floats:
+        """Return the next g."""
+        return self.theta * image + (1 - self.theta) * g
 
 
 @dataclass(frozen=True)
@@ -160,7 +164,7 @@ class Constant(Rule):
         return Relaxation(theta)
 
     def on_vectors(self, theta: float, metric: Metric = EUCLIDEAN) -> VectorStep:
-        return lambda g, image: theta * image + (1 - theta) * g
+        return Relaxation(theta).mixed
 
     def outside(self, friction: Fraction) -> str:
         return ""

@@ -9,10 +9,11 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ndtheory import Constants, EnergyConstants, Number
-from ndtheory.number import Level, Numeric
+from ndtheory.number import Level, Numeric, above, below
 from verification.progress import Progress, silent
 from verification.value import to_plain
 
@@ -44,6 +45,23 @@ class Thresholds:
     every: Number | None = None
     some: Number | None = None
     on: str = "k"
+
+    def over(self, k: Fraction) -> Thresholds:
+        """The same on the factor by which a friction k may grow; unchanged if they are not on k."""
+        if self.on != "k" or not k:
+            return self
+        return Thresholds(every=_over(self.every, k), some=_over(self.some, k), on="multiple")
+
+
+def _over(number: Number | None, k: Fraction) -> Number | None:
+    """A number >= 0 over k > 0, its ends rounded outwards."""
+    if number is None:
+        return None
+    low = None if number.lo is None else below(Fraction(number.lo) / k)
+    high = None if number.hi is None else above(Fraction(number.hi) / k)
+    value = number.value / float(k)
+    value = value if low is None else max(value, low)
+    return Number(value=value if high is None else min(value, high), lo=low, hi=high, level=number.level)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -82,6 +100,11 @@ class Subject:
             why_energy=measured.why_no_energy,
             exact=exact,
         )
+
+    @property
+    def varies(self) -> bool:
+        """True if the coefficient of friction varies along Gamma_c: k is then the largest one."""
+        return self.pair is not None and self.pair.interface.profile is not None
 
     def at(self, k: float) -> Subject:
         """The same bodies at another friction."""
@@ -223,6 +246,8 @@ class Bound(ABC):
     certifies : bool
         True if :func:`verification.certify` takes its factor: it is proved by multipliers that :meth:`enclose` returns,
         or by the multipliers of the theorem in energy norms.
+    divides : bool
+        True if :meth:`enclose` can divide the pieces of T into sets, with multipliers for each.
     """
 
     name: ClassVar[str]
@@ -237,6 +262,7 @@ class Bound(ABC):
     of_unit: ClassVar[bool] = False
     apart: ClassVar[bool] = False
     certifies: ClassVar[bool] = False
+    divides: ClassVar[bool] = False
 
     @abstractmethod
     def evaluate(self, subject: Subject, theta: Numeric | None = None, *, progress: Progress = silent) -> BoundResult:
@@ -265,8 +291,12 @@ class Bound(ABC):
         """Remarks to print beside figures of this bound (beside a region ``result`` is None), in a unit of stress."""
         return ()
 
-    def enclose(self, pair: ContactPair, forms: QuadraticForms, theta: float) -> Enclosure | None:
+    def enclose(
+        self, pair: ContactPair, forms: QuadraticForms, theta: float, *, exact: bool, progress: Progress
+    ) -> Enclosure | None:
         """Enclose the factor by multipliers of this bound's own, for a certificate; None where it has none.
+
+        With ``exact``, which is asked only of a bound that ``divides``, as closely as it can.
 
         Raises
         ------

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.linalg import block_diag, cho_factor, cho_solve, solve_triangular
 
 from fem1d2d.mesh import Floats
 from ndtheory.energy_norms import turning_theta, worst_ratio
@@ -15,6 +16,7 @@ from verification.bounds import LARGEST
 from verification.bounds.interior_point import Optimum, Program, Weights
 from verification.bounds.trace_forms import TraceForms, families
 from verification.constants import Measured
+from verification.dense import STILL
 from verification.interface.pair import ContactPair
 from verification.threads import one_thread
 
@@ -24,11 +26,6 @@ Cones = NDArray[np.intp]
 
 #: How much the square of a form of length 1 may weigh that is 0: the more, the nearer to leaving it out.
 LARGE = 1e2
-
-#: Why no multipliers are sought where a rigid motion lifts the contact body off; with friction and without.
-LIFTS = "the contact body can be lifted rigidly, which only multipliers of (2.4) that are equal at all nodes allow"
-OTHERS = ", like the multipliers of the bound in energy norms; others are not sought"
-SMOOTHLY = "; without friction these prove the bound in energy norms, and none prove less"
 
 #: Lengths and squares smaller than this are 0.
 TINY = 1e-300
@@ -73,6 +70,10 @@ class Pieces:
         values[node] = value
         return replace(self, **{name: values})
 
+    def divided(self, name: str, node: int) -> tuple[Pieces, Pieces]:
+        """Those with 1 and those with -1 at a node: together all of them."""
+        return self.where(name, node, 1), self.where(name, node, -1)
+
 
 class Conditions:
     """The quadratic forms of a pair of bodies, in coordinates in which ``|g|`` and ``|d_1|`` are Euclidean norms.
@@ -80,11 +81,13 @@ class Conditions:
     ``carried`` takes the coordinates of d_1 to forces p on the contact grid.  Proposals of a solver are checked in
     traces (:class:`verification.bounds.trace_forms.TraceForms`).  ``friction`` is k, the pair's by default.
 
+    Where rigid motions z lift the contact body (``lifts``) p is orthogonal to them, and adding z to d_1 must not change
+    the forms: ``sum_j lambda_j p_Nj z_Nj = 0``.  So all nodes have one lambda, and p and d_1 are taken modulo z.
+
     Raises
     ------
     ValueError
-        A contact node is held, the contact body can be lifted rigidly, or there are more nodes than
-        :data:`verification.bounds.LARGEST`.
+        A contact node is held, or there are more nodes than :data:`verification.bounds.LARGEST`.
     """
 
     @one_thread()
@@ -93,14 +96,12 @@ class Conditions:
             raise ValueError(f"{pair.contact.grid.n} contact nodes: worked out up to {LARGEST}")
         if pair.held:
             raise ValueError("a contact node is held: the semidefinite bound needs every one free")
-        k = float(pair.friction) if friction is None else friction
+        self.k = k = float(pair.friction) if friction is None else friction
         measured = measured.with_friction(k)
         constants = measured.energy_constants()
         if constants is None:
             raise ValueError("the theorem in energy norms does not apply to it: " + measured.why_no_energy)
-        if pair.contact.lifts:
-            raise ValueError(LIFTS + (OTHERS if k else SMOOTHLY))
-        self._measured = measured
+        self._measured, self.lifts = measured, pair.contact.lifts
         self.energy_bounds = float(constants.at_work), float(constants.kappa_1), float(constants.kappa_2)
         contact, neumann, interface = pair.contact.grid, pair.neumann.grid, pair.interface
         carries = slice(0, contact.size) if k else contact.normal  # without friction p_T = 0
@@ -108,13 +109,16 @@ class Conditions:
         L_2, flexible = pair.neumann.root, pair.contact.inverse  # without friction pinned motions do not matter
         inner = flexible[carries, carries]
         turn = solve_triangular(np.linalg.cholesky(inner).T, np.eye(len(inner)), lower=False)
-        B = np.zeros((contact.size, len(inner)))
+        if self.lifts:
+            held, lengths, _ = np.linalg.svd(turn.T @ pair.contact.motions[carries])
+            turn = turn @ held[:, int((lengths > STILL * lengths[0]).sum()) :]
+        B = np.zeros((contact.size, turn.shape[1]))
         B[carries] = turn
         S_1 = pair.contact.schur if k else cho_solve(cho_factor(inner), np.eye(len(inner)))
         near = pair.neumann.flexibility(L_2), inner @ turn
         self.traces = TraceForms(pair, k, S_1=S_1, carries=carries, near=near)
         self.size = neumann.size
-        self.g = np.hstack([np.eye(neumann.size), np.zeros((neumann.size, len(inner)))])
+        self.g = np.hstack([np.eye(neumann.size), np.zeros((neumann.size, B.shape[1]))])
         back = L_2.T @ pair.neumann.flexibility(interface.carry_back(B))
         self.p = np.hstack([np.zeros((neumann.size, neumann.size)), back])
         force = np.hstack([np.zeros((contact.size, neumann.size)), B])
@@ -139,7 +143,7 @@ class Conditions:
     @property
     def free(self) -> Floats:
         """The form ``|g|^2``."""
-        return self.g.T @ self.g
+        return np.asarray(self.g.T @ self.g)
 
     @property
     def cross(self) -> Floats:
@@ -165,12 +169,13 @@ class Conditions:
         0 at a node enters by its square, with a multiplier up to :data:`LARGE`.
         """
         (force, jump), *friction = self.families[:4]
+        first = multipliers[0][: self._count]
         if not friction:
-            return force, jump, np.empty((0, 3), dtype=np.intp), multipliers[0], np.full(len(force), np.inf)
+            return force, jump, np.empty((0, 3), dtype=np.intp), first, np.full(len(first), np.inf)
         (shear, slip), (zeta, _), (slide, _) = friction
-        n, t = len(force), len(shear)
+        n, t = len(first), len(shear)
         either = np.flatnonzero(pieces.signs == 0)
-        lam, tau, a, b = multipliers
+        _, tau, a, b = multipliers
         signed = shear - pieces.signs[:, None] * self.reach
         zero = [rows[at] for rows, at in zip((jump, force, slip, signed), pieces.zeros, strict=True)]
         left = np.vstack([force, signed, zeta[either], slide[either], *(-rows for rows in zero)])
@@ -178,14 +183,14 @@ class Conditions:
         place = n + t + np.arange(len(either))
         cones = np.stack([n + either, place, place + len(either)], axis=1)
         squares = np.concatenate([1 / np.maximum(np.einsum("ij,ij->i", rows, rows), TINY) for rows in zero])
-        y = np.concatenate([lam, tau, a[either], b[either], squares])
+        y = np.concatenate([first, tau, a[either], b[either], squares])
         return left, right, cones, y, np.concatenate([np.full(len(y) - len(squares), np.inf), LARGE * squares])
 
     def by_node(self, y: Floats, pieces: Pieces) -> Weights:
         """The multipliers of :meth:`rows` as multipliers of the families, node by node; 0 in place of negative ones."""
         y, n = np.maximum(y, 0.0), len(self.families[0][0])
         if len(self.families) == 1:
-            return (y,)
+            return (self._spread(y),)
         t = len(self.families[1][0])
         (lam, tau, a, b), (touching, open_, sticks, slides) = self._of_rows(y, pieces)
         tau = np.where(pieces.signs == 0, inside((lam, tau, a, b))[1], tau)
@@ -199,15 +204,44 @@ class Conditions:
         a[pieces.slip > 0] -= self.weight[pieces.slip > 0] ** 2 * slides
         return lam, tau, a, b, -1.0 * pieces.signs * tau, jump, force, shear, mixed
 
+    @property
+    def _count(self) -> int:
+        """Number of multipliers of (2.4)."""
+        return 1 if self.lifts else len(self.families[0][0])
+
+    def _spread(self, lam: Floats) -> Floats:
+        """The multipliers of (2.4) node by node."""
+        return np.asarray(np.repeat(lam, len(self.families[0][0]) // self._count))
+
+    def tie(self, rows: Floats) -> Floats | None:
+        """The multiplier of each of the :meth:`rows`, as :class:`Program` has it."""
+        n = len(self.families[0][0])
+        return block_diag(np.ones((n, 1)), np.eye(len(rows) - n)) if self.lifts else None
+
+    def apart(self, multipliers: Weights, pieces: Pieces) -> tuple[Weights, Mapping[str, Floats]]:
+        """The multipliers of the inequalities, node by node, and of equations that hold on pieces, by what is fixed.
+
+        They are what :meth:`by_node` adds up: of the squares of v_N or p_N, of ``(p_T - eps w k zeta) v_T``, and of the
+        squares of one of its factors.
+        """
+        if len(multipliers) <= 4:
+            return multipliers, {}
+        lam, tau, a, b, _, jump, force, shear, _ = multipliers
+        free = pieces.signs == 0
+        sticks = np.where(pieces.slip < 0, self.weight**2 * b, 0.0)
+        rest = {"normal": jump + force, "signs": np.where(free, 0.0, tau), "slip": shear + sticks}
+        return (lam, *(np.where(free, values, 0.0) for values in (tau, a, b))), rest
+
     def parts(self, y: Floats, pieces: Pieces) -> list[Floats]:
         """The multipliers of :meth:`rows` kind by kind, each from left to right."""
         either = int((pieces.signs == 0).sum())
-        counts = [*(len(a) for a, _ in self.families[:2]), either, either, *(at.sum() for at in pieces.zeros[:-1])]
+        counts = [self._count, len(self.families[1][0]), either, either, *(at.sum() for at in pieces.zeros[:-1])]
         return np.split(y, np.cumsum(counts))
 
     def _of_rows(self, y: Floats, pieces: Pieces) -> tuple[Weights, list[Floats]]:
         """lambda, tau, a, b among the multipliers of :meth:`rows`, 0 for those that are not there, and the rest."""
         lam, tau, of_a, of_b, *rest = self.parts(y, pieces)
+        lam = self._spread(lam)
         either = pieces.signs == 0
         a, b = np.zeros((2, len(tau)))
         a[either], b[either] = of_a, of_b
@@ -221,10 +255,15 @@ class Conditions:
         """
         s, y = early
         weights, squares = self._of_rows(y, parent)
-        left, right, cones, y, most = self.rows(weights, pieces)
-        rest = np.concatenate(squares)
-        y[len(y) - len(rest) :] = rest
-        return Program(fixed=fixed, free=self.free, left=left, right=right, cones=cones, most=most, s=s, y=y)
+        program, rest = self.program(fixed, pieces, weights, s), np.concatenate(squares)
+        program.y[len(program.y) - len(rest) :] = rest
+        return program
+
+    def program(self, fixed: Floats, pieces: Pieces, multipliers: Weights, s: float = 0.0) -> Program:
+        """The program of the least s that starts from some multipliers."""
+        left, right, cones, y, most = self.rows(multipliers, pieces)
+        free, tie = self.free, self.tie(left)
+        return Program(fixed=fixed, free=free, left=left, right=right, cones=cones, most=most, s=s, y=y, tie=tie)
 
     def known(self, theta: float) -> Weights:
         """The multipliers that prove the factor q(theta) of the theorem in energy norms.

@@ -1,7 +1,8 @@
 """The semidefinite program of the bound, and a primal-dual interior-point method for it.
 
 Each multiplier weighs a product of two rows, so in the direction of Helmberg, Rendl, Vanderbei and Wolkowicz, Kojima,
-Shindoh and Hara, and Monteiro (HKM) the Schur complement is a sum of elementwise products of six Gram matrices::
+Shindoh and Hara, and Monteiro (HKM) the Schur complement is a sum of elementwise products of parts of two Gram
+matrices, one in X and one in Z^-1, with all rows::
 
     tr(A_i X A_j Z^-1),   A_i = (a_i b_i' + b_i a_i')/2
 
@@ -18,7 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
-from scipy.linalg.lapack import dstev, dtrtri
+from scipy.linalg.blas import dsymv, dtrmm, dtrsm, dtrsv
+from scipy.linalg.lapack import dpotrf, dpotri, dstev
 
 from fem1d2d.mesh import Floats
 from verification.threads import one_thread
@@ -31,6 +33,9 @@ SHIFTS = (0.0, 1e-14, 1e-12, 1e-10, 1e-8)
 
 #: Steps of the method of Lanczos; a matrix of no more rows is decomposed.
 LANCZOS = 30
+
+#: Rows of length 1 that agree in so many digits after the point are one row.
+ALIKE = 12
 
 #: How well a step length is known, relatively.
 NEAR = 0.02
@@ -78,16 +83,20 @@ class Program:
     ----------
     fixed, free : array, shape (d, d)
         Symmetric.
-    left, right : array, shape (K, d)
+    left, right : array, shape (K, d), or (R, d) with ``tie``
         Their rows are a_i and b_i.
     cones : int array, shape (n, 3)
         Positions of (tau, a, b) among the multipliers.
     most : array, shape (K,)
         Largest multipliers; inf without a limit.
+    tie : array, shape (R, K), or None
+        1 where a row has a multiplier, if several rows share one; None: each has its own.
     s, y : float, array of shape (K,)
         A start of a search: the matrix is positive definite there, and every inequality strict.
     highest : float or None
         Where given, the largest s up to it is wanted instead of the least.
+    blocks : tuple of slices
+        The blocks of the matrix on its diagonal, the whole by default: what is beside them is 0, or does not count.
     """
 
     fixed: Floats
@@ -100,6 +109,8 @@ class Program:
     y: Floats
     highest: float | None = None
     stop: Stop = USUAL
+    tie: Floats | None = None
+    blocks: tuple[slice, ...] = (slice(None),)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -127,37 +138,74 @@ class Optimum:
 
 
 class Form:
-    """The matrix of the program as one block: ``fixed + s free - sum_i y_i (a_i b_i' + b_i a_i')/2``.
+    """A block of the matrix of the program: ``fixed + s free - sum_i y_i (a_i b_i' + b_i a_i')/2``.
 
     The rows are scaled to length one, and the multipliers with them.
     """
 
-    def __init__(self, program: Program, left: Floats, right: Floats) -> None:
-        self.fixed, self.free, self.left, self.right = program.fixed[None], program.free, left, right
-        self.rows = len(program.fixed)
+    def __init__(self, program: Program, block: slice, left: Floats, right: Floats) -> None:
+        self.block, self.fixed, self.free = block, program.fixed[block, block][None], program.free[block, block]
+        self.left, self.right = left, right = left[:, block], right[:, block]
+        self.rows, self.tie = len(self.free), program.tie
+        both = np.vstack([left, right])
+        place: dict[bytes, int] = {}  # zeta and the slip are in several products
+        at = [place.setdefault(row.tobytes(), len(place)) for row in np.round(both, ALIKE) + 0.0]  # no -0
+        self._distinct = both[np.unique(at, return_index=True)[1]]
+        self._a, self._b = np.split(np.array(at), 2)
+        self._weighed = np.flatnonzero(self.free.any(axis=0))
+        self._weights = self.free[np.ix_(self._weighed, self._weighed)]
 
     def linear(self, y: Floats) -> Floats:
         """The part of the slack that is linear in (s, y), shape (1, d, d)."""
-        half = self.left.T @ (y[1:, None] * self.right)
+        by_row = y[1:] if self.tie is None else self.tie @ y[1:]
+        half = self.left.T @ (by_row[:, None] * self.right)
         return np.asarray((y[0] * self.free - (half + half.T) / 2)[None])
 
     def adjoint(self, matrix: Floats, total: Floats) -> None:
         """Add the inner products of the coefficients of (s, y) with a symmetric matrix."""
         total[0] += np.vdot(self.free, matrix[0])
-        total[1:] -= np.einsum("ij,ij->i", self.left @ matrix[0], self.right)
+        total[1:] -= self._tied(np.einsum("ij,ij->i", self.left @ matrix[0], self.right))
 
-    def schur(self, X: Floats, inverse: Floats, M: Floats) -> None:
-        """Add ``tr(G_i X G_j Z^-1)`` for the coefficients G_i of (s, y)."""
-        a, b, X, inverse, free = self.left, self.right, X[0], inverse[0], self.free
-        X_b, Z_b = X @ b.T, inverse @ b.T
-        X_ab, Z_ab = a @ X_b, a @ Z_b
-        M[1:, 1:] += ((b @ X_b) * (a @ inverse @ a.T) + (a @ X @ a.T) * (b @ Z_b)) / 4
-        M[1:, 1:] += (X_ab.T * Z_ab + X_ab * Z_ab.T) / 4
-        product = X @ free @ inverse
-        M[0, 0] += np.vdot(product.T, free)
-        mixed = np.einsum("ij,ij->i", a @ (product + product.T), b) / 2
-        M[0, 1:] -= mixed
-        M[1:, 0] -= mixed
+    def _tied(self, by_row: Floats) -> Floats:
+        """The sum over the rows of each multiplier, for numbers by row or by two rows."""
+        if self.tie is None:
+            return by_row
+        total = self.tie.T @ by_row
+        return total if total.ndim == 1 else np.asarray(total @ self.tie)
+
+    def root(self, matrix: Floats) -> Floats:
+        """The lower triangular L with ``L L'`` a matrix; LinAlgError unless it is positive definite."""
+        L, failed = dpotrf(matrix[0].T, lower=1, clean=1)
+        if failed:
+            raise np.linalg.LinAlgError("not positive definite")
+        return np.asarray(L)
+
+    def inverse(self, root: Floats) -> Floats:
+        """The inverse of the matrix of a root."""
+        lower = np.tril(dpotri(root, lower=1)[0])
+        return np.asarray((lower + np.tril(lower, -1).T)[None])
+
+    def least(self, root: Floats, step: Floats) -> float:
+        """The least eigenvalue of a matrix against the one of a root, or a lower bound close to it."""
+        if self.rows > LANCZOS:
+            return _least(root, step[0])
+        half = dtrsm(1.0, root, step[0], lower=1)
+        return float(np.linalg.eigvalsh(dtrsm(1.0, root, half.T, lower=1))[0])
+
+    def schur(self, X: Floats, inverse: Floats, roots: tuple[Floats, Floats], M: Floats) -> None:
+        """Add ``tr(G_i X G_j Z^-1)`` for the coefficients G_i of (s, y), from X, Z^-1 and the roots of X and Z."""
+        by_X = dtrmm(1.0, roots[0], self._distinct.T, lower=1, trans_a=1)
+        by_Z = dtrsm(1.0, roots[1], self._distinct.T, lower=1)
+        X_rows, Z_rows = by_X.T @ by_X, by_Z.T @ by_Z  # the Gram matrices
+        aa, bb, ab = (np.ix_(i, j) for i, j in ((self._a, self._a), (self._b, self._b), (self._a, self._b)))
+        X_ab, Z_ab = X_rows[ab], Z_rows[ab]
+        part = X_rows[bb] * Z_rows[aa] + X_rows[aa] * Z_rows[bb] + X_ab.T * Z_ab + X_ab * Z_ab.T
+        M[1:, 1:] += self._tied(part / 4)
+        product = _symmetric(X[0][:, self._weighed] @ self._weights @ inverse[0][self._weighed])
+        mixed = np.zeros(len(M))
+        self.adjoint(product[None], mixed)
+        M[0] += mixed
+        M[1:, 0] += mixed[1:]
 
 
 class Cones:
@@ -180,7 +228,19 @@ class Cones:
         for at, E in self.terms:
             total[at] += np.einsum("nij,nij->n", E, matrix)
 
-    def schur(self, X: Floats, inverse: Floats, M: Floats) -> None:
+    def root(self, matrices: Floats) -> Floats:
+        """The inverses of the lower triangular L with ``L L'`` each matrix; LinAlgError unless all are definite."""
+        return np.asarray(np.linalg.inv(np.linalg.cholesky(matrices)))
+
+    def inverse(self, root: Floats) -> Floats:
+        """The inverses of the matrices of some roots."""
+        return _turned(root) @ root
+
+    def least(self, root: Floats, steps: Floats) -> float:
+        """The least of the eigenvalues of matrices against those of some roots."""
+        return float(np.linalg.eigvalsh(root @ steps @ _turned(root)).min())
+
+    def schur(self, X: Floats, inverse: Floats, roots: tuple[Floats, Floats], M: Floats) -> None:
         """Add ``tr(E_i X E_j Z^-1)``."""
         for i, E in self.terms:
             left = E @ X
@@ -201,9 +261,15 @@ def solve(program: Program) -> Optimum:
     lengths = [np.linalg.norm(rows, axis=1) for rows in (program.left, program.right)]
     # A node that no force reaches has rows without a length: its multiplier weighs nothing.
     lengths = [np.where(length > 0, length, 1.0) for length in lengths]
-    size = lengths[0] * lengths[1]
-    form = Form(program, *(r / n[:, None] for r, n in zip((program.left, program.right), lengths, strict=True)))
-    blocks: list[Form | Cones] = [form, *_cones(program, size)]
+    if program.tie is not None:  # rows with one multiplier have one scale
+        of = program.tie.argmax(axis=1)
+        most = [np.max(program.tie * length[:, None], axis=0) for length in lengths]
+        lengths, size = [values[of] for values in most], most[0] * most[1]
+    else:
+        size = lengths[0] * lengths[1]
+    rows = [r / n[:, None] for r, n in zip((program.left, program.right), lengths, strict=True)]
+    forms = [Form(program, block, *rows) for block in program.blocks]
+    blocks: list[Form | Cones] = [*forms, *_cones(program, size)]
     cost = np.zeros(1 + len(size))
     cost[0] = -1.0 if maximise else 1.0
     order = sum(block.rows for block in blocks)
@@ -211,47 +277,53 @@ def solve(program: Program) -> Optimum:
     y = np.concatenate([[program.s], program.y * size])
     Z = [block.fixed + block.linear(y) for block in blocks]
     try:
-        roots = [_inverse_root(z) for z in Z]
+        roots = [block.root(z) for block, z in zip(blocks, Z, strict=True)]
     except np.linalg.LinAlgError:
         raise LMIError("no multipliers to start from: what the known ones leave is lost in rounding") from None
-    inverse = [_turned(root) @ root for root in roots]
-    mu = abs(1 / np.vdot(program.free, inverse[0]))  # on the central path, except for the equation of s
+    inverse = [block.inverse(root) for block, root in zip(blocks, roots, strict=True)]
+    weight = sum(np.vdot(form.free, z[0]) for form, z in zip(forms, inverse, strict=False))
+    mu = abs(1 / weight)  # on the central path, except for the equation of s
     X = [mu * z for z in inverse]
 
     steps, converged, early = 0, False, None
     while steps < MOST_STEPS:
         gap = _inner(X, Z)
-        missing = float(np.abs(cost - _adjoint(blocks, X, len(cost))).max())
-        converged = gap <= program.stop.accuracy * max(abs(y[0]), SMALL) and missing <= program.stop.accuracy
+        near = gap <= program.stop.accuracy * max(abs(y[0]), SMALL)
+        converged = near and np.abs(cost - _adjoint(blocks, X, len(cost))).max() <= program.stop.accuracy
         if early is None and gap <= EARLY * max(abs(y[0]), SMALL):
             early = float(y[0]), y[1:] / size
         if converged or y[0] < program.stop.enough:
             break
         M = np.zeros((len(cost),) * 2)
-        for block, x, z in zip(blocks, X, inverse, strict=True):
-            block.schur(x, z, M)
         try:
-            eliminate = _elimination(M)
-            roots_X = [_inverse_root(x) for x in X]
-            newton = _Newton(blocks=blocks, cost=cost, X=X, inverse=inverse, eliminate=eliminate)
-            _, dZ, dX = newton.step(0.0, [np.zeros_like(z) for z in Z])
-            along_Z, along_X = min(_longest(roots, dZ), 1.0), min(_longest(roots_X, dX), 1.0)
+            roots_X = [block.root(x) for block, x in zip(blocks, X, strict=True)]
+            for block, x, z, *both in zip(blocks, X, inverse, roots_X, roots, strict=True):
+                block.schur(x, z, (both[0], both[1]), M)
+            newton = _Newton(blocks=blocks, cost=cost, X=X, inverse=inverse, eliminate=_elimination(M))
+            _, dZ, turned, dX = newton.step()
+            along_Z, along_X = min(_longest(blocks, roots, dZ), 1.0), min(_longest(blocks, roots_X, dX), 1.0)
             left = _inner(_moved(X, along_X, dX), _moved(Z, along_Z, dZ)) / gap
             shorter = min(along_Z, along_X)
             centring = min(max(left, 0.0) ** max(1.0, 3 * shorter**2), 1.0)
-            second_order = [_symmetric(x @ d @ z) for x, d, z in zip(dX, dZ, inverse, strict=True)]
-            dy, dZ, dX = newton.step(centring * gap / order, second_order)
+            mu = centring * gap / order
+            dy, dZ, _, dX = newton.step(
+                [mu * z - _symmetric(d @ t) for z, d, t in zip(inverse, dX, turned, strict=True)]
+            )
             share = 0.9 + 0.09 * shorter
-            along_Z, along_X = min(share * _longest(roots, dZ), 1.0), min(share * _longest(roots_X, dX), 1.0)
+            along_Z = min(share * _longest(blocks, roots, dZ), 1.0)
+            along_X = min(share * _longest(blocks, roots_X, dX), 1.0)
             trial = y + along_Z * dy
             Z_trial = [block.fixed + block.linear(trial) for block in blocks]
-            roots = [_inverse_root(z) for z in Z_trial]
+            roots = [block.root(z) for block, z in zip(blocks, Z_trial, strict=True)]
         except np.linalg.LinAlgError:  # rounding is larger than what is left
             break
         y, Z, X = trial, Z_trial, _moved(X, along_X, dX)
-        inverse = [_turned(root) @ root for root in roots]
+        inverse = [block.inverse(root) for block, root in zip(blocks, roots, strict=True)]
         steps += 1
-    return Optimum(s=float(y[0]), y=y[1:] / size, moments=X[0][0], steps=steps, converged=bool(converged), early=early)
+    moments = np.zeros_like(program.fixed)
+    for form, x in zip(forms, X, strict=False):
+        moments[form.block, form.block] = x[0]
+    return Optimum(s=float(y[0]), y=y[1:] / size, moments=moments, steps=steps, converged=bool(converged), early=early)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -264,13 +336,17 @@ class _Newton:
     inverse: list[Floats]
     eliminate: Callable[[Floats], Floats]
 
-    def step(self, centre: float, correction: list[Floats]) -> tuple[Floats, list[Floats], list[Floats]]:
-        """The changes of (s, y), Z and X, with ``X Z`` corrected by terms of second order."""
-        wanted = [centre * z - c for z, c in zip(self.inverse, correction, strict=True)]
-        dy = self.eliminate(_adjoint(self.blocks, wanted, len(self.cost)) - self.cost)
+    def step(self, wanted: list[Floats] | None = None) -> tuple[Floats, list[Floats], list[Floats], list[Floats]]:
+        """The changes of (s, y) and Z, the latter times Z^-1, and the change of X.
+
+        ``wanted`` is the centre times Z^-1 without the terms of second order of ``X Z``; 0 by default.
+        """
+        right = -self.cost if wanted is None else _adjoint(self.blocks, wanted, len(self.cost)) - self.cost
+        dy = self.eliminate(right)
         dZ = [block.linear(dy) for block in self.blocks]
-        quartets = zip(wanted, self.X, dZ, self.inverse, strict=True)
-        return dy, dZ, [w - x - _symmetric(x @ d @ z) for w, x, d, z in quartets]
+        turned = [d @ z for d, z in zip(dZ, self.inverse, strict=True)]
+        dX = [-x - _symmetric(x @ t) for x, t in zip(self.X, turned, strict=True)]
+        return dy, dZ, turned, dX if wanted is None else _moved(wanted, 1.0, dX)
 
 
 def _adjoint(blocks: list[Form | Cones], matrices: list[Floats], size: int) -> Floats:
@@ -331,15 +407,6 @@ def _symmetric(matrices: Floats) -> Floats:
     return np.asarray((matrices + _turned(matrices)) / 2)
 
 
-def _inverse_root(matrices: Floats) -> Floats:
-    """R with ``R' R`` the inverse of each."""
-    lower = np.linalg.cholesky(matrices)
-    if len(lower) > 1:
-        return np.linalg.inv(lower)
-    inverse, _ = dtrtri(lower[0].T)  # of a triangle: a third of the time of another matrix
-    return np.asarray(inverse.T[None])
-
-
 def _inner(X: list[Floats], Z: list[Floats]) -> float:
     return float(sum(np.vdot(x, z) for x, z in zip(X, Z, strict=True)))
 
@@ -348,27 +415,23 @@ def _moved(matrices: list[Floats], along: float, steps: list[Floats]) -> list[Fl
     return [m + along * d for m, d in zip(matrices, steps, strict=True)]
 
 
-def _longest(roots: list[Floats], steps: list[Floats]) -> float:
-    """Largest step, at most, along which matrices with these inverse roots stay positive semidefinite."""
-    low = min(
-        _least(root[0], d[0]) if d.shape[1] > LANCZOS else float(np.linalg.eigvalsh(root @ d @ _turned(root)).min())
-        for root, d in zip(roots, steps, strict=True)
-    )
+def _longest(blocks: list[Form | Cones], roots: list[Floats], steps: list[Floats]) -> float:
+    """Largest step, at most, along which matrices with these roots stay positive semidefinite."""
+    low = min(block.least(root, step) for block, root, step in zip(blocks, roots, steps, strict=True))
     return -1 / low if low < 0 else math.inf
 
 
-def _least(root: Floats, step: Floats) -> float:
-    """A lower bound, close to it, of the least eigenvalue of ``root step root'``, by the method of Lanczos.
+def _least(L: Floats, step: Floats) -> float:
+    """A lower bound, close to it, of the least eigenvalue of ``L^-1 step L'^-1``, by the method of Lanczos.
 
     An eigenvalue lies within the norm of its residual of each Ritz value; that the least one does is not sure, and
     where a step leaves the cone the factorisation that follows refuses it.
     """
-    C = root @ step @ root.T
     diagonal, beside = np.empty(LANCZOS), np.empty(LANCZOS)
-    v = np.cos(np.arange(len(C)) ** 2)  # no special direction
-    v, before, length = v / math.sqrt(v @ v), np.zeros(len(C)), 0.0
+    v = np.cos(np.arange(len(L)) ** 2)  # no special direction
+    v, before, length = v / math.sqrt(v @ v), np.zeros(len(L)), 0.0
     for k in range(LANCZOS):
-        image = C @ v - length * before
+        image = dtrsv(L, dsymv(1.0, step.T, dtrsv(L, v, lower=1, trans=1)), lower=1) - length * before
         diagonal[k] = image @ v
         image -= diagonal[k] * v
         beside[k] = length = math.sqrt(image @ image)

@@ -5,8 +5,7 @@ a sign eps_j, with which step II gives ``p_T v_T = eps_j w k zeta v_T`` in place
 are 0 where the node sticks.  So the set of pieces with the largest bound is divided in two, by the sign of a node or by
 its state, until the bound of every set is close to the largest ``|J|`` found.  Proofs in ``docs/energy.md``.
 
-:func:`work_out` does all of it for one pair: both bounds, the thetas and the friction that they allow, and half of
-the work where the bodies are their own mirror image.
+:func:`work_out` does all of it for one pair: both bounds, the thetas and the friction that they allow.
 """
 
 from __future__ import annotations
@@ -20,19 +19,17 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
 
-from fem1d2d.mesh import Floats
 from ndtheory import Number
 from ndtheory.number import above, below
 from verification.algorithm.affine_piece import Piece
-from verification.bounds.conditions import TINY, Conditions, Pieces, Signs
+from verification.bounds.conditions import TINY, Pieces, Signs
 from verification.bounds.interior_point import LMIError, Optimum, Stop, Weights
+from verification.bounds.mirror import Mirror
 from verification.bounds.multipliers import Certified, QuadraticForms, friction_threshold
 from verification.bounds.pattern_search import factor_search
 from verification.certificate.claims import Confirmation, NoCertificate
 from verification.constants import Measured
-from verification.interface.interface import Grid
 from verification.interface.pair import ContactPair
 from verification.progress import Progress, silent
 from verification.threads import one_thread
@@ -51,15 +48,15 @@ PROGRAMS = 50
 #: And never more than this: at most 8 s on a hundred random problems of up to 9 nodes.
 MOST = 160
 
+#: Programs for a certificate that divides the pieces, at most: a minute or so up to 25 contact nodes.  Section 6 needs
+#: 204 to reach CLOSE at theta = 0.7; some random problems of 8 nodes would need more than ten minutes.
+CERTIFIED = 2000
+
 #: Signs are fixed where that may save this share of what the bound is too large by.
 WORTH = 0.3
 
 #: What images of multipliers prove may be weaker by this share, which rounding costs, before a program is solved.
 SAME_BOUND = 1e-9
-
-#: Entries that differ by less, relative to the diagonal or to the largest, are equal: rounding leaves 1e-14 on Section
-#: 6 with 97 contact nodes.
-SAME = 1e-12
 
 #: A pattern read off the moments is climbed from where its ``|J|`` reaches this share of the best.
 PROMISING = 0.995
@@ -78,12 +75,15 @@ class Enclosure:
         Proved by multipliers for every set of pieces, and by one program for all pieces together.
     lower, piece : float, Piece
         The largest ``|J|`` found, and its piece.
+    tree : Leaf or Division
+        The sets of pieces into which all were divided, with the proof of each.
     programs, why_apart : int, str
         Number of programs that were solved; why the gap is larger than was asked for.
     """
 
     upper: Certified
     whole: Certified
+    tree: Leaf | Division
     lower: float
     piece: Piece
     programs: int
@@ -97,11 +97,21 @@ class Enclosure:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Leaf:
-    """Some pieces: the bound proved for them, and the program's answer."""
+    """Some pieces: the bound proved for them, the pieces that its multipliers are for, and the program's answer."""
 
     pieces: Pieces
     upper: Certified
+    proved_on: Pieces
     proposal: Optimum | None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Division:
+    """Some pieces in two: those with 1 at a node and those with -1, in the field of :class:`Pieces` of some name."""
+
+    name: str
+    node: int
+    cases: tuple[Leaf | Division, ...]
 
 
 def budget(n: int) -> int:
@@ -136,26 +146,29 @@ def enclose(
     """
     with one_thread():
         upper, proposal = forms.on(forms.everywhere, theta)
-        root = Leaf(pieces=forms.everywhere, upper=upper, proposal=proposal)
+        root = Leaf(pieces=forms.everywhere, upper=upper, proved_on=forms.everywhere, proposal=proposal)
         search = factor_search(pair, theta)
         patterns = [*search.extremes(), *_read_off(forms, root, search.sign)]
         best = max((search.climb(search.found(*pattern)) for pattern in patterns), key=lambda found: found.value)
-        order, solved, mirror = count(), 1, Mirror.of(pair, forms)
+        order, solved, mirror = count(), 1, forms.mirror
         leaves, bounded, why = [(-upper.value, next(order), root)], {root.pieces.key: root}, ""
+        divisions: dict[bytes, tuple[str, int]] = {}
         while True:
             worst, lower = leaves[0][2], best.piece.factor(theta)
             if worst.upper.value <= (1 + gap) * lower:
                 break
-            parts = _divided(forms, worst, lower)
-            if not parts:
+            division = _division(forms, worst, lower)
+            if division is None:
                 why = "the worst set of pieces cannot be divided"
                 break
+            parts = worst.pieces.divided(*division)
             if programs is not None and solved + len(parts) > programs:
                 why = f"{solved} programs were solved"
                 break
             stop = Stop(accuracy=gap / 100, enough=((1 + gap) * lower) ** 2 * (1 - SAME_BOUND))
             progress(f"semidefinite bound: {worst.upper.value / lower - 1:.2%} above a factor that occurs", None)
             heapq.heappop(leaves)
+            divisions[worst.pieces.key] = division
             for part in parts:
                 leaf = None if mirror is None else _mirrored(forms, mirror, bounded, part, theta)
                 if leaf is None:
@@ -168,7 +181,22 @@ def enclose(
                 heapq.heappush(leaves, (-leaf.upper.value, next(order), leaf))
         best = search.climb(best, side_by_side=True)
         lower = max(lower, best.piece.factor(theta))
-    return Enclosure(upper=worst.upper, whole=root.upper, lower=lower, piece=best.piece, programs=solved, why_apart=why)
+
+    def tree(pieces: Pieces) -> Leaf | Division:
+        if pieces.key not in divisions:
+            return replace(bounded[pieces.key], proposal=None)
+        name, node = divisions[pieces.key]
+        return Division(name=name, node=node, cases=tuple(map(tree, pieces.divided(name, node))))
+
+    return Enclosure(
+        upper=worst.upper,
+        whole=root.upper,
+        tree=tree(root.pieces),
+        lower=lower,
+        piece=best.piece,
+        programs=solved,
+        why_apart=why,
+    )
 
 
 def _solved(forms: QuadraticForms, parent: Leaf, part: Pieces, theta: float, stop: Stop) -> Leaf:
@@ -180,7 +208,9 @@ def _solved(forms: QuadraticForms, parent: Leaf, part: Pieces, theta: float, sto
         upper, proposal = forms.on(part, theta, stop=stop, parent=start)
     except LMIError:
         return replace(parent, pieces=part, proposal=None)
-    return Leaf(pieces=part, upper=min(upper, parent.upper, key=lambda certified: certified.value), proposal=proposal)
+    if parent.upper.value < upper.value:
+        return replace(parent, pieces=part, proposal=proposal)
+    return Leaf(pieces=part, upper=upper, proved_on=part, proposal=proposal)
 
 
 def _mirrored(
@@ -193,17 +223,18 @@ def _mirrored(
     upper = forms.proved_by(mirror.multipliers(other.upper.multipliers), theta)
     if upper is None or upper.value > other.upper.value * (1 + SAME_BOUND):
         return None
-    return Leaf(pieces=part, upper=upper, proposal=mirror.proposal(other.proposal, forms, other.pieces))
+    proposal = mirror.proposal(other.proposal, forms, other.pieces)
+    return Leaf(pieces=part, upper=upper, proved_on=mirror.pieces(other.proved_on), proposal=proposal)
 
 
-def _divided(forms: QuadraticForms, leaf: Leaf, lower: float) -> list[Pieces]:
-    """A set of pieces in two, at the node where that promises most in the moments of the worst pairs.
+def _division(forms: QuadraticForms, leaf: Leaf, lower: float) -> tuple[str, int] | None:
+    """The division of a set of pieces, at the node where it promises most in the moments of the worst pairs.
 
     First by signs, whose relaxation costs the difference of ``tau |zeta| |v_T|`` and ``tau |zeta v_T|``; where that is
     little of the excess of the bound, by the state of a node.
     """
     if leaf.proposal is None or len(forms.families) == 1:
-        return []
+        return None
     pieces, moments, (lam, tau, *_) = leaf.pieces, leaf.proposal.moments, leaf.upper.multipliers
     (force, jump), (shear, slip), (zeta, _), (slide, _), *_ = forms.families
     of = lambda a, b: np.einsum("ij,ij->i", a @ moments, b)
@@ -211,23 +242,20 @@ def _divided(forms: QuadraticForms, leaf: Leaf, lower: float) -> list[Pieces]:
     free = pieces.signs == 0
     lost = np.where(free & (pieces.slip == 0), tau * (sizes(zeta, slide) - np.abs(of(zeta, slide))), 0.0)
     if lost.sum() >= WORTH * (leaf.upper.value**2 - lower**2):
-        node = int(np.argmax(lost))
-        return [pieces.where("signs", node, sign) for sign in (1, -1)]
+        return "signs", int(np.argmax(lost))
     signed = shear - pieces.signs[:, None] * forms.reach
     both = np.concatenate(
         [
-            np.where(pieces.normal == 0, lam * sizes(force, jump), -1.0),
+            np.where((pieces.normal == 0) & (not forms.lifts), lam * sizes(force, jump), -1.0),
             np.where(~free & (pieces.slip == 0), tau * sizes(signed, slip), -1.0),
         ]
     )
     node = int(np.argmax(both))
     if both[node] >= 0:
-        name, node = ("normal", node) if node < len(lam) else ("slip", node - len(lam))
-        return [pieces.where(name, node, value) for value in (1, -1)]
+        return ("normal", node) if node < len(lam) else ("slip", node - len(lam))
     if free.any():
-        node = int(np.argmax(np.where(free, lost, -1.0)))
-        return [pieces.where("signs", node, sign) for sign in (1, -1)]
-    return []
+        return "signs", int(np.argmax(np.where(free, lost, -1.0)))
+    return None
 
 
 def _read_off(forms: QuadraticForms, leaf: Leaf, sign: Signs) -> Iterator[tuple[NDArray[np.bool_], Signs]]:
@@ -249,76 +277,6 @@ def _read_off(forms: QuadraticForms, leaf: Leaf, sign: Signs) -> Iterator[tuple[
         rests = relative(shear - eps[:, None] * forms.reach) < relative(slip)
         slides = np.where(leaf.pieces.slip != 0, leaf.pieces.slip > 0, rests)
         yield touching, np.where(slides, eps * np.where(sign != 0, sign, 1), 0).astype(np.int8)
-
-
-# --- mirror images ----------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Mirror:
-    """The reflection of a pair of bodies that is its own mirror image.
-
-    The reflection of Gamma_c about its middle reverses the order of the nodes and turns tangential components round.
-    Where it changes neither the matrices of a pair nor its law of friction, two forces and their images fulfil the same
-    conditions of step II, with the other sign of slip against S sigma_N: so a set of pieces and its mirror image have
-    the same Lipschitz constant, and the images of multipliers prove the image of a claim.  Images are only proposals:
-    they are checked as any multipliers, with the matrices as they are.
-
-    ``turn``, shape (d, d), is the reflection in the coordinates of :class:`verification.bounds.conditions.Conditions`.
-    """
-
-    turn: Floats
-
-    @classmethod
-    def of(cls, pair: ContactPair, forms: Conditions) -> Mirror | None:
-        """The reflection; None where the pair is not its own mirror image to rounding, and without friction."""
-        interface, contact, neumann = pair.interface, pair.contact, pair.neumann
-        if interface.kernel is None or len(forms.families) == 1:
-            return None
-        same = _alike(contact.grid.weights, contact.grid.weights[::-1]) and _alike(
-            interface.kernel, interface.kernel[::-1, ::-1]
-        )
-        if interface.transfer is not None:
-            same = same and _alike(interface.transfer, interface.transfer[::-1, ::-1])
-        if not (same and _is_even(contact.schur, contact.grid) and _is_even(neumann.schur, neumann.grid)):
-            return None
-        L_2, carried = neumann.root, forms.carried
-        turns = (
-            np.linalg.solve(L_2, _reflected(L_2, neumann.grid)),
-            np.linalg.solve(carried, _reflected(carried, contact.grid)),
-        )
-        return cls(turn=block_diag(*turns))
-
-    def pieces(self, pieces: Pieces) -> Pieces:
-        """The images of some pieces."""
-        return Pieces(signs=-pieces.signs[::-1], normal=pieces.normal[::-1], slip=pieces.slip[::-1])
-
-    def multipliers(self, multipliers: Weights) -> Weights:
-        """The images of multipliers; those of ``w k zeta v_T`` and of ``p_T sqrt(w k) zeta`` change sign."""
-        signs = (1, 1, 1, 1, -1, 1, 1, 1, -1)
-        return tuple(sign * values[::-1] for sign, values in zip(signs, multipliers, strict=False))
-
-    def proposal(self, found: Optimum, forms: Conditions, pieces: Pieces) -> Optimum:
-        """The image of a solver's answer for some pieces."""
-        reverse = lambda y: np.concatenate([part[::-1] for part in forms.parts(y, pieces)])
-        early = None if found.early is None else (found.early[0], reverse(found.early[1]))
-        return replace(found, y=reverse(found.y), moments=self.turn @ found.moments @ self.turn.T, early=early)
-
-
-def _reflected(rows: Floats, grid: Grid) -> Floats:
-    """Interface vectors, as columns, reflected."""
-    return np.concatenate([-rows[grid.tangential][::-1], rows[grid.normal][::-1]])
-
-
-def _is_even(S: Floats, grid: Grid) -> bool:
-    """True if the reflection does not change a symmetric positive definite matrix, entry by entry."""
-    root = np.sqrt(np.diag(S))
-    scaled = S / np.outer(root, root)
-    return bool(np.abs(_reflected(_reflected(scaled, grid).T, grid) - scaled).max() <= SAME)
-
-
-def _alike(a: Floats, b: Floats) -> bool:
-    return bool(np.abs(a - b).max() <= SAME * np.abs(a).max())
 
 
 # --- the result -------------------------------------------------------------------------------------------------------
@@ -504,10 +462,15 @@ def thetas(
     if measured.friction_threshold is None:
         raise ValueError(measured.why_no_threshold)
     last = friction_threshold(pair, measured, measured.friction_threshold.value, progress=progress)
-    kept = []
-    for i, k in enumerate(last * np.arange(1, count + 1) / count):
-        progress(f"semidefinite bound: largest theta at k = {k:.3g}", i / count)
-        found = QuadraticForms(pair, measured, friction=float(k)).largest_theta()
+    kept: list[tuple[float, float]] = []
+    near = None
+    for done, k in enumerate(last * np.arange(count, 0, -1) / count):
+        progress(f"semidefinite bound: largest theta at k = {k:.3g}", done / count)
+        if kept and kept[-1][1] == 1:  # its multipliers prove the same below: the conditions grow with k
+            kept.append((float(k), 1.0))
+            continue
+        found = QuadraticForms(pair, measured, friction=float(k)).largest_theta(near)
         if found is not None:
             kept.append((float(k), found.value))
-    return last, kept
+            near = found.early
+    return last, kept[::-1]

@@ -32,6 +32,7 @@ from ndtheory.energy_norms import contraction_interval
 from verification.bounds import interior_point
 from verification.bounds.conditions import Conditions, Pieces, inside, mixed, times
 from verification.bounds.interior_point import USUAL, LMIError, Optimum, Program, Stop, Weights
+from verification.bounds.mirror import Mirror
 from verification.constants import Measured
 from verification.interface.pair import ContactPair
 from verification.progress import Progress, silent
@@ -46,11 +47,19 @@ LEAST = 1e-2
 #: So many of them are tried one by one, before the rest is bisected.
 ENOUGH = 3
 
+#: How much larger than where another friction leaves it the value of a program begins, relatively.
+NEARBY = 0.1
+
+Start = tuple[float, Weights]
+
 #: Shares of a solver's proposal, the rest known multipliers, that are tried one after the other.
 DRAWN = (1.0, 0.9999, 0.999, 0.99, 0.9)
 
 #: By how much a is larger and b smaller than known, from one start to the next, until one is inside.
 STRETCHES = (1.0, 2.0, 4.0, 16.0, 256.0)
+
+#: The share of the largest tau that a and b allow with which a program starts.
+INSIDE = 0.95
 
 #: How much larger known multipliers are tried.
 MORE = (0.0, 1e-12, 1e-9, 1e-6)
@@ -75,6 +84,8 @@ class Certified:
         lambda, tau, a, b by node; only lambda without friction.
     gave_up : str
         Why the solver proposed nothing; empty where it did.
+    early : (float, tuple of arrays), optional
+        The value and lambda, tau, k a, k b far from the end of the central path: a start for a friction nearby.
     """
 
     value: float
@@ -82,6 +93,7 @@ class Certified:
     proposed: float
     multipliers: Weights
     gave_up: str = ""
+    early: Start | None = None
 
 
 class QuadraticForms(Conditions):
@@ -105,6 +117,7 @@ class QuadraticForms(Conditions):
     ) -> None:
         super().__init__(pair, measured, friction=friction)
         self._solver = interior_point.solve if solver is None else solver
+        self.mirror = Mirror.of(pair, self)
 
     def factor(self, theta: float) -> Certified:
         """The least Lipschitz constant of T_theta in the norm (5.21) that multipliers prove, for 0 < theta <= 1.
@@ -134,8 +147,11 @@ class QuadraticForms(Conditions):
         LMIError
         """
         step = theta * self.p + (1 - theta) * self.g
+        fixed, start = -step.T @ step, None
+        if parent is not None and parent[1].early is not None:
+            start = self.started(fixed, parent[1].early, parent[0], pieces)
         holds = lambda weights: self.traces.with_multipliers(weights, step=(theta, 1 - theta))
-        found, proposal = self._least(-step.T @ step, self.known(theta), theta, holds, pieces, stop, parent)
+        found, proposal = self._least(fixed, self.known(theta), theta, holds, pieces, stop, start)
         return _root(found), proposal
 
     @one_thread()
@@ -152,22 +168,42 @@ class QuadraticForms(Conditions):
         return _root(Certified(value=safe, evaluated=evaluated, proposed=math.nan, multipliers=multipliers))
 
     @one_thread()
-    def friction_number(self) -> Certified:
+    def friction_number(self, near: Start | None = None) -> Certified:
         """The least c with ``<g, p> <= c |g|^2`` that multipliers prove: every small theta contracts where c < 1.
+
+        ``near`` is from the friction number at a friction nearby.
 
         Raises
         ------
         LMIError
         """
         holds = lambda weights: self.traces.with_multipliers(weights, cross=1.0)
-        return self._least(-self.cross, self.towards_zero, 1.0, holds, self.everywhere)[0]
+        fixed, start = -self.cross, None
+        if near is not None:
+            start = self.program(fixed, self.everywhere, self._from(near), (1 + NEARBY) * near[0])
+        found, proposal = self._least(fixed, self.towards_zero, 1.0, holds, self.everywhere, start=start)
+        return replace(found, early=self._early(proposal))
+
+    def _from(self, near: Start) -> Weights:
+        """The multipliers of a start at another friction; of a larger one they leave the form as definite as there."""
+        lam, tau, a, b = near[1]
+        a, b = a / self.k, b / self.k
+        return lam, np.minimum(tau, 2 * INSIDE * np.sqrt(a * b)), a, b
+
+    def _early(self, proposal: Optimum | None) -> Start | None:
+        """A start from a solver's answer for all pieces; None where it has none, and without friction."""
+        if proposal is None or proposal.early is None or not self.k:
+            return None
+        lam, tau, a, b = self.parts(proposal.early[1], self.everywhere)[:4]
+        return proposal.early[0], (lam, tau, self.k * a, self.k * b)
 
     @one_thread()
-    def largest_theta(self) -> Certified | None:
+    def largest_theta(self, near: Start | None = None) -> Certified | None:
         """The largest theta <= 1 below which multipliers prove that every T_theta contracts; None where there is none.
 
         With q = 1 the form, over theta, is linear in theta and the multipliers: one program answers for all theta.
-        The program of the friction number says whether there is any, and starts it.
+        The program of the friction number says whether there is any, and starts it, unless ``near`` does: from the
+        largest theta at a larger friction, whose multipliers prove as much here.
 
         Raises
         ------
@@ -176,30 +212,50 @@ class QuadraticForms(Conditions):
         move = self.p - self.g
         still, moving = 2 * (self.free - self.cross), move.T @ move
         proposals: list[tuple[float, Weights]] = []
+        early = None
         try:
-            start = self._program(-self.cross, self.towards_zero, 1.0, self.everywhere)
-            below = self._solver(replace(start, stop=Stop(enough=1.0)))
-            if below.s < 1:
-                found = self._solver(replace(start, fixed=still, free=-moving, s=0.0, y=2 * below.y, highest=1.01))
+            if near is not None:
+                start: Program | None = self.program(still, self.everywhere, self._from(near), near[0])
+            else:
+                below = self._program(-self.cross, self.towards_zero, 1.0, self.everywhere)
+                found = self._solved(replace(below, stop=Stop(enough=1.0)))
+                start = replace(below, s=0.0, y=2 * found.y) if found.s < 1 else None
+            if start is not None:
+                found = self._solved(replace(start, fixed=still, free=-moving, highest=1.01))
+                if near is not None and not found.converged:
+                    return self.largest_theta()
                 proposals.append((found.s, self.by_node(found.y, self.everywhere)))
+                early = self._early(found)
         except LMIError:  # the known multipliers may still prove something
-            pass
+            if near is not None:
+                return self.largest_theta()
         energy = contraction_interval(*self.energy_bounds, 1e-12)
         if energy is not None:
             highest = energy[1] * (1 - 1e-9)
             proposals += [(math.nan, inside(times((1 + more) / highest, self.known(highest)))) for more in MORE]
-        candidates = []
+        best = None
         for proposed, multipliers in proposals:
-            if (checked := self._check_theta(still - self.conditions(multipliers), moving, multipliers)) is not None:
-                safe, theta = (min(value, 1.0) for value in checked)
-                candidates.append(Certified(value=safe, evaluated=theta, proposed=proposed, multipliers=multipliers))
-        return max(candidates, key=lambda certified: certified.value, default=None)
+            least = 0.0 if best is None else best.value
+            checked = self._check_theta(still - self.conditions(multipliers), moving, multipliers, least)
+            if checked is None:
+                continue
+            safe, theta = (min(value, 1.0) for value in checked)
+            if best is None or safe > best.value:
+                best = Certified(value=safe, evaluated=theta, proposed=proposed, multipliers=multipliers, early=early)
+        return best
 
-    def _check_theta(self, rest: Floats, moving: Floats, multipliers: Weights) -> tuple[float, float] | None:
-        """The largest theta with ``rest - theta moving`` definite, on the safe side of rounding, and as evaluated."""
+    def _check_theta(
+        self, rest: Floats, moving: Floats, multipliers: Weights, least: float
+    ) -> tuple[float, float] | None:
+        """The largest theta with ``rest - theta moving`` definite, on the safe side of rounding, and as evaluated.
+
+        None where it is not proved, or cannot be above ``least``, which is at most 1.
+        """
         if not eigvalsh(rest)[0] > 0:
             return None
         theta = 1 / float(eigvalsh(moving, rest)[-1])
+        if min(theta, 1.0) <= least:
+            return None
         definite = self.traces.with_multipliers(multipliers, cross=2.0, step=(1.0, -1.0))
         share = _least_share(lambda share: definite(2.0, theta * (1 - share)))
         return None if share is None else (theta * (1 - share), theta)
@@ -212,7 +268,7 @@ class QuadraticForms(Conditions):
         holds: Callable[[Weights], Callable[[float], bool]],
         pieces: Pieces,
         stop: Stop = USUAL,
-        parent: tuple[Pieces, Optimum] | None = None,
+        start: Program | None = None,
     ) -> tuple[Certified, Optimum | None]:
         """The least s for which multipliers prove that ``s |g|^2 + fixed - conditions`` is positive definite.
 
@@ -222,7 +278,7 @@ class QuadraticForms(Conditions):
         proposal, gave_up = None, ""
         drawn: list[Weights] = []
         try:
-            proposal = self._proposed(fixed, known, theta, pieces, stop, parent)
+            proposal = self._proposed(fixed, known, theta, pieces, stop, start)
             found, towards = self.by_node(proposal.y, pieces), self.by_node(self.rows(known, pieces)[3], pieces)
             drawn = [mixed(share, found, towards) for share in DRAWN]
         except LMIError as error:
@@ -251,28 +307,28 @@ class QuadraticForms(Conditions):
         return best, proposal
 
     def _proposed(
-        self,
-        fixed: Floats,
-        known: Weights,
-        theta: float,
-        pieces: Pieces,
-        stop: Stop,
-        parent: tuple[Pieces, Optimum] | None,
+        self, fixed: Floats, known: Weights, theta: float, pieces: Pieces, stop: Stop, start: Program | None
     ) -> Optimum:
-        """The solver's proposal, started from an early point of a parent, else from known multipliers.
+        """The solver's proposal, from a start that is near its end, else from known multipliers.
 
         Raises
         ------
         LMIError
         """
-        if parent is not None and parent[1].early is not None:
+        if start is not None:
             try:
-                near = self._solver(replace(self.started(fixed, parent[1].early, parent[0], pieces), stop=stop))
-                if near.converged or near.s < stop.enough:
-                    return near
+                found = self._solved(replace(start, stop=stop), pieces)
+                if found.converged or found.s < stop.enough:
+                    return found
             except LMIError:
                 pass
-        return self._solver(replace(self._program(fixed, known, theta, pieces), stop=stop))
+        return self._solved(replace(self._program(fixed, known, theta, pieces), stop=stop), pieces)
+
+    def _solved(self, program: Program, pieces: Pieces | None = None) -> Optimum:
+        """The solver's answer for some pieces, all by default: by halves where a reflection leaves them the same."""
+        if self.mirror is None or (pieces is not None and pieces.any):
+            return self._solver(program)
+        return self.mirror.solved(program, self._solver)
 
     def _least_value(self, form: Floats) -> float | None:
         """The least s for which ``s |g|^2 + form`` is positive semidefinite; None where the part of d_1 is not."""
@@ -294,12 +350,11 @@ class QuadraticForms(Conditions):
         for stretch in STRETCHES if len(start) > 1 else STRETCHES[:1]:
             if len(start) > 1:  # the less b, the more is left to d_1
                 lam, tau, a, b = start
-                start = [lam, 0.95 * tau, stretch * a, b / stretch]
-            left, right, cones, y, most = self.rows(tuple(start), pieces)
-            least = self._least_value(fixed - self.conditions(self.by_node(y, pieces)))
+                start = [lam, INSIDE * tau, stretch * a, b / stretch]
+            program = self.program(fixed, pieces, tuple(start))
+            least = self._least_value(fixed - self.conditions(self.by_node(program.y, pieces)))
             if least is not None:
-                s = least + max(1.0, abs(least))
-                return Program(fixed=fixed, free=self.free, left=left, right=right, cones=cones, most=most, s=s, y=y)
+                return replace(program, s=least + max(1.0, abs(least)))
         raise LMIError("the multipliers to start from are lost in rounding")
 
 
@@ -336,12 +391,17 @@ def friction_threshold(pair: ContactPair, measured: Measured, start: float, *, p
     LMIError
     """
 
+    near: Start | None = None
+
     def spare(k: float) -> float:
+        nonlocal near
         progress(f"semidefinite bound: friction threshold, k = {k:.3g} is tried", None)
         try:
-            return 1 - QuadraticForms(pair, measured, friction=k).friction_number().value
+            found = QuadraticForms(pair, measured, friction=k).friction_number(near)
         except LMIError:  # nothing is proved at this friction
             return -1.0
+        near = found.early
+        return 1 - found.value
 
     low, high, k = 0.0, float("inf"), start
     while high - low > NARROW * high or high == float("inf"):

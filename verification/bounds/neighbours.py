@@ -37,12 +37,13 @@ class Patterns:
 class Responses:
     """Answers of T to changes of force: to one on several pieces, or to several on one; a row each.
 
-    ``g``, shape (c, 2 n), are the changes of the force on the Neumann grid, ``jump`` the changes of v and ``reaction``
-    those of the forces on the contact grid.
+    ``g``, shape (c, 2 n), are the changes of the force on the Neumann grid, ``d_1`` and ``reaction`` the changes of
+    traces and forces on the contact grid, ``jump`` the changes of v.
     """
 
     pair: ContactPair
     g: Floats
+    d_1: Floats
     jump: Floats
     reaction: Floats
 
@@ -50,11 +51,6 @@ class Responses:
     def force(self) -> Floats:
         """The changes of T g, shape (c, 2 n)."""
         return self.pair.interface.carry_back(self.reaction.T).T
-
-    @property
-    def d_1(self) -> Floats:
-        """The changes of the trace of the contact body, shape (c, 2 n)."""
-        return self.pair.interface.carry(self.pair.neumann.flexibility(self.g.T)).T + self.jump
 
     @property
     def friction(self) -> tuple[Floats, Floats]:
@@ -97,8 +93,8 @@ def responses(pair: ContactPair, g: Floats, patterns: Patterns, sign: NDArray[np
     load = np.where(moves, -contact.schur @ carried - rubbing, 0.0)
     jump = np.asarray(np.linalg.solve(systems, load[..., None])[..., 0], dtype=float)
     jump[:, ~contact.free] = -carried[~contact.free]
-    gs, reaction = np.repeat(g[None], len(jump), axis=0), -(carried + jump) @ contact.schur
-    return Responses(pair=pair, g=gs, jump=jump, reaction=reaction)
+    gs, d_1 = np.repeat(g[None], len(jump), axis=0), carried + jump
+    return Responses(pair=pair, g=gs, d_1=d_1, jump=jump, reaction=-d_1 @ contact.schur)
 
 
 class Neighbours:
@@ -137,15 +133,18 @@ class Neighbours:
             self._systems[self._unknown] = np.eye(each.shape[1])
         # what a unit of each component adds to the answers
         size = contact.grid.size
-        self._left, self._right = self._made(np.zeros((pair.neumann.grid.size, size)), np.eye(size), transform)
+        none = np.zeros((pair.neumann.grid.size, size))
+        self._left, self._right = self._made(none, np.zeros((size, size)), np.eye(size), transform)
         squares = self._left[each] @ np.swapaxes(self._right[each], 1, 2)
         self._squares = ((squares + np.swapaxes(squares, 1, 2)) / 2)[of]
 
-    def _made(self, forces: Floats, inputs: Floats, answers: Floats) -> tuple[Floats, Floats]:
-        """The factors of the form where step II takes columns of inputs to answers."""
-        carried = self._pair.interface.carry(self._pair.neumann.flexibility(forces))
+    def _made(self, forces: Floats, carried: Floats, inputs: Floats, answers: Floats) -> tuple[Floats, Floats]:
+        """The factors of the form where step II takes columns of inputs to answers.
+
+        ``carried`` are the traces of the Neumann body under the forces, on the contact grid.
+        """
         d, f = np.where(self._moves[:, None], [answers, inputs], [inputs, answers])
-        return self._factors(Responses(pair=self._pair, g=forces.T, jump=(d - carried).T, reaction=-f.T))
+        return self._factors(Responses(pair=self._pair, g=forces.T, d_1=d.T, jump=(d - carried).T, reaction=-f.T))
 
     def _changes(self, forces: Floats) -> tuple[Floats, Floats, tuple[Floats, Floats]]:
         """Change of the answers when nodes switch state, for columns of forces, shape (c, k, m), and of the form.
@@ -163,7 +162,7 @@ class Neighbours:
             wanted[:, tangential] -= (self._slides * self._moved[:, tangential])[..., None] * bound[self._node]
         asked = self._transform @ given
         change = np.linalg.solve(self._systems, wanted - np.where(self._swapped[..., None], asked[at], given[at]))
-        one, two = self._made(forces, given, asked)
+        one, two = self._made(forces, carried, given, asked)
         return change, ((self._left @ two.T + self._right @ one.T) / 2)[at], (one, two)
 
     def values(self, g: Floats) -> Floats:

@@ -43,7 +43,7 @@ class Section5(Bound):
         why = ""
         if theta is not None and found.factor is None:
             friction = float(subject.constants.C_K if subject.constants.k is None else subject.constants.k)
-            why = _why_not(found.interval, found.C2, friction, found.theta)
+            why = _why_not(found.interval, found.C2, friction, found.theta, subject.varies)
             if self.of_unit and subject.measured is not None:
                 why += f" (in {subject.measured.units['stress']})"
         return BoundResult(
@@ -98,7 +98,7 @@ class Energy(Bound):
             friction = Thresholds(every=measured.friction_threshold, some=measured.friction_limit, on="k")
             without = measured.C_t1 is None  # no friction is allowed
             if theta is not None and found.factor is None:
-                why = _why_not(found.interval, friction.some, measured.friction, found.theta)
+                why = _why_not(found.interval, friction.some, measured.friction, found.theta, subject.varies)
         return BoundResult(
             name=self.name,
             proved=True,
@@ -136,7 +136,7 @@ class SemidefiniteBound(Bound):
     colour, dashes, fill = "#8A5A00", "-.", "#FFF3B0"
     calculated = False
     attained = True  # without friction
-    apart = certifies = True
+    apart = certifies = divides = True
 
     def evaluate(self, subject: Subject, theta: Numeric | None = None, *, progress: Progress = silent) -> BoundResult:
         if theta is None or subject.pair is None or subject.measured is None:
@@ -182,10 +182,14 @@ class SemidefiniteBound(Bound):
             said.append(f"{self.name} is not proved: {found.not_proved}")
         return tuple(said)
 
-    def enclose(self, pair: ContactPair, forms: QuadraticForms, theta: float) -> Enclosure:
-        from verification.bounds.lipschitz import enclose
+    def enclose(
+        self, pair: ContactPair, forms: QuadraticForms, theta: float, *, exact: bool, progress: Progress
+    ) -> Enclosure:
+        from verification.bounds.lipschitz import CERTIFIED, CLOSE, budget, enclose
 
-        return enclose(pair, forms, theta, gap=float("inf"), programs=1)
+        programs = min(CERTIFIED, 20 * budget(pair.contact.grid.n)) if exact else 1
+        gap = CLOSE if exact else float("inf")
+        return enclose(pair, forms, theta, gap=gap, programs=programs, progress=progress)
 
     def region(self, subject: Subject, *, progress: Progress = silent) -> Region:
         from verification.bounds.interior_point import LMIError
@@ -204,12 +208,14 @@ class SemidefiniteBound(Bound):
 
 
 def _why_not(
-    interval: tuple[float, float] | None, threshold: Number | None, friction: float, theta: float | None
+    interval: tuple[float, float] | None, threshold: Number | None, friction: float, theta: float | None, varies: bool
 ) -> str:
     """Reason why a bound has no conclusion at a theta."""
     if interval is not None and theta is not None:
         return f"theta = {theta:g} is outside ({interval[0]:.2g}, {interval[1]:.2g})"
     scale = threshold.value if threshold is not None else float("inf")
+    if varies:
+        return f"needed less than {scale / friction:.2g} times the friction along Gamma_c"
     return f"friction {friction:g} is not below {scale:.2g}"
 
 

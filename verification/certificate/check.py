@@ -14,6 +14,11 @@ so that for multipliers lambda, tau, a, b >= 0 with 4 a b >= tau^2 the sum over 
     factor^2 |g|^2 - |theta P' p + (1 - theta) g|^2 - that sum
 
 is a positive definite form in (d, c).  Here it is enclosed in balls, from the rational data on, and decided.
+
+T_theta is piecewise affine, and a constant of all its pieces is one.  On a piece each node has v_N = 0 (normal, 1) or
+p_N = 0 (-1), and a sign e (signs, 1 or -1) with ``(p_T - e w k zeta) v_T = 0``; the first factor is 0 (slip, 1) or the
+other one (-1).  A tree divides the pieces by such cases.  Each of its leaves has multipliers, and for each case on the
+way to it one more, of any sign, for a form that vanishes there: a square, or the product.
 """
 
 import hashlib
@@ -44,40 +49,58 @@ def check(discrete, claim, eliminated=None):
     theta, factor, k = (rational(claim["theta"]), rational(claim["factor"]), rational(discrete["friction"]))
     demand(0 < theta <= 1 and factor >= 0 and k >= 0, "0 < theta <= 1, a factor and a friction that are not negative")
     demand(discrete["neumann_body"] in (1, 2), "neumann_body 1 or 2")
-    one, two = discrete["body1"], discrete["body2"]
-    neumann, contact = (two, one) if discrete["neumann_body"] == 2 else (one, two)
+    neumann, contact = (discrete[f"body{i}"] for i in ((2, 1) if discrete["neumann_body"] == 2 else (1, 2)))
     S_n, S_c = stiffness(neumann, both=True), stiffness(contact, both=k != 0)
     n, m, t = len(contact["surface"]), len(neumann["surface"]), len(contact["surface"]) if k else 0
     P = matrix(discrete["transfer"], n, m) if discrete["transfer"] else identity(n)
     demand(P.ncols() == m, "a transfer between contact nodes that differ")
     weights = [rational(w) for w in discrete["weights"]]
     demand(len(weights) == n and all(w > 0 for w in weights), "a positive weight for each contact node")
-    lam, tau, a, b = (spread(claim["multipliers"][name], n) for name in ("lambda", "tau", "a", "b"))
-    demand(all(x >= 0 for x in lam + tau + a + b), "multipliers that are not negative")
-    demand(all(4 * x * y >= z * z for x, y, z in zip(a, b, tau, strict=True)), "4 a b >= tau^2")
-
     # rows: forms in (d, c).  Without friction p_T = 0, and c is only the normal trace
-    still = lambda rows, columns: arb_mat(rows, columns)
-    across = stacked([[P, still(n, m)], [still(n, m), P]]) if k else stacked([[still(n, m), P]])
-    force = stacked([[still(t + n, 2 * m), S_c]])
-    jump = -stacked([[across, identity(t + n)]])
+    across = stacked([[P, arb_mat(n, m)], [arb_mat(n, m), P]]) if k else stacked([[arb_mat(n, m), P]])
+    p = stacked([[arb_mat(t + n, 2 * m), S_c]]).tolist()
+    v = (-stacked([[across, identity(t + n)]])).tolist()
     moved = across.transpose() * S_c  # P' p
-    square = moved.transpose() * S_n.solve(moved)
-    form = stacked(
-        [
-            [(factor**2 - (1 - theta) ** 2) * S_n, -theta * (1 - theta) * moved],
-            [-theta * (1 - theta) * moved.transpose(), -(theta**2) * square],
-        ]
-    )
-    product = force.transpose() * scaled((tau if k else []) + lam, jump)
-    form -= (product + product.transpose()) / 2
+    corner, mixed = (factor**2 - (1 - theta) ** 2) * S_n, -theta * (1 - theta) * moved
+    square = -(theta**2) * moved.transpose() * S_n.solve(moved)
+    form = stacked([[corner, mixed], [mixed.transpose(), square]])
+    rubs, zeta = [k * w for w in weights[:t]], []
     if k:
-        kernel = matrix(discrete["kernel"], n, m)
-        zeta = stacked([[kernel * part(S_n, range(m, 2 * m), range(2 * m)), still(n, 2 * n)]])
-        slip = part(jump, range(n), range(jump.ncols()))
-        for rows, values in ((zeta, a), (slip, b)):
-            form -= rows.transpose() * scaled([k * w * x for w, x in zip(weights, values, strict=True)], rows)
-    demand(definite(form), "multipliers for which the form is positive definite in balls of these bits")
+        pressure = matrix(discrete["kernel"], n, m) * part(S_n, range(m, 2 * m), range(2 * m))
+        zeta = stacked([[pressure, arb_mat(n, 2 * n)]]).tolist()
+
+    def product(kind, j, case, sign):
+        """Two forms, one of which is 0 on the pieces of a case."""
+        demand(j in range(n if kind == "normal" else t), "a contact node")
+        if kind == "normal" or (kind, case) == ("slip", -1):
+            return [v[j] if kind == "slip" else v[t + j] if case > 0 else p[t + j]] * 2
+        excess = [x - sign * rubs[j] * y for x, y in zip(p[j], zeta[j], strict=True)]
+        return excess, (v[j] if kind == "signs" else excess)
+
+    for leaf, cases in leaves(claim["multipliers"]):
+        lam, tau, a, b = (spread(leaf[name], n) for name in ("lambda", "tau", "a", "b"))
+        demand(all(x >= 0 for x in lam + tau + a + b), "multipliers that are not negative")
+        demand(all(4 * x * y >= z * z for x, y, z in zip(a, b, tau, strict=True)), "4 a b >= tau^2")
+        values = tau[:t] + lam + [w * x for each in (a, b) for w, x in zip(rubs, each[:t], strict=True)]
+        values += [rational(x) for x in leaf.get("equal", [])]
+        pairs = [*zip(p + zeta + v[:t], v + zeta + v[:t], strict=True), *(product(*case) for case in cases)]
+        demand(len(values) == len(pairs), "one more multiplier for each case")
+        left, right = (arb_mat(list(rows)) for rows in zip(*pairs, strict=True))
+        total = left.transpose() * scaled(values, right)
+        demand(definite(form - (total + total.transpose()) / 2), "multipliers that prove it in balls of these bits")
+
+
+def leaves(tree, cases=(), signs=()):
+    """The leaves of a tree, each with its cases: kind of division, contact node, 1 or -1, and the sign of the node."""
+    if "cases" not in tree:
+        yield tree, cases
+        return
+    kind, j, branches, signs = tree["divided"], tree["node"], tree["cases"], dict(signs)
+    demand(len(branches) == 2, "both cases of each division")
+    demand(kind in ("normal", "signs") or (kind == "slip" and j in signs), "normal, signs, or then slip")
+    for branch, case in zip(branches, (1, -1), strict=True):
+        known = {**signs, j: case} if kind == "signs" else signs
+        yield from leaves(branch, (*cases, (kind, j, case, known.get(j))), known)
 
 
 def surface_stiffness(body, both):
@@ -229,9 +252,7 @@ def main(path):
     except UNREADABLE as error:
         show(f"REFUSED: {type(error).__name__}: {error}")
         return 1
-    print(
-        "ACCEPTED:", "T_theta contracts" if rational(document["claim"]["factor"]) < 1 else "no contraction is claimed"
-    )
+    print("ACCEPTED:", "T_theta contracts" if rational(document["claim"]["factor"]) < 1 else "no contraction claimed")
     return 0
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from decimal import ROUND_DOWN, ROUND_UP, Context, Decimal
 from fractions import Fraction
@@ -137,6 +137,8 @@ class Confirmation:
             )
         if pair.outside:
             raise NoCertificate(f"outside the theorem: {pair.outside[0]}")
+        if pair.contact.lifts:
+            raise NoCertificate("the contact body can be lifted rigidly: its form in traces is not definite")
         try:
             claims = Claims(describe(pair.problem, pair), progress)
         except NotExact as error:
@@ -201,16 +203,19 @@ def _times(factor: float, multipliers: Weights) -> Weights:
     return tuple(factor * values for values in multipliers)
 
 
-def written(multipliers: Weights) -> dict[str, Any]:
-    """Multipliers as rationals, rounded so that ``4 a b >= tau^2`` stays; one for all nodes where they are equal."""
+def written(multipliers: Weights, equal: Sequence[float] = ()) -> dict[str, Any]:
+    """Multipliers as rationals, rounded so that ``4 a b >= tau^2`` stays; one for all nodes where they are equal.
+
+    ``equal`` are multipliers of equations that hold on some pieces, in the order of the divisions that lead to them.
+    """
     if len(multipliers) < 4:
         multipliers = (*multipliers, *(np.zeros(1),) * 3)
     rules = {"lambda": None, "tau": ROUND_DOWN, "a": ROUND_UP, "b": ROUND_UP}
-    found = {}
+    found: dict[str, Any] = {}
     for (name, rounding), values in zip(rules.items(), multipliers, strict=True):
         texts = [str(_decimal(value, rounding)) for value in values.tolist()]
         found[name] = texts[0] if len(set(texts)) == 1 else texts
-    return found
+    return found | ({"equal": [str(_decimal(float(value))) for value in equal]} if len(equal) else {})
 
 
 def _allowed(bits: float) -> int:
@@ -267,8 +272,8 @@ def _described(spec: BodySpec, body: Body, points: NDArray[Any]) -> dict[str, An
         "cells": body.mesh.cells.tolist(),
         "held": np.argwhere(body.known.held).tolist(),
         "surface": body.nodes.tolist(),
-        "young": str(spec.young),
-        "poisson": str(spec.poisson),
+        "young": str(spec.moduli[0]),
+        "poisson": str(spec.moduli[1]),
     }
 
 

@@ -28,6 +28,7 @@ from ndtheory.continuum import (
 )
 from ndtheory.intervals import Interval
 from ndtheory.moduli import Moduli, half_planes
+from verification.certificate.calibrating import for_cut_off, for_traces
 from verification.constants.cells import OfCells, rho_of_cells
 from verification.constants.measuring import of_energy
 from verification.document import Document
@@ -179,12 +180,12 @@ class ContinuumCertificate(Document):
         uppers["kappa_1"], uppers["kappa_2"] = c.kappa(k)
         order = 1 if self.problem.contact_body == 1 else -1  # the contact body first
         bodies = (self.problem.body1, self.problem.body2)[::order]
-        moduli = [Moduli(young=body.young, poisson=body.poisson) for body in bodies]
+        moduli = [Moduli(young=young, poisson=poisson) for young, poisson in (body.moduli for body in bodies)]
         return {
             "kind": "continuum",
             "constants": {
                 **{name: at_most(value) for name, value in uppers.items()},
-                "segments": [str(value) for value in c.segments],
+                "K": [str(value) for value in c.K],
                 "rho_least": at_least(half_planes(*moduli).high),
                 "rho_ends": at_least(c.rho_ends),
             },
@@ -236,13 +237,9 @@ def two_rectangles(problem: Problem) -> TwoRectangles:
             raise refuse(f"{name}.fixed", sorted(held), f'needed a body held at "{outer}" only, fixed or prescribed')
         if None in body.prescribed.get(outer, ()):
             raise refuse(f"{name}.prescribed.{outer}", "free", "needed both components")
-        if not body.poisson < Fraction(1, 2):
-            raise refuse(f"{name}.poisson", body.poisson, "needed poisson < 1/2")
+        young, poisson = body.moduli
         found[name] = Rectangle(
-            left=body.x[0],
-            right=body.x[1],
-            thickness=body.y[1] - body.y[0],
-            body=Moduli(young=body.young, poisson=body.poisson),
+            left=body.x[0], right=body.x[1], thickness=body.y[1] - body.y[0], body=Moduli(young=young, poisson=poisson)
         )
     lower_body, upper_body = found["body1"], found["body2"]
     overlap = (max(lower_body.left, upper_body.left), min(lower_body.right, upper_body.right))
@@ -253,6 +250,18 @@ def two_rectangles(problem: Problem) -> TwoRectangles:
         interval=problem.contact.interval or overlap,
         radius=problem.contact.radius or ANY_RADIUS,
     )
+
+
+def bounded(model: TwoRectangles) -> ContinuumConstants:
+    """The constants of two rectangles, with calibrations from a solver where these are better than closed forms."""
+    proofs = []
+    for body in (model.contact, model.neumann):
+        at, kappa = body.in_thicknesses(model.interval), body.body.kappa
+        found = [for_traces(*at, kappa)]
+        if body is model.neumann and min(model.margins) > 0:
+            found.append(for_cut_off(*at, kappa))
+        proofs.append([proof for proof in found if proof is not None])
+    return continuum_constants(model, contact=proofs[0], neumann=proofs[1])
 
 
 def certify_continuum(problem: Problem, progress: Progress = silent) -> ContinuumCertificate:
@@ -276,7 +285,7 @@ def certify_continuum(problem: Problem, progress: Progress = silent) -> Continuu
     """
     model, theta = two_rectangles(problem), problem.iteration.theta
     progress("bounding the constants of the continuum", None)
-    constants = continuum_constants(model)
+    constants = bounded(model)
     energy = statement(constants, friction=problem.contact.friction, theta=None if theta == "auto" else theta)
     mesh = file_mesh(problem, progress)
     return ContinuumCertificate(problem=problem, constants=constants, energy=energy, mesh=mesh)

@@ -15,7 +15,9 @@ from typing import Any, ClassVar
 from ndtheory.number import Numeric
 from verification.algorithm.theta import choose
 from verification.bounds.bound import Subject
+from verification.bounds.conditions import Conditions
 from verification.bounds.interior_point import LMIError
+from verification.bounds.lipschitz import Division, Leaf
 from verification.bounds.multipliers import QuadraticForms
 from verification.bounds.table import BOUNDS, certifying, strongest
 from verification.certificate import check
@@ -99,6 +101,11 @@ class Certificate(Document):
         return Fraction(self.claim["theta"])
 
     @property
+    def sets(self) -> int:
+        """Number of sets of pieces, each with its own multipliers."""
+        return sum(1 for _ in check.leaves(self.claim["multipliers"]))
+
+    @property
     def summary(self) -> str:
         return f"theta = {float(self.theta):.4g}, factor {float(self.factor):.6g} proved ({self.edition})"
 
@@ -115,7 +122,12 @@ class Certificate(Document):
 
 
 def certify(
-    problem: Problem, *, theta: Numeric | None = None, edition: str | None = None, progress: Progress = silent
+    problem: Problem,
+    *,
+    theta: Numeric | None = None,
+    edition: str | None = None,
+    exact: bool = False,
+    progress: Progress = silent,
 ) -> Certificate:
     """Prove that one step contracts on the meshes of a problem, for its rational data.
 
@@ -128,6 +140,9 @@ def certify(
     edition : str, optional
         Name of the bound that proposes factor and multipliers, 'repaired', 'energy' or 'lmi' among ours; by default the
         strongest one that certifies.
+    exact : bool
+        Divide the pieces of T into sets until the factor is nearly the largest that occurs; the certificate has
+        multipliers for each set.  Only the edition 'lmi' does that.
     progress : callable
 
     Returns
@@ -152,6 +167,8 @@ def certify(
     edition = strongest() if edition is None else edition
     if edition not in certifying():
         raise ValueError(f"edition {edition!r}: needed one of {', '.join(certifying())}")
+    if exact and not BOUNDS[edition].divides:
+        raise ValueError(f"edition {edition!r} with exact: needed one that divides the pieces of T")
     if problem.dimension != 2:
         raise refuse(
             "dimension",
@@ -164,7 +181,7 @@ def certify(
     chosen = choose(pair, theta, measured).theta
     assert isinstance(chosen, Fraction)
     progress(f"{BOUNDS[edition].words} proposes multipliers", None)
-    spare, multipliers, lower = _proposed(pair, measured, chosen, edition)
+    spare, multipliers, lower = _proposed(pair, measured, chosen, edition, exact, progress)
     discrete = describe(problem, pair)
     claim = Claims(discrete, progress).confirmed(chosen, spare, multipliers)
     if claim is None:
@@ -226,25 +243,46 @@ def check_again(document: Any, problem: Problem | None = None) -> Checked:
 
 
 def _proposed(
-    pair: ContactPair, measured: Measured, theta: Fraction, edition: str
+    pair: ContactPair, measured: Measured, theta: Fraction, edition: str, exact: bool, progress: Progress
 ) -> tuple[float, dict[str, Any], float | None]:
     """1 minus the factor of a bound, multipliers that should prove it, and the largest factor found."""
 
     bound = BOUNDS[edition]
     try:
         forms = QuadraticForms(pair, measured)
-        found = bound.enclose(pair, forms, float(theta))
+        found = bound.enclose(pair, forms, float(theta), exact=exact, progress=progress)
         if found is not None:
-            lower, spare, multipliers = found.lower, 1 - found.upper.value, found.upper.multipliers
+            lower, spare = found.lower, 1 - found.upper.value
+            multipliers = _of_tree(found.tree, forms, pair.neumann.upward)
             why = f"its bound of the factor is {found.upper.value:.4g}"
+            if not exact and lower < 1:
+                why += f", the largest factor found {lower:.4g}; dividing the pieces (exact) may prove more"
         else:
             result = bound.evaluate(Subject.of(pair, measured), theta)
             one_minus = result.one_minus_factor
-            lower, spare, multipliers = None, 0.0 if one_minus is None else one_minus.value, forms.known(float(theta))
+            lower, spare = None, 0.0 if one_minus is None else one_minus.value
+            multipliers = written(forms.known(float(theta)))
             why = result.why or result.not_computed
     except (LMIError, ValueError) as error:
         raise NoCertificate(str(error)) from None
     if not spare > 0:
         at = f"theta = {float(theta):g}, k = {float(pair.friction):g}"
         raise NoCertificate(f"{bound.words} proves no contraction at {at}: {why}")
-    return spare, written(multipliers), lower
+    return spare, multipliers, lower
+
+
+def _of_tree(
+    tree: Leaf | Division, forms: Conditions, upward: bool, divisions: tuple[tuple[str, int], ...] = ()
+) -> dict[str, Any]:
+    """The multipliers of all sets of pieces, as the checker reads them.
+
+    Its normal components are along y; where the pair's are not, zeta changes its sign, and so do the cases.
+    """
+    if isinstance(tree, Division):
+        further = (*divisions, (tree.name, tree.node))
+        cases = [_of_tree(case, forms, upward, further) for case in tree.cases]
+        if tree.name == "signs" and not upward:
+            cases.reverse()
+        return {"divided": tree.name, "node": tree.node, "cases": cases}
+    multipliers, equal = forms.apart(tree.upper.multipliers, tree.proved_on)
+    return written(multipliers, [equal[name][node] if equal else 0.0 for name, node in divisions])

@@ -75,7 +75,7 @@ def _grids(transfer: Path, given: Mapping[str, Any]) -> dict[str, Any]:
     return {name: read_array(transfer, of) for name, of in wanted.items() if of in held and name not in given}
 
 
-TIED = click.option("--tied", is_flag=True, help="Advise by what holds where nothing opens or slips.")
+TIED = click.option("--tied", is_flag=True, help="Nothing opens or slips: tied bodies, heat, a fluid at a wall.")
 SNIPPETS_OF = click.option(
     "--snippets",
     type=OneOf([*SNIPPETS, "all"], case_sensitive=False),
@@ -103,13 +103,14 @@ def of_file(file: Path, keys: dict[str, str], swap: bool, tied: bool, snippets: 
     FILE is a problem file, or the interface.npz that a run has written.  Both assignments of the roles are compared:
     theta (no unit) and the factor of a step, predicted and proved, and lines to paste into a coupling configuration.
 
-    The commands below need no problem file.  A file that has the name of one of them is given as
-    ./run.
+    The commands below need no problem file; two solvers that are Python functions are coupled by verification.couple.
+    A file that has the name of a command is given as ./run.
 
     \b
     Examples:
       ndtheory advise my.toml
-      ndtheory advise my.toml --set contact.friction=0.4
+      ndtheory advise run --log precice-Solid-convergence.log --theta 0.5
+      ndtheory advise moduli --conductivity 50,0.5
       ndtheory advise my.toml --tied
       ndtheory advise my.toml --snippets preCICE
       ndtheory advise results/interface.npz
@@ -122,6 +123,8 @@ def of_file(file: Path, keys: dict[str, str], swap: bool, tied: bool, snippets: 
     changed = [option for option, given in (("--set", keys), ("--swap-roles", swap)) if given]
     if file.suffix == ".npz" and changed:
         raise click.UsageError(f"received {changed[0]} with {file}: it changes a problem file", context)
+    if file.suffix in (".log", ".csv", ".dat"):
+        raise click.UsageError(f"{file}: for a log type ndtheory advise run --log {file} --theta X", context)
     problem = file if file.suffix == ".npz" else load_problem(file, keys, swap=swap)
     from verification.advice import roles
 
@@ -289,70 +292,92 @@ def run(
     _show(found, snippets, as_json)
 
 
+#: Words of --shape, and the parameters of advise_moduli that they set.
+SHAPES: dict[str, tuple[str, Any]] = {
+    "plane-stress": ("plane", "stress"),
+    "3d": ("plane", "3d"),
+    "flat": ("flat", True),
+    **{f"corners-{name}": ("corners", name) for name in ("none", "1", "2", "both")},
+    **{f"mirror-{body}": ("mirror", body) for body in (1, 2)},
+}
+
+
+def _shape(context: click.Context, parameter: click.Parameter, value: str | None) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for word in value.split(",") if value else ():
+        if word not in SHAPES:
+            needed = f"some of {', '.join(SHAPES)}{did_you_mean(word, SHAPES)}"
+            raise click.UsageError(f"--shape = {word}: needed {needed}", context)
+        key, meant = SHAPES[word]
+        if found.get(key, meant) != meant and key != "mirror":
+            raise click.UsageError(f"--shape = {value}: needed one {key}, received two", context)
+        found[key] = [*found.get(key, ()), meant] if key == "mirror" else meant
+    if found.get("flat") and "mirror" not in found:
+        raise click.UsageError(f"--shape = {value}: needed mirror-1 or mirror-2 with flat", context)
+    return found
+
+
 @click.command(cls=AdviseCommand)
 @click.option(
-    "--young", metavar="E1,E2", required=True, help="Moduli of elasticity of bodies 1 and 2, in one unit of stress."
+    "--young", metavar="E1,E2", help="Elastic: moduli of bodies 1 and 2, in one unit of stress.  Fluid: E of the wall."
 )
-@click.option("--poisson", metavar="NU1,NU2", required=True, help="Poisson ratios of bodies 1 and 2, no unit.")
-@click.option("--plane-stress", is_flag=True, help="Plane stress; plane strain by default.")
-@click.option("--three-dimensional", is_flag=True, help="Bodies in space.")
+@click.option("--poisson", metavar="NU1,NU2", help="Poisson ratios of bodies 1 and 2, no unit.  Fluid: nu of the wall.")
 @click.option(
-    "--corners",
-    type=OneOf(["none", "1", "2", "both"]),
-    help="Which body ends in corners of 90 degrees at the ends of Gamma_c.",
+    "--shape",
+    metavar="WORDS",
+    callback=_shape,
+    help="Elastic bodies, words with commas: plane-stress or 3d; corners-1, -2, -both or -none (the body that ends in "
+    "corners of 90 degrees at the ends of Gamma_c); mirror-1 or -2 (the body whose mirror image in a flat Gamma_c, "
+    "with its supports, lies inside the other one), and flat (that one is twice as wide as high, its far side held).",
+)
+@click.option("--conductivity", metavar="K1,K2", help="Heat: conductivities of plates 1 and 2.")
+@click.option(
+    "--capacity", metavar="C1,C2", help="Heat, step in time: capacities per volume, density times specific heat."
+)
+@click.option("--density", metavar="RHO_F,RHO_S", help="Fluid: densities of the fluid and of the wall.")
+@click.option(
+    "--thickness",
+    metavar="D1,D2",
+    help="Heat: thicknesses of both plates; without it they are thick.  Fluid: of the wall.",
 )
 @click.option(
-    "--mirror",
-    type=OneOf(["1", "2", "both"]),
-    help="The body whose mirror image in a flat Gamma_c lies inside the other one, and wherever it is held, its image "
-    "is held too.",
+    "--length",
+    metavar="L or L,R",
+    help="Fluid: length of the wall between its ends; of a tube, its length and its radius.",
 )
-@click.option(
-    "--flat",
-    is_flag=True,
-    help="With --mirror: the other body is at least twice as wide as high and held along its other side.",
-)
+@click.option("--dt", metavar="TIME", help="Heat with a capacity, or fluid: the step in time.")
+@click.option("--parallel", is_flag=True, help="Parallel coupling: both solvers run at once.")
 @JSON
-def moduli(
-    young: str,
-    poisson: str,
-    plane_stress: bool,
-    three_dimensional: bool,
-    corners: Any,
-    mirror: str | None,
-    flat: bool,
-    as_json: bool,
-) -> None:
-    """Bound rho from the moduli, before there is a mesh.
+def moduli(shape: dict[str, Any], parallel: bool, as_json: bool, **given: str | None) -> None:
+    """Bound rho from material data, before there is a mesh.
 
-    The moduli of both bodies bound rho (no unit) from below, in both roles.  E is in any one unit of stress.  A theta
-    to start with is proved only where the mirror image of one body fits into the other: say so with --mirror.
+    Elastic bodies: their moduli bound rho (no unit) from below, in both roles.  A theta to start with is proved only
+    where the mirror image of one body fits into the other: say so with --shape.
+
+    Heat: conductivities of two flat plates give theta.  Fluid: densities bound rho from below by the added mass of the
+    longest wave.  Units: any, one set for all.
 
     \b
-    Examples, E in MPa:
+    Examples, in MPa and in SI units:
       ndtheory advise moduli --young 7e4,2e4 --poisson 0.3,0.3
-      ndtheory advise moduli --young 7e4,2e4 --poisson 0.3,0.3 --corners 2 \\
-        --mirror 2 --flat
+      ndtheory advise moduli --young 7e4,2e4 --poisson 0.3,0.3 \\
+        --shape corners-2,mirror-2,flat
+      ndtheory advise moduli --conductivity 50,0.5 --capacity 3.6e6,1.6e6
+      ndtheory advise moduli --density 1000,1200 --thickness 1e-3 \\
+        --length 0.05,0.005
     """
     context = click.get_current_context()
-    if flat and mirror is None:
-        needed = "received --flat without --mirror: it tells of the body that such an image fits into"
-        raise click.UsageError(needed, context)
-    if plane_stress and three_dimensional:
-        raise click.UsageError("received --plane-stress with --three-dimensional: needed one of both", context)
+    data: dict[str, Any] = {name: value.split(",") for name, value in given.items() if value is not None}
+    if not {"young", "conductivity", "density"} & data.keys():
+        received = f"received {f'--{min(data)} alone' if data else 'no material'}"
+        raise click.UsageError(f"{received}: needed --young and --poisson, --conductivity, or --density", context)
     from verification.advice.from_moduli import advise_moduli
 
     try:
-        found = advise_moduli(
-            young=young.split(","),
-            poisson=poisson.split(","),
-            plane="stress" if plane_stress else "3d" if three_dimensional else "strain",
-            corners=corners,
-            mirror=[body for body in (1, 2) if mirror in (str(body), "both")],
-            flat=flat,
-        )
+        found = advise_moduli(**data, **shape, parallel=parallel)
     except HypothesisError as error:
-        raise click.UsageError(f"--{error}", context) from None
+        option = "--shape, " if error.key in ("plane", "corners", "mirror", "flat") else "--"
+        raise click.UsageError(f"{option}{error}", context) from None
     _show(found, None, as_json)
 
 

@@ -29,6 +29,7 @@ def _editions() -> Sequence[str]:
 @THETA
 @SWAP
 @click.option("--edition", type=Registered(_editions), help="Bound that proposes the factor; the strongest by default.")
+@click.option("--exact", is_flag=True, help="Divide the pieces of T until the factor is nearly attained: some time.")
 @click.option(
     "--continuum", is_flag=True, help="Prove it without a mesh, for two rectangles, each held at its outer side."
 )
@@ -47,6 +48,7 @@ def certify(
     theta: str | None,
     swap: bool,
     edition: Any,
+    exact: bool,
     continuum: bool,
     target: Path | None,
     given: Path | None,
@@ -55,15 +57,16 @@ def certify(
     """Prove that one step contracts on the meshes of FILE in exact numbers, or in the continuum.
 
     The certificate of a mesh holds the bodies in rational numbers and the multipliers that prove the factor.  Anyone
-    can check it with a script of some 200 lines, verification/certificate/check.py, which imports nothing of this
+    can check it with a script of 260 lines, verification/certificate/check.py, which imports nothing of this
     program (only python-flint, for interval arithmetic).  Exit 1 where contraction is not proved.
 
     \b
     Examples:
       ndtheory certify my.toml --theta 0.5 -o certificate.json
+      ndtheory certify my.toml --exact -o certificate.json
       ndtheory certify --check certificate.json
       ndtheory certify --check certificate.json my.toml
-      ndtheory certify --continuum my.toml --theta 0.4
+      ndtheory certify --continuum my.toml --theta 0.6
     """
     context = click.get_current_context()
     for first, used, second, also in (
@@ -72,6 +75,9 @@ def certify(
         ("--edition", edition, "--check", given),
         ("--continuum", continuum or None, "--check", given),
         ("--edition", edition, "--continuum", continuum or None),
+        ("--exact", exact or None, "--edition", edition),
+        ("--exact", exact or None, "--check", given),
+        ("--exact", exact or None, "--continuum", continuum or None),
     ):
         if used is not None and also is not None:
             raise click.UsageError(f"received {first} with {second}: needed one of both", context)
@@ -93,7 +99,7 @@ def certify(
     problem = load_problem(file, keys, theta=theta, swap=swap)
     try:
         with stages() as tell:
-            found = prove(problem, edition=edition, progress=tell)
+            found = prove(problem, edition=edition, exact=exact, progress=tell)
     except NoCertificate as error:
         return fail(error, "not proved", "no certificate")
     typed = Typed(file=file, keys=keys, theta=theta, swap=swap)

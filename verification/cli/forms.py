@@ -46,7 +46,8 @@ class AdviseCommand(click.Command):
             raise click.UsageError(f"{error.option_name} is an option of {of}", ctx) from None
         if extra and not ctx.resilient_parsing:
             words = [str(ctx.params[p.name or ""]) for p in self.params if isinstance(p, click.Argument)] + extra
-            raise click.UsageError(f"received {' '.join(words)}: needed {self.needed(ctx)}", ctx)
+            log = " (a log: after --log)" if takes(self, "--log") else ""
+            raise click.UsageError(f"received {' '.join(words)}: needed {self.needed(ctx)}{log}", ctx)
         return extra
 
     def needed(self, ctx: click.Context) -> str:

@@ -8,10 +8,10 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import Any
 
-from fem1d2d import plane_strain
 from fem1d2d.layers import Interface, Layer, peaks
 from ndtheory import Number
 from ndtheory.moduli import Moduli, half_planes
+from verification.interface.body import material_of
 from verification.problem import Problem
 from verification.problem.specs import BodySpec
 from verification.threads import one_thread
@@ -63,7 +63,7 @@ def rho_of_cells(problem: Problem | None, *, verified: bool = False) -> OfCells:
     except NoCells as error:
         return OfCells(numbers={}, why=str(error))
     contact, neumann = _roles(problem)
-    limit = half_planes(*(Moduli(young=body.young, poisson=body.poisson) for body in (contact, neumann)))
+    limit = half_planes(*map(_moduli, (contact, neumann)))
     ratios = zip(NAMES, _largest(interface), (limit.high, limit.free), strict=True)
     numbers = {name: Number.of_float(max(found, float(least))) for name, found, least in ratios}
     if not verified:
@@ -80,7 +80,7 @@ def halved_cells(problem: Problem) -> Interface:
     Raises
     ------
     NoCells
-        One dimension, bodies that are no rectangles or held along Gamma_c, lengths of cells without a simple ratio.
+        One dimension, bodies not rectangular or held along Gamma_c, lengths of cells without a simple ratio.
 
     Examples
     --------
@@ -94,7 +94,7 @@ def halved_cells(problem: Problem) -> Interface:
     bodies = {name: getattr(problem, name) for name in ("body1", "body2")}
     for (name, body), side in zip(bodies.items(), SIDES, strict=True):
         if body.shape != "rectangle":
-            raise NoCells(f"{name} is no rectangle of equal cells")
+            raise NoCells(f"{name} is not a rectangle of equal cells")
         if side in body.fixed or side in body.prescribed:
             raise NoCells(f"{name} is held along Gamma_c")
     contact, neumann = _roles(problem)
@@ -132,8 +132,12 @@ def _cell(body: BodySpec) -> tuple[Fraction, Fraction]:
 
 
 def _layer(body: BodySpec, size: tuple[Fraction, Fraction], column: int) -> Layer:
-    material = plane_strain(float(body.young), float(body.poisson))
-    return Layer(material=material, aspect=float(size[0] / size[1]), rising=column % 2 == 1)
+    return Layer(material=material_of(body), aspect=float(size[0] / size[1]), rising=column % 2 == 1)
+
+
+def _moduli(body: BodySpec) -> Moduli:
+    young, poisson = body.moduli
+    return Moduli(young=young, poisson=poisson)
 
 
 def _roles(problem: Problem) -> tuple[BodySpec, BodySpec]:
@@ -154,8 +158,8 @@ def _enclosed(interface: Interface, contact: BodySpec, neumann: BodySpec) -> OfC
 
     bodies = []
     for body in (contact, neumann):
-        (width, height), shear = _cell(body), Moduli(young=body.young, poisson=body.poisson).shear
-        bodies.append(HalfPlane(aspect=width / height, shear=shear, poisson=body.poisson))
+        (width, height), found = _cell(body), _moduli(body)
+        bodies.append(HalfPlane(aspect=width / height, shear=found.shear, poisson=found.poisson))
     mirrored = interface.contact.rising == interface.neumann.rising
     numbers: dict[str, Number] = {}
     try:

@@ -83,7 +83,7 @@ class Measured(Document):
     kappa_1, kappa_2 : Number or None
         ``k C_s C_t1`` and ``k C_s C_t2`` of the theorem in energy norms; dimensionless.
     friction : float
-        k.
+        k, the largest one where it varies along Gamma_c; S is then ``k(s) S / max k`` in all constants.
     interface_nodes : int
     reason : mapping
         Why a value is None.

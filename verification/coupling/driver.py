@@ -34,7 +34,7 @@ Solver = Callable[[Floats], Any]
 
 
 class CouplingError(RuntimeError):
-    """A solver returned what is no vector of finite numbers."""
+    """A solver returned something other than a vector of finite numbers."""
 
 
 class Coupling:
@@ -109,7 +109,8 @@ class Coupling:
     @property
     def spectrum(self) -> Spectrum | None:
         """The eigenvalues as the vectors show them; None before two of them differ."""
-        return None if self.advice is None else self.advice.spectrum
+        advice = self.advice
+        return None if advice is None else advice.spectrum
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -246,10 +247,9 @@ def couple(
     (True, 3, 1.714286, 0.75)
     """
     coupling, g = Coupling(rule, theta), _vector("start", start)
-    if not 0 < tolerance < math.inf:
-        raise ValueError(f"tolerance {tolerance!r}: needed a number > 0")
-    if not max_iterations >= 1:
-        raise ValueError(f"max_iterations {max_iterations!r}: needed a whole number > 0")
+    tolerance = float(take("tolerance", tolerance, "a number > 0", lambda value: value > 0))
+    whole = lambda value: value >= 1 and value.denominator == 1
+    max_iterations = int(take("max_iterations", max_iterations, "a whole number > 0", whole))
     history, first = list[float](), math.inf
     for iterations in range(1, max_iterations + 1):
         displacement = _answer("neumann", neumann, g, iterations)

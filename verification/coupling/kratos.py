@@ -61,7 +61,7 @@ class Accelerator:
     def __init__(self, settings: Mapping[str, Any], say: Callable[[str], Any]) -> None:
         unknown = sorted(settings.keys() - {*SETTINGS, *COMMON})
         if unknown:
-            raise ValueError(f"{LABEL}: {unknown[0]!r} is no setting, needed {' or '.join(SETTINGS)}")
+            raise ValueError(f"{LABEL}: {unknown[0]!r} is not a setting, needed {' or '.join(SETTINGS)}")
         self._chosen = {name: settings[name] for name in SETTINGS if name in settings}
         self._echo_level, self._say = settings.get("echo_level", 0), say
         self._coupling = Coupling(**self._chosen)

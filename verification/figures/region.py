@@ -25,6 +25,7 @@ def draw_region(plane: Plane) -> Figure:
     ends = [hi for region in plane.regions.values() for _, hi in region.theta]
     frictions = [k for region in plane.regions.values() for k in region.k]
     left, bottom = 10 ** (-2) * min(ends), 0.1 * min(frictions)
+    varies = plane.problem is not None and plane.problem.contact.profile is not None
     highest = max([*frictions, *(p.k for p in plane.points)])
     with styled():
         figure = new_figure(7.2, 7.2)
@@ -32,7 +33,7 @@ def draw_region(plane: Plane) -> Figure:
         whole.set(xscale="log", yscale="log")
         for ax, least in ((whole, (left, bottom)), (enlarged, (0.0, 0.0))):
             _draw(ax, plane, *least)
-            ax.set(ylabel="coefficient of friction k")
+            ax.set(ylabel=f"{'largest ' * varies}coefficient of friction k")
         whole.set(xlim=(left, 1.3), ylim=(bottom, 2 * highest))
         enlarged.set(xlim=(0, 1), ylim=(0, ROOM * max(frictions)), xlabel=THETA)
         whole.set_title(f"{plain(plane.title)}: where one step is proved to contract")

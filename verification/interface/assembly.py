@@ -12,12 +12,10 @@ from fem1d2d import (
     Mesh,
     MeshError,
     Supports,
-    bar,
     body_load,
     facet_weights,
     from_file,
     interval,
-    plane_strain,
     rectangle,
     rigid_motions,
     stiffness,
@@ -26,7 +24,7 @@ from fem1d2d import (
 from fem1d2d.mesh import Floats, Ints
 from fem1d2d.trace import SAME, extent
 from verification.dense import STILL
-from verification.interface.body import Body, Name
+from verification.interface.body import Body, Name, material_of
 from verification.interface.interface import Interface, Law
 from verification.interface.joining import join
 from verification.problem.specification import Problem
@@ -78,7 +76,7 @@ class TwoBodies(Value):
     interface : Interface
         In the roles of the problem.
     friction : Fraction
-        k, constant along Gamma_c.
+        k, the largest one where it varies along Gamma_c.
     problem : Problem
         The problem they were made from.
     """
@@ -368,7 +366,7 @@ def _body(problem: Problem, name: Name, mesh: Mesh, nodes: Ints, ends: Floats) -
         needed = "Gamma_u must leave the normal component of every contact node free; it holds the one at "
         raise problem.refuse(f"{name}.{key}", value, f"{needed}({', '.join(f'{c:g}' for c in where)})")
     motions = rigid_motions(mesh, known.held)
-    material = plane_strain(float(spec.young), float(spec.poisson)) if d == 2 else bar(float(spec.young))
+    material = material_of(spec)
     matrix = stiffness(mesh, material)
     load = _load(problem, name, mesh, nodes, ends)
     free = np.flatnonzero(~known.held.ravel())
@@ -381,7 +379,7 @@ def _body(problem: Problem, name: Name, mesh: Mesh, nodes: Ints, ends: Floats) -
         name=name,
         mesh=mesh,
         material=material,
-        poisson=float(spec.poisson),
+        poisson=float(spec.moduli[1]),
         known=known,
         nodes=nodes,
         positions=free,

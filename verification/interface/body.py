@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from functools import cached_property
 from typing import Any, Literal
 
@@ -22,14 +23,18 @@ from fem1d2d import (
     Response,
     Supports,
     Uncoupled,
+    bar,
     elimination_order,
     gram,
+    plane_strain,
+    plane_stress,
     solver,
     stiffness,
 )
 from fem1d2d.mesh import Floats, Ints
 from verification.dense import STILL, Cholesky
 from verification.interface.interface import Grid
+from verification.problem.specs import BodySpec
 from verification.threads import one_thread
 from verification.value import Value, copied, freeze, lent, original_of
 
@@ -37,6 +42,14 @@ Name = Literal["body1", "body2"]
 
 #: The traces of no rigid motion.
 NO_MOTIONS: Floats = freeze(np.zeros((0, 0)))
+
+
+def material_of(spec: BodySpec, number: Callable[[Fraction], Any] = float) -> Material:
+    """Return the material of a body of a problem, its moduli as some type of number."""
+    if spec.shape == "interval":
+        return bar(number(spec.young))
+    law = plane_stress if spec.plane == "stress" else plane_strain
+    return law(number(spec.young), number(spec.poisson))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -47,7 +60,7 @@ class Body(Value):
     ----------
     name : {'body1', 'body2'}
     poisson : float
-        Poisson's ratio; 0 for a bar.
+        Poisson's ratio, in plane stress of the body of plane strain with the same law in the plane; 0 for a bar.
     known : Supports
         Displacements known on Gamma_u.
     nodes : int array, shape (n,)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from fem1d2d import trapezoid
 from fem1d2d.mesh import Floats
-from ndtheory.number import Numeric
 from verification.interface import pair as pairs
 from verification.interface.body import NO_MOTIONS, Condensed
 from verification.interface.files import read_interface
@@ -33,7 +32,7 @@ def build(
     gap: Floats | float = 0.0,
     kernel: Floats | None = None,
     transfer: Floats | None = None,
-    friction: Numeric = 0,
+    friction: Any = None,
     neumann_body: Literal[1, 2] = 2,
 ) -> ContactPair:
     """Make a contact pair from a problem, or from the interface matrices of any code.
@@ -63,8 +62,10 @@ def build(
         The operator S: normal nodal forces on the Neumann body to normal stress at the contact nodes.
     transfer : array, shape (n, nodes of the Neumann body), optional
         P: from values at the nodes of the Neumann body to values at the contact body's nodes; the identity by default.
-    friction : number
-        k >= 0; needs a kernel or a law.
+    friction : number, array or function, optional
+        k >= 0, 0 by default; a number, one for each contact node from left to right, or a function of the distance s
+        from the left end of Gamma_c.  It needs a kernel or a law.  With a problem it takes the place of the problem's,
+        and may be a table as in its file.
     neumann_body : {1, 2}
 
     Returns
@@ -87,13 +88,16 @@ def build(
     if problem is not None:
         if S1 is not None or S2 is not None:
             raise ValueError("received a problem and matrices: needed one of them")
-        if isinstance(problem, Problem):
-            return pairs.pair_from(problem, law=law)
-        if Path(problem).suffix != ".npz":
-            return pairs.pair_from(load(problem), law=law)
+        if isinstance(problem, Problem) or Path(problem).suffix != ".npz":
+            problem = problem if isinstance(problem, Problem) else load(problem)
+            if friction is not None and not _varies(friction):
+                return pairs.pair_from(problem.changed(friction=friction), law=law)
+            pair = pairs.pair_from(problem, law=law)
+            return pair if friction is None else pair.along(friction)
         if law is not None:
             raise ValueError("received a law and an interface file: its operator S is a matrix already")
-        return read_interface(Path(problem))
+        pair = read_interface(Path(problem))
+        return pair if friction is None else _rubbing(pair, friction)
     if S1 is None or S2 is None or x is None:
         raise ValueError("needed a problem, or S1, S2 and x")
     if neumann_body not in (1, 2):
@@ -128,7 +132,16 @@ def build(
     )
     interface = Interface(contact=grid, neumann=other, gap=distance, law=given, transfer=P)
     pair = ContactPair(contact=contact, neumann=neumann, interface=interface, neumann_body=neumann_body)
-    return pair.at(friction=friction)
+    return _rubbing(pair, 0 if friction is None else friction)
+
+
+def _varies(friction: Any) -> bool:
+    """Return True for a value at each node, or a function."""
+    return callable(friction) or isinstance(friction, (list, tuple)) or np.ndim(friction) > 0
+
+
+def _rubbing(pair: ContactPair, friction: Any) -> ContactPair:
+    return pair.along(friction) if _varies(friction) else pair.at(friction=friction)
 
 
 def pair_of(problem: Problem | ContactPair | Path | str) -> ContactPair:

@@ -146,7 +146,7 @@ def _strain(bodies: TwoBodies, moved: Displacements) -> tuple[float, Place | Non
     largest, at = 0.0, None
     for body, u in zip((bodies.body1, bodies.body2), moved, strict=True):
         if body is not None and u is not None:
-            strains = largest_strains(body.mesh, u)
+            strains = largest_strains(body.mesh, u, body.material)
             if strains.max() > largest * (1 + TIE):
                 centre = body.mesh.points[body.mesh.cells[_first_largest(strains)]].mean(axis=0)
                 at = tuple(map(float, centre))

@@ -8,16 +8,17 @@ exact sides, and the nodes of a mesh file are the doubles read from it.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fem1d2d import bar, exact, interval, mortar, plane_strain, rectangle_points, trapezoid
+from fem1d2d import exact, interval, mortar, rectangle_points, trapezoid
 from fem1d2d.enclosed import Enclosed, nearest
 from fem1d2d.exact import Shapes
-from verification.interface.body import Body
+from verification.interface.body import Body, material_of
 from verification.interface.friction import LAWS, Nonlocal
 from verification.interface.interface import Grid, Interface
 from verification.interface.pair import ContactPair
@@ -59,8 +60,7 @@ class ExactBody:
         points, mesh = exact_points(spec, body), body.mesh
         try:
             shapes = Shapes.of(points, mesh.cells)
-            material = plane_strain(spec.young, spec.poisson) if problem.dimension == 2 else bar(spec.young)
-            stiffness = exact.stiffness(mesh, material, shapes)
+            stiffness = exact.stiffness(mesh, material_of(spec, Fraction), shapes)
             gram = exact.gram(mesh, problem.length, shapes)
         except (TypeError, ValueError) as error:
             raise NotExact(f"{body.name}: {error}") from None
@@ -143,10 +143,14 @@ class ExactInterface:
         if isinstance(law, Nonlocal):
             law = replace(law, radius=contact.radius)  # type: ignore[arg-type]  # its formula takes any scalar
         interface = Interface(
-            contact=self.grid, neumann=self.other, gap=self.pair.interface.gap, law=law, transfer=self.exact_transfer
+            contact=self.grid,
+            neumann=self.other,
+            gap=self.pair.interface.gap,
+            transfer=self.exact_transfer,
+            profile=self.pair.interface.profile,
         )
         try:
-            return np.asarray(law.operator(interface))
+            return np.asarray(interface.operator(law))
         except (TypeError, ValueError) as error:
             raise NotExact(f"law of friction: {error}") from None
 

@@ -69,8 +69,7 @@ class Nonlocal(Law):
         return hat(interface.contact.x[:, None] - interface.neumann.x[None, :], self.radius)
 
     def warnings(self, interface: Interface) -> list[str]:
-        x, weights, kernel = interface.neumann.x, interface.contact.weights, interface.kernel
-        assert kernel is not None
+        x, weights, kernel = interface.neumann.x, interface.contact.weights, self.operator(interface)
         r, width, length = self.radius, float(np.diff(x).max()), float(np.ptp(interface.contact.x))
         # the force that a sliding body carries under an even pressure, as a part of k times the normal force
         share = float(weights @ kernel @ interface.neumann.weights / weights.sum())

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from fem1d2d import trapezoid
 from fem1d2d.mesh import Floats
+from verification.problem.specs import Profile
 from verification.value import Value, freeze, lent
 
 
@@ -151,6 +152,8 @@ class Interface(Value):
     transfer : array, shape (contact nodes, Neumann nodes), or None
         P: values on the contact grid of a function given on the Neumann grid.  Only its transpose returns the forces.
         None where both grids are one: then P is the identity.
+    profile : Profile or None
+        How the coefficient of friction varies along Gamma_c; None where it is constant.
     slipped : array, shape (t of the contact grid,), or None
         ``u1_T - u2_T`` before the load increment, from which friction measures slip, unit of length; None for 0.
     """
@@ -160,6 +163,7 @@ class Interface(Value):
     gap: Floats
     law: Law | None = None
     transfer: Floats | None = None
+    profile: Profile | None = None
     slipped: Floats | None = None
 
     @property
@@ -181,19 +185,35 @@ class Interface(Value):
     def kernel(self) -> Floats | None:
         """S as a matrix: normal nodal forces on the Neumann grid to normal stress at the contact nodes.
 
-        ValueError where the grids differ, and the law takes the forces of the contact grid.
+        Where the coefficient of friction varies it is ``diag(k_j / max k) S``, so that the friction bound is
+        ``w_j max k |(S sigma_N)_j|`` as with a constant one.  ValueError where the grids differ, and the law takes the
+        forces of the contact grid.
         """
         if self.law is None or self.contact.dimension == 1:
             return None
         if self.law.of_contact and self.transfer is not None:
             raise ValueError(f"{self.law.words}: no operator on the Neumann grid")
-        return freeze(self.law.operator(self))
+        return freeze(self.operator(self.law))
+
+    @property
+    def shares(self) -> Floats | None:
+        """``k_j / max k`` at the contact nodes, rationals where their positions are; None where k is constant."""
+        if self.profile is None:
+            return None
+        x = self.contact.x
+        found = [self.profile.at(Fraction(s)) for s in x - x[0]]
+        return np.array(found, dtype=x.dtype)
+
+    def operator(self, law: Law) -> Floats:
+        """Return the operator of a law, each row times the share of its contact node."""
+        shares, S = self.shares, law.operator(self)
+        return S if shares is None else shares[:, None] * S
 
     @property
     def contact_kernel(self) -> Floats | None:
         """S as a matrix on normal nodal forces of the contact grid, shape (contact nodes, contact nodes)."""
         if self.transfer is not None and self.law is not None and self.law.of_contact:
-            return self.law.operator(self)
+            return self.operator(self.law)
         if self.transfer is None or self.kernel is None:
             return self.kernel
         return self.kernel @ self.transfer.T
@@ -244,4 +264,11 @@ class Interface(Value):
         """Return the interface with the roles of the grids exchanged; ValueError where the grids differ."""
         if self.transfer is not None:
             raise ValueError("the grids differ: needed a pair built for these roles, with its own transfer")
-        return Interface(contact=self.neumann, neumann=self.contact, gap=self.gap, law=self.law, slipped=self.slipped)
+        return Interface(
+            contact=self.neumann,
+            neumann=self.contact,
+            gap=self.gap,
+            law=self.law,
+            profile=self.profile,
+            slipped=self.slipped,
+        )

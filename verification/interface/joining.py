@@ -89,11 +89,21 @@ def join(problem: Problem, meshes: list[Mesh | None], law: Law | None = None) ->
         gap=_gap(problem, meshes, grid, [np.broadcast_to(level, grid.x.shape) for level in levels], SAME * size),
         law=law or LAWS[problem.contact.law].of(problem.contact.radius),
         transfer=P,
+        profile=problem.contact.profile,
     )
+    _check_profile(problem, interface, SAME * size)
     if P is not None and interface.contact_kernel is not None and not interface.contact_kernel.any():
         needed = "needed a larger one: it reaches no node of the Neumann grid from any contact node, so that S is 0"
         raise problem.refuse("contact.radius", problem.contact.radius, needed)
     return nodes, interface
+
+
+def _check_profile(problem: Problem, interface: Interface, rounding: float) -> None:
+    """Refuse a table of the coefficient of friction that ends before Gamma_c does."""
+    profile, x = interface.profile, interface.contact.x
+    if profile is not None and float(profile.s[-1]) < x[-1] - x[0] - rounding:
+        needed = f"needed distances up to the length of Gamma_c, {x[-1] - x[0]:g}"
+        raise problem.refuse("contact.friction.s", list(profile.s), needed)
 
 
 def _interval(problem: Problem) -> Ends | None:

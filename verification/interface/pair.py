@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
@@ -25,7 +26,7 @@ from verification.interface.body import Body, Condensed
 from verification.interface.interface import Grid, Interface, Law
 from verification.interface.joining import check_slopes
 from verification.problem import Problem, Settings
-from verification.problem.specs import MOST_FRICTION
+from verification.problem.specs import MOST_FRICTION, Profile
 from verification.problem.steps import path_warnings
 from verification.value import Value, freeze
 
@@ -48,7 +49,7 @@ class ContactPair(Value):
         The body of step I.  Both have their normal components along n of the contact body.
     interface : Interface
     friction : Fraction
-        k, constant along Gamma_c.
+        k, the largest one where it varies along Gamma_c.
     neumann_body : {1, 2}
         The body of the file with the Neumann problem; body 1 lies below body 2.
     settings : Settings
@@ -67,7 +68,7 @@ class ContactPair(Value):
 
     @property
     def summary(self) -> str:
-        k = f"k = {float(self.friction):g}"
+        k = f"k = {float(self.friction):g}" + " at most" * (self.interface.profile is not None)
         return f"{self.title}, {self.contact.grid.n} contact nodes, {k}, Neumann body {self.neumann_body}"
 
     @property
@@ -99,6 +100,8 @@ class ContactPair(Value):
     def at(self, *, friction: Numeric) -> ContactPair:
         """Return the same bodies at another friction; condensed matrices are shared.
 
+        Where k varies along Gamma_c, all of it is multiplied by one number, and ``friction`` is its largest value.
+
         Raises
         ------
         HypothesisError
@@ -108,9 +111,39 @@ class ContactPair(Value):
         needed = "a number >= 0" if law else "0: without a law of friction there is none"
         k = take("friction", friction, needed, lambda v: v == 0 or (law and v > 0))
         origin = self.problem
-        if origin is not None:  # a file may not hold every friction
-            origin = origin.changed(friction=k) if k <= MOST_FRICTION else None
+        if origin is not None and k > MOST_FRICTION:  # a file may not hold every friction
+            origin = None
+        elif origin is not None and self.interface.profile is not None:
+            origin = replace(origin, contact=replace(origin.contact, friction=k))
+        elif origin is not None:
+            origin = origin.changed(friction=k)
         return replace(self, friction=k, problem=origin)
+
+    def along(self, friction: Callable[[float], Any] | Sequence[Any] | Floats) -> ContactPair:
+        """Return the same bodies with a coefficient of friction that varies; condensed matrices are shared.
+
+        Parameters
+        ----------
+        friction : callable or array, shape (contact nodes,)
+            k at the contact nodes from left to right, or a function of their distance s from the left end of Gamma_c.
+
+        Raises
+        ------
+        ValueError
+            Unless all k >= 0 and one for each contact node, or if friction has no law.
+        """
+        x = self.contact.grid.x
+        s = [Fraction(at) for at in (x - x[0]).tolist()]
+        values = [friction(float(at)) for at in s] if callable(friction) else np.asarray(friction).tolist()
+        if not isinstance(values, list) or len(values) != len(s) or len(s) < 2:
+            raise ValueError(f"friction: needed a number for each of the {len(s)} contact nodes, two or more")
+        k = [take("friction", value, "numbers >= 0", lambda v: v >= 0) for value in values]
+        largest, profile = Profile.of(s, k)
+        found = replace(self, interface=replace(self.interface, profile=profile), problem=None).at(friction=largest)
+        if self.problem is None or largest > MOST_FRICTION:
+            return found
+        contact = replace(self.problem.contact, friction=largest, profile=profile)
+        return replace(found, problem=replace(self.problem, contact=contact))
 
     def changed(self, **values: Any) -> ContactPair:
         """Return the pair of its problem with other values, which are those of :meth:`verification.Problem.changed`.
@@ -234,14 +267,14 @@ class ContactPair(Value):
         return not (self.contact.free.all() and self.neumann.free.all())
 
     def bound(self, force: Floats) -> Floats:
-        """Return the friction bound ``w_j k |(S sigma_N)_j|``, shape (t,), for nodal forces on the Neumann grid."""
+        """Return the friction bound ``w_j k_j |(S sigma_N)_j|``, shape (t,), for nodal forces on the Neumann grid."""
         if not self.rubs:
             return np.zeros(self.interface.contact.t)
         return np.asarray(self._limits * np.abs(self.interface.stress(force)))
 
     @cached_property
     def _limits(self) -> Floats:
-        """``w_j k``."""
+        """``w_j max k``; the kernel has ``k_j / max k``."""
         return freeze(float(self.friction) * self.interface.contact.weights)
 
     @property

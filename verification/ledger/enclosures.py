@@ -24,7 +24,6 @@ from typing import Any
 import numpy as np
 from scipy.linalg import eigh
 
-from fem1d2d import plane_strain
 from fem1d2d.enclosed import Enclosed, upwards
 from fem1d2d.mesh import Floats
 from fem1d2d.proved import Ends
@@ -33,7 +32,7 @@ from ndtheory import bounds as formulas
 from ndtheory.intervals import Interval
 from ndtheory.number import SLACK, decimal, directed, working_precision
 from verification.constants.proved import Between, Proof, entries
-from verification.interface.body import Condensed
+from verification.interface.body import Condensed, material_of
 from verification.ledger.cases import NAMED, three_digits
 from verification.ledger.differences import directions, uniform_piece
 from verification.ledger.evidence import Evidence, Form, source
@@ -111,7 +110,7 @@ class EnclosedBodies:
     def continuity(self) -> list[Interval]:
         """The bounds of M^a that follow from the materials."""
         specs = (getattr(self.problem, name) for name in self.names)
-        return [Interval.of(plane_strain(spec.young, spec.poisson).continuity(2)) for spec in specs]
+        return [Interval.of(material_of(spec, Fraction).continuity(2)) for spec in specs]
 
     @cached_property
     def slides(self) -> Slides:

@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 
 from fem1d2d import element
 from fem1d2d.exact import Shapes
-from fem1d2d.material import plane_strain
 from verification.algorithm.fixed_point import FixedPointMap
-from verification.interface.body import Condensed
+from verification.interface.body import Condensed, material_of
 from verification.interface.exact_bodies import ExactInterface, exact_points
 from verification.interface.pair import pair_from
 from verification.ledger.cases import rectangle
@@ -80,7 +79,7 @@ class ExactSide:
         spec = getattr(problem, body.name)
         cells = body.mesh.cells
         shapes = Shapes.of(exact_points(spec, body), cells)
-        local = element.stiffness(shapes, plane_strain(spec.young, spec.poisson))[shapes.of_cell]
+        local = element.stiffness(shapes, material_of(spec, Fraction))[shapes.of_cell]
         A = np.full((2 * len(body.mesh.points),) * 2, Fraction(0), dtype=object)
         for corners, entries in zip(cells, local, strict=True):
             unknowns = (2 * corners[:, None] + np.arange(2)).ravel()

@@ -5,8 +5,9 @@ from __future__ import annotations
 import importlib
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from fractions import Fraction
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
@@ -25,6 +26,7 @@ from verification.problem.specs import (
     Loads,
     MeshFile,
     ProblemSpec,
+    Profile,
     SidePart,
     StepSpec,
     Theta,
@@ -96,8 +98,11 @@ def read_problem(data: Mapping[str, Any], source: str) -> ProblemSpec:
     units = top.table("units")
     labels = {name: units.take(name, label, default) for name, default in (("length", "mm"), ("stress", "MPa"))}
     units.close()
-    body1 = _read_body(top.table("body1", required=True), dimension, source)
-    body2 = _read_body(top.table("body2", required=True), dimension, source)
+    if dimension == 1 and "plane" in top:
+        raise top.refuse("plane", None, "a bar has none; leave it out in one dimension")
+    plane = top.take("plane", _plane, "strain")
+    body1 = _read_body(top.table("body1", required=True), dimension, plane, source)
+    body2 = _read_body(top.table("body2", required=True), dimension, plane, source)
     if body1.rigid and body2.rigid:
         raise top.refuse("body2.shape", "rigid", "needed at least one elastic body")
     if not (body1.rigid or body2.rigid or 1 / MOST_CONTRAST <= body1.young / body2.young <= MOST_CONTRAST):
@@ -233,7 +238,21 @@ def _names(table: TomlTable) -> Iterator[str]:
 SIDES: Mapping[str, tuple[str, ...]] = {"rectangle": RECTANGLE_SIDES, "interval": INTERVAL_SIDES}
 
 
-def _read_body(table: TomlTable, dimension: int, source: str) -> BodySpec:
+def _plane(value: Any) -> Any:
+    """Read the name of a plane model."""
+    if value == "axisymmetric":
+        raise Unfit('bodies of revolution have other matrices and no proofs here; needed "strain" or "stress"')
+    return choice("strain", "stress")(value)
+
+
+def _poisson(plane: str) -> Callable[[Any], Fraction]:
+    """Return a reader of Poisson's ratio: in plane stress the body of plane strain must be one as well."""
+    if plane == "strain":
+        return number("a number with -1 < nu < 0.5", lambda v: -1 < v < Fraction(1, 2))
+    return number("a number with -0.5 < nu <= 0.5 in plane stress", lambda v: -Fraction(1, 2) < v <= Fraction(1, 2))
+
+
+def _read_body(table: TomlTable, dimension: int, plane: Literal["strain", "stress"], source: str) -> BodySpec:
     shape = _read_shape(table, dimension, source)
     if shape["shape"] == "rigid":
         table.close()
@@ -256,7 +275,7 @@ def _read_body(table: TomlTable, dimension: int, source: str) -> BodySpec:
 
     young = table.take("young", positive)
     if dimension == 2:
-        poisson = table.take("poisson", number("a number with -1 < nu < 0.5", lambda v: -1 < v < Fraction(1, 2)))
+        poisson = table.take("poisson", _poisson(plane))
     else:
         if "poisson" in table:
             raise table.refuse("poisson", None, "a bar has no Poisson ratio; leave it out in one dimension")
@@ -279,12 +298,13 @@ def _read_body(table: TomlTable, dimension: int, source: str) -> BodySpec:
         prescribed=prescribed,
         traction=traction,
         body_force=body_force,
+        plane=plane,
     )
 
 
 def _read_contact(table: TomlTable, dimension: int) -> ContactSpec:
     laws = registered_laws()
-    friction = table.take("friction", coefficient, Fraction(0))
+    friction, profile = table.take("friction", lambda value: _friction(value, table), (Fraction(0), None))
     law = table.take("law", choice(*laws), "nonlocal")
     radius = table.take("radius", positive, None)
     interval = table.take("interval", ends, None)
@@ -301,7 +321,38 @@ def _read_contact(table: TomlTable, dimension: int) -> ContactSpec:
             None,
             f'this key is missing; the {laws[law].label} law needs the radius of its kernel (or law = "local")',
         )
-    return ContactSpec(interval=interval, friction=friction, law=law, radius=radius, gap=gap)
+    return ContactSpec(interval=interval, friction=friction, law=law, radius=radius, gap=gap, profile=profile)
+
+
+def _friction(value: Any, table: TomlTable) -> tuple[Fraction, Profile | None]:
+    """Read a coefficient of friction, or a table of it along Gamma_c: the largest one, and how it varies."""
+    if not isinstance(value, Mapping) or not value:
+        return coefficient(value), None
+    inside = table.within("friction", value)
+    s, k = inside.take("s", _positions), inside.take("k", _listed(coefficient))
+    inside.close()
+    if len(s) != len(k):
+        raise inside.refuse("k", list(k), f"needed as many values as s has, {len(s)}")
+    return Profile.of(s, k)
+
+
+def _listed(read: Callable[[Any], Fraction]) -> Callable[[Any], tuple[Fraction, ...]]:
+    """Return a reader of a list of two numbers or more."""
+
+    def read_all(value: Any) -> tuple[Fraction, ...]:
+        if not isinstance(value, (list, tuple)) or len(value) < 2:
+            raise Unfit("needed a list of two numbers or more")
+        return tuple(map(read, value))
+
+    return read_all
+
+
+def _positions(value: Any) -> tuple[Fraction, ...]:
+    """Read distances along Gamma_c, which begins at 0."""
+    s = _listed(number("increasing numbers, the first one at most 0"))(value)
+    if s[0] > 0 or not all(float(a) < float(b) for a, b in pairwise(s)):
+        raise Unfit("needed increasing numbers, the first one at most 0")
+    return s
 
 
 def _read_steps(top: TomlTable, bodies: Mapping[str, BodySpec], dimension: int) -> tuple[StepSpec, ...]:
@@ -313,7 +364,7 @@ def _read_steps(top: TomlTable, bodies: Mapping[str, BodySpec], dimension: int) 
     def read(value: Any) -> list[TomlTable]:
         if not isinstance(value, (list, tuple)) or not all(isinstance(each, Mapping) for each in value):
             raise Unfit("needed tables, each as [[step]]")
-        return [top.inner(each, f"step[{i}]") for i, each in enumerate(value, 1)]
+        return [top.within(f"step[{i}]", each) for i, each in enumerate(value, 1)]
 
     held = {name: dict(body.prescribed) for name, body in bodies.items()}
     steps: list[StepSpec] = []

@@ -6,7 +6,7 @@ import hashlib
 import json
 import math
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from typing import Any, Literal
@@ -72,7 +72,7 @@ class Problem(ProblemSpec):
 
     def __repr__(self) -> str:
         bodies = " / ".join("rigid" if body.rigid else f"E {float(body.young):g}" for body in (self.body1, self.body2))
-        return f"<Problem: {self.title}, {self.dimension}D, {bodies}, k = {float(self.contact.friction):g}>"
+        return f"<Problem: {self.title}, {self.dimension}D, {bodies}, k = {self.contact.friction_words}>"
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], source: str = "<dict>") -> Problem:
@@ -141,7 +141,7 @@ class Problem(ProblemSpec):
         young: Sequence[Numeric | None] | None = None,
         poisson: Sequence[Numeric | None] | None = None,
         cells: Sequence[int | Sequence[int] | None] | None = None,
-        friction: Numeric | None = None,
+        friction: Numeric | Mapping[str, Any] | Callable[[float], float] | None = None,
         law: str | None = None,
         radius: Numeric | None = None,
         gap: Numeric | None = None,
@@ -158,7 +158,9 @@ class Problem(ProblemSpec):
         young, poisson, cells : pair
             For body 1 and body 2; None leaves a body as it is.
         friction, law, radius, gap, neumann_body, theta, relaxation, tolerance, max_iterations, title
-            As in the problem file.  Momentum takes its step from rho: without a theta it sets theta to ``"auto"``.
+            As in the problem file.  Friction may also be a function k(s) of the distance along Gamma_c from its left
+            end, which is read at the contact nodes of rectangles; for mesh files give it to
+            :func:`verification.build`.  Momentum takes its step from rho: without a theta it sets theta to ``"auto"``.
 
         Returns
         -------
@@ -175,6 +177,8 @@ class Problem(ProblemSpec):
         >>> str(example("section6").changed(friction="1/3").contact.friction)
         '1/3'
         """
+        if callable(friction):
+            friction = self._read_at_nodes(friction)
         given: dict[Key, Any] = {
             ("title",): title,
             ("contact", "friction"): friction,
@@ -193,6 +197,21 @@ class Problem(ProblemSpec):
                 raise self.refuse(name, pair, needed)
             given |= {(f"body{i}", name): value for i, value in enumerate(pair or (), 1)}
         return self._with({key: value for key, value in given.items() if value is not None})
+
+    def _read_at_nodes(self, function: Callable[[float], float]) -> dict[str, list[Any]]:
+        """Return the table of a function at the contact nodes of a rectangle."""
+        body, other = self.body1, self.body2
+        if self.contact_body == 2:
+            body, other = other, body
+        ends = [spec.x for spec in (body, other) if spec.x is not None]
+        if body.x is None or body.cells is None or not (self.contact.interval or other.x or other.rigid):
+            needed = "needed a table, or verification.build(problem, friction=function), as a mesh file has the nodes"
+            raise self.refuse("contact.friction", None, needed)
+        low, high = self.contact.interval or (max(x[0] for x in ends), min(x[1] for x in ends))
+        width = (body.x[1] - body.x[0]) / body.cells[0]
+        nodes = [body.x[0] + i * width for i in range(body.cells[0] + 1)]
+        s = [node - low for node in nodes if low <= node <= high]
+        return {"s": s, "k": [function(float(at)) for at in s]}
 
     def with_keys(self, values: Mapping[str, Any]) -> Problem:
         """Return the problem with keys of its file set, as ``{"contact.friction": "0.4", "body1.cells": "[40, 6]"}``.

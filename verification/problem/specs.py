@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from bisect import bisect
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from fractions import Fraction
@@ -141,6 +142,8 @@ class BodySpec:
         A rigid body is an obstacle: of the other attributes it has at most x and y.
     young, poisson : Fraction
         E in stress; Poisson's ratio is 0 for a bar.  Both 0 where rigid.
+    plane : {'strain', 'stress'}
+        Plane strain or plane stress, the same for both bodies.
     parts : read-only mapping from name to SidePart
         Parts of sides, each with a name that is used like a side's.
     prescribed, traction : read-only mapping from side to components
@@ -161,6 +164,7 @@ class BodySpec:
     prescribed: Mapping[str, Components] = field(default_factory=ReadOnly)
     traction: Mapping[str, tuple[Fraction, ...]] = field(default_factory=ReadOnly)
     body_force: tuple[Fraction, ...] = ()
+    plane: Literal["strain", "stress"] = "strain"
 
     def __post_init__(self) -> None:
         for name in ("parts", "prescribed", "traction"):
@@ -170,6 +174,50 @@ class BodySpec:
     def rigid(self) -> bool:
         """True if the body is an obstacle."""
         return self.shape == "rigid"
+
+    @property
+    def moduli(self) -> tuple[Fraction, Fraction]:
+        """E and nu of the body of plane strain with the same law in the plane."""
+        E, nu = self.young, self.poisson
+        return (E, nu) if self.plane == "strain" else (E * (1 + 2 * nu) / (1 + nu) ** 2, nu / (1 + nu))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Profile:
+    """A coefficient of friction that varies along Gamma_c, over its largest value; linear between positions.
+
+    Attributes
+    ----------
+    s : tuple of Fraction
+        Distances from the left end of Gamma_c along the contact body's line, increasing, unit of length.
+    share : tuple of Fraction
+        ``k(s) / max k`` there, from 0 to 1.
+
+    Examples
+    --------
+    >>> Profile(s=(Fraction(0), Fraction(2)), share=(Fraction(1), Fraction(1, 2))).at(Fraction(1))
+    Fraction(3, 4)
+    """
+
+    s: tuple[Fraction, ...]
+    share: tuple[Fraction, ...]
+
+    @classmethod
+    def of(cls, s: Iterable[Fraction], k: Iterable[Fraction]) -> tuple[Fraction, Profile | None]:
+        """Return the largest k and the profile; None where k is 0."""
+        values = tuple(k)
+        largest = max(values)
+        return largest, cls(s=tuple(s), share=tuple(v / largest for v in values)) if largest else None
+
+    def at(self, s: Fraction) -> Fraction:
+        """Return the share at a distance; beyond the ends, where only rounding leads, it is the last one."""
+        i = min(max(bisect(self.s, s), 1), len(self.s) - 1)
+        (low, high), (left, right) = self.share[i - 1 : i + 1], self.s[i - 1 : i + 1]
+        return low + (high - low) * (min(max(s, left), right) - left) / (right - left)
+
+    def table(self, k: Fraction) -> dict[str, tuple[Fraction, ...]]:
+        """Return ``s`` and ``k`` as a problem file has them, for a largest k."""
+        return {"s": self.s, "k": tuple(k * share for share in self.share)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -207,13 +255,15 @@ class ContactSpec:
     interval : pair of Fraction or None
         Ends of Gamma_c along x; None: the overlap of the two surfaces.
     friction : Fraction
-        k, constant along Gamma_c.
+        k, the largest one where it varies along Gamma_c.
     law : str
         One of :data:`verification.interface.friction.LAWS`.
     radius : Fraction or None
         Radius r of the hat kernel (length); None with a law that has none or without friction.
     gap : Fraction
         Initial distance (length).
+    profile : Profile or None
+        How k varies; None where it is constant.
     """
 
     interval: tuple[Fraction, Fraction] | None
@@ -221,6 +271,18 @@ class ContactSpec:
     law: str
     radius: Fraction | None
     gap: Fraction
+    profile: Profile | None = None
+
+    @property
+    def frictions(self) -> tuple[float, ...]:
+        """k, or the least and the largest one where it varies."""
+        shares = () if self.profile is None else (min(self.profile.share),)
+        return tuple(float(self.friction * share) for share in (*shares, 1))
+
+    @property
+    def friction_words(self) -> str:
+        """The same as a text: ``0.3``, or ``0.1 to 0.3``."""
+        return " to ".join(f"{k:g}" for k in self.frictions)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -273,6 +335,11 @@ class ProblemSpec:
     length: Fraction
     steps: tuple[StepSpec, ...] = ()
     source: str = field(default="<dict>", compare=False)
+
+    @property
+    def plane(self) -> Literal["strain", "stress"]:
+        """Plane strain or plane stress; without a meaning in one dimension."""
+        return self.body2.plane if self.body1.rigid else self.body1.plane
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "units", ReadOnly(self.units))

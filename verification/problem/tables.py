@@ -240,19 +240,19 @@ class TomlTable:
         except Unfit as error:
             raise self.refuse(name, value, str(error)) from None
 
+    def within(self, name: str, value: Mapping[str, Any]) -> TomlTable:
+        """Return the value of a key as a table."""
+        return TomlTable(value, self._file, self.key(name))
+
     def table(self, name: str, *, required: bool = False) -> TomlTable:
         """Read a sub-table; a missing one is empty unless required."""
 
         def read(value: Any) -> TomlTable:
             if not isinstance(value, Mapping):
                 raise Unfit("needed a table")
-            return self.inner(value, name)
+            return self.within(name, value)
 
-        return self.take(name, read) if required else self.take(name, read, self.inner({}, name))
-
-    def inner(self, data: Mapping[str, Any], name: str) -> TomlTable:
-        """Return a table within this one, known by that name in errors."""
-        return TomlTable(data, self._file, self.key(name))
+        return self.take(name, read) if required else self.take(name, read, self.within(name, {}))
 
     def names(self) -> Iterable[str]:
         """Return the keys not taken yet."""

@@ -11,7 +11,7 @@ from typing import Any
 from ndtheory import exact
 from ndtheory.number import LARGEST_EXPONENT
 from ndtheory.texts import CONTROL
-from verification.problem.specs import BodySpec, Loads, MeshFile, ProblemSpec, StepSpec
+from verification.problem.specs import BodySpec, ContactSpec, Loads, MeshFile, ProblemSpec, StepSpec
 
 #: Integers up to this size are doubles: readers of JSON agree on them.
 LARGEST_INTEGER = 2**53
@@ -29,10 +29,11 @@ def tables(problem: ProblemSpec) -> dict[str, Any]:
     return {
         "title": problem.title,
         "dimension": problem.dimension,
+        **({"plane": problem.plane} if problem.dimension == 2 else {}),
         "units": dict(problem.units),
         "body1": _body(problem.body1),
         "body2": _body(problem.body2),
-        "contact": _present(vars(problem.contact)),
+        "contact": _contact(problem.contact),
         "iteration": {"neumann_body": problem.iteration.neumann_body} | vars(problem.iteration),
         "norm": {"length": problem.length},
         **({"step": tuple(_step(step, problem.dimension == 1) for step in problem.steps)} if problem.steps else {}),
@@ -71,6 +72,13 @@ def _loads(loads: BodySpec | Loads, bar: bool) -> dict[str, Any]:
 def _step(step: StepSpec, bar: bool) -> dict[str, Any]:
     bodies = {name: _present(_loads(loads, bar)) for name, loads in (("body1", step.body1), ("body2", step.body2))}
     return _present({"name": step.name, "increments": step.increments, **bodies})
+
+
+def _contact(contact: ContactSpec) -> dict[str, Any]:
+    written = vars(contact) | {"profile": None}
+    if contact.profile is not None and contact.friction:
+        written["friction"] = contact.profile.table(contact.friction)
+    return _present(written)
 
 
 def _vector(values: tuple[Fraction | None, ...], bar: bool) -> Any:

@@ -217,7 +217,7 @@ def changed(problem: Problem, values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def shared(work: Work, problem: Problem) -> Work:
-    """Work for the sweeps of one problem in turn, which makes each row once: figures have curves in common."""
+    """Work for the sweeps of one problem, one after the other, which makes each row once: figures share curves."""
     known: dict[tuple[tuple[str, Any], ...], Row] = {}
 
     def made(start: Problem | ContactPair, wanted: Sequence[tuple[int, Row]]) -> Generator[Placed, None, None]:

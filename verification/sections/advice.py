@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from verification.advice.accelerated import Accelerated
+from verification.advice.cells import Suggested
 from verification.advice.methods import NAMES as METHOD_NAMES
 from verification.advice.readings import LARGEST_TO_PASTE, NextRun, RunReading, SeenRun
 from verification.advice.readings import assumed as assumption
 from verification.advice.roles import Advice, Role, in_steps, steps
 from verification.advice.runs_with_friction import FrictionBounds
 from verification.advice.seen import LogBound, RhoInterval, SeenLog
-from verification.advice.seen_moduli import Corners, ModuliRole, SeenModuli, excluded_from
+from verification.advice.seen_moduli import Corners, ModuliRole, SeenModuli, SeenWaves, excluded_from
 from verification.advice.sides import SeenMatrices
 from verification.advice.snippets import SNIPPETS
 from verification.advice.spectrum import SeenVectors
@@ -42,6 +44,8 @@ NAMES = {1: "body 1", 2: "body 2", None: "as in that run"}
 @of.register
 def sections(found: Advice) -> Sections:
     """The sections."""
+    if found.waves is not None:
+        return _of_waves(found, found.waves)
     return _of_moduli(found, found.moduli) if found.moduli is not None else tuple(_sections(found))
 
 
@@ -57,11 +61,11 @@ def _sections(found: Advice) -> Iterator[Section]:
     if found.interval is not None:
         yield from of_logs(found, found.interval)
         if found.roles:
-            if any(row.bound is None for row in found.methods):
+            if any(row.bound for row in found.methods):
+                yield _paste(found, _few_methods(found))
+            else:
                 yield from _which_method(found)
                 yield _paste(found)
-            else:
-                yield _paste(found, *_few_methods(found))
     if found.roles and found.interval is None:
         if found.vectors is None:
             yield _which_body(found)
@@ -159,11 +163,21 @@ def _which_theta(found: Advice) -> Section:
     ]
     if ends:
         said.append(f"if tied: 2/(2+rho_min+rho), {'; '.join(ends)}")
+    said += [_cells(role, role.cells) for role in possible if role.cells is not None and role.cells.found is not None]
     lines = table(("Neumann", "rho", "theta is", "theta", "per step", "to 1e-9", "note"), rows)
     return section("theta", "WHICH THETA?", lines, *said)
 
 
-def _which_method(found: Advice) -> Iterator[Section]:
+def _cells(role: Role, seen: Suggested) -> str:
+    """Cells that make rho smaller."""
+    assert seen.cells is not None
+    assert seen.found is not None
+    lower, upper = ("[{}, {}]".format(*counts) for counts in seen.cells)
+    least, own = (figures(seen.value(of)) for of in (seen.found, seen.of_file))
+    return f"{NAMES[role.neumann_body]}: with cells {lower}, {upper} fine meshes have rho >= {least}, not >= {own}"
+
+
+def _which_method(found: Advice, names: Mapping[int | None, str] = NAMES) -> Iterator[Section]:
     """Steps of each method in each role, and the one that is advised."""
     if not found.methods:
         return
@@ -171,9 +185,8 @@ def _which_method(found: Advice) -> Iterator[Section]:
     rows: list[tuple[Cell, ...]] = []
     for exchanged in dict.fromkeys(row.exchanged for row in found.methods):
         own = [row for row in found.methods if row.exchanged == exchanged]
-        few = {"at most": "<= ", "at least": ">= ", None: ""}[own[0].bound]
-        roles = NAMES[own[0].neumann_body] if named else "exchanged" if exchanged else "as they are"
-        rows.append((roles, figures(own[0].theta), *(count(row.steps, few) for row in own)))
+        roles = names[own[0].neumann_body] if named else "exchanged" if exchanged else "as they are"
+        rows.append((roles, figures(own[0].theta), *(count(row.steps, "<= " * bool(row.bound)) for row in own)))
     first, *others = (METHOD_NAMES[row.method] for row in own)
     heads = ("Neumann" if named else "roles", "theta", f"steps to 1e-6: {first}", *others)
     said = []
@@ -181,16 +194,16 @@ def _which_method(found: Advice) -> Iterator[Section]:
         who = ", with the roles exchanged" * (found.method.exchanged and not named)
         said.append(f"Advised: {METHOD_NAMES[found.method.name]}{who}: {found.method.reason}.")
         if not found.tied:
-            said.append("In contact Aitken and IQN-ILS may take more, and IQN-ILS may not arrive.")
+            said.append("Predicted as if tied: where contact changes, IQN-ILS may take more or not arrive.")
         elif found.method.name != "constant":
             said.append("Predicted, not proved.")
     yield section("method", "WHICH METHOD?", table(heads, rows), *said)
 
 
-def _few_methods(found: Advice) -> list[str]:
-    """The same in one line, where only one end of the spectrum is known."""
-    each = [f"{METHOD_NAMES[row.method]} {count(row.steps, '<= ')}" for row in found.methods]
-    return [f"Steps to 1e-6: {', '.join(each)} (only the largest eigenvalue is known)."] if each else []
+def _few_methods(found: Advice) -> str:
+    """The same in one line, where only the largest eigenvalue is known."""
+    each = [f"{METHOD_NAMES[row.method]} {count(row.steps, '<= ' * bool(row.bound))}" for row in found.methods]
+    return f"Steps to 1e-6: {', '.join(each)} (only the largest eigenvalue is known)."
 
 
 def of_vectors(found: Advice, seen: SeenVectors) -> Iterator[Section]:
@@ -206,9 +219,10 @@ def of_vectors(found: Advice, seen: SeenVectors) -> Iterator[Section]:
     if seen.noise is not None:
         said.append(f"images of dependent directions differ by {figures(seen.noise, 2)} of the largest: noise")
     if not found.roles:
-        yield section("given", "WHAT WAS GIVEN?", *said, f"No theta: {found.why_no_theta}.")
-        return
+        said.append(f"No theta: {found.why_no_theta}.")
     yield section("given", "WHAT WAS GIVEN?", *said)
+    if not found.roles:
+        return
     rows = [
         ("least lambda", figures(spectrum.low), figures(spectrum.error_low, 2)),
         ("largest lambda, rho", figures(spectrum.high), figures(spectrum.error_high, 2)),
@@ -240,7 +254,11 @@ def _friction(found: Advice) -> Iterator[Section]:
         said[NAMES[role.neumann_body]] = role.reason.get("friction_threshold", "")
         if role.friction_threshold is not None:
             allowed = f"every small theta contracts for k < {figures(role.friction_threshold)}"
-            said[NAMES[role.neumann_body]] = f"{allowed} (here k = {figures(found.friction, 2)})"
+            allowed += f" (here k = {figures(found.friction, 2)})"
+            if found.friction and found.problem is not None and found.problem.contact.profile is not None:
+                share = figures(role.friction_threshold.value / found.friction)
+                allowed = f"every small theta contracts for less than {share} times the friction along Gamma_c"
+            said[NAMES[role.neumann_body]] = allowed
     yield section("friction", "HOW MUCH FRICTION DOES THE ENERGY BOUND ALLOW?", *_together(said))
 
 
@@ -357,6 +375,8 @@ def of_logs(found: Advice, interval: RhoInterval) -> Sections:
         notes.append("Nothing: no time window shows a steady ratio or level over enough steps.")
     elif not read and not notes:
         notes.append("Nothing: residuals show rho only where the relaxation is constant.")
+    if found.logs and not found.roles and found.next is not None and not found.next.kept:
+        notes.append("A few vectors of a run decide more than its log: ndtheory advise vectors --help.")
     if interval.contradiction is not None:
         notes.append(f"CONTRADICTION: {interval.contradiction}.")
     else:
@@ -446,13 +466,15 @@ def _of_moduli(found: Advice, seen: SeenModuli) -> Sections:
         then = f"ndtheory advise run --theta {theta} --ratio R (R: the ratio of that run)"
     last: Sections = ()
     if tried is not None and tried.start is not None:
-        last = (pasted(tried.neumann_body, tried.start.theta_guess),)
+        start = found.next.theta if found.parallel and found.next is not None else tried.start.theta_guess
+        last = (pasted(tried.neumann_body, start),)
     return (
         section("setting", "", Facts("", (*each, PLANES[seen.bodies[0].plane]))),
         _least_rho(seen),
         _excluded(seen),
         _who(found, seen),
-        _start(started, None if last else found.next),
+        *_parallel(found),
+        _start(started, None if last else found.next, bool(found.parallel)),
         *last,
         closing("a bound of rho from above with friction, or where no image fits", then=then),
     )
@@ -498,7 +520,7 @@ def _who(found: Advice, seen: SeenModuli) -> Section:
     return which_body(says)
 
 
-def _start(started: Sequence[ModuliRole], first: NextRun | None) -> Section:
+def _start(started: Sequence[ModuliRole], first: NextRun | None, parallel: bool) -> Section:
     notes = []
     for role in started:
         start, body = role.start, f"body {role.neumann_body}"
@@ -513,6 +535,89 @@ def _start(started: Sequence[ModuliRole], first: NextRun | None) -> Section:
     if first is not None:
         notes.append(f"theta = {first.theta:g}, a guess: {first.why}")
     if not started:
-        notes.append("A lower bound of rho proves no theta. If the mirror image of a body fits into the other one, say")
-        notes[-1] += " --mirror."
+        notes[-1] += ". One is proved where the mirror image of a body fits into the other one: --shape mirror-1 or -2"
+    elif parallel:
+        notes.append("These are for serial coupling; the theta to paste is 1/(1 + rho) with the guess of rho.")
     return section("start", "WHICH THETA TO START WITH?", *notes)
+
+
+#: Names of the bodies, and of what they read and write.
+WORDS: dict[str, tuple[dict[int | None, str], str, str]] = {
+    "heat": ({1: "plate 1", 2: "plate 2"}, "fluxes", "temperatures"),
+    "fluid": ({1: "the fluid", 2: "the wall"}, "pressures", "displacements"),
+}
+
+
+def _of_waves(found: Advice, seen: SeenWaves) -> Sections:
+    """The sections of advice for two plates that exchange heat, or for a fluid and a wall."""
+    names, forces, moves = WORDS[seen.kind]
+    data = [f"{key} {', '.join(f'{float(v):.5g}' for v in values)}" for key, values in seen.given.items()]
+    neumann, contact = names[found.best.neumann_body or 2], names[3 - (found.best.neumann_body or 2)]
+    who = [f"{neumann}'s solver reads {forces} and writes {moves}, {contact}'s the reverse.".capitalize()]
+    if seen.kind == "fluid":
+        who.append(f"With the roles exchanged: {found.roles[1].reason['rho']}.")
+        then = f"ndtheory advise run --tied --theta {found.next.theta:g} --ratio R" if found.next else ""
+        last = (_waves_of_a_fluid(found, seen), *_parallel(found), *_which_method(found, names), *next_run(found.next))
+        claims = "a bound of rho from above, or anything with a viscous or compressible fluid"
+    else:
+        relaxed = "Fluxes and temperatures are both relaxed." if found.parallel else "For temperatures the same."
+        paste = pasted(None, found.theta, relaxed)
+        last = (_waves_of_heat(found, seen), *_parallel(found), *_which_method(found, names), paste)
+        then = "ndtheory advise vectors X.npy TX.npy (iterates of a run: theta for your shapes)"
+        claims = "anything about plates that are not flat; the command below reads those"
+    return (section("setting", "", Facts("", tuple(data))), which_body(*who), *last, closing(claims, then=then))
+
+
+def _waves_of_heat(found: Advice, seen: SeenWaves) -> Section:
+    """Both ends of the spectrum of two plates, and the theta for them."""
+    rows: list[tuple[Cell, ...]] = []
+    for role in found.roles:
+        ends = figures(role.rho_min), figures(role.rho_tied)
+        rows.append(
+            (WORDS["heat"][0][role.neumann_body], *ends, figures(role.theta_tied), near_one(role.rate_tied or 0))
+        )
+    thick, dt = "thickness" not in seen.given, seen.one("dt")
+    notes = [
+        f"For flat {'thick ' * thick}plates: conductance of the plate that reads temperatures over the other one's, "
+        "least and largest over all waves of temperature, proved in the continuum; theta = 2/(2 + least + largest)."
+    ]
+    if dt is not None:
+        pairs = zip(seen.given["conductivity"], seen.given["capacity"], strict=True)
+        reach = " and ".join(f"{3 * math.sqrt(k * dt / c):.3g}" for k, c in pairs)
+        notes.append(f"In dt heat reaches 3 sqrt(k dt/c), {reach}, into the plates; a thicker one counts as thick.")
+    elif "capacity" in seen.given:
+        notes.append("This holds for every step in time dt. A plate of more than 3 sqrt(k dt/c) counts as thick.")
+    elif not thick:
+        notes.append("Both plates are held at given temperatures on their other sides.")
+    if found.parallel:
+        notes.append("These thetas and factors are for serial coupling.")
+    heads = ("reads fluxes", "least", "largest", "theta", "factor a step")
+    return section("theta", "WHICH THETA?", table(heads, rows), *notes)
+
+
+def _waves_of_a_fluid(found: Advice, seen: SeenWaves) -> Section:
+    """The lower bound of rho of a fluid and a wall, and the thetas that it excludes."""
+    rho = found.roles[0].rho
+    assert rho is not None
+    short = "" if "young" in seen.given else ", where steps in time are so short that stiffness does not count"
+    where = "tube" if len(seen.given["length"]) == 2 else "square over the plate"
+    notes = (
+        f"rho >= {figures(rho)}: added mass over the mass of the wall, for the longest wave{short}",
+        f"Proved if the fluid fills the {where}, has no viscosity and is incompressible, and both solvers use one time "
+        "scheme.",
+        f"Theta from {figures(2 / (1 + rho.value))} on diverges." if rho.value > 1 else "No theta up to 1 is excluded.",
+    )
+    return section("bounds", "HOW LARGE IS RHO AT LEAST?", *notes)
+
+
+def _parallel(found: Advice) -> Sections:
+    """theta and factor of parallel coupling for each role, where it was asked for."""
+    if not found.parallel:
+        return ()
+    names = NAMES if found.waves is None else WORDS[found.waves.kind][0]
+    notes = ["A mode lambda is multiplied by 1 - theta +- i theta sqrt(lambda) where nothing opens or slips."]
+    for one in found.parallel:
+        most, least = ("at most ", "at least ") if one.bound else ("", "")
+        best = f"Neumann problem on {names[one.neumann_body]}: best theta = 1/(1 + rho), {most}{figures(one.theta)}"
+        notes.append(f"{best}; factor {least}{near_one(one.factor)} a step")
+    return (section("parallel", "WHAT IF BOTH SOLVERS RUN AT ONCE?", *notes),)

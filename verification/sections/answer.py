@@ -60,7 +60,9 @@ def _bound(finished: Run, bounds: Sequence[BoundResult]) -> str:
         return f"none at this theta: outside {interval(allowed.interval, allowed.interval_level)}"
     if not found:
         limits = [bound.friction.some.value for bound in bounds if bound.friction.some is not None]
-        reach = f"; some theta contracts for k < {figures(max(limits))}" if limits else ""
+        varies = any(bound.friction.on == "multiple" for bound in bounds)
+        what = "for less than {} times as much" if varies else "for k < {}"
+        reach = f"; some theta contracts {what.format(figures(max(limits)))}" if limits else ""
         return f"none at this friction{reach}"
     best = min(found, key=lambda bound: bound.factor.value if bound.factor is not None else 1.0)
     how = "in doubles" if best.level == "float" else best.level

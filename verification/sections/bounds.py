@@ -54,7 +54,7 @@ def bounds(rows: Sequence[BoundResult], unit: str) -> list[Shown | str]:
     )
     notes = [words for row in results for words in named(row.name).remarks(row, unit)]
     if any(row.friction.on == "multiple" for row in found):
-        notes.append("x given: times the friction that gave kappa_1 and kappa_2")
+        notes.append("x given: times the friction that was given")
     notes += [LEGEND] * any(row.marked for row in found)
     return [Table(heads, tuple(lines)), *notes]
 

@@ -14,7 +14,7 @@ from verification.certificate import check
 from verification.certificate.continuum import ContinuumCertificate
 from verification.certificate.contraction import Certificate, Checked
 from verification.problem.specs import PLACES
-from verification.sections.numbers import figures, near_one
+from verification.sections.numbers import figures, rounded
 from verification.sections.parts import (
     Cell,
     Facts,
@@ -37,20 +37,27 @@ def sections(found: Certificate, target: Path | None = None) -> Sections:
     """The sections; ``target`` is where the certificate is written."""
     discrete, claim = found.discrete, []
     nodes = sum(len(discrete[name]["points"]) for name in ("body1", "body2"))
-    factor, theta = near_one(float(found.factor)), float(found.theta)
+    spare, theta = float(1 - found.factor), float(found.theta)
+    few = lambda digits: rounded(float(found.factor), digits, up=True)
+    factor = f"1 - {rounded(spare, 2, up=False)}" if 0 < spare < 1e-3 else few(4)
     claim.append(
         f"On these meshes a step with theta = {theta:g} multiplies the difference of two forces, in the norm (5.21), by"
         f" {factor} at most, for all loads and gaps: it contracts.  Level: verified."
     )
     if found.lower is not None:
-        claim.append(f"No proof can give less than {found.lower:.6g}, a factor that two forces attain (in doubles).")
+        gap = float(found.factor) / found.lower - 1
+        claim.append(
+            f"Proved factor {few(6)}, attained {found.lower:.6g} by two forces (in doubles): {max(gap, 0.0):.2%} apart."
+            "  No proof can give less than the attained factor."
+        )
+    sets = "" if found.sets == 1 else f"The pieces of T are divided into {found.sets} sets, each with its own form.  "
     proof = (
-        f"Multipliers proposed by {named(found.edition).words}; with them the quadratic form of the proof is positive"
-        f" definite for the rational data of the problem, in balls of {found.claim['bits']} bits."
+        f"{sets}Multipliers proposed by {named(found.edition).words}; with them the quadratic form of the proof is"
+        f" positive definite for the rational data of the problem, in balls of {found.claim['bits']} bits."
     )
     then = following("certify", "-o", "certificate.json", iteration=True)
     about = f"{found.problem.title}: {nodes} nodes, {len(discrete['weights'])} contact nodes"
-    bodies = f"k = {float(found.problem.contact.friction):g}, Neumann body {discrete['neumann_body']}"
+    bodies = f"k = {found.problem.contact.friction_words}, Neumann body {discrete['neumann_body']}"
     return (
         section("setting", "", Facts(about), Facts(bodies)),
         section("proved", "WHAT IS PROVED?", *claim),
@@ -100,7 +107,7 @@ def continuum(found: ContinuumCertificate) -> Sections:
     radius = [] if problem.contact.radius is None else [f"r = {float(problem.contact.radius):g} {length}"]
     number = problem.iteration.neumann_body
     body = f"Neumann body: {number} ({PLACES[number]})"
-    friction = ", ".join([f"k = {float(found.friction):g}", *radius])
+    friction = ", ".join([f"k = {problem.contact.friction_words}", *radius])
     return (
         section("setting", "", Facts(f"{problem.title}: the continuous problem, no mesh"), Facts(body, (friction,))),
         _used(found, document["constants"], f"sqrt({stress}/{length})", f"sqrt({length}/{stress})"),
@@ -112,11 +119,11 @@ def continuum(found: ContinuumCertificate) -> Sections:
 
 def _used(found: ContinuumCertificate, constants: Mapping[str, Any], of_stress: str, of_trace: str) -> Section:
     """The bounds behind the proof."""
-    first, second = (f"K = {figures(float(value))}" for value in found.constants.segments)
+    first, second = (f"K = {figures(float(value))}" for value in found.constants.K)
     used = (
         ("C_s", "C_s", _at_most, of_stress, "smoothed pressure, Neumann body; strip"),
-        ("C_t1", "C_t1", _at_most, of_trace, f"trace, contact body; segments, {first}"),
-        ("C_t2", "C_t2", _at_most, of_trace, f"trace, Neumann body; segments, {second}"),
+        ("C_t1", "C_t1", _at_most, of_trace, f"trace, contact body; {first}"),
+        ("C_t2", "C_t2", _at_most, of_trace, f"trace, Neumann body; {second}"),
         ("R", "strips", _at_most, "", "ratio of stiffness of two strips"),
         ("eps", "cut_off", _at_most, "", "loss by the cut-off beside Gamma_c"),
         ("rho", "rho", _at_most, "", "(1 + eps) R"),
@@ -132,19 +139,20 @@ def _used(found: ContinuumCertificate, constants: Mapping[str, Any], of_stress: 
 
 def _contracts(found: ContinuumCertificate, document: Mapping[str, Any]) -> list[str]:
     k, threshold = float(found.friction), _few(document["friction_threshold"]["lo"], False)
-    said = [f"Every small theta contracts for k < {threshold}: one fixed point, and exactly one solution."]
+    name = "k" if found.problem.contact.profile is None else "max k"
+    said = [f"Every small theta contracts for {name} < {threshold}: one fixed point, and exactly one solution."]
     if document["friction_limit"] is not None:
-        said.append(f"Some theta contracts for k < {_few(document['friction_limit']['lo'], False)}.")
+        said.append(f"Some theta contracts for {name} < {_few(document['friction_limit']['lo'], False)}.")
     if found.energy is None:
         said.append(f"Nothing is proved for any particular theta. {document['reason']['rho']}.")
     elif document["interval"] is None:
-        said.append(f"At k = {k:g} no theta is proved to contract: no conclusion.")
+        said.append(f"At {name} = {k:g} no theta is proved to contract: no conclusion.")
     else:
         lo, hi = document["interval"][0], "1"
         if found.energy.interval != (0.0, 1.0):
             hi = _few(document["theta_max_proved"]["lo"], False)
         best = f"{document['theta_proved']:.3f}, factor {_at_most(document['factor_proved'])}"
-        said.append(f"At k = {k:g}: {lo:.4g} < theta < {hi}; the best proved theta is {best}.")
+        said.append(f"At {name} = {k:g}: {lo:.4g} < theta < {hi}; the best proved theta is {best}.")
         if document["factor"] is not None:
             said.append(f"theta = {document['theta']:g}: factor {_at_most(document['factor'])}, guaranteed.")
         elif document["theta"] is not None:

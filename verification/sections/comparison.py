@@ -82,8 +82,14 @@ class Parts(Listener):
             self.waiting.append(compared(measured))
 
     def bounds(self, results: Sequence[BoundResult], measured: Measured) -> None:
-        self.results = results
-        self.waiting.append(contracts(results, self.unit, measured.why_no_energy))
+        self.results = self._told(results)
+        self.waiting.append(contracts(self.results, self.unit, measured.why_no_energy))
+
+    def _told(self, results: Sequence[BoundResult]) -> Sequence[BoundResult]:
+        """The results; where friction varies along Gamma_c its thresholds are factors by which it may grow."""
+        if self.pair.interface.profile is None:
+            return results
+        return [replace(result, friction=result.friction.over(self.pair.friction)) for result in results]
 
     def run(self, finished: Run) -> None:
         before, self.waiting = self.waiting, []
@@ -111,7 +117,10 @@ class Parts(Listener):
             self.show((section("losses", "HOW MUCH DOES EACH ESTIMATE LOSE?", *parts, pictures=WATERFALL),))
 
     def programs(self, results: Sequence[BoundResult]) -> None:
-        parts = [*bounds(results, self.unit), *(f"{r.name}: {r.not_computed}" for r in results if not r.worked_out)]
+        parts = [
+            *bounds(self._told(results), self.unit),
+            *(f"{r.name}: {r.not_computed}" for r in results if not r.worked_out),
+        ]
         title = "WHAT DO SEMIDEFINITE PROGRAMS PROVE OF ONE STEP?"
         caption = "The same for the bound that takes the matrices of the bodies."
         if parts:

@@ -47,7 +47,7 @@ def sections(measured: Measured) -> Sections:
         ends = "verified: between two bounds proved for the exact data of the file on this mesh, rounding included."
     else:
         unit = _units(measured)
-        words = WORDS if len(levels) == 1 else {}  # there is no room beside several columns
+        words = WORDS if len(levels) == 1 else {}  # several columns leave no room
         rows = [
             (
                 name,
@@ -82,7 +82,7 @@ def _cells(measured: Measured) -> Note:
     if rho is None or rho_normal is None:
         return Note(f"rho_cells, rho_normal_cells: {measured.why_no_cells}")
     both = f"rho_cells = {figures(rho, 5)}, rho_normal_cells = {figures(rho_normal, 5)}"
-    return Note(f"{both}: half-planes of these cells, once halved; limits on finer such meshes are no smaller")
+    return Note(f"{both}: half-planes of these cells, once halved; limits on finer such meshes are at least these")
 
 
 def compared(measured: Measured) -> Section:

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from verification.interface.friction import LAWS
 from verification.problem.specification import Problem
-from verification.problem.specs import PLACES
+from verification.problem.specs import PLACES, ContactSpec
 from verification.sections.numbers import figures
 from verification.sections.parts import Facts, Next, Note, Section, closing, section
 
@@ -19,15 +19,21 @@ def setting(problem: Problem, nodes: int | None, interface: int) -> Section:
     moduli = " / ".join("rigid" if body.rigid else f"{float(body.young):g}" for body in bodies)
     body = problem.iteration.neumann_body
     law = LAWS[contact.law].label if LAWS[contact.law].needs_radius else f"{LAWS[contact.law].label} law"
-    friction = "no friction" if not contact.friction else f"k = {figures(float(contact.friction), 2)}, {law}"
+    friction = "no friction" if not contact.friction else f"k = {frictions(contact)}, {law}"
     if contact.friction and contact.radius is not None and LAWS[contact.law].needs_radius:
         friction += f", r = {float(contact.radius):g} {units['length']}"
     if any(one.rigid for one in bodies):
         facts = [f"Obstacle: {'lower' if problem.body1.rigid else 'upper'} body", friction]
     else:
         facts = [f"Neumann body: {body} ({PLACES[body]})", friction, _how(problem)]
-    first = Facts(problem.title, (*counts, f"E {moduli} {units['stress']}"))
+    thin = ["plane stress"] if problem.plane == "stress" else []
+    first = Facts(problem.title, (*counts, f"E {moduli} {units['stress']}", *thin))
     return section("setting", "", first, Facts("", tuple(facts)))
+
+
+def frictions(contact: ContactSpec) -> str:
+    """k, or the least and the largest one where it varies."""
+    return " to ".join(f"{figures(k, 2)}" for k in contact.frictions)
 
 
 def _how(problem: Problem) -> str:

@@ -146,7 +146,11 @@ def _of_pair(pair: ContactPair) -> dict[str, Any]:
     for name, side in (("contact", pair.contact), ("neumann", pair.neumann)):
         arrays |= {f"{name}.{part}": getattr(side, attribute) for part, attribute in ARRAYS.items()}
         arrays |= {f"{name}.x": side.grid.x, f"{name}.weights": side.grid.weights}
-    return {
+    profile = interface.profile
+    varies = (
+        {} if profile is None else {"profile": [[exactly(v) for v in vars(profile)[name]] for name in vars(profile)]}
+    )
+    return varies | {
         "matrices": {name: None if array is None else _content(array) for name, array in arrays.items()},
         "upward": [pair.contact.upward, pair.neumann.upward],
         "dimension": pair.contact.grid.dimension,

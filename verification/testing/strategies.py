@@ -106,11 +106,12 @@ def plane_problems(
     law: str | None = None,
     theta: Numbers | None = None,
     most_cells: int = 6,
+    varying: bool = False,
 ) -> dict[str, Any]:
     """Two rectangles whose grids match; body 1 wider, equal or narrower, offset by whole cells.
 
     By default friction is 0 to 1, and the law mostly the non-local one; the discrete inequalities hold for the local
-    one as well.
+    one as well.  With ``varying`` it is mostly a table along Gamma_c, whose largest value may lie beside the nodes.
     """
     h = draw(st.sampled_from([Fraction(1, 20), Fraction(1, 4), Fraction(1), Fraction(30)]))
     n1, n2 = draw(st.integers(1, most_cells)), draw(st.integers(1, most_cells))
@@ -140,13 +141,18 @@ def plane_problems(
             }
         )
     span = h * (end - begin)
+    k: Any = draw(st.integers(0, 10).map(lambda i: Fraction(i, 10)) if friction is None else friction)
+    if varying and draw(st.integers(0, 3)):
+        inner = draw(st.lists(st.integers(1, 7), max_size=2, unique=True).map(sorted))
+        s = [Fraction(0), *(span * i / 8 for i in inner), span]
+        k = {"s": s, "k": [k * draw(st.sampled_from([0, Fraction(1, 3), 1])) for _ in s]}
     return {
         "dimension": 2,
         "body1": bodies[0],
         "body2": bodies[1],
         "contact": {
             "interval": [x(begin), x(end)],
-            "friction": draw(st.integers(0, 10).map(lambda i: Fraction(i, 10)) if friction is None else friction),
+            "friction": k,
             "law": draw(st.sampled_from(["nonlocal", "nonlocal", "nonlocal", "local"])) if law is None else law,
             "radius": draw(st.sampled_from([h / 2, h * Fraction(3, 2), span])),
             "gap": draw(st.sampled_from([Fraction(0), h / 1000, h / 30])),

@@ -27,7 +27,7 @@ def _of_matrices(
     """A pair of matrices whose sides are made from those of another one."""
     contact, neumann = (replace(side(given), body=None, own_load=None) for given in (pair.contact, pair.neumann))
     law = None if kernel is None else GivenOperator(matrix=kernel)
-    joined = replace(pair.interface, contact=contact.grid, neumann=neumann.grid, law=law, **changes)
+    joined = replace(pair.interface, contact=contact.grid, neumann=neumann.grid, law=law, profile=None, **changes)
     return replace(pair, contact=contact, neumann=neumann, interface=joined, problem=None)
 
 
@@ -125,12 +125,14 @@ def problem_in_units(problem: Problem, *, stress: Fraction = Fraction(1), length
 
     contact = problem.contact
     radius = None if contact.radius is None else contact.radius * length
-    interval = _times(contact.interval, length)
+    interval, profile = _times(contact.interval, length), contact.profile
+    if profile is not None:
+        profile = replace(profile, s=_times(profile.s, length))
     return replace(
         problem,
         body1=body(problem.body1),
         body2=body(problem.body2),
-        contact=replace(contact, interval=interval, radius=radius, gap=contact.gap * length),
+        contact=replace(contact, interval=interval, radius=radius, gap=contact.gap * length, profile=profile),
         length=problem.length * length,
     )
 
@@ -160,8 +162,16 @@ def problem_mirrored(problem: Problem) -> Problem:
             body_force=turned(given.body_force) if given.body_force else (),
         )
 
-    interval = problem.contact.interval
+    interval, profile = problem.contact.interval, problem.contact.profile
     ends = None if interval is None else (-interval[1], -interval[0])
+    if profile is not None:
+        if interval is None:
+            raise ValueError("contact.interval: needed where friction varies")
+        s = tuple(interval[1] - interval[0] - at for at in profile.s[::-1])
+        profile = replace(profile, s=s, share=profile.share[::-1])
     return replace(
-        problem, body1=body(problem.body1), body2=body(problem.body2), contact=replace(problem.contact, interval=ends)
+        problem,
+        body1=body(problem.body1),
+        body2=body(problem.body2),
+        contact=replace(problem.contact, interval=ends, profile=profile),
     )

@@ -1,0 +1,132 @@
+"""Cells that make rho smaller: both bodies in cells of one shape, whose diagonals mirror each other across Gamma_c."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any
+
+from ndtheory import Number
+from verification.constants.cells import NAMES, OfCells, rho_of_cells
+from verification.problem import Problem
+
+#: Cells are suggested where rho of the file's own is larger by this share of rho of theirs.
+GAIN = 0.05
+
+#: Suggested meshes have at most this many times the cells of the file.
+MOST_GROWTH = 2
+
+#: Other cells must make rho smaller by this share to be preferred to those found first.
+SAME = 0.001
+
+Counts = tuple[int, int]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Suggested:
+    """Cells for both bodies, and rho of them; or why none are suggested.
+
+    Attributes
+    ----------
+    cells : pair of pair of int, or None
+        Columns and rows of body 1 and of body 2.
+    of_file, found : OfCells
+        ``rho_cells`` and ``rho_normal_cells`` of the file's cells and of the suggested ones, in the file's roles.
+    normal : bool
+        True if ``rho_normal_cells`` decides.
+    why : str
+        Why there are none.
+    """
+
+    of_file: OfCells
+    normal: bool
+    cells: tuple[Counts, Counts] | None = None
+    found: OfCells | None = None
+    why: str = ""
+
+    def entries(self) -> tuple[dict[str, Any], dict[str, str]]:
+        """``rho_cells``, ``rho_normal_cells`` and ``cells`` of a role's document, and why they are null."""
+        numbers, reason = self.of_file.objects()
+        if self.cells is None or self.found is None:
+            return numbers | {"cells": None}, reason | {"cells": self.why}
+        cells = {"body1": list(self.cells[0]), "body2": list(self.cells[1])}
+        return numbers | {"cells": cells | self.found.objects()[0]}, reason
+
+    def value(self, of: OfCells) -> Number:
+        """The one of the two numbers that decides."""
+        return of.numbers[NAMES[self.normal]]
+
+
+def no_cells(why: str) -> Suggested:
+    """Nothing at all, and why."""
+    return Suggested(of_file=OfCells(numbers={}, why=why), normal=False, why=why)
+
+
+def suggest(problem: Problem, rho: Number, *, normal: bool) -> Suggested:
+    """Cells with a smaller rho on fine meshes.
+
+    Parameters
+    ----------
+    problem : Problem
+    rho : Number
+        Of the file's mesh, of normal components if ``normal``.  Where it is larger than rho of the cells, long waves
+        or the ends of Gamma_c decide, and other cells change little.
+    normal : bool
+        True without friction, unless the interface is tied.
+
+    Examples
+    --------
+    >>> from verification.problem.examples import example
+    >>> tall = example("section6").changed(cells=((40, 6), (24, 3)))
+    >>> found = suggest(tall, Number.of_float(0.6), normal=False)
+    >>> found.cells, [round(found.value(of).value, 4) for of in (found.of_file, found.found)]
+    (((40, 6), (24, 6)), [0.6728, 0.5143])
+    """
+    own = rho_of_cells(problem)
+    if not own.numbers:
+        return no_cells(own.why)
+    none = Suggested(of_file=own, normal=normal)
+    value = none.value(own).value
+    if rho.value > (1 + GAIN) * value:
+        return replace(none, why="rho is larger than rho of the cells: long waves or the ends of Gamma_c decide")
+    if problem.body1.parts or problem.body2.parts:
+        return replace(none, why="parts of sides need nodes at their ends")
+    best = replace(none, why=f"rho is at most {GAIN:.0%} larger than with cells of one shape that mirror each other")
+    least = value / (1 + GAIN)
+    for cells in dict.fromkeys(_of_one_shape(problem)):
+        found = rho_of_cells(problem.changed(cells=cells))
+        if found.numbers and none.value(found).value < least:
+            best, least = replace(none, cells=cells, found=found), none.value(found).value * (1 - SAME)
+    return best
+
+
+def _of_one_shape(problem: Problem) -> Iterator[tuple[Counts, Counts]]:
+    """Cells of one shape with common nodes, as near to those of one body or the other as these nodes allow."""
+    counts, widths, heights, left = [], [], [], []
+    for body in (problem.body1, problem.body2):
+        assert body.x is not None
+        assert body.y is not None
+        assert body.cells is not None
+        counts.append(body.cells)
+        widths.append(body.x[1] - body.x[0])
+        heights.append(body.y[1] - body.y[0])
+        left.append(body.x[0])
+    apart = left[1] - left[0]
+    common = _divisor(*widths, apart, *(end - left[0] for end in problem.contact.interval or ()))
+    most = MOST_GROWTH * sum(n * m for n, m in counts)
+    for (columns, _), width in zip(counts, widths, strict=True):
+        a = common / max(1, round(common * columns / width))
+        for (_, own), height in zip(counts, heights, strict=True):
+            rows = round(heights[0] * own / height)
+            rows = max(1, rows + (rows + int(apart / a)) % 2)  # the diagonals of this mesh mirror, too
+            found = (int(widths[0] / a), rows), (int(widths[1] / a), max(1, round(heights[1] * rows / heights[0])))
+            if sum(n * m for n, m in found) <= most:
+                yield found
+
+
+def _divisor(*lengths: Fraction) -> Fraction:
+    """The largest length that divides all."""
+    whole = math.lcm(*(length.denominator for length in lengths))
+    return Fraction(math.gcd(*(int(length * whole) for length in lengths)), whole)
