@@ -127,6 +127,17 @@ def test_ctrl_c_shows_and_writes_the_increments_that_are_done(call, path, quick,
     assert json.loads((tmp_path / "kept" / "history.json").read_text()) == answer.document
 
 
+def test_ctrl_c_after_the_last_increment_keeps_all_of_them(call, path, monkeypatch):
+    def linearise(self):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(vf.History, "linearise", linearise)
+    answer = call("march", path, "--json")
+    assert answer.status == 130
+    assert len(answer.document["increments"]) == 30
+    assert "interrupted after the last increment" in answer.err
+
+
 @pytest.mark.parametrize("view", ["loop", "states", "shear"])
 def test_every_view_is_drawn_of_both_methods_and_an_unknown_one_is_refused(path, view):
     found = vf.march(path, method="monolithic")

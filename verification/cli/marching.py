@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -53,12 +54,14 @@ def march(file: Path, solver: Any, method: Any, folder: Path | None, as_json: bo
         tell("measuring the constants", None)
         found = history.march(problem, method=method, solver=solver, watch=watch)
         tell("linearising", None)
-        if found.converged:
-            found = found.linearise()
+        try:
+            found = found.linearise() if found.converged else found
+        except KeyboardInterrupt:  # costs no increment
+            found = replace(found, interrupted=True)
     warn(found.warnings)
     deliver(found, sections, as_json, write, folder, typing=Typed(file=file, **changes).command)
-    if found.ended:
-        complain(f"{found.ended}: what was computed is kept")
+    if found.ended or found.interrupted:
+        complain(f"{found.ended or 'interrupted after the last increment'}: what was computed is kept")
     last = found.increments[-1].result
     if found.interrupted:
         return 130
