@@ -36,7 +36,7 @@ FLOORS: dict[str, dict[str, str]] = {
         "verification": "dense interrupts progress spreadsheet threads value",
         "verification.sections": "__init__ layout numbers parts",
     },
-    "input": {"verification.problem": "__init__ examples files reading specification specs tables writing"},
+    "input": {"verification.problem": "__init__ examples files reading specification specs steps tables writing"},
     "results, extras": {"verification": "document extras"},
     "bodies": {
         "verification.interface": (
@@ -62,7 +62,7 @@ FLOORS: dict[str, dict[str, str]] = {
         "verification.certificate": "__init__ calibrating check claims continuum contraction",
     },
     "answers": {
-        "verification": "comparison verdicts",
+        "verification": "comparison history verdicts",
         "verification.advice": (
             "__init__ accelerated best_theta cells ends from_logs from_matrices from_moduli from_runs from_vectors "
             "from_waves log_files log_lines matrix_files methods pace readings roles runs_with_friction seen "
@@ -78,21 +78,22 @@ FLOORS: dict[str, dict[str, str]] = {
     "pages that move": {"verification.exploration": "__init__ film javascript page"},
     "parts of results": {
         "verification.sections": (
-            "advice answer bounds certificate comparison constants exploration ledger of_results reproduction run "
-            "setting sweep"
+            "advice answer bounds certificate comparison constants exploration history ledger of_results reproduction "
+            "run setting sweep"
         )
     },
     "figures": {
         "verification.figures": (
-            "__init__ best_theta bodies factor layers of_results proof_map region reproduction residuals squares style "
-            "sweep waterfall"
+            "__init__ best_theta bodies factor history layers of_results proof_map region reproduction residuals "
+            "squares style sweep waterfall"
         )
     },
     "files": {"verification.output": "__init__ fields files folder report"},
     "names for users": {"verification": "__init__"},
     "commands, test kit": {
         "verification.cli": (
-            "__init__ advising calculator certifying console exploring forms ledger main options problems sweeping"
+            "__init__ advising calculator certifying console exploring forms ledger main marching options problems "
+            "sweeping"
         ),
         "verification.testing": "__init__ bounds laws properties rules steps strategies transforms",
     },
@@ -102,23 +103,23 @@ FLOORS: dict[str, dict[str, str]] = {
 BUDGET = {
     "fem1d2d": 4050,
     "ndtheory": 5865,
-    "verification": 1240,
+    "verification": 1799,
     "verification.advice": 6185,
-    "verification.algorithm": 2260,
+    "verification.algorithm": 2268,
     "verification.bounds": 3575,
     "verification.certificate": 1410,
-    "verification.cli": 2435,
+    "verification.cli": 2505,
     "verification.constants": 1325,
     "verification.contact": 945,
     "verification.coupling": 420,
     "verification.exploration": 600,
-    "verification.figures": 1520,
-    "verification.interface": 3180,
+    "verification.figures": 1670,
+    "verification.interface": 3300,
     "verification.ledger": 4320,
-    "verification.output": 470,
-    "verification.problem": 1665,
+    "verification.output": 524,
+    "verification.problem": 1920,
     "verification.reproduce": 655,
-    "verification.sections": 2345,
+    "verification.sections": 2438,
     "verification.sweeps": 2405,
     "verification.testing": 1583,
 }

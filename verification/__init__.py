@@ -47,6 +47,8 @@ if TYPE_CHECKING:
     from verification.coupling import couple as couple
     from verification.exploration.page import Exploration as Exploration
     from verification.exploration.page import explore as explore
+    from verification.history import History as History
+    from verification.history import march as march
     from verification.interface.build import build as build
     from verification.interface.interface import Law as Law
     from verification.interface.pair import ContactPair as ContactPair
@@ -70,6 +72,7 @@ _HOME = {
     "ContactPair": "interface.pair",
     "Coupling": "coupling",
     "Exploration": "exploration.page",
+    "History": "history",
     "Law": "interface.interface",
     "Ledger": "ledger",
     "Measured": "constants.measured",
@@ -96,6 +99,7 @@ _HOME = {
     "explore": "exploration.page",
     "iterate": "algorithm.start",
     "load": "problem.files",
+    "march": "history",
     "measure": "constants.measuring",
     "run": "algorithm.runs",
     "solve": "monolithic",

@@ -4,7 +4,7 @@ It shares only the problem, the meshes and the assembled matrices with the itera
 contact force lambda (on body 2; compressive in the normal direction).  With the flexibilities F_a of the bodies on
 Gamma_c the jump is
 
-    d = d_0 - W lambda,   W = F_1 + F_2,   d_T = u1_T - u2_T,  d_N = [u_N] - gap,
+    d = d_0 - W lambda,   W = F_1 + F_2,   d_T = u1_T - u2_T - slip so far,  d_N = [u_N] - gap,
 
 (plus ``M alpha`` where a body can move rigidly: then ``M' lambda`` must balance its loads)
 
@@ -170,11 +170,7 @@ def solve(problem: Problem | TwoBodies | ContactPair | Path | str) -> Solution:
         force=found.force,
         motion=found.motion,
         contact=ContactFields.of(
-            bodies.interface.contact,
-            force=found.force,
-            bound=system.bound(found.force),
-            jump=jump,
-            state=found.branches,
+            bodies.interface, force=found.force, bound=system.bound(found.force), jump=jump, state=found.branches
         ),
         kkt_residual=residual,
         linear_solves=system.linear_solves,
@@ -199,8 +195,7 @@ def contact_system(bodies: TwoBodies) -> ContactSystem:
     """Assemble W, d_0 and the friction law of a problem."""
     interface, grid = bodies.interface, bodies.interface.contact
     t, size = grid.t, grid.size
-    W, d0 = np.zeros((size, size)), np.zeros(size)
-    d0[t:] = -bodies.interface.gap
+    W, d0 = np.zeros((size, size)), -interface.offset
     motions, resultant = [np.zeros((size, 0))], [np.zeros(0)]
     for body, sign in ((bodies.body1, 1.0), (bodies.body2, -1.0)):
         if body is not None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
-from typing import Any, TypeVar
+from dataclasses import fields, replace
+from functools import cached_property
+from typing import Any, TypeVar, overload
 
 T = TypeVar("T")
 
@@ -38,6 +39,42 @@ class Value:
         for name, value in state.items():
             object.__setattr__(self, name, value)
             freeze(value)  # numpy gives back arrays that can be written
+
+
+class lent(cached_property[T]):
+    """A cached value that a copy made by :func:`copied` takes from its original, as what changed does not enter it."""
+
+    @overload
+    def __get__(self, instance: None, owner: type[Any] | None = None) -> lent[T]: ...
+
+    @overload
+    def __get__(self, instance: object, owner: type[Any] | None = None) -> T: ...
+
+    def __get__(self, instance: Any, owner: type[Any] | None = None) -> Any:
+        original = None if instance is None else original_of(instance)
+        if original is None or self.attrname is None:
+            return super().__get__(instance, owner)
+        return vars(instance).setdefault(self.attrname, getattr(original, self.attrname))
+
+
+#: The name under which a copy has its original.
+_ORIGINAL = "_original"
+
+
+def copied(value: T, **changes: Any) -> T:
+    """Return a copy of a dataclass with other fields, to which the original lends its :class:`lent` values.
+
+    A pickled copy leaves its original behind, and computes them again.
+    """
+    copy: T = replace(value, **changes)  # type: ignore[type-var]
+    vars(copy)[_ORIGINAL] = value
+    return copy
+
+
+def original_of(value: T) -> T | None:
+    """Return the value of which another is a copy by :func:`copied`; None where it is none."""
+    original: T | None = vars(value).get(_ORIGINAL)
+    return original
 
 
 def freeze(value: T) -> T:

@@ -94,6 +94,7 @@ def write(tmp_path):
 def quick(monkeypatch):
     """Figures that cost nothing, where only their files matter."""
     monkeypatch.setattr(figures, "draw_bodies", lambda result: "bodies")
+    monkeypatch.setattr(figures, "draw_history", lambda history, view: view)
     monkeypatch.setattr(figures, "draw_residuals", lambda run, bounds=(): "residuals")
     monkeypatch.setattr(figures, "draw_waterfall", lambda losses, unit: "waterfall")
     monkeypatch.setattr(figures, "draw_region", lambda plane: "region")

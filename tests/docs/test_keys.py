@@ -220,6 +220,22 @@ def vectors() -> Iterator[tuple[Any, Any]]:
         yield some, [image(x) for x in some]
 
 
+def histories(problem: vf.Problem) -> Iterator[Any]:
+    """Histories by both methods, linearised, without a promise, with a bound of one's own that has no conclusion."""
+    loads = {"prescribed": {"top": [0, "-0.01"]}, "traction": {"right": [1, 0]}, "body_force": [0, 1]}
+    steps = [
+        {"name": "press", "body1": {"prescribed": {"left": [0, "free"]}}, "body2": loads},
+        {"increments": 2, "body1": {"traction": {"left": [0, 1]}}},
+    ]
+    steps += [{"body1": {"body_force": [1, 0]}, "body2": {"prescribed": {"top": [0, 1]}}}]
+    found = vf.Problem.from_dict(problem.to_dict() | {"step": steps})
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(BOUNDS, Halfway.name, Halfway())
+        yield vf.march(found).linearise()
+    yield from (vf.march(found.changed(friction=5)), vf.march(found, method="monolithic"))
+    yield vf.march(found.changed(law="local"))
+
+
 def certified(*problems: vf.Problem) -> Iterator[Any]:
     """Certificates, and what comes of checking them again."""
     for problem in problems:
@@ -263,6 +279,7 @@ def documents(folder: Path, small: vf.Problem) -> list[dict[str, Any]]:
         vf.run(bars.changed(theta="0.99"), rule="momentum"),
         vf.run(vf.Problem.from_dict({**BARS, "body1": {**BARS["body1"], "young": "0.1"}}), theta="0.9"),  # diverges
         *(vf.solve(problem) for problem in (small, bars, of_mesh, vf.example("signorini"))),
+        *histories(small),
         *(vf.measure(problem) for problem in (bars, matrices)),
         vf.measure(small, refine=1),
         vf.measure(matrices, verified=True),

@@ -1,6 +1,6 @@
 """Rates of made-up series of residuals, and the noise of a pair of numbers: closed forms."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from types import SimpleNamespace
 
@@ -64,6 +64,7 @@ class Factor:
     """Carries by a factor."""
 
     transfer: np.ndarray
+    slipped: np.ndarray | None = None
 
     def carry(self, u):
         return self.transfer @ u
@@ -97,6 +98,13 @@ def test_the_noise_has_every_term_whatever_its_sign(negative, zero):
     g, u, S_1, S_2, l_1, l_2, P = (Fraction(size[name]) for name in ("g", "u", "S_1", "S_2", "l_1", "l_2", "transfer"))
     added = g + P * (S_1 * P * (u + u + (g + l_2) / S_2) + l_1)
     assert found == pytest.approx(float(4 * Fraction(2) ** -52 * added) * float(1 / S_2) ** 0.5, rel=1e-15, abs=0)
+
+
+def test_the_noise_of_an_increment_has_the_force_of_the_slip_so_far():
+    bodies = pair(4, 1, 8, 0, 1)
+    bodies.interface = replace(bodies.interface, slipped=np.array([-3.0]))
+    (found,) = Noise(bodies).of(np.zeros((1, 1)), np.zeros((1, 1)))
+    assert found == pytest.approx(4 * 2.0**-52 * (4 * 3 + 8), rel=1e-15, abs=0)
 
 
 # --- the largest step -------------------------------------------------------------------------------------------------

@@ -26,6 +26,13 @@ def problem(cells: int) -> vf.Problem:
     return vf.Problem.from_dict(plates()).with_keys(keys)
 
 
+def with_steps(shown: vf.Problem) -> vf.Problem:
+    """The problem, pressed and sheared."""
+    tops = {"press": [0, "-0.01"], "shear": ["0.002", "-0.01"]}
+    steps = [{"name": name, "increments": 2, "body2": {"prescribed": {"top": top}}} for name, top in tops.items()]
+    return vf.Problem.from_dict(shown.to_dict() | {"step": steps})
+
+
 def a_plane(shown: vf.Problem) -> Plane:
     region = Region(k=(0.1, 0.2), theta=((0.0, 0.5), (0.0, 0.4)), every=0.3, some=0.4)
     points = (Point(theta=0.4, k=0.1, outcome="converged", iterations=12, coupled_residual=1e-9),)
@@ -63,6 +70,7 @@ KINDS: dict[str, Callable[[vf.Problem], object]] = {
     "Run": lambda given: vf.run(given).linearise(),
     "Run by another rule": lambda given: vf.run(given, rule="anderson"),
     "Solution": vf.solve,
+    "History": lambda given: vf.march(with_steps(given)),
     "Comparison": vf.compare,
     "Advice": vf.advise,
     "Certificate": vf.certify,
@@ -74,6 +82,7 @@ KINDS: dict[str, Callable[[vf.Problem], object]] = {
 
 #: The others, which tell nothing of the problem or differ in what they show.
 OTHERS: dict[str, Callable[[vf.Problem], object]] = {
+    "History by the global method": lambda given: vf.march(with_steps(given), method="monolithic"),
     "Exploration": lambda given: vf.explore(vf.example("two-bars")),
     "Measured with proofs": partial(vf.measure, verified=True),
     "Comparison with proofs": partial(vf.compare, verified=True),

@@ -30,9 +30,9 @@ class LaterContact(ContactSpec):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class LaterProblem(Problem):
-    """A problem of a later release, with a table of steps."""
+    """A problem of a later release, with a table of phases."""
 
-    steps: Any = ()
+    phases: Any = ()
 
 
 def later_contact(monkeypatch):
@@ -50,16 +50,16 @@ def later_contact(monkeypatch):
 
 
 def later_table(monkeypatch):
-    """Put a table `step` into what a digest reads and writes, empty by default."""
+    """Put a table `phase` into what a digest reads and writes, empty by default."""
     read, tables = specification.read_problem, specification.tables
 
     def read_later(data, *given):
-        found = read({key: value for key, value in data.items() if key != "step"}, *given)
+        found = read({key: value for key, value in data.items() if key != "phase"}, *given)
         values = {field.name: getattr(found, field.name) for field in fields(found)}
-        return LaterProblem(**values, steps=data.get("step", ()))
+        return LaterProblem(**values, phases=data.get("phase", ()))
 
     monkeypatch.setattr(specification, "read_problem", read_later)
-    monkeypatch.setattr(specification, "tables", lambda it: tables(it) | {"step": getattr(it, "steps", ())})
+    monkeypatch.setattr(specification, "tables", lambda it: tables(it) | {"phase": getattr(it, "phases", ())})
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -85,7 +85,7 @@ def test_a_later_table_changes_the_digest_where_it_says_something(monkeypatch):
     later_table(monkeypatch)
     later = LaterProblem(**{field.name: getattr(before, field.name) for field in fields(before)})
     assert later.digest == digest_before
-    assert replace(later, steps=("press",)).digest != digest_before
+    assert replace(later, phases=("press",)).digest != digest_before
 
 
 def test_a_key_that_the_file_must_have_counts(monkeypatch):

@@ -86,9 +86,8 @@ def fields(*states: str) -> ContactFields:
     """A contact of 13 nodes over 1.2 mm in given states."""
     x = np.linspace(0.4, 1.6, 13)
     zero = np.zeros(13)
-    return ContactFields(
-        x=x, s=x - x[0], weights=zero + 0.1, pressure=zero, shear=zero, bound=zero, gap=zero, slip=zero, status=states
-    )
+    rest = dict.fromkeys(("pressure", "shear", "bound", "gap", "slip", "slip_increment"), zero)
+    return ContactFields(x=x, s=x - x[0], weights=zero + 0.1, status=states, **rest)
 
 
 PRINTED = ("stick",) * 6 + ("slip",) * 4 + ("open",) * 3

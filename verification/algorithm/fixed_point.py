@@ -67,10 +67,9 @@ class FixedPointMap:
         return neumann.known + neumann.flexibility(g + neumann.load)
 
     def contact(self, g: Floats, u: Floats) -> ContactSolution:
-        """Solve (II): minimise over ``phi = P u2 + v``, ``phi_N <= (P u2)_N + gap``; may raise ContactError."""
+        """Solve (II): minimise over ``phi = P u2 + offset + v`` with ``v_N <= 0``; may raise ContactError."""
         contact, interface = self.pair.contact, self.pair.interface
-        obstacle = interface.carry(u).copy()
-        obstacle[contact.grid.normal] += interface.gap
+        obstacle = interface.carry(u) + self.pair.offset
         bound = self.pair.bound(g)
         solution = self._step.solve(contact.load - times(contact.schur, obstacle), bound)
         return solution if self._all_free else self._held(solution, obstacle, bound)

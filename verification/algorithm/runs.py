@@ -20,9 +20,9 @@ from verification.algorithm.fixed_point import FixedPointMap, iterates
 from verification.algorithm.iterate import Iterate
 from verification.algorithm.linearisation import Forecast, Linearisation, NotLinear, at_solution, forecast, linearise
 from verification.algorithm.rates import ObservedRate, observed_rate
-from verification.algorithm.relaxation import Constant, Rule
+from verification.algorithm.relaxation import Constant, Rule, rule_of
 from verification.algorithm.start import Start, begin_at
-from verification.algorithm.theta import Choice, begin
+from verification.algorithm.theta import Choice, choose
 from verification.constants import Measured
 from verification.contact import ContactError, Solver
 from verification.document import Document
@@ -201,7 +201,7 @@ class Run(Document):
         turned[pair.contact.grid.tangential] = pair.normal_sign  # to body 1 against body 2
         force, jump = turned * solved.force, turned * solved.v
         return ContactFields.of(
-            pair.contact.grid, force=force, bound=pair.bound(iterate.g), jump=jump, state=solved.pattern
+            pair.interface, force=force, bound=pair.bound(iterate.g), jump=jump, state=solved.pattern
         )
 
     @property
@@ -221,8 +221,7 @@ class Run(Document):
     def traces_at(self, iterate: Iterate) -> tuple[Floats, Floats]:
         """Return the displacements of body 1 and body 2 along Gamma_c at an iterate, normal components along y."""
         contact, neumann = self.pair.contact, self.pair.neumann
-        moved = self.pair.interface.carry(iterate.displacement) + iterate.contact.v
-        moved[contact.grid.normal] += self.pair.interface.gap
+        moved = self.pair.interface.carry(iterate.displacement) + iterate.contact.v + self.pair.offset
         of_contact, of_neumann = contact.orient(moved), neumann.orient(iterate.displacement)
         return (of_contact, of_neumann) if self.pair.neumann_body == 2 else (of_neumann, of_contact)
 
@@ -415,15 +414,23 @@ def run(
     """
     pair = pair_of(problem)
     check_memory(pair)
-    relaxation, choice, step = begin(pair, theta, rule, measured)
+    relaxation = rule_of(rule or pair.settings.relaxation)
+    choice = choose(pair, theta, measured, rule=relaxation)
     T = FixedPointMap(pair, solver)
-    begun = begin_at(T, start)
+    return run_from(T, relaxation, choice, begin_at(T, start), watch)
+
+
+def run_from(
+    T: FixedPointMap, rule: Rule, choice: Choice, start: Start, watch: Callable[[Iterate], None] = unwatched
+) -> Run:
+    """Run T with a rule and a theta from a start to its outcome; parameters and errors as for :func:`run`."""
+    pair, step = T.pair, rule.begin(T.pair, float(choice.theta), choice.rho)
     seen: list[Iterate] = []
     ending = Ending(pair.settings)
     outcome: Outcome | None = None
     joined = lambda: arrived(pair, seen[-1])
     try:
-        for found in iterates(T, step, begun.g, begun.scale):
+        for found in iterates(T, step, start.g, start.scale):
             seen.append(found)
             watch(found)
             outcome = ending.at(found.iteration, found.residual, found.scale, joined)
@@ -436,9 +443,9 @@ def run(
     assert outcome is not None  # the iterates do not end
     return Run(
         pair=pair,
-        rule=relaxation,
+        rule=rule,
         choice=choice,
-        start=begun,
+        start=start,
         iterates=tuple(seen),
         outcome=outcome,
         interrupted=outcome == "interrupted",

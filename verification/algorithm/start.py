@@ -146,13 +146,12 @@ def forces(given: ArrayLike, pair: ContactPair, source: str = "") -> Floats:
 
 
 def tied_force(pair: ContactPair) -> Floats:
-    """Solve for g of the bodies tied along Gamma_c, gap closed: ``(S2 + P' S1 P) u2 = l2 + P' (l1 - S1 gap n)``.
+    """Solve for g of the bodies tied along Gamma_c, gap closed: ``(S2 + P' S1 P) u2 = l2 + P' (l1 - S1 offset)``.
 
     Linear, without contact and friction, so that it exists wherever the supports hold the two bodies as one.
     """
     contact, neumann, interface = pair.contact, pair.neumann, pair.interface
-    apart = interface.carry(neumann.known).copy()
-    apart[contact.grid.normal] += interface.gap
+    apart = interface.carry(neumann.known) + pair.offset
     matrix = neumann.schur + interface.carry_form(contact.schur)
     right = neumann.load + interface.carry_back(contact.load - contact.schur @ apart)
     free = neumann.free

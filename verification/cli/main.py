@@ -18,7 +18,7 @@ import ndtheory
 import verification
 from ndtheory import HypothesisError
 from ndtheory.texts import printable
-from verification.cli import advising, calculator, certifying, exploring, ledger, problems, sweeping
+from verification.cli import advising, calculator, certifying, exploring, ledger, marching, problems, sweeping
 from verification.cli.console import (
     NOTHING,
     SHOWN,
@@ -58,6 +58,7 @@ for command in (
     problems.constants,
     problems.run,
     problems.solve,
+    marching.march,
     problems.compare,
     exploring.explore,
     advising.advise,

@@ -152,7 +152,7 @@ def run(file: Path, solver: Any, start: Path | None, folder: Path | None, as_jso
     write = None if folder is None else Folder(folder, "run").write
     pair = pair_from(problem)
     g = None if start is None else forces(read_matrix(start), pair, str(start))
-    _warn(pair.warnings)
+    warn(pair.warnings)
     with stages() as tell, progress(tell, problem.iteration.tolerance) as watch:
         finished = runs.run(pair, start=g, solver=solver, watch=watch)
         tell("linearising", None)
@@ -160,7 +160,7 @@ def run(file: Path, solver: Any, start: Path | None, folder: Path | None, as_jso
             finished = finished.linearise()
         except KeyboardInterrupt:  # costs no run
             finished = replace(finished, interrupted=True).linearise()
-    _warn(finished.warnings[len(pair.warnings) :])
+    warn(finished.warnings[len(pair.warnings) :])
     deliver(finished, sections, as_json, write, folder, typing=Typed(file=file, **changes).command)
     return _status_of_run(finished, changes["swap"])
 
@@ -189,11 +189,11 @@ def solve(file: Path, keys: dict[str, str], folder: Path | None, as_json: bool) 
     problem = load_problem(file, keys)
     write = None if folder is None else Folder(folder, "solve").write
     bodies = discretise(problem)
-    _warn(bodies.warnings)
+    warn(bodies.warnings)
     with stages() as tell:
         tell("solving both bodies at once", None)
         solution = monolithic.solve(bodies)
-    _warn(list(solution.checks.warnings))
+    warn(list(solution.checks.warnings))
     deliver(solution, run.solution, as_json, write, folder, typing=Typed(file=file, keys=keys).command)
     return 0
 
@@ -291,16 +291,16 @@ def _compare(problem: Problem, typed: Typed, folder: Path | None, solver: Any, a
 
     write = None if folder is None else Folder(folder, "compare").write
     pair = pair_from(problem)
-    _warn(pair.warnings)
+    warn(pair.warnings)
     parts = None if as_json else Parts(pair, one_by_one(needed=write is not None))
     with stages() as tell, progress(tell, problem.iteration.tolerance) as watch, parts or nullcontext():
         comparison = verdicts.compare(pair, solver=solver, watch=watch, progress=tell, listener=parts, **asked)
-    _warn(comparison.run.warnings[len(pair.warnings) :])
+    warn(comparison.run.warnings[len(pair.warnings) :])
     deliver(comparison, end, as_json, write, folder, typing=typed.command)
     return _status_of_comparison(comparison, typed.swap)
 
 
-def _warn(warnings: list[str]) -> None:
+def warn(warnings: list[str]) -> None:
     for warning in warnings:
         complain(f"warning: {warning}")
 

@@ -5,6 +5,7 @@ from matplotlib.figure import Figure
 from verification.figures.best_theta import draw_best_theta
 from verification.figures.bodies import draw_bodies
 from verification.figures.factor import draw_factor
+from verification.figures.history import draw_history
 from verification.figures.proof_map import draw_map
 from verification.figures.region import draw_region
 from verification.figures.reproduction import draw_reproduction
@@ -19,6 +20,7 @@ __all__ = [
     "draw_best_theta",
     "draw_bodies",
     "draw_factor",
+    "draw_history",
     "draw_map",
     "draw_region",
     "draw_reproduction",

@@ -20,11 +20,13 @@ from verification.comparison import Comparison
 from verification.constants import Measured
 from verification.figures.bodies import draw_bodies
 from verification.figures.factor import draw_factor
+from verification.figures.history import draw_history
 from verification.figures.region import draw_region
 from verification.figures.reproduction import draw_reproduction
 from verification.figures.residuals import draw_residuals
 from verification.figures.squares import draw_squares
 from verification.figures.sweep import draw_sweep
+from verification.history import History
 from verification.monolithic import Solution
 from verification.reproduce.experiments import Reproduction
 from verification.sweeps.sweep import Sweep
@@ -36,6 +38,7 @@ def draw(result: Any, **options: Any) -> Figure:
     raise ValueError(f"a {type(result).__name__} has no figure")
 
 
+draw.register(History, draw_history)
 draw.register(Plane, draw_region)
 draw.register(Reproduction, draw_reproduction)
 draw.register(Solution, draw_bodies)

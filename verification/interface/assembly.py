@@ -29,8 +29,9 @@ from verification.interface.interface import Grid, Interface, Law
 from verification.interface.joining import join
 from verification.problem.specification import Problem
 from verification.problem.specs import MOST_CELLS, BodySpec
+from verification.problem.steps import path_warnings
 from verification.problem.tables import ProblemError, short
-from verification.value import Value
+from verification.value import Value, copied
 
 #: Largest number of contact nodes for interface matrices, which are dense: more would fill the memory.
 MOST_CONTACT_NODES = 2000
@@ -104,6 +105,28 @@ class TwoBodies(Value):
         """The bodies that are not rigid."""
         return [body for body in (self.body1, self.body2) if body is not None]
 
+    def under(self, problem: Problem, slipped: Floats | None) -> TwoBodies:
+        """Return the bodies under the loads of another problem, which has no other difference, after they have slipped.
+
+        Nothing is assembled or factorised anew.
+
+        Raises
+        ------
+        ProblemError
+            Two sides prescribe different displacements of a node.
+        """
+
+        def loaded(body: Body | None) -> Body | None:
+            if body is None:
+                return None
+            x = (self.interface.neumann if body is self.neumann else self.interface.contact).x
+            load = _load(problem, body.name, body.mesh, body.nodes, x, self.interface.contact.x[[0, -1]])
+            return body.under(_supports(problem, body.name, body.mesh), load)
+
+        interface = copied(self.interface, slipped=slipped)
+        body1, body2 = loaded(self.body1), loaded(self.body2)
+        return replace(self, body1=body1, body2=body2, interface=interface, problem=problem)
+
     @property
     def outside(self) -> list[str]:
         """The reasons why the theorem does not apply to this problem; empty where it does."""
@@ -112,7 +135,7 @@ class TwoBodies(Value):
     @property
     def warnings(self) -> list[str]:
         """Facts that a user should know before trusting the numbers."""
-        return warnings_of(self.interface, self.friction, self.elastic)
+        return warnings_of(self.interface, self.friction, self.elastic) + path_warnings(self.problem)
 
 
 def reasons_outside(interface: Interface, friction: Fraction, free: list[Any]) -> list[str]:
@@ -217,7 +240,7 @@ def discretise(problem: Problem, *, law: Law | None = None, dense: bool = True) 
     """
     meshes = [None if spec.rigid else _mesh(problem, name) for name, spec in _specs(problem)]
     known = [
-        None if mesh is None else _known(problem, name, mesh)
+        None if mesh is None else _supports(problem, name, mesh)
         for (name, _), mesh in zip(_specs(problem), meshes, strict=True)
     ]
     nodes, interface = join(problem, meshes, known, law)
@@ -309,15 +332,16 @@ def _with_parts(problem: Problem, name: Name, mesh: Mesh) -> Mesh:
     return replace(mesh, sides={**mesh.sides, **parts}) if parts else mesh
 
 
-def _sides(spec: BodySpec, dimension: int) -> dict[str, list[float | None]]:
-    """Return the displacements that sides prescribe; None leaves a component free."""
+def _known_sides(spec: BodySpec, dimension: int) -> dict[str, list[float | None]]:
+    """Return the displacements that the sides of Gamma_u have, by component; None leaves one free."""
     sides: dict[str, list[float | None]] = {side: [0.0] * dimension for side in spec.fixed}
-    return sides | {side: [None if v is None else float(v) for v in values] for side, values in spec.prescribed.items()}
+    return sides | {side: [None if v is None else float(v) for v in vs] for side, vs in spec.prescribed.items()}
 
 
-def _known(problem: Problem, name: Name, mesh: Mesh) -> Supports:
+def _supports(problem: Problem, name: Name, mesh: Mesh) -> Supports:
+    """Return the displacements known on Gamma_u; ProblemError where two sides contradict each other."""
     try:
-        return supports(mesh, _sides(getattr(problem, name), mesh.dimension))
+        return supports(mesh, _known_sides(getattr(problem, name), mesh.dimension))
     except MeshError as error:
         raise problem.refuse(f"{name}.prescribed", None, str(error)) from None
 
@@ -332,7 +356,7 @@ def _check_free(problem: Problem, name: Name, mesh: Mesh, known: Supports, nodes
     spec, j = getattr(problem, name), int(np.argmax(wrong))
     holds = next(
         side
-        for side, values in _sides(spec, mesh.dimension).items()
+        for side, values in _known_sides(spec, mesh.dimension).items()
         if nodes[j] in mesh.sides[side] and any(v is not None and n for v, n in zip(values, normals[j], strict=True))
     )
     where = ", ".join(f"{c:g}" for c in mesh.points[nodes[j]].astype(float))
@@ -341,19 +365,18 @@ def _check_free(problem: Problem, name: Name, mesh: Mesh, known: Supports, nodes
     raise problem.refuse(f"{name}.{key}", value, f"{needed}({where})")
 
 
-def _body(problem: Problem, name: Name, mesh: Mesh, known: Supports, nodes: Ints, grid: Grid, ends: Floats) -> Body:
+def _load(problem: Problem, name: Name, mesh: Mesh, nodes: Ints, x: Floats, ends: Floats) -> Floats:
+    """Return the nodal forces of the body force and of tractions, shape (n, d); ProblemError for a force that is lost.
+
+    ``nodes`` at positions x are those of Gamma_c, which lies between the ``ends``: no traction acts there.
+    """
     spec: BodySpec = getattr(problem, name)
     d = mesh.dimension
-    plain = lambda values: [float(v) for v in values]
-    _check_free(problem, name, mesh, known, nodes, grid.normals)
-    motions = rigid_motions(mesh, known.held)
-    material = material_of(spec)
-    matrix = stiffness(mesh, material)
-    load = body_load(mesh, plain(spec.body_force))
+    load = body_load(mesh, [float(v) for v in spec.body_force])
     along = None
     if problem.contact.surface is not None:
         along = np.zeros(len(mesh.points))
-        along[nodes] = grid.x
+        along[nodes] = x
     pieces = {frozenset(nodes[i : i + d].tolist()) for i in range(len(nodes) - d + 1)}  # of Gamma_c
     for side, force in spec.traction.items():
         covered = np.array([frozenset(facet) in pieces for facet in mesh.sides[side].tolist()])
@@ -362,7 +385,18 @@ def _body(problem: Problem, name: Name, mesh: Mesh, known: Supports, nodes: Ints
         if any(force) and loaded.max() <= SAME * extent(mesh):
             needed = "Gamma_c covers this side: a force there is lost"
             raise problem.refuse(f"{name}.traction.{side}", list(force), needed)
-        load += loaded[:, None] * plain(force)
+        load += loaded[:, None] * [float(v) for v in force]
+    return load
+
+
+def _body(problem: Problem, name: Name, mesh: Mesh, known: Supports, nodes: Ints, grid: Grid, ends: Floats) -> Body:
+    spec: BodySpec = getattr(problem, name)
+    d = mesh.dimension
+    _check_free(problem, name, mesh, known, nodes, grid.normals)
+    motions = rigid_motions(mesh, known.held)
+    material = material_of(spec)
+    matrix = stiffness(mesh, material)
+    load = _load(problem, name, mesh, nodes, grid.x, ends)
     free = np.flatnonzero(~known.held.ravel())
     rigid = motions.reshape(known.held.size, motions.shape[2])[free]
     right = load.ravel()[free] - (matrix @ known.values.ravel())[free]

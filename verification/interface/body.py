@@ -36,7 +36,7 @@ from verification.dense import STILL, Cholesky
 from verification.interface.interface import Grid
 from verification.problem.specs import BodySpec
 from verification.threads import one_thread
-from verification.value import Value, freeze
+from verification.value import Value, copied, freeze, lent, original_of
 
 Name = Literal["body1", "body2"]
 
@@ -116,19 +116,37 @@ class Body(Value):
             matrix = stiffness(self.mesh, self.material)[self.positions][:, self.positions]
             object.__setattr__(self, "stiffness", freeze(in_frames(matrix.tocsc(), self.turned)))
 
-    @cached_property
+    def under(self, known: Supports, load: Floats) -> Body:
+        """Return the body under other loads, with the factorisations of this one.
+
+        Parameters
+        ----------
+        known : Supports
+            Other values of the displacements that are known here.
+        load : array, shape (n, d)
+            Nodal forces of the body force and of tractions.
+        """
+        right = (load.ravel() - self._whole @ known.values.ravel())[self.positions]
+        return copied(self, known=known, load=right if self.turned is None else self.turned @ right)
+
+    @lent
+    def _whole(self) -> sp.csc_array:
+        """The stiffness matrix with the unknowns that Gamma_u holds."""
+        return stiffness(self.mesh, self.material)
+
+    @lent
     def gram_matrix(self) -> sp.csc_array:
         """The Gram matrix of H1 on the unknowns; a run does not need it."""
         whole = gram(self.mesh, self.length)
         return freeze(in_frames(whole[self.positions][:, self.positions].tocsc(), self.turned))
 
-    @cached_property
+    @lent
     def _left(self) -> Ints:
         """The unknowns that are left where as many are pinned as rigid motions are left."""
         _, _, order = qr(self.motions.T, pivoting=True, mode="economic")
         return np.sort(order[self.motions.shape[1] :])
 
-    @cached_property
+    @lent
     def solve(self) -> Callable[[Floats], Floats]:
         """The function ``load -> A^-1 load`` on the unknowns, for one load or columns of loads.
 
@@ -151,6 +169,8 @@ class Body(Value):
     def response(self) -> Response:
         """The displacements under the loads and under forces on the interface, pinned as in :attr:`solve`."""
         with one_thread():
+            if (original := original_of(self)) is not None:
+                return replace(original.response, loaded=original.solve(self.load))
             if self.motions.shape[1] == 0:
                 return self.elastic.response(self.load)
             left = self._left
@@ -169,7 +189,7 @@ class Body(Value):
 
         return Response(flexibility=flexibility, loaded=loaded, field=field)
 
-    @cached_property
+    @lent
     def order(self) -> Ints:
         """An order of elimination that ends with the interface, one for all matrices of the mesh."""
         return elimination_order(self.stiffness, self.interface)
@@ -179,7 +199,7 @@ class Body(Value):
         """True if it has so few unknowns that dense matrices cost less than sparse ones."""
         return len(self.positions) <= FEW
 
-    @cached_property
+    @lent
     def elastic(self) -> Condensation:
         """The stiffness matrix condensed onto the interface."""
         loose = self.motions.shape[1] > 0
@@ -187,7 +207,7 @@ class Body(Value):
             return Lifted(self.stiffness, self.interface, singular=loose)
         return Condensation(self.stiffness, self.interface, self.order, singular=loose)
 
-    @cached_property
+    @lent
     def gram(self) -> Condensation:
         """The Gram matrix condensed onto the interface."""
         if self.few:
@@ -196,7 +216,7 @@ class Body(Value):
             return Condensation(self.gram_matrix, self.interface, self.order)
         return Uncoupled(self.gram_matrix, self.interface, self.positions % self.mesh.dimension, self.order)
 
-    @cached_property
+    @lent
     def lift_gram(self) -> Floats:
         """``N_a = R_a' H_a R_a``: the H1 norm squared of the elastic lift (4.5), on the free components."""
         with one_thread():
@@ -373,6 +393,14 @@ class Condensed(Value):
             own_load=load,
         )
 
+    def under(self, body: Body) -> Condensed:
+        """Return the same side with the loads of its body under other ones, as :meth:`Body.under` makes it."""
+        load = np.zeros(self.grid.size)
+        with one_thread():
+            load[body.unknown] = body.elastic.condense(body.load)
+        load = self.orient(load)
+        return copied(self, body=body, load=load, own_load=load, known=self.orient(body.known_trace))
+
     def turned(self) -> Condensed:
         """Return the same body with its normal components along the opposite direction."""
         turn = self.grid.turn
@@ -414,7 +442,7 @@ class Condensed(Value):
         load[body.interface] += self.orient(self.load - self.own_load)[body.unknown]
         return replace(body, load=load)
 
-    @cached_property
+    @lent
     def _factor(self) -> Cholesky:
         return Cholesky(self.schur, np.flatnonzero(self.free), self.motions)
 
@@ -425,12 +453,12 @@ class Condensed(Value):
         """
         return self._factor.solve(force)
 
-    @cached_property
+    @lent
     def inverse(self) -> Floats:
         """``S_a^-1`` as a matrix, 0 on held components, shape (2 n, 2 n)."""
         return freeze(self.flexibility(np.eye(len(self.load))))
 
-    @cached_property
+    @lent
     def root(self) -> Floats:
         """L with ``S_a = L L'``, shape (2 n, free components): columns orthonormal in the norm (5.21)."""
         result = np.zeros((len(self.free), int(self.free.sum())))

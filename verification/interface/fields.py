@@ -9,7 +9,7 @@ import numpy as np
 
 from fem1d2d.mesh import Floats
 from verification.contact.active_set import Pattern
-from verification.interface.interface import Grid
+from verification.interface.interface import Interface
 from verification.value import Value
 
 
@@ -39,6 +39,8 @@ class ContactFields(Value):
         Distance of the bodies, >= 0, unit of length.
     slip : array
         ``u1_T - u2_T``, unit of length; 0 in 1D.
+    slip_increment : array
+        The part of it that the load increment brought: all of it unless the interface has slipped before.
     status : tuple of {'stick', 'slip', 'open'}
         A node that touches and whose friction bound is zero slips.
     """
@@ -51,6 +53,7 @@ class ContactFields(Value):
     bound: Floats
     gap: Floats
     slip: Floats
+    slip_increment: Floats
     status: tuple[str, ...]
     y: Floats | None = None
     normal: Floats | None = None
@@ -60,7 +63,7 @@ class ContactFields(Value):
         return ", ".join(f"{count} {name}" for name, count in self.pattern.items())
 
     @classmethod
-    def of(cls, grid: Grid, *, force: Floats, bound: Floats, jump: Floats, state: Pattern) -> ContactFields:
+    def of(cls, interface: Interface, *, force: Floats, bound: Floats, jump: Floats, state: Pattern) -> ContactFields:
         """Make the fields from interface vectors on the contact grid, tangential components first.
 
         Parameters
@@ -70,10 +73,12 @@ class ContactFields(Value):
         bound : array, shape (t,)
             Friction bound on nodal forces.
         jump : array
-            ``u1_T - u2_T`` and ``[u_N] - gap <= 0``.
+            ``u1_T - u2_T`` less the slip so far, and ``[u_N] - gap <= 0``.
         state : Pattern
         """
+        grid = interface.contact
         plane, zero = grid.t > 0, np.zeros(grid.n)
+        slip = jump[grid.tangential] if plane else zero
         slides = state.sliding != 0 if plane else np.ones(grid.n, dtype=bool)
         names = np.where(state.touching, np.where(slides, "slip", "stick"), "open")
         return cls(
@@ -86,7 +91,8 @@ class ContactFields(Value):
             shear=force[grid.tangential] / grid.weights if plane else zero,
             bound=bound / grid.weights if plane else zero,
             gap=-jump[grid.normal] + 0.0,
-            slip=jump[grid.tangential].copy() if plane else zero,
+            slip=slip + interface.offset[grid.tangential] if plane else zero,
+            slip_increment=slip.copy(),
             status=tuple(str(name) for name in names),
         )
 

@@ -65,8 +65,7 @@ def write_interface(pair: ContactPair, path: Path) -> None:
     }
     if interface.kernel is not None and interface.law is not None:
         arrays |= {"kernel": interface.kernel, "law": interface.law.words, "outside": interface.law.outside}
-    if interface.transfer is not None:
-        arrays["transfer"] = interface.transfer
+    arrays |= {name: v for name in ("transfer", "slipped") if (v := getattr(interface, name)) is not None}
     with path.open("wb") as file:
         np.savez(file, **arrays)
 
@@ -185,7 +184,9 @@ def _pair(arrays: dict[str, np.ndarray], source: str) -> ContactPair:
     check_nodes(grid.x, grid.weights)
     if neumann.loose:
         raise ValueError(f"motions{neumann_body}: needed none of the body with the Neumann problem")
-    interface = Interface.joining(grid, other, transfer, gap=real_array("gap", arrays["gap"], (n,)), law=law)
+    slipped = real_array("slipped", arrays["slipped"], (grid.t,)) if "slipped" in arrays else None
+    gap = real_array("gap", arrays["gap"], (n,))
+    interface = Interface.joining(grid, other, transfer, gap=gap, law=law, slipped=slipped)
     if neumann_body == 1:
         interface = interface.reversed()
     pair = ContactPair(

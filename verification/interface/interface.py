@@ -5,7 +5,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cached_property
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 from fem1d2d import trapezoid
 from fem1d2d.mesh import Floats
 from verification.problem.specs import Profile
-from verification.value import Value, freeze
+from verification.value import Value, freeze, lent
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -183,6 +182,8 @@ class Interface(Value):
     on_traces : array, shape (contact components, Neumann components), or None
         P on vectors, where the normals of the two grids differ: it turns each vector from one node's directions into
         another's.  None where P acts on each component by itself.
+    slipped : array, shape (t of the contact grid,), or None
+        ``u1_T - u2_T`` before the load increment, from which friction measures slip, unit of length; None for 0.
     """
 
     contact: Grid
@@ -191,6 +192,7 @@ class Interface(Value):
     law: Law | None = None
     transfer: Floats | None = None
     profile: Profile | None = None
+    slipped: Floats | None = None
     on_traces: Floats | None = None
 
     @classmethod
@@ -220,7 +222,13 @@ class Interface(Value):
     def summary(self) -> str:
         return f"{self.contact.n} contact nodes, {'no law of friction' if self.law is None else self.law.words}"
 
-    @cached_property
+    @property
+    def offset(self) -> Floats:
+        """The jump of body 1 against body 2 at which nothing has moved: the slip before the increment, and the gap."""
+        slipped = np.zeros(self.contact.t) if self.slipped is None else self.slipped
+        return np.concatenate([slipped, self.gap])
+
+    @lent
     def kernel(self) -> Floats | None:
         """S as a matrix: normal nodal forces on the Neumann grid to normal stress at the contact nodes.
 
@@ -309,7 +317,14 @@ class Interface(Value):
         """Return the interface with the roles of the grids exchanged; ValueError where the grids differ."""
         if self.transfer is not None:
             raise ValueError("the grids differ: needed a pair built for these roles, with its own transfer")
-        return Interface(contact=self.neumann, neumann=self.contact, gap=self.gap, law=self.law, profile=self.profile)
+        return Interface(
+            contact=self.neumann,
+            neumann=self.contact,
+            gap=self.gap,
+            law=self.law,
+            profile=self.profile,
+            slipped=self.slipped,
+        )
 
 
 def turned_transfer(P: NDArray[Any] | None, contact: NDArray[Any] | None, neumann: NDArray[Any] | None) -> Any:

@@ -27,7 +27,8 @@ from verification.interface.interface import Grid, Interface, Law
 from verification.interface.joining import check_slopes
 from verification.problem import Problem, Settings
 from verification.problem.specs import MOST_FRICTION, Profile
-from verification.value import Value, freeze
+from verification.problem.steps import path_warnings
+from verification.value import Value, copied, freeze
 
 #: Condensation loses one digit of the least stiff motion of a body for each digit of 1/rcond: at 1e-13 three are left.
 LEAST_RCOND = 1e-13
@@ -168,6 +169,29 @@ class ContactPair(Value):
         law = None if {"law", "radius"} & values.keys() else self.interface.law
         return pair_from(self.problem.changed(**values), law=law, like=self)
 
+    def under(self, problem: Problem, slipped: Floats | None = None) -> ContactPair:
+        """Return the same bodies under the loads of another problem, which has no other difference.
+
+        Nothing is assembled or factorised anew.
+
+        Parameters
+        ----------
+        slipped : array, shape (contact nodes,), optional
+            ``u1_T - u2_T`` so far, from which friction measures slip; 0 by default.
+
+        Raises
+        ------
+        ProblemError
+            Two sides prescribe different displacements of a node.
+        ValueError
+            The pair is made from matrices.
+        """
+        bodies = self.on_meshes().under(problem, slipped)
+        lower, upper = (side.under(body) for side, body in zip((self.body1, self.body2), bodies.elastic, strict=True))
+        contact, neumann = (lower, upper) if self.neumann_body == 2 else (upper, lower)
+        interface = copied(self.interface, slipped=slipped)
+        return replace(self, contact=contact, neumann=neumann, interface=interface, problem=problem)
+
     def swapped(self) -> ContactPair:
         """Return the same bodies with the roles exchanged; condensed matrices are shared.
 
@@ -233,6 +257,13 @@ class ContactPair(Value):
         """The name in errors: a file, ``<dict>`` or ``<matrices>``."""
         return "<matrices>" if self.problem is None else self.problem.source
 
+    @cached_property
+    def offset(self) -> Floats:
+        """The jump of the contact body against the other one at which v = 0: the slip so far, and the gap."""
+        offset = self.interface.offset
+        offset[self.contact.grid.tangential] *= self.normal_sign
+        return freeze(offset)
+
     @property
     def rubs(self) -> bool:
         """True if friction can act."""
@@ -268,7 +299,8 @@ class ContactPair(Value):
     def warnings(self) -> list[str]:
         """Facts that a user should know before trusting the numbers."""
         bodies = [side.body for side in (self.body1, self.body2) if side.body is not None]
-        return warnings_of(self.interface, self.friction, bodies)
+        path = [] if self.problem is None else path_warnings(self.problem)
+        return warnings_of(self.interface, self.friction, bodies) + path
 
 
 def pair_from(problem: Problem, *, law: Law | None = None, like: ContactPair | None = None) -> ContactPair:
@@ -292,6 +324,11 @@ def pair_from(problem: Problem, *, law: Law | None = None, like: ContactPair | N
     bodies, iteration = held_bodies(problem, law=law), problem.iteration
     known = (None, None) if like is None else (like.body1, like.body2)
     upward, grids = iteration.neumann_body == 2, (bodies.interface.contact, bodies.interface.neumann)
+    interface = bodies.interface
+    if like is not None and like.interface.slipped is not None:
+        if not interface.contact.equals(like.interface.contact):
+            raise problem.refuse("contact", None, "needed the contact nodes of the increment, on which it has slipped")
+        interface = replace(interface, slipped=like.interface.slipped)
     lower, upper = (
         _condensed(body, grid, upward, side)
         for body, grid, side in zip(bodies.elastic, grids if upward else grids[::-1], known, strict=True)
@@ -301,7 +338,7 @@ def pair_from(problem: Problem, *, law: Law | None = None, like: ContactPair | N
     return ContactPair(
         contact=lower if upward else upper,
         neumann=upper if upward else lower,
-        interface=bodies.interface if upward else bodies.interface.reversed(),
+        interface=interface if upward else interface.reversed(),
         friction=bodies.friction,
         neumann_body=iteration.neumann_body,
         settings=iteration.settings,

@@ -226,8 +226,7 @@ def between(setting: DrawnSetting, psi: Floats, other: Floats) -> Difference:
     for force in (psi, other):
         u, solution = _solve(pair, force)
         image = pair.interface.carry_back(solution.force)
-        w_1 = pair.interface.carry(u) + solution.v
-        w_1[pair.contact.grid.normal] += pair.interface.gap
+        w_1 = pair.interface.carry(u) + solution.v + pair.offset
         parts = ((w_1, pair.contact.schur), (force + pair.neumann.load, forms.inverse), (image, forms.inverse))
         size += sum(_norm(v, gram) ** 2 for v, gram in parts)
         solutions.append(solution)

@@ -80,12 +80,11 @@ IDS = ("5.30", "5.31", "5.32", "5.33", "5.36", "5.39", "5.44", "x-printed-false-
 def loaded(pair: ContactPair, g: Floats, v: Floats, force: Floats) -> ContactPair:
     """The same bodies, the contact body loaded so that step II answers g with the jump v and the reaction ``force``.
 
-    ``l_1 = force + S_1 (u_2 + gap + v)``, applied as forces on the contact nodes, which condensation does not change.
+    ``l_1 = force + S_1 (u_2 + offset + v)``, applied as forces on the contact nodes: condensation changes none of them.
     g acts on the grid of the Neumann body; v and the reaction, on the contact grid, must obey step II.
     """
     neumann, contact = pair.neumann, pair.contact
-    u = pair.interface.carry(neumann.known + neumann.flexibility(g + neumann.load)) + v
-    u[pair.contact.grid.normal] += pair.interface.gap
+    u = pair.interface.carry(neumann.known + neumann.flexibility(g + neumann.load)) + v + pair.offset
     return replace(pair, contact=replace(contact, load=force + contact.schur @ u), problem=None)
 
 

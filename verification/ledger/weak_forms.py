@@ -108,8 +108,7 @@ class Weak:
     def jump(self, one: Floats, two: Floats) -> Floats:
         """``v^1 - v^2`` on Gamma_c, less the initial gap in the normal components."""
         jump = self.trace(self.one, one) - self.carried(two)
-        jump[self.pair.contact.grid.normal] -= self.pair.interface.gap.reshape(-1, *[1] * (jump.ndim - 1))
-        return jump
+        return jump - self.pair.offset.reshape(-1, *[1] * (jump.ndim - 1))
 
     def bound(self, two: Floats) -> Floats:
         """``w_j k |S sigma_N|`` at the contact nodes, sigma_N that of body 2."""
@@ -131,8 +130,7 @@ class Weak:
     def at(self, state: Iterate) -> Fields:
         """``w^1`` and ``w^2`` of (5.5) and (5.6), steps II and I of an evaluation of T."""
         pair = self.pair
-        moved = pair.interface.carry(state.displacement) + state.contact.v
-        moved[pair.contact.grid.normal] += pair.interface.gap
+        moved = pair.interface.carry(state.displacement) + state.contact.v + pair.offset
         traces = {self.one.name: pair.contact.orient(moved), self.two.name: pair.neumann.orient(state.displacement)}
         body1, body2 = pair.on_meshes().elastic
         return self.of((body1.displacement(traces["body1"]), body2.displacement(traces["body2"])))

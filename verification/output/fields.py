@@ -12,6 +12,7 @@ from fem1d2d.mesh import Floats
 from ndtheory import __version__
 from ndtheory.texts import printable
 from verification.algorithm.runs import Run
+from verification.history import History
 from verification.interface.body import Body
 from verification.monolithic import Solution
 
@@ -22,15 +23,33 @@ CELLS = {1: "line", 2: "triangle"}
 SIX = (0, 1, 2, 0, 1, 0), (0, 1, 2, 1, 2, 2)
 
 
-def write_fields(result: Run | Solution, room: Path) -> None:
+def write_series(history: History, room: Path) -> None:
+    """Write ``body1.pvd`` and ``body2.pvd``, the fields of all increments over time, and a VTU file for each one."""
+    places = [f"-{i:04}" for i in range(1, len(history.increments) + 1)]
+    for place, increment in zip(places, history.increments, strict=True):
+        write_fields(increment.result, room, place)
+    for name in ("body1", "body2"):
+        sets = [
+            f'<DataSet timestep="{increment.time!r}" part="0" file="{name}{place}.vtu"/>'
+            for place, increment in zip(places, history.increments, strict=True)
+            if (room / f"{name}{place}.vtu").exists()
+        ]
+        if sets:
+            head = f'<?xml version="1.0"?>\n<!-- ndtheory {__version__} -->\n<VTKFile type="Collection"><Collection>'
+            text = "\n".join([head, *sets, "</Collection></VTKFile>", ""])
+            (room / f"{name}.pvd").write_text(text, encoding="utf-8")
+
+
+def write_fields(result: Run | Solution, room: Path, place: str = "") -> None:
     """Write ``body1.vtu`` and ``body2.vtu``: displacement at the nodes, stresses on the cells; none where rigid.
 
-    A run is written at its last iterate.
+    A run is written at its last iterate; ``place`` follows the name of the body.
     """
     bodies, units = result.bodies, result.units
+    says = f"lengths in {units['length']}, stresses in {units['stress']}"
     for body, u in zip((bodies.body1, bodies.body2), result.displacements, strict=True):
         if body is not None and u is not None:
-            _write(room / f"{body.name}.vtu", body, u, f"lengths in {units['length']}, stresses in {units['stress']}")
+            _write(room / f"{body.name}{place}.vtu", body, u, says)
 
 
 def _write(path: Path, body: Body, u: Floats, says: str) -> None:

@@ -20,7 +20,7 @@ try:
 except ImportError:  # Windows: what a killed process leaves stays there
     LOCKS = False
 
-Kind = Literal["run", "solve", "compare", "verify", "reproduce"]
+Kind = Literal["run", "solve", "march", "compare", "verify", "reproduce"]
 
 _PICTURES = ("bodies.svg", "bodies.png", "residuals.svg", "residuals.png")
 
@@ -35,10 +35,16 @@ _FIELDS = ("body1.vtu", "body2.vtu")
 
 _MATRICES = ("interface.npz", "P.npz")
 
+#: The views of a history, and the fields of its increments: of each body ``body1-0001.vtu``, .. in ``body1.pvd``.
+_VIEWS = tuple(f"{view}.{ending}" for view in ("loop", "states", "shear") for ending in ("svg", "png"))
+_SERIES = ("body1.pvd", "body2.pvd")
+_IN_SERIES = "body[12]-[0-9][0-9][0-9][0-9].vtu"
+
 #: The files that each command writes, beside the problem.
 FILES: dict[Kind, tuple[str, ...]] = {
     "run": ("run.json", *_TABLES, *_MATRICES, *_FIELDS, *_PICTURES),
     "solve": ("solve.json", *_TABLES[:1], *_MATRICES[1:], *_FIELDS, *_PICTURES[:2]),
+    "march": ("history.json", *_TABLES, *_SERIES, *_VIEWS),
     "compare": ("compare.json", *_TABLES, *_MATRICES, *_FIELDS, *_PICTURES, *_LOSSES, "report.html"),
     "reproduce": ("reproduce.json", "reproduce.svg", "reproduce.png", *_ROWS),
     "verify": ("ledger.json", "ledger.md", "errata.md", "verdicts.json"),
@@ -50,6 +56,7 @@ MARKS = {
     ".svg": b"<dc:title>ndtheory</dc:title>",
     ".png": b"Software\x00ndtheory",
     ".vtu": b"<!-- ndtheory ",
+    ".pvd": b"<!-- ndtheory ",
     ".html": b'name="generator" content="ndtheory ',
     ".md": b"<!-- ndtheory verify -->",
     ".csv": b"# ndtheory ",
@@ -61,6 +68,12 @@ MARKS = {
 
 #: No file of this program is larger, so that reading a file to look for its mark ends.
 MOST_BYTES = 500_000_000
+
+
+def files_of(kind: Kind, folder: Path) -> tuple[str, ...]:
+    """Return the names of the files that a command writes, of a series those that are in the folder."""
+    series = sorted(path.name for path in folder.glob(_IN_SERIES)) if kind == "march" else ()
+    return (*FILES[kind], *series)
 
 
 def check_ours(target: Path, option: str = "-o") -> None:

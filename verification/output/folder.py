@@ -8,17 +8,29 @@ from typing import TYPE_CHECKING, Any
 
 from ndtheory import __version__
 from verification.algorithm.runs import Run
+from verification.document import Document
 from verification.interface.files import write_interface, write_transfer
 from verification.interrupts import undisturbed
 from verification.ledger import sheets
-from verification.output.fields import write_fields
-from verification.output.files import FILES, MARKS, MOST_BYTES, Kind, check_folder, check_ours, check_place, staged
+from verification.output.fields import write_fields, write_series
+from verification.output.files import (
+    FILES,
+    MARKS,
+    MOST_BYTES,
+    Kind,
+    check_folder,
+    check_ours,
+    check_place,
+    files_of,
+    staged,
+)
 from verification.problem.tables import ProblemError, unreadable
 from verification.spreadsheet import as_csv
 
 if TYPE_CHECKING:
     from verification.comparison import Comparison
     from verification.figures import Figure
+    from verification.history import History
     from verification.ledger import Ledger
     from verification.monolithic import Solution
     from verification.reproduce import Reproduction
@@ -36,7 +48,7 @@ class Folder:
     def __init__(self, path: Path, kind: Kind) -> None:
         self.path, self.kind = path, kind
         check_folder(path)
-        for name in FILES[kind]:
+        for name in files_of(kind, path):
             check_ours(path / name)
         if kind not in ("verify", "reproduce"):
             check_place(path / "problem.toml")  # a file of a user's stays as it is
@@ -56,7 +68,7 @@ class Folder:
 
         RuntimeError if a file is written that FILES does not list: then nothing takes its place.
         """
-        with staged(self.path, FILES[self.kind]) as room:
+        with staged(self.path, files_of(self.kind, self.path)) as room:
             _text(room / FILES[self.kind][0], found.to_json())
             match self.kind:
                 case "verify":
@@ -65,10 +77,12 @@ class Folder:
                     _reproduced(room, found)
                 case "compare":
                     self._compared(room, found)
+                case "march":
+                    self._marched(room, found)
                 case _:
                     self._tables(room, found)
                     _pictures(room, found)
-            if unknown := {path.name for path in room.iterdir()} - {*FILES[self.kind], "problem.toml"}:
+            if unknown := {path.name for path in room.iterdir()} - {*files_of(self.kind, room), "problem.toml"}:
                 names = ", ".join(sorted(unknown))
                 raise RuntimeError(f"{names}: needed in FILES, so that a file of a user's is never overwritten")
 
@@ -93,6 +107,21 @@ class Folder:
         if interface.transfer is not None:
             write_transfer(interface, room / "P.npz")
         write_fields(result, room)
+        self._problem(room, result)
+
+    def _marched(self, room: Path, history: History) -> None:
+        """Increments and Gamma_c as CSV, the fields as a series, the problem where a user has none, the views."""
+        from verification.figures import draw_history
+
+        length, stress = history.units["length"], history.units["stress"]
+        units = f"x, gap, slip in {length}; stresses in {stress}; forces in {stress} {length}"
+        _csv(room / "contact.csv", units, history.contact_table())
+        _csv(room / "history.csv", f"one row an increment; {units}", history.table())
+        write_series(history, room)
+        self._problem(room, history)
+        _save(room, {view: draw_history(history, view) for view in ("loop", "states", "shear")})
+
+    def _problem(self, room: Path, result: Document) -> None:
         there = self.path / "problem.toml"
         ours = not there.exists() or (not unreadable(there, MOST_BYTES) and MARKS[".toml"] in there.read_bytes())
         if result.problem is not None and ours:

@@ -17,15 +17,18 @@ from verification.problem.specs import (
     MOST_CELLS,
     MOST_CONTRAST,
     MOST_FRICTION,
+    MOST_INCREMENTS,
     RECTANGLE_SIDES,
     BodySpec,
     Components,
     ContactSpec,
     IterationSpec,
+    Loads,
     MeshFile,
     ProblemSpec,
     Profile,
     SidePart,
+    StepSpec,
     Theta,
     read_theta,
 )
@@ -111,6 +114,7 @@ def read_problem(data: Mapping[str, Any], source: str) -> ProblemSpec:
             needed = "needed an elastic body: an obstacle has no named sides (contact.interval takes one)"
             raise top.refuse(f"{name}.shape", "rigid", needed)
     iteration = _read_iteration(top.table("iteration"))
+    steps = _read_steps(top, {"body1": body1, "body2": body2}, dimension)
     norm = top.table("norm")
     length = norm.take("length", positive, Fraction(1))
     norm.close()
@@ -124,6 +128,7 @@ def read_problem(data: Mapping[str, Any], source: str) -> ProblemSpec:
         contact=contact,
         iteration=iteration,
         length=length,
+        steps=steps,
         source=source,
     )
 
@@ -233,6 +238,10 @@ def _names(table: TomlTable) -> Iterator[str]:
             raise table.refuse(str(name), None, str(error)) from None
 
 
+#: The sides of a shape; a mesh file names its own, which are known only later.
+SIDES: Mapping[str, tuple[str, ...]] = {"rectangle": RECTANGLE_SIDES, "interval": INTERVAL_SIDES}
+
+
 def _plane(value: Any) -> Any:
     """Read the name of a plane model."""
     if value == "axisymmetric":
@@ -252,8 +261,7 @@ def _read_body(table: TomlTable, dimension: int, plane: Literal["strain", "stres
     if shape["shape"] == "rigid":
         table.close()
         return BodySpec(**shape)
-    known: dict[str, tuple[str, ...]] = {"rectangle": RECTANGLE_SIDES, "interval": INTERVAL_SIDES}
-    sides = known.get(shape["shape"])  # the sides of a mesh file are known only later
+    sides = SIDES.get(shape["shape"])
     parts = _read_parts(table.table("parts"), sides, dimension)
     if sides is not None:
         sides += tuple(parts)
@@ -282,12 +290,7 @@ def _read_body(table: TomlTable, dimension: int, plane: Literal["strain", "stres
         if name in prescribed:
             raise table.refuse(f"prescribed.{name}", list(prescribed[name]), f"side {name!r} is fixed already")
     traction = _by_side(table.table("traction"), sides, _components(dimension, free=False))
-    for name, force in traction.items():
-        held = prescribed.get(name, (None,) * dimension) if name not in fixed else (Fraction(0),) * dimension
-        if any(t != 0 and h is not None for t, h in zip(force, held, strict=True)):
-            raise table.refuse(
-                f"traction.{name}", list(force), "this component of the side is held: a force there is lost"
-            )
+    _check_tractions(table, traction, fixed, prescribed)
     body_force = table.take("body_force", _components(dimension, free=False), (Fraction(0),) * dimension)
     table.close()
     return BodySpec(
@@ -361,6 +364,66 @@ def _positions(value: Any) -> tuple[Fraction, ...]:
     if s[0] > 0 or not all(float(a) < float(b) for a, b in pairwise(s)):
         raise Unfit("needed increasing numbers, the first one at most 0")
     return s
+
+
+def _read_steps(top: TomlTable, bodies: Mapping[str, BodySpec], dimension: int) -> tuple[StepSpec, ...]:
+    """Read the tables ``[[step]]`` of a loading history, in which the supports of the bodies stay the same.
+
+    A side that the first step prescribes need not be prescribed by the body.
+    """
+
+    def read(value: Any) -> list[TomlTable]:
+        if not isinstance(value, (list, tuple)) or not all(isinstance(each, Mapping) for each in value):
+            raise Unfit("needed tables, each as [[step]]")
+        return [top.within(f"step[{i}]", each) for i, each in enumerate(value, 1)]
+
+    held = {name: dict(body.prescribed) for name, body in bodies.items()}
+    steps: list[StepSpec] = []
+    for i, table in enumerate(top.take("step", read, []), 1):
+        name, count = table.take("name", label, f"step {i}"), table.take("increments", at_least_one, 1)
+        if count + sum(step.increments for step in steps) > MOST_INCREMENTS:
+            raise table.refuse("increments", count, f"needed at most {MOST_INCREMENTS} increments of all steps")
+        loads = {
+            key: _read_loads(table.table(key), body, held[key], dimension, first=i == 1) for key, body in bodies.items()
+        }
+        table.close()
+        steps.append(StepSpec(name=name, increments=count, **loads))
+    return tuple(steps)
+
+
+def _read_loads(table: TomlTable, body: BodySpec, held: dict[str, Components], dimension: int, *, first: bool) -> Loads:
+    """Read the loads of a body at the end of a step; ``held`` has the sides prescribed before, and gets new ones."""
+    if body.rigid:
+        if names := list(table.names()):
+            raise table.refuse(names[0], None, "a rigid body has no loads")
+        return Loads()
+    sides = SIDES.get(body.shape)
+    sides = None if sides is None else sides + tuple(body.parts)
+    prescribed = _by_side(table.table("prescribed"), sides, _components(dimension, free=True))
+    for side, values in prescribed.items():
+        refuse = lambda needed, side=side, values=values: table.refuse(f"prescribed.{side}", list(values), needed)
+        if side in body.fixed:
+            raise refuse(f"side {side!r} is fixed already")
+        if not first and side not in held:
+            raise refuse("needed a side that the body or the first step prescribes: supports stay through a history")
+        if [v is None for v in held.setdefault(side, values)] != [v is None for v in values]:
+            raise refuse('needed "free" where it was "free" before, only there: supports stay through a history')
+    traction = _by_side(table.table("traction"), sides, _components(dimension, free=False))
+    _check_tractions(table, traction, body.fixed, held)
+    body_force = table.take("body_force", _components(dimension, free=False), None)
+    table.close()
+    return Loads(prescribed=prescribed, traction=traction, body_force=body_force)
+
+
+def _check_tractions(
+    table: TomlTable, traction: Mapping[str, Components], fixed: tuple[str, ...], prescribed: Mapping[str, Components]
+) -> None:
+    """Refuse a force on a component that a side holds."""
+    for name, force in traction.items():
+        held = prescribed.get(name, (None,) * len(force)) if name not in fixed else (Fraction(0),) * len(force)
+        if any(t != 0 and h is not None for t, h in zip(force, held, strict=True)):
+            needed = "this component of the side is held: a force there is lost"
+            raise table.refuse(f"traction.{name}", list(force), needed)
 
 
 def factor(value: Any) -> Theta:

@@ -256,6 +256,11 @@ class Problem(ProblemSpec):
         return replace(self, iteration=replace(self.iteration, theta=read_theta(theta)))
 
     @property
+    def prescribes(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """The sides of body 1 and of body 2 with prescribed displacements."""
+        return tuple(self.body1.prescribed), tuple(self.body2.prescribed)
+
+    @property
     def contact_body(self) -> Literal[1, 2]:
         """The body that carries the contact grid: the one without the Neumann problem, or the only elastic one."""
         if self.body1.rigid or self.body2.rigid:

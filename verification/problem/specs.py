@@ -36,6 +36,9 @@ MOST_CELLS = 250_000
 #: Largest ratio of the two moduli: at 1e60 the bounds of Section 5, with high powers of M C_R / m, overflow a double.
 MOST_CONTRAST = Fraction(10**30)
 
+#: Largest number of increments of a loading history, all of whose results are kept.
+MOST_INCREMENTS = 2000
+
 #: Largest coefficient of friction: all contact sticks already, and larger ones would only overflow.
 MOST_FRICTION = Fraction(10**9)
 
@@ -218,6 +221,32 @@ class Profile:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Loads:
+    """Loads of a body that a step of a loading history names: prescribed displacements, tractions, body force.
+
+    Attributes as those of :class:`BodySpec`; the body force is None where it keeps its value.
+    """
+
+    prescribed: Mapping[str, Components] = field(default_factory=ReadOnly)
+    traction: Mapping[str, tuple[Fraction, ...]] = field(default_factory=ReadOnly)
+    body_force: tuple[Fraction, ...] | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("prescribed", "traction"):
+            object.__setattr__(self, name, ReadOnly(getattr(self, name)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class StepSpec:
+    """A step of a loading history: the loads at its end, reached in equal increments from those before."""
+
+    name: str
+    increments: int
+    body1: Loads
+    body2: Loads
+
+
+@dataclass(frozen=True, kw_only=True)
 class ContactSpec:
     """Gamma_c, the friction law and the initial distance.
 
@@ -307,6 +336,7 @@ class ProblemSpec:
     contact: ContactSpec
     iteration: IterationSpec
     length: Fraction
+    steps: tuple[StepSpec, ...] = ()
     source: str = field(default="<dict>", compare=False)
 
     @property

@@ -252,9 +252,7 @@ class TomlTable:
                 raise Unfit("needed a table")
             return self.within(name, value)
 
-        if required:
-            return self.take(name, read)
-        return self.take(name, read, TomlTable({}, self._file, self.key(name)))
+        return self.take(name, read) if required else self.take(name, read, self.within(name, {}))
 
     def names(self) -> Iterable[str]:
         """Return the keys not taken yet."""

@@ -11,7 +11,7 @@ from typing import Any
 from ndtheory import exact
 from ndtheory.number import LARGEST_EXPONENT
 from ndtheory.texts import CONTROL
-from verification.problem.specs import BodySpec, ContactSpec, MeshFile, ProblemSpec
+from verification.problem.specs import BodySpec, ContactSpec, Loads, MeshFile, ProblemSpec, StepSpec
 
 #: Integers up to this size are doubles: readers of JSON agree on them.
 LARGEST_INTEGER = 2**53
@@ -36,12 +36,12 @@ def tables(problem: ProblemSpec) -> dict[str, Any]:
         "contact": _contact(problem.contact),
         "iteration": {"neumann_body": problem.iteration.neumann_body} | vars(problem.iteration),
         "norm": {"length": problem.length},
+        **({"step": tuple(_step(step, problem.dimension == 1) for step in problem.steps)} if problem.steps else {}),
     }
 
 
 def _body(body: BodySpec) -> dict[str, Any]:
     bar = body.shape == "interval"
-    vector = lambda values: _vector(values, bar)
     written: dict[str, Any] = {
         "shape": None if body.mesh else body.shape,
         "mesh": body.mesh,
@@ -55,11 +55,23 @@ def _body(body: BodySpec) -> dict[str, Any]:
             "poisson": None if bar else body.poisson,
             "parts": {name: {"side": part.side, part.axis: part.ends} for name, part in body.parts.items()},
             "fixed": body.fixed,
-            "prescribed": {side: vector(values) for side, values in body.prescribed.items()},
-            "traction": {side: vector(values) for side, values in body.traction.items()},
-            "body_force": vector(body.body_force),
+            **_loads(body, bar),
         }
     return _present(written)
+
+
+def _loads(loads: BodySpec | Loads, bar: bool) -> dict[str, Any]:
+    force = loads.body_force
+    return {
+        "prescribed": {side: _vector(values, bar) for side, values in loads.prescribed.items()},
+        "traction": {side: _vector(values, bar) for side, values in loads.traction.items()},
+        "body_force": None if force is None else _vector(force, bar),
+    }
+
+
+def _step(step: StepSpec, bar: bool) -> dict[str, Any]:
+    bodies = {name: _present(_loads(loads, bar)) for name, loads in (("body1", step.body1), ("body2", step.body2))}
+    return _present({"name": step.name, "increments": step.increments, **bodies})
 
 
 def _contact(contact: ContactSpec) -> dict[str, Any]:
@@ -110,7 +122,7 @@ def written_number(value: Fraction) -> int | float | str:
 
 
 def toml(data: Mapping[str, Any]) -> str:
-    """Write a dictionary as TOML: its dictionaries as tables, those within them inline.
+    """Write a dictionary as TOML: its dictionaries as tables, lists of them as arrays of tables, those within inline.
 
     The keys are texts; the values are texts, numbers, truth values, lists and dictionaries.
 
@@ -122,8 +134,11 @@ def toml(data: Mapping[str, Any]) -> str:
     prescribed = { right = "1/3" }
     """
     tables = {name: value for name, value in data.items() if isinstance(value, Mapping)}
-    blocks = [_lines({name: value for name, value in data.items() if name not in tables})]
+    several = lambda given: isinstance(given, list) and given and all(isinstance(each, Mapping) for each in given)
+    arrays = {name: value for name, value in data.items() if several(value)}
+    blocks = [_lines({name: value for name, value in data.items() if name not in {*tables, *arrays}})]
     blocks += [f"[{key(name)}]\n{_lines(table)}" for name, table in tables.items()]
+    blocks += [f"[[{key(name)}]]\n{_lines(table)}" for name, array in arrays.items() for table in array]
     return "\n".join(block for block in blocks if block)
 
 

@@ -8,6 +8,7 @@ from verification.sections import (
     comparison,
     constants,
     exploration,
+    history,
     ledger,
     reproduction,
     run,

@@ -87,9 +87,7 @@ class Affine:
         contact, interface = pair.contact, pair.interface
         self.piece, self.key = replace(piece), key_of(piece.pattern, piece.sign, piece.still)
         piece = replace(piece)  # neither copy hands on the matrices that it has: they are not kept twice
-        unloaded = interface.carry(pair.neumann.unloaded)
-        obstacle = unloaded.copy()
-        obstacle[contact.grid.normal] += interface.gap
+        obstacle = interface.carry(pair.neumann.unloaded) + pair.offset
         trace = interface.carry(pair.neumann.inverse)
         start = contact.load - contact.schur @ obstacle  # q of step II at g = 0, where the bound is 0 as well
         v, force = systems.of(piece.pattern).solve(start, np.zeros(contact.grid.t))

@@ -1,0 +1,83 @@
+"""Two equal cylinders, pressed and then sheared: slip zone and shear of Cattaneo and Mindlin, in closed form."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mesh_writer import write_gmsh22
+
+import verification as vf
+
+E, NU, RADIUS, FRICTION = 70000.0, 0.3, 1.0, 0.3
+
+#: Half the width of the contact, to which the elements are fitted; bodies reach twenty times as far.
+HALF, REACH = 0.02, 20
+
+#: The top goes down by this (as much as makes that contact), and aside by these.
+DOWN, ASIDE = "-0.00166", ("0.000255", "0.0005")
+
+
+def graded(h, fine, growth=1.15):
+    """Distances from the contact: of size h where it is fine, then growing."""
+    found, step = [0.0], h
+    while found[-1] < REACH * HALF:
+        step *= growth if found[-1] > fine else 1.0
+        found.append(found[-1] + step)
+    return np.array(found)
+
+
+def crossed(path, x, y):
+    """Write rectangles split by both diagonals, so that all nodes of a side are alike and both bodies mirror images."""
+    X, Y = np.meshgrid(x, y, indexing="ij")
+    middle = lambda A: (A[1:, 1:] + A[:-1, 1:] + A[1:, :-1] + A[:-1, :-1]) / 4
+    points = np.concatenate([np.column_stack([A.ravel(), B.ravel()]) for A, B in ((X, Y), (middle(X), middle(Y)))])
+    node = np.arange(X.size).reshape(X.shape)
+    centre = X.size + np.arange(middle(X).size).reshape(middle(X).shape)
+    around = node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]
+    cells = [np.stack([around[i], around[i - 3], centre], -1).reshape(-1, 3) for i in range(4)]
+    line = lambda nodes: np.column_stack([nodes[:-1], nodes[1:]])
+    sides = {"bottom": node[:, 0], "top": node[:, -1], "left": node[0], "right": node[-1]}
+    write_gmsh22(path, points, np.concatenate(cells), {name: line(nodes) for name, nodes in sides.items()})
+    return str(path)
+
+
+def pressed_and_sheared(folder, elements):
+    """The ends of both steps of shear, with so many elements in half the contact."""
+    h = HALF / elements
+    half, depth = graded(h, 1.3 * HALF), graded(h, 0.4 * HALF)
+    x, end = np.concatenate([-half[:0:-1], half]), half[half > 1.3 * HALF][0]
+    low, high = crossed(folder / "low.msh", x, -depth[::-1]), crossed(folder / "high.msh", x, depth)
+    step = lambda aside, count: {"increments": count, "body2": {"prescribed": {"top": [aside, DOWN]}}}
+    problem = vf.Problem.from_dict({
+        "body1": {"mesh": low, "young": E, "poisson": str(NU), "fixed": ["bottom"]},
+        "body2": {"mesh": high, "young": E, "poisson": str(NU), "prescribed": {"top": [0, DOWN]}},
+        "contact": {"interval": [float(-end), float(end)], "friction": str(FRICTION), "law": "local"},
+        "iteration": {"theta": "0.5"},
+        "step": [step(0, 2), *(step(aside, 1) for aside in ASIDE)],
+    })  # fmt: skip
+    pair = vf.build(problem)
+    gap = pair.interface.contact.x**2 / RADIUS  # x^2 / 2R of each cylinder
+    found = vf.march(replace(pair, interface=replace(pair.interface, gap=gap)))
+    assert found.converged
+    return h, [each.contact for each in found.increments[2:]]
+
+
+@pytest.mark.parametrize("elements", [10, 14, 20])
+def test_slip_zone_and_shear_are_those_of_cattaneo_and_mindlin(tmp_path, elements):
+    h, ends = pressed_and_sheared(tmp_path, elements)
+    ratios = []
+    for contact in ends:
+        P, T = contact.force["normal"], -contact.force["tangential"]
+        a = np.sqrt(4 * P * (RADIUS / 2) * 2 * (1 - NU**2) / (np.pi * E))  # Hertz: E* = E / (2 (1 - nu^2))
+        peak, ratio = 2 * P / (np.pi * a), T / (FRICTION * P)
+        c = a * np.sqrt(1 - ratio)
+        sticks = np.array(contact.status) == "stick"
+        assert abs(np.abs(contact.x[sticks]).max() - c) <= h
+        inside = lambda r, x=contact.x: np.sqrt(np.maximum(1 - x**2 / r**2, 0))
+        exact = FRICTION * peak * (inside(a) - c / a * inside(c))
+        off = np.abs(-contact.shear - exact)
+        away = (np.abs(np.abs(contact.x) - c) > 0.1 * a) & (np.abs(contact.x) < 0.9 * a)
+        assert off[away].max() <= 0.01 * FRICTION * peak
+        ratios.append(ratio)
+    assert 0.3 < ratios[0] < 0.5
+    assert 0.6 < ratios[1] < 0.75

@@ -1,0 +1,70 @@
+"""``ndtheory march``: a loading history."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from verification.cli.console import complain, deliver, stages
+from verification.cli.options import FOLDER, JSON, OneOf, Typed, of_a_run
+from verification.cli.problems import load_problem, remedy, warn
+
+if TYPE_CHECKING:
+    from verification.history import Increment
+
+
+@click.command()
+@of_a_run
+@click.option(
+    "--method",
+    type=OneOf(["iteration", "monolithic"]),
+    default="iteration",
+    show_default=True,
+    help="The iteration, or the global method: the same history by another path.",
+)
+@FOLDER
+@JSON
+def march(file: Path, solver: Any, method: Any, folder: Path | None, as_json: bool, **changes: Any) -> int:
+    """Follow the loading history of the [[step]] tables of FILE, increment by increment.
+
+    Friction measures slip from the end of the last increment, so that it depends on the path.  Exit 0 where every
+    increment was computed, 1 where one did not converge, 130 after Ctrl-C; what was computed is shown and written.
+
+    \b
+    Example:
+      ndtheory march my.toml -o results
+      ndtheory march my.toml --method monolithic --json
+    """
+    problem = load_problem(file, **changes)
+    from verification import history
+    from verification.algorithm.runs import Run
+    from verification.output.folder import Folder
+    from verification.sections.history import sections
+
+    write = None if folder is None else Folder(folder, "march").write
+    with stages() as tell:
+
+        def watch(increment: Increment, planned: int) -> None:
+            steps = "" if increment.iterations is None else f", {increment.iterations} steps"
+            tell(f"step {increment.step} ({increment.name}){steps}", increment.time / len(problem.steps))
+
+        tell("measuring the constants", None)
+        found = history.march(problem, method=method, solver=solver, watch=watch)
+        tell("linearising", None)
+        try:
+            found = found.linearise() if found.converged else found
+        except KeyboardInterrupt:  # costs no increment
+            found = replace(found, interrupted=True)
+    warn(found.warnings)
+    deliver(found, sections, as_json, write, folder, typing=Typed(file=file, **changes).command)
+    if found.ended or found.interrupted:
+        complain(f"{found.ended or 'interrupted after the last increment'}: what was computed is kept")
+    last = found.increments[-1].result
+    if found.interrupted:
+        return 130
+    if isinstance(last, Run) and not last.converged:
+        complain(remedy(last, changes["swap"]))
+    return 0 if found.converged and not found.proved_violated else 1

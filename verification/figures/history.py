@@ -1,0 +1,145 @@
+"""A loading history: force against displacement, states over position and time, shear against its bound."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from fem1d2d.mesh import Floats
+from verification.figures.style import (
+    SHEAR,
+    STATES,
+    legend_beside,
+    mark_states,
+    mark_unfinished,
+    new_figure,
+    plain,
+    styled,
+)
+from verification.history import History
+
+#: Colours of the states in a map; the orange of slip and the grey of open nodes look alike in grey print.
+MAP = {"stick": STATES["stick"], "slip": STATES["slip"], "open": "#F4F4F4"}
+
+#: Most times of a figure of shear, unless some are asked for.
+MOST_TIMES = 4
+
+
+def draw_history(history: History, view: str = "loop", **options: Any) -> Figure:
+    """One view of a history: ``loop``, ``states``, or ``shear`` (with ``times``); ValueError for another word."""
+    views: dict[str, Callable[..., Figure]] = {"loop": _loop, "states": _states, "shear": _shear}
+    if view not in views:
+        raise ValueError(f"{view!r}: needed one of {', '.join(views)}")
+    with styled():
+        return views[view](history, **options)
+
+
+def driven(history: History) -> tuple[str, Floats, int]:
+    """Return what drives a history: its name, its values from time 0 on, and its axis, 0 along Gamma_c.
+
+    It is the prescribed displacement that varies most, along Gamma_c where one varies there and the problem is plane;
+    the mean slip where no displacement is prescribed.
+    """
+    found = []
+    plane = history.problem.dimension == 2
+    for name in ("body1", "body2"):
+        bodies = [getattr(each.result.problem, name) for each in history.increments]
+        for side, first in bodies[0].prescribed.items():
+            for axis in (axis for axis, value in enumerate(first) if value is not None):
+                values = np.array([0.0, *(float(body.prescribed[side][axis]) for body in bodies)])
+                label = f"displacement of {side} of {name} along {'xy'[axis]}"
+                found.append((plane and axis == 0, np.ptp(values), label, values, axis if plane else 1))
+    moving = [each for each in found if each[1] > 0]
+    if moving:
+        _, _, label, values, axis = max(moving, key=lambda each: each[:2])
+        return label, values, axis
+    weights = history.increments[0].contact.weights
+    return "mean slip", np.array([0.0, *(history.fields["slip"] @ weights / weights.sum())]), 0
+
+
+def _loop(history: History) -> Figure:
+    label, along, axis = driven(history)
+    which = ("tangential", "normal")[axis]
+    force = np.array([0.0, *(each.contact.force[which] for each in history.increments)])
+    units = history.problem.units
+    figure = new_figure(7.2, 3.6)
+    ax = figure.subplots()
+    ax.axhline(0, color="0.8", linewidth=0.8)
+    steps = np.array([0, *(each.step for each in history.increments)])
+    for number in np.unique(steps[1:]):
+        own = np.flatnonzero(steps == number)
+        rows = np.concatenate([own[:1] - 1, own])
+        name = history.increments[own[0] - 1].name
+        look: Any = {"color": f"{0.65 * (number - 1) / max(steps.max() - 1, 1):.3f}", "markersize": 3}
+        marker = "os^Dvx*"[(number - 1) % 7]
+        ax.plot(along[rows], force[rows], f"{marker}-", label=f"{number} {plain(name)}", **look)
+    ax.set_xlabel(f"{plain(label)} [{plain(units['length'])}]")
+    ax.set_ylabel(
+        f"{which} force{' on body 2' if axis == 0 else ''} [{plain(units['stress'])} {plain(units['length'])}]"
+    )
+    lost = sum(each.dissipated for each in history.increments)
+    ax.set_title(f"{plain(history.problem.title)}: friction took {lost:.4g} per unit thickness")
+    legend_beside(ax)
+    _unfinished(ax, history)
+    return figure
+
+
+def _states(history: History) -> Figure:
+    x = history.increments[0].contact.x
+    order = list(MAP)
+    codes = np.array([[order.index(state) for state in each.contact.status] for each in history.increments])
+    half = np.diff(x) / 2 if len(x) > 1 else np.array([0.5])
+    edges = np.concatenate([[x[0] - half[0]], (x[:-1] + x[1:]) / 2, [x[-1] + half[-1]]])
+    figure = new_figure(7.2, 4.2)
+    ax = figure.subplots()
+    rows = np.arange(len(codes) + 1) + 0.5
+    colours = ListedColormap(list(MAP.values()))
+    ax.pcolormesh(
+        edges, rows, codes, cmap=colours, norm=BoundaryNorm(np.arange(-0.5, 3), 3), edgecolor="0.75", linewidth=0.2
+    )
+    for i, (before, after) in enumerate(zip(history.increments, history.increments[1:], strict=False), 1):
+        if before.step != after.step:
+            ax.axhline(i + 0.5, color="0.1", linewidth=1.0)
+    for number, name in {each.step: each.name for each in history.increments}.items():
+        own = [i for i, each in enumerate(history.increments, 1) if each.step == number]
+        ax.text(1.01, (own[0] + own[-1]) / 2, plain(name), transform=ax.get_yaxis_transform(), va="center")
+    ax.set_xlabel(f"position along $\\Gamma_c$ [{plain(history.problem.units['length'])}]")
+    ax.set_ylabel("increment")
+    ax.set_title(plain(history.problem.title))
+    patches = [Patch(facecolor=colour, edgecolor="0.4", label=state) for state, colour in MAP.items()]
+    figure.legend(handles=patches, loc="outside lower center", ncols=3)
+    _unfinished(ax, history)
+    return figure
+
+
+def _shear(history: History, times: Sequence[float] | None = None) -> Figure:
+    every = np.array([each.time for each in history.increments])
+    if times is None:
+        last = {each.step: i for i, each in enumerate(history.increments)}
+        chosen = list(last.values())[-MOST_TIMES:]
+    else:
+        chosen = [int(np.argmin(np.abs(every - time))) for time in times]
+    figure = new_figure(7.2, 1.2 + 1.6 * len(chosen))
+    axes = np.atleast_1d(figure.subplots(len(chosen), sharex=True, sharey=True))
+    for ax, i in zip(axes, chosen, strict=True):
+        contact = history.increments[i].contact
+        look: Any = {"facecolor": "0.9", "edgecolor": "0.4", "linestyle": ":"}
+        ax.fill_between(contact.x, -contact.bound, contact.bound, label="friction bound", **look)
+        ax.plot(contact.x, contact.shear, "--", color=SHEAR, label="shear on body 2")
+        mark_states(ax, contact.status, contact.x, contact.shear)
+        ax.set_title(f"time {every[i]:g}, step {plain(history.increments[i].name)}")
+        ax.set_ylabel(f"stress [{plain(history.problem.units['stress'])}]")
+        legend_beside(ax)
+    axes[-1].set_xlabel(f"position along $\\Gamma_c$ [{plain(history.problem.units['length'])}]")
+    return figure
+
+
+def _unfinished(ax: Axes, history: History) -> None:
+    if not history.converged:
+        mark_unfinished(ax, f"{len(history.increments)} of {history.planned} increments")
