@@ -106,7 +106,7 @@ BUDGET = {
     "verification.advice": 5750,
     "verification.algorithm": 2260,
     "verification.bounds": 3280,
-    "verification.certificate": 1315,
+    "verification.certificate": 1320,
     "verification.cli": 2405,
     "verification.constants": 1310,
     "verification.contact": 940,
