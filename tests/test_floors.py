@@ -106,7 +106,7 @@ BUDGET = {
     "verification.advice": 6185,
     "verification.algorithm": 2260,
     "verification.bounds": 3570,
-    "verification.certificate": 1375,
+    "verification.certificate": 1380,
     "verification.cli": 2435,
     "verification.constants": 1311,
     "verification.contact": 940,
