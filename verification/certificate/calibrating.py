@@ -30,6 +30,9 @@ SHORTEST, GROWTH = 0.05, 1.5
 #: Room in each condition, tried one after the other: the solver often stops at 1e-6.
 ROOMS = (1e-6, 1e-5, 1e-4)
 
+#: From here on kappa - 1, by which the solver divides, has digits enough in doubles.
+NEAR = Fraction(1, 10**6)
+
 #: Binary digits after the point of a number of the field.
 DIGITS = 32
 
@@ -81,7 +84,9 @@ def for_cut_off(length: Fraction, lo: Fraction, hi: Fraction, kappa: Fraction) -
 
 
 def _first(x: list[Fraction], kappa: Fraction, found: Callable[[_Program], Proposal]) -> Calibration | None:
-    """The calibration with the least room that passes the check."""
+    """The calibration with the least room that passes the check; None for kappa near 1, where doubles lose it."""
+    if kappa < 1 + NEAR:
+        return None
     for room in ROOMS:
         nodes, tau, beta = found(_Program(x, float(kappa), room))
         try:
