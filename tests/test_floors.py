@@ -114,11 +114,11 @@ BUDGET = {
     "verification.exploration": 600,
     "verification.figures": 1520,
     "verification.interface": 3120,
-    "verification.ledger": 4320,
+    "verification.ledger": 4345,
     "verification.output": 470,
     "verification.problem": 1520,
     "verification.reproduce": 655,
-    "verification.sections": 2210,
+    "verification.sections": 2215,
     "verification.sweeps": 2400,
     "verification.testing": 1570,
 }

@@ -64,6 +64,7 @@ class Factor:
     """Carries by a factor."""
 
     transfer: np.ndarray
+    on_traces: None = None
 
     def carry(self, u):
         return self.transfer @ u

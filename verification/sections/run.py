@@ -150,8 +150,13 @@ def _contact(problem: Problem, contact: ContactFields, solved: str = "") -> list
     tangential = total["tangential"] if abs(total["tangential"]) > rounding else 0.0
     unit = f"{units['stress']} {units['length']} (per unit thickness)"
     pressure = figures(float(contact.pressure.max()), 4)
+    along_axes = []
+    if problem.contact.surface is not None:
+        x, y = (figures(float(value), 6) for value in contact.weights @ contact.tractions)
+        along_axes = [Labelled("on body 2", f"{x} along x, {y} along y")]
     return [
         nodes,
         Labelled("force", f"{normal}, {figures(tangential)} tangential, {unit}"),
+        *along_axes,
         Labelled("largest pressure", f"{pressure} {units['stress']}{solved}"),
     ]
