@@ -2,6 +2,7 @@
 
 import json
 import pickle
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,6 +25,9 @@ from verification.problem import ProblemError
 
 #: Documents of one problem in two positions agree up to this: rounding, and what conditions make of it.
 ROTATED = 1e-9
+
+#: Two meshes that Gmsh made, joined along an arc.
+PIN = Path(__file__).parents[2] / "docs" / "meshes" / "pin.toml"
 
 #: Size of the displacements that supports prescribe here.
 MOVED = 0.01
@@ -376,3 +380,15 @@ def test_a_quarter_turn_of_plates_with_two_rows_of_cells_changes_nothing(neumann
     a, b = vf.measure(flat), vf.measure(upright)
     for name in ("m", "M", "C_R", "C_s", "C_tr", "C_tr_half", "rho_max", "rho_min", "rho_normal", "kappa_1", "kappa_2"):
         assert getattr(b, name).value == pytest.approx(getattr(a, name).value, rel=1e-9), name
+
+
+@pytest.mark.parametrize("friction", ["0", "0.2"])
+def test_a_pin_that_only_its_groove_holds_feels_no_force_sideways(friction):
+    loose = {"body2.prescribed.top": '["free", -0.01]', "contact.friction": friction}
+    problem = vf.load(PIN).with_keys(loose | {"iteration.theta": "0.6"})
+    run, solution = vf.run(problem), vf.solve(problem)
+    assert run.pair.contact.loose
+    assert np.abs(run.contact.pressure - solution.contact.pressure).max() <= 1e-8 * solution.contact.pressure.max()
+    x, y = solution.contact.to_dict()["force"]["vector"]
+    assert abs(x) <= 1e-12 * y
+    assert y > 0
