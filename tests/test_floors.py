@@ -118,7 +118,7 @@ BUDGET = {
     "verification.output": 470,
     "verification.problem": 1520,
     "verification.reproduce": 655,
-    "verification.sections": 2215,
+    "verification.sections": 2220,
     "verification.sweeps": 2400,
     "verification.testing": 1570,
 }

@@ -2,6 +2,7 @@
 
 import json
 import pickle
+import re
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,8 @@ from verification.interface.files import read_interface, write_interface
 from verification.ledger import cases, weak_forms
 from verification.ledger.solutions import solutions
 from verification.problem import ProblemError
+from verification.sections.layout import text
+from verification.sections.of_results import of
 
 #: Documents of one problem in two positions agree up to this: rounding, and what conditions make of it.
 ROTATED = 1e-9
@@ -152,13 +155,13 @@ def numbers(document, path=""):
 def test_a_rotation_of_the_whole_problem_changes_no_document(name, angle, tmp_path):
     plain, other = (PROBLEMS[name](tmp_path, angle=a) for a in (0.0, angle))
     compared = lambda problem: vf.compare(problem, bounds=("repaired", "energy"))
-    for of, least in ((vf.solve, 8), (vf.run, 10), (vf.measure, 15), (vf.advise, 15), (compared, 25)):
-        one, two = (dict(numbers(of(problem).to_dict())) for problem in (plain, other))
+    for door, least in ((vf.solve, 8), (vf.run, 10), (vf.measure, 15), (vf.advise, 15), (compared, 25)):
+        one, two = (dict(numbers(door(problem).to_dict())) for problem in (plain, other))
         assert len(one) >= least
         assert one.keys() == two.keys()
         for place, values in one.items():
             off = np.abs(values - two[place]) / np.maximum(np.abs(values), 1.0 if len(values) > 2 else 1e-300)
-            assert off.max() <= ROTATED, (of, place)
+            assert off.max() <= ROTATED, (door, place)
     force, image = (vf.solve(problem).contact.to_dict()["force"]["vector"] for problem in (plain, other))
     assert vector(*force, angle) == pytest.approx(image, rel=1e-9)
 
@@ -392,3 +395,10 @@ def test_a_pin_that_only_its_groove_holds_feels_no_force_sideways(friction):
     x, y = solution.contact.to_dict()["force"]["vector"]
     assert abs(x) <= 1e-12 * y
     assert y > 0
+
+
+def test_the_screen_names_bodies_by_number_and_shows_the_force_along_both_axes():
+    shown = text(of(vf.solve(PIN)))
+    assert "Neumann body: 1 |" in shown
+    assert "23 nodes of body 2, Neumann grid: 19 of body 1" in shown
+    assert re.search(r"on body 2 +-13.57\d+ along x, 183.2\d+ along y", shown)

@@ -131,8 +131,10 @@ def _grids(contact_body: int, interface: Interface) -> list[Shown]:
     """The body that carries the contact grid, if there are two grids."""
     if interface.transfer is None:
         return []
-    own, other = PLACES[contact_body], PLACES[3 - contact_body]
-    counts = f"{interface.contact.n} nodes of the {own} body, Neumann grid: {interface.neumann.n} of the {other}"
+    own, other = f"the {PLACES[contact_body]} body", f"the {PLACES[3 - contact_body]}"
+    if interface.contact.normals is not None:  # either body may lie above
+        own, other = f"body {contact_body}", f"body {3 - contact_body}"
+    counts = f"{interface.contact.n} nodes of {own}, Neumann grid: {interface.neumann.n} of {other}"
     return [Labelled("contact grid", counts)]
 
 
