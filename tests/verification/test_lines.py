@@ -402,3 +402,21 @@ def test_the_screen_names_bodies_by_number_and_shows_the_force_along_both_axes()
     assert "Neumann body: 1 |" in shown
     assert "23 nodes of body 2, Neumann grid: 19 of body 1" in shown
     assert re.search(r"on body 2 +-13.57\d+ along x, 183.2\d+ along y", shown)
+
+
+@pytest.mark.parametrize("cells", [(10, 8), (8, 14), (10, 9)], ids=str)
+@pytest.mark.parametrize("named", [True, False])
+def test_two_convex_bodies_that_touch_do_not_overlap_as_they_are_drawn(named, cells, tmp_path):
+    """Where both grids have a node at the point that touches, and where only that of the contact body has one."""
+    low = write(tmp_path / "low.msh", (-0.2, 0.2), (cells[0], 3), lambda x: 0 * x - 0.3, lambda x: -x * x / 50)
+    up = write(tmp_path / "up.msh", (-0.25, 0.25), (cells[1], 3), lambda x: x * x / 2, lambda x: 0 * x + 0.3)
+    where = {"surface": ["top", "bottom"]} if named else {"interval": [-0.2, 0.2]}
+    problem = vf.Problem.from_dict({
+        "body1": low | {"young": 70000, "poisson": 0.3, "fixed": ["bottom"]},
+        "body2": up | {"young": 20000, "poisson": 0.3, "prescribed": {"top": [0, "-0.001"]}},
+        "contact": where,
+    })  # fmt: skip
+    solution = vf.solve(problem)
+    assert -1e-7 <= solution.bodies.interface.gap.min() <= 4e-4
+    assert not [words for words in solution.warnings if "overlap" in words]
+    assert solution.contact.force["normal"] > 0
