@@ -15,7 +15,10 @@ from numpy.typing import NDArray
 from fem1d2d.mesh import Floats, Ints, Mesh, MeshError, undirected
 from fem1d2d.trace import SAME
 
-#: The largest corner between two edges, in degrees: beyond it a bisector is no normal of either, and the line is cut.
+#: Pairs of an edge and a node that are computed together: arrays of some 10 MB.
+TOGETHER = 200_000
+
+#: The largest corner between two edges, in degrees: beyond it a bisector is far from both normals, and the line is cut.
 SHARPEST = 20.0
 
 
@@ -72,7 +75,7 @@ class Line:
         if abs(turn[sharp]) > SHARPEST:
             raise MeshError(
                 f"the corner of side {side!r} at ({points[sharp, 0]:g}, {points[sharp, 1]:g}) has"
-                f" {abs(turn[sharp]):.3g} degrees: needed at most {SHARPEST:g}; cut the line there"
+                f" {abs(turn[sharp]):.3g} degrees: needed at most {SHARPEST:g}; cut it there, or mesh a curve finer"
             )
         tangents = before + after
         tangents /= np.linalg.norm(tangents, axis=1)[:, None]
@@ -99,29 +102,33 @@ class Line:
         MeshError
             The normal at a node meets no part of the other line that faces it, or normals cross before it.
         """
-        start, along = other.points[:-1], np.diff(other.points, axis=0)
-        tangents = np.stack([self.normals[:, 1], -self.normals[:, 0]], axis=1)
-        ahead = other.points @ tangents.T - (self.points * tangents).sum(axis=1)  # (other nodes, nodes)
-        rise = np.diff(ahead, axis=0)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            place = -ahead[:-1] / rise
         size = float(max(np.ptp(line.points, axis=0).max() for line in (self, other)))
-        slack = SAME * size / np.linalg.norm(along, axis=1)[:, None]
-        meets = (rise > 0) & (place >= -slack) & (place <= 1 + slack)
-        place = np.clip(np.where(meets, place, 0.0), 0.0, 1.0)
-        hit = start[:, None] + place[..., None] * along[:, None]  # (edges, nodes, 2)
-        far = np.abs(((hit - self.points) * self.normals).sum(axis=2))
-        edge = np.argmin(np.where(meets, far, np.inf), axis=0)
-        each = np.arange(len(self.points))
-        lost = ~meets.any(axis=0)
-        if lost.any():
-            raise MeshError(f"does not face {_at(self.points[np.argmax(lost)])}")
-        met = other.s[edge] + place[edge, each] * np.diff(other.s)[edge]
+        n, step = len(self.points), max(1, TOGETHER // len(other.points))
+        parts = [self._meets(other, np.arange(i, min(i + step, n)), SAME * size) for i in range(0, n, step)]
+        edge, place = (np.concatenate(found) for found in zip(*parts, strict=True))
+        met = other.s[edge] + place * np.diff(other.s)[edge]
         back = np.flatnonzero(np.diff(met) <= 0)
         if len(back):
             raise MeshError(f"is met by normals that cross near {_at(self.points[back[0]])}")
         gap = ((smooth(other.s, other.points, met) - self.points) * self.normals).sum(axis=1)
         return Seen(gap=gap, met=met, s=_onto(other.s, met, self.s))
+
+    def _meets(self, other: Line, nodes: Ints, slack: float) -> tuple[Ints, Floats]:
+        """The edges of another line that normals meet first, and the places there between 0 and 1."""
+        points, normals = self.points[nodes], self.normals[nodes]
+        start, along = other.points[:-1, None], np.diff(other.points, axis=0)[:, None]  # (edges, 1, 2)
+        tangents = np.stack([normals[:, 1], -normals[:, 0]], axis=1)
+        rise = (along * tangents).sum(axis=2)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            place = ((points - start) * tangents).sum(axis=2) / rise
+        beyond = slack / np.linalg.norm(along, axis=2)
+        meets = (rise > 0) & (place >= -beyond) & (place <= 1 + beyond)
+        if not meets.any(axis=0).all():
+            raise MeshError(f"does not face {_at(points[np.argmin(meets.any(axis=0))])}")
+        place = np.clip(np.where(meets, place, 0.0), 0.0, 1.0)
+        far = np.abs(((start + place[..., None] * along - points) * normals).sum(axis=2))
+        edge = np.argmin(np.where(meets, far, np.inf), axis=0)
+        return edge, place[edge, np.arange(len(nodes))]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -101,11 +101,11 @@ FLOORS: dict[str, dict[str, str]] = {
 
 #: Lines of each package at most, those of packages inside it apart: whoever needs more says here how many.
 BUDGET = {
-    "fem1d2d": 4050,
+    "fem1d2d": 4055,
     "ndtheory": 5865,
     "verification": 1799,
     "verification.advice": 6185,
-    "verification.algorithm": 2268,
+    "verification.algorithm": 2270,
     "verification.bounds": 3575,
     "verification.certificate": 1410,
     "verification.cli": 2505,
@@ -115,11 +115,11 @@ BUDGET = {
     "verification.exploration": 600,
     "verification.figures": 1670,
     "verification.interface": 3300,
-    "verification.ledger": 4320,
+    "verification.ledger": 4345,
     "verification.output": 524,
     "verification.problem": 1920,
     "verification.reproduce": 655,
-    "verification.sections": 2438,
+    "verification.sections": 2450,
     "verification.sweeps": 2405,
     "verification.testing": 1583,
 }

@@ -65,6 +65,7 @@ class Factor:
 
     transfer: np.ndarray
     slipped: np.ndarray | None = None
+    on_traces: None = None
 
     def carry(self, u):
         return self.transfer @ u

@@ -1,9 +1,13 @@
 """Contact along named lines: a ramp, arcs of grids that differ, rotations, both methods, certificates, refusals."""
 
 import json
+import pickle
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.quiver import Quiver
 from mesh_writer import read_here, write_gmsh22
 
 import verification as vf
@@ -16,12 +20,17 @@ from verification.certificate.contraction import check_again
 from verification.interface.assembly import discretise
 from verification.interface.exact_bodies import ExactBody, exact_normals
 from verification.interface.files import read_interface, write_interface
-from verification.ledger import weak_forms
+from verification.ledger import cases, weak_forms
 from verification.ledger.solutions import solutions
 from verification.problem import ProblemError
+from verification.sections.layout import text
+from verification.sections.of_results import of
 
 #: Documents of one problem in two positions agree up to this: rounding, and what conditions make of it.
 ROTATED = 1e-9
+
+#: Two meshes that Gmsh made, joined along an arc.
+PIN = Path(__file__).parents[2] / "docs" / "meshes" / "pin.toml"
 
 #: Size of the displacements that supports prescribe here.
 MOVED = 0.01
@@ -146,13 +155,13 @@ def numbers(document, path=""):
 def test_a_rotation_of_the_whole_problem_changes_no_document(name, angle, tmp_path):
     plain, other = (PROBLEMS[name](tmp_path, angle=a) for a in (0.0, angle))
     compared = lambda problem: vf.compare(problem, bounds=("repaired", "energy"))
-    for of, least in ((vf.solve, 8), (vf.run, 10), (vf.measure, 15), (vf.advise, 15), (compared, 25)):
-        one, two = (dict(numbers(of(problem).to_dict())) for problem in (plain, other))
+    for door, least in ((vf.solve, 8), (vf.run, 10), (vf.measure, 15), (vf.advise, 15), (compared, 25)):
+        one, two = (dict(numbers(door(problem).to_dict())) for problem in (plain, other))
         assert len(one) >= least
         assert one.keys() == two.keys()
         for place, values in one.items():
             off = np.abs(values - two[place]) / np.maximum(np.abs(values), 1.0 if len(values) > 2 else 1e-300)
-            assert off.max() <= ROTATED, (of, place)
+            assert off.max() <= ROTATED, (door, place)
     force, image = (vf.solve(problem).contact.to_dict()["force"]["vector"] for problem in (plain, other))
     assert vector(*force, angle) == pytest.approx(image, rel=1e-9)
 
@@ -277,21 +286,15 @@ def test_an_interface_file_keeps_a_line(tmp_path):
 
 def test_what_does_not_fit_is_refused_in_one_line(tmp_path):
     problem = ramp(tmp_path)
-    refusals = {
-        ("contact.surface", '["top", "below"]'): r"body 2 has no side 'below'; its sides: left, right, bottom, top",
-        ("iteration.neumann_body", "2"): r"side 'bottom' of body 2 does not face \(-1, 0.3\), of 'top'",
-        ("contact.interval", "[-0.5, 0.5]"): "needed either surface or interval, not both",
-        ("contact.surface", '["top"]'): "two names of sides",
-        ("body1.fixed", '["bottom", "left"]'): "fits",
-        (
-            "body2.prescribed.left",
-            '[0, "free"]',
-        ): r"normal component of every contact node free; it holds the one at \(-0.8, 0.24\)",
-    }
-    for (key, value), message in refusals.items():
-        if message == "fits":  # the corner of the lower body lies outside of Gamma_c
-            vf.solve(problem.with_keys({key: value}))
-            continue
+    free = r"normal component of every contact node free; it holds the one at \(-0.8, 0.24\)"
+    for key, value, message in (
+        ("contact.surface", '["top", "below"]', "body 2 has no side 'below'; its sides: left, right, bottom, top"),
+        ("iteration.neumann_body", "2", r"side 'bottom' of body 2 does not face \(-1, 0.3\), of 'top'"),
+        ("contact.interval", "[-0.5, 0.5]", "needed either surface or interval, not both"),
+        ("contact.surface", '["top"]', "two names of sides"),
+        ("body1", {"shape": "rigid"}, "an obstacle has no named sides"),
+        ("body2.prescribed.left", '[0, "free"]', free),
+    ):
         with pytest.raises(ProblemError, match=message) as caught:
             vf.solve(problem.with_keys({key: value}))
         assert "\n" not in str(caught.value)
@@ -306,3 +309,115 @@ def test_the_weak_forms_of_whole_fields_hold_along_lines_of_any_shape(monkeypatc
     asked = ["2.4", "2.6", "4.4", "4.5", "4.9.1", "4.9.3", "5.1", "5.2", "lemma-5.2", "5.3", "5.5", "5.6"]
     for statement, evidence in solutions(asked).items():
         assert all(one.holds for one in evidence), (statement, [one.text for one in evidence])
+
+
+def test_figures_and_pages_draw_tractions_along_the_normals(tmp_path):
+    problem = shaft(tmp_path)
+    found = vf.solve(problem)
+    figure = found.plot(motions=True)
+    [arrows] = [drawn for drawn in figure.axes[0].collections if isinstance(drawn, Quiver)]
+    contact = found.contact
+    tangent = np.stack([contact.normal[:, 1], -contact.normal[:, 0]], axis=1)
+    drawn = np.stack([arrows.U, arrows.V], axis=1)
+    assert (drawn * contact.normal).sum(axis=1) == pytest.approx(contact.pressure, rel=1e-12)
+    assert (drawn * tangent).sum(axis=1) == pytest.approx(contact.shear, rel=1e-9, abs=1e-9 * contact.pressure.max())
+    assert figure.axes[1].lines[1].get_xdata() == pytest.approx(contact.s)
+    smooth = problem.with_keys({"contact": {"surface": ["right", "left"]}})  # with one friction, the runs of one row
+    page = vf.explore(vf.build(smooth)).page()
+    assert f'"normals":{json.dumps(contact.normal.round(6).tolist(), separators=(",", ":"))}' in page
+
+
+def test_sweeps_and_changes_share_bodies_along_a_line(tmp_path):
+    problem = ramp(tmp_path, friction=0.3)
+    pair = vf.build(problem)
+    other = pair.changed(young=(None, 4e4))
+    assert other.contact.body.turned is not None
+    fresh = vf.build(problem.changed(young=(None, 4e4)))
+    assert other.contact.schur == pytest.approx(fresh.contact.schur, rel=1e-12)
+    table = vf.sweep(problem, theta=["0.4"], neumann_body=[1, 2])
+    assert table.rows[0]["outcome"] == "converged"
+    assert "does not face (-1, 0.3)" in next(row["reason"] for row in table.rows if row["neumann_body"] == 2)
+    assert vf.run(pickle.loads(pickle.dumps(pair))).contact.pressure == pytest.approx(vf.run(pair).contact.pressure)
+
+
+def test_a_constant_pressure_on_an_arc_passes_up_to_an_error_that_vanishes_with_the_cells(tmp_path):
+    errors = []
+    for times in (1, 2, 4):
+        pair = vf.build(shaft(tmp_path, cells=(8 * times, 7 * times), friction=0))
+        even = lambda grid: np.concatenate([0 * grid.weights, grid.weights])
+        received, expected = pair.interface.carry_back(even(pair.contact.grid)), even(pair.neumann.grid)
+        errors.append(pair.neumann.dual_norm(received - expected) / pair.neumann.dual_norm(expected))
+    assert errors[0] <= 2e-3
+    assert errors[2] <= errors[0] / 8  # order 1.5 in this norm
+    force = lambda grid, vectors: np.stack(
+        [grid.components(vectors)[0] * grid.upright[:, 1] + grid.components(vectors)[1] * grid.upright[:, 0],
+         grid.components(vectors)[1] * grid.upright[:, 1] - grid.components(vectors)[0] * grid.upright[:, 0]]
+    ).sum(axis=1)  # fmt: skip
+    total = force(pair.contact.grid, even(pair.contact.grid))
+    assert force(pair.neumann.grid, received) == pytest.approx(total, rel=1e-12)  # no resultant is lost
+
+
+def test_some_drawn_problems_of_the_ledger_meet_on_an_upright_line():
+    for made in range(40):
+        rng = np.random.default_rng(made)
+        plates = cases.drawn(rng)
+        if "surface" not in plates["contact"]:
+            continue
+        upright = vf.Problem.from_dict(plates)
+        run, solution = vf.run(upright), vf.solve(upright)
+        assert np.abs(run.contact.pressure - solution.contact.pressure).max() <= 1e-6 * solution.contact.pressure.max()
+        assert set(np.abs(solution.contact.normal[:, 0])) == {1.0}
+        return
+    raise AssertionError("none of them is turned")
+
+
+@pytest.mark.parametrize("neumann_body", [1, 2])
+def test_a_quarter_turn_of_plates_with_two_rows_of_cells_changes_nothing(neumann_body):
+    """An even number of rows keeps the diagonals."""
+    data = cases.PROBLEMS["sheared, body 2 Neumann"]
+    plates = data | {"iteration": data["iteration"] | {"neumann_body": neumann_body}}
+    flat, upright = vf.Problem.from_dict(plates), vf.Problem.from_dict(cases.quarter_turn(plates, ["0.4", "1.6"]))
+    one, two = vf.solve(flat).contact, vf.solve(upright).contact
+    assert two.y == pytest.approx(one.x)
+    assert two.pressure == pytest.approx(one.pressure, rel=1e-12)
+    assert two.shear == pytest.approx(one.shear, rel=1e-11)
+    a, b = vf.measure(flat), vf.measure(upright)
+    for name in ("m", "M", "C_R", "C_s", "C_tr", "C_tr_half", "rho_max", "rho_min", "rho_normal", "kappa_1", "kappa_2"):
+        assert getattr(b, name).value == pytest.approx(getattr(a, name).value, rel=1e-9), name
+
+
+@pytest.mark.parametrize("friction", ["0", "0.2"])
+def test_a_pin_that_only_its_groove_holds_feels_no_force_sideways(friction):
+    loose = {"body2.prescribed.top": '["free", -0.01]', "contact.friction": friction}
+    problem = vf.load(PIN).with_keys(loose | {"iteration.theta": "0.6"})
+    run, solution = vf.run(problem), vf.solve(problem)
+    assert run.pair.contact.loose
+    assert np.abs(run.contact.pressure - solution.contact.pressure).max() <= 1e-8 * solution.contact.pressure.max()
+    x, y = solution.contact.to_dict()["force"]["vector"]
+    assert abs(x) <= 1e-12 * y
+    assert y > 0
+
+
+def test_the_screen_names_bodies_by_number_and_shows_the_force_along_both_axes():
+    shown = text(of(vf.solve(PIN)))
+    assert "Neumann body: 1 |" in shown
+    assert "23 nodes of body 2, Neumann grid: 19 of body 1" in shown
+    assert re.search(r"on body 2 +-13.57\d+ along x, 183.2\d+ along y", shown)
+
+
+@pytest.mark.parametrize("cells", [(10, 8), (8, 14), (10, 9)], ids=str)
+@pytest.mark.parametrize("named", [True, False])
+def test_two_convex_bodies_that_touch_do_not_overlap_as_they_are_drawn(named, cells, tmp_path):
+    """Where both grids have a node at the point that touches, and where only that of the contact body has one."""
+    low = write(tmp_path / "low.msh", (-0.2, 0.2), (cells[0], 3), lambda x: 0 * x - 0.3, lambda x: -x * x / 50)
+    up = write(tmp_path / "up.msh", (-0.25, 0.25), (cells[1], 3), lambda x: x * x / 2, lambda x: 0 * x + 0.3)
+    where = {"surface": ["top", "bottom"]} if named else {"interval": [-0.2, 0.2]}
+    problem = vf.Problem.from_dict({
+        "body1": low | {"young": 70000, "poisson": 0.3, "fixed": ["bottom"]},
+        "body2": up | {"young": 20000, "poisson": 0.3, "prescribed": {"top": [0, "-0.001"]}},
+        "contact": where,
+    })  # fmt: skip
+    solution = vf.solve(problem)
+    assert -1e-7 <= solution.bodies.interface.gap.min() <= 4e-4
+    assert not [words for words in solution.warnings if "overlap" in words]
+    assert solution.contact.force["normal"] > 0

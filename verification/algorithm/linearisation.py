@@ -105,7 +105,7 @@ def _near(pair: ContactPair, iterate: Iterate, theta: float, piece: Piece | None
     error: Floats = np.asarray(newton, dtype=float)
     margin, node = _margin(piece, iterate)
     if not margin > np.linalg.norm(error) + noise(pair, iterate):
-        raise NotLinear(f"the node at x = {pair.contact.grid.x[node]:g} is about to change its state")
+        raise NotLinear(f"the node at {pair.contact.grid.place(node)} is about to change its state")
     return _Near(piece=piece, J=J, error=error, margin=margin)
 
 

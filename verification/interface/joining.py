@@ -156,7 +156,9 @@ def _along_lines(problem: Problem, meshes: list[Mesh | None], known: list[Suppor
         seen = line.seen_from(other)
     except MeshError as error:
         needed = f"side {sides[1 - contact]!r} of body {2 - contact} {error}, of {sides[contact]!r}"
-        raise refuse(f"{needed}: it must face all of the contact body's side along its normals") from None
+        raise refuse(
+            f"{needed}: it must face all of the contact body's side along its normals; name a part of that side"
+        ) from None
     size = max(map(extent, both))
     within, s = SAME * size, seen.s
     kept = np.append(s[1:] > within, True) & np.insert(s[:-1] < line.s[-1] - within, 0, True)

@@ -193,7 +193,7 @@ PLANE: dict[str, dict[str, Any]] = {
 
 
 def drawn(rng: np.random.Generator) -> dict[str, Any]:
-    """Two plates with everything drawn at random; a third have grids that differ."""
+    """Two plates with everything drawn at random; a third have grids that differ, a quarter meet on an upright line."""
     pick = lambda low, high: round(float(rng.uniform(low, high)), 3)
     lower: dict[str, Any] = {"young": round(10 ** rng.uniform(-1, 1), 3), "poisson": pick(-0.3, 0.45)}
     upper: dict[str, Any] = {"young": round(10 ** rng.uniform(-1, 1), 3), "poisson": pick(-0.3, 0.45)}
@@ -204,4 +204,29 @@ def drawn(rng: np.random.Generator) -> dict[str, Any]:
     iteration = {"neumann_body": int(rng.integers(1, 3)), "theta": "auto"}
     if rng.random() < 1 / 3:
         upper["cells"] = [int(rng.integers(3, 12)), 2]
-    return _plates(lower, upper, contact=contact, iteration=iteration)
+    plates = _plates(lower, upper, contact=contact, iteration=iteration)
+    return quarter_turn(plates, [UPPER["x"][0], UPPER["x"][1]]) if rng.random() < 1 / 4 else plates
+
+
+#: Where each side goes by a quarter turn to the left.
+TURNED = {"bottom": "right", "right": "top", "top": "left", "left": "bottom"}
+
+
+def quarter_turn(plates: Mapping[str, Any], meet: Any) -> dict[str, Any]:
+    """Two plates turned to the left by 90 degrees: body 2 lies left of body 1, and named sides meet on an upright line.
+
+    ``meet`` are the ends of Gamma_c.  Diagonals of cells may run the other way.
+    """
+    turned = dict(plates)
+    for name, side in (("body1", "left"), ("body2", "right")):
+        body = dict(plates[name])
+        (low, high), negative = body["y"], lambda v: -Fraction(v)
+        body |= {"x": [negative(high), negative(low)], "y": body["x"], "cells": body["cells"][::-1]}
+        if "fixed" in body:
+            body["fixed"] = [TURNED[old] for old in body["fixed"]]
+        for key in {"prescribed", "traction"} & body.keys():
+            body[key] = {TURNED[old]: [negative(y), x] for old, (x, y) in body[key].items()}
+        body["parts"] = {"facing": {"side": side, "y": meet}}
+        turned[name] = body
+    turned["contact"] = {**plates["contact"], "surface": ["facing", "facing"]}
+    return turned

@@ -131,8 +131,10 @@ def _grids(contact_body: int, interface: Interface) -> list[Shown]:
     """The body that carries the contact grid, if there are two grids."""
     if interface.transfer is None:
         return []
-    own, other = PLACES[contact_body], PLACES[3 - contact_body]
-    counts = f"{interface.contact.n} nodes of the {own} body, Neumann grid: {interface.neumann.n} of the {other}"
+    own, other = f"the {PLACES[contact_body]} body", f"the {PLACES[3 - contact_body]}"
+    if interface.contact.normals is not None:  # either body may lie above
+        own, other = f"body {contact_body}", f"body {3 - contact_body}"
+    counts = f"{interface.contact.n} nodes of {own}, Neumann grid: {interface.neumann.n} of {other}"
     return [Labelled("contact grid", counts)]
 
 
@@ -150,8 +152,13 @@ def _contact(problem: Problem, contact: ContactFields, solved: str = "") -> list
     tangential = total["tangential"] if abs(total["tangential"]) > rounding else 0.0
     unit = f"{units['stress']} {units['length']} (per unit thickness)"
     pressure = figures(float(contact.pressure.max()), 4)
+    along_axes = []
+    if problem.contact.surface is not None:
+        x, y = (figures(float(value), 6) for value in contact.weights @ contact.tractions)
+        along_axes = [Labelled("on body 2", f"{x} along x, {y} along y")]
     return [
         nodes,
         Labelled("force", f"{normal}, {figures(tangential)} tangential, {unit}"),
+        *along_axes,
         Labelled("largest pressure", f"{pressure} {units['stress']}{solved}"),
     ]

@@ -25,7 +25,8 @@ def setting(problem: Problem, nodes: int | None, interface: int) -> Section:
     if any(one.rigid for one in bodies):
         facts = [f"Obstacle: {'lower' if problem.body1.rigid else 'upper'} body", friction]
     else:
-        facts = [f"Neumann body: {body} ({PLACES[body]})", friction, _how(problem)]
+        place = f" ({PLACES[body]})" if contact.surface is None else ""  # either body may lie above along a named line
+        facts = [f"Neumann body: {body}{place}", friction, _how(problem)]
     thin = ["plane stress"] if problem.plane == "stress" else []
     first = Facts(problem.title, (*counts, f"E {moduli} {units['stress']}", *thin))
     return section("setting", "", first, Facts("", tuple(facts)))
