@@ -108,7 +108,7 @@ BUDGET = {
     "verification.algorithm": 2268,
     "verification.bounds": 3570,
     "verification.certificate": 1375,
-    "verification.cli": 2501,
+    "verification.cli": 2504,
     "verification.constants": 1311,
     "verification.contact": 940,
     "verification.coupling": 420,
