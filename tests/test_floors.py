@@ -119,7 +119,7 @@ BUDGET = {
     "verification.output": 524,
     "verification.problem": 1903,
     "verification.reproduce": 655,
-    "verification.sections": 2438,
+    "verification.sections": 2441,
     "verification.sweeps": 2401,
     "verification.testing": 1583,
 }
