@@ -103,7 +103,7 @@ FLOORS: dict[str, dict[str, str]] = {
 BUDGET = {
     "fem1d2d": 4055,
     "ndtheory": 5865,
-    "verification": 1799,
+    "verification": 1792,
     "verification.advice": 6185,
     "verification.algorithm": 2270,
     "verification.bounds": 3575,

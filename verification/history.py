@@ -368,15 +368,21 @@ def march(
     rest = at_rest(whole)
     if like is not None and rest.prescribes != whole.prescribes:
         raise whole.refuse("step", None, "needed a pair whose bodies prescribe the sides that the first step does")
-    by: _Iteration | _Global
+    pair = None if like is None else like.under(rest)
+    by: _Iteration | None = None
     if method == "monolithic":
-        by = _Global(discretise(rest) if like is None else like.on_meshes().under(rest, None), path)
+        bodies = discretise(rest) if pair is None else pair.on_meshes()
+        _check_supports(bodies, path)
+        increments = _by_global_method(bodies, path)
     else:
-        by = _Iteration(pair_from(rest) if like is None else like.under(rest), path, theta, rule, solver)
+        pair = pair or pair_from(rest)
+        _check_supports(pair.on_meshes(), path)
+        by = _Iteration(pair, theta, rule, solver)
+        increments = by.increments(path)
     done: list[Increment] = []
     ended, interrupted = "", False
     try:
-        for increment in by.increments(path):
+        for increment in increments:
             done.append(increment)
             watch(increment, len(path))
             if increment.outcome != "converged":
@@ -395,8 +401,8 @@ def march(
         method=method,
         increments=tuple(done),
         planned=len(path),
-        measured=by.measured,
-        bounds=by.bounds,
+        measured=None if by is None else by.measured,
+        bounds={} if by is None else by.bounds,
         ended=ended,
         interrupted=interrupted,
     )
@@ -436,32 +442,19 @@ def _slipped(before: ContactFields | None, interface: Interface) -> Floats | Non
     return None if before is None else before.slip[: interface.contact.t]
 
 
-class _Global:
-    """The increments by the global method."""
-
-    measured: Measured | None = None
-    bounds: ClassVar[Mapping[str, BoundResult]] = {}
-
-    def __init__(self, bodies: TwoBodies, path: list[Moment]) -> None:
-        self._bodies = bodies
-        _check_supports(bodies, path)
-
-    def increments(self, path: list[Moment]) -> Iterator[Increment]:
-        before: ContactFields | None = None
-        for moment in path:
-            solution = solve(self._bodies.under(moment.problem, _slipped(before, self._bodies.interface)))
-            yield _increment(moment, solution, before)
-            before = solution.contact
+def _by_global_method(bodies: TwoBodies, path: list[Moment]) -> Iterator[Increment]:
+    before: ContactFields | None = None
+    for moment in path:
+        solution = solve(bodies.under(moment.problem, _slipped(before, bodies.interface)))
+        yield _increment(moment, solution, before)
+        before = solution.contact
 
 
 class _Iteration:
     """The increments by the iteration: constants, bounds and theta once, linear systems shared by all runs."""
 
-    def __init__(
-        self, pair: ContactPair, path: list[Moment], theta: Numeric | None, rule: Rule | str | None, solver: Solver
-    ) -> None:
+    def __init__(self, pair: ContactPair, theta: Numeric | None, rule: Rule | str | None, solver: Solver) -> None:
         check_memory(pair)
-        _check_supports(pair.on_meshes(), path)
         self._pair, self._solver = pair, solver
         self.measured = measure(pair)
         self._rule = rule_of(rule or pair.settings.relaxation)

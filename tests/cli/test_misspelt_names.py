@@ -88,7 +88,7 @@ def test_a_sweep_of_a_sweep_is_refused(call, tmp_path):
 
 #: What `-o` is of each command: a folder, or the one file that it makes.
 OUTPUT = {
-    **dict.fromkeys(["run", "solve", "compare", "demo", "sweep", "reproduce", "verify"], "DIR"),
+    **dict.fromkeys(["run", "solve", "march", "compare", "demo", "sweep", "reproduce", "verify"], "DIR"),
     "bounds": "FILE.svg",
     "explore": "FILE.html",
     "region": "FILE.svg",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from itertools import groupby
 
-from verification.history import NO_ITERATION, History
+from verification.history import History
 from verification.sections.numbers import NONE, count, figures, near_one
 from verification.sections.parts import Cell, Note, Quantity, Sections, Shown, following, of, section, table
 from verification.sections.setting import limits, setting
@@ -15,6 +15,7 @@ STEPS = (
     "One row a step: its increments, the steps that their runs took, and at its end the forces between the bodies, the "
     "nodes that stick, slip and are open, and the work of friction in the step."
 )
+PROMISE = "WHAT DOES THE THEOREM SAY OF EACH INCREMENT?"
 PICTURES = (
     ("loop", "The force between the bodies against the displacement that drives them; friction took the area inside."),
     ("states", "What sticks, slips and is open along Gamma_c, increment by increment."),
@@ -31,7 +32,7 @@ def sections(found: History) -> Sections:
     return (
         setting(found.problem, nodes, len(found.increments[0].contact.x)),
         section("history", "WHAT HAPPENED", *_happened(found), caption=STEPS, pictures=PICTURES),
-        section("promise", "WHAT DOES THE THEOREM SAY OF EACH INCREMENT?", *_promised(found)),
+        *([section("promise", PROMISE, *_promised(found))] if found.method == "iteration" else []),
         limits(found.outside, then),
     )
 
@@ -39,26 +40,31 @@ def sections(found: History) -> Sections:
 def _happened(found: History) -> Iterable[Shown | str]:
     units = found.problem.units
     rounding = 1e-12 * max(max(map(abs, each.contact.force.values())) for each in found.increments)
+    small = 1e-12 * sum(abs(each.dissipated) for each in found.increments)
     rows = []
     for number, group in groupby(found.increments, key=lambda each: each.step):
         done = list(group)
         force, pattern = done[-1].contact.force, done[-1].contact.pattern
+        taken = sum(each.dissipated for each in done)
         normal, tangential = (value if abs(value) > rounding else 0.0 for value in force.values())
         rows.append(
             (
-                f"{number} {done[-1].name}",
+                f"{number} {done[-1].name}".replace(f"{number} step {number}", f"step {number}"),
                 count(len(done)),
                 _range([each.iterations for each in done]),
                 figures(normal, 4),
                 figures(tangential, 4),
                 "/".join(map(str, pattern.values())),
-                figures(sum(each.dissipated for each in done), 3),
+                figures(taken if abs(taken) > small else 0.0),
             )
         )
     head = ("step", "increments", "steps", "normal", "tangential", "stick/slip/open", "friction")
-    unit = f"{units['stress']} {units['length']}"
     yield table(head, rows, right=(1,))
-    yield f"normal and tangential force in {unit}, work of friction in {unit}^2 (per unit thickness)"
+    unit = f"{units['stress']} {units['length']}"
+    if found.problem.dimension == 2:
+        yield f"normal and tangential force in {unit}, work of friction in {unit}^2 (per unit thickness)"
+    else:
+        yield f"normal force in {units['stress']} (per unit area)"
     if found.ended:
         yield Note(f"{found.ended}.", lead="Not whole:")
 
@@ -72,9 +78,6 @@ def _range(numbers: Sequence[int | None]) -> Cell:
 
 
 def _promised(found: History) -> Iterable[Shown | str]:
-    if found.method == "monolithic":
-        yield f"{NO_ITERATION}: nothing to compare."
-        return
     yield (
         "Friction measures slip from the last increment.  The slip so far is an offset that cancels in every"
         " difference: constants, bounds and the factor of one step are the same in each increment."
