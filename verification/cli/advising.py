@@ -111,7 +111,7 @@ def of_file(file: Path, keys: dict[str, str], swap: bool, tied: bool, snippets: 
       ndtheory advise my.toml
       ndtheory advise run --log precice-Solid-convergence.log --theta 0.5
       ndtheory advise moduli --conductivity 50,0.5
-      ndtheory advise my.toml --tied
+      ndtheory advise my.toml --set contact.friction=0.4
       ndtheory advise my.toml --snippets preCICE
       ndtheory advise results/interface.npz
     """
