@@ -33,7 +33,7 @@ FLOORS: dict[str, dict[str, str]] = {
         )
     },
     "for all of verification": {
-        "verification": "dense interrupts progress spreadsheet threads value",
+        "verification": "dense interrupts progress schemas spreadsheet threads value",
         "verification.sections": "__init__ layout numbers parts",
     },
     "input": {"verification.problem": "__init__ examples files reading specification specs tables writing"},
@@ -92,7 +92,8 @@ FLOORS: dict[str, dict[str, str]] = {
     "names for users": {"verification": "__init__"},
     "commands, test kit": {
         "verification.cli": (
-            "__init__ advising calculator certifying console exploring forms ledger main options problems sweeping"
+            "__init__ advising calculator certifying console documents exploring forms ledger main options problems "
+            "sweeping"
         ),
         "verification.testing": "__init__ bounds laws properties rules steps strategies transforms",
     },
@@ -102,12 +103,12 @@ FLOORS: dict[str, dict[str, str]] = {
 BUDGET = {
     "fem1d2d": 3845,
     "ndtheory": 5865,
-    "verification": 1240,
+    "verification": 1465,
     "verification.advice": 6185,
     "verification.algorithm": 2260,
     "verification.bounds": 3570,
     "verification.certificate": 1375,
-    "verification.cli": 2435,
+    "verification.cli": 2480,
     "verification.constants": 1311,
     "verification.contact": 940,
     "verification.coupling": 420,
