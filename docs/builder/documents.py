@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from verification.schemas import INCLUDED, TYPES, Row, tables
 
 #: Words in types that are not names of parts.
@@ -10,8 +12,9 @@ WORDS = {*TYPES, "object", "null"}
 
 def shown(kind: str) -> str:
     """A type with the names of parts in bold."""
-    before, of, last = kind.rpartition(" of ") if kind not in tables() else ("", "", kind)
-    return kind if last.removesuffix(" or null") in WORDS else f"{before}{of}**{last}**"
+    outer = re.match("((list|map) of )*", kind)[0]
+    last = kind.removeprefix(outer)
+    return kind if last.removesuffix(" or null") in WORDS else f"{outer}**{last}**"
 
 
 def line(row: Row) -> str:
