@@ -33,7 +33,7 @@ FLOORS: dict[str, dict[str, str]] = {
         )
     },
     "for all of verification": {
-        "verification": "dense interrupts progress spreadsheet threads value",
+        "verification": "dense interrupts progress schemas spreadsheet threads value",
         "verification.sections": "__init__ layout numbers parts",
     },
     "input": {"verification.problem": "__init__ examples files reading specification specs steps tables writing"},
@@ -92,8 +92,8 @@ FLOORS: dict[str, dict[str, str]] = {
     "names for users": {"verification": "__init__"},
     "commands, test kit": {
         "verification.cli": (
-            "__init__ advising calculator certifying console exploring forms ledger main marching options problems "
-            "sweeping"
+            "__init__ advising calculator certifying console documents exploring forms ledger main marching options "
+            "problems sweeping"
         ),
         "verification.testing": "__init__ bounds laws properties rules steps strategies transforms",
     },
@@ -103,12 +103,12 @@ FLOORS: dict[str, dict[str, str]] = {
 BUDGET = {
     "fem1d2d": 4055,
     "ndtheory": 5865,
-    "verification": 1792,
+    "verification": 2015,
     "verification.advice": 6185,
     "verification.algorithm": 2270,
     "verification.bounds": 3575,
     "verification.certificate": 1410,
-    "verification.cli": 2505,
+    "verification.cli": 2555,
     "verification.constants": 1325,
     "verification.contact": 945,
     "verification.coupling": 420,

@@ -61,6 +61,7 @@ if TYPE_CHECKING:
     from verification.problem.files import load as load
     from verification.problem.specification import Problem as Problem
     from verification.problem.tables import ProblemError as ProblemError
+    from verification.schemas import schema as schema
     from verification.sweeps.sweep import Sweep as Sweep
     from verification.sweeps.sweep import sweep as sweep
 
@@ -102,6 +103,7 @@ _HOME = {
     "march": "history",
     "measure": "constants.measuring",
     "run": "algorithm.runs",
+    "schema": "schemas",
     "solve": "monolithic",
     "sweep": "sweeps.sweep",
     "verify": "ledger",

@@ -1,4 +1,4 @@
-"""Directives and events of the site: widgets, notebooks, the course, equations, several processes, navigation."""
+"""Directives and events of the site: widgets, notebooks, course, equations, keys, several processes, navigation."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ from sphinx.util.docutils import SphinxDirective
 from sphinx_proof.domain import ProofDomain
 
 import verification as vf
-from builder import course, equations, notebooks, slides, widgets
+from builder import course, documents, equations, notebooks, slides, widgets
 from builder.references import References
+from verification import schemas
 
 
 class Proofs(ProofDomain):
@@ -61,6 +62,20 @@ def say_needs(app: Sphinx, page: str, source: list[str]) -> None:
     found = course.read(page, source[0])
     if found is not None:
         source[0] = source[0].replace(course.MARK, found.sentence())
+
+
+class KeysDirective(SphinxDirective):
+    """``{keys} ndtheory.run/1``: the table of the keys of a document, or of a part."""
+
+    required_arguments = 1
+    final_argument_whitespace = True
+
+    def run(self) -> list[nodes.Node]:
+        name = self.arguments[0]
+        if name not in schemas.tables():
+            raise self.error(f"keys {name!r}: needed one of {'; '.join(schemas.tables())}")
+        self.env.note_dependency(str(Path(schemas.__file__).with_suffix(".toml")))
+        return list(self.parse_text_to_nodes(documents.table(name)))
 
 
 class gallery(nodes.General, nodes.Element):
@@ -219,6 +234,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
     app.add_domain(Proofs, override=True)
     app.add_directive("widget", WidgetDirective)
     app.add_directive("course", CourseDirective)
+    app.add_directive("keys", KeysDirective)
     app.add_role("slides", slides.SlidesRole())
     app.connect("html-collect-pages", slides.write_decks)
     app.connect("source-read", say_needs)

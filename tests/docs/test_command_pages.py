@@ -18,7 +18,7 @@ DOCUMENTS = (ROOT / "docs" / "json.md").read_text("utf-8")
 def pages():
     sys.path.append(str(ROOT / "docs"))
     try:
-        from builder import commands
+        from builder import commands, documents  # noqa: F401
     finally:
         sys.path.remove(str(ROOT / "docs"))
     return commands
@@ -60,3 +60,9 @@ def test_a_command_without_a_page_or_a_schema_is_found(pages):
         == []
     )
     assert "## `ndtheory mine forces`" in pages.page(group, "ndtheory")
+
+
+def test_types_on_the_page_of_documents_have_the_names_of_parts_in_bold(pages):
+    shown = sys.modules["builder"].documents.shown
+    assert shown("list of Reading of a run") == "list of **Reading of a run**"
+    assert (shown("Number"), shown("list of list of number")) == ("**Number**", "list of list of number")

@@ -1,4 +1,4 @@
-"""The page of documents lists every key of every document, and no other; its tables of files list what is written."""
+"""Every document fits its schema, whose tables have its keys and no other; the page lists what files are written."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ import io
 import json
 import re
 from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+import jsonschema
 import meshio
 import numpy as np
 import pytest
@@ -18,7 +20,7 @@ from coupling_logs import linear_run, precice
 from made_up import Halfway
 
 import verification as vf
-from verification import figures
+from verification import figures, schemas
 from verification.bounds import region as plane
 from verification.bounds.table import BOUNDS
 from verification.certificate.continuum import certify_continuum
@@ -41,111 +43,74 @@ SIDE_BY_SIDE = {
 }
 GIVEN = "bounds --m 3084 --M 153229 --CR 1.7"
 
-#: How a value of each type is told.
-TYPES: Mapping[str, Callable[[Any], bool]] = {
-    "text": lambda v: isinstance(v, str),
-    "truth": lambda v: isinstance(v, bool),
-    "integer": lambda v: isinstance(v, int) and not isinstance(v, bool),
-    "number": lambda v: isinstance(v, (int, float)) and not isinstance(v, bool),
-    "exact": lambda v: isinstance(v, (int, float, str)) and not isinstance(v, bool),
-    "vector": lambda v: isinstance(v, (int, float, str, list)),
-    "free": lambda v: v is not None,
-}
 
-Row = tuple[str, str]  # type and meaning
-Table = dict[str, Row]
+@cache
+def validator(name: str) -> Any:
+    """What holds a document against its schema; 1.0 is no integer, as in the documents themselves."""
+    strict = jsonschema.Draft202012Validator.TYPE_CHECKER.redefine(
+        "integer", lambda _, value: isinstance(value, int) and not isinstance(value, bool)
+    )
+    kind = jsonschema.validators.extend(jsonschema.Draft202012Validator, type_checker=strict)
+    kind.check_schema(vf.schema(name))
+    return kind(vf.schema(name))
 
 
-def tables(page: str) -> dict[str, Table]:
-    """Heading -> path -> type and meaning; what is included from a part stands under the empty type."""
-    result: dict[str, Table] = {}
-    for heading, body in re.findall(r"^##+ ([^\n]+)\n(.*?)(?=^##|\Z)", page, re.M | re.S):
-        rows: Table = {}
-        for line in body.splitlines():
-            cells = [cell.strip() for cell in line.strip().strip("|").split("|")]
-            if not line.startswith("|") or len(cells) != 4:
-                continue
-            keys, kind, _, meaning = cells
-            if included := re.fullmatch(r"all keys of \*\*(.+)\*\*", keys):
-                rows[included[1]] = ("", meaning)
-            for key in re.findall("`([^`]+)`", keys):
-                assert key not in rows, f"{heading} lists {key} twice"
-                rows[key] = (kind, meaning)
-        if rows:
-            result[heading.strip("`")] = rows
-    return result
+def errors(document: Mapping[str, Any]) -> list[str]:
+    """Where a document differs from its schema."""
+    found = validator(document["schema"]).iter_errors(document)
+    return [f"{document['schema']}{error.json_path[1:]}: {error.message[:300]}" for error in found]
 
 
 class Reader:
-    """Holds documents against the tables of a page.
+    """Compares the keys of documents with the tables of which the schemas are made.
 
     Attributes
     ----------
     wrong : list of str
-        Where a document and the page differ.
+        Keys of documents that no table has.
     seen : set of pairs
-        Heading and key of the rows that some document has.
+        Table and key of the rows that some document has.
     """
 
-    def __init__(self, page: str) -> None:
-        self.tables, self.wrong, self.seen = tables(page), [], set()
+    def __init__(self) -> None:
+        self.wrong: list[str] = []
+        self.seen: set[tuple[str, str]] = set()
 
     def read(self, document: Mapping[str, Any]) -> None:
         name, kind = document["schema"], document.get("kind")
-        name = f"{name}, {kind}" if f"{name}, {kind}" in self.tables else name  # a table for one kind
-        self.object(name, "", document, name)
+        self.object(f"{name}, {kind}" if f"{name}, {kind}" in schemas.tables() else name, "", document)
 
-    def rows(self, name: str) -> Iterator[tuple[str, str, Row]]:
-        """The rows of a table with those it includes: which table has the row, its path, its type and meaning."""
-        for key, row in self.tables[name].items():
-            if row[0]:
-                yield name, key, row
-            else:
-                yield from self.rows(key)
-
-    def object(self, name: str, path: str, value: Mapping[str, Any], where: str) -> None:
-        """Compare an object with the rows of a table whose paths begin with ``path``."""
-        rows = {key: (home, row) for home, key, row in self.rows(name) if key.startswith(path)}
+    def object(self, name: str, path: str, value: Mapping[str, Any]) -> None:
+        """Look up the keys of an object in the rows of a table whose paths begin with ``path``."""
+        rows = {key: (home, row) for home, key, row in schemas.rows(name) if key.startswith(path)}
         first = {key[len(path) :].split(".")[0] for key in rows}
         for key, member in value.items():
-            step = key if key in first else "*"
-            if step not in first:
-                self.wrong.append(f"{where}: the page has no {path}{key}")
-            elif (full := path + step) in rows:
+            full = path + (key if key in first else "*")
+            if full in rows:
                 home, row = rows[full]
                 self.seen.add((home, full))
-                self.value(name, full, row, member, f"{where}.{key}")
+                self.value(name, full, row.type, member)
+            elif full.removeprefix(path) in first:
+                self.object(name, f"{full}.", member)
             else:
-                self.object(name, f"{full}.", member, f"{where}.{key}")
-        for key in first - {*value, "*"}:
-            below = [row for full, (_, row) in rows.items() if full[len(path) :].split(".")[0] == key]
-            if not all("left out" in meaning for _, meaning in below):
-                self.wrong.append(f"{where}: the document has no {path}{key}")
+                self.wrong.append(f"{name}: no table has {path}{key}")
 
-    def value(self, name: str, path: str, row: Row, value: Any, where: str) -> None:
-        kind, meaning = row
+    def value(self, name: str, path: str, kind: str, value: Any) -> None:
         if value is None:
-            if "null" not in meaning:
-                self.wrong.append(f"{where} is null, and the page does not say when")
-        elif kind.startswith(("list of ", "map of ")):
-            if type(value) is not (list if kind.startswith("list") else dict):
-                self.wrong.append(f"{where} is no {kind}")
-                return
+            return
+        if kind.startswith(("list of ", "map of ")):
             for member in value if isinstance(value, list) else value.values():
-                self.value(name, path, (kind.partition(" of ")[2], meaning), member, where)
-        elif kind.startswith("**"):
-            self.object(kind.strip("*"), "", value, where)
+                self.value(name, path, kind.partition(" of ")[2], member)
+        elif kind in schemas.tables():
+            self.object(kind, "", value)
         elif kind == "object":
-            self.object(name, f"{path}.", value, where)
-        elif not TYPES[kind](value):
-            self.wrong.append(f"{where} = {value!r} is no {kind}")
+            self.object(name, f"{path}.", value)
 
     @property
     def unseen(self) -> set[str]:
-        """Rows of the page that no document has."""
-        everything = {(heading, key) for heading, rows in self.tables.items() for key, row in rows.items() if row[0]}
-        objects = {(heading, key) for heading, key in everything if self.tables[heading][key][0] == "object"}
-        return {f"{heading}: {key}" for heading, key in everything - objects - self.seen}
+        """Rows that no document has."""
+        everything = {(home, key): row for table in schemas.tables() for home, key, row in schemas.rows(table)}
+        return {f"{home}: {key}" for (home, key), row in everything.items() if (home, key) not in self.seen}
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -327,8 +292,8 @@ def compared(folder: Path, small: vf.Problem, printed: Callable[[str], dict[str,
     return printed(f"compare {folder / 'small.toml'} --verified -o {folder / 'results'}")
 
 
-def test_the_page_lists_every_key_of_every_document_and_no_other(documents, compared, printed, folder):
-    reader = Reader(PAGE)
+def test_every_document_fits_its_schema_which_has_its_keys_and_no_other(documents, compared, printed, folder):
+    reader, found = Reader(), set[str]()
     for arguments in (
         f"{GIVEN} --CK 1e-8 --rho 0.475 --kappa1 0.9 --kappa2 0.4 --theta 1e-4",
         f"{GIVEN} --k 0.1 --Cs 1 --Ctr 1",
@@ -343,31 +308,70 @@ def test_the_page_lists_every_key_of_every_document_and_no_other(documents, comp
     ):
         documents = [*documents, printed(arguments)]
     for document in (*documents, compared):
+        found.update(errors(document))
         reader.read(document)
+    assert sorted(found) == []
     assert sorted(set(reader.wrong)) == []
     assert sorted(reader.unseen) == []
 
 
-def test_a_key_that_is_not_on_the_page_is_found(small):
+def test_a_key_that_no_table_has_and_one_that_no_document_has_are_found(small):
     document = vf.measure(small).to_dict()
-    less = Reader(PAGE.replace("| `rho_min` |", "| `rho_least` |"))
-    less.read(document)
-    assert less.wrong == [
-        "ndtheory.constants/1: the page has no rho_min",
-        "ndtheory.constants/1: the document has no rho_least",
-    ]
-    assert "Constants: rho_least" in less.unseen
-
-
-def test_a_type_or_a_null_that_the_page_does_not_tell_is_found():
-    document = vf.measure(vf.build(S1=np.eye(2), S2=np.eye(2), x=np.zeros(1))).to_dict()
-    page = PAGE.replace("| `interface_nodes` | integer |", "| `interface_nodes` | text |").replace(
-        "lift constant; null of a pair made from matrices", "lift constant"
-    )
-    reader = Reader(page)
+    reader = Reader()
+    document["rho_least"] = document.pop("rho_min")
+    document["body1"]["weight"] = 1
     reader.read(document)
-    assert any("interface_nodes = " in line and "is no text" in line for line in reader.wrong)
-    assert any("C_R is null" in line for line in reader.wrong)
+    assert reader.wrong == ["Body constants: no table has weight", "ndtheory.constants/1: no table has rho_least"]
+    assert "Constants: rho_min" in reader.unseen
+    assert errors(document) == ["ndtheory.constants/1: 'rho_min' is a required property"]
+
+
+def places(value: Any, name: str, path: str = "") -> Iterator[tuple[dict[str, Any], str, schemas.Row]]:
+    """Each key of a document that has a row of its own: the object that has it, the key, its row."""
+    rows = {key: row for _, key, row in schemas.rows(name)}
+    for key, member in value.items():
+        row = rows.get(path + key)
+        if row is not None:
+            yield value, key, row
+        if isinstance(member, dict) and row is not None and row.type in schemas.tables():
+            yield from places(member, row.type)
+        elif isinstance(member, dict) and (row is None or row.type == "object"):
+            yield from places(member, name, f"{path}{key}.")
+
+
+@pytest.mark.parametrize("schema", ["constants", "bounds", "solve", "run"])
+def test_a_schema_refuses_another_type_an_unexplained_null_and_a_key_that_is_missing(documents, schema):
+    document = next(each for each in documents if each["schema"] == f"ndtheory.{schema}/1")
+    fits = validator(document["schema"]).is_valid
+    assert fits(document)
+    for holder, key, row in list(places(document, document["schema"])):
+        value = holder.pop(key)
+        assert fits(document) == (row.absent is not None), key
+        holder[key] = None
+        assert fits(document) == (row.null is not None), key
+        holder[key] = False if row.type != "truth" else "yes"
+        assert not fits(document) or row.type == "free", key
+        holder[key] = value
+    document["further"] = document["units"]["further"] = "allowed"
+    assert fits(document)
+    del document["further"], document["units"]["further"]
+
+
+def test_a_schema_of_several_kinds_takes_each_and_no_other(documents):
+    certificates = [each for each in documents if each["schema"] == "ndtheory.certificate/1"]
+    assert {each["kind"] for each in certificates} == {"contraction", "continuum"}
+    for each in certificates:
+        assert errors({**each, "kind": "guess"})
+
+
+def test_the_page_shows_every_table_once():
+    assert re.findall(r"^```\{keys\} (.+)$", PAGE, re.M) == list(schemas.tables())
+
+
+def test_no_key_is_in_two_rows_of_a_table():
+    for table in schemas.tables():
+        keys = [key for _, key, _ in schemas.rows(table)]
+        assert len(set(keys)) == len(keys), table
 
 
 # --- files ---

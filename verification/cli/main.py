@@ -18,7 +18,17 @@ import ndtheory
 import verification
 from ndtheory import HypothesisError
 from ndtheory.texts import printable
-from verification.cli import advising, calculator, certifying, exploring, ledger, marching, problems, sweeping
+from verification.cli import (
+    advising,
+    calculator,
+    certifying,
+    documents,
+    exploring,
+    ledger,
+    marching,
+    problems,
+    sweeping,
+)
 from verification.cli.console import (
     NOTHING,
     SHOWN,
@@ -67,6 +77,7 @@ for command in (
     certifying.certify,
     ledger.reproduce,
     ledger.verify,
+    documents.schema,
 ):
     for form in command.forms().values() if isinstance(command, AdviseGroup) else [command]:
         assert form.callback is not None

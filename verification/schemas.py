@@ -1,0 +1,223 @@
+"""The keys of every document as tables, and as JSON Schemas (draft 2020-12).
+
+The tables are data, in ``schemas.toml`` beside this module.  The page on documents shows them.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+from ndtheory.texts import did_you_mean
+
+JsonSchema = dict[str, Any]
+
+#: The types of the tables as those of JSON; the other types are made of these, or are parts.
+TYPES: dict[str, JsonSchema] = {
+    "text": {"type": "string"},
+    "truth": {"type": "boolean"},
+    "integer": {"type": "integer"},
+    "number": {"type": "number"},
+    "exact": {"type": ["number", "string"]},
+    "vector": {"type": ["number", "string", "array"], "items": {"type": ["number", "string"]}},
+    "free": {"type": ["array", "boolean", "number", "object", "string"]},
+}
+
+#: What a row begins with that includes a part.
+INCLUDED = "all keys of "
+
+#: A reference of the site: its role, its text where it has one, its target.
+_REFERENCE = re.compile(r"\{(\w+)\}`(?:([^`<]+) <[^`>]+>|([^`]+))`")
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Row:
+    """A row of a table: keys that share a type and a meaning.
+
+    Attributes
+    ----------
+    keys : tuple of str
+        Paths with dots, in which ``*`` stands for any name; or one that names an included part.
+    type, unit, says : str
+        Type, unit and meaning; empty where there is none.
+    null, absent : str or None
+        When the value is null, and when the key is left out; None for never.
+    """
+
+    keys: tuple[str, ...]
+    type: str = ""
+    unit: str = ""
+    says: str = ""
+    null: str | None = None
+    absent: str | None = None
+
+    @property
+    def meaning(self) -> str:
+        """The meaning in words, with when the value is null and when the key is left out."""
+        conditional = [
+            f"{word} {when}" for word, when in (("null", self.null), ("left out", self.absent)) if when is not None
+        ]
+        return "; ".join([self.says, *conditional] if self.says else conditional)
+
+
+@cache
+def tables() -> dict[str, tuple[Row, ...]]:
+    """Return the rows of each table, by the schema of a document or the name of a part."""
+    data = tomllib.loads(files("verification").joinpath("schemas.toml").read_text("utf-8"))
+    return {
+        name: tuple(Row(keys=tuple(keys.split(", ")), **row) for keys, row in rows.items())
+        for name, rows in data.items()
+    }
+
+
+def rows(table: str) -> Iterator[tuple[str, str, Row]]:
+    """Yield each key of a table with those it includes: the table that has its row, the key, the row."""
+    for row in tables()[table]:
+        if row.keys[0].startswith(INCLUDED):
+            yield from rows(row.keys[0].removeprefix(INCLUDED))
+        else:
+            for key in row.keys:
+                yield table, key, row
+
+
+def names() -> list[str]:
+    """Return the names of the documents, as ``schema`` takes them."""
+    return list(dict.fromkeys(_name(table) for table in tables() if table.startswith("ndtheory.")))
+
+
+def schema(name: str) -> JsonSchema:
+    """The JSON Schema of a document, which allows further keys.
+
+    The unit of a value is under ``x-unit``, where 1 means a pure number.
+
+    Parameters
+    ----------
+    name : str
+        Name of the document, as ``run``, or what the document has under ``schema``, as ``ndtheory.run/1``.
+
+    Returns
+    -------
+    dict
+        Without references to other files.
+
+    Raises
+    ------
+    ValueError
+        An unknown name; the message lists the known ones.
+
+    Examples
+    --------
+    >>> found = schema("bounds")
+    >>> found["properties"]["schema"]["const"]
+    'ndtheory.bounds/1'
+    >>> found["properties"]["inputs"]["properties"]["m"]
+    {'type': ['number', 'null'], 'description': 'as given; null where only `--rho` was', 'x-unit': 'stress'}
+    """
+    kinds = [table for table in tables() if table.startswith("ndtheory.") and name in (_name(table), _schema(table))]
+    if not kinds:
+        raise ValueError(
+            f"no schema {str(name)[:60]!r}; there are {', '.join(names())}{did_you_mean(str(name), names())}"
+        )
+    documents = [_document(table) for table in kinds]
+    found = {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$id": f"urn:{_schema(kinds[0]).replace('.', ':').replace('/', ':')}",
+        "title": _schema(kinds[0]),
+        **(documents[0] if len(documents) == 1 else {"type": "object", "oneOf": documents}),
+    }
+    parts: JsonSchema = {}
+    missing = _parts(found)
+    while missing:
+        parts |= {part: _object(part) for part in missing}
+        missing = _parts(parts) - set(parts)
+    return {**found, "$defs": {part.replace(" ", "_"): parts[part] for part in sorted(parts)}}
+
+
+def _schema(table: str) -> str:
+    return table.partition(", ")[0]
+
+
+def _name(table: str) -> str:
+    return _schema(table).removeprefix("ndtheory.").partition("/")[0]
+
+
+def _parts(found: Any) -> set[str]:
+    """Return the names of the parts to which a schema refers."""
+    if isinstance(found, dict):
+        reference = found.get("$ref")
+        here = {reference.removeprefix("#/$defs/").replace("_", " ")} if isinstance(reference, str) else set()
+        return here.union(*map(_parts, found.values()))
+    return set().union(*map(_parts, found)) if isinstance(found, list) else set()
+
+
+def _document(table: str) -> JsonSchema:
+    """Return the schema of a document of one kind."""
+    found = _object(table)
+    found["properties"]["schema"]["const"], _, kind = table.partition(", ")
+    if kind:
+        found["properties"]["kind"]["const"] = kind
+    return found
+
+
+def _object(table: str) -> JsonSchema:
+    """Return the schema of an object with the keys of a table."""
+    objects = {"": _empty()}
+
+    def add(path: str, value: JsonSchema, *, required: bool) -> None:
+        above, _, key = path.rpartition(".")
+        if above not in objects:  # it has no row: all that is said of it is that it has keys
+            objects[above] = _empty()
+            add(above, objects[above], required=True)
+        if key == "*":
+            objects[above]["additionalProperties"] = value
+        else:
+            objects[above]["properties"][key] = value
+            if required:
+                objects[above]["required"].append(key)
+
+    for _, key, row in rows(table):
+        value = objects[key] = _empty()
+        if row.type.endswith("object"):
+            for _ in range(row.type.count("list of ")):
+                value = {"type": "array", "items": value}
+        else:
+            value = _value(row.type)
+        value = value if row.null is None else _or_null(value)
+        value |= {"description": _plain(row.meaning)} if row.meaning else {}
+        value |= {"x-unit": row.unit} if row.unit else {}
+        add(key, value, required=row.absent is None)
+    return objects[""]
+
+
+def _empty() -> JsonSchema:
+    return {"type": "object", "properties": {}, "required": []}
+
+
+def _value(kind: str) -> JsonSchema:
+    """Return the schema of a value by the type in its row."""
+    outer, _, inner = kind.partition(" of ")
+    if outer == "list":
+        return {"type": "array", "items": _value(inner)}
+    if outer == "map":
+        return {"type": "object", "additionalProperties": _value(inner)}
+    if kind.endswith(" or null"):
+        return _or_null(_value(kind.removesuffix(" or null")))
+    return dict(TYPES[kind]) if kind in TYPES else {"$ref": f"#/$defs/{kind.replace(' ', '_')}"}
+
+
+def _or_null(value: JsonSchema) -> JsonSchema:
+    """Return a schema after null has been allowed in it; an object may still get keys."""
+    if "type" not in value:
+        return {"anyOf": [value, {"type": "null"}]}
+    value["type"] = [*(value["type"] if isinstance(value["type"], list) else [value["type"]]), "null"]
+    return value
+
+
+def _plain(text: str) -> str:
+    """Return a meaning without the references of the site."""
+    return _REFERENCE.sub(lambda m: m[2] or (f"the page {m[3]}" if m[1] == "doc" else m[3]), text)
