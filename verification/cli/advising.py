@@ -319,7 +319,9 @@ def _shape(context: click.Context, parameter: click.Parameter, value: str | None
 
 @click.command(cls=AdviseCommand)
 @click.option(
-    "--young", metavar="E1,E2", help="Elastic: moduli of bodies 1 and 2, in one unit of stress.  Fluid: E of the wall."
+    "--young",
+    metavar="E1,E2",
+    help="Elastic bodies: moduli of bodies 1 and 2, in one unit of stress.  Fluid: E of the wall.",
 )
 @click.option("--poisson", metavar="NU1,NU2", help="Poisson ratios of bodies 1 and 2, no unit.  Fluid: nu of the wall.")
 @click.option(
@@ -330,20 +332,20 @@ def _shape(context: click.Context, parameter: click.Parameter, value: str | None
     "corners of 90 degrees at the ends of Gamma_c); mirror-1 or -2 (the body whose mirror image in a flat Gamma_c, "
     "with its supports, lies inside the other one), and flat (that one is twice as wide as high, its far side held).",
 )
-@click.option("--conductivity", metavar="K1,K2", help="Heat: conductivities of plates 1 and 2.")
+@click.option("--conductivity", metavar="K1,K2", help="Heat flow: conductivities of plates 1 and 2.")
 @click.option(
-    "--capacity", metavar="C1,C2", help="Heat, step in time: capacities per volume, density times specific heat."
+    "--capacity", metavar="C1,C2", help="Heat flow in time: capacities per volume, density times specific heat."
 )
-@click.option("--density", metavar="RHO_F,RHO_S", help="Fluid: densities of the fluid and of the wall.")
+@click.option("--density", metavar="RHO_F,RHO_S", help="A fluid: densities of the fluid and of the wall.")
 @click.option(
     "--thickness",
     metavar="D1,D2",
-    help="Heat: thicknesses of both plates; without it they are thick.  Fluid: of the wall.",
+    help="Heat flow: thicknesses of both plates; without it they are thick.  Fluid: of the wall.",
 )
 @click.option(
     "--length",
     metavar="L or L,R",
-    help="Fluid: length of the wall between its ends; of a tube, its length and its radius.",
+    help="A fluid: length of the wall between its ends; of a tube, its length and its radius.",
 )
 @click.option("--dt", metavar="TIME", help="Heat with a capacity, or fluid: the step in time.")
 @click.option("--parallel", is_flag=True, help="Parallel coupling: both solvers run at once.")
