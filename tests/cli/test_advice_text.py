@@ -229,6 +229,6 @@ def test_a_number_of_steps_is_none_where_nothing_falls():
 @pytest.mark.parametrize("form", FORMS)
 def test_in_contact_the_table_of_methods_is_called_a_prediction_as_if_tied(call, write, form):
     said = flat(call("advise", write(), *FORMS[form]))
-    warned = "Predicted as if tied: where contact changes, IQN-ILS may take more or not arrive." in said
+    warned = "Predicted as if tied: where contact changes, IQN-ILS may not arrive." in said
     assert "WHICH METHOD?" in said
     assert warned == ("--tied" not in FORMS[form])

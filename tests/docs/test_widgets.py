@@ -152,6 +152,10 @@ ANSWERS = {
         "12 times as many, 140",
         "E1/E2 = 3.5. With the lower plate as Neumann body rho = 0.38, theta = 0.840",
     ),
+    "constant_theta": (
+        "it tends to 2.35 or more",
+        "Cells 2 and 1 times as high as wide: rho* = 2.355, waves as short as the cells decide",
+    ),
     "friction": ("A opens, B sticks", "k = 4: this load has 3 solutions: open, slip, stick"),
     "theorem_and_experiment": ("all of them", "lmi for theta below 0.38. Of 10 runs 4 are proved to converge"),
     "prediction": ("nearly all at one step", "k = 0.2: the matrix of step 4 predicts the rate 0.50078235"),

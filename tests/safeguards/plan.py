@@ -220,7 +220,7 @@ MUTANTS: dict[str, list[tuple[str, ...]]] = {
         ("np.abs(pair.neumann.inverse)", "pair.neumann.inverse"),
         ("np.abs(pair.neumann.schur)", "pair.neumann.schur"),
         ("np.abs(side.load)[:, None]", "side.load[:, None]"),
-        ("slipped = np.abs(interface.slipped)", "slipped = interface.slipped"),
+        ("slipped = np.abs(pair.interface.slipped)", "slipped = pair.interface.slipped"),
         ("self._load + (self", "(self"),
         ("g, u = np.abs(g), np.abs(u)", "u = np.abs(u)"),
         ("g, u = np.abs(g), np.abs(u)", "g = np.abs(g)"),

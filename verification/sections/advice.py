@@ -194,7 +194,7 @@ def _which_method(found: Advice, names: Mapping[int | None, str] = NAMES) -> Ite
         who = ", with the roles exchanged" * (found.method.exchanged and not named)
         said.append(f"Advised: {METHOD_NAMES[found.method.name]}{who}: {found.method.reason}.")
         if not found.tied:
-            said.append("Predicted as if tied: where contact changes, IQN-ILS may take more or not arrive.")
+            said.append("Predicted as if tied: where contact changes, IQN-ILS may not arrive.")
         elif found.method.name != "constant":
             said.append("Predicted, not proved.")
     yield section("method", "WHICH METHOD?", table(heads, rows), *said)
