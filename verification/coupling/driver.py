@@ -159,6 +159,8 @@ def exchange(advice: Advice) -> list[str]:
         return []
     own = [row.steps for row in advice.methods if not row.exchanged and row.steps is not None]
     there = next(row for row in advice.methods if row.exchanged and row.method == advice.method.name)
+    if advice.theta is None:  # nothing is predicted of these roles
+        return [f"exchange the roles: {there.steps} steps"]
     return [f"exchange the roles: {there.steps} instead of {min(own) if own else 'no end of'} steps"]
 
 

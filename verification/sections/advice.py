@@ -72,7 +72,8 @@ def _sections(found: Advice) -> Iterator[Section]:
             yield _which_theta(found)
         yield from _which_method(found)
         yield from _friction(found)
-        yield _paste(found)
+        if found.theta is not None:
+            yield _paste(found)
         if found.quote is not None:
             yield section("quote", "TO QUOTE", found.quote)
     yield _end(found)
@@ -81,7 +82,7 @@ def _sections(found: Advice) -> Iterator[Section]:
 def _end(found: Advice) -> Section:
     """The limits of the advice, and the command to type next."""
     outside = map(outside_the_theorem, found.outside)
-    if not found.roles and found.vectors is not None:
+    if found.theta is None and found.vectors is not None:
         return closing("a theta", then="ndtheory advise vectors X.npy TX.npy (with more iterates)")
     if found.next is None:
         tied = "that nothing opens or slips"
@@ -227,6 +228,13 @@ def of_vectors(found: Advice, seen: SeenVectors) -> Iterator[Section]:
         ("least lambda", figures(spectrum.low), figures(spectrum.error_low, 2)),
         ("largest lambda, rho", figures(spectrum.high), figures(spectrum.error_high, 2)),
     ]
+    if found.theta is None:
+        rows[1] = (rows[1][0], Quantity(spectrum.high, f">= {rounded(spectrum.high, 4, up=False)}"), "not found")
+        notes = [f"No theta: {found.why_no_theta}."]
+        if found.method is not None:
+            notes.append("With the roles exchanged theta depends on the least eigenvalue, which is found.")
+        yield section("theta", "WHICH EIGENVALUES, AND WHICH THETA?", table(("", "lambda", "error"), rows), *notes)
+        return
     theta, rate = found.chosen(found.best)
     formula = "2/(2 + least + largest)" if spectrum.real else "the theta of least factor over the spectrum"
     best = f"theta = {theta:.4g} = {formula}, with both errors: factor {near_one(rate)} a step"
