@@ -110,7 +110,7 @@ BUDGET = {
     "verification.cli": 2435,
     "verification.constants": 1311,
     "verification.contact": 940,
-    "verification.coupling": 422,
+    "verification.coupling": 436,
     "verification.exploration": 600,
     "verification.figures": 1520,
     "verification.interface": 2811,
@@ -118,7 +118,7 @@ BUDGET = {
     "verification.output": 470,
     "verification.problem": 1648,
     "verification.reproduce": 655,
-    "verification.sections": 2347,
+    "verification.sections": 2356,
     "verification.sweeps": 2401,
     "verification.testing": 1583,
 }

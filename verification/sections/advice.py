@@ -41,6 +41,13 @@ from verification.sections.setting import outside_the_theorem
 NAMES = {1: "body 1", 2: "body 2", None: "as in that run"}
 
 
+#: What it takes to exchange the roles of solvers that are already coupled.
+EXCHANGED = (
+    "To exchange the roles, the second solver, which now reads displacements (temperatures), must take forces "
+    "(fluxes), and the first the reverse. To swap two arguments is not enough."
+)
+
+
 @of.register
 def sections(found: Advice) -> Sections:
     """The sections."""
@@ -194,6 +201,8 @@ def _which_method(found: Advice, names: Mapping[int | None, str] = NAMES) -> Ite
     if found.method is not None:
         who = ", with the roles exchanged" * (found.method.exchanged and not named)
         said.append(f"Advised: {METHOD_NAMES[found.method.name]}{who}: {found.method.reason}.")
+        if who:
+            said.append(EXCHANGED)
         if not found.tied:
             said.append("Predicted as if tied: where contact changes, IQN-ILS may take more or not arrive.")
         elif found.method.name != "constant":
