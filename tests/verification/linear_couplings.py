@@ -48,3 +48,31 @@ class Linear:
                 return None
             x = following(x, y)
         return None
+
+
+def strips(points=40, rows=12):
+    """Two plane strips that exchange heat, smooth data: from a flux to temperatures, and from these to a flux.
+
+    The one of k = 15 and depth 0.25 reads the flux, the one of k = 400 and depth 1.5 returns it; also the eigenvalues.
+    """
+    i = np.arange(points * rows).reshape(rows, points)
+    dx, condensed = 1 / points, []
+    for k, depth, held in ((15.0, 0.25, 500 + 200 * np.sin(3 * dx * i[0])), (400.0, 1.5, np.full(points, 300.0))):
+        h, A, b = depth / rows, np.zeros((i.size, i.size)), np.zeros(i.size)
+        along = np.full((rows, points - 1), k * h / dx)
+        along[0] /= 2  # the row on Gamma_c has half the height
+        for p, q, c in (
+            (i[:, :-1].ravel(), i[:, 1:].ravel(), along.ravel()),
+            (i[:-1].ravel(), i[1:].ravel(), np.full((rows - 1) * points, k * dx / h)),
+        ):
+            for one, other, sign in ((p, p, 1), (q, q, 1), (p, q, -1), (q, p, -1)):
+                np.add.at(A, (one, other), sign * c)
+        A[i[-1], i[-1]] += k * dx / h
+        b[i[-1]] = k * dx / h * held
+        c, f = i[0], i[1:].ravel()
+        inner = np.linalg.solve(A[np.ix_(f, f)], np.column_stack([A[np.ix_(f, c)], b[f]]))
+        S = A[np.ix_(c, c)] - A[np.ix_(c, f)] @ inner[:, :-1]
+        condensed.append((S, -A[np.ix_(c, f)] @ inner[:, -1]))
+    (S1, l1), (S2, l2) = condensed
+    values = np.sort(np.linalg.eigvals(np.linalg.solve(S1, S2)).real)
+    return (lambda q: np.linalg.solve(S1, q * dx + l1)), (lambda T: (l2 - S2 @ T) / dx), values

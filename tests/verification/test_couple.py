@@ -72,6 +72,19 @@ def test_a_coupling_that_runs_away_ends():
     assert not found.converged
     assert found.iterations < 60
     assert found.spectrum.high == pytest.approx(30)
+    assert found.diverged
+    assert found.summary.startswith(f"diverged, {found.iterations} evaluations")
+
+
+def test_a_run_that_grows_until_its_limit_has_diverged_and_one_that_is_cut_short_has_not():
+    """By 1 - theta (1 + lambda) of the only mode, -1.2 and 0.5, over eight evaluations."""
+    falls = vf.couple(lambda g: g, lambda u: 1 - u, start=0.0, rule="constant", theta="1/4", max_iterations=8)
+    assert not falls.converged
+    assert not falls.diverged
+    assert falls.summary.startswith("not converged, 8 evaluations")
+    grows = vf.couple(lambda g: g, lambda u: 1 - 3.4 * u, start=0.0, rule="constant", theta=0.5, max_iterations=8)
+    assert grows.diverged
+    assert grows.summary.startswith("diverged, 8 evaluations")
 
 
 @pytest.mark.parametrize("at", [1, 4])
@@ -138,6 +151,7 @@ def test_a_listener_hears_each_evaluation_in_one_line():
     assert all("\n" not in str(state) for state in said)
     assert said[-1].steps_left == 0
     assert any("exchange the roles: " in str(state) for state in said)
+    assert "must take forces (fluxes)" in str(said[-1].advice.sections())
 
 
 def test_rest_is_a_solution():

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from linear_couplings import Linear
+from linear_couplings import Linear, strips
 
 import verification as vf
 from verification.advice.spectrum import Spectrum, seen_in
+from verification.algorithm.relaxation import RULES
 
 spectra = st.lists(st.floats(0.01, 30), min_size=2, max_size=12).map(sorted)
 seeds = st.integers(0, 10**6)
@@ -74,6 +75,58 @@ def test_theta_from_nine_iterates_of_aitken_never_diverges_and_is_near_the_best(
     best = min(coupling.steps("constant", 2 / (2 + low + high) * 1.05**k) or 3000 for k in range(-8, 3))
     assert taken is not None
     assert taken <= 1.4 * best
+
+
+@pytest.mark.parametrize(("rule", "theta"), [("iqn-ils", 0.5), ("aitken", 0.5), ("constant", 0.5), ("constant", 0.05)])
+def test_no_theta_diverges_where_smooth_data_hide_the_stiff_modes(rule, theta):
+    neumann, contact, values = strips()
+    assert values[[0, -1]] == pytest.approx([4.444, 104.4], rel=1e-3)
+    following, x = RULES[rule].on_vectors(theta), np.zeros(len(values))
+    X, TX, found = [], [], {}
+    for count in range(1, 21):
+        X.append(x)
+        TX.append(contact(neumann(x)))
+        x = following(x, TX[-1])
+        if count > 1:
+            found[count] = vf.advise_vectors(X, TX)
+    thetas = {count: one.theta for count, one in found.items()}
+    assert {count for count in thetas if thetas[count] is None} >= set(range(2, 10))
+    assert all(theta * (1 + values[-1]) < 2 for theta in thetas.values() if theta is not None)
+    if rule != "constant":  # both constant runs diverge, and their last iterates hold one mode above rounding
+        assert thetas[20] == pytest.approx(2 / (2 + values[0] + values[-1]), rel=0.04)
+    unfinished = found[6]
+    assert "rho changes with every iterate (27.5, 36.1, 47.3), not found yet" in unfinished.summary
+    assert unfinished.best.theta_predicted is unfinished.best.theta_tied is unfinished.quote is None
+    assert unfinished.method.exchanged
+    assert unfinished.methods[0].theta == pytest.approx(2 / (2 + 1 / values[0] + 1 / values[-1]), rel=0.01)
+    said = str(unfinished.sections())
+    assert "TO PASTE" not in said
+    assert "'not found'" in said
+    with pytest.raises(ValueError, match="not found yet"):
+        unfinished.snippet("preCICE")
+
+
+@pytest.mark.parametrize("tied", [False, True])
+def test_a_wrong_sign_leaves_no_theta_and_no_method(tied):
+    neumann, contact, _ = strips()
+    coupled = vf.couple(neumann, lambda T: -contact(T), start=np.zeros(40), max_iterations=12)
+    assert coupled.advice.theta is None
+    assert "one solver probably has the wrong sign" in coupled.advice.summary
+    coupling = Linear([0.5, 2.0, 8.0])
+    X = np.random.default_rng(0).normal(size=(5, 3))
+    found = vf.advise_vectors(X, [-coupling(x) for x in X], tied=tied)
+    assert (found.theta, found.methods, found.method, found.spectrum) == (None, (), None, None)
+    assert "all eigenvalues are negative" in found.summary
+    assert "wrong sign" in found.to_dict()["reason"]["theta"]
+
+
+@pytest.mark.parametrize("tied", [False, True])
+def test_an_eigenvalue_of_minus_one_or_less_leaves_no_theta(tied):
+    coupling = Linear([-3.0, 2.0, 8.0])
+    X = np.random.default_rng(0).normal(size=(5, 3))
+    found = vf.advise_vectors(X, [coupling(x) for x in X], tied=tied)
+    assert found.theta is None
+    assert "an eigenvalue is -3: with -1 or less no theta above 0 converges" in found.why_no_theta
 
 
 def test_a_coupling_that_is_not_symmetric_has_complex_eigenvalues_and_a_theta_for_them():

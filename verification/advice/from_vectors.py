@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from ndtheory import Number
 from verification.advice import methods
-from verification.advice.roles import Advice, Role, role_on, table_of
+from verification.advice.methods import MethodRow
+from verification.advice.roles import PROVED, Advice, Role, role_on, table_of
 from verification.advice.spectrum import SeenVectors, Spectrum, seen_in
 from verification.interface.matrices import real_array
 from verification.interface.pair import UNITS
@@ -37,7 +40,8 @@ def advise_vectors(X: Any, TX: Any, *, tied: bool = False) -> Advice:
     Advice
         ``spectrum.low`` and ``spectrum.high`` are the ends as estimated, ``theta`` is to paste, ``methods`` compares
         constant relaxation, Aitken and IQN-ILS, also with the roles exchanged.  No theta and no spectrum while
-        contact still changes in the last iterates.
+        contact still changes in the last iterates, or where the eigenvalues are negative; no theta while the largest
+        eigenvalue still changes with every iterate: `methods` then has the exchanged roles, if the least is found.
 
     Raises
     ------
@@ -73,11 +77,29 @@ def advise_vectors(X: Any, TX: Any, *, tied: bool = False) -> Advice:
 
 def advice_of(seen: SeenVectors, *, tied: bool = False) -> Advice:
     """The advice for a spectrum that vectors show."""
-    if not (seen.settled or tied):
+    if not (seen.settled or tied) or seen.negative:
         return Advice(neumann_body=None, roles=(), units=UNITS, vectors=seen)
     linear = tied or not seen.changing
     spectrum = seen.spectrum if linear else seen.spectrum.with_open_nodes()
+    if not seen.high_found:
+        return _of_the_least_end(spectrum, seen, tied=linear)
     return advice_on(spectrum, tied=linear, of="vectors", vectors=seen)
+
+
+def _of_the_least_end(spectrum: Spectrum, seen: SeenVectors, *, tied: bool) -> Advice:
+    """The advice while the largest eigenvalue is not found: the exchanged roles, where the least one is.
+
+    Their largest eigenvalue is one over the least of these roles; their least one may be any down to 0.
+    """
+    because = dict.fromkeys(("theta_predicted", "rate_predicted", *PROVED, "friction_threshold"), seen.why_no_theta)
+    reason = {**_unnumbered("vectors"), **because, "rho_min": seen.why_no_theta}
+    role = Role(neumann_body=None, rho=Number.of_float(max(spectrum.high, 0.0)), spectrum=spectrum, reason=reason)
+    table: tuple[MethodRow, ...] = ()
+    if seen.low_found and spectrum.low - spectrum.error_low > 0:
+        exchanged = _role(spectrum.exchanged().with_open_nodes(), "vectors")
+        table = tuple(replace(row, exchanged=True) for row in table_of([exchanged], tied=True))
+    method = methods.advised(table, tied=tied)
+    return Advice(neumann_body=None, roles=(role,), units=UNITS, tied=tied, methods=table, method=method, vectors=seen)
 
 
 def advice_on(spectrum: Spectrum, *, tied: bool, of: str, **known: Any) -> Advice:
@@ -99,5 +121,9 @@ def advice_on(spectrum: Spectrum, *, tied: bool, of: str, **known: Any) -> Advic
 
 def _role(spectrum: Spectrum, of: str) -> Role:
     """The role of an estimated spectrum."""
-    reason = {"neumann_body": f"{of} do not tell which body had the Neumann problem"}
-    return role_on(None, spectrum, nothing=f"{of}, {ESTIMATED}", reason=reason)
+    return role_on(None, spectrum, nothing=f"{of}, {ESTIMATED}", reason=_unnumbered(of))
+
+
+def _unnumbered(of: str) -> dict[str, str]:
+    """The reason why the body of a role has no number."""
+    return {"neumann_body": f"{of} do not tell which body had the Neumann problem"}

@@ -429,7 +429,7 @@ class Advice(Document):
             return self.moduli.summary
         if self.theta is None and self.waves is not None and self.best.rho is not None:
             return f"rho is at least {self.best.rho.value:.4g} with the Neumann problem on the wall"
-        if not self.roles and self.vectors is not None:
+        if self.theta is None and self.vectors is not None:
             return self.why_no_theta
         if not self.roles:
             return f"assumed: {self.assumes}; {len(self.readings)} readings of {'a run' if self.run else 'logs'}"
@@ -455,6 +455,8 @@ class Advice(Document):
         """The theta to paste, rounded down; None while several readings are left, or of moduli."""
         if not self.roles or self.moduli is not None or (self.waves is not None and self.next is not None):
             return None
+        if self.vectors is not None and not self.vectors.high_found:
+            return None
         if self.next is not None:
             return self.next.theta
         return rounded_down(min(Fraction(self.chosen(self.best)[0]), LARGEST_TO_PASTE))
@@ -469,7 +471,7 @@ class Advice(Document):
         if self.waves is not None:
             return "one wave bounds rho from below: `next` is a run to begin with"
         if self.vectors is not None:
-            return "contact still changes in the last iterates: continue the run, and give more of its vectors"
+            return self.vectors.why_no_theta
         if self.friction_bounds is not None:
             return "with friction no run decides theta: make the run that `next` names"
         if self.accelerated and not self.readings:

@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -159,6 +160,8 @@ def exchange(advice: Advice) -> list[str]:
         return []
     own = [row.steps for row in advice.methods if not row.exchanged and row.steps is not None]
     there = next(row for row in advice.methods if row.exchanged and row.method == advice.method.name)
+    if advice.theta is None:  # nothing is predicted of these roles
+        return [f"exchange the roles: {there.steps} steps"]
     return [f"exchange the roles: {there.steps} instead of {min(own) if own else 'no end of'} steps"]
 
 
@@ -170,6 +173,8 @@ class Coupled(Value):
     ----------
     converged : bool
         True if the last residual is below the tolerance.
+    diverged : bool
+        True if ``|Tg - g|`` ran away, or has grown in each of the last PACE steps.
     iterations : int
         Evaluations of T.
     force : array, shape (n,)
@@ -185,6 +190,7 @@ class Coupled(Value):
     """
 
     converged: bool
+    diverged: bool
     iterations: int
     force: Floats
     displacement: Floats
@@ -194,7 +200,7 @@ class Coupled(Value):
 
     @property
     def summary(self) -> str:
-        end = "converged" if self.converged else "not converged"
+        end = "converged" if self.converged else "diverged" if self.diverged else "not converged"
         return f"{end}, {self.iterations} evaluations, residual {self.history[-1]:.1e}"
 
 
@@ -232,6 +238,8 @@ def couple(
     Returns
     -------
     Coupled
+        Where its advice is to exchange the roles, the contact solver must take forces (fluxes) and return displacements
+        (temperatures), and the Neumann solver the reverse: two other functions, not the two arguments swapped.
 
     Raises
     ------
@@ -250,15 +258,16 @@ def couple(
     tolerance = float(take("tolerance", tolerance, "a number > 0", lambda value: value > 0))
     whole = lambda value: value >= 1 and value.denominator == 1
     max_iterations = int(take("max_iterations", max_iterations, "a whole number > 0", whole))
-    history, first = list[float](), math.inf
+    history, changes = list[float](), list[float]()
     for iterations in range(1, max_iterations + 1):
         displacement = _answer("neumann", neumann, g, iterations)
         image = _answer("contact", contact, displacement, iterations)
         size, change = float(np.linalg.norm(image)), float(np.linalg.norm(image - g))
         history.append(change / size if size else math.inf if change else 0.0)
-        first = change if iterations == 1 else first
+        changes.append(change)
         converged = change < tolerance * size or not change
-        last = converged or iterations == max_iterations or change > RUNAWAY * first
+        away = change > RUNAWAY * changes[0]
+        last = converged or iterations == max_iterations or away
         following = g
         if last:
             coupling.see(g, image)
@@ -273,6 +282,7 @@ def couple(
         g = following
     return Coupled(
         converged=converged,
+        diverged=not converged and (away or _grows(changes)),
         iterations=iterations,
         force=g,
         displacement=displacement,
@@ -298,6 +308,12 @@ def _answer(name: str, solver: Solver, given: Floats, iterations: int) -> Floats
         return _vector(f"what {name} returned", answer, len(given))
     except (ValueError, TypeError) as error:
         raise CouplingError(f"evaluation {iterations}: {error}") from None
+
+
+def _grows(changes: list[float]) -> bool:
+    """True if each of the last PACE steps has a larger change than the one before."""
+    some = changes[-1 - PACE :]
+    return len(some) > PACE and all(before < after for before, after in pairwise(some))
 
 
 def _steps_left(history: list[float], tolerance: float) -> int | None:

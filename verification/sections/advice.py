@@ -41,6 +41,13 @@ from verification.sections.setting import outside_the_theorem
 NAMES = {1: "body 1", 2: "body 2", None: "as in that run"}
 
 
+#: What it takes to exchange the roles of solvers that are already coupled.
+EXCHANGED = (
+    "To exchange the roles, the second solver, which now reads displacements (temperatures), must take forces "
+    "(fluxes), and the first the reverse. To swap two arguments is not enough."
+)
+
+
 @of.register
 def sections(found: Advice) -> Sections:
     """The sections."""
@@ -72,7 +79,8 @@ def _sections(found: Advice) -> Iterator[Section]:
             yield _which_theta(found)
         yield from _which_method(found)
         yield from _friction(found)
-        yield _paste(found)
+        if found.theta is not None:
+            yield _paste(found)
         if found.quote is not None:
             yield section("quote", "TO QUOTE", found.quote)
     yield _end(found)
@@ -81,7 +89,7 @@ def _sections(found: Advice) -> Iterator[Section]:
 def _end(found: Advice) -> Section:
     """The limits of the advice, and the command to type next."""
     outside = map(outside_the_theorem, found.outside)
-    if not found.roles and found.vectors is not None:
+    if found.theta is None and found.vectors is not None:
         return closing("a theta", then="ndtheory advise vectors X.npy TX.npy (with more iterates)")
     if found.next is None:
         tied = "that nothing opens or slips"
@@ -193,6 +201,8 @@ def _which_method(found: Advice, names: Mapping[int | None, str] = NAMES) -> Ite
     if found.method is not None:
         who = ", with the roles exchanged" * (found.method.exchanged and not named)
         said.append(f"Advised: {METHOD_NAMES[found.method.name]}{who}: {found.method.reason}.")
+        if who:
+            said.append(EXCHANGED)
         if not found.tied:
             said.append("Predicted as if tied: where contact changes, IQN-ILS may not arrive.")
         elif found.method.name != "constant":
@@ -227,6 +237,13 @@ def of_vectors(found: Advice, seen: SeenVectors) -> Iterator[Section]:
         ("least lambda", figures(spectrum.low), figures(spectrum.error_low, 2)),
         ("largest lambda, rho", figures(spectrum.high), figures(spectrum.error_high, 2)),
     ]
+    if found.theta is None:
+        rows[1] = (rows[1][0], Quantity(spectrum.high, f">= {rounded(spectrum.high, 4, up=False)}"), "not found")
+        notes = [f"No theta: {found.why_no_theta}."]
+        if found.method is not None:
+            notes.append("With the roles exchanged theta depends on the least eigenvalue, which is found.")
+        yield section("theta", "WHICH EIGENVALUES, AND WHICH THETA?", table(("", "lambda", "error"), rows), *notes)
+        return
     theta, rate = found.chosen(found.best)
     formula = "2/(2 + least + largest)" if spectrum.real else "the theta of least factor over the spectrum"
     best = f"theta = {theta:.4g} = {formula}, with both errors: factor {near_one(rate)} a step"
