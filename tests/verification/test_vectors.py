@@ -117,6 +117,7 @@ def test_a_wrong_sign_leaves_no_theta_and_no_method(tied):
     found = vf.advise_vectors(X, [-coupling(x) for x in X], tied=tied)
     assert (found.theta, found.methods, found.method, found.spectrum) == (None, (), None, None)
     assert "all eigenvalues are negative" in found.summary
+    assert "open nodes" not in str(found.sections())
     assert "wrong sign" in found.to_dict()["reason"]["theta"]
 
 

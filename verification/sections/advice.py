@@ -221,7 +221,7 @@ def of_vectors(found: Advice, seen: SeenVectors) -> Iterator[Section]:
     spectrum = seen.spectrum
     said = [f"{seen.iterates} iterates of {seen.unknowns} unknowns, {seen.directions} independent directions"]
     kinds = ["real: the coupling looks symmetric" if seen.symmetric else "complex: the coupling is not symmetric"]
-    if seen.changing:
+    if seen.changing and not seen.negative:
         kinds.append("contact changes between the iterates: a theta for open nodes as well")
         if seen.used < seen.iterates:
             kinds.append(f"read from the last {seen.used}, in which the same nodes are open")
