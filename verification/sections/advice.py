@@ -302,7 +302,18 @@ def _paste(found: Advice, *more: str) -> Section:
             takes = f'theta = "auto" takes the proved {float(auto.theta):.4g}'
             said.append(f"{takes}: at most twice the predicted steps.")
     said.append("For displacements (heat: temperatures) the same, but not in parallel coupling.")
-    return pasted(found.neumann_body, found.theta, *said, *more)
+    return pasted(found.neumann_body, found.theta, *_only_constant(found), *said, *more)
+
+
+def _only_constant(found: Advice) -> Iterator[str]:
+    """A note beside a theta to paste, where another method or the other roles are advised."""
+    advised = found.method
+    if advised is None:
+        return
+    other = advised.exchanged if advised.neumann_body is None else advised.neumann_body != found.neumann_body
+    if other or advised.name != "constant":
+        roles = ", in the roles as they are" * other
+        yield f"This is the constant theta{roles}; advised is {METHOD_NAMES[advised.name]}{', exchanged' * other}."
 
 
 def snippets(found: Advice, library: str) -> Sections:
