@@ -104,7 +104,7 @@ BUDGET = {
     "fem1d2d": 4055,
     "ndtheory": 5865,
     "verification": 2015,
-    "verification.advice": 6282,
+    "verification.advice": 6285,
     "verification.algorithm": 2270,
     "verification.bounds": 3575,
     "verification.certificate": 1410,
@@ -119,7 +119,7 @@ BUDGET = {
     "verification.output": 524,
     "verification.problem": 1920,
     "verification.reproduce": 655,
-    "verification.sections": 2470,
+    "verification.sections": 2480,
     "verification.sweeps": 2405,
     "verification.testing": 1583,
 }
