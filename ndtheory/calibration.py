@@ -1,14 +1,14 @@
 r"""Lower bounds of the energy of a rectangle, proved by a field of symmetric tensors of order three.
 
 A rectangle ``0 < x < l, 0 < y < 1`` with G = 1 is clamped at y = 0, and its side y = 1 carries Gamma_c.  Let M be a
-field of tensors of order three, symmetric in all three indices, and let ``M w`` be the stress ``M_ijk w_k``.  Then
+field of tensors of order three, symmetric in all three indices, and let ``M w`` be the stress ``M_ijk w_k``.  Then::
 
     a(w) = int |e(w) - C^-1 M w|^2 + int R_jk w_j w_k + int over the boundary of n_i M_ijk w_j w_k,
     R_jk = -d_i M_ijk - (C^-1 M : M)_jk ,
 
 because ``2 M w : e(w) = M_ijk d_i (w_j w_k)``.  So bounds of R in the body and of ``n M`` on its sides bound a(w).
 Here ``M = N/y`` with N bilinear on each cell of a grid.  By Bernstein's coefficients, finitely many conditions on the
-values of N at the nodes, all of them in rational numbers, prove (``docs/continuum.md``)
+values of N at the nodes, all of them in rational numbers, prove (``docs/continuum.md``)::
 
     a(w) >= sum over the columns of  tau int w_T^2 over its part of y = 1  +  beta int q(w) over the column,
     q(w) = (kappa+1)/(kappa-1) w_x^2 + w_y^2 ,
