@@ -116,7 +116,7 @@ BUDGET = {
     "verification.figures": 1670,
     "verification.interface": 3300,
     "verification.ledger": 4345,
-    "verification.output": 524,
+    "verification.output": 534,
     "verification.problem": 1920,
     "verification.reproduce": 655,
     "verification.sections": 2480,

@@ -79,10 +79,19 @@ def files_of(kind: Kind, folder: Path) -> tuple[str, ...]:
 def check_ours(target: Path, option: str = "-o") -> None:
     """Raise ProblemError where writing would replace a file that this program has not written."""
     check_place(target, option)
-    if target.exists() and (unreadable(target, MOST_BYTES) or MARKS[target.suffix] not in target.read_bytes()):
+    if _foreign(target) and _foreign(target):  # another process may just have replaced its own file
         raise ProblemError(
             str(target), "", None, f"not written by this program; needed another folder or name ({option})"
         )
+
+
+def _foreign(target: Path) -> bool:
+    """Return True for a file that this program has not written, False where there is none."""
+    try:
+        marked = not unreadable(target, MOST_BYTES) and MARKS[target.suffix] in target.read_bytes()
+    except FileNotFoundError:
+        return False
+    return not marked and target.exists()
 
 
 def check_folder(room: Path, option: str = "") -> None:
