@@ -20,7 +20,7 @@ settings.register_profile("nightly", deadline=None, max_examples=2000)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE") or ("ci" if os.environ.get("CI") else "dev"))
 
 # Helpers that assert, so that a failure shows the values as it does in a test.
-pytest.register_assert_rewrite("complaints", "section_5", "pieces")
+pytest.register_assert_rewrite("complaints", "section_5", "pieces", "two_methods")
 
 # A shell that runs the tests in its background lets them ignore Ctrl-C, and their children inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.quiver import Quiver
 from mesh_writer import read_here, write_gmsh22
+from two_methods import assert_same
 
 import verification as vf
 from fem1d2d import element, mesh_files, plane_strain, rectangle
@@ -113,12 +114,7 @@ def test_the_limit_of_the_iteration_is_the_global_solution(make, tmp_path):
     problem = make(tmp_path)
     run, solution = vf.run(problem.with_keys({"iteration.tolerance": 1e-12})), vf.solve(problem)
     assert run.converged
-    assert run.contact.status == solution.contact.status
-    stress, length = solution.contact.pressure.max(), max(np.abs(u).max() for u in solution.displacements)
-    for name, scale in (("pressure", stress), ("shear", stress), ("gap", length), ("slip", length)):
-        assert np.abs(getattr(run.contact, name) - getattr(solution.contact, name)).max() <= 1e-8 * scale, name
-    for ours, theirs in zip(run.displacements, solution.displacements, strict=True):
-        assert np.abs(ours - theirs).max() <= 1e-8 * length
+    assert_same(run, solution)
     assert vf.solve(run.pair).contact.pressure == pytest.approx(solution.contact.pressure, rel=1e-9)
 
 
