@@ -186,7 +186,7 @@ def parallel_factor(theta: Scalar, rho: Scalar) -> Scalar:
     """``sqrt((1 - theta)^2 + theta^2 rho)``: the factor of *parallel* coupling where nothing opens or slips.
 
     A mode is multiplied by ``1 - theta +- i theta sqrt(lambda)``.  It is least, ``sqrt(rho/(1 + rho))``, at
-    ``theta = 1/(1 + rho)``, and below 1 where ``theta (1 + rho) < 2``, as of serial coupling.
+    :func:`parallel_theta`, and below 1 where ``theta (1 + rho) < 2``, as of serial coupling.
 
     Examples
     --------
@@ -194,6 +194,11 @@ def parallel_factor(theta: Scalar, rho: Scalar) -> Scalar:
     0.4472135954999579
     """
     return sqrt((1 - theta) ** 2 + theta**2 * rho)
+
+
+def parallel_theta(rho: Scalar) -> Scalar:
+    """``1/(1 + rho)``: the theta of the least :func:`parallel_factor`."""
+    return 1 / (1 + rho)
 
 
 def predicted_factor(theta: Scalar, rho: Scalar) -> Scalar:

@@ -102,9 +102,9 @@ FLOORS: dict[str, dict[str, str]] = {
 #: Lines of each package at most, those of packages inside it apart: whoever needs more says here how many.
 BUDGET = {
     "fem1d2d": 4055,
-    "ndtheory": 5865,
-    "verification": 2015,
-    "verification.advice": 6285,
+    "ndtheory": 5869,
+    "verification": 2022,
+    "verification.advice": 6286,
     "verification.algorithm": 2270,
     "verification.bounds": 3575,
     "verification.certificate": 1410,

@@ -85,14 +85,10 @@ class Increment(Value):
 
     Attributes
     ----------
-    step : int
-        Number of its step, from 1.
-    name : str
-        The name of the step.
-    time : float
-        0 where the history begins, the number of the step at its end.
+    moment : Moment
+        Its end.
     result : Run or Solution
-        The run, or the solution of the global method, under the loads at this time.
+        The run, or the solution of the global method, under the loads at this moment.
     promise : Promise or None
         None where ``why_none`` says why.
     verdicts : mapping from the name of a bound to Judgement
@@ -101,14 +97,27 @@ class Increment(Value):
         Work of friction in this increment, energy per unit thickness (in 1D per unit area).
     """
 
-    step: int
-    name: str
-    time: float
+    moment: Moment
     result: Run | Solution
     promise: Promise | None
     why_none: str
     verdicts: Mapping[str, Judgement]
     dissipated: float
+
+    @property
+    def step(self) -> int:
+        """Number of its step, from 1."""
+        return self.moment.step
+
+    @property
+    def name(self) -> str:
+        """The name of the step."""
+        return self.moment.name
+
+    @property
+    def time(self) -> float:
+        """0 where the history begins, the number of the step at its end."""
+        return float(self.moment.time)
 
     @property
     def summary(self) -> str:
@@ -427,9 +436,7 @@ def _increment(
     now = result.contact
     shear = 0.5 * (now.shear if before is None else now.shear + before.shear)
     return Increment(
-        step=moment.step,
-        name=moment.name,
-        time=float(moment.time),
+        moment=moment,
         result=result,
         promise=promise,
         why_none=why_none,

@@ -118,7 +118,6 @@ def cells() -> Numbers:
         "meshes": halved(problem, "interface_nodes", "rho_max", "rho_normal"),
         "enclosed": {name: list(map(str, both)) for name, both in ends.items()},
         "theta_limit": limit,
-        "theta_continuum": 2 / (1 + 3.5),
         "runs": runs,
     }
 

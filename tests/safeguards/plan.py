@@ -215,7 +215,7 @@ MUTANTS: dict[str, list[tuple[str, ...]]] = {
         ("clear.index(False) if False in clear else len(clear)", "sum(clear)"),
         ("if count < 3:", "if count < 2:"),
         ("patterns[first - 1] == patterns[-1]", "patterns[first - 1] in patterns"),
-        ("transfer=np.abs(interface.transfer)", "transfer=interface.transfer"),
+        ("self._interface = pair.interface.moduli", "self._interface = pair.interface"),
         ("np.abs(pair.contact.schur)", "pair.contact.schur"),
         ("np.abs(pair.neumann.inverse)", "pair.neumann.inverse"),
         ("np.abs(pair.neumann.schur)", "pair.neumann.schur"),

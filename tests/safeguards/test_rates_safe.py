@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from verification.algorithm.rates import CLEAR_OF_NOISE, Noise, largest_step_ratio, rate_at_the_end, rate_of
+from verification.interface.interface import Interface
 
 
 @pytest.mark.parametrize("share", [0.5, -0.9])
@@ -66,6 +67,7 @@ class Factor:
     transfer: np.ndarray
     slipped: np.ndarray | None = None
     on_traces: None = None
+    moduli = Interface.moduli
 
     def carry(self, u):
         return self.transfer @ u

@@ -225,10 +225,9 @@ def of_pooled(theta: Fraction, ratio: Observed) -> NextRun:
     )
     if ratio.most <= ends.SWIFT:
         return kept(theta, f"{why}, and none much faster is to be found")
-    following = read_observed(theta, ratio)[1]
-    larger = following.why.partition("; if the residual")[0]  # nobody knows that the factor of this log converges
+    following = read_observed(theta, ratio, converges=False)[1]
     accelerated = "of an Aitken or IQN-ILS run this says nothing: give its vectors to ndtheory advise vectors"
-    return replace(following, why=f"{why}: {larger}; {accelerated}")
+    return replace(following, why=f"{why}: {following.why}; {accelerated}")
 
 
 def one_mode(theta: Fraction, ratio: Observed, plateau: Observed) -> bool:

@@ -9,7 +9,7 @@ from typing import Any, get_args
 
 from ndtheory import HypothesisError, Number
 from ndtheory.constants import take
-from ndtheory.energy_norms import predicted_rate, predicted_theta
+from ndtheory.energy_norms import parallel_theta, predicted_rate, predicted_theta
 from ndtheory.moduli import Moduli, Plane, column, end, free_end, half_planes, layer, mirror
 from ndtheory.number import below
 from verification.advice import BodyNumber
@@ -231,7 +231,7 @@ def _next(seen: SeenModuli, tried: BodyNumber | None, parallel: bool) -> NextRun
     """The theta to start with in the role that is tried, or the run to make."""
     role = seen.roles[0 if tried is None else tried - 1]
     if role.start is not None and parallel:
-        theta = min(1 / (1 + Fraction(role.start.guess)), Fraction(role.start.theta_guess))
+        theta = min(parallel_theta(Fraction(role.start.guess)), Fraction(role.start.theta_guess))
         return NextRun(
             theta=rounded_down(theta), why="a guess for parallel coupling, 1/(1 + rho) with the guess of rho"
         )

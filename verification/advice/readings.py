@@ -198,11 +198,14 @@ def assumed(tied: bool, friction: bool) -> str:
 # --- readings ---------------------------------------------------------------------------------------------------------
 
 
-def read_observed(theta: Fraction, ratio: Observed) -> tuple[tuple[RunReading, ...], NextRun, Fraction | None]:
+def read_observed(
+    theta: Fraction, ratio: Observed, *, converges: bool = True
+) -> tuple[tuple[RunReading, ...], NextRun, Fraction | None]:
     """Every reading of a ratio of residuals at theta, the run to make next, and rho of the only reading.
 
     :func:`verification.advice.from_runs.advise_run` explains the readings.  Bounds hold for the ratio within its
-    limits, and no reading of a part is left out.  rho is None where there are several readings.
+    limits, and no reading of a part is left out.  rho is None where there are several readings.  Without ``converges``
+    nobody knows that a run with this theta does where the ratio is below 1.
     """
     r = ratio.value
     high = (1 + r) / theta - 1
@@ -224,7 +227,7 @@ def read_observed(theta: Fraction, ratio: Observed) -> tuple[tuple[RunReading, .
         following = min(between if between >= SHORTEST_STEP * theta else 3 * theta / 2, (1 + theta) / 2)
         confirmed = f"a ratio of {few(following * (1 + high) - 1)} there confirms mode-high"
         why = f"larger; {confirmed}, a smaller one rules it out"
-        if following * (1 + high) >= 2:
+        if converges and following * (1 + high) >= 2:
             why += f"; if the residual does not fall there, keep {few(theta)}, which converges"
     rho = high if kinds == ["mode-high"] else None
     return readings, NextRun(theta=rounded_down(following), why=why), rho

@@ -9,7 +9,7 @@ from fractions import Fraction
 from typing import Any, Literal
 
 from ndtheory import Number
-from ndtheory.energy_norms import parallel_factor, predicted_theta
+from ndtheory.energy_norms import parallel_factor, parallel_theta, predicted_theta
 from ndtheory.moduli import Moduli
 from ndtheory.number import above
 from verification.advice import BodyNumber
@@ -197,8 +197,8 @@ class Parallel:
 
     @classmethod
     def of(cls, neumann_body: BodyNumber | None, rho: float, *, bound: bool = False) -> Parallel:
-        """``1/(1 + rho)`` and its factor."""
-        theta = 1 / (1 + rho)
+        """The best theta and its factor."""
+        theta = parallel_theta(rho)
         return cls(neumann_body=neumann_body, theta=theta, factor=parallel_factor(theta, rho), bound=bound)
 
     def to_dict(self) -> dict[str, Any]:

@@ -274,8 +274,8 @@ def _described(spec: BodySpec, body: Body, points: NDArray[Any]) -> dict[str, An
         "cells": body.mesh.cells.tolist(),
         "held": np.argwhere(body.known.held).tolist(),
         "surface": body.nodes.tolist(),
-        "young": str(spec.moduli[0]),
-        "poisson": str(spec.moduli[1]),
+        "young": str(spec.moduli.young),
+        "poisson": str(spec.moduli.poisson),
     }
 
 

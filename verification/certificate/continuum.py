@@ -27,7 +27,7 @@ from ndtheory.continuum import (
     upper,
 )
 from ndtheory.intervals import Interval
-from ndtheory.moduli import Moduli, half_planes
+from ndtheory.moduli import half_planes
 from verification.certificate.calibrating import for_cut_off, for_traces
 from verification.constants.cells import OfCells, rho_of_cells
 from verification.constants.measuring import of_energy
@@ -180,13 +180,12 @@ class ContinuumCertificate(Document):
         uppers["kappa_1"], uppers["kappa_2"] = c.kappa(k)
         order = 1 if self.problem.contact_body == 1 else -1  # the contact body first
         bodies = (self.problem.body1, self.problem.body2)[::order]
-        moduli = [Moduli(young=young, poisson=poisson) for young, poisson in (body.moduli for body in bodies)]
         return {
             "kind": "continuum",
             "constants": {
                 **{name: at_most(value) for name, value in uppers.items()},
                 "K": [str(value) for value in c.K],
-                "rho_least": at_least(half_planes(*moduli).high),
+                "rho_least": at_least(half_planes(*(body.moduli for body in bodies)).high),
                 "rho_ends": at_least(c.rho_ends),
             },
             "friction": float(k),
@@ -239,10 +238,7 @@ def two_rectangles(problem: Problem) -> TwoRectangles:
             raise refuse(f"{name}.fixed", sorted(held), f'needed a body held at "{outer}" only, fixed or prescribed')
         if None in body.prescribed.get(outer, ()):
             raise refuse(f"{name}.prescribed.{outer}", "free", "needed both components")
-        young, poisson = body.moduli
-        found[name] = Rectangle(
-            left=body.x[0], right=body.x[1], thickness=body.y[1] - body.y[0], body=Moduli(young=young, poisson=poisson)
-        )
+        found[name] = Rectangle(left=body.x[0], right=body.x[1], thickness=body.y[1] - body.y[0], body=body.moduli)
     lower_body, upper_body = found["body1"], found["body2"]
     overlap = (max(lower_body.left, upper_body.left), min(lower_body.right, upper_body.right))
     contact, neumann = (upper_body, lower_body) if problem.contact_body == 2 else (lower_body, upper_body)

@@ -10,7 +10,7 @@ from typing import Any
 
 from fem1d2d.layers import Interface, Layer, peaks
 from ndtheory import Number
-from ndtheory.moduli import Moduli, half_planes
+from ndtheory.moduli import half_planes
 from verification.interface.body import material_of
 from verification.problem import Problem
 from verification.problem.specs import BodySpec
@@ -63,7 +63,7 @@ def rho_of_cells(problem: Problem | None, *, verified: bool = False) -> OfCells:
     except NoCells as error:
         return OfCells(numbers={}, why=str(error))
     contact, neumann = _roles(problem)
-    limit = half_planes(*map(_moduli, (contact, neumann)))
+    limit = half_planes(contact.moduli, neumann.moduli)
     ratios = zip(NAMES, _largest(interface), (limit.high, limit.free), strict=True)
     numbers = {name: Number.of_float(max(found, float(least))) for name, found, least in ratios}
     if not verified:
@@ -137,11 +137,6 @@ def _layer(body: BodySpec, size: tuple[Fraction, Fraction], column: int) -> Laye
     return Layer(material=material_of(body), aspect=float(size[0] / size[1]), rising=column % 2 == 1)
 
 
-def _moduli(body: BodySpec) -> Moduli:
-    young, poisson = body.moduli
-    return Moduli(young=young, poisson=poisson)
-
-
 def _roles(problem: Problem) -> tuple[BodySpec, BodySpec]:
     """The contact body and the Neumann body."""
     bodies = (problem.body1, problem.body2)
@@ -160,7 +155,7 @@ def _enclosed(interface: Interface, contact: BodySpec, neumann: BodySpec) -> OfC
 
     bodies = []
     for body in (contact, neumann):
-        (width, height), found = _cell(body), _moduli(body)
+        (width, height), found = _cell(body), body.moduli
         bodies.append(HalfPlane(aspect=width / height, shear=found.shear, poisson=found.poisson))
     mirrored = interface.contact.rising == interface.neumann.rising
     numbers: dict[str, Number] = {}

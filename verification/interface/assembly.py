@@ -413,7 +413,7 @@ def _body(problem: Problem, name: Name, mesh: Mesh, known: Supports, nodes: Ints
         name=name,
         mesh=mesh,
         material=material,
-        poisson=float(spec.moduli[1]),
+        poisson=float(spec.moduli.poisson),
         known=known,
         nodes=nodes,
         positions=free,

@@ -317,14 +317,7 @@ class Interface(Value):
         """Return the interface with the roles of the grids exchanged; ValueError where the grids differ."""
         if self.transfer is not None:
             raise ValueError("the grids differ: needed a pair built for these roles, with its own transfer")
-        return Interface(
-            contact=self.neumann,
-            neumann=self.contact,
-            gap=self.gap,
-            law=self.law,
-            profile=self.profile,
-            slipped=self.slipped,
-        )
+        return replace(self, contact=self.neumann, neumann=self.contact)
 
 
 def turned_transfer(P: NDArray[Any] | None, contact: NDArray[Any] | None, neumann: NDArray[Any] | None) -> Any:

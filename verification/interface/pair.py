@@ -137,8 +137,7 @@ class ContactPair(Value):
         ValueError
             Unless all k >= 0 and one for each contact node, or if friction has no law.
         """
-        x = self.contact.grid.x
-        s = [Fraction(at) for at in (x - x[0]).tolist()]
+        s = [Fraction(at) for at in self.contact.grid.s.tolist()]
         values = [friction(float(at)) for at in s] if callable(friction) else np.asarray(friction).tolist()
         if not isinstance(values, list) or len(values) != len(s) or len(s) < 2:
             raise ValueError(f"friction: needed a number for each of the {len(s)} contact nodes, two or more")

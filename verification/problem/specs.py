@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 from ndtheory import HypothesisError, relaxation_factor
+from ndtheory.moduli import Moduli
 from verification.problem.tables import Unfit, unreadable
 
 V = TypeVar("V")
@@ -176,10 +177,12 @@ class BodySpec:
         return self.shape == "rigid"
 
     @property
-    def moduli(self) -> tuple[Fraction, Fraction]:
-        """E and nu of the body of plane strain with the same law in the plane."""
+    def moduli(self) -> Moduli:
+        """Those of the body of plane strain with the same law in the plane."""
         E, nu = self.young, self.poisson
-        return (E, nu) if self.plane == "strain" else (E * (1 + 2 * nu) / (1 + nu) ** 2, nu / (1 + nu))
+        if self.plane == "stress":
+            E, nu = E * (1 + 2 * nu) / (1 + nu) ** 2, nu / (1 + nu)
+        return Moduli(young=E, poisson=nu)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -142,9 +142,7 @@ def _of_pair(pair: ContactPair) -> dict[str, Any]:
         if name in SETTINGS or value != getattr(default, name)
     }
     arrays: dict[str, Any] = {"gap": interface.gap, "transfer": interface.transfer}
-    if interface.on_traces is not None:
-        arrays["on_traces"] = interface.on_traces
-    arrays |= {} if interface.slipped is None else {"slipped": interface.slipped}
+    arrays |= {name: v for name in ("on_traces", "slipped") if (v := getattr(interface, name)) is not None}
     for name, side in (("contact", pair.contact), ("neumann", pair.neumann)):
         arrays |= {f"{name}.{part}": getattr(side, attribute) for part, attribute in ARRAYS.items()}
         arrays |= {f"{name}.x": side.grid.x, f"{name}.weights": side.grid.weights}
