@@ -104,7 +104,7 @@ BUDGET = {
     "fem1d2d": 4055,
     "ndtheory": 5869,
     "verification": 2022,
-    "verification.advice": 6286,
+    "verification.advice": 6315,
     "verification.algorithm": 2270,
     "verification.bounds": 3575,
     "verification.certificate": 1410,
@@ -119,7 +119,7 @@ BUDGET = {
     "verification.output": 534,
     "verification.problem": 1920,
     "verification.reproduce": 655,
-    "verification.sections": 2480,
+    "verification.sections": 2486,
     "verification.sweeps": 2405,
     "verification.testing": 1583,
 }

@@ -64,11 +64,8 @@ def test_roles_between_which_there_is_no_difference_are_told_so(call, tmp_path):
     S1, S2 = (saved(tmp_path, name, np.diag(values)) for name, values in (("a", [1.0, 4.0]), ("b", [4.0, 1.0])))
     answer = call("advise", "matrices", "--S1", S1, "--S2", S2)
     assert "and no difference with the roles exchanged" in answer.out
-    assert (
-        call("advise", "matrices", "--S1", S1, "--S2", S2, "--json")
-        .document["quote"]
-        .endswith("the same with the roles exchanged.")
-    )
+    quote = call("advise", "matrices", "--S1", S1, "--S2", S2, "--json").document["quote"]
+    assert "the same with the roles exchanged." in quote
 
 
 def test_the_table_has_a_row_for_a_tied_interface_with_the_steps_of_both_thetas(call, write):
@@ -81,7 +78,7 @@ def test_the_table_has_a_row_for_a_tied_interface_with_the_steps_of_both_thetas(
         )
         assert f"<= {steps(role['rate_tied'])} " in row
         at = max(abs(1 - role["theta_predicted"] * (1 + role[end]["value"])) for end in ("rho_min", "rho_tied"))
-        assert row.endswith(f"{steps(at)} steps at {role['theta_predicted']:.3f}")
+        assert row.endswith(f"{steps(at)} at {role['theta_predicted']:.3f}")
 
 
 def test_tied_advice_says_what_it_assumes_and_pastes_the_tied_theta(call, write):

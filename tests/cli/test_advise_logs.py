@@ -191,7 +191,7 @@ def test_the_screen_of_an_aitken_log_shows_both_ends_as_estimates_and_pastes_whe
     [
         (["run", "precice-A-convergence.log"], ["precice-A-convergence.log", "after --log"]),
         (["precice-A-convergence.log"], ["ndtheory advise run --log precice-A-convergence.log --theta X"]),
-        (["run", "--log", "precice-A-convergence.log"], ["--theta = None", "does not name it", "iterations.log"]),
+        (["run", "--log", "precice-A-convergence.log"], ["--theta = None", "name it", "Aitken", "iterations.log"]),
     ],
 )
 def test_a_log_given_in_another_way_gets_the_call_that_reads_it(call, tmp_path, monkeypatch, words, parts):

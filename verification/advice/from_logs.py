@@ -52,8 +52,11 @@ AGREE = Fraction(103, 100)
 #: Where the bounds of rho differ by less, a theta between costs a few steps at most.
 NARROW = Fraction(5, 4)
 
-#: How a quasi-Newton run is recognised.
-UNNAMED = "a quasi-Newton run of preCICE is recognised by its iterations.log in the same folder"
+#: What a log without its factor may be of.
+UNNAMED = (
+    "of a run with Aitken give the vectors instead, ndtheory advise vectors, or a log with its factors; "
+    "a quasi-Newton run of preCICE is recognised by its iterations.log in the same folder"
+)
 
 #: The smallest theta that a log may have: for a smaller one a ratio has to be steady over millions of steps.
 SMALLEST_THETA = Fraction(1, 10**6)

@@ -14,7 +14,7 @@ from ndtheory.moduli import Moduli, Plane, column, end, free_end, half_planes, l
 from ndtheory.number import below
 from verification.advice import BodyNumber
 from verification.advice.from_waves import advise_waves, shown
-from verification.advice.readings import AT_ONE, NextRun, rounded_down
+from verification.advice.readings import NextRun, or_at_one, rounded_down
 from verification.advice.roles import PROVED, Advice, Role
 from verification.advice.seen_moduli import Corners, LowerBounds, ModuliRole, Parallel, SeenModuli, StartTheta, exactly
 from verification.interface.pair import UNITS
@@ -247,6 +247,6 @@ def _next(seen: SeenModuli, tried: BodyNumber | None, parallel: bool) -> NextRun
     among = "the largest bound above" if seen.corners is None else "the bound above"
     why = (
         f"the Neumann problem on {who}, 1/(2 + {largest:.4g}) with {among}, which contracts {where} "
-        f"if rho is below {3 + 2 * largest:.4g}; halve it if the residual does not fall. {AT_ONE}"
+        f"if rho is below {3 + 2 * largest:.4g}; halve it if the residual does not fall{or_at_one(largest)}"
     )
     return NextRun(theta=rounded_down(1 / (2 + Fraction(largest))), why=why)

@@ -10,7 +10,7 @@ from ndtheory.constants import take
 from ndtheory.energy_norms import tied_theta
 from ndtheory.moduli import Wall, added_mass, conduction
 from verification.advice import BodyNumber, methods
-from verification.advice.readings import AT_ONE, NextRun, rounded_down
+from verification.advice.readings import NextRun, or_at_one, rounded_down
 from verification.advice.roles import Advice, Role, plain_role, table_of
 from verification.advice.seen_moduli import WAVES_KEYS, Kind, Parallel, SeenWaves
 from verification.advice.spectrum import Spectrum
@@ -117,7 +117,7 @@ def _fluid(seen: SeenWaves, parallel: bool) -> Advice:
     names = [name for name in Role.__dataclass_fields__ if name not in ("neumann_body", "rho", "reason", "singular")]
     why = (
         f"1/(2 + {largest:.4g}), which contracts if rho is below {3 + 2 * largest:.4g}; halve it if the residual does "
-        f"not fall. {AT_ONE}"
+        f"not fall{or_at_one(largest)}"
     )
     return Advice(
         neumann_body=2,

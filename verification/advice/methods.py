@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -201,13 +201,11 @@ def advised(table: Sequence[MethodRow], *, tied: bool, exchanged: bool | None = 
         (row for row in arriving if _count(row) <= WITHIN[row.method] * _count(fewest)),
         key=lambda row: (METHODS.index(row.method), _count(row)),
     )
-    same = [row for row in own if row.exchanged == taken.exchanged]
-    fewest = min(same, key=_count)
     return Advised(
         name=taken.method,
         neumann_body=taken.neumann_body,
         exchanged=taken.exchanged,
-        reason=_reason(taken, same, fewest),
+        reason=_reason(taken, [row for row in own if row.exchanged == taken.exchanged], tied),
     )
 
 
@@ -215,18 +213,18 @@ def _count(row: MethodRow) -> float:
     return math.inf if row.steps is None else row.steps
 
 
-def _reason(taken: MethodRow, same: Iterable[MethodRow], fewest: MethodRow) -> str:
+def _reason(taken: MethodRow, same: Sequence[MethodRow], tied: bool) -> str:
     constant = next(row for row in same if row.method == "constant")
-    others = f"{NAMES[fewest.method]} takes {fewest.steps}"
     bound = f"{constant.bound} " if constant.bound else ""
-    if taken.method == "constant" == fewest.method:
-        return f"{bound}{taken.steps} steps, and no method takes fewer"
+    fewest = min(same, key=_count)
+    others = "" if fewest.method == taken.method else f"; {NAMES[fewest.method]} takes {fewest.steps}"
+    if others:
+        others += ", hardly fewer" if tied or fewest.method != "iqn-ils" else " if contact does not change"
     if taken.method == "constant":
-        return f"{bound}{taken.steps} steps; {others}, hardly fewer"
+        return f"{bound}{taken.steps} steps{others or ', and no method takes fewer'}"
     known = "more than can be counted" if constant.steps is None else f"{bound}{constant.steps}"
     times = "" if constant.steps is None else f", {constant.steps / _count(taken):.2g} times as many"
-    hardly = "" if taken.method == fewest.method else f"; {others}, hardly fewer"
-    return f"{taken.steps} steps; a constant theta takes {known}{times}{hardly}"
+    return f"{taken.steps} steps; a constant theta takes {known}{times}{others}"
 
 
 #: How many times the fewest steps a method may take to be advised.

@@ -26,6 +26,12 @@ WIDEST, NARROWEST = Fraction(1, 10), Fraction(3, 100)
 SHOWS_MOST = "a few steps with theta = 1, if they may be run: if nothing slips or opens, their ratio tends to rho"
 AT_ONE = f"Or begin with {SHOWS_MOST}"
 
+
+def or_at_one(least: float) -> str:
+    """The offer to begin with theta = 1, after a sentence; nothing where rho is known to be above 1, as it grows."""
+    return "" if least > 1 else f". {AT_ONE}"
+
+
 #: A run with this theta or a larger one shows what one with theta = 1 would.
 LIKE_ONE = Fraction(9, 10)
 

@@ -491,7 +491,7 @@ class Advice(Document):
 
     @property
     def quote(self) -> str | None:
-        """The reason for the advice in two sentences, to be quoted: rho, theta and steps; None without a theta."""
+        """The reason for the advice in sentences to be quoted: rho, theta, steps, method; None without a theta."""
         if self.theta is None or self.waves is not None:
             return None
         best, other = self.best, self.other
@@ -513,6 +513,9 @@ class Advice(Document):
         if other is not None:
             away = in_steps(self.chosen(other)[1]).removesuffix(" steps")
             then += ", the same with the roles exchanged" if self.no_difference else f", against {away}"
+        if (own := self.method_to_paste) != "constant":
+            then += f". {methods.NAMES[own]} from there is predicted to take {self.steps_of(own)} to 1e-6, not "
+            then += self.steps_of("constant").removesuffix(" steps")
         return f"{first}. {then}."
 
     def snippet(self, library: str, method: str | None = None) -> str:
@@ -534,12 +537,25 @@ class Advice(Document):
         if self.parallel:
             raise ValueError("the blocks are for serial coupling: needed advice without parallel")
         if method is None:
-            exchanged = self.best is not self.roles[0]
-            own = methods.advised(self.methods, tied=self.tied, exchanged=exchanged)
-            method = "constant" if own is None or library in ONLY_CONSTANT else own.name
+            method = "constant" if library in ONLY_CONSTANT else self.method_to_paste
         count = steps(self.chosen(self.best)[1])
         scheme = CouplingScheme(neumann_body=self.neumann_body, theta=self.theta, steps=count, tied=self.tied)
         return snippet(library, scheme, method)
+
+    @property
+    def method_to_paste(self) -> str:
+        """The method that is advised in the roles of `theta`, where `method` may be for the exchanged ones.
+
+        theta is the first factor of one that is not constant.
+        """
+        own = methods.advised(self.methods, tied=self.tied, exchanged=self.best is not self.roles[0])
+        return "constant" if own is None else own.name
+
+    def steps_of(self, method: str) -> str:
+        """The steps of a method in the roles of `theta`, to 1e-6, as words."""
+        exchanged = self.best is not self.roles[0]
+        row = next(row for row in self.methods if row.method == method and row.exchanged == exchanged)
+        return "no end of steps" if row.steps is None else f"{f'{row.bound} ' if row.bound else ''}{row.steps} steps"
 
     @property
     def best(self) -> Role:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
+from textwrap import indent
 from typing import Any, Literal
 
 from verification.advice import METHODS
@@ -96,9 +97,7 @@ def precice(c: CouplingScheme, method: str) -> str:
     Both fields live on the mesh of the Neumann body, to which the other participant maps: displacements consistently,
     forces conservatively, which is the transposed map.
     """
-    mesh = f"{c.neumann}-Mesh"
-    tag, factor = ACCELERATIONS[method]
-    data = "" if method == "constant" else f'\n    <data name="Force" mesh="{mesh}" />'
+    mesh, acceleration = f"{c.neumann}-Mesh", indent(precice_acceleration(c, method), "  ")
     return f"""\
 <!-- {c.neumann}, the Neumann body, reads Force and writes Displacement;
      {c.contact}, the contact body, reads Displacement and writes Force. -->
@@ -113,10 +112,15 @@ def precice(c: CouplingScheme, method: str) -> str:
             from="{c.contact}" to="{c.neumann}" />
   <relative-convergence-measure data="Force" mesh="{mesh}"
                                 limit="{TOLERANCE:g}" />
-  <acceleration:{tag}>
-    <{factor} value="{c.theta:g}" />{data}
-  </acceleration:{tag}>
+{acceleration}
 </coupling-scheme:serial-implicit>"""
+
+
+def precice_acceleration(c: CouplingScheme, method: str) -> str:
+    """The element of the acceleration; a rule that adapts its factor must name the forces."""
+    tag, factor = ACCELERATIONS[method]
+    data = "" if method == "constant" else f'\n  <data name="Force" mesh="{c.neumann}-Mesh" />'
+    return f'<acceleration:{tag}><{factor} value="{c.theta:g}" />{data}</acceleration:{tag}>'
 
 
 #: The convergence accelerators of Kratos, and their names of the factor, or of the first one and its upper limit.

@@ -16,6 +16,9 @@ from verification.document import Document
 from verification.problem import Problem
 from verification.value import to_plain
 
+#: Why no friction is the largest one.
+NO_LAW = "no law of friction"
+
 #: Why C_t1 is infinite, and m is 0.
 SLIDES = "infinite: the contact body can move rigidly along Gamma_c, and its energy does not bound how far"
 NO_COERCIVITY = "m = 0: the contact body can move rigidly, held by contact alone"
@@ -200,7 +203,7 @@ class Measured(Document):
     @property
     def why_no_threshold(self) -> str:
         """Why no friction is the largest one allowed."""
-        return f"C_t1 is {SLIDES}" if self.reason.get("C_t1") == SLIDES else "no law of friction"
+        return f"C_t1 is {SLIDES}" if self.reason.get("C_t1") == SLIDES else NO_LAW
 
     @property
     def of_friction(self) -> tuple[Number, ...]:

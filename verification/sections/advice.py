@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
+from verification.advice import BodyNumber
 from verification.advice.accelerated import Accelerated
 from verification.advice.cells import Suggested
 from verification.advice.methods import NAMES as METHOD_NAMES
@@ -16,8 +17,9 @@ from verification.advice.runs_with_friction import FrictionBounds
 from verification.advice.seen import LogBound, RhoInterval, SeenLog
 from verification.advice.seen_moduli import Corners, ModuliRole, SeenModuli, SeenWaves, excluded_from
 from verification.advice.sides import SeenMatrices
-from verification.advice.snippets import SNIPPETS
+from verification.advice.snippets import SNIPPETS, CouplingScheme, precice_acceleration
 from verification.advice.spectrum import SeenVectors
+from verification.constants.measured import NO_LAW
 from verification.problem.reading import takes_theta
 from verification.sections.numbers import NONE, count, figures, near_one, rounded
 from verification.sections.parts import (
@@ -100,7 +102,7 @@ def _end(found: Advice) -> Section:
     if found.next.kept and not found.roles:
         then = f"no run; keep theta = {theta}"
     elif found.interval is not None:
-        then = f"the same with --log LOG --theta {theta} (LOG: the log of that run)"
+        then = f"a run with theta = {theta}; then this again plus --log LOG --theta {theta}"
     else:
         then = f"ndtheory advise run {assumed}--theta {theta} --ratio R (R: its ratio)"
     return closing("a bound of rho with friction, or that a reading is the right one", *outside, then=then)
@@ -111,8 +113,9 @@ def _after_a_problem(found: Advice) -> Next | str:
         return "ndtheory advise --help"
     if found.best.theta_auto is None:  # too large for a run
         return following("constants")
-    taken = found.theta is not None and takes_theta(found.problem.iteration.relaxation)
-    theta = ["--theta", f"{found.theta:g}"] if taken else []
+    rule = found.problem.iteration.relaxation if (own := found.method_to_paste) == "constant" else own
+    theta = ["--theta", f"{found.theta:g}"] if found.theta is not None and takes_theta(rule) else []
+    theta += [] if own == "constant" else ["--relaxation", own]
     return following("run", *theta, exchanged=found.roles[0].neumann_body != found.neumann_body)
 
 
@@ -257,7 +260,7 @@ def _at_predicted(role: Role) -> str:
     rate = role.factor_where_tied(theta)
     if rate is None or rate >= 1:
         return f"grows at {figures(theta)}"
-    return f"{count(steps(rate))} steps at {figures(theta)}"
+    return f"{count(steps(rate))} at {figures(theta)}"
 
 
 def _friction(found: Advice) -> Iterator[Section]:
@@ -276,6 +279,8 @@ def _friction(found: Advice) -> Iterator[Section]:
                 share = figures(role.friction_threshold.value / found.friction)
                 allowed = f"every small theta contracts for less than {share} times the friction along Gamma_c"
             said[NAMES[role.neumann_body]] = allowed
+    if set(said.values()) == {NO_LAW}:
+        return
     yield section("friction", "HOW MUCH FRICTION DOES THE ENERGY BOUND ALLOW?", *_together(said))
 
 
@@ -302,18 +307,16 @@ def _paste(found: Advice, *more: str) -> Section:
             takes = f'theta = "auto" takes the proved {float(auto.theta):.4g}'
             said.append(f"{takes}: at most twice the predicted steps.")
     said.append("For displacements (heat: temperatures) the same, but not in parallel coupling.")
-    return pasted(found.neumann_body, found.theta, *_only_constant(found), *said, *more)
+    return _pasted(found, found.neumann_body, *said, *more)
 
 
-def _only_constant(found: Advice) -> Iterator[str]:
-    """A note beside a theta to paste, where another method or the other roles are advised."""
-    advised = found.method
-    if advised is None:
-        return
-    other = advised.exchanged if advised.neumann_body is None else advised.neumann_body != found.neumann_body
-    if other or advised.name != "constant":
-        roles = ", in the roles as they are" * other
-        yield f"This is the constant theta{roles}; advised is {METHOD_NAMES[advised.name]}{', exchanged' * other}."
+def _pasted(found: Advice, neumann_body: BodyNumber | None, *notes: str) -> Section:
+    """The lines of :func:`pasted` for the method that is advised in the roles of its theta."""
+    assert found.theta is not None
+    own, rule = found.method_to_paste, []
+    if found.method is not None and found.method.exchanged and found.neumann_body is None:
+        rule.append(f"These are the roles as they are: exchanged, {METHOD_NAMES[found.method.name]} is advised.")
+    return pasted(neumann_body, found.theta, *rule, *notes, method=own, file=found.problem is not None)
 
 
 def snippets(found: Advice, library: str) -> Sections:
@@ -336,11 +339,16 @@ def next_run(made: NextRun | None) -> Sections:
     return () if made is None else (section("next", "WHICH RUN NEXT?", f"theta = {made.theta:g}: {made.why}"),)
 
 
-def pasted(neumann_body: int | None, theta: float | None, *notes: str) -> Section:
-    """The lines for a problem file and for a coupling configuration."""
+def pasted(
+    neumann_body: BodyNumber | None, theta: float, *notes: str, method: str = "constant", file: bool = False
+) -> Section:
+    """The lines for a problem file, if that was given, and for the configuration of preCICE."""
     lines = [] if neumann_body is None else [f"neumann_body = {neumann_body}"]
     lines.append(f"theta = {theta:g}")
-    lines.append(f'<acceleration:constant><relaxation value="{theta:g}" /></acceleration:constant>')
+    if file and method != "constant":
+        lines.append(f'relaxation = "{method}"')
+    scheme = CouplingScheme(neumann_body=neumann_body, theta=theta, steps=None)
+    lines += precice_acceleration(scheme, method).split("\n")
     return section("paste", "TO PASTE", Block(tuple(lines), 2), *notes)
 
 
@@ -589,7 +597,7 @@ def _of_waves(found: Advice, seen: SeenWaves) -> Sections:
         claims = "a bound of rho from above, or anything with a viscous or compressible fluid"
     else:
         relaxed = "Fluxes and temperatures are both relaxed." if found.parallel else "For temperatures the same."
-        paste = pasted(None, found.theta, relaxed)
+        paste = _pasted(found, None, relaxed)
         last = (_waves_of_heat(found, seen), *_parallel(found), *_which_method(found, names), paste)
         then = "ndtheory advise vectors X.npy TX.npy (iterates of a run: theta for your shapes)"
         claims = "anything about plates that are not flat; the command below reads those"
