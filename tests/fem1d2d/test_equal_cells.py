@@ -200,7 +200,7 @@ def drawn(seed: int):
     return bodies, mirrored, Interface(contact=doubles[0], neumann=neumann)
 
 
-@pytest.mark.parametrize("seed", range(60) if AT_NIGHT else (0, 3))
+@pytest.mark.parametrize("seed", range(60) if AT_NIGHT else (0,))
 def test_the_supremum_is_enclosed_to_1e_9_and_no_wave_in_doubles_is_above_it(seed):
     (contact, neumann), mirrored, interface = drawn(seed)
     phases = np.linspace(1e-3, np.pi, 500)
@@ -211,6 +211,7 @@ def test_the_supremum_is_enclosed_to_1e_9_and_no_wave_in_doubles_is_above_it(see
         assert peak.ratio <= hi * (1 + 1e-9)
 
 
+@pytest.mark.skipif(not AT_NIGHT, reason="in the nightly profile, as it takes eight seconds")
 def test_a_phase_that_is_not_the_best_proves_nothing_false():
     (contact, neumann), _ = half_planes(("1/2", "1"), ("0.3", "0.3"))
     with pytest.raises(Unproved):
