@@ -1,8 +1,11 @@
 """`advise run`: what the screen shows of the logs of other codes, and what it refuses."""
 
+import numpy as np
 import pytest
 from advice_calls import pasted
 from coupling_logs import linear_run, precice
+
+import verification as vf
 
 MODES = (0.2, 0.5, 1.1, 3.0)  # tied; rho = 3
 
@@ -159,7 +162,7 @@ def test_a_run_to_keep_is_no_run_to_make(call, tmp_path):
     path = tmp_path / "a.log"
     path.write_text("it res\n1 1.0\n2 1e-9\n", "utf-8")
     answer = call("advise", "run", "--log", path, "--theta", "0.3")
-    assert "theta = 0.3: keep it: the run converges within 1 step" in answer.out
+    assert "theta = 0.3: keep it: the run converges within 2 iterations" in answer.out
     assert answer.out.endswith("Next: no run; keep theta = 0.3\n")
 
 
@@ -205,6 +208,70 @@ def test_a_log_that_decides_nothing_leads_to_vectors(call, tmp_path):
     log = precice(tmp_path / "a.log", [{"ResAbs(M:F)": [0.8**n for n in range(9)]}])
     said = " ".join(call("advise", "run", "--log", log, "--theta", "0.3").out.split())
     assert "A few vectors of a run decide more than its log: ndtheory advise vectors --help." in said
-    assert "Or begin with a few steps with theta = 1" in said
+    assert "Or begin with ten steps with theta = 1" in said
     again = " ".join(call("advise", "run", "--log", log, "--theta", "1").out.split())
     assert "Or begin" not in again
+
+
+# --- logs of both participants' data, and logs of runs that were not constant ----------------------------------------
+
+
+def both_columns(theta, modes, steps=60):
+    """Relative residuals of the relaxed forces and of the displacements that answer them, which are not relaxed."""
+    eigenvalues, load = np.array(modes, float), np.arange(1.0, len(modes) + 1)
+    x, before, forces, displacements = np.zeros(len(modes)), np.zeros(len(modes)), [], []
+    for n in range(steps):
+        image = load - eigenvalues * x
+        forces.append(float(np.linalg.norm(image - x) / np.linalg.norm(image)))
+        displacements.append(float(np.linalg.norm(x - before) / np.linalg.norm(x)) if n else 1.0)
+        before, x = x, x + theta * (image - x)
+    return {"ResRel(M:Displacement)": displacements, "ResRel(M:Force)": forces}
+
+
+@pytest.mark.parametrize("modes", [(0.1, 1.0, 6.0), (0.5, 20.0)])
+@pytest.mark.parametrize("left_out", [None, "ResRel(M:Force)", "ResRel(M:Displacement)"])
+def test_a_tied_run_that_diverges_shows_rho_in_either_column(call, tmp_path, modes, left_out):
+    columns = {name: values for name, values in both_columns(0.5, modes).items() if name != left_out}
+    file = precice(tmp_path / "a.log", [columns])
+    found = call("advise", "run", "--log", file, "--theta", "0.5", "--tied", "--json").document
+    if modes[-1] > 6 and left_out == "ResRel(M:Force)":  # it may be relaxed, too: then rho is at least 1/(P - 1)
+        assert found["interval"]["lo"]["value"] == pytest.approx(0.5 * 21 - 1, rel=0.01)
+    else:
+        assert found["interval"]["lo"]["value"] == pytest.approx(modes[-1], rel=0.01)
+    assert "leave out tied" not in found["next"]["why"]
+
+
+def test_a_log_that_rises_and_falls_as_with_aitken_keeps_no_theta(call, tmp_path):
+    """Residuals of Aitken with first factor 0.5 on eigenvalues 0.1 to 6, where a constant 0.5 diverges."""
+    eigenvalues, residuals = np.linspace(0.1, 6.0, 20), []
+    coupling, x = vf.Coupling(rule="aitken", theta=0.5), np.zeros(20)
+    for _ in range(25):
+        image = np.arange(1.0, 21.0) - eigenvalues * x
+        residuals.append(float(np.linalg.norm(image - x) / np.linalg.norm(image)))
+        x = coupling.next(x, image)
+    file = precice(tmp_path / "a.log", [{"ResRel(M:Force)": residuals}])
+    answer = call("advise", "run", "--log", file, "--theta", "0.5")
+    said = " ".join(answer.out.split())
+    assert "this residual rises and falls as with Aitken or quasi-Newton" in said
+    assert "keep" not in said
+
+
+def test_thetas_are_for_the_logs_that_need_one(call, log, tmp_path):
+    path = precice(tmp_path / "precice-Fluid-convergence.log", [{"ResRel(M:F)": [0.5**n for n in range(16)]}])
+    iterations = tmp_path / "precice-Fluid-iterations.log"
+    iterations.write_text("TimeWindow TotalIterations Iterations Convergence QNColumns\n1 16 16 1 14\n", "utf-8")
+    one, name, _, theta = log(0.45)
+    found = call("advise", "run", "--log", path, one, name, "--theta", theta, "--json").document
+    assert [seen["theta"] for seen in found["logs"]] == [0.45]
+    assert len(found["accelerated"]) == 1
+
+
+def test_windows_that_end_where_they_were_largest_ask_for_a_smaller_theta(call, tmp_path):
+    grows = [0.02 * 1.3**n for n in range(10)]
+    file = precice(tmp_path / "a.log", [{"ResAbs(M:Force)": grows}] * 3)
+    found = call("advise", "run", "--log", file, "--theta", "0.5", "--json").document
+    assert found["next"]["theta"] == 0.25
+
+
+def test_what_is_decided_ends_without_another_run(call, log):
+    assert call("advise", "run", *log(0.45)).out.splitlines()[-1] == "Next: your coupling, with the lines above"

@@ -211,7 +211,7 @@ def test_the_screens_of_heat_and_of_fluids_fit_and_have_their_words(call, name, 
         assert (document["neumann_body"], document["roles"][1]["rho"]) == (2, None)
         rho = document["roles"][0]["rho"]["value"]
         assert document["next"]["theta"] == pytest.approx(1 / (2 + rho), rel=1e-3)
-        assert ("diverges" in said) == (rho > 1) == ("begin with a few steps with theta = 1" not in said)
+        assert ("diverges" in said) == (rho > 1) == ("begin with ten steps with theta = 1" not in said)
 
 
 def test_the_command_has_at_most_ten_options_beside_json_and_help(call):

@@ -42,15 +42,15 @@ def test_blocks_to_paste_have_the_theta_of_the_vectors(call, files):
 
 
 def test_where_another_method_is_advised_it_is_pasted_quoted_and_written_into_blocks(call, tmp_path):
-    """Eigenvalues 5 to 200: IQN-ILS takes the fewest steps in these roles, and fewer with the exchanged ones."""
+    """Eigenvalues 5 to 200: IQN-ILS takes the fewest steps in these roles, a constant theta few with them exchanged."""
     stiffness, X = np.diag(np.linspace(5.0, 200.0, 12)), np.random.default_rng(3).normal(size=(13, 12))
     np.savez(tmp_path / "run.npz", X=X, TX=1 - X @ stiffness)
     words = ["advise", "vectors", tmp_path / "run.npz", "--tied"]
     document, screen = call(*words, "--json").document, call(*words).out
-    assert (document["method"]["name"], document["method"]["exchanged"]) == ("iqn-ils", True)
+    assert (document["method"]["name"], document["method"]["exchanged"]) == ("constant", True)
     element = f'<acceleration:IQN-ILS><initial-relaxation value="{document["theta"]:g}" />'
     assert element in screen.partition("TO PASTE")[2]
-    assert "These are the roles as they are: exchanged, IQN-ILS is advised." in " ".join(screen.split())
+    assert "These are the roles as they are: exchanged, constant theta is advised." in " ".join(screen.split())
     own = {row["method"]: row["steps"] for row in document["methods"] if not row["exchanged"]}
     words_of_steps = f"predicted to take {own['iqn-ils']} steps to 1e-6, not {own['constant']}."
     assert document["quote"].endswith(words_of_steps)

@@ -227,3 +227,32 @@ def test_the_end_can_be_pickled():
     assert again.summary == found.summary
     assert again.advice.to_json() == found.advice.to_json()
     assert not again.force.flags.writeable
+
+
+# --- steps in time, wrong signs ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("rule", ["constant", "aitken", "anderson", "iqn-ils"])
+def test_in_a_loop_over_time_only_differences_within_a_step_show_the_spectrum(rule):
+    """The loads change by much more than the iterates do."""
+    linear = Linear(np.array([0.4, 1.0, 3.0]), 3)
+    told, mixed = vf.Coupling(rule=rule, theta=0.3), vf.Coupling(rule=rule, theta=0.3)
+    g = np.zeros(3)
+    for time in range(4):
+        told.new_step()
+        for _ in range(5):
+            image = linear.b + 50.0 * time * np.array([1.0, -2.0, 3.0]) - linear.H @ g
+            following = told.next(g, image)
+            mixed.see(g, image)
+            g = following
+    assert told.spectrum.low == pytest.approx(0.4, rel=0.02)
+    assert told.spectrum.high == pytest.approx(3.0, rel=0.02)
+    if rule in ("constant", "aitken"):  # the others arrive in each step, and begin the next one where they arrived
+        wrong = mixed.spectrum
+        assert wrong is None or abs(wrong.high - 3.0) > 0.1 or abs(wrong.low - 0.4) > 0.1
+
+
+def test_a_wrong_sign_is_told_where_the_end_is_printed():
+    found = vf.couple(lambda g: g / 2, lambda u: 3 + 0.5 * u, start=0.0)
+    assert found.converged
+    assert "but all eigenvalues are negative: one solver probably has the wrong sign" in found.summary

@@ -25,7 +25,15 @@ def observed(value, least=None, most=None):
 
 
 def steady(ratio, steps=60, height=1e-3):
-    return Pace(kind="steady", value=float(ratio), least=float(ratio), most=float(ratio), steps=steps, height=height)
+    return Pace(
+        kind="steady",
+        value=float(ratio),
+        least=float(ratio),
+        most=float(ratio),
+        steps=steps,
+        length=steps,
+        height=height,
+    )
 
 
 def log(theta, ratio=None, *, kinds=("steady",), plateau=None, residual="absolute", file="a.log", paces=None, **more):
@@ -147,11 +155,12 @@ def test_of_a_log_that_shows_no_ratio_the_next_run_follows_its_end():
     longer = lambda *paces: from_logs.longer(column(*paces), F(3, 10))
     arrived = Pace(kind="unsteady", steps=20, height=1e-7)
     short = Pace(kind="short", steps=5, height=0.5)
-    assert longer(arrived, Pace(kind="unsteady", steps=30, height=1e-8)).why.startswith(
+    assert longer(arrived, Pace(kind="unsteady", steps=30, length=30, height=1e-8)).why.startswith(
         "keep it: the run converges within 30"
     )
     assert not longer(arrived, short).kept
-    assert longer(Pace(kind="short", steps=1, height=1e-12)).why.startswith("keep it: the run converges within 1 step,")
+    swift = Pace(kind="short", steps=1, length=2, height=1e-12)
+    assert longer(swift).why.startswith("keep it: the run converges within 2 iterations,")
     assert not longer(Pace(kind="unsteady", steps=20, height=1e-6)).kept
     assert longer(Pace(kind="short", steps=5, height=0.5, lost=True), short).theta == 0.15
     assert "smaller limits" in longer(short, short).why
@@ -216,12 +225,12 @@ def test_a_swift_log_is_kept_unless_the_largest_decides_rho():
     assert slow.rho is None
     found = together(slow, swift)
     assert (found[1].theta, found[1].kept, found[2]) == (0.3, True, None)
-    assert "within 8 steps" in found[1].why
+    assert "within 8 iterations" in found[1].why
     decides = log("0.45", "0.8")
     assert together(decides)[1].theta < decides.next.theta  # as the softest mode is not known
     assert together(decides, swift)[2] == decides.rho
-    one = Pace(kind="short", steps=1, height=1e-12)
-    assert "within 1 step," in together(log("0.3", paces=(one,)))[1].why
+    one = Pace(kind="short", steps=1, length=2, height=1e-12)
+    assert "within 2 iterations," in together(log("0.3", paces=(one,)))[1].why
 
 
 def test_a_rho_between_narrow_bounds_is_taken_at_its_upper_end():

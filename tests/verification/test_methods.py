@@ -128,6 +128,13 @@ def test_the_simplest_method_is_kept_where_it_costs_little():
     assert NEAR * 10 >= 12
 
 
+def test_neither_a_method_nor_the_other_roles_are_taken_for_two_steps():
+    table = [row("constant", 4), row("aitken", 3), row("constant", 2, exchanged=True)]
+    found = advised(table, tied=True)
+    assert (found.name, found.exchanged) == ("constant", False)
+    assert advised([row("constant", 5), row("aitken", 2)], tied=True).name == "aitken"
+
+
 def test_a_method_that_saves_steps_is_advised_with_what_it_saves():
     table = [row("constant", 237), row("aitken", 52), row("iqn-ils", 14)]
     found = advised(table, tied=True)

@@ -38,16 +38,13 @@ from verification.advice.readings import (
 )
 from verification.advice.roles import Advice
 from verification.advice.runs_with_friction import by_kind, friction_bounds, readings_with_friction, with_friction
-from verification.advice.seen import LogBound, RhoInterval, SeenColumn, SeenLog, bounds, seen_column
+from verification.advice.seen import AGREE, LogBound, RhoInterval, SeenColumn, SeenLog, bounds, seen_column
 from verification.advice.spectrum import Spectrum
 from verification.interface.pair import UNITS
 from verification.problem.tables import ProblemError
 
 #: Readings that are left, the run to make next, and rho where the logs decide it.
 Decision = tuple[tuple[RunReading, ...], NextRun, Fraction | None]
-
-#: Bounds of 1 + rho that differ by less do not contradict each other: a ratio has not wholly settled.
-AGREE = Fraction(103, 100)
 
 #: Where the bounds of rho differ by less, a theta between costs a few steps at most.
 NARROW = Fraction(5, 4)
@@ -57,6 +54,10 @@ UNNAMED = (
     "of a run with Aitken give the vectors instead, ndtheory advise vectors, or a log with its factors; "
     "a quasi-Newton run of preCICE is recognised by its iterations.log in the same folder"
 )
+
+#: A window too short to be read does not converge where it has FEW steps, and its last residual is this share of the
+#: largest one.
+LARGE, FEW = 0.9, 5
 
 #: The smallest theta that a log may have: for a smaller one a ratio has to be steady over millions of steps.
 SMALLEST_THETA = Fraction(1, 10**6)
@@ -242,10 +243,17 @@ def one_mode(theta: Fraction, ratio: Observed, plateau: Observed) -> bool:
 def longer(columns: tuple[SeenColumn, ...], theta: Fraction) -> NextRun:
     """The run to make where a log shows nothing steady."""
     paces = [one for column in columns for one in column.paces]
+    if any(one.adapts for one in paces):
+        why = "the same again, constant: this residual rises and falls as with Aitken or quasi-Newton"
+        vectors = "of such a run give the vectors to ndtheory advise vectors"
+        return NextRun(theta=float(theta), why=f"{why}; {vectors}", again=True)
     if all(one.height < CONVERGED for one in paces):
         return kept(theta, f"{_within(paces)}, and shows no ratio")
     if any(one.lost for one in paces):
         why = "half of it, as the log ends in inf or nan before a ratio shows"
+        return NextRun(theta=rounded_down(theta / 2), why=why)
+    if all(one.kind == "short" and one.height > LARGE and one.steps >= FEW for one in paces):
+        why = "half of it, as the residual is about as large at the end of each window as ever"
         return NextRun(theta=rounded_down(theta / 2), why=why)
     steps = f"{steps_needed(theta)} steps or more in one time window"
     again = f"the same again, constant and without Aitken or quasi-Newton, {steps}"
@@ -257,8 +265,8 @@ def longer(columns: tuple[SeenColumn, ...], theta: Fraction) -> NextRun:
 
 
 def _within(paces: Sequence[Pace]) -> str:
-    most = max(one.steps for one in paces)
-    return f"the run converges within {most} step{'s' * (most > 1)}"
+    most = max(one.length for one in paces)
+    return f"the run converges within {most} iteration{'s' * (most > 1)}"
 
 
 def interval_of(lower: list[LogBound], upper: list[LogBound]) -> RhoInterval:

@@ -25,6 +25,9 @@ MOST, COUNTED = 1000, 10**9
 #: well, is preferred to IQN-ILS within the second number.
 NEAR, NEAR_AITKEN = 1.3, 1.15
 
+#: Nor is it given up, or are roles exchanged, for so few steps.
+LITTLE = 2
+
 
 @dataclass(frozen=True, kw_only=True)
 class MethodRow:
@@ -194,11 +197,12 @@ def advised(table: Sequence[MethodRow], *, tied: bool, exchanged: bool | None = 
     if not arriving:
         return None
     kept = [row for row in arriving if not row.exchanged]
-    if kept and min(map(_count, kept)) <= NEAR * min(map(_count, arriving)):
+    near = lambda row, fewest, times: _count(row) <= max(times * fewest, fewest + LITTLE * (times > 1))
+    if kept and near(min(kept, key=_count), min(map(_count, arriving)), NEAR):
         arriving = kept
-    fewest = min(arriving, key=_count)
+    fewest = min(map(_count, arriving))
     taken = min(
-        (row for row in arriving if _count(row) <= WITHIN[row.method] * _count(fewest)),
+        (row for row in arriving if near(row, fewest, WITHIN[row.method])),
         key=lambda row: (METHODS.index(row.method), _count(row)),
     )
     return Advised(

@@ -44,6 +44,9 @@ ROUNDED = 1e-15
 #: Ratios that have not settled when a run arrives may have risen by this share over the stretch that is looked at.
 RISE = 0.3
 
+#: Ratios of a residual with constant relaxation do not fall by this factor.
+DROP = 8.0
+
 #: How often the steady stretch is looked for further from the end.
 TRIES = 12
 
@@ -67,13 +70,15 @@ class Pace:
         steady steps before.
     value, least, most : float or None
         The ratio of consecutive residuals, or P of a plateau, and its limits.
-    steps : int
-        Number of steps of the series that can be read.
+    steps, length : int
+        Number of steps of the series that can be read, and of all its residuals.
     height : float
         The last residual as a share of the largest one; where it is lost in rounding or zero, the share of rounding.
     lost, arrived : bool
         True if the series ends in inf or nan; True if it ends in rounding or in zero, a step after those that can be
         read.
+    adapts : bool
+        True if it falls much faster than before after it rose: a constant factor does not do that.
     """
 
     kind: Kind
@@ -81,9 +86,11 @@ class Pace:
     least: float | None = None
     most: float | None = None
     steps: int
+    length: int = 0
     height: float = 1.0
     lost: bool = False
     arrived: bool = False
+    adapts: bool = False
 
     @property
     def swift(self) -> bool:
@@ -131,12 +138,12 @@ def pace(residuals: Floats, column: Column, theta: Fraction) -> Pace:
     grown = taken > 0 and values[0] < CONVERGED * values[-1]
     if height < CONVERGED or grown:  # no level: fewer steps show the ratio
         steps = min(steps, max(FEWEST_STEPS, taken // 2))
+    known: dict[str, Any] = {"length": len(residuals), "height": height, "arrived": arrived, "adapts": _adapts(values)}
     if taken < steps:
-        return Pace(kind="short", steps=max(taken, int(arrived)), height=height, lost=lost, arrived=arrived)
+        return Pace(kind="short", steps=max(taken, int(arrived)), lost=lost, **known)
+    known["steps"] = taken
     logs = np.log(values)
     limit = min(STEADY, float(theta) / 5)
-
-    known: dict[str, Any] = {"steps": taken, "height": height, "arrived": arrived}
 
     def ratio(end: int) -> Pace | None:
         """The steady ratio of the steps before ``end``; None where there is none."""
@@ -209,6 +216,19 @@ def _settling(tail: Floats, relative: bool, limit: float, steps: int) -> dict[st
     if not (0 < rise <= RISE and scatter <= limit and last + rise + scatter < 0):
         return None
     return {"least": math.exp(middle - scatter), "value": math.exp(last), "most": math.exp(last + rise + scatter)}
+
+
+def _adapts(values: Floats) -> bool:
+    """True if a step falls DROP times faster than one before it, which rises.
+
+    With a constant factor the residuals of a symmetric linear coupling are log-convex, ``r_n^2 <= r_{n-1} r_{n+1}``, in
+    the norm in which it is symmetric: their ratios do not fall.
+    """
+    ratios = np.diff(np.log(values))
+    if not ratios.size:
+        return False
+    before = np.maximum.accumulate(ratios)
+    return bool(((before > 0) & (before - ratios > math.log(DROP))).any())
 
 
 def _slopes(logs: Floats, lag: int) -> Floats:

@@ -23,7 +23,7 @@ FEWEST_STEPS = 10
 WIDEST, NARROWEST = Fraction(1, 10), Fraction(3, 100)
 
 #: The run that shows most: with theta = 1 a mode is multiplied by ``-lambda``, and an open node by 0.
-SHOWS_MOST = "a few steps with theta = 1, if they may be run: if nothing slips or opens, their ratio tends to rho"
+SHOWS_MOST = "ten steps with theta = 1, if they may be run: if nothing slips or opens, their ratio tends to rho"
 AT_ONE = f"Or begin with {SHOWS_MOST}"
 
 
@@ -141,6 +141,11 @@ class Observed:
     def known(cls, value: Fraction) -> Observed:
         """A number that was given."""
         return cls(value=value, least=value, most=value)
+
+    def of_relaxed(self, theta: Fraction) -> Observed:
+        """The plateau of relaxed data where this one is of other data: ``1 + 1/q`` with ``q = theta (1 + rho) - 1``."""
+        there = lambda plateau: 1 + 1 / ((1 + 1 / (plateau - 1)) / theta - 1)
+        return Observed(value=there(self.value), least=there(self.least), most=there(self.most))
 
     def __str__(self) -> str:
         return f"{few(self.value)} ({few(self.least)} to {few(self.most)})"
@@ -278,9 +283,8 @@ def read_plateau(theta: Fraction, plateau: Observed) -> tuple[tuple[RunReading, 
     found = []
     following, why = theta / 2, f"half of {few(theta)}, which does not converge; its log narrows rho"
     if rho > least:
-        says = (
-            f"a tied run diverges, its relative residual at {few(plateau.value)} = 1 + 1/rho: nothing opens or slides"
-        )
+        at = f"the relative residual of relaxed data at {few(plateau.value)} = 1 + 1/rho"
+        says = f"a tied run diverges, {at}: nothing opens or slides"
         lo = max(1 / (plateau.most - 1), least)
         found.append(RunReading(kind="plateau", value=float(rho), lo=below(lo), says=says))
         following = 2 / (rho + Fraction(7, 4))

@@ -551,6 +551,13 @@ class Advice(Document):
         own = methods.advised(self.methods, tied=self.tied, exchanged=self.best is not self.roles[0])
         return "constant" if own is None else own.name
 
+    @property
+    def advised_exchanged(self) -> str:
+        """The method advised with the roles exchanged, where theta is for the roles as they are; empty elsewhere."""
+        if self.method is None or not self.method.exchanged or self.neumann_body is not None:
+            return ""
+        return f"exchanged, {methods.NAMES[self.method.name]} is advised"
+
     def steps_of(self, method: str) -> str:
         """The steps of a method in the roles of `theta`, to 1e-6, as words."""
         exchanged = self.best is not self.roles[0]

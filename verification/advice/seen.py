@@ -16,6 +16,9 @@ from verification.value import to_plain
 #: A residual below this share of its largest value has fallen, although the log is too short for a ratio.
 FALLEN = 0.1
 
+#: Numbers of one run, as rho by two fields, agree within this factor.
+AGREE = Fraction(103, 100)
+
 #: Assumption under which a ratio bounds rho from below, and from above.
 FROM_BELOW = "no friction, or a tied interface"
 TIED = "a tied interface"
@@ -116,6 +119,12 @@ def seen_column(column: Column, theta: Fraction) -> SeenColumn:
     )
 
 
+def _same(one: Observed, other: Observed) -> bool:
+    """True if two plateaus are of one rho."""
+    rho = [1 / (plateau.value - 1) for plateau in (one, other)]
+    return max(rho) <= AGREE * min(rho)
+
+
 @dataclass(frozen=True, kw_only=True)
 class SeenLog:
     """One log of a run with constant theta.
@@ -158,8 +167,18 @@ class SeenLog:
 
     @property
     def plateau(self) -> Observed | None:
-        """The plateau of the first relative residual that shows one."""
-        return next((column.plateau for column in self.columns if column.plateau is not None), None)
+        """The plateau of the first residual of relaxed data that shows one; of data that are not relaxed as its equal.
+
+        In a tied run that diverges the stiffest mode is multiplied by -q with ``q = theta (1 + rho) - 1``.  Relaxed
+        data stay at ``1 + 1/rho``, and the data that the other participant returns at ``1 + 1/q``.
+        """
+        found = [column.plateau for column in self.columns if column.plateau is not None]
+        if not found:
+            return None
+        partner = lambda one: any(_same(one, other.of_relaxed(self.theta)) for other in found if other is not one)
+        relaxed = [one for one in found if partner(one)]
+        relaxed += [one for one in found if 1 / (one.least - 1) * AGREE >= 2 / self.theta - 1]
+        return relaxed[0] if relaxed else found[0].of_relaxed(self.theta)
 
     @property
     def stays(self) -> bool:
@@ -184,7 +203,7 @@ class SeenLog:
     def swift(self) -> bool:
         """True if the residual falls so fast, in the mean of every window, that no faster run is looked for."""
         paces = [pace for pace in self.paces if pace.steps]
-        return bool(paces) and all(pace.swift for pace in paces)
+        return bool(paces) and all(pace.swift and not pace.adapts for pace in paces)
 
     @property
     def pooled(self) -> Observed | None:
@@ -269,7 +288,7 @@ def bounds(logs: Sequence[SeenLog]) -> tuple[list[LogBound], list[LogBound]]:
         if log.diverges:
             lower.append(LogBound(value=2 / theta - 1, log=log, says="it does not converge", assumes=FROM_BELOW))
         if plateau is not None and any(reading.kind == "plateau" for reading in log.readings):
-            says = f"its relative residual stays at {few(plateau.value)}"
+            says = f"the relative residual of relaxed data stays at {few(plateau.value)}"
             lower.append(LogBound(value=1 / (plateau.most - 1), log=log, says=says, assumes=TIED))
         if ratio is not None and log.converges:
             says = f"its residual changes by {few(ratio.most)} a step at most"

@@ -33,12 +33,15 @@ class CouplingScheme:
         The relaxation factor; True if nothing opens or slips.
     steps : int or None
         To 1e-9 of the first error, by the rate of the advice.
+    force : str
+        The name of the relaxed data in preCICE.
     """
 
     neumann_body: Literal[1, 2] | None
     theta: float
     steps: int | None
     tied: bool = False
+    force: str = "Force"
 
     @property
     def neumann(self) -> str:
@@ -119,7 +122,7 @@ def precice(c: CouplingScheme, method: str) -> str:
 def precice_acceleration(c: CouplingScheme, method: str) -> str:
     """The element of the acceleration; a rule that adapts its factor must name the forces."""
     tag, factor = ACCELERATIONS[method]
-    data = "" if method == "constant" else f'\n  <data name="Force" mesh="{c.neumann}-Mesh" />'
+    data = "" if method == "constant" else f'\n  <data name="{c.force}" mesh="{c.neumann}-Mesh" />'
     return f'<acceleration:{tag}><{factor} value="{c.theta:g}" />{data}</acceleration:{tag}>'
 
 

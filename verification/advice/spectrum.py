@@ -232,7 +232,7 @@ class SeenVectors(Value):
         }
 
 
-def seen_in(X: Floats, TX: Floats, *, tied: bool = False) -> SeenVectors:
+def seen_in(X: Floats, TX: Floats, *, tied: bool = False, starts: NDArray[np.bool_] | None = None) -> SeenVectors:
     """The spectrum by Ritz values: iterates x and their images T x as rows, of a run by any method.
 
     With an orthonormal basis U of the differences of the iterates, the eigenvalues of ``U' (1 + H) U`` lie between the
@@ -244,6 +244,8 @@ def seen_in(X: Floats, TX: Floats, *, tied: bool = False) -> SeenVectors:
         k >= 2 vectors and what T makes of them.
     tied : bool
         True if an entry that is 0 shows no open node.
+    starts : array of bool, shape (k,), optional
+        Where another step in time begins, with another T of the same linear part.
 
     Raises
     ------
@@ -253,12 +255,13 @@ def seen_in(X: Floats, TX: Floats, *, tied: bool = False) -> SeenVectors:
     given, last = len(X), len(X) if tied else _last_piece(TX)
     changing, read = last < given, last if last >= FEWEST else given
     X, TX = X[-read:], TX[-read:]
-    values, residuals, noise = _ritz(X, TX)
+    inside = np.ones(read - 1, dtype=bool) if starts is None else ~starts[-read + 1 :]
+    values, residuals, noise = _ritz(X, TX, inside)
     low, high = (_error(values, residuals, i) for i in (0, -1))
     negative = bool(values[0].real < 1 - max(REAL, low))
     modes = _modes(values, residuals / np.abs(values), X.shape[1])
     spectrum = Spectrum(values=modes - 1, source="vectors", error_low=low, error_high=high)
-    before = _before(X, TX, len(values))
+    before = _before(X, TX, inside, len(values))
     steady = lambda ends: len(before) > 0 and max(ends) <= (1 + STEADY) * min(ends)
     whole = len(values) == X.shape[1]
     known = [whole or bool(residuals[i] <= INVARIANT * abs(values[i])) for i in (0, -1)]
@@ -281,12 +284,12 @@ def seen_in(X: Floats, TX: Floats, *, tied: bool = False) -> SeenVectors:
     )
 
 
-def _before(X: Floats, TX: Floats, directions: int) -> list[Complex]:
+def _before(X: Floats, TX: Floats, inside: NDArray[np.bool_], directions: int) -> list[Complex]:
     """Ritz values of fewer iterates, up to FEWER directions fewer; empty where fewer than LEFT would be left."""
     found: list[Complex] = []
     for count in range(len(X) - 1, LEFT, -1):
         try:
-            values = _ritz(X[:count], TX[:count])[0]
+            values = _ritz(X[:count], TX[:count], inside[: count - 1])[0]
         except ValueError:
             return []
         if len(values) < directions and all(len(values) < len(more) for more in found):
@@ -296,9 +299,12 @@ def _before(X: Floats, TX: Floats, directions: int) -> list[Complex]:
     return []
 
 
-def _ritz(X: Floats, TX: Floats) -> tuple[Complex, Floats, float | None]:
-    """Ritz values of ``1 + H`` by increasing real part, their residuals, and the noise of the images."""
-    D, E = (np.diff(rows, axis=0).T for rows in (X, TX - X))
+def _ritz(X: Floats, TX: Floats, inside: NDArray[np.bool_]) -> tuple[Complex, Floats, float | None]:
+    """Ritz values of ``1 + H`` by increasing real part, their residuals, and the noise of the images.
+
+    Differences of consecutive rows count where ``inside``.
+    """
+    D, E = (np.diff(rows, axis=0)[inside].T for rows in (X, TX - X))
     lengths = np.linalg.norm(D, axis=0)
     accuracy = _accuracy(X, TX) * float(np.abs(TX).max(initial=0.0))
     kept = lengths > ROUNDING * accuracy

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -246,7 +246,7 @@ def run(
     snippets: str | None,
     as_json: bool,
 ) -> None:
-    r"""Bound rho from runs of any other code.
+    """Bound rho from runs of any other code.
 
     Runs with constant theta (no unit), as logs or as the ratio of the residuals of one run: what these can mean, and
     which theta to run next.  Aitken's factors in a log show both ends of the spectrum.  Without --friction runs are
@@ -261,7 +261,7 @@ def run(
       ndtheory advise run --log precice-Solid-convergence.log --theta 0.5
       ndtheory advise run --log a.log --theta 0.3 --log b.log --theta 0.6
       ndtheory advise run --log a.log --theta 0.3 --friction
-      ndtheory advise run --log out.txt --theta 0.5 --pattern 'res = (\S+)'
+      ndtheory advise run --log out.txt --theta 0.5 --pattern 'res = (\\S+)'
     """
     context = click.get_current_context()
     _no_document_of(snippets, as_json)
@@ -270,7 +270,7 @@ def run(
         raise click.UsageError(f"received {received}: needed one of --log and --ratio", context)
     if pattern is not None and not logs:
         raise click.UsageError("received --pattern without --log", context)
-    given: tuple[str | None, ...] = thetas or (None,) * len(logs)
+    given = _thetas_of(logs, thetas, pattern)
     if len(given) != max(len(logs), 1):
         received = f"received {len(thetas)} --theta with {len(logs)} --log"
         raise click.UsageError(f"{received}: needed one --theta for each log, or one with --ratio", context)
@@ -290,6 +290,18 @@ def run(
     except HypothesisError as error:
         raise click.UsageError(f"--{error}", context) from None
     _show(found, snippets, as_json)
+
+
+def _thetas_of(logs: Sequence[Path], thetas: Sequence[str], pattern: str | None) -> Sequence[str | None]:
+    """The theta of each log; fewer than logs are for those whose relaxation was constant and that name no factor."""
+    if not thetas or len(thetas) >= len(logs):
+        return thetas or (None,) * len(logs)
+    from verification.advice.log_files import read_log
+
+    read = [read_log(path, pattern) for path in logs]
+    wanted = [log.accelerator is None and log.theta is None for log in read]
+    left = iter(thetas)
+    return [next(left) if needed else None for needed in wanted] if sum(wanted) == len(thetas) else thetas
 
 
 #: Words of --shape, and the parameters of advise_moduli that they set.
@@ -393,9 +405,9 @@ def vectors(iterates: Path, images: Path | None, tied: bool, snippets: str | Non
     """Read the spectrum off a few iterates and their images.
 
     X has a row for each iterate of a run, TX the row that T made of it before relaxation, in any one unit; three to ten
-    iterates of a run by any method are enough.  Files are .npy, .npz (one file with X and TX too), .mtx, .mat, .csv or
-    .txt.  The answer has the ends of the spectrum (no unit), theta, and the steps of a constant theta, Aitken
-    and IQN-ILS.
+    iterates of a run by any method are enough, all of one step in time.  Files are .npy, .npz (one file with X and TX
+    too), .mtx, .mat, .csv or .txt.  The answer has the ends of the spectrum (no unit), theta, and the steps of a
+    constant theta, Aitken and IQN-ILS.
 
     \b
     Examples:
@@ -438,6 +450,8 @@ def _show(found: Advice, snippets: str | None, as_json: bool, typed: Typed | Non
 
     if snippets is not None and found.theta is not None:
         deliver(found, lambda found: blocks(found, snippets), as_json)
+        if found.advised_exchanged:
+            complain(f"the roles are as they are: {found.advised_exchanged}")
     else:
         deliver(found, sections, as_json, typing=nothing_typed if typed is None else typed.command)
     if snippets is not None and found.theta is None:

@@ -41,6 +41,8 @@ class CouplingError(RuntimeError):
 class Coupling:
     """The next force of a coupling whose loop is yours, and what its vectors show.
 
+    In a loop over time call :meth:`new_step` at the start of each step, and :meth:`see` for the last evaluation of it.
+
     Parameters
     ----------
     rule : {'constant', 'aitken', 'anderson', 'iqn-ils'} or Rule
@@ -68,7 +70,8 @@ class Coupling:
         needed = "the relaxation factor, 0 < theta <= 1"
         self.theta = float(FIRST if theta is None else take("theta", theta, needed, lambda value: 0 < value <= 1))
         self._following = self.rule.on_vectors(self.theta)
-        self._seen: deque[tuple[Floats, Floats]] = deque(maxlen=REMEMBERED)
+        self._seen: deque[tuple[Floats, Floats, bool]] = deque(maxlen=REMEMBERED)
+        self._anew = True
         self._advice: Advice | None = None
 
     def next(self, g: Any, Tg: Any) -> Floats:
@@ -93,16 +96,23 @@ class Coupling:
 
     def see(self, g: Floats, image: Floats) -> None:
         """Take in an evaluation without asking for the next force."""
-        self._seen.append((g, image))
-        self._advice = None
+        self._seen.append((g, image, self._anew))
+        self._anew, self._advice = False, None
+
+    def new_step(self) -> None:
+        """Begin another step in time: T has other loads.
+
+        The rule forgets what it has seen, and no difference of vectors across steps counts for the spectrum.
+        """
+        self._following, self._anew = self.rule.on_vectors(self.theta), True
 
     @property
     def advice(self) -> Advice | None:
         """The advice from the vectors seen so far; None before two of them differ."""
         if self._advice is None and len(self._seen) > 1:
-            X, TX = map(np.array, zip(*self._seen, strict=True))
+            X, TX, starts = map(np.array, zip(*self._seen, strict=True))
             try:
-                self._advice = advice_of(seen_in(X, TX))
+                self._advice = advice_of(seen_in(X, TX, starts=starts))
             except ValueError:  # they do not differ above rounding
                 return None
         return self._advice
@@ -201,7 +211,8 @@ class Coupled(Value):
     @property
     def summary(self) -> str:
         end = "converged" if self.converged else "diverged" if self.diverged else "not converged"
-        return f"{end}, {self.iterations} evaluations, residual {self.history[-1]:.1e}"
+        why = "" if self.advice is None or self.advice.vectors is None else self.advice.vectors.negative
+        return f"{end}, {self.iterations} evaluations, residual {self.history[-1]:.1e}{f', but {why}' if why else ''}"
 
 
 def couple(

@@ -43,6 +43,9 @@ from verification.sections.setting import outside_the_theorem
 NAMES = {1: "body 1", 2: "body 2", None: "as in that run"}
 
 
+#: The next step where nothing is left to type.
+AS_ABOVE = "your coupling, with the lines above"
+
 #: What it takes to exchange the roles of solvers that are already coupled.
 EXCHANGED = (
     "To exchange the roles, the second solver, which now reads displacements (temperatures), must take forces "
@@ -101,6 +104,8 @@ def _end(found: Advice) -> Section:
     assumed = "--tied " * found.tied + "--friction " * (found.friction_bounds is not None)
     if found.next.kept and not found.roles:
         then = f"no run; keep theta = {theta}"
+    elif found.interval is not None and found.roles:
+        then = AS_ABOVE
     elif found.interval is not None:
         then = f"a run with theta = {theta}; then this again plus --log LOG --theta {theta}"
     else:
@@ -110,7 +115,7 @@ def _end(found: Advice) -> Section:
 
 def _after_a_problem(found: Advice) -> Next | str:
     if found.problem is None:
-        return "ndtheory advise --help"
+        return AS_ABOVE
     if found.best.theta_auto is None:  # too large for a run
         return following("constants")
     rule = found.problem.iteration.relaxation if (own := found.method_to_paste) == "constant" else own
@@ -213,16 +218,22 @@ def _which_method(found: Advice, names: Mapping[int | None, str] = NAMES) -> Ite
     yield section("method", "WHICH METHOD?", table(heads, rows), *said)
 
 
+def _some(number: int, what: str) -> str:
+    """A number of things."""
+    return f"{number} {what}{'s' * (number != 1)}"
+
+
 def _few_methods(found: Advice) -> str:
     """The same in one line, where only the largest eigenvalue is known."""
     each = [f"{METHOD_NAMES[row.method]} {count(row.steps, '<= ' * bool(row.bound))}" for row in found.methods]
-    return f"Steps to 1e-6: {', '.join(each)} (only the largest eigenvalue is known)."
+    return f"Steps to 1e-6: {', '.join(each)} (for eigenvalues from 0 to the largest)."
 
 
 def of_vectors(found: Advice, seen: SeenVectors) -> Iterator[Section]:
     """The eigenvalues that vectors show, and the theta for them."""
     spectrum = seen.spectrum
-    said = [f"{seen.iterates} iterates of {seen.unknowns} unknowns, {seen.directions} independent directions"]
+    of, directions = _some(seen.unknowns, "unknown"), _some(seen.directions, "independent direction")
+    said = [f"{seen.iterates} iterates of {of}, {directions}"]
     kinds = ["real: the coupling looks symmetric" if seen.symmetric else "complex: the coupling is not symmetric"]
     if seen.changing and not seen.negative:
         kinds.append("contact changes between the iterates: a theta for open nodes as well")
@@ -310,13 +321,12 @@ def _paste(found: Advice, *more: str) -> Section:
     return _pasted(found, found.neumann_body, *said, *more)
 
 
-def _pasted(found: Advice, neumann_body: BodyNumber | None, *notes: str) -> Section:
+def _pasted(found: Advice, neumann_body: BodyNumber | None, *notes: str, force: str = "Force") -> Section:
     """The lines of :func:`pasted` for the method that is advised in the roles of its theta."""
     assert found.theta is not None
-    own, rule = found.method_to_paste, []
-    if found.method is not None and found.method.exchanged and found.neumann_body is None:
-        rule.append(f"These are the roles as they are: exchanged, {METHOD_NAMES[found.method.name]} is advised.")
-    return pasted(neumann_body, found.theta, *rule, *notes, method=own, file=found.problem is not None)
+    rule = [f"These are the roles as they are: {found.advised_exchanged}."] if found.advised_exchanged else []
+    file, method = found.problem is not None, found.method_to_paste
+    return pasted(neumann_body, found.theta, *rule, *notes, method=method, file=file, force=force)
 
 
 def snippets(found: Advice, library: str) -> Sections:
@@ -340,14 +350,19 @@ def next_run(made: NextRun | None) -> Sections:
 
 
 def pasted(
-    neumann_body: BodyNumber | None, theta: float, *notes: str, method: str = "constant", file: bool = False
+    neumann_body: BodyNumber | None,
+    theta: float,
+    *notes: str,
+    method: str = "constant",
+    file: bool = False,
+    force: str = "Force",
 ) -> Section:
-    """The lines for a problem file, if that was given, and for the configuration of preCICE."""
+    """The lines for a problem file, if that was given, and for preCICE, where the relaxed data has a name."""
     lines = [] if neumann_body is None else [f"neumann_body = {neumann_body}"]
     lines.append(f"theta = {theta:g}")
     if file and method != "constant":
         lines.append(f'relaxation = "{method}"')
-    scheme = CouplingScheme(neumann_body=neumann_body, theta=theta, steps=None)
+    scheme = CouplingScheme(neumann_body=neumann_body, theta=theta, steps=None, force=force)
     lines += precice_acceleration(scheme, method).split("\n")
     return section("paste", "TO PASTE", Block(tuple(lines), 2), *notes)
 
@@ -407,7 +422,9 @@ def of_logs(found: Advice, interval: RhoInterval) -> Sections:
     """The values of rho that each log and all logs together allow, and the run to make next."""
     read = [_readings(found.readings)] if found.readings else []
     notes = [f"Aitken's {log.factors.says}." for log in found.accelerated if log.factors is not None]
-    if not read and found.logs:
+    if not read and any(log.stays for log in found.logs):
+        notes.append("Nothing by itself: a level is about where theta begins to diverge, or where contact changes.")
+    elif not read and found.logs:
         notes.append("Nothing: no time window shows a steady ratio or level over enough steps.")
     elif not read and not notes:
         notes.append("Nothing: residuals show rho only where the relaxation is constant.")
@@ -590,6 +607,8 @@ def _of_waves(found: Advice, seen: SeenWaves) -> Sections:
     data = [f"{key} {', '.join(f'{float(v):.5g}' for v in values)}" for key, values in seen.given.items()]
     neumann, contact = names[found.best.neumann_body or 2], names[3 - (found.best.neumann_body or 2)]
     who = [f"{neumann}'s solver reads {forces} and writes {moves}, {contact}'s the reverse.".capitalize()]
+    if found.no_difference:
+        who.append("It makes no difference with the roles exchanged.")
     if seen.kind == "fluid":
         who.append(f"With the roles exchanged: {found.roles[1].reason['rho']}.")
         then = f"ndtheory advise run --tied --theta {found.next.theta:g} --ratio R" if found.next else ""
@@ -597,10 +616,10 @@ def _of_waves(found: Advice, seen: SeenWaves) -> Sections:
         claims = "a bound of rho from above, or anything with a viscous or compressible fluid"
     else:
         relaxed = "Fluxes and temperatures are both relaxed." if found.parallel else "For temperatures the same."
-        paste = _pasted(found, None, relaxed)
+        paste = _pasted(found, None, relaxed, force="Heat-Flux")
         last = (_waves_of_heat(found, seen), *_parallel(found), *_which_method(found, names), paste)
         then = "ndtheory advise vectors X.npy TX.npy (iterates of a run: theta for your shapes)"
-        claims = "anything about plates that are not flat; the command below reads those"
+        claims = "anything about plates that are not flat, or coarse meshes; the command below reads those"
     return (section("setting", "", Facts("", tuple(data))), which_body(*who), *last, closing(claims, then=then))
 
 
@@ -609,9 +628,9 @@ def _waves_of_heat(found: Advice, seen: SeenWaves) -> Section:
     rows: list[tuple[Cell, ...]] = []
     for role in found.roles:
         ends = figures(role.rho_min), figures(role.rho_tied)
-        rows.append(
-            (WORDS["heat"][0][role.neumann_body], *ends, figures(role.theta_tied), near_one(role.rate_tied or 0))
-        )
+        best = figures(role.theta_tied), near_one(role.rate_tied or 0)
+        limit = 2 / (1 + role.rho_tied.value) if role.rho_tied is not None else math.inf
+        rows.append((WORDS["heat"][0][role.neumann_body], *ends, *best, "never" if limit > 1 else figures(limit)))
     thick, dt = "thickness" not in seen.given, seen.one("dt")
     notes = [
         f"For flat {'thick ' * thick}plates: conductance of the plate that reads temperatures over the other one's, "
@@ -623,11 +642,14 @@ def _waves_of_heat(found: Advice, seen: SeenWaves) -> Section:
         notes.append(f"In dt heat reaches 3 sqrt(k dt/c), {reach}, into the plates; a thicker one counts as thick.")
     elif "capacity" in seen.given:
         notes.append("This holds for every step in time dt. A plate of more than 3 sqrt(k dt/c) counts as thick.")
+    if "capacity" in seen.given:
+        coarse = "Cells must be smaller than sqrt(k dt/c): with larger ones lambda is c times cell height over the same"
+        notes.append(f"{coarse} of the other plate, and this theta may diverge.")
     elif not thick:
         notes.append("Both plates are held at given temperatures on their other sides.")
     if found.parallel:
         notes.append("These thetas and factors are for serial coupling.")
-    heads = ("reads fluxes", "least", "largest", "theta", "factor a step")
+    heads = ("reads fluxes", "least", "largest", "theta", "factor a step", "diverges from")
     return section("theta", "WHICH THETA?", table(heads, rows), *notes)
 
 
