@@ -109,15 +109,15 @@ def measured(family: Family) -> np.ndarray:
 
 
 @pytest.mark.parametrize("family", FAMILIES, ids=str)
-def test_rho_on_fine_meshes_is_not_above_that_of_their_cells_and_tends_to_it_where_a_short_wave_decides(family):
-    """On coarse meshes with few rows the longest waves may have a larger ratio.
+def test_where_a_short_wave_decides_rho_of_fine_meshes_tends_to_that_of_their_cells_from_below(family):
+    """Elsewhere rho of the bodies decides, and may be larger: 0.31 of one family at night, 0.3 for its cells.
 
     Waves like those of half-planes are short against the body and long against the cells.  Where the largest ratio is
     theirs, or nearly so, rho approaches it more slowly and is not extrapolated here.
     """
     cells, found = np.maximum(family.predicted, family.limit), measured(family)
-    assert (found[-1] <= cells * (1 + 2e-3)).all()
     short = family.predicted > 1.1 * family.limit
+    assert (found[-1] <= cells * (1 + 2e-3))[short].all()
     extrapolated = found[-1] + (found[-1] - found[-2]) / 3
     assert extrapolated[short] == pytest.approx(cells[short], rel=2e-3)
 
