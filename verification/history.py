@@ -250,6 +250,29 @@ class History(Document):
         names = ("pressure", "shear", "bound", "gap", "slip", "slip_increment")
         return {name: np.array([getattr(each.contact, name) for each in self.increments]) for name in names}
 
+    @cached_property
+    def driven(self) -> tuple[str, Floats, int]:
+        """The load that drives the history: its name, its values from time 0 on, and its axis, 0 along Gamma_c.
+
+        It is the prescribed displacement that varies most, along Gamma_c where one varies there and the problem is
+        plane; the mean slip where no displacement is prescribed.
+        """
+        found = []
+        plane = self.problem.dimension == 2
+        for name in ("body1", "body2"):
+            bodies = [getattr(each.result.problem, name) for each in self.increments]
+            for side, first in bodies[0].prescribed.items():
+                for axis in (axis for axis, value in enumerate(first) if value is not None):
+                    values = np.array([0.0, *(float(body.prescribed[side][axis]) for body in bodies)])
+                    label = f"displacement of {side} of {name} along {'xy'[axis]}"
+                    found.append((plane and axis == 0, np.ptp(values), label, values, axis if plane else 1))
+        moving = [each for each in found if each[1] > 0]
+        if moving:
+            _, _, label, values, axis = max(moving, key=lambda each: each[:2])
+            return label, values, axis
+        weights = self.increments[0].contact.weights
+        return "mean slip", np.array([0.0, *(self.fields["slip"] @ weights / weights.sum())]), 0
+
     def linearise(self) -> History:
         """Return the same history with the Jacobian at the end of each increment, for the steps it predicts."""
         each = (one if one.run is None else replace(one, result=one.run.linearise()) for one in self.increments)

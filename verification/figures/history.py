@@ -11,7 +11,6 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from fem1d2d.mesh import Floats
 from verification.figures.style import (
     SHEAR,
     STATES,
@@ -40,31 +39,8 @@ def draw_history(history: History, view: str = "loop", **options: Any) -> Figure
         return views[view](history, **options)
 
 
-def driven(history: History) -> tuple[str, Floats, int]:
-    """Return what drives a history: its name, its values from time 0 on, and its axis, 0 along Gamma_c.
-
-    It is the prescribed displacement that varies most, along Gamma_c where one varies there and the problem is plane;
-    the mean slip where no displacement is prescribed.
-    """
-    found = []
-    plane = history.problem.dimension == 2
-    for name in ("body1", "body2"):
-        bodies = [getattr(each.result.problem, name) for each in history.increments]
-        for side, first in bodies[0].prescribed.items():
-            for axis in (axis for axis, value in enumerate(first) if value is not None):
-                values = np.array([0.0, *(float(body.prescribed[side][axis]) for body in bodies)])
-                label = f"displacement of {side} of {name} along {'xy'[axis]}"
-                found.append((plane and axis == 0, np.ptp(values), label, values, axis if plane else 1))
-    moving = [each for each in found if each[1] > 0]
-    if moving:
-        _, _, label, values, axis = max(moving, key=lambda each: each[:2])
-        return label, values, axis
-    weights = history.increments[0].contact.weights
-    return "mean slip", np.array([0.0, *(history.fields["slip"] @ weights / weights.sum())]), 0
-
-
 def _loop(history: History) -> Figure:
-    label, along, axis = driven(history)
+    label, along, axis = history.driven
     which = ("tangential", "normal")[axis]
     force = np.array([0.0, *(each.contact.force[which] for each in history.increments)])
     units = history.problem.units
