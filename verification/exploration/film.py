@@ -185,15 +185,13 @@ def past(history: History) -> Shown:
 
 def told(history: History) -> dict[str, Any]:
     """The numbers of a loading history beside its frames, as columns with an entry for each increment."""
-    every = history.increments
     table = history.table()
-    plain = ("time", "name", "iterations", "normal", "tangential", "stick", "slip", "open")
     return {
-        **{name: table[name] for name in plain},
+        **{name: table[name] for name in ("time", "name", "iterations", "normal", "tangential")},
         "dissipated": np.cumsum(table["dissipated"]).tolist(),
         "along": history.driven[1].tolist(),
         **{name: [_short(row) for row in history.fields[name]] for name in ("pressure", "shear", "bound", "slip")},
-        "status": [each.contact.status for each in every],
+        "status": [each.contact.status for each in history.increments],
     }
 
 
@@ -260,7 +258,7 @@ def _short(values: Floats, digits: int = 5) -> list[float]:
     return [float(f"{x:.{digits}g}") for x in values]
 
 
-def drawn(body: Body, later: Sequence[Body] = ()) -> dict[str, Any]:
+def drawn(body: Body, *later: Body) -> dict[str, Any]:
     """A body for a page: points, cells or boundary, and the affine map from its trace on Gamma_c to displacements.
 
     The finite elements give the map; it is rounded to 16 bits: ``u = still + size * lift @ trace / 32767``.  The same

@@ -126,8 +126,7 @@ class Exploration(Document):
             "tolerance": float(first.settings.tolerance),
             "gap": _gap(first),
             "bodies": [
-                drawn(first.body1.mesh_body, [each.body1.mesh_body for each in later]),
-                drawn(first.body2.mesh_body, [each.body2.mesh_body for each in later]),
+                drawn(*(getattr(each, name).mesh_body for each in (first, *later))) for name in ("body1", "body2")
             ],
             "roles": [self._role(found) for found in self.films],
             "bounds": [{"name": name, "colour": named(name).colour} for name in self._bounds],
