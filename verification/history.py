@@ -263,19 +263,18 @@ class History(Document):
         It is the prescribed displacement that varies most, along Gamma_c where one varies there and the problem is
         plane; the mean slip where no displacement is prescribed.
         """
-        found = []
-        plane = self.problem.dimension == 2
+        found, contact = [], self.increments[0].contact
+        along = None if contact.normal is None else int(np.abs(contact.normal.mean(axis=0)).argmin())
         for name in ("body1", "body2"):
             bodies = [getattr(each.result.problem, name) for each in self.increments]
             for side, first in bodies[0].prescribed.items():
                 for axis in (axis for axis, value in enumerate(first) if value is not None):
                     values = np.array([0.0, *(float(body.prescribed[side][axis]) for body in bodies)])
                     label = f"displacement of {side} of {name} along {'xy'[axis]}"
-                    found.append((plane and axis == 0, np.ptp(values), label, values, axis if plane else 1))
+                    found.append((axis == along, np.ptp(values), label, values, int(axis != along)))
         if moving := [each for each in found if each[1] > 0]:
             return max(moving, key=lambda each: each[:2])[2:]
-        weights = self.increments[0].contact.weights
-        return "mean slip", np.array([0.0, *(self.fields["slip"] @ weights / weights.sum())]), 0
+        return "mean slip", np.array([0.0, *(self.fields["slip"] @ contact.weights / contact.weights.sum())]), 0
 
     def linearise(self) -> History:
         """Return the same history with the Jacobian at the end of each increment, for the steps it predicts."""

@@ -212,7 +212,7 @@ nd.onPage("explore", (figure) => {
 
   // A loading history: the panels of an increment.
   function ofHistory() {
-    const { told, x, driven, axis } = past, { length, stress } = data.units;
+    const { told, position: x, driven, axis } = past, { length, stress } = data.units;
     const ends = (rows) => { const all = rows.flat(); const [low, high] = [Math.min(0, ...all), Math.max(0, ...all)], room = 0.08 * (high - low || 1); return { low: low - room, high: high + room }; };
     const room = 0.04 * (x[x.length - 1] - x[0] || 1), along = { low: x[0] - room, high: x[x.length - 1] + room, name: `position along the contact line [${length}]` };
     const chart = (title, label, words, xs, ys) => {
@@ -220,12 +220,12 @@ nd.onPage("explore", (figure) => {
       panel(title, made.root, nd.html("p", { class: "legend" }, words));
       return made;
     };
-    const force = axis ? "normal" : "tangential";
+    const force = axis ? "normal" : "tangential", unit = plane ? `${stress} ${length}` : stress;  // per unit thickness, of bars per unit area
     const loop = chart("Force and displacement", "Force against displacement",
       "Each point is an increment; the area that the curve goes round is work that friction took.",
-      { ...ends(told.map((each) => each.along)), name: `${driven} [${length}]` }, { ...ends(told.map((each) => each[force])), name: `${force} force [${stress} ${length}]` });
-    const tractions = chart("Shear against the friction bound", "Shear and friction bound along the contact line",
-      "Grey: within the friction bound. Points: shear on the upper body.", along, { low: -1, high: 1, name: `stress [${stress}]` });
+      { ...ends(told.map((each) => each.along)), name: `${driven} [${length}]` }, { ...ends(told.map((each) => each[force])), name: `${force} force [${unit}]` });
+    const tractions = plane && chart("Shear against the friction bound", "Shear and friction bound along the contact line",
+      "Grey: within the friction bound. Points: shear on body 2.", along, { low: -1, high: 1, name: `stress [${stress}]` });
     const map = chart("What sticks, slips and is open", "States over position and increment",
       "One row an increment, one column a node: green sticks, orange slips, empty is open. Line: this increment.",
       along, { low: 0, high: past.planned + 1, name: "increment" });
@@ -236,7 +236,8 @@ nd.onPage("explore", (figure) => {
       const k = friction.value, each = told[k], at = { stick: "", slip: "" };
       const signed = (value) => number(Math.abs(value) < 1e-9 * Math.max(...told[k].normal) ? 0 : value);
       says.textContent = `k = ${number(data.friction[k])}, increment ${i + 1} of ${past.planned}, time ${number(each.time[i])} (${each.name[i]}): theta = ${number(data.theta[0])} took ${each.iterations[i]} steps. `
-        + `Force on body 2: normal ${signed(each.normal[i])}, tangential ${signed(each.tangential[i])} ${stress} ${length}. Friction took ${signed(each.dissipated[i])} ${stress} ${length}${plane ? "^2" : ""} so far.`
+        + `Force on body 2: normal ${signed(each.normal[i])}, tangential ${signed(each.tangential[i])} ${unit}.`
+        + (plane ? ` Friction took ${signed(each.dissipated[i])} ${unit}^2 so far.` : "")
         + (run.outcome === "converged" ? "" : ` The history ends early: ${run.outcome}.`);
       stageTitle.textContent = `The bodies at time ${number(each.time[i])}`;
       stepText.textContent = `${i + 1} of ${past.planned}`;
@@ -244,6 +245,16 @@ nd.onPage("explore", (figure) => {
       const points = each.along.map((a, j) => [a, j ? each[force][j - 1] : 0]);
       loop.line(points, { stroke: nd.COLOURS.blue });
       points.forEach(([a, b], j) => loop.dot(a, b, j === i + 1 ? { class: "here", r: 6 } : { fill: nd.COLOURS.blue, r: 2.5 }));
+      if (plane) drawShear(each, i);
+      map.clear();
+      each.status.forEach((row, n) => row.forEach((state, j) => { if (state !== "open") at[state] += `M${cell(j, n).join("L")}Z`; }));
+      Object.entries(at).forEach(([state, d]) => map.marks.append(nd.svg("path", { d, class: `${state} cells` })));
+      map.line([[edges[0], i + 1], [edges[x.length], i + 1]], { class: "here" });
+      nd.fill(table, [past.positionName, "pressure", "shear", "bound", "slip", "state"],
+        x.map((a, j) => [...[a, each.pressure[i][j], each.shear[i][j], each.bound[i][j], each.slip[i][j]].map(nd.digits), each.status[i][j]]));
+    };
+
+    function drawShear(each, i) {
       const { high } = ends([...each.bound, ...each.shear].map((row) => row.map(Math.abs)));
       tractions.axes(along, { low: -high, high, name: `stress [${stress}]` });
       tractions.clear();
@@ -251,13 +262,7 @@ nd.onPage("explore", (figure) => {
       tractions.area([...bound, ...bound.map(([a, b]) => [a, -b]).reverse()], { class: "area region", fill: nd.COLOURS.grey, stroke: nd.COLOURS.grey });
       tractions.line(x.map((a, j) => [a, each.shear[i][j]]), { stroke: nd.COLOURS.blue });
       each.status[i].forEach((state, j) => mark(tractions.marks, state, tractions.toX(x[j]), tractions.toY(each.shear[i][j]), 3.5));
-      map.clear();
-      each.status.forEach((row, n) => row.forEach((state, j) => { if (state !== "open") at[state] += `M${cell(j, n).join("L")}Z`; }));
-      Object.entries(at).forEach(([state, d]) => map.marks.append(nd.svg("path", { d, class: `${state} cells` })));
-      map.line([[edges[0], i + 1], [edges[x.length], i + 1]], { class: "here" });
-      nd.fill(table, ["x", "pressure", "shear", "bound", "slip", "state"],
-        x.map((a, j) => [...[a, each.pressure[i][j], each.shear[i][j], each.bound[i][j], each.slip[i][j]].map(nd.digits), each.status[i][j]]));
-    };
+    }
   }
 
   function ended(run) {

@@ -137,8 +137,9 @@ class Exploration(Document):
         """Return the histories, by friction, and what they have in common."""
         own = self.histories[self.own[1]]
         label, _, axis = own.driven
-        x = own.increments[0].contact.x.tolist()
-        return {"x": x, "driven": label, "axis": axis, "planned": own.planned, "told": [*map(told, self.histories)]}
+        name = "x" if self.films[0].pair.contact.grid.normals is None else "s"  # a line of any shape may stand upright
+        at = {"positionName": name, "position": getattr(own.increments[0].contact, name).tolist()}
+        return {**at, "driven": label, "axis": axis, "planned": own.planned, "told": [*map(told, self.histories)]}
 
     @property
     def _bounds(self) -> list[str]:

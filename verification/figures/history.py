@@ -65,9 +65,8 @@ def _loop(history: History) -> Figure:
         line, rows = f"{'os^Dvx*'[(number - 1) % 7]}-", slice(first, end + 1)
         ax.plot(along[rows], force[rows], line, label=f"{number} {plain(name)}", **look)
     ax.set_xlabel(f"{plain(label)} [{plain(units['length'])}]")
-    ax.set_ylabel(
-        f"{which} force{' on body 2' if axis == 0 else ''} [{plain(units['stress'])} {plain(units['length'])}]"
-    )
+    unit = plain(units["stress"] + (f" {units['length']}" if history.problem.dimension == 2 else ""))
+    ax.set_ylabel(f"{which} force{' on body 2' if axis == 0 else ''} [{unit}]")
     lost = sum(each.dissipated for each in history.increments)
     ax.set_title(f"{plain(history.problem.title)}: friction took {lost:.4g} per unit thickness")
     legend_beside(ax)
