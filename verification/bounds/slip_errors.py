@@ -150,7 +150,7 @@ class SlipErrors:
         return self.W[:n] @ np.linalg.solve(rows, identity[:, :n] * tied)
 
     def factors(self, patterns: Patterns) -> Floats:
-        """Norms of the Jacobians, by |.|_K; 0 for patterns that no loads cause."""
+        """Norms of the Jacobians, by ``|.|_K``; 0 for patterns that no loads cause."""
         found = np.linalg.norm(self._root @ self.jacobians(patterns) @ np.linalg.inv(self._root), 2, axis=(1, 2))
         return np.where(self.possible(patterns), found, 0.0)
 
