@@ -57,7 +57,7 @@ FLOORS: dict[str, dict[str, str]] = {
     "bounds, proofs": {
         "verification.bounds": (
             "__init__ bound conditions interior_point lipschitz losses mirror model "
-            "multipliers neighbours pattern_search region table trace_forms"
+            "multipliers neighbours pattern_search region slip_errors table trace_forms"
         ),
         "verification.certificate": "__init__ calibrating check claims continuum contraction",
     },
@@ -103,23 +103,23 @@ FLOORS: dict[str, dict[str, str]] = {
 BUDGET = {
     "fem1d2d": 4055,
     "ndtheory": 5869,
-    "verification": 2022,
+    "verification": 2011,
     "verification.advice": 6385,
     "verification.algorithm": 2270,
-    "verification.bounds": 3575,
+    "verification.bounds": 3770,
     "verification.certificate": 1410,
     "verification.cli": 2571,
     "verification.constants": 1325,
     "verification.contact": 945,
     "verification.coupling": 447,
-    "verification.exploration": 600,
-    "verification.figures": 1670,
+    "verification.exploration": 690,
+    "verification.figures": 1644,
     "verification.interface": 3300,
     "verification.ledger": 4345,
     "verification.output": 534,
-    "verification.problem": 1920,
+    "verification.problem": 1903,
     "verification.reproduce": 655,
-    "verification.sections": 2507,
+    "verification.sections": 2529,
     "verification.sweeps": 2405,
     "verification.testing": 1583,
 }

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
@@ -89,20 +89,20 @@ class Increment(Value):
         Its end.
     result : Run or Solution
         The run, or the solution of the global method, under the loads at this moment.
+    before : ContactFields or None
+        Those of the increment before.
     promise : Promise or None
         None where ``why_none`` says why.
     verdicts : mapping from the name of a bound to Judgement
         By the steps of this run; empty with the global method.
-    dissipated : float
-        Work of friction in this increment, energy per unit thickness (in 1D per unit area).
     """
 
     moment: Moment
     result: Run | Solution
-    promise: Promise | None
-    why_none: str
-    verdicts: Mapping[str, Judgement]
-    dissipated: float
+    before: ContactFields | None
+    promise: Promise | None = None
+    why_none: str = NO_ITERATION
+    verdicts: Mapping[str, Judgement] = field(default_factory=dict)
 
     @property
     def step(self) -> int:
@@ -127,6 +127,12 @@ class Increment(Value):
     def contact(self) -> ContactFields:
         """Stresses and motions along Gamma_c at its end."""
         return self.result.contact
+
+    @property
+    def dissipated(self) -> float:
+        """Work of friction, by the mean of the shear before and after: energy per unit thickness (in 1D per area)."""
+        shear = self.contact.shear if self.before is None else self.contact.shear + self.before.shear
+        return float((self.contact.weights * (0.5 * shear)) @ self.contact.slip_increment)
 
     @property
     def run(self) -> Run | None:
@@ -250,6 +256,26 @@ class History(Document):
         names = ("pressure", "shear", "bound", "gap", "slip", "slip_increment")
         return {name: np.array([getattr(each.contact, name) for each in self.increments]) for name in names}
 
+    @cached_property
+    def driven(self) -> tuple[str, Floats, int]:
+        """The load that drives the history: its name, its values from time 0 on, and its axis, 0 along Gamma_c.
+
+        It is the prescribed displacement that varies most, along Gamma_c where one varies there and the problem is
+        plane; the mean slip where no displacement is prescribed.
+        """
+        found, contact = [], self.increments[0].contact
+        along = None if contact.normal is None else int(np.abs(contact.normal.mean(axis=0)).argmin())
+        for name in ("body1", "body2"):
+            bodies = [getattr(each.result.problem, name) for each in self.increments]
+            for side, first in bodies[0].prescribed.items():
+                for axis in (axis for axis, value in enumerate(first) if value is not None):
+                    values = np.array([0.0, *(float(body.prescribed[side][axis]) for body in bodies)])
+                    label = f"displacement of {side} of {name} along {'xy'[axis]}"
+                    found.append((axis == along, np.ptp(values), label, values, int(axis != along)))
+        if moving := [each for each in found if each[1] > 0]:
+            return max(moving, key=lambda each: each[:2])[2:]
+        return "mean slip", np.array([0.0, *(self.fields["slip"] @ contact.weights / contact.weights.sum())]), 0
+
     def linearise(self) -> History:
         """Return the same history with the Jacobian at the end of each increment, for the steps it predicts."""
         each = (one if one.run is None else replace(one, result=one.run.linearise()) for one in self.increments)
@@ -266,13 +292,11 @@ class History(Document):
 
     def contact_table(self) -> dict[str, list[Any]]:
         """Return one row for each contact node of each increment, as columns."""
-        table: dict[str, list[Any]] = {}
-        for each in self.increments:
-            count, increment = len(each.contact.x), {"slip_increment": each.contact.slip_increment.tolist()}
-            rows = {"step": [each.step] * count, "time": [each.time] * count, **each.contact.table(), **increment}
-            for name, column in rows.items():
-                table.setdefault(name, []).extend(column)
-        return table
+        tables = [each.contact.table() for each in self.increments]
+        when = [(each.step, each.time) for each in self.increments for _ in each.contact.x]
+        columns = {name: [value for table in tables for value in table[name]] for name in tables[0]}
+        step, time = map(list, zip(*when, strict=True))
+        return {"step": step, "time": time, **columns, "slip_increment": self.fields["slip_increment"].ravel().tolist()}
 
     def plot(self, view: str = "loop", **options: Any) -> Figure:
         """Draw a view of the history; ValueError for another word, or where there is nothing to draw.
@@ -313,10 +337,6 @@ def steps_to(first: float, last: float, factor: float) -> int | None:
     return math.ceil(math.log(last / first) / math.log(factor) * (1 - 1e-12)) if factor else 1
 
 
-def unwatched(increment: Increment, planned: int) -> None:
-    """Show nothing."""
-
-
 def march(
     problem: Problem | ContactPair | Path | str,
     *,
@@ -324,7 +344,7 @@ def march(
     theta: Numeric | None = None,
     rule: Rule | str | None = None,
     solver: Solver = "auto",
-    watch: Callable[[Increment, int], None] = unwatched,
+    watch: Callable[[Increment, int], object] = lambda increment, planned: None,
 ) -> History:
     """Compute the loading history of the ``[[step]]`` tables of a problem, increment by increment.
 
@@ -377,17 +397,13 @@ def march(
     rest = at_rest(whole)
     if like is not None and rest.prescribes != whole.prescribes:
         raise whole.refuse("step", None, "needed a pair whose bodies prescribe the sides that the first step does")
-    pair = None if like is None else like.under(rest)
-    by: _Iteration | None = None
-    if method == "monolithic":
-        bodies = discretise(rest) if pair is None else pair.on_meshes()
-        _check_supports(bodies, path)
-        increments = _by_global_method(bodies, path)
-    else:
-        pair = pair or pair_from(rest)
-        _check_supports(pair.on_meshes(), path)
-        by = _Iteration(pair, theta, rule, solver)
-        increments = by.increments(path)
+    pair = like.under(rest) if like is not None else pair_from(rest) if method == "iteration" else None
+    bodies = discretise(rest) if pair is None else pair.on_meshes()
+    for moment in path:
+        if moment.time.denominator == 1:
+            bodies.under(moment.problem, None)  # refuses sides that contradict each other at the end of a step
+    by = _Iteration(pair, theta, rule, solver) if pair is not None and method == "iteration" else None
+    increments = _by_global_method(bodies, path) if by is None else by.increments(path)
     done: list[Increment] = []
     ended, interrupted = "", False
     try:
@@ -417,34 +433,6 @@ def march(
     )
 
 
-def _check_supports(bodies: TwoBodies, path: list[Moment]) -> None:
-    """Refuse loads at the end of a step by which two sides contradict each other."""
-    for moment in path:
-        if moment.time.denominator == 1:
-            bodies.under(moment.problem, None)
-
-
-def _increment(
-    moment: Moment,
-    result: Run | Solution,
-    before: ContactFields | None,
-    promise: Promise | None = None,
-    why_none: str = NO_ITERATION,
-    verdicts: Mapping[str, Judgement] | None = None,
-) -> Increment:
-    """Return an increment; friction takes work with the mean of the shear before and after it."""
-    now = result.contact
-    shear = 0.5 * (now.shear if before is None else now.shear + before.shear)
-    return Increment(
-        moment=moment,
-        result=result,
-        promise=promise,
-        why_none=why_none,
-        verdicts=verdicts or {},
-        dissipated=float((now.weights * shear) @ now.slip_increment),
-    )
-
-
 def _slipped(before: ContactFields | None, interface: Interface) -> Floats | None:
     return None if before is None else before.slip[: interface.contact.t]
 
@@ -453,7 +441,7 @@ def _by_global_method(bodies: TwoBodies, path: list[Moment]) -> Iterator[Increme
     before: ContactFields | None = None
     for moment in path:
         solution = solve(bodies.under(moment.problem, _slipped(before, bodies.interface)))
-        yield _increment(moment, solution, before)
+        yield Increment(moment=moment, result=solution, before=before)
         before = solution.contact
 
 
@@ -498,7 +486,8 @@ class _Iteration:
             largest = max(largest, run.last.scale)
             seen = largest_step_ratio(pair, run.iterates)
             verdicts = {name: judge_bound(bound, seen, self._outside) for name, bound in self.bounds.items()}
-            yield _increment(moment, run, earlier, *self._promise(before, run), verdicts)
+            promise, why = self._promise(before, run)
+            yield Increment(moment=moment, result=run, before=earlier, promise=promise, why_none=why, verdicts=verdicts)
             before = run
 
     def _promise(self, before: Run | None, run: Run) -> tuple[Promise | None, str]:

@@ -84,6 +84,7 @@ KINDS: dict[str, Callable[[vf.Problem], object]] = {
 OTHERS: dict[str, Callable[[vf.Problem], object]] = {
     "History by the global method": lambda given: vf.march(with_steps(given), method="monolithic"),
     "Exploration": lambda given: vf.explore(vf.example("two-bars")),
+    "Exploration of a history": lambda given: vf.explore(with_steps(given)),
     "Measured with proofs": partial(vf.measure, verified=True),
     "Comparison with proofs": partial(vf.compare, verified=True),
     "Advice from a run": lambda given: vf.advise_run("0.1", "1.4"),

@@ -10,11 +10,15 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from browser import chromium, needs_browser
+from histories import VARIANTS, pressed_and_sheared
 from kinds import problem as plates
+from problem_list import bars
 from strategies import AT_NIGHT
 
 import verification as vf
 from ndtheory.energy_norms import one_minus_square, predicted_factor
+from verification.contact import ContactError
+from verification.exploration import page
 from verification.exploration.film import STATES, steps_shown
 
 #: A page of a problem with 25 contact nodes weighs at most so many bytes.
@@ -206,3 +210,137 @@ def test_a_film_plays_to_its_end(opened):
     while time.monotonic() < end and len({*opened.execute_script(position)}) == 2:
         time.sleep(0.1)
     assert len({*opened.execute_script(position)}) == 1
+
+
+# --- loading histories ------------------------------------------------------------------------------------------------
+
+
+def with_history(**tables):
+    return vf.Problem.from_dict(pressed_and_sheared(**tables))
+
+
+@pytest.fixture(scope="module")
+def followed():
+    return vf.explore(with_history(**VARIANTS["grids that differ"]))
+
+
+def data_of(found):
+    return json.loads(re.search(r"explore: (\{.*\}) \};</script>", found.page())[1])
+
+
+def moved(body, row, length, time):
+    """The displacement of a drawn body, as the page has it: loads between the ends of steps are mixed in proportion."""
+    stills = np.array([body["still"], *body["later"]])
+    before, part = int(time), time - int(time)
+    still = stills[before] if not part else (1 - part) * stills[before] + part * stills[before + 1]
+    lift = numbers(body["lift"], "<i2").reshape(-1, len(row)) * body["size"] / 32767
+    return still + lift @ (row * length / 127)
+
+
+def test_a_page_of_a_history_has_the_increments_of_a_march_at_each_friction(followed):
+    data = data_of(followed)
+    role, past = data["roles"][0], data["past"]
+    sizes = [2 * len(body["contact"]) for body in data["bodies"]]
+    width = sum(sizes) + 3 * role["contactNodes"]
+    frames = numbers(role["frames"], np.int8).reshape(-1, width)
+    assert followed.frictions[followed.own[1]] == followed.problem.contact.friction
+    for k, friction in enumerate(followed.frictions):
+        path = vf.march(followed.problem.changed(friction=friction))
+        shown, told = role["runs"][k][0], past["told"][k]
+        assert (shown["outcome"], shown["shown"]) == ("converged", list(range(1, 31)))
+        assert shown["steps"] == sum(each.iterations for each in path.increments)
+        assert told["dissipated"][-1] == pytest.approx(path.content()["dissipated"], rel=1e-9)
+        for name in ("pressure", "shear", "bound", "slip"):
+            assert np.array(told[name]) == pytest.approx(path.fields[name], rel=1e-4, abs=1e-12)
+        for i in random.Random(k).sample(range(30), 4):
+            each, frame = path.increments[i], shown["first"] + i
+            length, stress = role["scales"][frame]
+            assert [STATES[int(n)] for n in frames[frame, -role["contactNodes"] :]] == list(each.contact.status)
+            stresses = np.concatenate([each.contact.pressure, each.contact.shear])
+            assert frames[frame, sum(sizes) : -role["contactNodes"]] * stress / 127 == pytest.approx(
+                stresses, abs=ROUNDED * stress
+            )
+            rows = np.split(frames[frame, : sum(sizes)], sizes[:1])
+            for body, row, exact in zip(data["bodies"], rows, each.result.displacements, strict=True):
+                most = max(length, np.abs(exact).max())
+                assert moved(body, row, length, each.time) == pytest.approx(exact.ravel(), abs=3 * ROUNDED * most)
+
+
+def test_a_history_that_ends_early_says_why_and_one_without_a_first_increment_is_left_out(monkeypatch):
+    short = vf.explore(with_history(iteration={"max_iterations": 12}))
+    assert len(short.histories[short.own[1]].increments) < 30
+    assert "ended otherwise: limit" in short.to_dict()["roles"][0]["runs"][short.own[1]]["outcome"]
+    march = page.march
+
+    def picky(pair):
+        if pair.friction > Fraction(1, 5):
+            raise ContactError("no solution")
+        return march(pair)
+
+    monkeypatch.setattr(page, "march", picky)
+    assert vf.explore(with_history()).frictions == (0, Fraction(1, 10), Fraction(1, 5))
+    with pytest.raises(ContactError):
+        vf.explore(with_history(contact={"friction": "0.3"}))
+
+
+def test_a_history_of_bars_and_of_a_pair_at_its_own_friction_is_shown():
+    steps = [{"increments": 3, "body2": {"prescribed": {"right": "-0.1"}}}]
+    found = vf.explore(vf.Problem.from_dict(bars() | {"step": steps}))
+    assert data_of(found)["past"]["axis"] == 1
+    pair = vf.build(with_history()).at(friction="0.1")
+    assert vf.explore(pair).histories[2].increments[0].run.pair.friction == Fraction(1, 10)
+
+
+@pytest.fixture(scope="module")
+def opened_history(followed, tmp_path_factory):
+    path = tmp_path_factory.mktemp("explore") / "history.html"
+    path.write_text(followed.page(), "utf-8")
+    with chromium("--window-size=1280,1400") as driver:
+        driver.get(path.as_uri())
+        yield driver
+
+
+GO = """
+const set = (name, value) => { const input = document.querySelector(`input[name=${name}]`); input.value = value;
+  input.dispatchEvent(new Event("input")); };
+set("friction", arguments[0]); set("increment", arguments[1]);
+const states = document.querySelectorAll("svg.bodies .stick, svg.bodies .slip, svg.bodies .open");
+const marks = [...states].map((mark) => {
+  const { x, y, width, height } = mark.getBBox();
+  return [mark.getAttribute("class"), x + width / 2, y + height / 2]; });
+return { text: document.querySelector(".answer").textContent, most: document.querySelector("input[name=increment]").max,
+  rows: [...document.querySelectorAll("tbody tr")].map((row) => [...row.children].map((cell) => cell.textContent)),
+  legend: document.querySelector(".legend").textContent, marks };
+"""
+
+
+@needs_browser
+def test_a_slider_moves_through_the_increments_of_a_march(followed, opened_history):
+    farthest = 0.0
+    for k, i in [(0, 0), (2, 8), (2, 18), (4, 26), (2, 29)]:
+        history = vf.march(followed.problem.changed(friction=followed.frictions[k]))
+        each, seen = history.increments[i], opened_history.execute_script(GO, k, i)
+        contact = each.contact
+        assert seen["most"] == "29"
+        assert f"increment {i + 1} of 30, time {each.time:.4g} ({each.name})" in seen["text"]
+        assert int(re.search(r"took (\d+) steps", seen["text"])[1]) == each.iterations
+        force = re.search(r"normal (\S+), tangential (\S+) MPa mm", seen["text"])
+        assert [float(value) for value in force.groups()] == pytest.approx(
+            list(contact.force.values()), rel=1e-3, abs=1e-6
+        )
+        assert [row[-1] for row in seen["rows"]] == list(contact.status)
+        read = np.array([[float(value) for value in row[:-1]] for row in seen["rows"]]).T
+        columns = contact.x, contact.pressure, contact.shear, contact.bound, contact.slip
+        for shown, exact in zip(read, columns, strict=True):
+            assert shown == pytest.approx(exact, rel=1e-3, abs=1e-12)
+        # the marks sit at the contact nodes of the upper body; 12 % of the wider body are left free around both
+        names, *seen_at = zip(*seen["marks"], strict=True)
+        assert list(names) == list(contact.status)
+        enlarged = float(re.search(r"Displacements times (\S+)\.", seen["legend"])[1])
+        u = enlarged * each.result.displacements[1][each.result.pair.body2.mesh_body.nodes]
+        free, unit = 0.12 * 2, 1000 / (1.24 * 2)
+        at = (contact.x + u[:, 0] + free) * unit, (0.3 + free - u[:, 1]) * unit
+        farthest = max(farthest, np.abs(u * unit).max())
+        assert np.array(seen_at) == pytest.approx(np.array(at), abs=1.5)
+    assert farthest > 15
+    assert opened_history.get_log("browser") == []

@@ -11,7 +11,7 @@ import pytest
 from histories import PATH, VARIANTS, pressed_and_sheared
 from hypothesis import given
 from hypothesis import strategies as st
-from problem_list import bars, changed
+from problem_list import LOWER, bars, changed
 
 import verification as vf
 from fem1d2d import condense
@@ -265,6 +265,24 @@ def test_bars_have_histories_too():
     one, two = (vf.march(vf.Problem.from_dict(data), method=method) for method in ("iteration", "monolithic"))
     assert apart(one, two, "pressure") <= 1e-9
     assert [each.contact.status[0] for each in one.increments] == ["slip", "slip", "slip", "open", "open"]
+    assert one.plot().axes[0].get_ylabel() == "normal force [MPa]"
+
+
+def test_along_an_upright_line_the_displacement_that_slides_the_bodies_drives_the_loop():
+    box = lambda x, **more: LOWER | {"x": x, "y": [0, 1], "cells": [3, 4]} | more
+    left = box([-1, 0], fixed=["left"])
+    right = box([0, 1], young=20000, prescribed={"right": ["-0.005", 0]})
+    tops = [["-0.005", 0], ["-0.005", "0.002"]]
+    data = {
+        "body1": left,
+        "body2": right,
+        "contact": {"friction": "0.2", "radius": "0.3", "surface": ["right", "left"]},
+        "step": [{"increments": 2, "body2": {"prescribed": {"right": top}}} for top in tops],
+    }
+    found = vf.march(vf.Problem.from_dict(data), method="monolithic")
+    label, values, axis = found.driven
+    assert (label, axis) == ("displacement of right of body2 along y", 0)
+    assert values == pytest.approx([0, 0, 0, 0.001, 0.002])
 
 
 def test_an_obstacle_has_a_history_by_the_global_method():

@@ -23,6 +23,9 @@ def explore(file: Path, keys: dict[str, str], swap: bool, target: Path, as_json:
     The page is one HTML file that needs no network.  It shows both bodies step by step, the residual, and the plane of
     theta and friction; each position of a slider is a run that was made, with a constant theta.
 
+    Of a problem with [[step]] tables it shows the loading history, increment by increment, at several frictions: the
+    bodies, the shear against the friction bound, and what sticks, slips and is open.
+
     \b
     Example:
       ndtheory explore my.toml -o page.html

@@ -1,7 +1,7 @@
-// One problem: its runs on a grid of theta and friction in both roles, step by step.
+// One problem: its runs on a grid of theta and friction in both roles, step by step; or its loading history by increments.
 nd.onPage("explore", (figure) => {
   "use strict";
-  const data = ndData.explore, f = ndFormulas, plane = data.dimension === 2;
+  const data = ndData.explore, f = ndFormulas, plane = data.dimension === 2, past = data.past;
   const STATES = ["stick", "slip", "open"];
   const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
   const bodies = data.bodies.map((body) => ({ ...body, lift: new Int16Array(bytes(body.lift).buffer) }));
@@ -17,12 +17,13 @@ nd.onPage("explore", (figure) => {
 
   const slider = (name, label, values, value) => nd.slider(widget, { name, label, low: 0, high: values.length - 1, step: 1, value,
     show: (i) => `${name === "friction" ? "k" : name} = ${number(values[i])}` });
-  const theta = slider("theta", "theta", data.theta, data.own[0]);
+  const theta = past ? { value: 0 } : slider("theta", "theta", data.theta, data.own[0]);
   const friction = slider("friction", "friction k", data.friction, data.own[1]);
-  const exchanged = nd.button(widget, "roles", roles.length > 1 ? "exchange the roles of the bodies" : "roles cannot be exchanged", () => {});
-  if (roles.length < 2) widget.controls.lastChild.disabled = true;
-  const step = nd.slider(widget, { name: "step", label: "step", low: 0, high: 60, step: 1, value: 60, show: () => "" });
-  const stepInput = widget.sliders.step, stepText = stepInput.nextSibling;
+  const exchanged = past ? { on: false } : nd.button(widget, "roles", roles.length > 1 ? "exchange the roles of the bodies" : "roles cannot be exchanged", () => {});
+  if (!past && roles.length < 2) widget.controls.lastChild.disabled = true;
+  const stepName = past ? "increment" : "step", mostSteps = past ? past.planned : 60;
+  const step = nd.slider(widget, { name: stepName, label: stepName, low: 0, high: mostSteps, step: 1, value: past ? sheared() : mostSteps, show: () => "" });
+  const stepInput = widget.sliders[stepName], stepText = stepInput.nextSibling;
   const play = nd.html("button", { type: "button", onclick: () => (timer ? stop() : start()) }, "play");
   widget.controls.append(play);
   let timer = null;
@@ -40,21 +41,14 @@ nd.onPage("explore", (figure) => {
   const stageTitle = panel("", stage).firstChild;
   const legend = nd.html("p", { class: "legend" });
   stage.parentNode.append(legend);
-  const residuals = new nd.Chart({ width: 360, height: 260, label: "Residual over the steps", x: { low: 0, high: 1, name: "step" }, y: { low: 1e-9, high: 1, log: true, name: "relative residual" } });
-  panel("The residual", residuals.root);
-  const most = Math.max(...data.friction);
-  const map = new nd.Chart({ width: 360, height: 260, label: "The runs over theta and friction",
-    x: { low: 0, high: 1, name: "theta" }, y: { low: -0.06 * (most || 1), high: 1.06 * (most || 1), name: "friction k" } });
-  panel("All runs: theta and friction", map.root, nd.html("p", { class: "legend" },
-    "Circle: converged, the larger the fewer steps; cross: not. Filled region: a bound proves that one step contracts."));
-  const factors = new nd.Chart({ width: 360, height: 260, label: "Error per step over theta", x: { low: 0, high: 1, name: "theta" }, y: { low: 0, high: 1.5, name: "error per step" } });
-  panel("Error per step at this friction", factors.root, nd.html("p", { class: "legend" },
-    "Points: observed, of runs that converged. Dashed: predicted from rho, not a bound. Line: bound in energy norms, where it applies."));
+  const showRun = past ? ofHistory() : ofGrid();
 
   // Displacements of all drawn nodes from a trace on the interface.
-  function moved(body, trace) {
-    const count = trace.length, share = body.size / 32767;
-    return body.still.map((still, i) => {
+  function moved(body, trace, time = 0) {
+    const count = trace.length, share = body.size / 32767, stills = [body.still, ...body.later];
+    const before = stills[Math.floor(time)], after = stills[Math.ceil(time)], part = time - Math.floor(time);
+    return before.map((value, i) => {
+      const still = value + part * (after[i] - value);
       let sum = 0;
       for (let j = 0; j < count; j += 1) sum += body.lift[i * count + j] * trace[j];
       return still + share * sum;
@@ -79,7 +73,10 @@ nd.onPage("explore", (figure) => {
   const spread = (values) => Math.max(...values) - Math.min(...values);
   const size = plane ? Math.max(...bodies.map((b) => spread(xs(b)))) : spread(bodies.flatMap(xs));
   const own = roles[0].runs[data.own[1]][data.own[0]];
-  const largest = Math.max(...bodies.flatMap((body, b) => moved(body, frame(roles[0], own, own.shown.length - 1).traces[b]).map(Math.abs)));
+  const time = (k, i) => (past ? past.told[k].time[i] : 0);
+  const weighed = own.shown.map((_, i) => i).slice(past ? 0 : -1);  // of a history every increment
+  const largest = Math.max(...weighed.flatMap((i) => bodies.map((body, b) =>
+    moved(body, frame(roles[0], own, i).traces[b], time(data.own[1], i)).reduce((most, v) => Math.max(most, Math.abs(v)), 0))));
   const round = (value) => { const p = 10 ** Math.floor(Math.log10(value)); return Math.max(...[1, 2, 5].filter((q) => q * p <= value * (1 + 1e-12))) * p; };
   const scale = data.gap.flat && largest > 0 ? Math.max(1, round(0.06 * size / largest)) : 1;
   const heights = bodies.map((body) => (plane ? body.points[2 * body.contact[0] + 1] : body.points[body.contact[0]]));
@@ -98,13 +95,19 @@ nd.onPage("explore", (figure) => {
   stage.setAttribute("viewBox", `0 0 1000 ${Math.max(1000 * height / width, 160).toFixed(0)}`);
   const unit = 1000 / width, X = (x) => ((x - left) * unit).toFixed(1), Y = (y) => ((top - y) * unit).toFixed(1);
   const stresses = roles[0].scales.slice(own.first, own.first + own.shown.length).map((s) => s[1]);
-  const arrow = stresses.length && Math.max(...stresses) > 0 ? 0.1 * size / stresses[stresses.length - 1] : 0;
+  const arrow = stresses.length && Math.max(...stresses) > 0 ? 0.1 * size / (past ? Math.max(...stresses) : stresses[stresses.length - 1]) : 0;
+
+  function mark(marks, state, x, y, r = 5) {
+    if (state === "stick") marks.append(nd.svg("rect", { x: x - r, y: y - r, width: 2 * r, height: 2 * r, class: "stick" }));
+    else if (state === "slip") marks.append(nd.svg("path", { d: `M${x},${y - 1.4 * r}l${1.4 * r},${2.4 * r}h${-2.8 * r}z`, class: "slip" }));
+    else marks.append(nd.svg("circle", { cx: x, cy: y, r, class: "open" }));
+  }
 
   function drawBodies(role, run, i) {
     stage.replaceChildren();
     if (i < 0) return;
     const now = frame(role, run, i);
-    const places = bodies.map((body, b) => positions(body, b, moved(body, now.traces[b])));
+    const places = bodies.map((body, b) => positions(body, b, moved(body, now.traces[b], time(friction.value, i))));
     bodies.forEach((body, b) => {
       const point = (k) => `${X(places[b][k][0])},${Y(places[b][k][1])}`;
       const d = body.cells.filter((cell) => cell.length > 1).map((cell) => `M${cell.map(point).join("L")}${cell.length > 2 ? "Z" : ""}`).join("");
@@ -122,12 +125,7 @@ nd.onPage("explore", (figure) => {
         marks.append(nd.svg("path", { d: `M${X(x)},${Y(y)}L${tip[0]},${tip[1]}${barb(0.45)}${barb(-0.45)}`, class: "traction" }));
       }
     });
-    now.states.forEach((state, j) => {
-      const [x, y] = places[carrier][bodies[carrier].contact[j]].map((v, k) => Number(k ? Y(v) : X(v)));
-      if (state === "stick") marks.append(nd.svg("rect", { x: x - 5, y: y - 5, width: 10, height: 10, class: "stick" }));
-      else if (state === "slip") marks.append(nd.svg("path", { d: `M${x},${y - 7}l7,12h-14z`, class: "slip" }));
-      else marks.append(nd.svg("circle", { cx: x, cy: y, r: 5, class: "open" }));
-    });
+    now.states.forEach((state, j) => mark(marks, state, ...places[carrier][bodies[carrier].contact[j]].map((v, k) => Number(k ? Y(v) : X(v)))));
     stage.append(marks);
     const count = (name) => now.states.filter((state) => state === name).length;
     const frictionless = data.friction[friction.value] === 0;
@@ -136,46 +134,135 @@ nd.onPage("explore", (figure) => {
       + `Blue: body 1, orange: body 2; the ${role.name} one is the Neumann body. Displacements times ${scale}.`;
   }
 
-  function drawResiduals(run, i) {
-    const seen = run.residuals.filter((r) => r > 0), low = Math.min(data.tolerance / 10, ...seen), high = Math.max(1, ...seen) * 2;
-    residuals.axes({ low: 0, high: 1.04 * Math.max(run.shown[run.shown.length - 1] || 1, 1), name: "step" }, { low, high, log: true, name: "relative residual" });
-    residuals.clear();
-    const points = run.shown.map((s, j) => [s, Math.max(run.residuals[j], low)]);
-    residuals.line([[0, data.tolerance], [1e6, data.tolerance]], { stroke: nd.COLOURS.grey, "stroke-dasharray": "4 3" });
-    if (points.length > 1) residuals.line(points, { stroke: nd.COLOURS.blue });
-    points.forEach(([x, y], j) => residuals.dot(x, y, j === i ? { class: "here", r: 6 } : { fill: nd.COLOURS.blue, r: 2.5 }));
-  }
+  // Theta, friction and roles: the panels of a run.
+  function ofGrid() {
+    const residuals = new nd.Chart({ width: 360, height: 260, label: "Residual over the steps", x: { low: 0, high: 1, name: "step" }, y: { low: 1e-9, high: 1, log: true, name: "relative residual" } });
+    panel("The residual", residuals.root);
+    const most = Math.max(...data.friction);
+    const map = new nd.Chart({ width: 360, height: 260, label: "The runs over theta and friction",
+      x: { low: 0, high: 1, name: "theta" }, y: { low: -0.06 * (most || 1), high: 1.06 * (most || 1), name: "friction k" } });
+    panel("All runs: theta and friction", map.root, nd.html("p", { class: "legend" },
+      "Circle: converged, the larger the fewer steps; cross: not. Filled region: a bound proves that one step contracts."));
+    const factors = new nd.Chart({ width: 360, height: 260, label: "Error per step over theta", x: { low: 0, high: 1, name: "theta" }, y: { low: 0, high: 1.5, name: "error per step" } });
+    panel("Error per step at this friction", factors.root, nd.html("p", { class: "legend" },
+      "Points: observed, of runs that converged. Dashed: predicted from rho, not a bound. Line: bound in energy norms, where it applies."));
 
-  function drawMap(role) {
-    map.clear();
-    role.regions.forEach((corners, b) => {
-      const { name, colour } = data.bounds[b], ends = corners.length ? [[0, corners[0][1], corners[0][2]], ...corners] : [];
-      map.area([...ends.map(([k, low]) => [low, k]), ...ends.map(([k, , high]) => [high, k]).reverse()], { class: "area region", fill: colour, stroke: colour, "data-region": name });
-    });
-    role.runs.forEach((line, k) => line.forEach((run, t) => {
-      const done = run.outcome === "converged", r = done ? Math.max(2, 8 - 1.6 * Math.log10(1 + run.steps) * 1.3) : 3.5;
-      const [x, y] = [map.toX(data.theta[t]), map.toY(data.friction[k])];
-      const mark = done ? nd.svg("circle", { cx: x, cy: y, r, fill: nd.COLOURS.blue }) : nd.svg("path", { d: `M${x - r},${y - r}l${2 * r},${2 * r}m${-2 * r},0l${2 * r},${-2 * r}`, stroke: nd.COLOURS.red, "stroke-width": 2 });
-      mark.classList.add("run");
-      mark.addEventListener("click", () => { theta.value = t; friction.value = k; });
-      map.marks.append(mark);
-    }));
-    map.dot(data.theta[theta.value], data.friction[friction.value], { class: "here", r: 9 });
-  }
-
-  function drawFactors(role, k) {
-    factors.clear();
-    const line = Array.from({ length: 199 }, (_, i) => (i + 1) / 200), at = data.friction[k];
-    factors.line([[0, 1], [1, 1]], { stroke: nd.COLOURS.grey, "stroke-width": 1 });
-    if (role.rho !== null) {
-      factors.line(line.map((t) => [t, f.predictedFactor(t, role.rho)]), { stroke: nd.COLOURS.orange, "stroke-dasharray": "5 3" });
-      const kappa = role.kappa ? role.kappa.map((each) => each * at) : at === 0 ? [0, 0] : null;
-      if (kappa) {
-        const proved = line.map((t) => [t, Math.sqrt(Math.max(0, 1 - f.energyOneMinusSquare(t, role.rho, ...kappa)))]);
-        factors.line(proved.filter(([, q]) => q < 1), { stroke: nd.COLOURS.green, "data-curve": "energy" });
-      }
+    function drawResiduals(run, i) {
+      const seen = run.residuals.filter((r) => r > 0), low = Math.min(data.tolerance / 10, ...seen), high = Math.max(1, ...seen) * 2;
+      residuals.axes({ low: 0, high: 1.04 * Math.max(run.shown[run.shown.length - 1] || 1, 1), name: "step" }, { low, high, log: true, name: "relative residual" });
+      residuals.clear();
+      const points = run.shown.map((s, j) => [s, Math.max(run.residuals[j], low)]);
+      residuals.line([[0, data.tolerance], [1e6, data.tolerance]], { stroke: nd.COLOURS.grey, "stroke-dasharray": "4 3" });
+      if (points.length > 1) residuals.line(points, { stroke: nd.COLOURS.blue });
+      points.forEach(([x, y], j) => residuals.dot(x, y, j === i ? { class: "here", r: 6 } : { fill: nd.COLOURS.blue, r: 2.5 }));
     }
-    role.runs[k].forEach((run, t) => { if (run.rate !== null && run.outcome === "converged") factors.dot(data.theta[t], run.rate, { fill: nd.COLOURS.blue, r: t === theta.value ? 6 : 3 }); });
+
+    function drawMap(role) {
+      map.clear();
+      role.regions.forEach((corners, b) => {
+        const { name, colour } = data.bounds[b], ends = corners.length ? [[0, corners[0][1], corners[0][2]], ...corners] : [];
+        map.area([...ends.map(([k, low]) => [low, k]), ...ends.map(([k, , high]) => [high, k]).reverse()], { class: "area region", fill: colour, stroke: colour, "data-region": name });
+      });
+      role.runs.forEach((line, k) => line.forEach((run, t) => {
+        const done = run.outcome === "converged", r = done ? Math.max(2, 8 - 1.6 * Math.log10(1 + run.steps) * 1.3) : 3.5;
+        const [x, y] = [map.toX(data.theta[t]), map.toY(data.friction[k])];
+        const mark = done ? nd.svg("circle", { cx: x, cy: y, r, fill: nd.COLOURS.blue }) : nd.svg("path", { d: `M${x - r},${y - r}l${2 * r},${2 * r}m${-2 * r},0l${2 * r},${-2 * r}`, stroke: nd.COLOURS.red, "stroke-width": 2 });
+        mark.classList.add("run");
+        mark.addEventListener("click", () => { theta.value = t; friction.value = k; });
+        map.marks.append(mark);
+      }));
+      map.dot(data.theta[theta.value], data.friction[friction.value], { class: "here", r: 9 });
+    }
+
+    function drawFactors(role, k) {
+      factors.clear();
+      const line = Array.from({ length: 199 }, (_, i) => (i + 1) / 200), at = data.friction[k];
+      factors.line([[0, 1], [1, 1]], { stroke: nd.COLOURS.grey, "stroke-width": 1 });
+      if (role.rho !== null) {
+        factors.line(line.map((t) => [t, f.predictedFactor(t, role.rho)]), { stroke: nd.COLOURS.orange, "stroke-dasharray": "5 3" });
+        const kappa = role.kappa ? role.kappa.map((each) => each * at) : at === 0 ? [0, 0] : null;
+        if (kappa) {
+          const proved = line.map((t) => [t, Math.sqrt(Math.max(0, 1 - f.energyOneMinusSquare(t, role.rho, ...kappa)))]);
+          factors.line(proved.filter(([, q]) => q < 1), { stroke: nd.COLOURS.green, "data-curve": "energy" });
+        }
+      }
+      role.runs[k].forEach((run, t) => { if (run.rate !== null && run.outcome === "converged") factors.dot(data.theta[t], run.rate, { fill: nd.COLOURS.blue, r: t === theta.value ? 6 : 3 }); });
+    }
+
+    return (role, run, i) => {
+      const k = friction.value, last = run.shown.length - 1;
+      const best = data.bounds.map(({ name }, b) => [name, run.factors[b]]).filter(([, factor]) => factor !== null).sort((a, b) => a[1] - b[1])[0];
+      const rate = run.rate === null || run.outcome !== "converged" ? "" : `, each leaving ${number(run.rate)} of the error`;
+      says.textContent = `theta = ${number(data.theta[theta.value])}, k = ${number(data.friction[k])}, Neumann body ${role.neumann} (${role.name}): ${ended(run)}${rate}. `
+        + (best ? `Bound for any loads (${best[0]}, in doubles): at most ${number(best[1])} of the error is left by a step.` : "No bound proves that a step contracts here.");
+      stageTitle.textContent = last < 0 ? "The bodies" : `The bodies at step ${run.shown[i]}`;
+      stepText.textContent = last < 0 ? "none" : `${run.shown[i]} of ${run.steps}`;
+      drawResiduals(run, i);
+      drawMap(role);
+      drawFactors(role, k);
+      nd.fill(table, ["step", "relative residual"], run.shown.map((s, j) => [s, nd.digits(run.residuals[j])]));
+    };
+  }
+
+  // The increment of the problem's own history with the largest shear.
+  function sheared() {
+    const sizes = past.told[data.own[1]].tangential.map(Math.abs);
+    return sizes.indexOf(Math.max(...sizes));
+  }
+
+  // A loading history: the panels of an increment.
+  function ofHistory() {
+    const { told, position: x, driven, axis } = past, { length, stress } = data.units;
+    const ends = (rows) => { const all = rows.flat(); const [low, high] = [Math.min(0, ...all), Math.max(0, ...all)], room = 0.08 * (high - low || 1); return { low: low - room, high: high + room }; };
+    const room = 0.04 * (x[x.length - 1] - x[0] || 1), along = { low: x[0] - room, high: x[x.length - 1] + room, name: `position along the contact line [${length}]` };
+    const chart = (title, label, words, xs, ys) => {
+      const made = new nd.Chart({ width: 360, height: 260, label, x: xs, y: ys });
+      panel(title, made.root, nd.html("p", { class: "legend" }, words));
+      return made;
+    };
+    const force = axis ? "normal" : "tangential", unit = plane ? `${stress} ${length}` : stress;  // per unit thickness, of bars per unit area
+    const loop = chart("Force and displacement", "Force against displacement",
+      "Each point is an increment; the area that the curve goes round is work that friction took.",
+      { ...ends(told.map((each) => each.along)), name: `${driven} [${length}]` }, { ...ends(told.map((each) => each[force])), name: `${force} force [${unit}]` });
+    const tractions = plane && chart("Shear against the friction bound", "Shear and friction bound along the contact line",
+      "Grey: within the friction bound. Points: shear on body 2.", along, { low: -1, high: 1, name: `stress [${stress}]` });
+    const map = chart("What sticks, slips and is open", "States over position and increment",
+      "One row an increment, one column a node: green sticks, orange slips, empty is open. Line: this increment.",
+      along, { low: 0, high: past.planned + 1, name: "increment" });
+    const edges = x.length > 1 ? [x[0], ...x.slice(1).map((v, j) => (v + x[j]) / 2), x[x.length - 1]] : [x[0] - room, x[0] + room];
+    const cell = (j, i) => [[edges[j], i + 0.5], [edges[j + 1], i + 0.5], [edges[j + 1], i + 1.5], [edges[j], i + 1.5]].map(([a, b]) => `${map.toX(a).toFixed(1)},${map.toY(b).toFixed(1)}`);
+
+    return (role, run, i) => {
+      const k = friction.value, each = told[k], at = { stick: "", slip: "" };
+      const signed = (value) => number(Math.abs(value) < 1e-9 * Math.max(...told[k].normal) ? 0 : value);
+      says.textContent = `k = ${number(data.friction[k])}, increment ${i + 1} of ${past.planned}, time ${number(each.time[i])} (${each.name[i]}): theta = ${number(data.theta[0])} took ${each.iterations[i]} steps. `
+        + `Force on body 2: normal ${signed(each.normal[i])}, tangential ${signed(each.tangential[i])} ${unit}.`
+        + (plane ? ` Friction took ${signed(each.dissipated[i])} ${unit}^2 so far.` : "")
+        + (run.outcome === "converged" ? "" : ` The history ends early: ${run.outcome}.`);
+      stageTitle.textContent = `The bodies at time ${number(each.time[i])}`;
+      stepText.textContent = `${i + 1} of ${past.planned}`;
+      loop.clear();
+      const points = each.along.map((a, j) => [a, j ? each[force][j - 1] : 0]);
+      loop.line(points, { stroke: nd.COLOURS.blue });
+      points.forEach(([a, b], j) => loop.dot(a, b, j === i + 1 ? { class: "here", r: 6 } : { fill: nd.COLOURS.blue, r: 2.5 }));
+      if (plane) drawShear(each, i);
+      map.clear();
+      each.status.forEach((row, n) => row.forEach((state, j) => { if (state !== "open") at[state] += `M${cell(j, n).join("L")}Z`; }));
+      Object.entries(at).forEach(([state, d]) => map.marks.append(nd.svg("path", { d, class: `${state} cells` })));
+      map.line([[edges[0], i + 1], [edges[x.length], i + 1]], { class: "here" });
+      nd.fill(table, [past.positionName, "pressure", "shear", "bound", "slip", "state"],
+        x.map((a, j) => [...[a, each.pressure[i][j], each.shear[i][j], each.bound[i][j], each.slip[i][j]].map(nd.digits), each.status[i][j]]));
+    };
+
+    function drawShear(each, i) {
+      const { high } = ends([...each.bound, ...each.shear].map((row) => row.map(Math.abs)));
+      tractions.axes(along, { low: -high, high, name: `stress [${stress}]` });
+      tractions.clear();
+      const bound = each.bound[i].map((b, j) => [x[j], b]);
+      tractions.area([...bound, ...bound.map(([a, b]) => [a, -b]).reverse()], { class: "area region", fill: nd.COLOURS.grey, stroke: nd.COLOURS.grey });
+      tractions.line(x.map((a, j) => [a, each.shear[i][j]]), { stroke: nd.COLOURS.blue });
+      each.status[i].forEach((state, j) => mark(tractions.marks, state, tractions.toX(x[j]), tractions.toY(each.shear[i][j]), 3.5));
+    }
   }
 
   function ended(run) {
@@ -186,22 +273,13 @@ nd.onPage("explore", (figure) => {
 
   function draw() {
     if (!widget.ready) return;
-    const role = roles[exchanged.on && roles.length > 1 ? 1 : 0], k = friction.value, t = theta.value, run = role.runs[k][t];
+    const role = roles[exchanged.on && roles.length > 1 ? 1 : 0], run = role.runs[friction.value][theta.value];
     const last = run.shown.length - 1;
     stepInput.max = Math.max(last, 0);
     const i = Math.min(step.value, last);
-    stepText.textContent = last < 0 ? "none" : `${run.shown[i]} of ${run.steps}`;
-    stepInput.setAttribute("aria-valuetext", `step ${stepText.textContent}`);
-    const best = data.bounds.map(({ name }, b) => [name, run.factors[b]]).filter(([, factor]) => factor !== null).sort((a, b) => a[1] - b[1])[0];
-    const rate = run.rate === null || run.outcome !== "converged" ? "" : `, each leaving ${number(run.rate)} of the error`;
-    says.textContent = `theta = ${number(data.theta[t])}, k = ${number(data.friction[k])}, Neumann body ${role.neumann} (${role.name}): ${ended(run)}${rate}. `
-      + (best ? `Bound for any loads (${best[0]}, in doubles): at most ${number(best[1])} of the error is left by a step.` : "No bound proves that a step contracts here.");
-    stageTitle.textContent = last < 0 ? "The bodies" : `The bodies at step ${run.shown[i]}`;
+    showRun(role, run, i);
+    stepInput.setAttribute("aria-valuetext", `${stepName} ${stepText.textContent}`);
     drawBodies(role, run, i);
-    drawResiduals(run, i);
-    drawMap(role);
-    drawFactors(role, k);
-    nd.fill(table, ["step", "relative residual"], run.shown.map((s, j) => [s, nd.digits(run.residuals[j])]));
     const state = Object.entries(widget.sliders).map(([name, input]) => `explore.${name}=${input.value}`);
     link.href = `#${[...state, `explore.roles=${exchanged.on ? 1 : 0}`].join("&")}`;
   }

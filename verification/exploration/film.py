@@ -18,6 +18,7 @@ from verification.bounds.region import check_plane
 from verification.bounds.table import BOUNDS
 from verification.constants import Measured
 from verification.contact import ContactError
+from verification.history import History
 from verification.interface.body import Body
 from verification.interface.pair import ContactPair
 from verification.problem.tables import ProblemError
@@ -164,6 +165,36 @@ def _shown(pair: ContactPair, theta: Fraction, farthest: float, factors: dict[st
     )
 
 
+def past(history: History) -> Shown:
+    """A loading history as a run of a film: each increment is a step, with its relative residual."""
+    runs = [each.run for each in history.increments if each.run is not None]
+    shown = [_frame(each, len(each.iterates) - 1) for each in runs]
+    return Shown(
+        theta=float(runs[0].theta),
+        friction=float(runs[0].pair.friction),
+        outcome=history.ended or "converged",
+        iterations=sum(each.iterations for each in runs),
+        rate=None,
+        steps=tuple(range(1, len(runs) + 1)),
+        residuals=tuple(each.last.relative_residual for each in runs),
+        frames=np.stack([frame for frame, _ in shown]),
+        sizes=tuple(size for _, size in shown),
+        factors={name: None if bound.factor is None else bound.factor.value for name, bound in history.bounds.items()},
+    )
+
+
+def told(history: History) -> dict[str, Any]:
+    """The numbers of a loading history beside its frames, as columns with an entry for each increment."""
+    table = history.table()
+    return {
+        **{name: table[name] for name in ("time", "name", "iterations", "normal", "tangential")},
+        "dissipated": np.cumsum(table["dissipated"]).tolist(),
+        "along": history.driven[1].tolist(),
+        **{name: [_short(row) for row in history.fields[name]] for name in ("pressure", "shear", "bound", "slip")},
+        "status": [each.contact.status for each in history.increments],
+    }
+
+
 def steps_shown(history: Sequence[float]) -> list[int]:
     """The steps of a run that are shown: the first ones, ever fewer while the residual is visible, and the last one.
 
@@ -223,10 +254,15 @@ def _text(values: NDArray[Any]) -> str:
     return b64encode(values.astype(values.dtype.newbyteorder("<")).tobytes()).decode()
 
 
-def drawn(body: Body) -> dict[str, Any]:
+def _short(values: Floats, digits: int = 5) -> list[float]:
+    return [float(f"{x:.{digits}g}") for x in values]
+
+
+def drawn(body: Body, *later: Body) -> dict[str, Any]:
     """A body for a page: points, cells or boundary, and the affine map from its trace on Gamma_c to displacements.
 
-    The finite elements give the map; it is rounded to 16 bits: ``u = still + size * lift @ trace / 32767``.
+    The finite elements give the map; it is rounded to 16 bits: ``u = still + size * lift @ trace / 32767``.  The same
+    body under other loads has an entry of ``later`` in place of ``still``.
     """
     components = len(body.unknown)
     whole = body.mesh.points.size * components <= MOST_NUMBERS
@@ -236,9 +272,10 @@ def drawn(body: Body) -> dict[str, Any]:
     lift = np.stack([body.displacement(row)[nodes].ravel() - still for row in np.eye(components)], axis=1)
     size = float(np.abs(lift).max())
     return {
-        "points": [float(f"{x:.6g}") for x in body.mesh.points[nodes].ravel()],
+        "points": _short(body.mesh.points[nodes].ravel(), 6),
         "cells": corners.reshape(cells.shape).tolist(),
-        "still": [float(f"{x:.5g}") for x in still],
+        "still": _short(still),
+        "later": [_short(each.displacement(np.zeros(components))[nodes].ravel()) for each in later],
         "size": size,
         "lift": _text(_bytes(lift.ravel(), size, 32767)),
         "contact": np.searchsorted(nodes, body.nodes).tolist(),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from importlib.resources import files
 from pathlib import Path
@@ -17,13 +17,17 @@ from verification.algorithm.runs import run
 from verification.bounds.bound import Region
 from verification.bounds.table import named
 from verification.constants import measure
+from verification.contact import ContactError
 from verification.document import Document
-from verification.exploration.film import FARTHEST, Film, drawn, film, packed
+from verification.exploration.film import FARTHEST, Film, drawn, film, packed, past, told
 from verification.exploration.javascript import function
+from verification.history import History, march
 from verification.interface.build import pair_of
-from verification.interface.pair import ContactPair
+from verification.interface.pair import ContactPair, pair_from
+from verification.problem import load
 from verification.problem.specification import Problem
 from verification.problem.specs import PLACES
+from verification.problem.steps import at_rest, moments
 from verification.problem.tables import ProblemError
 from verification.progress import Progress, silent
 
@@ -40,7 +44,7 @@ FORMULAS = (
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Exploration(Document):
-    """Runs of one problem at several theta and frictions, in both roles of the bodies.
+    """Runs of one problem at several theta and frictions, in both roles of the bodies; or its loading histories.
 
     Attributes
     ----------
@@ -51,6 +55,8 @@ class Exploration(Document):
         One for each role, the role of the problem first.
     why_one_role : str
         Why the roles cannot be exchanged; empty where they can.
+    histories : tuple of History
+        By friction, where the problem has steps: the one film then has one theta, and the increments for steps.
     """
 
     schema: ClassVar[str] = "ndtheory.explore/1"
@@ -61,6 +67,7 @@ class Exploration(Document):
     own: tuple[int, int]
     films: tuple[Film, ...]
     why_one_role: str
+    histories: tuple[History, ...] = ()
 
     @property
     def units(self) -> Any:  # type: ignore[override]
@@ -69,6 +76,8 @@ class Exploration(Document):
     @property
     def summary(self) -> str:
         count = len(self.films) * len(self.thetas) * len(self.frictions)
+        if self.histories:
+            return f"{self.problem.title}, {count} loading histories at {len(self.frictions)} frictions"
         return f"{self.problem.title}, {count} runs at {len(self.thetas)} thetas and {len(self.frictions)} frictions"
 
     def content(self) -> dict[str, Any]:
@@ -107,6 +116,7 @@ class Exploration(Document):
         """Return what the scripts of the page read."""
         first = self.films[0].pair
         grid = first.contact.grid
+        later = [first.under(each.problem) for each in moments(self.problem) if each.time.denominator == 1]
         return {
             "units": dict(self.units),
             "dimension": grid.dimension,
@@ -115,10 +125,21 @@ class Exploration(Document):
             "own": self.own,
             "tolerance": float(first.settings.tolerance),
             "gap": _gap(first),
-            "bodies": [drawn(side.mesh_body) for side in (first.body1, first.body2)],
+            "bodies": [
+                drawn(*(getattr(each, name).mesh_body for each in (first, *later))) for name in ("body1", "body2")
+            ],
             "roles": [self._role(found) for found in self.films],
             "bounds": [{"name": name, "colour": named(name).colour} for name in self._bounds],
+            "past": self._past() if self.histories else None,
         }
+
+    def _past(self) -> dict[str, Any]:
+        """Return the histories, by friction, and what they have in common."""
+        own = self.histories[self.own[1]]
+        label, _, axis = own.driven
+        name = "x" if self.films[0].pair.contact.grid.normals is None else "s"  # a line of any shape may stand upright
+        at = {"positionName": name, "position": getattr(own.increments[0].contact, name).tolist()}
+        return {**at, "driven": label, "axis": axis, "planned": own.planned, "told": [*map(told, self.histories)]}
 
     @property
     def _bounds(self) -> list[str]:
@@ -188,9 +209,18 @@ def explore(
     >>> explore(example("two-bars"))
     <Exploration: Two bars, 40 runs at 20 thetas and 1 frictions>
     """
-    pair = pair_of(problem)
-    if pair.problem is None:
+    given = problem if isinstance(problem, Problem | ContactPair) else load(problem)
+    whole = given.problem if isinstance(given, ContactPair) else given
+    if whole is None:
         raise ProblemError("", "", None, "this pair is made from matrices: needed the meshes of both bodies")
+    found = _histories(given, whole, progress) if whole.steps else _grid(pair_of(given), whole, progress)
+    if path is not None:
+        Path(path).write_text(found.page(), encoding="utf-8")
+    return found
+
+
+def _grid(pair: ContactPair, problem: Problem, progress: Progress) -> Exploration:
+    """Run a problem on the grid of theta and friction."""
     made = run(pair, rule="constant")
     seen = made.iterates[0] if made.outcome == "diverged" else made.last
     farthest = FARTHEST * max(float(np.abs(u).max()) for u in made.traces_at(seen))
@@ -208,17 +238,44 @@ def explore(
         film(each, constants, thetas, frictions, farthest, _part(progress, i, len(pairs)))
         for i, (each, constants) in enumerate(zip(pairs, measured, strict=True))
     ]
-    found = Exploration(
-        problem=pair.problem,
+    return Exploration(
+        problem=problem,
         thetas=thetas,
         frictions=frictions,
         own=(thetas.index(made.theta), frictions.index(pair.friction)),
         films=tuple(films),
         why_one_role=why,
     )
-    if path is not None:
-        Path(path).write_text(found.page(), encoding="utf-8")
-    return found
+
+
+def _histories(given: Problem | ContactPair, whole: Problem, progress: Progress) -> Exploration:
+    """Follow the steps of a problem at each friction of the grid at which the first increment has a solution."""
+    rest = at_rest(whole)
+    pair = given if isinstance(given, ContactPair) else pair_from(replace(rest, steps=whole.steps))
+    done: dict[Fraction, History] = {}
+    frictions = _frictions(pair)
+    for i, k in enumerate(frictions):
+        progress(f"following the steps at k = {float(k):.3g}", i / len(frictions))
+        try:
+            done[k] = march(pair.at(friction=k))
+        except ContactError:
+            if k == pair.friction:
+                raise
+            continue
+        if done[k].interrupted:
+            raise KeyboardInterrupt
+    own = done[pair.friction]
+    runs = tuple((past(each),) for each in done.values())
+    assert own.measured is not None
+    return Exploration(
+        problem=whole,
+        thetas=(Fraction(runs[0][0].theta),),
+        frictions=tuple(done),
+        own=(0, list(done).index(pair.friction)),
+        films=(Film(pair=pair.under(rest), measured=own.measured, runs=runs, regions={}, why_no_region=""),),
+        why_one_role="a loading history keeps the roles of the file",
+        histories=tuple(done.values()),
+    )
 
 
 def _part(progress: Progress, i: int, count: int) -> Progress:

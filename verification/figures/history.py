@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from itertools import groupby
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from fem1d2d.mesh import Floats
 from verification.figures.style import (
     SHEAR,
     STATES,
@@ -37,56 +36,40 @@ def draw_history(history: History, view: str = "loop", **options: Any) -> Figure
     if view not in views:
         raise ValueError(f"{view!r}: needed one of {', '.join(views)}")
     with styled():
-        return views[view](history, **options)
+        figure = views[view](history, **options)
+        if not history.converged and view != "shear":
+            mark_unfinished(figure.axes[0], f"{len(history.increments)} of {history.planned} increments")
+    return figure
 
 
-def driven(history: History) -> tuple[str, Floats, int]:
-    """Return what drives a history: its name, its values from time 0 on, and its axis, 0 along Gamma_c.
-
-    It is the prescribed displacement that varies most, along Gamma_c where one varies there and the problem is plane;
-    the mean slip where no displacement is prescribed.
-    """
-    found = []
-    plane = history.problem.dimension == 2
-    for name in ("body1", "body2"):
-        bodies = [getattr(each.result.problem, name) for each in history.increments]
-        for side, first in bodies[0].prescribed.items():
-            for axis in (axis for axis, value in enumerate(first) if value is not None):
-                values = np.array([0.0, *(float(body.prescribed[side][axis]) for body in bodies)])
-                label = f"displacement of {side} of {name} along {'xy'[axis]}"
-                found.append((plane and axis == 0, np.ptp(values), label, values, axis if plane else 1))
-    moving = [each for each in found if each[1] > 0]
-    if moving:
-        _, _, label, values, axis = max(moving, key=lambda each: each[:2])
-        return label, values, axis
-    weights = history.increments[0].contact.weights
-    return "mean slip", np.array([0.0, *(history.fields["slip"] @ weights / weights.sum())]), 0
+def _steps(history: History) -> Iterator[tuple[int, str, int, int]]:
+    """Yield number and name of each step, and the number of increments before it and at its end."""
+    end = 0
+    for number, group in groupby(history.increments, key=lambda each: each.step):
+        first, done = end, list(group)
+        end += len(done)
+        yield number, done[0].name, first, end
 
 
 def _loop(history: History) -> Figure:
-    label, along, axis = driven(history)
+    label, along, axis = history.driven
     which = ("tangential", "normal")[axis]
     force = np.array([0.0, *(each.contact.force[which] for each in history.increments)])
     units = history.problem.units
     figure = new_figure(7.2, 3.6)
     ax = figure.subplots()
     ax.axhline(0, color="0.8", linewidth=0.8)
-    steps = np.array([0, *(each.step for each in history.increments)])
-    for number in np.unique(steps[1:]):
-        own = np.flatnonzero(steps == number)
-        rows = np.concatenate([own[:1] - 1, own])
-        name = history.increments[own[0] - 1].name
-        look: Any = {"color": f"{0.65 * (number - 1) / max(steps.max() - 1, 1):.3f}", "markersize": 3}
-        marker = "os^Dvx*"[(number - 1) % 7]
-        ax.plot(along[rows], force[rows], f"{marker}-", label=f"{number} {plain(name)}", **look)
+    last = history.increments[-1].step
+    for number, name, first, end in _steps(history):
+        look: Any = {"color": f"{0.65 * (number - 1) / max(last - 1, 1):.3f}", "markersize": 3}
+        line, rows = f"{'os^Dvx*'[(number - 1) % 7]}-", slice(first, end + 1)
+        ax.plot(along[rows], force[rows], line, label=f"{number} {plain(name)}", **look)
     ax.set_xlabel(f"{plain(label)} [{plain(units['length'])}]")
-    ax.set_ylabel(
-        f"{which} force{' on body 2' if axis == 0 else ''} [{plain(units['stress'])} {plain(units['length'])}]"
-    )
+    unit = plain(units["stress"] + (f" {units['length']}" if history.problem.dimension == 2 else ""))
+    ax.set_ylabel(f"{which} force{' on body 2' if axis == 0 else ''} [{unit}]")
     lost = sum(each.dissipated for each in history.increments)
     ax.set_title(f"{plain(history.problem.title)}: friction took {lost:.4g} per unit thickness")
     legend_beside(ax)
-    _unfinished(ax, history)
     return figure
 
 
@@ -103,26 +86,22 @@ def _states(history: History) -> Figure:
     ax.pcolormesh(
         edges, rows, codes, cmap=colours, norm=BoundaryNorm(np.arange(-0.5, 3), 3), edgecolor="0.75", linewidth=0.2
     )
-    for i, (before, after) in enumerate(zip(history.increments, history.increments[1:], strict=False), 1):
-        if before.step != after.step:
-            ax.axhline(i + 0.5, color="0.1", linewidth=1.0)
-    for number, name in {each.step: each.name for each in history.increments}.items():
-        own = [i for i, each in enumerate(history.increments, 1) if each.step == number]
-        ax.text(1.01, (own[0] + own[-1]) / 2, plain(name), transform=ax.get_yaxis_transform(), va="center")
+    for number, name, first, end in _steps(history):
+        if number > 1:
+            ax.axhline(first + 0.5, color="0.1", linewidth=1.0)
+        ax.text(1.01, (first + 1 + end) / 2, plain(name), transform=ax.get_yaxis_transform(), va="center")
     ax.set_xlabel(f"position along $\\Gamma_c$ [{plain(history.problem.units['length'])}]")
     ax.set_ylabel("increment")
     ax.set_title(plain(history.problem.title))
     patches = [Patch(facecolor=colour, edgecolor="0.4", label=state) for state, colour in MAP.items()]
     figure.legend(handles=patches, loc="outside lower center", ncols=3)
-    _unfinished(ax, history)
     return figure
 
 
 def _shear(history: History, times: Sequence[float] | None = None) -> Figure:
     every = np.array([each.time for each in history.increments])
     if times is None:
-        last = {each.step: i for i, each in enumerate(history.increments)}
-        chosen = list(last.values())[-MOST_TIMES:]
+        chosen = [end - 1 for *_, end in _steps(history)][-MOST_TIMES:]
     else:
         chosen = [int(np.argmin(np.abs(every - time))) for time in times]
     figure = new_figure(7.2, 1.2 + 1.6 * len(chosen))
@@ -138,8 +117,3 @@ def _shear(history: History, times: Sequence[float] | None = None) -> Figure:
         legend_beside(ax)
     axes[-1].set_xlabel(f"position along $\\Gamma_c$ [{plain(history.problem.units['length'])}]")
     return figure
-
-
-def _unfinished(ax: Axes, history: History) -> None:
-    if not history.converged:
-        mark_unfinished(ax, f"{len(history.increments)} of {history.planned} increments")

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import reduce
+from itertools import accumulate, pairwise
 from typing import Any
 
 from verification.problem.specification import Problem
@@ -38,27 +40,27 @@ class Moment:
 
 def at_rest(problem: Problem) -> Problem:
     """Return the problem where its history begins, without loads, with the supports and sides of all its steps."""
-    return _under(problem, _loads_at_rest(problem))
+    return _under(problem, _path(problem)[0])
 
 
 def moments(problem: Problem) -> Iterator[Moment]:
     """Yield the increments of a history in their order."""
-    before = _loads_at_rest(problem)
-    for number, (step, after) in enumerate(zip(problem.steps, ends(problem), strict=True), 1):
+    for number, (step, (before, after)) in enumerate(zip(problem.steps, pairwise(_path(problem)), strict=True), 1):
         for i in range(1, step.increments + 1):
             share = Fraction(i, step.increments)
-            first, second = (_between(a, b, share) for a, b in zip(before, after, strict=True))
+            mix = lambda a, b, share=share: a + share * (b - a)
+            first, second = (_of_each(mix, *ends) for ends in zip(before, after, strict=True))
             yield Moment(step=number, name=step.name, time=number - 1 + share, problem=_under(problem, (first, second)))
-        before = after
 
 
-def ends(problem: Problem) -> list[Both]:
-    """Return the loads at the end of each step; what a step does not name keeps its value."""
-    found, loads = [], _loads_at_rest(problem)
-    for step in problem.steps:
-        loads = _after(loads[0], step.body1), _after(loads[1], step.body2)
-        found.append(loads)
-    return found
+def _path(problem: Problem) -> list[Both]:
+    """Return the loads where the history begins, 0 on every side that the bodies or the steps name, and at each end."""
+    rest = []
+    for body, name in ((problem.body1, "body1"), (problem.body2, "body2")):
+        drawn = Loads(prescribed=body.prescribed, traction=body.traction, body_force=body.body_force)
+        rest.append(_of_each(lambda _: Fraction(0), reduce(_after, (getattr(s, name) for s in problem.steps), drawn)))
+    later = lambda loads, step: (_after(loads[0], step.body1), _after(loads[1], step.body2))
+    return list(accumulate(problem.steps, later, initial=(rest[0], rest[1])))
 
 
 def path_warnings(problem: Problem) -> list[str]:
@@ -73,7 +75,7 @@ def path_warnings(problem: Problem) -> list[str]:
 
 def proportional(problem: Problem) -> bool:
     """Return True if the loads of the history are multiples of its last ones, by a factor that never falls."""
-    path = [_numbers(loads) for loads in ends(problem)]
+    path = [_numbers(loads) for loads in _path(problem)[1:]]
     if not path:
         return True
     last = path[-1]
@@ -93,25 +95,6 @@ def _numbers(loads: Both) -> list[Fraction]:
     return [v for vector in vectors for v in vector or () if v is not None]
 
 
-def _loads_at_rest(problem: Problem) -> Both:
-    """Return loads of 0, with every side that the bodies or the steps name."""
-    rest = []
-    for body, name in ((problem.body1, "body1"), (problem.body2, "body2")):
-        given = [Loads(prescribed=body.prescribed, traction=body.traction), *(getattr(s, name) for s in problem.steps)]
-        rest.append(
-            Loads(
-                prescribed={side: _zero(v) for each in given for side, v in each.prescribed.items()},
-                traction={side: _zero(v) for each in given for side, v in each.traction.items()},
-                body_force=_zero(body.body_force),
-            )
-        )
-    return rest[0], rest[1]
-
-
-def _zero(values: Any) -> Any:
-    return tuple(None if v is None else Fraction(0) for v in values)
-
-
 def _after(before: Loads, step: Loads) -> Loads:
     return Loads(
         prescribed={**before.prescribed, **step.prescribed},
@@ -120,16 +103,16 @@ def _after(before: Loads, step: Loads) -> Loads:
     )
 
 
-def _between(before: Loads, after: Loads, share: Fraction) -> Loads:
-    """Return the loads at a share of the way; the first ones have every side."""
+def _of_each(of: Callable[..., Fraction], *loads: Loads) -> Loads:
+    """Return a function of the components of loads on the same sides; what the first ones leave free stays free."""
 
-    def mix(one: Any, two: Any) -> Any:
-        return tuple(None if a is None else a + share * (b - a) for a, b in zip(one, two, strict=True))
+    def mixed(vectors: Iterable[Any]) -> Any:
+        return tuple(None if values[0] is None else of(*values) for values in zip(*vectors, strict=True))
 
     return Loads(
-        prescribed={side: mix(v, after.prescribed[side]) for side, v in before.prescribed.items()},
-        traction={side: mix(v, after.traction[side]) for side, v in before.traction.items()},
-        body_force=mix(before.body_force, after.body_force),
+        prescribed={side: mixed(each.prescribed[side] for each in loads) for side in loads[0].prescribed},
+        traction={side: mixed(each.traction[side] for each in loads) for side in loads[0].traction},
+        body_force=mixed(each.body_force for each in loads),
     )
 
 

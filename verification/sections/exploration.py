@@ -1,4 +1,4 @@
-"""Runs on a grid of theta and friction in both roles."""
+"""Runs on a grid of theta and friction in both roles, or loading histories."""
 
 from __future__ import annotations
 
@@ -15,6 +15,9 @@ from verification.sections.parts import Cell, Facts, Section, Sections, closing,
 @of.register
 def sections(found: Exploration, target: Path | None = None) -> Sections:
     """The sections: for each role and friction the theta with the fewest steps; ``target`` is the page."""
+    then = "" if target is None else f"open {quote(str(target))}"
+    if found.histories:
+        return _histories(found, then)
     rows: list[tuple[Cell, ...]] = []
     for each in found.films:
         body = each.pair.neumann_body
@@ -30,7 +33,29 @@ def sections(found: Exploration, target: Path | None = None) -> Sections:
     ]
     if found.why_one_role:
         parts.append(section("roles", "", f"The roles cannot be exchanged: {found.why_one_role}"))
-    return (*parts, closing(closing_words, then="" if target is None else f"open {quote(str(target))}"))
+    return (*parts, closing(closing_words, then=then))
+
+
+def _histories(found: Exploration, then: str) -> Sections:
+    """The sections where the problem has steps."""
+    rows = []
+    for history in found.histories:
+        run = history.increments[0].run
+        assert run is not None
+        done = f"{len(history.increments)} of {history.planned}"
+        steps = sum(each.iterations or 0 for each in history.increments)
+        rows.append(
+            (figures(float(run.pair.friction), 2), done, count(steps), figures(history.content()["dissipated"]))
+        )
+    head = ("k", "increments", "steps", "friction")
+    unit = f"{found.units['stress']} {found.units['length']}{'^2' if found.problem.dimension == 2 else ''}"
+    caption = f"For each friction the increments that were computed, their steps, and the work of friction in {unit}."
+    facts = (f"{len(rows)} frictions", f"theta = {float(found.thetas[0]):.4g}")
+    return (
+        section("setting", "", Facts(found.problem.title, facts)),
+        section("histories", "WHAT HAPPENED AT EACH FRICTION?", table(head, rows), caption=caption),
+        closing("that a friction between two of them behaves like them", then=then),
+    )
 
 
 def _best(line: tuple[Shown, ...]) -> tuple[Cell, ...]:
