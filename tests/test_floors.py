@@ -108,7 +108,7 @@ BUDGET = {
     "verification.algorithm": 2270,
     "verification.bounds": 3770,
     "verification.certificate": 1410,
-    "verification.cli": 2571,
+    "verification.cli": 2574,
     "verification.constants": 1325,
     "verification.contact": 945,
     "verification.coupling": 447,
@@ -119,7 +119,7 @@ BUDGET = {
     "verification.output": 534,
     "verification.problem": 1903,
     "verification.reproduce": 655,
-    "verification.sections": 2529,
+    "verification.sections": 2532,
     "verification.sweeps": 2405,
     "verification.testing": 1583,
 }
