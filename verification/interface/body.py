@@ -229,8 +229,7 @@ class Body(Value):
         )
         if not all(map(np.array_equal, plan(self), plan(other))):
             return None
-        dimension = self.mesh.dimension
-        return float(self.material.continuity(dimension) / other.material.continuity(dimension))
+        return self.material.over(other.material)
 
     def equals(self, other: Body) -> bool:
         """Return True if it is the same body, loads and norm included."""
