@@ -101,7 +101,7 @@ FLOORS: dict[str, dict[str, str]] = {
 
 #: Lines of each package at most, those of packages inside it apart: whoever needs more says here how many.
 BUDGET = {
-    "fem1d2d": 4055,
+    "fem1d2d": 4155,
     "ndtheory": 5869,
     "verification": 2022,
     "verification.advice": 6286,
@@ -114,10 +114,10 @@ BUDGET = {
     "verification.coupling": 436,
     "verification.exploration": 600,
     "verification.figures": 1670,
-    "verification.interface": 3300,
+    "verification.interface": 3305,
     "verification.ledger": 4345,
     "verification.output": 534,
-    "verification.problem": 1920,
+    "verification.problem": 1965,
     "verification.reproduce": 655,
     "verification.sections": 2480,
     "verification.sweeps": 2405,

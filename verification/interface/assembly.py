@@ -288,9 +288,14 @@ def _mesh(problem: Problem, name: Name) -> Mesh:
         if why := spec.mesh.unusable():
             raise refuse(why)
         try:
-            mesh = from_file(path)
+            mesh = from_file(path, one_material=not spec.materials)
         except MeshError as error:
             raise refuse(str(error).removeprefix(f"{path}: ")) from None
+        if spec.materials:
+            try:
+                mesh.split([*spec.materials])
+            except MeshError as error:
+                raise problem.refuse(f"{name}.young", [*spec.materials], str(error)) from None
         if len(mesh.cells) > 2 * MOST_CELLS:
             raise refuse(f"needed at most {2 * MOST_CELLS} triangles, these are {len(mesh.cells)}")
         mesh = _with_parts(problem, name, mesh)
@@ -394,7 +399,7 @@ def _body(problem: Problem, name: Name, mesh: Mesh, known: Supports, nodes: Ints
     d = mesh.dimension
     _check_free(problem, name, mesh, known, nodes, grid.normals)
     motions = rigid_motions(mesh, known.held)
-    material = material_of(spec)
+    material = material_of(spec, mesh=mesh)
     matrix = stiffness(mesh, material)
     load = _load(problem, name, mesh, nodes, grid.x, ends)
     free = np.flatnonzero(~known.held.ravel())

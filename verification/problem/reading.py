@@ -105,7 +105,7 @@ def read_problem(data: Mapping[str, Any], source: str) -> ProblemSpec:
     body2 = _read_body(top.table("body2", required=True), dimension, plane, source)
     if body1.rigid and body2.rigid:
         raise top.refuse("body2.shape", "rigid", "needed at least one elastic body")
-    if not (body1.rigid or body2.rigid or 1 / MOST_CONTRAST <= body1.young / body2.young <= MOST_CONTRAST):
+    if not (body1.rigid or body2.rigid or _within_contrast(body1, body2)):
         needed = f"needed a modulus within {float(MOST_CONTRAST):g} times that of body1, {float(body1.young):g}"
         raise top.refuse("body2.young", body2.young, f'{needed}; for `solve`, shape = "rigid" makes an obstacle')
     contact = _read_contact(top.table("contact"), dimension)
@@ -256,6 +256,43 @@ def _poisson(plane: str) -> Callable[[Any], Fraction]:
     return number("a number with -0.5 < nu <= 0.5 in plane stress", lambda v: -Fraction(1, 2) < v <= Fraction(1, 2))
 
 
+def _read_moduli(table: TomlTable, readers: Mapping[str, Any], dimension: int, *, meshed: bool) -> dict[str, Any]:
+    """Read ``young`` and ``poisson``: numbers, or tables of them by named surfaces of a mesh file."""
+
+    def by_surface(name: str) -> Callable[[Any], Any]:
+        def read(value: Any) -> Any:
+            if not isinstance(value, Mapping) or not value:
+                return readers[name](value)
+            if not meshed:
+                raise Unfit("needed a number: only a mesh file has named surfaces")
+            inside = table.within(name, value)
+            return {surface: inside.take(surface, readers[name]) for surface in _names(inside)}
+
+        return read
+
+    young = table.take("young", by_surface("young"))
+    if dimension == 1:
+        if "poisson" in table:
+            raise table.refuse("poisson", None, "a bar has no Poisson ratio; leave it out in one dimension")
+        return {"young": young}
+    poisson = table.take("poisson", by_surface("poisson"))
+    surfaces = {surface: None for value in (young, poisson) if isinstance(value, dict) for surface in value}
+    E, nu = (value if isinstance(value, dict) else dict.fromkeys(surfaces, value) for value in (young, poisson))
+    if not E.keys() == nu.keys():
+        raise table.refuse("poisson", poisson, f"needed the same surfaces as young has, {', '.join(E)}")
+    if surfaces and max(E.values()) > MOST_CONTRAST * min(E.values()):
+        raise table.refuse("young", young, f"needed moduli within {float(MOST_CONTRAST):g} times each other")
+    materials = {surface: (E[surface], nu[surface]) for surface in surfaces}
+    largest = [max(pair) for pair in zip(*materials.values(), strict=True)] or [young, poisson]
+    return {"young": largest[0], "poisson": largest[1], "materials": materials}
+
+
+def _within_contrast(*bodies: BodySpec) -> bool:
+    """Return True if no modulus of some bodies is too large against another one."""
+    youngs = [E for body in bodies for E in body.youngs]
+    return max(youngs) <= MOST_CONTRAST * min(youngs)
+
+
 def _read_body(table: TomlTable, dimension: int, plane: Literal["strain", "stress"], source: str) -> BodySpec:
     shape = _read_shape(table, dimension, source)
     if shape["shape"] == "rigid":
@@ -277,13 +314,7 @@ def _read_body(table: TomlTable, dimension: int, plane: Literal["strain", "stres
             raise Unfit("needed each side once")
         return tuple(value)
 
-    young = table.take("young", positive)
-    if dimension == 2:
-        poisson = table.take("poisson", _poisson(plane))
-    else:
-        if "poisson" in table:
-            raise table.refuse("poisson", None, "a bar has no Poisson ratio; leave it out in one dimension")
-        poisson = Fraction(0)
+    moduli = _read_moduli(table, {"young": positive, "poisson": _poisson(plane)}, dimension, meshed=sides is None)
     fixed = table.take("fixed", side_list, ())
     prescribed = _by_side(table.table("prescribed"), sides, _components(dimension, free=True))
     for name in fixed:
@@ -295,8 +326,7 @@ def _read_body(table: TomlTable, dimension: int, plane: Literal["strain", "stres
     table.close()
     return BodySpec(
         **shape,
-        young=young,
-        poisson=poisson,
+        **moduli,
         parts=parts,
         fixed=fixed,
         prescribed=prescribed,

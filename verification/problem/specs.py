@@ -142,7 +142,9 @@ class BodySpec:
     shape : {'rectangle', 'interval', 'mesh', 'rigid'}
         A rigid body is an obstacle: of the other attributes it has at most x and y.
     young, poisson : Fraction
-        E in stress; Poisson's ratio is 0 for a bar.  Both 0 where rigid.
+        E in stress; Poisson's ratio is 0 for a bar.  Both 0 where rigid, the largest ones of several materials.
+    materials : read-only mapping from surface to pair of Fraction
+        E and Poisson's ratio of each named surface of a mesh file; empty where the body is of one material.
     plane : {'strain', 'stress'}
         Plane strain or plane stress, the same for both bodies.
     parts : read-only mapping from name to SidePart
@@ -166,15 +168,22 @@ class BodySpec:
     traction: Mapping[str, tuple[Fraction, ...]] = field(default_factory=ReadOnly)
     body_force: tuple[Fraction, ...] = ()
     plane: Literal["strain", "stress"] = "strain"
+    materials: Mapping[str, tuple[Fraction, Fraction]] = field(default_factory=ReadOnly)
 
     def __post_init__(self) -> None:
-        for name in ("parts", "prescribed", "traction"):
+        for name in ("parts", "prescribed", "traction", "materials"):
             object.__setattr__(self, name, ReadOnly(getattr(self, name)))
 
     @property
     def rigid(self) -> bool:
         """True if the body is an obstacle."""
         return self.shape == "rigid"
+
+    @property
+    def youngs(self) -> tuple[Fraction, ...]:
+        """E, or the least and the largest one of several materials."""
+        each = {E for E, _ in self.materials.values()} or {self.young}
+        return (self.young,) if len(each) == 1 else (min(each), max(each))
 
     @property
     def moduli(self) -> Moduli:

@@ -51,8 +51,8 @@ def _body(body: BodySpec) -> dict[str, Any]:
     }
     if not body.rigid:
         written |= {
-            "young": body.young,
-            "poisson": None if bar else body.poisson,
+            "young": {name: E for name, (E, _) in body.materials.items()} or body.young,
+            "poisson": {name: nu for name, (_, nu) in body.materials.items()} or (None if bar else body.poisson),
             "parts": {name: {"side": part.side, part.axis: part.ends} for name, part in body.parts.items()},
             "fixed": body.fixed,
             **_loads(body, bar),

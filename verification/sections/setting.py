@@ -16,7 +16,7 @@ def setting(problem: Problem, nodes: int | None, interface: int) -> Section:
     units, contact = problem.units, problem.contact
     counts = [] if nodes is None else [f"{nodes} nodes, {interface} on Gamma_c"]
     bodies = (problem.body1, problem.body2)
-    moduli = " / ".join("rigid" if body.rigid else f"{float(body.young):g}" for body in bodies)
+    moduli = " / ".join("rigid" if one.rigid else " to ".join(f"{float(E):g}" for E in one.youngs) for one in bodies)
     body = problem.iteration.neumann_body
     law = LAWS[contact.law].label if LAWS[contact.law].needs_radius else f"{LAWS[contact.law].label} law"
     friction = "no friction" if not contact.friction else f"k = {frictions(contact)}, {law}"
