@@ -36,11 +36,14 @@ FLOORS: dict[str, dict[str, str]] = {
         "verification": "dense interrupts progress schemas spreadsheet threads value",
         "verification.sections": "__init__ layout numbers parts",
     },
-    "input": {"verification.problem": "__init__ examples files reading specification specs steps tables writing"},
+    "input": {
+        "verification.problem": "__init__ colours examples files reading specification specs steps tables writing"
+    },
     "results, extras": {"verification": "document extras"},
     "bodies": {
         "verification.interface": (
             "__init__ assembly body build checks exact_bodies fields files friction interface joining matrices pair "
+            "several"
         ),
         "verification.contact": "__init__ active_set kkt model step system",
     },
@@ -101,10 +104,10 @@ FLOORS: dict[str, dict[str, str]] = {
 
 #: Lines of each package at most, those of packages inside it apart: whoever needs more says here how many.
 BUDGET = {
-    "fem1d2d": 4155,
+    "fem1d2d": 4160,
     "ndtheory": 5869,
-    "verification": 2022,
-    "verification.advice": 6286,
+    "verification": 2030,
+    "verification.advice": 6295,
     "verification.algorithm": 2270,
     "verification.bounds": 3575,
     "verification.certificate": 1410,
@@ -113,13 +116,13 @@ BUDGET = {
     "verification.contact": 945,
     "verification.coupling": 436,
     "verification.exploration": 600,
-    "verification.figures": 1670,
-    "verification.interface": 3305,
+    "verification.figures": 1675,
+    "verification.interface": 3655,
     "verification.ledger": 4345,
     "verification.output": 534,
-    "verification.problem": 1965,
+    "verification.problem": 2270,
     "verification.reproduce": 655,
-    "verification.sections": 2480,
+    "verification.sections": 2505,
     "verification.sweeps": 2405,
     "verification.testing": 1583,
 }

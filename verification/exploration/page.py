@@ -191,6 +191,8 @@ def explore(
     pair = pair_of(problem)
     if pair.problem is None:
         raise ProblemError("", "", None, "this pair is made from matrices: needed the meshes of both bodies")
+    if pair.interface.lines:
+        raise pair.problem.refuse("contact", None, "needed one table [contact]: the page shows two bodies")
     made = run(pair, rule="constant")
     seen = made.iterates[0] if made.outcome == "diverged" else made.last
     farthest = FARTHEST * max(float(np.abs(u).max()) for u in made.traces_at(seen))

@@ -57,6 +57,8 @@ class ExactBody:
         NotExact
             An element that computes in doubles, or entries that are not of ordinary size.
         """
+        if problem.contact.lines:
+            raise NotExact("there are more than two bodies")
         spec: BodySpec = getattr(problem, body.name)
         points, mesh = exact_points(spec, body), body.mesh
         try:
