@@ -54,7 +54,7 @@ def three(tmp_path):
 @pytest.mark.parametrize(
     ("command", "seen"),
     [
-        ("solve", ("E 20000 / 30000 / 20000 MPa", "Neumann bodies: 1, 3", "1 on 2 ", "3 on 2 ")),
+        ("solve", ("E 20000 / 30000 / 20000 MPa", "Neumann bodies: 1, 3", "1 on 2 ", "3 on 2 ", " normal, ")),
         (
             "run",
             ("k = 0.050 to 0.10, non-local, r = 0.5 mm", "converged", "of body 2, Neumann grid: 18 of bodies 1, 3"),

@@ -72,6 +72,20 @@ def test_a_run_has_the_stresses_of_the_global_method(data):
     assert run.to_dict()["coupled_residual"] < 1e-8
 
 
+@pytest.mark.parametrize(("name", "number"), [("stack", 3), ("jaws", 3), ("chain", 5)])
+def test_a_built_in_problem_of_several_bodies_has_the_forces_of_the_global_method(name, number):
+    problem = vf.example(name)
+    pair = vf.build(problem)
+    run, found = vf.run(pair), vf.solve(pair)
+    assert len(problem.bodies) == number
+    assert run.converged
+    assert close(run.contact.pressure, found.contact.pressure)
+    assert close(run.contact.shear, found.contact.shear, 1e-7)
+    assert run.contact.pattern == found.contact.pattern
+    assert all(found.contact.pattern[state] for state in ("stick", "slip"))
+    assert vf.advise(pair).neumann_body == problem.iteration.neumann_body
+
+
 def test_a_floating_plate_carries_on_what_presses_on_it():
     first, second = vf.solve(read(stack())).to_dict()["forces"]
     assert (first["bodies"], second["bodies"]) == ([1, 2], [2, 3])

@@ -153,13 +153,13 @@ def _contact(problem: Problem, contact: ContactFields, solved: str = "") -> list
     unit = f"{units['stress']} {units['length']} (per unit thickness)"
     pressure = figures(float(contact.pressure.max()), 4)
     totals = [Labelled("force", f"{normal}, {figures(tangential)} tangential, {unit}")]
-    along = lambda vector: "{} along x, {} along y".format(*(figures(float(value), 6) for value in vector))
     if problem.contact.surface is not None:
-        totals.append(Labelled("on body 2", along(contact.weights @ contact.tractions)))
+        x, y = (figures(float(value), 6) for value in contact.weights @ contact.tractions)
+        totals.append(Labelled("on body 2", f"{x} along x, {y} along y"))
     if contact.lines:
         totals = [Labelled("force", f"in {unit}")]
     for each in contact.forces:
         one, other = each["bodies"]
         words = f"{figures(each['normal'], 6)} normal, {figures(each['tangential'])} tangential"
-        totals.append(Labelled(f"{one} on {other}", f"{words}; {along(each['vector'])}"))
+        totals.append(Labelled(f"{one} on {other}", words))
     return [nodes, *totals, Labelled("largest pressure", f"{pressure} {units['stress']}{solved}")]
