@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import verification as vf
-from verification.interface.assembly import SingularRole
+from verification.interface.assembly import SingularRole, discretise
 from verification.problem.colours import OddRing, colours
 
 
@@ -84,6 +84,39 @@ def test_a_built_in_problem_of_several_bodies_has_the_forces_of_the_global_metho
     assert run.contact.pattern == found.contact.pattern
     assert all(found.contact.pattern[state] for state in ("stick", "slip"))
     assert vf.advise(pair).neumann_body == problem.iteration.neumann_body
+
+
+def test_bodies_that_stick_together_are_one_body():
+    """A row of three blocks, of which two stick together, and a row of two on the same cells."""
+
+    def block(x, columns, **more):
+        shape = {"shape": "rectangle", "x": x, "y": [0, 2], "cells": [columns, 4]}
+        return shape | {"young": "2e4", "poisson": "0.3"} | more
+
+    touch = {"surface": ["right", "left"], "radius": "0.5"}
+    last = block([4, 6], 4, young="5e4", prescribed={"right": ["-0.01", "0.001"]})
+    one = {"body1": block([0, 4], 8, fixed=["left"]), "body2": last, "contact": touch | {"friction": "0.1"}}
+    apart = {"body1": block([0, 2], 4, fixed=["left"]), "body2": block([2, 4], 4), "body3": last}
+    lines = [touch | {"bodies": [1, 2], "friction": "1e6"}, touch | {"bodies": [2, 3], "friction": "0.1"}]
+    found, expected = (vf.solve(read(data)).to_dict() for data in (apart | {"contact": lines}, one))
+    assert expected["pattern"] == {"stick": 2, "slip": 3, "open": 0}
+    for name in ("pressure", "shear", "slip", "x", "y", "s", "normal"):
+        assert close(np.array(found["contact"][name])[5:], np.array(expected["contact"][name]), 1e-11), name
+    assert found["forces"][1]["vector"] == pytest.approx(expected["force"]["vector"], rel=1e-11)
+
+
+def test_two_blocks_share_a_side_of_a_base_and_a_traction_acts_beside_them():
+    base = plate((-1, 0), x=(0, 10), fixed=["bottom"], traction={"top": [0, -1]}) | {"cells": [40, 4]}
+    one = plate((0, 1), x=(1, 3), prescribed={"top": ["0.001", "-0.01"]})
+    other = plate((0, 1), cells=12, x=(6, 9), prescribed={"top": ["-0.001", "-0.005"]})
+    data = {"body1": base, "body2": one, "body3": other, "contact": [touch(1, 2), touch(1, 3)]}
+    problem = read(data | {"iteration": {"neumann_bodies": [1], "theta": "auto"}})
+    bodies, run, found = discretise(problem), vf.run(problem), vf.solve(problem)
+    assert bodies.body1.load.sum() == pytest.approx(-1 * (10 - 2 - 3), rel=1e-12)
+    assert run.converged
+    assert close(run.contact.pressure, found.contact.pressure)
+    with pytest.raises(vf.ProblemError, match=r"contact\[1\]\.surface = .*name a part of that side"):
+        vf.build(problem.swapped())
 
 
 def test_a_floating_plate_carries_on_what_presses_on_it():

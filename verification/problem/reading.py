@@ -164,8 +164,8 @@ def _read_several(top: TomlTable, dimension: Literal[1, 2], plane: Literal["stra
     for i, body in bodies.items():
         if body.rigid:
             raise top.refuse(f"body{i}.shape", "rigid", "needed an elastic body: an obstacle has no named sides")
-        if not _within_contrast(bodies[1], body):
-            needed = f"needed a modulus within {float(MOST_CONTRAST):g} times that of body1"
+        if not _within_contrast(*(bodies[j] for j in numbers if j <= i)):
+            needed = f"needed a modulus within {float(MOST_CONTRAST):g} times those before it"
             raise top.refuse(f"body{i}.young", body.young, needed)
     tables = top.take("contact", _tables_of(top, "contact"))
     if not tables:
