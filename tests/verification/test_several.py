@@ -6,8 +6,10 @@ import pickle
 import jsonschema
 import numpy as np
 import pytest
+from mesh_writer import read_here, write_gmsh22
 
 import verification as vf
+from fem1d2d import mesh_files, rectangle
 from verification.interface.assembly import SingularRole, discretise
 from verification.problem.colours import OddRing, colours
 
@@ -393,3 +395,26 @@ def test_three_springs_in_a_ring_never_converge_undamped():
     ring = np.roll(np.eye(3), 1, axis=0)
     roots = np.exp(2j * np.pi * np.arange(3) / 3)
     assert np.sort_complex(np.linalg.eigvals(ring)) == pytest.approx(np.sort_complex(roots), abs=1e-12)
+
+
+def test_a_problem_turned_by_an_angle_has_the_same_results(tmp_path, monkeypatch):
+    monkeypatch.setattr(mesh_files, "read_in_process", read_here)
+    found = []
+    for angle in (0.0, 0.7):
+        turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        data = stack(cells=(8, 10, 7))
+        for i in (1, 2, 3):
+            body = data[f"body{i}"]
+            mesh = rectangle((0.0, 4.0), (i - 1.0, float(i)), tuple(body["cells"]))
+            path = tmp_path / f"body{i}.msh"
+            write_gmsh22(path, mesh.points @ turn, mesh.cells, mesh.sides)
+            rest = {key: value for key, value in body.items() if key not in ("shape", "x", "y", "cells")}
+            data[f"body{i}"] = rest | {"mesh": str(path)}
+        data["body3"]["prescribed"] = {"top": (np.array([0.001, -0.01]) @ turn).tolist()}
+        problem = read(data)
+        run, measured = vf.run(problem), vf.measure(problem)
+        assert run.converged
+        forces = [force["vector"] @ turn.T for force in run.to_dict()["forces"]]
+        constants = [measured.rho_max.value, measured.rho_normal.value, measured.M.value, measured.kappa_2.value]
+        found.append((run.contact.pressure, run.contact.shear, np.array(forces), np.array(constants)))
+    assert all(close(one, other) for one, other in zip(*found, strict=True))
