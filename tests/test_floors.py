@@ -116,7 +116,7 @@ BUDGET = {
     "verification.contact": 945,
     "verification.coupling": 436,
     "verification.exploration": 600,
-    "verification.figures": 1675,
+    "verification.figures": 1678,
     "verification.interface": 3655,
     "verification.ledger": 4345,
     "verification.output": 534,

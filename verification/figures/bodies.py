@@ -190,13 +190,16 @@ def _colour(ax: Axes, cells: list[PolyCollection], stress: str, values: list[Flo
     above, below = (distance > 1e-6 * (high - low) for distance in (every.max() - high, low - every.min()))
     beyond = ("neither", "max", "min", "both")[int(above) + 2 * int(below)]
     corner, opposite = zip(ax.get_xlim(), ax.get_ylim(), strict=True)
-    for collection, colours in zip(cells, values, strict=True):
+    look: Any = {"ha": "center", "va": "center", "bbox": {"facecolor": "white", "linewidth": 0, "pad": 1.5}}
+    for collection, colours, body in zip(cells, values, bodies.elastic, strict=True):
         collection.set(array=colours, clim=(low, high), cmap="viridis", edgecolor="0.5")
-        points = np.concatenate([path.vertices for path in collection.get_paths()])
-        seen = points[((points > corner) & (points < opposite)).all(axis=1)]
-        if len(seen):
-            look: Any = {"ha": "center", "va": "center", "bbox": {"facecolor": "white", "linewidth": 0, "pad": 1.5}}
-            ax.text(float(seen[:, 0].mean()), float(seen[:, 1].mean()), str(collection.get_label()), **look)
+        corners = np.array([path.vertices for path in collection.get_paths()])
+        for i in bodies.problem.numbers(int(body.name[-1])):
+            own = corners[body.mesh.surfaces[f"body{i}"]] if bodies.interface.lines else corners
+            points = own.reshape(-1, 2)
+            seen = points[((points > corner) & (points < opposite)).all(axis=1)]
+            if len(seen):
+                ax.text(float(seen[:, 0].mean()), float(seen[:, 1].mean()), f"body {i}", **look)
     words = f"{STRESSES[stress][0]}\n[{plain(bodies.problem.units['stress'])}]"
     ax.figure.colorbar(cells[0], ax.inset_axes((1.03, 0.0, 0.025, 1.0)), extend=beyond, label=words)
 
