@@ -47,10 +47,15 @@ def gram(mesh: Mesh, length: float = 1.0) -> sp.csc_array:
     return assemble(cells, np.concatenate([local] * d), d * len(mesh.points))
 
 
-def body_load(mesh: Mesh, force: Sequence[float]) -> Floats:
-    """``int f . v`` of a constant force f, unit stress / length: shape (n, d), unit stress x length^(d - 1)."""
-    volumes = element.element_of(mesh).volumes(mesh).astype(float)
-    weights = np.bincount(mesh.cells.ravel(), volumes.ravel(), minlength=len(mesh.points))
+def body_load(mesh: Mesh, force: Sequence[float], cells: Ints | None = None) -> Floats:
+    """``int f . v`` of a constant force f, unit stress / length: shape (n, d), unit stress x length^(d - 1).
+
+    It acts on all cells, or on those whose numbers are given.
+    """
+    volumes, on = element.element_of(mesh).volumes(mesh).astype(float), mesh.cells
+    if cells is not None:
+        volumes, on = volumes[cells], on[cells]
+    weights = np.bincount(on.ravel(), volumes.ravel(), minlength=len(mesh.points))
     return np.asarray(weights[:, None] * np.asarray(force, dtype=float))
 
 

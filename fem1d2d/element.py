@@ -87,7 +87,8 @@ def _stiffness(size: NDArray[Any], g: NDArray[Any], material: Material) -> NDArr
     dot = np.einsum("cip,cjp->cij", g, g)
     unit = np.eye(g.shape[2], dtype=int)
     shear = np.einsum("cij,pq->cipjq", dot, unit) + outer.transpose(0, 1, 4, 3, 2)
-    return np.asarray((material.lame_lambda * outer + material.lame_mu * shear) * size[:, None, None, None, None])
+    first, second = (np.reshape(value, (-1, 1, 1, 1, 1)) for value in (material.lame_lambda, material.lame_mu))
+    return np.asarray((first * outer + second * shear) * size[:, None, None, None, None])
 
 
 def laplace(mesh: Cells) -> NDArray[Any]:
@@ -147,7 +148,8 @@ def stresses(mesh: Cells, material: Material, displacement: Floats) -> Floats:
         strain[:, :d, :d] += (size / whole)[:, None, None] * (slopes + slopes.transpose(0, 2, 1)) / 2
     trace = np.trace(strain, axis1=1, axis2=2)[:, None, None]
     held = np.diag([1.0, float(d == 2), float(d == 2 and not material.thin)])
-    return np.asarray(material.lame_lambda * trace * held + 2 * material.lame_mu * strain)
+    first, second = (np.reshape(value, (-1, 1, 1)) for value in (material.lame_lambda, material.lame_mu))
+    return np.asarray(first * trace * held + 2 * second * strain)
 
 
 def von_mises(stress: Floats) -> Floats:

@@ -39,8 +39,10 @@ class Shapes(Cells):
     of_cell: Ints
 
     @classmethod
-    def of(cls, points: NDArray[Any], cells: Ints) -> Shapes:
+    def of(cls, points: NDArray[Any], cells: Ints, kinds: Ints | None = None) -> Shapes:
         """The shapes of cells, shape (c, k), with exact nodes: ``points`` are Fractions, shape (n, d).
+
+        Cells of different ``kinds``, shape (c,), as those of different materials, share no shape.
 
         Examples
         --------
@@ -53,9 +55,11 @@ class Shapes(Cells):
         corners = whole[cells]
         known: dict[tuple[Any, ...], int] = {}
         spokes = (corners[:, 1:] - corners[:, :1]).reshape(len(corners), -1)
-        of_cell = [known.setdefault(tuple(row), len(known)) for row in spokes.tolist()]
+        kinds = np.zeros(len(cells), dtype=np.int64) if kinds is None else kinds
+        rows = zip(kinds.tolist(), spokes.tolist(), strict=True)
+        of_cell = [known.setdefault((kind, *row), len(known)) for kind, row in rows]
         k, d = corners.shape[1:]
-        first = [[Fraction(0)] * d + [Fraction(value, unit) for value in row] for row in known]
+        first = [[Fraction(0)] * d + [Fraction(value, unit) for value in row] for _, *row in known]
         return cls(
             points=np.array(first, dtype=object).reshape(-1, d),
             cells=np.arange(k * len(known)).reshape(-1, k),
@@ -79,7 +83,7 @@ def stiffness(mesh: Cells, material: Material, shapes: Shapes | None = None) -> 
     ----------
     mesh : Mesh
     material : Material
-        Of rationals.
+        Of rationals; if one for each cell, then ``shapes`` must tell them apart.
     shapes : Shapes, optional
         The shapes of the exact mesh, if the coordinates of this one are rounded; otherwise its doubles are exact.
 
@@ -90,6 +94,9 @@ def stiffness(mesh: Cells, material: Material, shapes: Shapes | None = None) -> 
     ValueError
         Entries that are not of ordinary size.
     """
+    if shapes is None:
+        shapes = Shapes.of(fractions(mesh.points), mesh.cells, material.kinds)
+    material = material.on(np.unique(shapes.of_cell, return_index=True)[1])
     return _assembled(mesh, shapes, unknowns(mesh), lambda cells: element.stiffness(cells, material))
 
 

@@ -53,6 +53,8 @@ class Mesh(Cells):
         Corners of each cell, anticlockwise in 2D; k = 2 in 1D, 3 or more in 2D.
     sides : mapping from name to int array, shape (s, d)
         Boundary facets of each named side: end points in 1D, edges in 2D, each listed once.
+    surfaces : mapping from name to int array, shape (m,)
+        Numbers of the cells of each named surface; those of two surfaces may be the same.
 
     Attributes
     ----------
@@ -67,6 +69,7 @@ class Mesh(Cells):
     """
 
     sides: Mapping[str, Ints]
+    surfaces: Mapping[str, Ints] = field(default_factory=dict)
     boundary: Ints = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -115,9 +118,11 @@ class Mesh(Cells):
             if (count > 1).any():
                 twice = _where(points, facets[first[np.argmax(count > 1)]])
                 raise MeshError(f"side {name!r} lists the facet {twice} {count.max()} times: once is needed")
-        for array in (points, cells, boundary, *sides.values()):
+        surfaces = {name: np.array(members, dtype=np.int64) for name, members in self.surfaces.items()}
+        for array in (points, cells, boundary, *sides.values(), *surfaces.values()):
             array.setflags(write=False)
-        kept = {"points": points, "cells": cells, "sides": MappingProxyType(sides), "boundary": boundary}
+        kept: dict[str, Any] = {"points": points, "cells": cells, "boundary": boundary}
+        kept |= {"sides": MappingProxyType(sides), "surfaces": MappingProxyType(surfaces)}
         for name, value in kept.items():
             object.__setattr__(self, name, value)
 
@@ -125,7 +130,34 @@ class Mesh(Cells):
         return f"<Mesh: {len(self.points)} nodes, {len(self.cells)} cells, sides {', '.join(self.sides) or 'none'}>"
 
     def __reduce__(self) -> tuple[Any, ...]:  # a read-only mapping cannot be pickled, and numpy returns writable arrays
-        return partial(Mesh, points=self.points, cells=self.cells, sides=dict(self.sides)), ()
+        named = {"sides": dict(self.sides), "surfaces": dict(self.surfaces)}
+        return partial(Mesh, points=self.points, cells=self.cells, **named), ()
+
+    def split(self, names: Sequence[str]) -> Ints:
+        """Return which of these surfaces each cell lies in, shape (c,).
+
+        MeshError for an unknown surface, and unless each cell lies in one of them.
+
+        Examples
+        --------
+        >>> mesh = interval((0.0, 1.0), 3)
+        >>> surfaces = {"rubber": [0], "steel": [1, 2]}
+        >>> Mesh(points=mesh.points, cells=mesh.cells, sides={}, surfaces=surfaces).split(["steel", "rubber"])
+        array([1, 0, 0])
+        """
+        which = np.full(len(self.cells), -1)
+        for i, name in enumerate(names):
+            if name not in self.surfaces:
+                raise MeshError(f"no surface {name!r}; named surfaces: {', '.join(self.surfaces) or 'none'}")
+            members = self.surfaces[name]
+            if (which[members] >= 0).any():
+                other = names[which[members].max()]
+                raise MeshError(f"surfaces {other!r} and {name!r} have a cell in common: each cell is needed in one")
+            which[members] = i
+        if (which < 0).any():
+            left = int((which < 0).sum())
+            raise MeshError(f"{left} of {len(which)} cells lie in none of the surfaces {', '.join(names)}")
+        return which
 
 
 def _whole(what: str, values: Any, columns: int) -> Ints:

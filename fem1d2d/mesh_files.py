@@ -32,11 +32,12 @@ START = (
 )
 
 
-def from_file(path: Path | str) -> Mesh:
+def from_file(path: Path | str, *, one_material: bool = True) -> Mesh:
     """A triangle mesh from a Gmsh (``.msh``) or Abaqus (``.inp``) file; its sides are the names of its lines.
 
     A triangle that the file lists clockwise is turned over; points that no triangle uses and names without lines are
-    left out.
+    left out.  Its ``surfaces`` are the named groups of triangles; if these split the mesh it is refused, unless not
+    ``one_material``.
 
     Raises
     ------
@@ -47,7 +48,10 @@ def from_file(path: Path | str) -> Mesh:
     path = Path(path)
     try:
         _check_kind(path)
-        return _plane_mesh(*read_in_process(path))
+        points, triangles, sides, surfaces, split = read_in_process(path)
+        if split and one_material:
+            raise MeshError(split)
+        return _plane_mesh(points, triangles, sides, surfaces)
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from None
 
@@ -69,8 +73,8 @@ def _check_kind(path: Path) -> None:
         )
 
 
-def read_in_process(path: Path) -> tuple[Floats, Ints, dict[str, Ints]]:
-    """Points, triangles and named lines of a file, read in a separate process.
+def read_in_process(path: Path) -> tuple[Floats, Ints, dict[str, Ints], dict[str, Ints], str]:
+    """Points, triangles, lines and surfaces of a file, and why they are several materials, from a separate process.
 
     The process ends when this one does: it waits for the end of its stdin.  Ctrl-C on a terminal does not reach it.
     MeshError if :func:`fem1d2d.mesh_reader.contents` refuses the file, or the process meets a limit or fails.
@@ -108,11 +112,15 @@ def read_in_process(path: Path) -> tuple[Floats, Ints, dict[str, Ints]]:
     if ended.returncode:
         raise MeshError(f"the process that read it ended with status {ended.returncode}")
     with np.load(io.BytesIO(ended.stdout), allow_pickle=False) as found:
-        names = json.loads(found["names"].tobytes())
-        return found["points"], found["triangles"], {name: found[f"side{i}"] for i, name in enumerate(names)}
+        lines, surfaces, split = json.loads(found["names"].tobytes())
+        sides = {name: found[f"lines{i}"] for i, name in enumerate(lines)}
+        groups = {name: found[f"surfaces{i}"] for i, name in enumerate(surfaces)}
+        return found["points"], found["triangles"], sides, groups, split
 
 
-def _plane_mesh(points: Floats, triangles: Ints, sides: Mapping[str, Ints]) -> Mesh:
+def _plane_mesh(
+    points: Floats, triangles: Ints, sides: Mapping[str, Ints], surfaces: Mapping[str, Ints] | None = None
+) -> Mesh:
     """A mesh of the points in use, its triangles turned anticlockwise."""
     for what, named in (("a triangle", triangles), *((f"side {name!r}", facets) for name, facets in sides.items())):
         outside = named[(named < 0) | (named >= len(points))]
@@ -136,4 +144,5 @@ def _plane_mesh(points: Floats, triangles: Ints, sides: Mapping[str, Ints]) -> M
         points=points,
         cells=np.where(flipped[:, None], triangles[:, ::-1], triangles),
         sides={name: number[facets] for name, facets in sides.items()},
+        surfaces=surfaces or {},
     )

@@ -46,17 +46,18 @@ class NotRead(Exception):
 
 
 def contents(path: Path) -> dict[str, Any]:
-    """Points, triangles and named lines of a mesh file.
+    """Points, triangles, named lines and named surfaces of a mesh file.
 
     Returns
     -------
     dict
-        ``points`` of shape (n, 2) or (n, 3), ``triangles`` of shape (c, 3), ``lines`` of shape (l, 2) by their names.
+        ``points`` of shape (n, 2) or (n, 3), ``triangles`` of shape (c, 3), ``lines`` of shape (l, 2) by their names,
+        ``surfaces``, the numbers of their triangles by their names, ``split``, why they are several materials, or "".
 
     Raises
     ------
     NotRead
-        Unreadable, no triangles or other cells too, several materials, or no named lines.
+        Unreadable, no triangles or other cells too, or no named lines.
     """
     kind = FORMATS[path.suffix.lower()]
     materials: set[str] | None = None
@@ -81,14 +82,15 @@ def contents(path: Path) -> dict[str, Any]:
     if others:
         raise NotRead(f"needed only triangles, it has {', '.join(others)} too")
     split = sorted(materials) if materials else _split(read, groups, len(triangles))
+    why = ""
     if len(split) > 1:
         named = ", ".join(
             [json.dumps(name[:40], ensure_ascii=False) for name in split[:5]] + ["..."] * (len(split) > 5)
         )
         what = "materials" if materials else "groups"
-        raise NotRead(
-            f"needed one material: its triangles are split into the {what} {named}; write a file for each, or put all"
-            " triangles into one group"
+        why = (
+            f"needed one material: its triangles are split into the {what} {named}; write a file for each, put all"
+            " triangles into one group, or give young by the names of groups"
         )
     if not lines:
         raise NotRead("no named lines; give the sides physical names")
@@ -100,7 +102,8 @@ def contents(path: Path) -> dict[str, Any]:
         if least < 1:
             raise NotRead(f"an element names node {least}: nodes are numbered from 1")
     points = np.asarray(read.points, dtype=float)
-    return {"points": points, "triangles": np.asarray(triangles, dtype=np.int64), "lines": lines}
+    triangles = np.asarray(triangles, dtype=np.int64)
+    return {"points": points, "triangles": triangles, "lines": lines, "surfaces": groups, "split": why}
 
 
 def _by_meshio(path: Path, kind: str) -> tuple[Any, Any, dict[str, Ints], dict[str, Ints]]:
@@ -311,9 +314,11 @@ def main(arguments: Sequence[str]) -> int:
     out, status = io.BytesIO(), REFUSED
     try:
         found = contents(Path(path))
-        names = np.frombuffer(json.dumps(list(found["lines"])).encode(), dtype=np.uint8)
-        sides = {f"side{i}": facets for i, facets in enumerate(found["lines"].values())}
-        np.savez(out, points=found["points"], triangles=found["triangles"], names=names, **sides)
+        kinds = ("lines", "surfaces")
+        words = [*(list(found[kind]) for kind in kinds), found["split"]]
+        names = np.frombuffer(json.dumps(words).encode(), dtype=np.uint8)
+        named = {f"{kind}{i}": members for kind in kinds for i, members in enumerate(found[kind].values())}
+        np.savez(out, points=found["points"], triangles=found["triangles"], names=names, **named)
         status, reason = 0, ""
     except NotRead as error:
         reason = str(error)

@@ -36,11 +36,14 @@ FLOORS: dict[str, dict[str, str]] = {
         "verification": "dense interrupts progress schemas spreadsheet threads value",
         "verification.sections": "__init__ layout numbers parts",
     },
-    "input": {"verification.problem": "__init__ examples files reading specification specs steps tables writing"},
+    "input": {
+        "verification.problem": "__init__ colours examples files reading specification specs steps tables writing"
+    },
     "results, extras": {"verification": "document extras"},
     "bodies": {
         "verification.interface": (
             "__init__ assembly body build checks exact_bodies fields files friction interface joining matrices pair "
+            "several"
         ),
         "verification.contact": "__init__ active_set kkt model step system",
     },
@@ -101,25 +104,25 @@ FLOORS: dict[str, dict[str, str]] = {
 
 #: Lines of each package at most, those of packages inside it apart: whoever needs more says here how many.
 BUDGET = {
-    "fem1d2d": 4055,
+    "fem1d2d": 4160,
     "ndtheory": 5869,
-    "verification": 2011,
-    "verification.advice": 6385,
+    "verification": 2019,
+    "verification.advice": 6394,
     "verification.algorithm": 2270,
-    "verification.bounds": 3770,
+    "verification.bounds": 3771,
     "verification.certificate": 1410,
     "verification.cli": 2574,
     "verification.constants": 1325,
     "verification.contact": 945,
     "verification.coupling": 447,
-    "verification.exploration": 690,
-    "verification.figures": 1644,
-    "verification.interface": 3300,
+    "verification.exploration": 692,
+    "verification.figures": 1652,
+    "verification.interface": 3655,
     "verification.ledger": 4345,
     "verification.output": 534,
-    "verification.problem": 1903,
+    "verification.problem": 2253,
     "verification.reproduce": 655,
-    "verification.sections": 2532,
+    "verification.sections": 2562,
     "verification.sweeps": 2405,
     "verification.testing": 1583,
 }

@@ -31,6 +31,9 @@ TYPES: dict[str, JsonSchema] = {
 #: What a row begins with that includes a part.
 INCLUDED = "all keys of "
 
+#: How the type of an object begins that may be a list of a part instead.
+EITHER = "object, or list of "
+
 #: A reference of the site: its role, its text where it has one, its target.
 _REFERENCE = re.compile(r"\{(\w+)\}`(?:([^`<]+) <[^`>]+>|([^`]+))`")
 
@@ -182,7 +185,9 @@ def _object(table: str) -> JsonSchema:
 
     for _, key, row in rows(table):
         value = objects[key] = _empty()
-        if row.type.endswith("object"):
+        if row.type.startswith(EITHER):
+            value |= {"type": ["object", "array"], "items": _value(row.type.removeprefix(EITHER))}
+        elif row.type.endswith("object"):
             for _ in range(row.type.count("list of ")):
                 value = {"type": "array", "items": value}
         else:

@@ -12,7 +12,7 @@ WORDS = {*TYPES, "object", "null"}
 
 def shown(kind: str) -> str:
     """A type with the names of parts in bold."""
-    outer = re.match("((list|map) of )*", kind)[0]
+    outer = re.match("(object, or )?((list|map) of )*", kind)[0]
     last = kind.removeprefix(outer)
     return kind if last.removesuffix(" or null") in WORDS else f"{outer}**{last}**"
 

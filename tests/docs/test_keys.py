@@ -98,6 +98,8 @@ class Reader:
     def value(self, name: str, path: str, kind: str, value: Any) -> None:
         if value is None:
             return
+        if kind.startswith(schemas.EITHER):
+            kind = f"list of {kind.removeprefix(schemas.EITHER)}" if isinstance(value, list) else "object"
         if kind.startswith(("list of ", "map of ")):
             for member in value if isinstance(value, list) else value.values():
                 self.value(name, path, kind.partition(" of ")[2], member)
@@ -146,6 +148,15 @@ def triangles(path: Path) -> None:
     data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
     mesh = meshio.Mesh(np.array(points, float), cells, cell_data=data, field_data={"bottom": np.array([1, 1])})
     meshio.write(path, mesh, file_format="gmsh22", binary=False)
+
+
+def stack() -> vf.Problem:
+    """Three plates."""
+    plate = {"shape": "rectangle", "x": [0, 2], "cells": [2, 1], "young": 1, "poisson": "0.3"}
+    bodies = {f"body{i}": {**plate, "y": [i - 1, i]} for i in (1, 2, 3)}
+    bodies["body1"]["fixed"], bodies["body3"]["prescribed"] = ["bottom"], {"top": [0, "-0.1"]}
+    touch = {"surface": ["top", "bottom"], "friction": "0.3", "radius": 1}
+    return vf.Problem.from_dict({**bodies, "contact": [{**touch, "bodies": [i, i + 1]} for i in (1, 2)]})
 
 
 def diverging(folder: Path) -> list[tuple[Path, str]]:
@@ -243,7 +254,7 @@ def documents(folder: Path, small: vf.Problem) -> list[dict[str, Any]]:
         *(vf.run(problem) for problem in (small, bars, of_mesh, matrices)),
         vf.run(bars.changed(theta="0.99"), rule="momentum"),
         vf.run(vf.Problem.from_dict({**BARS, "body1": {**BARS["body1"], "young": "0.1"}}), theta="0.9"),  # diverges
-        *(vf.solve(problem) for problem in (small, bars, of_mesh, vf.example("signorini"))),
+        *(vf.solve(problem) for problem in (small, bars, of_mesh, vf.example("signorini"), stack())),
         *histories(small),
         *(vf.measure(problem) for problem in (bars, matrices)),
         vf.measure(small, refine=1),
@@ -335,7 +346,7 @@ def places(value: Any, name: str, path: str = "") -> Iterator[tuple[dict[str, An
             yield value, key, row
         if isinstance(member, dict) and row is not None and row.type in schemas.tables():
             yield from places(member, row.type)
-        elif isinstance(member, dict) and (row is None or row.type == "object"):
+        elif isinstance(member, dict) and (row is None or row.type.startswith("object")):
             yield from places(member, name, f"{path}{key}.")
 
 

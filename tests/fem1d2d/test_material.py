@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from strategies import numbers
 
-from fem1d2d import bar, plane_strain
+from fem1d2d import Material, bar, element, exact, interval, plane_strain, rectangle, stiffness
 
 youngs = numbers(Fraction(1, 6), 100, 6)
 poissons = numbers(Fraction(-19, 20), Fraction(9, 20), 20)
@@ -65,3 +65,45 @@ def test_poisson_ratios_next_to_the_ends_are_accepted(poisson):
     material = plane_strain(1.0, poisson)
     assert material.lame_mu > 0
     assert 3 * material.lame_lambda + 2 * material.lame_mu > 0
+
+
+# --- one material for each cell ---
+
+
+def test_two_materials_in_series_lengthen_like_two_springs():
+    mesh = interval((0.0, 3.0), 3)
+    steel, rubber = bar(8.0), bar(2.0)
+    material = Material.of_cells([steel, rubber], np.array([0, 1, 1]))
+    matrix = stiffness(mesh, material).toarray()[1:, 1:]
+    assert np.linalg.solve(matrix, [0.0, 0.0, 1.0])[-1] == pytest.approx(1 / 8 + 2 / 2, rel=1e-14)
+
+
+def test_a_body_of_two_materials_is_the_sum_of_its_parts():
+    mesh = rectangle((0.0, 2.0), (0.0, 1.0), (4, 3))
+    kinds = [plane_strain(7.0, 0.3), plane_strain(0.1, 0.45)]
+    which = (mesh.points[mesh.cells].mean(axis=1)[:, 0] > 1).astype(int)
+    whole = Material.of_cells(kinds, which)
+    single = element.stiffness(mesh, whole)
+    for kind, material in enumerate(kinds):
+        assert np.array_equal(single[which == kind], element.stiffness(mesh, material)[which == kind])
+    assert whole.continuity(2) == max(material.continuity(2) for material in kinds)
+
+
+def test_exact_matrices_of_two_materials_enclose_those_in_doubles():
+    mesh = rectangle((0.0, 2.0), (0.0, 1.0), (4, 3))
+    kinds = [plane_strain(Fraction(7), Fraction(3, 10)), plane_strain(Fraction(1, 10), Fraction(9, 20))]
+    which = np.arange(len(mesh.cells)) % 2
+    enclosed = exact.stiffness(mesh, Material.of_cells(kinds, which))
+    plain = [plane_strain(7.0, 0.3), plane_strain(0.1, 0.45)]
+    floats = stiffness(mesh, Material.of_cells(plain, which))
+    assert abs(enclosed.middle - floats).max() <= 1e-14 * abs(floats).max()
+    mixed = stiffness(mesh, Material.of_cells(plain[::-1], which))
+    assert abs(enclosed.middle - mixed).max() > 0.1 * abs(floats).max()
+
+
+def test_bodies_of_several_materials_are_as_stiff_as_each_other_only_where_they_are_the_same():
+    kinds = [plane_strain(7.0, 0.3), plane_strain(0.1, 0.45)]
+    one, other = (Material.of_cells(kinds, np.array(which)) for which in ([0, 1, 1], [0, 1, 0]))
+    assert one.over(one) == 1.0
+    assert one.over(other) is one.over(kinds[0]) is None
+    assert plane_strain(14.0, 0.3).over(kinds[0]) == 2.0

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mesh_writer import write_gmsh22
+from mesh_writer import GMSH41, write_gmsh22
 from processes import PATIENCE, running
 
 from fem1d2d import MeshError, from_file, mesh_files, mesh_reader, rectangle
@@ -212,9 +212,12 @@ def test_threads_read_at_the_same_time(good):
         assert all(map(same, pool.map(from_file, [good] * 4)))
 
 
-def test_what_is_read_here_and_there_is_the_same(good):
-    here = mesh_reader.contents(good)
-    points, triangles, lines = mesh_files.read_in_process(good)
+def test_what_is_read_here_and_there_is_the_same(tmp_path):
+    (tmp_path / "body.msh").write_text(GMSH41)
+    here = mesh_reader.contents(tmp_path / "body.msh")
+    points, triangles, lines, surfaces, split = mesh_files.read_in_process(tmp_path / "body.msh")
+    assert {name: cells.tolist() for name, cells in surfaces.items()} == {"body": [0, 1]}
+    assert split == here["split"] == ""
     assert np.array_equal(points, here["points"])
     assert np.array_equal(triangles, here["triangles"])
     assert lines.keys() == here["lines"].keys()

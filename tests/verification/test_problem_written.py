@@ -102,10 +102,12 @@ def test_equal_problems_are_written_walked_and_keyed_alike(meshes, data):
 def test_a_dictionary_has_the_keys_of_the_file_and_the_defaults(problem):
     document = problem.to_dict()
     plane = ["plane"] if problem.dimension == 2 else []
-    tables = ["units", "body1", "body2", "contact", "iteration", "norm"]
-    assert list(document) == ["title", "dimension", *plane, *tables]
-    assert list(document["iteration"]) == ["neumann_body", "theta", "relaxation", "tolerance", "max_iterations"]
-    assert document["contact"]["law"] == "nonlocal"
+    bodies, several = [f"body{i}" for i in problem.bodies], isinstance(document["contact"], list)
+    assert list(document) == ["title", "dimension", *plane, "units", *bodies, "contact", "iteration", "norm"]
+    roles = "neumann_bodies" if several else "neumann_body"
+    assert list(document["iteration"]) == [roles, "theta", "relaxation", "tolerance", "max_iterations"]
+    for contact in document["contact"] if several else [document["contact"]]:
+        assert contact["law"] == "nonlocal"
     assert document["body1"]["body_force"] == ([0, 0] if problem.dimension == 2 else 0)
     empty = [
         k for table in document.values() if isinstance(table, dict) for k, v in table.items() if v in (None, [], {})

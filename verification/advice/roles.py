@@ -434,9 +434,13 @@ class Advice(Document):
         if not self.roles:
             return f"assumed: {self.assumes}; {len(self.readings)} readings of {'a run' if self.run else 'logs'}"
         theta, rate = self.chosen(self.best)
-        who = "" if self.neumann_body is None else f"Neumann problem to body {self.neumann_body}, "
+        who = "" if self.neumann_body is None else f"Neumann problem to {self.words(self.neumann_body)}, "
         who = who if self.assumes is None else f"assumed: {self.assumes}; "
         return f"{who}theta = {theta:.4g} {'if tied' if self.tied else 'predicted'}, rate {rate:.4g}"
+
+    def words(self, body: int) -> str:
+        """Return what body 1 or body 2 stands for in the file: ``body 2``, or ``bodies 2, 4``."""
+        return f"body {body}" if self.problem is None else self.problem.words(body)
 
     @property
     def spectrum(self) -> Spectrum | None:
@@ -500,7 +504,8 @@ class Advice(Document):
         first = "" if self.assumes is None else f"Assumed: {self.assumes}. "
         first += f"rho (stiffness of contact body over Neumann body on the interface, at worst) is {_rho(best, tied)}"
         if self.neumann_body is not None:
-            first += f" with body {self.neumann_body} as Neumann body"
+            words = self.words(self.neumann_body)
+            first += f" with {words} as Neumann {words.split()[0]}"
         if other is not None:
             first += f", {_rho(other, tied)} with the roles exchanged"
         formula = "2/(2+rho)"
@@ -534,6 +539,8 @@ class Advice(Document):
         """
         if self.theta is None:
             raise ValueError(self.why_no_theta)
+        if self.problem is not None and self.problem.contact.lines:
+            raise self.problem.refuse("contact", None, "the blocks couple two solvers: needed a file with two bodies")
         if self.parallel:
             raise ValueError("the blocks are for serial coupling: needed advice without parallel")
         if method is None:

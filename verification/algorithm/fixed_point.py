@@ -48,7 +48,7 @@ class FixedPointMap:
         self.pair = pair
         contact = pair.contact
         near, motions = pair.nearly_incompressible, contact.motions
-        body = f"body {pair.contact_body}"
+        body = pair.words(pair.contact_body)
         self._step = step(contact.schur, contact.free, contact.grid.t, solver, near, motions, body, systems)
         self._all_free = bool(contact.free.all())
 

@@ -104,7 +104,7 @@ class Subject:
     @property
     def varies(self) -> bool:
         """True if the coefficient of friction varies along Gamma_c: k is then the largest one."""
-        return self.pair is not None and self.pair.interface.profile is not None
+        return self.pair is not None and self.pair.interface.varies
 
     def at(self, k: float) -> Subject:
         """The same bodies at another friction."""

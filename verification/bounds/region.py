@@ -139,7 +139,8 @@ def check_plane(pair: ContactPair, measured: Measured) -> None:
     if pair.outside:
         raise ProblemError(problem.source, "contact", None, f"no region is proved: {pair.outside[0]}")
     if pair.contact.slides:
-        raise ProblemError(problem.source, f"body{pair.contact_body}", None, f"no region is proved: C_t1 is {SLIDES}")
+        body = f"body{problem.numbers(pair.contact_body)[0]}"
+        raise ProblemError(problem.source, body, None, f"no region is proved: C_t1 is {SLIDES}")
     if measured.constants() is None and measured.energy_constants() is None:
         raise ProblemError(problem.source, "contact", None, measured.why_no_constants)
     if measured.friction_threshold is None or measured.friction_limit is None:

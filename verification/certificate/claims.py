@@ -235,6 +235,12 @@ def describe(problem: Problem, pair: ContactPair | None = None) -> dict[str, Any
 
     Coordinates of a mesh file are the doubles that were read from it.
     """
+    if problem.contact.lines:
+        raise problem.refuse("contact", None, "needed one table [contact]: a certificate is about two bodies")
+    for name, spec in (("body1", problem.body1), ("body2", problem.body2)):
+        if spec.materials:
+            needed = "needed a number: a certificate is about bodies of one material each"
+            raise problem.refuse(f"{name}.young", [*spec.materials], needed)
     pair = pair_from(problem) if pair is None else pair
     meshed = [side.mesh_body for side in (pair.body1, pair.body2)]
     points = [exact_points(spec, body) for spec, body in zip((problem.body1, problem.body2), meshed, strict=True)]

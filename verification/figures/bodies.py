@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -80,10 +79,11 @@ def draw_bodies(result: Run | Solution, *, stress: str = "", motions: bool = Fal
             _draw_tractions(axes[0], contact, bodies, drawn)
             axes[0].set_xlabel(f"x [{length}]")
         for ax, draw in zip(axes[1:], panels, strict=True):
-            seen = contact.between(*x)
-            draw(ax, replace(seen, x=seen.s) if named else seen, bodies)
+            seen = contact if contact.lines else contact.between(*x)
+            draw(ax, seen.unrolled() if named else seen, bodies)
             legend_beside(ax)
         where = ("s along $\\Gamma_c$" if named else "x along $\\Gamma_c$") if plane else "x"
+        where = "s along one contact after another" if contact.lines else where
         axes[-1].set_xlabel(f"{where} [{length}]")
     return figure
 
@@ -161,7 +161,7 @@ def _draw_meshes(ax: Axes, bodies: TwoBodies, drawn: list[Floats], scale: float)
             box = 0.1 + 3 * high * (2 * i - 1) + high * np.array([-1, -1, 1, 1])
             cells = np.stack([cells[:, [0, 1, 1, 0], 0], np.tile(box, (len(cells), 1))], axis=-1)
         found.append(PolyCollection(list(cells), facecolor=FILLS[i], edgecolor=BODIES[i], linewidth=0.4))
-        found[-1].set_label(f"body {i + 1}")
+        found[-1].set_label(bodies.problem.words(i + 1))
         ax.add_collection(found[-1])
     ax.set_aspect("equal")
     if bodies.problem.dimension == 1:
@@ -190,13 +190,16 @@ def _colour(ax: Axes, cells: list[PolyCollection], stress: str, values: list[Flo
     above, below = (distance > 1e-6 * (high - low) for distance in (every.max() - high, low - every.min()))
     beyond = ("neither", "max", "min", "both")[int(above) + 2 * int(below)]
     corner, opposite = zip(ax.get_xlim(), ax.get_ylim(), strict=True)
-    for collection, colours in zip(cells, values, strict=True):
+    look: Any = {"ha": "center", "va": "center", "bbox": {"facecolor": "white", "linewidth": 0, "pad": 1.5}}
+    for collection, colours, body in zip(cells, values, bodies.elastic, strict=True):
         collection.set(array=colours, clim=(low, high), cmap="viridis", edgecolor="0.5")
-        points = np.concatenate([path.vertices for path in collection.get_paths()])
-        seen = points[((points > corner) & (points < opposite)).all(axis=1)]
-        if len(seen):
-            look: Any = {"ha": "center", "va": "center", "bbox": {"facecolor": "white", "linewidth": 0, "pad": 1.5}}
-            ax.text(float(seen[:, 0].mean()), float(seen[:, 1].mean()), str(collection.get_label()), **look)
+        corners = np.array([path.vertices for path in collection.get_paths()])
+        for i in bodies.problem.numbers(int(body.name[-1])):
+            own = corners[body.mesh.surfaces[f"body{i}"]] if bodies.interface.lines else corners
+            points = own.reshape(-1, 2)
+            seen = points[((points > corner) & (points < opposite)).all(axis=1)]
+            if len(seen):
+                ax.text(float(seen[:, 0].mean()), float(seen[:, 1].mean()), f"body {i}", **look)
     words = f"{STRESSES[stress][0]}\n[{plain(bodies.problem.units['stress'])}]"
     ax.figure.colorbar(cells[0], ax.inset_axes((1.03, 0.0, 0.025, 1.0)), extend=beyond, label=words)
 
@@ -206,7 +209,8 @@ def _draw_stresses(ax: Axes, contact: ContactFields, bodies: TwoBodies) -> None:
     if law is not None and contact.bound.any():
         look: Any = {"facecolor": "0.9", "edgecolor": "0.4", "linestyle": ":"}
         ax.fill_between(contact.x, -contact.bound, contact.bound, label=f"friction bound\n({plain(law.words)})", **look)
-    curves = ("pressure $-\\sigma_N$", contact.pressure), ("shear $\\sigma_T$ on body 2", contact.shear)
+    who = "the second" if bodies.interface.lines else "body 2"
+    curves = ("pressure $-\\sigma_N$", contact.pressure), (f"shear $\\sigma_T$ on {who}", contact.shear)
     _draw_along(ax, contact, curves, f"stress [{plain(bodies.problem.units['stress'])}]")
 
 

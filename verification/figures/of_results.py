@@ -85,7 +85,9 @@ def _(result: Advice) -> Figure:
         raise ValueError("several readings are left: make the run that `next` names")
     if result.moduli is not None:
         raise ValueError("moduli bound rho from below only: no factor of a step follows")
-    named = {f"Neumann body {role.neumann_body}" if role.neumann_body else "that run": role for role in result.roles}
+    named = {
+        f"Neumann {result.words(role.neumann_body)}" if role.neumann_body else "that run": role for role in result.roles
+    }
     energy = {
         name: role.energy or EnergyConstants(rho=role.rho.value) for name, role in named.items() if role.rho is not None
     }

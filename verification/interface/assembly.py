@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
@@ -25,8 +26,9 @@ from fem1d2d.mesh import Floats, Ints
 from fem1d2d.trace import SAME, extent
 from verification.dense import STILL
 from verification.interface.body import Body, Name, in_frames, material_of, turning
-from verification.interface.interface import Grid, Interface, Law
+from verification.interface.interface import Interface, Law
 from verification.interface.joining import join
+from verification.interface.several import join_lines, together
 from verification.problem.specification import Problem
 from verification.problem.specs import MOST_CELLS, BodySpec
 from verification.problem.steps import path_warnings
@@ -58,15 +60,43 @@ class SingularRole(ProblemError):
 
     def __init__(self, source: str, body: int, motions: int) -> None:
         name, other = f"body{body}", 3 - body
-        free = f"{motions} free motion{'s' if motions > 1 else ''}"
-        super().__init__(
-            source,
-            name,
-            None,
-            f"{name} can move rigidly ({free}), so that its stiffness matrix in the Neumann problem of step I is"
-            f" singular: give body {other} the Neumann problem (iteration.neumann_body = {other}), fix or prescribe"
-            f" more sides of {name}, or use `ndtheory solve`",
-        )
+        remedy = f"give body {other} the Neumann problem (iteration.neumann_body = {other}), fix or prescribe"
+        super().__init__(source, name, None, f"{_singular(name, motions)}: {remedy} {_or_solve(name)}")
+
+    @classmethod
+    def of(cls, problem: Problem, body: Body, other: Body) -> SingularRole:
+        """Return the error for a body of a problem, or for bodies with one role; the other one would have the other."""
+        error = cls(problem.source, int(body.name[-1]), body.motions.shape[1])
+        if not problem.contact.lines:
+            return error
+        name = f"body{_loose(problem, body)[0]}"
+        if loose := _loose(problem, other):
+            remedy = f"body{loose[0]} can too, and of a chain held only at its ends neither colouring works: fix"
+        else:
+            remedy = f"set iteration.neumann_bodies = {list(problem.numbers(int(other.name[-1])))}, fix"
+        needed = f"{_singular(name, body.motions.shape[1])}: {remedy} or prescribe {_or_solve(name)}"
+        ProblemError.__init__(error, problem.source, name, None, needed)
+        return error
+
+
+def _singular(name: str, motions: int) -> str:
+    free = f"{motions} free motion{'s' if motions > 1 else ''}"
+    return (
+        f"{name} can move rigidly ({free}), so that its stiffness matrix in the Neumann problem of step I is singular"
+    )
+
+
+def _or_solve(name: str) -> str:
+    return f"more sides of {name}, or use `ndtheory solve`"
+
+
+def _loose(problem: Problem, body: Body) -> list[int]:
+    """Return the numbers of the bodies of a union that can move rigidly."""
+    motions = np.zeros((body.known.held.size, body.motions.shape[1]))
+    motions[body.positions] = body.motions if body.turned is None else body.turned.T @ body.motions
+    moves = np.abs(motions).max(axis=1, initial=0.0).reshape(-1, body.mesh.dimension).max(axis=1) > STILL
+    of_cell = moves[body.mesh.cells].any(axis=1)
+    return [i for i in problem.numbers(int(body.name[-1])) if of_cell[body.mesh.surfaces[f"body{i}"]].any()]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -100,6 +130,10 @@ class TwoBodies(Value):
         """The body whose traces reach the contact grid by the transfer; None where it is rigid."""
         return self.body2 if self.problem.contact_body == 1 else self.body1
 
+    def lines_on(self, body: Body) -> Iterator[tuple[Ints, Floats, Floats]]:
+        """Yield the contact nodes of a body on each line of Gamma_c, their positions, and the ends of the line."""
+        return _lines_on(body.nodes, self.interface, own=body is not self.neumann)
+
     @property
     def elastic(self) -> list[Body]:
         """The bodies that are not rigid."""
@@ -119,8 +153,7 @@ class TwoBodies(Value):
         def loaded(body: Body | None) -> Body | None:
             if body is None:
                 return None
-            x = (self.interface.neumann if body is self.neumann else self.interface.contact).x
-            load = _load(problem, body.name, body.mesh, body.nodes, x, self.interface.contact.x[[0, -1]])
+            load = _load(problem, body.name, body.mesh, body.nodes, self.interface)
             return body.under(_supports(problem, body.name, body.mesh), load)
 
         interface = copied(self.interface, slipped=slipped)
@@ -206,8 +239,9 @@ def _check_supports(bodies: TwoBodies, *, dense: bool) -> None:
         if not k:
             continue
         if number == problem.iteration.neumann_body:
-            raise SingularRole(problem.source, number, k)
-        moves = f"{body.name} can move rigidly"
+            raise SingularRole.of(problem, body, next(one for one in bodies.elastic if one is not body))
+        name = f"body{_loose(problem, body)[0]}" if problem.contact.lines else body.name
+        moves = f"{name} can move rigidly"
         if problem.dimension == 1:
             needed = "its loads are its contact force, and nothing is left to iterate; `ndtheory solve` takes it"
         elif not dense:
@@ -217,7 +251,7 @@ def _check_supports(bodies: TwoBodies, *, dense: bool) -> None:
             needed = "fix or prescribe more of its sides"
         else:
             continue
-        raise problem.refuse(body.name, None, f"{moves}: {needed}")
+        raise problem.refuse(name, None, f"{moves}: {needed}")
 
 
 def discretise(problem: Problem, *, law: Law | None = None, dense: bool = True) -> TwoBodies:
@@ -238,30 +272,26 @@ def discretise(problem: Problem, *, law: Law | None = None, dense: bool = True) 
         Bodies that can move rigidly together, or do not meet, an interval outside the overlap or without nodes of
         the contact body at its ends, Gamma_u holding the normal component of a contact node, an unreadable mesh.
     """
-    meshes = [None if spec.rigid else _mesh(problem, name) for name, spec in _specs(problem)]
+    meshes = [None if spec.rigid else _mesh(problem, spec, name) for name, spec in _specs(problem)]
     known = [
         None if mesh is None else _supports(problem, name, mesh)
         for (name, _), mesh in zip(_specs(problem), meshes, strict=True)
     ]
-    nodes, interface = join(problem, meshes, known, law)
+    nodes, interface = (join_lines if problem.contact.lines else join)(problem, meshes, known, law)
     if dense and interface.contact.n > MOST_CONTACT_NODES:
         needed = f"needed at most {MOST_CONTACT_NODES} contact nodes, these are {interface.contact.n}"
         raise TooManyContactNodes(problem.source, "contact", None, needed)
-    grids = (interface.contact, interface.neumann)
     body1, body2 = (
-        None
-        if mesh is None or held is None
-        else _body(problem, name, mesh, held, own, grid, interface.contact.x[[0, -1]])
-        for (name, _), mesh, held, own, grid in zip(
-            _specs(problem), meshes, known, nodes, grids if problem.contact_body == 1 else grids[::-1], strict=True
-        )
+        None if mesh is None or held is None else _body(problem, name, mesh, held, own, interface)
+        for (name, _), mesh, held, own in zip(_specs(problem), meshes, known, nodes, strict=True)
     )
     bodies = TwoBodies(
         body1=body1, body2=body2, interface=interface, friction=problem.contact.friction, problem=problem
     )
     if len(bodies.elastic) == 2 and _move_together(bodies):
-        needed = "body1 and body2 can move rigidly together, each held only by the other: fix or prescribe some sides"
-        raise problem.refuse("body2", None, needed)
+        which = "bodies that touch" if problem.contact.lines else "body1 and body2"
+        needed = f"{which} can move rigidly together, each held only by the other: fix or prescribe some sides"
+        raise problem.refuse("contact" if problem.contact.lines else "body2", None, needed)
     return bodies
 
 
@@ -280,20 +310,31 @@ def _specs(problem: Problem) -> list[tuple[Name, BodySpec]]:
     return [("body1", problem.body1), ("body2", problem.body2)]
 
 
-def _mesh(problem: Problem, name: Name) -> Mesh:
-    spec: BodySpec = getattr(problem, name)
+def _owners(spec: BodySpec, name: str) -> list[tuple[str, BodySpec, str]]:
+    """Return the bodies of a union, or the one body: each with its name in the file and the prefix of its sides."""
+    return [(f"body{i}", member, f"body{i}.") for i, member in spec.members] or [(name, spec, "")]
+
+
+def _mesh(problem: Problem, spec: BodySpec, name: str) -> Mesh:
+    if spec.members:
+        return together(problem, {i: _mesh(problem, member, f"body{i}") for i, member in spec.members})
     if spec.mesh is not None:
         path = spec.mesh.path
         refuse = lambda needed: problem.refuse(f"{name}.mesh", path, needed)
         if why := spec.mesh.unusable():
             raise refuse(why)
         try:
-            mesh = from_file(path)
+            mesh = from_file(path, one_material=not spec.materials)
         except MeshError as error:
             raise refuse(str(error).removeprefix(f"{path}: ")) from None
+        if spec.materials:
+            try:
+                mesh.split([*spec.materials])
+            except MeshError as error:
+                raise problem.refuse(f"{name}.young", [*spec.materials], str(error)) from None
         if len(mesh.cells) > 2 * MOST_CELLS:
             raise refuse(f"needed at most {2 * MOST_CELLS} triangles, these are {len(mesh.cells)}")
-        mesh = _with_parts(problem, name, mesh)
+        mesh = _with_parts(problem, spec, name, mesh)
         for key, sides in (("fixed", spec.fixed), ("prescribed", spec.prescribed), ("traction", spec.traction)):
             for side in sides:
                 if side not in mesh.sides:
@@ -308,15 +349,15 @@ def _mesh(problem: Problem, name: Name) -> Mesh:
             return interval(x, spec.cells[0])
         assert spec.y is not None
         mesh = rectangle(x, (float(spec.y[0]), float(spec.y[1])), (spec.cells[0], spec.cells[1]))
-        return _with_parts(problem, name, mesh)
+        return _with_parts(problem, spec, name, mesh)
     except MeshError as error:  # coordinates that no longer differ in doubles
         raise problem.refuse(f"{name}.cells", list(spec.cells), str(error)) from None
 
 
-def _with_parts(problem: Problem, name: Name, mesh: Mesh) -> Mesh:
+def _with_parts(problem: Problem, spec: BodySpec, name: str, mesh: Mesh) -> Mesh:
     """Add the parts of sides that the problem names: the edges of the side between the ends of the part."""
     parts = {}
-    for key, part in getattr(problem, name).parts.items():
+    for key, part in spec.parts.items():
         refuse = lambda needed, key=key: problem.refuse(f"{name}.parts.{key}", None, needed)
         if key in mesh.sides or part.side not in mesh.sides:
             raise refuse(
@@ -340,10 +381,15 @@ def _known_sides(spec: BodySpec, dimension: int) -> dict[str, list[float | None]
 
 def _supports(problem: Problem, name: Name, mesh: Mesh) -> Supports:
     """Return the displacements known on Gamma_u; ProblemError where two sides contradict each other."""
-    try:
-        return supports(mesh, _known_sides(getattr(problem, name), mesh.dimension))
-    except MeshError as error:
-        raise problem.refuse(f"{name}.prescribed", None, str(error)) from None
+    found = []
+    for own, spec, prefix in _owners(getattr(problem, name), name):
+        sides = {prefix + side: values for side, values in _known_sides(spec, mesh.dimension).items()}
+        try:
+            found.append(supports(mesh, sides))
+        except MeshError as error:
+            raise problem.refuse(f"{own}.prescribed", None, str(error)) from None
+    held, values = ([getattr(each, what) for each in found] for what in ("held", "values"))
+    return Supports(held=np.logical_or.reduce(held), values=np.sum(values, axis=0))
 
 
 def _check_free(problem: Problem, name: Name, mesh: Mesh, known: Supports, nodes: Ints, normals: Floats | None) -> None:
@@ -353,50 +399,70 @@ def _check_free(problem: Problem, name: Name, mesh: Mesh, known: Supports, nodes
     wrong = (known.held[nodes] & (normals != 0)).any(axis=1)
     if not wrong.any():
         return
-    spec, j = getattr(problem, name), int(np.argmax(wrong))
-    holds = next(
-        side
+    j = int(np.argmax(wrong))
+    own, spec, holds = next(
+        (own, spec, side)
+        for own, spec, prefix in _owners(getattr(problem, name), name)
         for side, values in _known_sides(spec, mesh.dimension).items()
-        if nodes[j] in mesh.sides[side] and any(v is not None and n for v, n in zip(values, normals[j], strict=True))
+        if nodes[j] in mesh.sides[prefix + side]
+        and any(v is not None and n for v, n in zip(values, normals[j], strict=True))
     )
     where = ", ".join(f"{c:g}" for c in mesh.points[nodes[j]].astype(float))
     key, value = ("fixed", list(spec.fixed)) if holds in spec.fixed else (f"prescribed.{holds}", None)
     needed = "Gamma_u must leave the normal component of every contact node free; it holds the one at "
-    raise problem.refuse(f"{name}.{key}", value, f"{needed}({where})")
+    raise problem.refuse(f"{own}.{key}", value, f"{needed}({where})")
 
 
-def _load(problem: Problem, name: Name, mesh: Mesh, nodes: Ints, x: Floats, ends: Floats) -> Floats:
+def _load(problem: Problem, name: Name, mesh: Mesh, nodes: Ints, interface: Interface) -> Floats:
     """Return the nodal forces of the body force and of tractions, shape (n, d); ProblemError for a force that is lost.
 
-    ``nodes`` at positions x are those of Gamma_c, which lies between the ``ends``: no traction acts there.
+    ``nodes`` are those of Gamma_c: no traction acts between the ends of its lines.
     """
-    spec: BodySpec = getattr(problem, name)
-    d = mesh.dimension
-    load = body_load(mesh, [float(v) for v in spec.body_force])
-    along = None
-    if problem.contact.surface is not None:
-        along = np.zeros(len(mesh.points))
-        along[nodes] = x
-    pieces = {frozenset(nodes[i : i + d].tolist()) for i in range(len(nodes) - d + 1)}  # of Gamma_c
-    for side, force in spec.traction.items():
-        covered = np.array([frozenset(facet) in pieces for facet in mesh.sides[side].tolist()])
-        loaded = facet_weights(mesh, mesh.sides[side])
-        loaded -= facet_weights(mesh, mesh.sides[side][covered], between=(ends[0], ends[1]), along=along)
-        if any(force) and loaded.max() <= SAME * extent(mesh):
-            needed = "Gamma_c covers this side: a force there is lost"
-            raise problem.refuse(f"{name}.traction.{side}", list(force), needed)
-        load += loaded[:, None] * [float(v) for v in force]
+    load, plain = np.zeros((len(mesh.points), mesh.dimension)), lambda values: [float(v) for v in values]
+    for own, spec, prefix in _owners(getattr(problem, name), name):
+        load += body_load(mesh, plain(spec.body_force), mesh.surfaces[own] if prefix else None)
+        for side, force in spec.traction.items():
+            facets = mesh.sides[prefix + side]
+            loaded = facet_weights(mesh, facets)
+            for line, x, ends in _lines_on(nodes, interface, own=int(name[-1]) == problem.contact_body):
+                loaded -= _covered(mesh, facets, line, x if problem.contact.named else None, ends)
+            if any(force) and loaded.max() <= SAME * extent(mesh):
+                needed = "Gamma_c covers this side: a force there is lost"
+                raise problem.refuse(f"{own}.traction.{side}", list(force), needed)
+            load += loaded[:, None] * plain(force)
     return load
 
 
-def _body(problem: Problem, name: Name, mesh: Mesh, known: Supports, nodes: Ints, grid: Grid, ends: Floats) -> Body:
+def _lines_on(nodes: Ints, interface: Interface, *, own: bool) -> Iterator[tuple[Ints, Floats, Floats]]:
+    """Yield the contact nodes of a body on each line, their positions, and the ends of the line.
+
+    ``own`` is True for the body that carries the contact grid.
+    """
+    for contact, neumann, ends in interface.stretches:
+        line, grid = (contact, interface.contact) if own else (neumann, interface.neumann)
+        yield nodes[line], grid.x[line], ends
+
+
+def _covered(mesh: Mesh, facets: Ints, nodes: Ints, x: Floats | None, ends: Floats) -> Floats:
+    """Return the weights of those facets that lie on a line of Gamma_c, between its ends."""
+    d, along = mesh.dimension, None
+    if x is not None:
+        along = np.zeros(len(mesh.points))
+        along[nodes] = x
+    pieces = {frozenset(nodes[i : i + d].tolist()) for i in range(len(nodes) - d + 1)}
+    covered = np.array([frozenset(facet) in pieces for facet in facets.tolist()])
+    return facet_weights(mesh, facets[covered], between=(ends[0], ends[1]), along=along)
+
+
+def _body(problem: Problem, name: Name, mesh: Mesh, known: Supports, nodes: Ints, interface: Interface) -> Body:
     spec: BodySpec = getattr(problem, name)
+    grid = interface.contact if int(name[-1]) == problem.contact_body else interface.neumann
     d = mesh.dimension
     _check_free(problem, name, mesh, known, nodes, grid.normals)
     motions = rigid_motions(mesh, known.held)
-    material = material_of(spec)
+    material = material_of(spec, mesh=mesh)
     matrix = stiffness(mesh, material)
-    load = _load(problem, name, mesh, nodes, grid.x, ends)
+    load = _load(problem, name, mesh, nodes, interface)
     free = np.flatnonzero(~known.held.ravel())
     rigid = motions.reshape(known.held.size, motions.shape[2])[free]
     right = load.ravel()[free] - (matrix @ known.values.ravel())[free]
@@ -407,8 +473,8 @@ def _body(problem: Problem, name: Name, mesh: Mesh, known: Supports, nodes: Ints
     if grid.normals is not None:
         turned = turning(grid.normals, places, len(free))
         places = np.where((places >= 0).all(axis=0), places, np.sort(places, axis=0))  # a single free one is normal
-    interface = places.ravel()
-    unknown = interface >= 0
+    positions = places.ravel()
+    unknown = positions >= 0
     return Body(
         name=name,
         mesh=mesh,
@@ -418,7 +484,7 @@ def _body(problem: Problem, name: Name, mesh: Mesh, known: Supports, nodes: Ints
         nodes=nodes,
         positions=free,
         unknown=unknown,
-        interface=interface[unknown],
+        interface=positions[unknown],
         stiffness=in_frames(matrix[free][:, free].tocsc(), turned),
         load=right if turned is None else turned @ right,
         motions=rigid if turned is None else turned @ rigid,

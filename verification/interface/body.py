@@ -44,12 +44,20 @@ Name = Literal["body1", "body2"]
 NO_MOTIONS: Floats = freeze(np.zeros((0, 0)))
 
 
-def material_of(spec: BodySpec, number: Callable[[Fraction], Any] = float) -> Material:
-    """Return the material of a body of a problem, its moduli as some type of number."""
+def material_of(spec: BodySpec, number: Callable[[Fraction], Any] = float, mesh: Mesh | None = None) -> Material:
+    """Return the material of a body of a problem, its moduli as some type of number.
+
+    A body of several materials needs its mesh.  MeshError unless each cell lies in one of their surfaces.
+    """
     if spec.shape == "interval":
         return bar(number(spec.young))
     law = plane_stress if spec.plane == "stress" else plane_strain
-    return law(number(spec.young), number(spec.poisson))
+    if not spec.materials:
+        return law(number(spec.young), number(spec.poisson))
+    if mesh is None:
+        raise ValueError("a body of several materials: needed its mesh")
+    materials = [law(number(E), number(nu)) for E, nu in spec.materials.values()]
+    return Material.of_cells(materials, mesh.split(list(spec.materials)))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -229,8 +237,7 @@ class Body(Value):
         )
         if not all(map(np.array_equal, plan(self), plan(other))):
             return None
-        dimension = self.mesh.dimension
-        return float(self.material.continuity(dimension) / other.material.continuity(dimension))
+        return self.material.over(other.material)
 
     def equals(self, other: Body) -> bool:
         """Return True if it is the same body, loads and norm included."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -123,6 +123,8 @@ def _check(bodies: TwoBodies, moved: Displacements) -> Checks:
         where = f"by {depth:.3g} {bodies.problem.units['length']} at {_show(at)}"
         low, high = grid.place(0), grid.place(-1).removeprefix("x = ")
         short = f"Gamma_c, from {low} to {high}, is too short, and the forces are wrong"
+        if bodies.interface.lines:
+            short = "a line of contact is too short or is missing, and the forces are wrong"
         crossed = (f"outside Gamma_c the bodies lie in each other, {where}: {short}",)
     return Checks(
         penetration_outside=depth,
@@ -169,15 +171,16 @@ class _Surface(Value):
     end: Floats
 
     @classmethod
-    def of(cls, mesh: Mesh, u: Floats, contact: Ints, ends: Floats, along: Floats | None = None) -> _Surface:
-        """Return the surface of a mesh with these contact nodes, some of which may lie beyond the ends of Gamma_c.
+    def of(cls, mesh: Mesh, u: Floats, lines: Iterable[tuple[Ints, Floats | None, Floats]]) -> _Surface:
+        """Return the surface of a mesh with the contact nodes of each line, some of which may lie beyond its ends.
 
-        ``along`` are their positions on Gamma_c, x by default.
+        The second entry of a line has the positions of its nodes, x by default.
         """
         points, slack = mesh.points.astype(float), SAME * extent(mesh)
-        x = points[contact, 0] if along is None else along
-        on_contact = contact[(x >= ends[0] - slack) & (x <= ends[1] + slack)]
-        outside = np.setdiff1d(mesh.boundary, on_contact)
+        outside = np.unique(mesh.boundary)
+        for nodes, positions, ends in lines:
+            x = points[nodes, 0] if positions is None else positions
+            outside = np.setdiff1d(outside, nodes[(x >= ends[0] - slack) & (x <= ends[1] + slack)])
         now = points + u
         start, end = now[mesh.boundary[:, 0]], now[mesh.boundary[:, 1]]
         return cls(drawn=points[outside], moved=now[outside], start=start, end=end)
@@ -187,14 +190,15 @@ def _penetration(bodies: TwoBodies, moved: Displacements) -> tuple[float, Place 
     """Return the greatest depth of a surface node outside Gamma_c inside the other body, and where it is drawn."""
     problem, grid = bodies.problem, bodies.interface.contact
     ends, mean = grid.x[[0, -1]], grid.upright.mean(axis=0)
-    lift = float(problem.contact.gap) * mean / np.linalg.norm(mean)  # of body 2
-    named = problem.contact.surface is not None
-    grids = (grid, bodies.interface.neumann) if problem.contact_body == 1 else (bodies.interface.neumann, grid)
+    gap, named = float(problem.contact.gap), problem.contact.named
+    lift = gap * mean / np.linalg.norm(mean) if gap else np.zeros(2)  # of body 2
     one, two = (
         None
         if body is None or u is None
-        else _Surface.of(body.mesh, u + i * lift, body.nodes, ends, along.x if named else None)
-        for i, (body, u, along) in enumerate(zip((bodies.body1, bodies.body2), moved, grids, strict=True))
+        else _Surface.of(
+            body.mesh, u + i * lift, ((nodes, x if named else None, its) for nodes, x, its in bodies.lines_on(body))
+        )
+        for i, (body, u) in enumerate(zip((bodies.body1, bodies.body2), moved, strict=True))
     )
     if one is None:
         assert bodies.body2 is not None
@@ -225,4 +229,4 @@ def _obstacle(spec: BodySpec, body: Body, opposite: _Surface, ends: Floats, lift
         face = float(obstacle_level(spec, body.mesh.points[body.nodes].astype(float), upper=upper))
         y = (min(float(low[1]), face) - size, face) if upper else (face, max(float(high[1]), face) + size)
     mesh = rectangle(x, y, (1, 1))
-    return _Surface.of(mesh, np.broadcast_to(lift, mesh.points.shape), surface(mesh, upper=upper), ends)
+    return _Surface.of(mesh, np.broadcast_to(lift, mesh.points.shape), [(surface(mesh, upper=upper), None, ends)])

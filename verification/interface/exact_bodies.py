@@ -57,11 +57,14 @@ class ExactBody:
         NotExact
             An element that computes in doubles, or entries that are not of ordinary size.
         """
+        if problem.contact.lines:
+            raise NotExact("there are more than two bodies")
         spec: BodySpec = getattr(problem, body.name)
         points, mesh = exact_points(spec, body), body.mesh
         try:
-            shapes = Shapes.of(points, mesh.cells)
-            stiffness = exact.stiffness(mesh, material_of(spec, Fraction), shapes)
+            material = material_of(spec, Fraction, mesh)
+            shapes = Shapes.of(points, mesh.cells, material.kinds)
+            stiffness = exact.stiffness(mesh, material, shapes)
             gram = exact.gram(mesh, problem.length, shapes)
         except (TypeError, ValueError) as error:
             raise NotExact(f"{body.name}: {error}") from None

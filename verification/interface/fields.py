@@ -9,7 +9,7 @@ import numpy as np
 
 from fem1d2d.mesh import Floats
 from verification.contact.active_set import Pattern
-from verification.interface.interface import Interface
+from verification.interface.interface import Interface, Stretch
 from verification.value import Value
 
 
@@ -43,6 +43,8 @@ class ContactFields(Value):
         The part of it that the load increment brought: all of it unless the interface has slipped before.
     status : tuple of {'stick', 'slip', 'open'}
         A node that touches and whose friction bound is zero slips.
+    lines : tuple of Stretch
+        The lines of more than two bodies, one after the other; empty for two bodies.  Of each, ``s`` begins at 0.
     """
 
     x: Floats
@@ -57,6 +59,7 @@ class ContactFields(Value):
     status: tuple[str, ...]
     y: Floats | None = None
     normal: Floats | None = None
+    lines: tuple[Stretch, ...] = ()
 
     @property
     def summary(self) -> str:
@@ -83,7 +86,7 @@ class ContactFields(Value):
         names = np.where(state.touching, np.where(slides, "slip", "stick"), "open")
         return cls(
             x=grid.x if grid.points is None else grid.points[:, 0],
-            s=grid.s,
+            s=np.concatenate([grid.x[line] - ends[0] for line, _, ends in interface.stretches]),
             y=None if grid.points is None else grid.points[:, 1],
             normal=grid.upright if plane else None,
             weights=grid.weights,
@@ -94,14 +97,47 @@ class ContactFields(Value):
             slip=slip + interface.offset[grid.tangential] if plane else zero,
             slip_increment=slip.copy(),
             status=tuple(str(name) for name in names),
+            lines=interface.lines,
         )
+
+    def in_order(self) -> ContactFields:
+        """Return the same fields with each of several lines as the file has it: the first of its bodies is body 1."""
+        order, turned = np.arange(len(self.x)), np.zeros(len(self.x), dtype=bool)
+        for line in self.lines:
+            if line.flipped:
+                order[line.contact], turned[line.contact] = order[line.contact][::-1], True
+        if not turned.any():
+            return self
+        arrays = {name: value[order] for name, value in vars(self).items() if isinstance(value, np.ndarray)}
+        for line in self.lines:  # s from the other end
+            if line.flipped:
+                arrays["s"][line.contact] = self.s[line.contact][-1] - arrays["s"][line.contact]
+        arrays["normal"] = np.where(turned[:, None], -arrays["normal"], arrays["normal"]) + 0.0
+        lines = tuple(replace(line, flipped=False) for line in self.lines)
+        return replace(self, **arrays, status=tuple(self.status[i] for i in order), lines=lines)
+
+    def unrolled(self) -> ContactFields:
+        """Return the fields with s in place of x; several lines follow each other, with NaN between them."""
+        if not self.lines:
+            return replace(self, x=self.s)
+        own, shift = self.in_order(), 0.0
+        order, x = [], []
+        for line in own.lines:
+            s = own.s[line.contact]
+            x.append(np.append(s + shift, np.nan))
+            order.append(np.append(np.arange(len(own.x))[line.contact], line.contact.stop - 1))
+            shift += 1.05 * float(s[-1])  # a gap that is seen
+        nodes, positions = np.concatenate(order), np.concatenate(x)
+        arrays = {name: value[nodes] for name, value in vars(own).items() if isinstance(value, np.ndarray)}
+        status = tuple(own.status[i] for i in nodes)
+        return replace(own, **{**arrays, "x": positions}, status=status, lines=())
 
     def between(self, low: float, high: float) -> ContactFields:
         """Return the part of Gamma_c from one position to another."""
         kept = np.flatnonzero((self.x >= low) & (self.x <= high))
         status = tuple(self.status[i] for i in kept)
         arrays = {name: value[kept] for name, value in vars(self).items() if isinstance(value, np.ndarray)}
-        return replace(self, **arrays, status=status)
+        return replace(self, **arrays, status=status, lines=())
 
     @property
     def pattern(self) -> dict[str, int]:
@@ -114,6 +150,17 @@ class ContactFields(Value):
         return {"normal": float(self.pressure @ self.weights), "tangential": float(self.shear @ self.weights)}
 
     @property
+    def forces(self) -> list[dict[str, Any]]:
+        """Total force of each of several lines, with its bodies: ``vector`` acts on the second of them."""
+        found = []
+        for line in self.lines:
+            w, sign = self.weights[line.contact], -1.0 if line.flipped else 1.0
+            normal, tangential = (float(w @ stress[line.contact]) for stress in (self.pressure, self.shear))
+            vector = (sign * (w @ self.tractions[line.contact])).tolist()
+            found.append({"bodies": list(line.bodies), "normal": normal, "tangential": tangential, "vector": vector})
+        return found
+
+    @property
     def tractions(self) -> Floats:
         """Stresses on body 2 along the axes, shape (n, d): pressure along the normals, shear along the tangents."""
         if self.normal is None:
@@ -124,17 +171,26 @@ class ContactFields(Value):
     def table(self) -> dict[str, list[Any]]:
         """Return Gamma_c as plain columns, one row a contact node: ``pandas.DataFrame(contact.table())`` reads it."""
         names = ("x", *(() if self.y is None else ("y",)), "s", "weights", "pressure", "shear", "bound", "gap", "slip")
-        return {name: getattr(self, name).tolist() for name in names} | {"status": list(self.status)}
+        own = self.in_order()
+        lists = {name: getattr(own, name).tolist() for name in names} | {"status": list(own.status)}
+        return lists | ({"interface": self._interface()} if self.lines else {})
+
+    def _interface(self) -> list[int]:
+        """Return the number of the line of each node, from 0."""
+        return [i for i, line in enumerate(self.lines) for _ in range(line.contact.start, line.contact.stop)]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the objects ``force``, ``pattern`` and ``contact`` that runs and solutions share."""
         names = ("x", "y", "s", "normal", "pressure", "shear", "bound", "gap", "slip")
-        arrays = {name: getattr(self, name) for name in names}
+        own = self.in_order()
+        arrays = {name: getattr(own, name) for name in names}
         why = "bars meet at a point" if self.normal is None else "the pair is made from matrices, without meshes"
         missing = {name: why for name, values in arrays.items() if values is None}
         lists = {name: None if values is None else values.tolist() for name, values in arrays.items()}
+        each = {"interface": self._interface()} if self.lines else {}
         return {
-            "force": {**self.force, "vector": (self.weights @ self.tractions).tolist()},
+            "force": {**self.force, "vector": (own.weights @ own.tractions).tolist()},
+            **({"forces": self.forces} if self.lines else {}),
             "pattern": self.pattern,
-            "contact": {**lists, "state": list(self.status), **({"reason": missing} if missing else {})},
+            "contact": {**lists, "state": list(own.status), **each, **({"reason": missing} if missing else {})},
         }

@@ -162,6 +162,26 @@ class Law(ABC):
         return []
 
 
+@dataclass(frozen=True, kw_only=True)
+class Stretch:
+    """The line between two of several bodies.
+
+    Attributes
+    ----------
+    bodies : pair of int
+        Their numbers, in the order of the file.
+    contact, neumann : slice
+        Its nodes on both grids.
+    flipped : bool
+        Whether the normals of the grids lead from the second of ``bodies`` to the first.
+    """
+
+    bodies: tuple[int, int]
+    contact: slice
+    neumann: slice
+    flipped: bool
+
+
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Interface(Value):
     """Two grids along Gamma_c and what passes between them.
@@ -184,6 +204,8 @@ class Interface(Value):
         another's.  None where P acts on each component by itself.
     slipped : array, shape (t of the contact grid,), or None
         ``u1_T - u2_T`` before the load increment, from which friction measures slip, unit of length; None for 0.
+    lines : tuple of Stretch
+        The lines of more than two bodies, one after the other; empty for two bodies, which have one line.
     """
 
     contact: Grid
@@ -194,6 +216,7 @@ class Interface(Value):
     profile: Profile | None = None
     slipped: Floats | None = None
     on_traces: Floats | None = None
+    lines: tuple[Stretch, ...] = ()
 
     @classmethod
     def joining(cls, contact: Grid, neumann: Grid, transfer: Floats | None, **rest: Any) -> Interface:
@@ -206,6 +229,17 @@ class Interface(Value):
         if self.on_traces is None:
             return self
         return replace(self, on_traces=self.contact.turn(self.neumann.turn(self.on_traces.T).T))
+
+    @property
+    def varies(self) -> bool:
+        """True if the coefficient of friction may differ from place to place: k is then the largest one."""
+        return self.profile is not None or bool(self.lines)
+
+    @property
+    def stretches(self) -> list[tuple[slice, slice, Floats]]:
+        """The nodes of each line on the contact grid and on the Neumann grid, and its ends as positions."""
+        every = [(line.contact, line.neumann) for line in self.lines] or [(slice(None), slice(None))]
+        return [(own, other, self.contact.x[own][[0, -1]]) for own, other in every]
 
     @property
     def moduli(self) -> Interface:

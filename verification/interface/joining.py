@@ -64,7 +64,7 @@ def join(
     contact, neumann = grids if problem.contact_body == 1 else grids[::-1]
     law = law or LAWS[problem.contact.law].of(problem.contact.radius)
     interface = Interface.joining(contact, neumann, P, gap=gap, law=law, profile=problem.contact.profile)
-    _check_profile(problem, interface)
+    check_profile(problem, interface)
     if P is not None and interface.contact_kernel is not None and not interface.contact_kernel.any():
         needed = "needed a larger one: it reaches no node of the Neumann grid from any contact node, so that S is 0"
         raise problem.refuse("contact.radius", problem.contact.radius, needed)
@@ -189,7 +189,7 @@ def _along_lines(problem: Problem, meshes: list[Mesh | None], known: list[Suppor
     return nodes if contact == 0 else nodes[::-1], grids if contact == 0 else grids[::-1], P, gap
 
 
-def _check_profile(problem: Problem, interface: Interface) -> None:
+def check_profile(problem: Problem, interface: Interface) -> None:
     """Refuse a table of the coefficient of friction that ends before Gamma_c does."""
     profile, length = interface.profile, float(interface.contact.s[-1])
     if profile is not None and float(profile.s[-1]) < length * (1 - SAME):

@@ -68,7 +68,7 @@ class ContactPair(Value):
 
     @property
     def summary(self) -> str:
-        k = f"k = {float(self.friction):g}" + " at most" * (self.interface.profile is not None)
+        k = f"k = {float(self.friction):g}" + " at most" * self.interface.varies
         return f"{self.title}, {self.contact.grid.n} contact nodes, {k}, Neumann body {self.neumann_body}"
 
     @property
@@ -118,8 +118,8 @@ class ContactPair(Value):
         origin = self.problem
         if origin is not None and k > MOST_FRICTION:  # a file may not hold every friction
             origin = None
-        elif origin is not None and self.interface.profile is not None:
-            origin = replace(origin, contact=replace(origin.contact, friction=k))
+        elif origin is not None and self.interface.varies:
+            origin = replace(origin, contact=origin.contact.rubbing(k))
         elif origin is not None:
             origin = origin.changed(friction=k)
         return replace(self, friction=k, problem=origin)
@@ -137,6 +137,8 @@ class ContactPair(Value):
         ValueError
             Unless all k >= 0 and one for each contact node, or if friction has no law.
         """
+        if self.interface.lines:
+            raise ValueError("friction: needed a number, or a table in each [[contact]] of the file")
         s = [Fraction(at) for at in self.contact.grid.s.tolist()]
         values = [friction(float(at)) for at in s] if callable(friction) else np.asarray(friction).tolist()
         if not isinstance(values, list) or len(values) != len(s) or len(s) < 2:
@@ -207,8 +209,10 @@ class ContactPair(Value):
             The grids differ, and the pair is made from matrices.
         """
         if self.contact.loose:
+            if self.problem is not None:
+                raise SingularRole.of(self.problem, self.contact.mesh_body, self.neumann.mesh_body)
             raise SingularRole(self.source, self.contact_body, self.contact.motions.shape[1])
-        named = self.problem is not None and self.problem.contact.surface is not None
+        named = self.problem is not None and self.problem.contact.named
         if (self.interface.transfer is not None or named) and self.problem is not None:
             return pair_from(self.problem.swapped(), law=self.interface.law, like=self)
         if self.problem is not None and self.contact.grid.dimension == 2:
@@ -240,6 +244,10 @@ class ContactPair(Value):
             friction=self.friction,
             problem=self.problem,
         )
+
+    def words(self, body: int) -> str:
+        """Return what body 1 or body 2 stands for in the file: ``body 2``, or ``bodies 2, 4``."""
+        return f"body {body}" if self.problem is None else self.problem.words(body)
 
     @property
     def title(self) -> str:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Literal, Protocol
 
 from ndtheory import HypothesisError
+from verification.problem.colours import OddRing, Touching, neumann_bodies
 from verification.problem.specs import (
     INTERVAL_SIDES,
     MOST_CELLS,
@@ -101,19 +102,10 @@ def read_problem(data: Mapping[str, Any], source: str) -> ProblemSpec:
     if dimension == 1 and "plane" in top:
         raise top.refuse("plane", None, "a bar has none; leave it out in one dimension")
     plane = top.take("plane", _plane, "strain")
-    body1 = _read_body(top.table("body1", required=True), dimension, plane, source)
-    body2 = _read_body(top.table("body2", required=True), dimension, plane, source)
-    if body1.rigid and body2.rigid:
-        raise top.refuse("body2.shape", "rigid", "needed at least one elastic body")
-    if not (body1.rigid or body2.rigid or 1 / MOST_CONTRAST <= body1.young / body2.young <= MOST_CONTRAST):
-        needed = f"needed a modulus within {float(MOST_CONTRAST):g} times that of body1, {float(body1.young):g}"
-        raise top.refuse("body2.young", body2.young, f'{needed}; for `solve`, shape = "rigid" makes an obstacle')
-    contact = _read_contact(top.table("contact"), dimension)
-    for name, body in (("body1", body1), ("body2", body2)):
-        if body.rigid and contact.surface:
-            needed = "needed an elastic body: an obstacle has no named sides (contact.interval takes one)"
-            raise top.refuse(f"{name}.shape", "rigid", needed)
-    iteration = _read_iteration(top.table("iteration"))
+    read = _read_several if isinstance(data.get("contact"), (list, tuple)) else _read_two
+    body1, body2, contact, iteration = read(top, dimension, plane, source)
+    if contact.lines and "step" in top:
+        raise top.refuse("step", None, "needed two bodies: histories of more bodies are not supported yet")
     steps = _read_steps(top, {"body1": body1, "body2": body2}, dimension)
     norm = top.table("norm")
     length = norm.take("length", positive, Fraction(1))
@@ -131,6 +123,130 @@ def read_problem(data: Mapping[str, Any], source: str) -> ProblemSpec:
         steps=steps,
         source=source,
     )
+
+
+#: Two bodies as the iteration takes them, their contact, and the iteration.
+Pair = tuple[BodySpec, BodySpec, ContactSpec, IterationSpec]
+
+
+def _read_two(top: TomlTable, dimension: Literal[1, 2], plane: Literal["strain", "stress"], source: str) -> Pair:
+    """Read two bodies and the table ``[contact]``."""
+    if "body3" in top:
+        needed = (
+            "needed tables [[contact]], each with bodies = [1, 2] and surface, where there are more than two bodies"
+        )
+        raise top.refuse("contact", None, needed)
+    body1 = _read_body(top.table("body1", required=True), dimension, plane, source)
+    body2 = _read_body(top.table("body2", required=True), dimension, plane, source)
+    if body1.rigid and body2.rigid:
+        raise top.refuse("body2.shape", "rigid", "needed at least one elastic body")
+    if not (body1.rigid or body2.rigid or _within_contrast(body1, body2)):
+        needed = f"needed a modulus within {float(MOST_CONTRAST):g} times that of body1, {float(body1.young):g}"
+        raise top.refuse("body2.young", body2.young, f'{needed}; for `solve`, shape = "rigid" makes an obstacle')
+    contact = _read_contact(top.table("contact"), dimension)
+    for name, body in (("body1", body1), ("body2", body2)):
+        if body.rigid and contact.surface:
+            needed = "needed an elastic body: an obstacle has no named sides (contact.interval takes one)"
+            raise top.refuse(f"{name}.shape", "rigid", needed)
+    iteration = top.table("iteration")
+    return body1, body2, contact, _read_iteration(iteration, iteration.take("neumann_body", choice(1, 2), 2))
+
+
+def _read_several(top: TomlTable, dimension: Literal[1, 2], plane: Literal["strain", "stress"], source: str) -> Pair:
+    """Read any number of bodies and the tables ``[[contact]]``, as two bodies: those of one role are one.
+
+    Body 1 of the result has body 1 of the file among its members.
+    """
+    if dimension == 1:
+        raise top.refuse("contact", None, "needed one table [contact]: in one dimension there are two bodies")
+    numbers = sorted({1, 2} | {int(name[4:]) for name in top.names() if re.fullmatch("body[1-9][0-9]*", str(name))})
+    bodies = {i: _read_body(top.table(f"body{i}", required=True), dimension, plane, source) for i in numbers}
+    for i, body in bodies.items():
+        if body.rigid:
+            raise top.refuse(f"body{i}.shape", "rigid", "needed an elastic body: an obstacle has no named sides")
+        if not _within_contrast(*(bodies[j] for j in numbers if j <= i)):
+            needed = f"needed a modulus within {float(MOST_CONTRAST):g} times those before it"
+            raise top.refuse(f"body{i}.young", body.young, needed)
+    tables = top.take("contact", _tables_of(top, "contact"))
+    if not tables:
+        raise top.refuse("contact", [], "needed a table, or several, each as [[contact]]")
+    lines = [_read_line(table, bodies) for table in tables]
+    laws = [contact.law for _, contact in lines if contact.friction] or [lines[0][1].law]
+    law = min(laws, key=lambda name: registered_laws()[name].needs_radius)  # the theorem is about one with a radius
+    touching = [pair for pair, _ in lines]
+    if untouched := bodies.keys() - {i for pair in touching for i in pair}:
+        raise top.refuse(f"body{min(untouched)}", None, "needed a table [[contact]] with another body")
+    iteration = top.table("iteration")
+    if "neumann_body" in iteration:
+        raise iteration.refuse(
+            "neumann_body", None, "needed neumann_bodies, a list of numbers, with tables [[contact]]"
+        )
+    held = {i for i, body in bodies.items() if body.fixed or any(None not in v for v in body.prescribed.values())}
+    try:
+        default = neumann_bodies(touching, held, {i for i, body in bodies.items() if body.fixed or body.prescribed})
+    except OddRing as error:
+        needed = (
+            f"{error}: two neighbours would have one role, and taken one after another around the ring they need not"
+            " converge; needed bodies of two colours, of which only different ones touch"
+        )
+        raise top.refuse("contact.bodies", None, needed) from None
+    chosen = iteration.take("neumann_bodies", _roles_of(touching, bodies), default)
+    neumann_body: Literal[1, 2] = 1 if 1 in chosen else 2
+    first, second = (
+        BodySpec.union((i, body) for i, body in bodies.items() if (i in chosen) == neumann)
+        for neumann in (neumann_body == 1, neumann_body == 2)
+    )
+    return first, second, ContactSpec.of_lines(lines, law), _read_iteration(iteration, neumann_body)
+
+
+def _tables_of(top: TomlTable, name: str) -> Callable[[Any], list[TomlTable]]:
+    """Return a reader of an array of tables."""
+
+    def read(value: Any) -> list[TomlTable]:
+        if not isinstance(value, (list, tuple)) or not all(isinstance(each, Mapping) for each in value):
+            raise Unfit(f"needed tables, each as [[{name}]]")
+        return [top.within(f"{name}[{i}]", each) for i, each in enumerate(value, 1)]
+
+    return read
+
+
+def _read_line(table: TomlTable, bodies: Mapping[int, BodySpec]) -> tuple[tuple[int, int], ContactSpec]:
+    """Read a table ``[[contact]]``: the numbers of its bodies, and the rest of it."""
+
+    def two(value: Any) -> tuple[int, int]:
+        needed = f"two different numbers of bodies, of {', '.join(map(str, bodies))}"
+        one, other = several(choice(*bodies), 2, needed)(value)
+        if one == other:
+            raise Unfit(f"needed {needed}")
+        return one, other
+
+    pair = table.take("bodies", two)
+    contact = _read_contact(table, 2)
+    if contact.surface is None:
+        raise table.refuse("surface", None, "needed two names of sides, of each of its bodies one")
+    if contact.gap:
+        raise table.refuse("gap", contact.gap, "needed 0 where there are more than two bodies: draw them apart")
+    if contact.law not in ("nonlocal", "local"):
+        raise table.refuse("law", contact.law, 'needed "nonlocal" or "local" where there are more than two bodies')
+    return pair, contact
+
+
+def _roles_of(touching: Touching, bodies: Mapping[int, BodySpec]) -> Callable[[Any], set[int]]:
+    """Return a reader of the bodies with the Neumann problem: of each contact exactly one."""
+
+    def read(value: Any) -> set[int]:
+        if not isinstance(value, (list, tuple)) or len(set(map(str, value))) < len(value):
+            raise Unfit("needed a list of different numbers of bodies, as [1, 3]")
+        chosen = {choice(*bodies)(i) for i in value}
+        for one, other in touching:
+            if (one in chosen) == (other in chosen):
+                raise Unfit(
+                    f"needed one of the two bodies of each contact, not {'both' if one in chosen else 'none'}"
+                    f" of {one} and {other}"
+                )
+        return chosen
+
+    return read
 
 
 def _read_shape(table: TomlTable, dimension: int, source: str) -> dict[str, Any]:
@@ -256,6 +372,43 @@ def _poisson(plane: str) -> Callable[[Any], Fraction]:
     return number("a number with -0.5 < nu <= 0.5 in plane stress", lambda v: -Fraction(1, 2) < v <= Fraction(1, 2))
 
 
+def _read_moduli(table: TomlTable, readers: Mapping[str, Any], dimension: int, *, meshed: bool) -> dict[str, Any]:
+    """Read ``young`` and ``poisson``: numbers, or tables of them by named surfaces of a mesh file."""
+
+    def by_surface(name: str) -> Callable[[Any], Any]:
+        def read(value: Any) -> Any:
+            if not isinstance(value, Mapping) or not value:
+                return readers[name](value)
+            if not meshed:
+                raise Unfit("needed a number: only a mesh file has named surfaces")
+            inside = table.within(name, value)
+            return {surface: inside.take(surface, readers[name]) for surface in _names(inside)}
+
+        return read
+
+    young = table.take("young", by_surface("young"))
+    if dimension == 1:
+        if "poisson" in table:
+            raise table.refuse("poisson", None, "a bar has no Poisson ratio; leave it out in one dimension")
+        return {"young": young}
+    poisson = table.take("poisson", by_surface("poisson"))
+    surfaces = {surface: None for value in (young, poisson) if isinstance(value, dict) for surface in value}
+    E, nu = (value if isinstance(value, dict) else dict.fromkeys(surfaces, value) for value in (young, poisson))
+    if not E.keys() == nu.keys():
+        raise table.refuse("poisson", poisson, f"needed the same surfaces as young has, {', '.join(E)}")
+    if surfaces and max(E.values()) > MOST_CONTRAST * min(E.values()):
+        raise table.refuse("young", young, f"needed moduli within {float(MOST_CONTRAST):g} times each other")
+    materials = {surface: (E[surface], nu[surface]) for surface in surfaces}
+    largest = [max(pair) for pair in zip(*materials.values(), strict=True)] or [young, poisson]
+    return {"young": largest[0], "poisson": largest[1], "materials": materials}
+
+
+def _within_contrast(*bodies: BodySpec) -> bool:
+    """Return True if no modulus of some bodies is too large against another one."""
+    youngs = [E for body in bodies for E in body.youngs]
+    return max(youngs) <= MOST_CONTRAST * min(youngs)
+
+
 def _read_body(table: TomlTable, dimension: int, plane: Literal["strain", "stress"], source: str) -> BodySpec:
     shape = _read_shape(table, dimension, source)
     if shape["shape"] == "rigid":
@@ -277,13 +430,7 @@ def _read_body(table: TomlTable, dimension: int, plane: Literal["strain", "stres
             raise Unfit("needed each side once")
         return tuple(value)
 
-    young = table.take("young", positive)
-    if dimension == 2:
-        poisson = table.take("poisson", _poisson(plane))
-    else:
-        if "poisson" in table:
-            raise table.refuse("poisson", None, "a bar has no Poisson ratio; leave it out in one dimension")
-        poisson = Fraction(0)
+    moduli = _read_moduli(table, {"young": positive, "poisson": _poisson(plane)}, dimension, meshed=sides is None)
     fixed = table.take("fixed", side_list, ())
     prescribed = _by_side(table.table("prescribed"), sides, _components(dimension, free=True))
     for name in fixed:
@@ -295,8 +442,7 @@ def _read_body(table: TomlTable, dimension: int, plane: Literal["strain", "stres
     table.close()
     return BodySpec(
         **shape,
-        young=young,
-        poisson=poisson,
+        **moduli,
         parts=parts,
         fixed=fixed,
         prescribed=prescribed,
@@ -372,14 +518,9 @@ def _read_steps(top: TomlTable, bodies: Mapping[str, BodySpec], dimension: int) 
     A side that the first step prescribes need not be prescribed by the body.
     """
 
-    def read(value: Any) -> list[TomlTable]:
-        if not isinstance(value, (list, tuple)) or not all(isinstance(each, Mapping) for each in value):
-            raise Unfit("needed tables, each as [[step]]")
-        return [top.within(f"step[{i}]", each) for i, each in enumerate(value, 1)]
-
     held = {name: dict(body.prescribed) for name, body in bodies.items()}
     steps: list[StepSpec] = []
-    for i, table in enumerate(top.take("step", read, []), 1):
+    for i, table in enumerate(top.take("step", _tables_of(top, "step"), []), 1):
         name, count = table.take("name", label, f"step {i}"), table.take("increments", at_least_one, 1)
         if count + sum(step.increments for step in steps) > MOST_INCREMENTS:
             raise table.refuse("increments", count, f"needed at most {MOST_INCREMENTS} increments of all steps")
@@ -439,10 +580,10 @@ tolerance = number("a number with 0 < tolerance < 1", lambda v: 0 < v < 1)
 at_least_one = integer("a whole number >= 1", 1)
 
 
-def _read_iteration(table: TomlTable) -> IterationSpec:
+def _read_iteration(table: TomlTable, neumann_body: Literal[1, 2]) -> IterationSpec:
     relaxation: str = table.take("relaxation", choice(*registered_rules()), "constant")
     spec = IterationSpec(
-        neumann_body=table.take("neumann_body", choice(1, 2), 2),
+        neumann_body=neumann_body,
         theta=table.take("theta", factor, Fraction(1, 2) if takes_theta(relaxation) else "auto"),
         relaxation=relaxation,
         tolerance=float(table.take("tolerance", tolerance, Fraction(1, 10**9))),

@@ -71,7 +71,7 @@ class Problem(ProblemSpec):
     """
 
     def __repr__(self) -> str:
-        bodies = " / ".join("rigid" if body.rigid else f"E {float(body.young):g}" for body in (self.body1, self.body2))
+        bodies = " / ".join("rigid" if body.rigid else f"E {float(body.young):g}" for body in self.bodies.values())
         return f"<Problem: {self.title}, {self.dimension}D, {bodies}, k = {self.contact.friction_words}>"
 
     @classmethod
@@ -125,7 +125,7 @@ class Problem(ProblemSpec):
         data = _without_defaults(self, tables(self))
         for name in NEVER:
             data.pop(name, None)
-        for name in ("body1", "body2"):
+        for name in (f"body{i}" for i in self.bodies):
             body = data[name]
             if "mesh" in body:
                 body["mesh"] = body["mesh"].sha256
@@ -158,8 +158,9 @@ class Problem(ProblemSpec):
         young, poisson, cells : pair
             For body 1 and body 2; None leaves a body as it is.
         friction, law, radius, gap, neumann_body, theta, relaxation, tolerance, max_iterations, title
-            As in the problem file.  Friction may also be a function k(s) of the distance along Gamma_c from its left
-            end, which is read at the contact nodes of rectangles; for mesh files give it to
+            As in the problem file; where there are more than two bodies, ``neumann_body`` is 1 for all bodies that have
+            the role of body 1, and 2 for the others.  Friction may also be a function k(s) of the distance along
+            Gamma_c from its left end, which is read at the contact nodes of rectangles; for mesh files give it to
             :func:`verification.build`.  Momentum takes its step from rho: without a theta it sets theta to ``"auto"``.
 
         Returns
@@ -192,14 +193,21 @@ class Problem(ProblemSpec):
             ("iteration", "max_iterations"): max_iterations,
         }
         for name, pair in {"young": young, "poisson": poisson, "cells": cells}.items():
+            if pair is not None and self.contact.lines:
+                raise self.refuse(name, pair, f"needed with_keys, as body3.{name}: there are more than two bodies")
             if pair is not None and (not isinstance(pair, (list, tuple)) or len(pair) != 2):
                 needed = "needed two values, for body 1 and body 2 (None leaves a body as it is)"
                 raise self.refuse(name, pair, needed)
             given |= {(f"body{i}", name): value for i, value in enumerate(pair or (), 1)}
+        if self.contact.lines and neumann_body in (1, 2):
+            del given["iteration", "neumann_body"]
+            given["iteration", "neumann_bodies"] = self.numbers(neumann_body)
         return self._with({key: value for key, value in given.items() if value is not None})
 
     def _read_at_nodes(self, function: Callable[[float], float]) -> dict[str, list[Any]]:
         """Return the table of a function at the contact nodes of a rectangle."""
+        if self.contact.lines:
+            raise self.refuse("contact.friction", None, "needed a number or a table in each [[contact]] of the file")
         body, other = self.body1, self.body2
         if self.contact_body == 2:
             body, other = other, body
@@ -240,7 +248,8 @@ class Problem(ProblemSpec):
             for depth, parent in enumerate(parents, 1):
                 table = table.setdefault(parent, {})
                 if not isinstance(table, dict):
-                    needed = f"unknown key; {'.'.join(key[:depth])} is no table"
+                    what = "no table" if not isinstance(table, tuple) else "a list of tables, which only a file changes"
+                    needed = f"unknown key; {'.'.join(key[:depth])} is {what}"
                     raise self.refuse(".".join(key), None, needed)
             table[name] = value
         return Problem.from_dict(data, self.source)
@@ -284,6 +293,8 @@ class Problem(ProblemSpec):
         def halved(name: str, body: BodySpec) -> BodySpec:
             if not halvings or body.rigid:
                 return body
+            if body.members:
+                return BodySpec.union((i, halved(f"body{i}", member)) for i, member in body.members)
             if body.cells is None:
                 named = body.mesh.path.name if body.mesh else None
                 raise self.refuse(f"{name}.mesh", named, "a mesh file cannot be halved")
@@ -343,7 +354,8 @@ def _without_defaults(problem: ProblemSpec, data: dict[str, Any]) -> dict[str, A
     for name in [name for name in data if name not in (*ALWAYS, *NEVER)]:
         data = shorter(_without(data, name))
     for name, always in ALWAYS.items():
-        for key in [key for key in data[name] if key not in always] if always else []:
+        table = data[name] if always and isinstance(data[name], dict) else {}
+        for key in [key for key in table if key not in always]:
             data = shorter(data | {name: _without(data[name], key)})
     return data
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from bisect import bisect
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, Literal, TypeVar
@@ -139,10 +139,13 @@ class BodySpec:
 
     Attributes
     ----------
-    shape : {'rectangle', 'interval', 'mesh', 'rigid'}
-        A rigid body is an obstacle: of the other attributes it has at most x and y.
+    shape : {'rectangle', 'interval', 'mesh', 'rigid', 'union'}
+        A rigid body is an obstacle: of the other attributes it has at most x and y.  A union has only members, plane
+        and the moduli, see :meth:`union`.
     young, poisson : Fraction
-        E in stress; Poisson's ratio is 0 for a bar.  Both 0 where rigid.
+        E in stress; Poisson's ratio is 0 for a bar.  Both 0 where rigid, the largest ones of several materials.
+    materials : read-only mapping from surface to pair of Fraction
+        E and Poisson's ratio of each named surface of a mesh file; empty where the body is of one material.
     plane : {'strain', 'stress'}
         Plane strain or plane stress, the same for both bodies.
     parts : read-only mapping from name to SidePart
@@ -151,9 +154,11 @@ class BodySpec:
         Displacement (length; None: free) and force per area (stress).
     body_force : tuple of Fraction
         Force per volume.
+    members : tuple of pairs of a number and BodySpec
+        The bodies of a union with their numbers in the file, in their order; empty for a single body.
     """
 
-    shape: Literal["rectangle", "interval", "mesh", "rigid"]
+    shape: Literal["rectangle", "interval", "mesh", "rigid", "union"]
     x: tuple[Fraction, Fraction] | None = None
     y: tuple[Fraction, Fraction] | None = None
     cells: tuple[int, ...] | None = None
@@ -166,15 +171,39 @@ class BodySpec:
     traction: Mapping[str, tuple[Fraction, ...]] = field(default_factory=ReadOnly)
     body_force: tuple[Fraction, ...] = ()
     plane: Literal["strain", "stress"] = "strain"
+    materials: Mapping[str, tuple[Fraction, Fraction]] = field(default_factory=ReadOnly)
+    members: tuple[tuple[int, BodySpec], ...] = ()
+
+    @classmethod
+    def union(cls, members: Iterable[tuple[int, BodySpec]]) -> BodySpec:
+        """Return bodies that have one role and do not touch each other as one body.
+
+        Its surfaces are ``body3`` for the whole body 3 of the file, or ``body3.steel`` for one of its surfaces.
+        """
+        each = tuple(sorted(members, key=lambda member: member[0]))
+        materials: dict[str, tuple[Fraction, Fraction]] = {}
+        for i, body in each:
+            materials |= {f"body{i}.{surface}": moduli for surface, moduli in body.materials.items()}
+            materials |= {} if body.materials else {f"body{i}": (body.young, body.poisson)}
+        young, poisson = map(max, zip(*materials.values(), strict=True))
+        plane = each[0][1].plane
+        moduli = {"young": young, "poisson": poisson, "materials": materials}
+        return cls(shape="union", plane=plane, members=each, **moduli)
 
     def __post_init__(self) -> None:
-        for name in ("parts", "prescribed", "traction"):
+        for name in ("parts", "prescribed", "traction", "materials"):
             object.__setattr__(self, name, ReadOnly(getattr(self, name)))
 
     @property
     def rigid(self) -> bool:
         """True if the body is an obstacle."""
         return self.shape == "rigid"
+
+    @property
+    def youngs(self) -> tuple[Fraction, ...]:
+        """E, or the least and the largest one of several materials."""
+        each = {E for E, _ in self.materials.values()} or {self.young}
+        return (self.young,) if len(each) == 1 else (min(each), max(each))
 
     @property
     def moduli(self) -> Moduli:
@@ -218,6 +247,10 @@ class Profile:
         (low, high), (left, right) = self.share[i - 1 : i + 1], self.s[i - 1 : i + 1]
         return low + (high - low) * (min(max(s, left), right) - left) / (right - left)
 
+    def mirrored(self, length: Fraction) -> Profile:
+        """Return the profile over distances from the other end of a line of this length."""
+        return Profile(s=tuple(length - s for s in self.s[::-1]), share=self.share[::-1])
+
     def table(self, k: Fraction) -> dict[str, tuple[Fraction, ...]]:
         """Return ``s`` and ``k`` as a problem file has them, for a largest k."""
         return {"s": self.s, "k": tuple(k * share for share in self.share)}
@@ -250,6 +283,25 @@ class StepSpec:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Line:
+    """A table ``[[contact]]``: the line along which two bodies of a file meet.
+
+    Attributes
+    ----------
+    bodies : pair of int
+        Their numbers in the file, in the order of its ``surface``.
+    contact : ContactSpec
+        The rest of the table.
+    share : Fraction
+        Its friction over the largest one of all lines; 1 where there is none.
+    """
+
+    bodies: tuple[int, int]
+    contact: ContactSpec
+    share: Fraction = Fraction(1)
+
+
+@dataclass(frozen=True, kw_only=True)
 class ContactSpec:
     """Gamma_c, the friction law and the initial distance.
 
@@ -269,6 +321,8 @@ class ContactSpec:
         Initial distance (length).
     profile : Profile or None
         How k varies; None where it is constant.
+    lines : tuple of Line
+        The contacts of more than two bodies, which together are Gamma_c; empty for two bodies.
     """
 
     interval: tuple[Fraction, Fraction] | None
@@ -278,10 +332,42 @@ class ContactSpec:
     gap: Fraction
     profile: Profile | None = None
     surface: tuple[str, str] | None = None
+    lines: tuple[Line, ...] = ()
+
+    @classmethod
+    def of_lines(cls, lines: Iterable[tuple[tuple[int, int], ContactSpec]], law: str) -> ContactSpec:
+        """Return the contacts of several bodies as one, whose friction is the largest one."""
+        pairs = tuple(lines)
+        k = max(contact.friction for _, contact in pairs)
+        radii = {contact.radius for _, contact in pairs}
+        each = (
+            Line(bodies=bodies, contact=contact, share=contact.friction / k if k else Fraction(1))
+            for bodies, contact in pairs
+        )
+        radius = radii.pop() if len(radii) == 1 else None
+        return cls(interval=None, friction=k, law=law, radius=radius, gap=Fraction(0), lines=tuple(each))
+
+    def rubbing(self, k: Fraction) -> ContactSpec:
+        """Return the same contact with k as its largest coefficient of friction, of which lines keep their shares."""
+        lines = (replace(line, contact=line.contact.rubbing(k * line.share)) for line in self.lines)
+        return replace(self, friction=k, lines=tuple(lines))
+
+    @property
+    def varies(self) -> bool:
+        """True if the coefficient of friction may differ from place to place: k is then the largest one."""
+        return self.profile is not None or bool(self.lines)
+
+    @property
+    def named(self) -> bool:
+        """True if Gamma_c is one or more named lines."""
+        return self.surface is not None or bool(self.lines)
 
     @property
     def frictions(self) -> tuple[float, ...]:
         """k, or the least and the largest one where it varies."""
+        if self.lines:
+            each = {k for line in self.lines for k in line.contact.frictions}
+            return (min(each), max(each)) if len(each) > 1 else (*each,)
         shares = () if self.profile is None else (min(self.profile.share),)
         return tuple(float(self.friction * share) for share in (*shares, 1))
 
@@ -341,6 +427,21 @@ class ProblemSpec:
     length: Fraction
     steps: tuple[StepSpec, ...] = ()
     source: str = field(default="<dict>", compare=False)
+
+    @property
+    def bodies(self) -> dict[int, BodySpec]:
+        """The bodies of the file by their numbers."""
+        members = dict(self.body1.members + self.body2.members)
+        return dict(sorted(members.items())) or {1: self.body1, 2: self.body2}
+
+    def numbers(self, body: int) -> tuple[int, ...]:
+        """Return the numbers in the file of the bodies that body 1 or body 2 stands for."""
+        return tuple(i for i, _ in (self.body1, self.body2)[body - 1].members) or (body,)
+
+    def words(self, body: int) -> str:
+        """Return what body 1 or body 2 stands for: ``body 2``, or ``bodies 2, 4``."""
+        numbers = self.numbers(body)
+        return f"{'body' if len(numbers) == 1 else 'bodies'} {', '.join(map(str, numbers))}"
 
     @property
     def plane(self) -> Literal["strain", "stress"]:

@@ -31,10 +31,9 @@ def tables(problem: ProblemSpec) -> dict[str, Any]:
         "dimension": problem.dimension,
         **({"plane": problem.plane} if problem.dimension == 2 else {}),
         "units": dict(problem.units),
-        "body1": _body(problem.body1),
-        "body2": _body(problem.body2),
-        "contact": _contact(problem.contact),
-        "iteration": {"neumann_body": problem.iteration.neumann_body} | vars(problem.iteration),
+        **{f"body{i}": _body(body) for i, body in problem.bodies.items()},
+        "contact": _contacts(problem.contact),
+        "iteration": _iteration(problem),
         "norm": {"length": problem.length},
         **({"step": tuple(_step(step, problem.dimension == 1) for step in problem.steps)} if problem.steps else {}),
     }
@@ -51,8 +50,8 @@ def _body(body: BodySpec) -> dict[str, Any]:
     }
     if not body.rigid:
         written |= {
-            "young": body.young,
-            "poisson": None if bar else body.poisson,
+            "young": {name: E for name, (E, _) in body.materials.items()} or body.young,
+            "poisson": {name: nu for name, (_, nu) in body.materials.items()} or (None if bar else body.poisson),
             "parts": {name: {"side": part.side, part.axis: part.ends} for name, part in body.parts.items()},
             "fixed": body.fixed,
             **_loads(body, bar),
@@ -74,8 +73,22 @@ def _step(step: StepSpec, bar: bool) -> dict[str, Any]:
     return _present({"name": step.name, "increments": step.increments, **bodies})
 
 
+def _contacts(contact: ContactSpec) -> Any:
+    if not contact.lines:
+        return _contact(contact)
+    return tuple({"bodies": line.bodies, **_contact(line.contact)} for line in contact.lines)
+
+
+def _iteration(problem: ProblemSpec) -> dict[str, Any]:
+    body, given = problem.iteration.neumann_body, vars(problem.iteration)
+    if not problem.contact.lines:
+        return {"neumann_body": body} | given
+    rest = {key: value for key, value in given.items() if key != "neumann_body"}
+    return {"neumann_bodies": problem.numbers(body)} | rest
+
+
 def _contact(contact: ContactSpec) -> dict[str, Any]:
-    written = vars(contact) | {"profile": None}
+    written = vars(contact) | {"profile": None, "lines": None}
     if contact.profile is not None and contact.friction:
         written["friction"] = contact.profile.table(contact.friction)
     return _present(written)

@@ -40,7 +40,10 @@ from verification.sections.parts import (
 )
 from verification.sections.setting import outside_the_theorem
 
-NAMES = {1: "body 1", 2: "body 2", None: "as in that run"}
+
+def _name(found: Advice, body: int | None) -> str:
+    """Words for the Neumann body of a role."""
+    return "as in that run" if body is None else found.words(body)
 
 
 #: The next step where nothing is left to type.
@@ -133,17 +136,20 @@ def _which_body(found: Advice) -> Section:
     else:
         rate = found.chosen(best)[1]
         kind = "rate if tied" if found.tied else "predicted rate"
-        said = [f"{NAMES[found.neumann_body]}: {kind} {near_one(rate)} a step, {in_steps(rate)} to 1e-9,"]
+        said = [f"{_name(found, found.neumann_body)}: {kind} {near_one(rate)} a step, {in_steps(rate)} to 1e-9,"]
         if other is None:
             refused = next(role for role in found.roles if role is not best)
-            said.append(f"{NAMES[refused.neumann_body]}: {refused.reason['rho']}")
+            said.append(f"{_name(found, refused.neumann_body)}: {refused.reason['rho']}")
         elif found.no_difference:
             said.append("and no difference with the roles exchanged")
         else:
             away = found.chosen(other)[1]
             said.append(f"against {near_one(away)} with the roles exchanged, {in_steps(away)}")
-        neumann, contact = NAMES[found.neumann_body], NAMES[3 - found.neumann_body]
-    said.append(f"{neumann}'s solver reads forces and writes displacements, {contact}'s the reverse.".capitalize())
+        neumann, contact = found.words(found.neumann_body), found.words(3 - found.neumann_body)
+    if found.problem is not None and found.problem.contact.lines:
+        said.append(f"Solvers of {neumann} read forces and write displacements, those of {contact} the reverse.")
+    else:
+        said.append(f"{neumann}'s solver reads forces and writes displacements, {contact}'s the reverse.".capitalize())
     return which_body(*said)
 
 
@@ -153,7 +159,7 @@ def _which_theta(found: Advice) -> Section:
     why = {}
     possible = [role for role in found.roles if role.rho is not None]
     for role in possible:
-        name, rate = NAMES[role.neumann_body], role.predicted[1]
+        name, rate = _name(found, role.neumann_body), role.predicted[1]
         theta, bound = figures(role.theta_predicted), "proved" if role.proved else "not a bound"
         rows.append((name, figures(role.rho), "predicted", theta, near_one(rate), count(steps(rate)), bound))
         if role.factor_proved is not None and role.theta_proved is not None:
@@ -173,27 +179,31 @@ def _which_theta(found: Advice) -> Section:
             why[name] = role.why_not_tied
     said = [*_together(why), "predicted: theta = 2/(2 + rho); proved: energy bound, doubles unless marked v"]
     ends = [
-        f"{figures(role.rho_min)}, {figures(role.rho_tied)} ({NAMES[role.neumann_body]})"
+        f"{figures(role.rho_min)}, {figures(role.rho_tied)} ({_name(found, role.neumann_body)})"
         for role in possible
         if role.ends is not None
     ]
     if ends:
         said.append(f"if tied: 2/(2+rho_min+rho), {'; '.join(ends)}")
-    said += [_cells(role, role.cells) for role in possible if role.cells is not None and role.cells.found is not None]
+    said += [
+        _cells(found, role, role.cells) for role in possible if role.cells is not None and role.cells.found is not None
+    ]
     lines = table(("Neumann", "rho", "theta is", "theta", "per step", "to 1e-9", "note"), rows)
     return section("theta", "WHICH THETA?", lines, *said)
 
 
-def _cells(role: Role, seen: Suggested) -> str:
+def _cells(found: Advice, role: Role, seen: Suggested) -> str:
     """Cells that make rho smaller."""
     assert seen.cells is not None
     assert seen.found is not None
     lower, upper = ("[{}, {}]".format(*counts) for counts in seen.cells)
     least, own = (figures(seen.value(of)) for of in (seen.found, seen.of_file))
-    return f"{NAMES[role.neumann_body]}: with cells {lower}, {upper} fine meshes have rho >= {least}, not >= {own}"
+    return (
+        f"{_name(found, role.neumann_body)}: with cells {lower}, {upper} fine meshes have rho >= {least}, not >= {own}"
+    )
 
 
-def _which_method(found: Advice, names: Mapping[int | None, str] = NAMES) -> Iterator[Section]:
+def _which_method(found: Advice, names: Mapping[int | None, str] | None = None) -> Iterator[Section]:
     """Steps of each method in each role, and the one that is advised."""
     if not found.methods:
         return
@@ -201,7 +211,10 @@ def _which_method(found: Advice, names: Mapping[int | None, str] = NAMES) -> Ite
     rows: list[tuple[Cell, ...]] = []
     for exchanged in dict.fromkeys(row.exchanged for row in found.methods):
         own = [row for row in found.methods if row.exchanged == exchanged]
-        roles = names[own[0].neumann_body] if named else "exchanged" if exchanged else "as they are"
+        body = own[0].neumann_body
+        roles = "exchanged" if exchanged else "as they are"
+        if named:
+            roles = _name(found, body) if names is None else names[body]
         rows.append((roles, figures(own[0].theta), *(count(row.steps, "<= " * bool(row.bound)) for row in own)))
     first, *others = (METHOD_NAMES[row.method] for row in own)
     heads = ("Neumann" if named else "roles", "theta", f"steps to 1e-6: {first}", *others)
@@ -282,14 +295,14 @@ def _friction(found: Advice) -> Iterator[Section]:
     for role in found.roles:
         if role.rho is None:
             continue
-        said[NAMES[role.neumann_body]] = role.reason.get("friction_threshold", "")
+        said[_name(found, role.neumann_body)] = role.reason.get("friction_threshold", "")
         if role.friction_threshold is not None:
             allowed = f"every small theta contracts for k < {figures(role.friction_threshold)}"
             allowed += f" (here k = {figures(found.friction, 2)})"
-            if found.friction and found.problem is not None and found.problem.contact.profile is not None:
+            if found.friction and found.problem is not None and found.problem.contact.varies:
                 share = figures(role.friction_threshold.value / found.friction)
                 allowed = f"every small theta contracts for less than {share} times the friction along Gamma_c"
-            said[NAMES[role.neumann_body]] = allowed
+            said[_name(found, role.neumann_body)] = allowed
     if set(said.values()) == {NO_LAW}:
         return
     yield section("friction", "HOW MUCH FRICTION DOES THE ENERGY BOUND ALLOW?", *_together(said))
@@ -305,7 +318,8 @@ def _together(said: Mapping[str, str]) -> list[str]:
 
 def _paste(found: Advice, *more: str) -> Section:
     """Lines to paste, and notes on them."""
-    said = [f"Whole blocks: --snippets {', '.join(SNIPPETS)} or all."]
+    several = found.problem is not None and found.problem.contact.lines
+    said = [] if several else [f"Whole blocks: --snippets {', '.join(SNIPPETS)} or all."]
     auto = found.best.theta_auto
     if auto is not None and found.theta is not None:
         if found.theta == float(LARGEST_TO_PASTE) <= auto.theta:
@@ -325,8 +339,10 @@ def _pasted(found: Advice, neumann_body: BodyNumber | None, *notes: str, force: 
     """The lines of :func:`pasted` for the method that is advised in the roles of its theta."""
     assert found.theta is not None
     rule = [f"These are the roles as they are: {found.advised_exchanged}."] if found.advised_exchanged else []
-    file, method = found.problem is not None, found.method_to_paste
-    return pasted(neumann_body, found.theta, *rule, *notes, method=method, file=file, force=force)
+    problem, method = found.problem, found.method_to_paste
+    several = problem.numbers(neumann_body) if problem and problem.contact.lines and neumann_body else ()
+    file = problem is not None
+    return pasted(neumann_body, found.theta, *rule, *notes, method=method, file=file, force=force, several=several)
 
 
 def snippets(found: Advice, library: str) -> Sections:
@@ -356,13 +372,15 @@ def pasted(
     method: str = "constant",
     file: bool = False,
     force: str = "Force",
+    several: Sequence[int] = (),
 ) -> Section:
-    """The lines for a problem file, if that was given, and for preCICE, where the relaxed data has a name."""
+    """The lines for a problem file of two or of ``several`` bodies, and for preCICE, where relaxed data has a name."""
     lines = [] if neumann_body is None else [f"neumann_body = {neumann_body}"]
+    lines = [f"neumann_bodies = {list(several)}"] if several else lines
     lines.append(f"theta = {theta:g}")
     if file and method != "constant":
         lines.append(f'relaxation = "{method}"')
-    scheme = CouplingScheme(neumann_body=neumann_body, theta=theta, steps=None, force=force)
+    scheme = CouplingScheme(neumann_body=None if several else neumann_body, theta=theta, steps=None, force=force)
     lines += precice_acceleration(scheme, method).split("\n")
     return section("paste", "TO PASTE", Block(tuple(lines), 2), *notes)
 
@@ -672,10 +690,11 @@ def _parallel(found: Advice) -> Sections:
     """theta and factor of parallel coupling for each role, where it was asked for."""
     if not found.parallel:
         return ()
-    names = NAMES if found.waves is None else WORDS[found.waves.kind][0]
+    names = None if found.waves is None else WORDS[found.waves.kind][0]
     notes = ["A mode lambda is multiplied by 1 - theta +- i theta sqrt(lambda) where nothing opens or slips."]
     for one in found.parallel:
         most, least = ("at most ", "at least ") if one.bound else ("", "")
-        best = f"Neumann problem on {names[one.neumann_body]}: best theta = 1/(1 + rho), {most}{figures(one.theta)}"
+        who = _name(found, one.neumann_body) if names is None else names[one.neumann_body]
+        best = f"Neumann problem on {who}: best theta = 1/(1 + rho), {most}{figures(one.theta)}"
         notes.append(f"{best}; factor {least}{near_one(one.factor)} a step")
     return (section("parallel", "WHAT IF BOTH SOLVERS RUN AT ONCE?", *notes),)

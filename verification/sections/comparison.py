@@ -87,7 +87,7 @@ class Parts(Listener):
 
     def _told(self, results: Sequence[BoundResult]) -> Sequence[BoundResult]:
         """The results; where friction varies along Gamma_c its thresholds are factors by which it may grow."""
-        if self.pair.interface.profile is None:
+        if not self.pair.interface.varies:
             return results
         return [replace(result, friction=result.friction.over(self.pair.friction)) for result in results]
 

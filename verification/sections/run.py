@@ -87,7 +87,7 @@ def happened(finished: Run, *, alone: bool) -> Section:
     elif finished.choice.source != "given":
         chosen = f"theta = {float(finished.theta):.4g} is the {finished.choice.source} one"
         parts.append(f"{chosen}: {finished.choice.why}")
-    parts += _grids(finished.pair.contact_body, finished.pair.interface)
+    parts += _grids(problem, finished.pair.contact_body, finished.pair.interface)
     parts += _contact(problem, finished.contact, f"; KKT residual of step II {finished.last.contact.kkt.residual:.1e}")
     parts.append(Note(_at_the_end(finished), only="report"))
     return section("run", "WHAT HAPPENED", *parts, caption=RATES, pictures=PICTURES)
@@ -118,7 +118,7 @@ def solution(found: Solution) -> Sections:
     bodies = found.bodies
     problem = bodies.problem
     then = following("run") if len(bodies.elastic) == 2 else following("solve", "-o", "results")
-    parts = (*_grids(problem.contact_body, bodies.interface), *_contact(problem, found.contact))
+    parts = (*_grids(problem, problem.contact_body, bodies.interface), *_contact(problem, found.contact))
     certified = f"KKT residual {found.kkt_residual:.1e} after {found.linear_solves} linear systems on Gamma_c"
     return (
         setting(problem, sum(len(body.mesh.points) for body in bodies.elastic), bodies.interface.contact.n),
@@ -127,13 +127,13 @@ def solution(found: Solution) -> Sections:
     )
 
 
-def _grids(contact_body: int, interface: Interface) -> list[Shown]:
+def _grids(problem: Problem, contact_body: int, interface: Interface) -> list[Shown]:
     """The body that carries the contact grid, if there are two grids."""
     if interface.transfer is None:
         return []
     own, other = f"the {PLACES[contact_body]} body", f"the {PLACES[3 - contact_body]}"
     if interface.contact.normals is not None:  # either body may lie above
-        own, other = f"body {contact_body}", f"body {3 - contact_body}"
+        own, other = problem.words(contact_body), problem.words(3 - contact_body)
     counts = f"{interface.contact.n} nodes of {own}, Neumann grid: {interface.neumann.n} of {other}"
     return [Labelled("contact grid", counts)]
 
@@ -152,13 +152,14 @@ def _contact(problem: Problem, contact: ContactFields, solved: str = "") -> list
     tangential = total["tangential"] if abs(total["tangential"]) > rounding else 0.0
     unit = f"{units['stress']} {units['length']} (per unit thickness)"
     pressure = figures(float(contact.pressure.max()), 4)
-    along_axes = []
+    totals = [Labelled("force", f"{normal}, {figures(tangential)} tangential, {unit}")]
     if problem.contact.surface is not None:
         x, y = (figures(float(value), 6) for value in contact.weights @ contact.tractions)
-        along_axes = [Labelled("on body 2", f"{x} along x, {y} along y")]
-    return [
-        nodes,
-        Labelled("force", f"{normal}, {figures(tangential)} tangential, {unit}"),
-        *along_axes,
-        Labelled("largest pressure", f"{pressure} {units['stress']}{solved}"),
-    ]
+        totals.append(Labelled("on body 2", f"{x} along x, {y} along y"))
+    if contact.lines:
+        totals = [Labelled("force", f"in {unit}")]
+    for each in contact.forces:
+        one, other = each["bodies"]
+        words = f"{figures(each['normal'], 6)} normal, {figures(each['tangential'])} tangential"
+        totals.append(Labelled(f"{one} on {other}", words))
+    return [nodes, *totals, Labelled("largest pressure", f"{pressure} {units['stress']}{solved}")]

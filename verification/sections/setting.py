@@ -15,21 +15,31 @@ def setting(problem: Problem, nodes: int | None, interface: int) -> Section:
     """A problem, on so many nodes of both bodies and of Gamma_c."""
     units, contact = problem.units, problem.contact
     counts = [] if nodes is None else [f"{nodes} nodes, {interface} on Gamma_c"]
-    bodies = (problem.body1, problem.body2)
-    moduli = " / ".join("rigid" if body.rigid else f"{float(body.young):g}" for body in bodies)
+    bodies = problem.bodies.values()
+    moduli = " / ".join("rigid" if one.rigid else " to ".join(f"{float(E):g}" for E in one.youngs) for one in bodies)
     body = problem.iteration.neumann_body
-    law = LAWS[contact.law].label if LAWS[contact.law].needs_radius else f"{LAWS[contact.law].label} law"
-    friction = "no friction" if not contact.friction else f"k = {frictions(contact)}, {law}"
-    if contact.friction and contact.radius is not None and LAWS[contact.law].needs_radius:
-        friction += f", r = {float(contact.radius):g} {units['length']}"
+    friction = "no friction" if not contact.friction else f"k = {frictions(contact)}, {_laws(contact, units['length'])}"
     if any(one.rigid for one in bodies):
         facts = [f"Obstacle: {'lower' if problem.body1.rigid else 'upper'} body", friction]
     else:
-        place = f" ({PLACES[body]})" if contact.surface is None else ""  # either body may lie above along a named line
-        facts = [f"Neumann body: {body}{place}", friction, _how(problem)]
+        place = "" if contact.named else f" ({PLACES[body]})"  # either body may lie above along a named line
+        numbers = problem.numbers(body)
+        who = f"Neumann {'body' if len(numbers) == 1 else 'bodies'}: {', '.join(map(str, numbers))}"
+        facts = [f"{who}{place}", friction, _how(problem)]
     thin = ["plane stress"] if problem.plane == "stress" else []
     first = Facts(problem.title, (*counts, f"E {moduli} {units['stress']}", *thin))
     return section("setting", "", first, Facts("", tuple(facts)))
+
+
+def _laws(contact: ContactSpec, length: str) -> str:
+    """The law of friction, or those of several lines."""
+    said = []
+    for line in (one.contact for one in contact.lines) if contact.lines else (contact,):
+        law = LAWS[line.law]
+        radius = f", r = {float(line.radius):g} {length}" if line.radius is not None and law.needs_radius else ""
+        if line.friction:
+            said.append(f"{law.label if law.needs_radius else f'{law.label} law'}{radius}")
+    return " and ".join(dict.fromkeys(said))
 
 
 def frictions(contact: ContactSpec) -> str:

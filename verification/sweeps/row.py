@@ -260,7 +260,10 @@ def _given(bodies: SharedBodies, values: Mapping[str, Any]) -> Row:
             "radius": None if contact.radius is None else float(contact.radius),
         }
         bodies_of = (problem.body1, problem.body2)
-        start |= {f"young{i}": None if body.rigid else float(body.young) for i, body in enumerate(bodies_of, 1)}
+        start |= {
+            f"young{i}": None if body.rigid or body.materials else float(body.young)
+            for i, body in enumerate(bodies_of, 1)
+        }
     if "young" in values:
         start["young1"], start["young2"] = map(float, values["young"])
     for name in ("theta", "friction", "radius"):
