@@ -42,11 +42,19 @@ def test_every_promised_python_runs_the_whole_suite_in_the_workflow():
         )
 
 
-def test_every_night_the_lowest_versions_and_the_python_after_the_promised_ones_are_tried():
-    workflow = read(".github/workflows/nightly.yml")
-    oldest, newest = PROMISED[0], int(PROMISED[-1].partition(".")[2])
-    tried = re.findall(r'python-version: "(3\.\d+)"\n *- run: (.*)', workflow)
-    assert tried[-2:] == [(oldest, "make lowest"), (f"3.{newest + 1}", "make test")]
+@pytest.mark.parametrize(
+    ("name", "command"), [("check", "make ${{ matrix.versions }}"), ("nightly", "make ${{ matrix.versions }} WHOLE=1")]
+)
+def test_the_oldest_and_the_newest_versions_are_tried_up_to_the_python_after_the_promised_ones(name, command):
+    workflow = read(f".github/workflows/{name}.yml")
+    after = f"3.{int(PROMISED[-1].partition('.')[2]) + 1}"
+    tried = re.findall(r'\{python-version: "(3\.\d+)", versions: (\w+)\}', workflow)
+    assert tried == [(PROMISED[0], "lowest"), *((version, "newest") for version in [*PROMISED, after])]
+    assert f"- run: {command}\n" in workflow
+    assert f"\n{' '.join(sorted({versions for _, versions in tried}))}: $(VENV)" in read("Makefile")
+
+
+def test_a_part_of_the_tests_is_named_for_the_sample_of_all_versions():
     [sample] = re.findall(r"(?m)^SAMPLE := ((?:.*\\\n)*.*)$", read("Makefile"))
     files = sample.replace("\\", "").split()
     assert [name for name in files if not (ROOT / "tests" / name).is_file()] == []
