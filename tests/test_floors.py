@@ -102,7 +102,7 @@ FLOORS: dict[str, dict[str, str]] = {
 #: Lines of each package at most, those of packages inside it apart: whoever needs more says here how many.
 BUDGET = {
     "fem1d2d": 4055,
-    "ndtheory": 5869,
+    "ndtheory": 5899,
     "verification": 2022,
     "verification.advice": 6286,
     "verification.algorithm": 2270,

@@ -1,6 +1,7 @@
 """Which Pythons are promised, tried and run: the same in the classifiers, the workflow, the Makefile and the README."""
 
 import ast
+import os
 import re
 import runpy
 import subprocess
@@ -14,6 +15,7 @@ from types import SimpleNamespace
 
 import pytest
 
+import ndtheory
 from verification.extras import EXTRAS
 
 ROOT = Path(__file__).parents[1]
@@ -175,3 +177,58 @@ def test_the_least_promised_python_is_the_one_that_is_needed():
     assert f"Python {least} or later" in read("README.md")
     assert f"--python-version {least}" in read("Makefile")
     assert f"sys.version_info < ({least.replace('.', ', ')})" in read("Makefile")
+
+
+# --- the names at the top ---
+
+WARNED = "import ndtheory"
+COMMAND = "import sys; from verification.cli import main; sys.exit(main(['bounds']))"
+
+
+@pytest.fixture
+def overwritten(tmp_path):
+    """Run code where the first file of `verification` has another content."""
+
+    def ended(code, content):
+        for name in ("fem1d2d", "ndtheory"):
+            (tmp_path / name).symlink_to(ROOT / name)
+        folder = tmp_path / "verification"
+        folder.mkdir()
+        for path in (ROOT / "verification").iterdir():
+            if path.name != "__init__.py":
+                (folder / path.name).symlink_to(path)
+        (folder / "__init__.py").write_text(content, encoding="utf-8")
+        environment = os.environ | {"PYTHONPATH": str(tmp_path)}
+        return subprocess.run(
+            [sys.executable, "-c", code], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+        )
+
+    return ended
+
+
+@pytest.mark.parametrize("content", ["", '__version__ = "0.0.9"\n'], ids=["empty", "another version"])
+@pytest.mark.parametrize(("code", "status"), [(WARNED, 0), (COMMAND, 2)], ids=["Python", "command"])
+def test_a_foreign_package_named_verification_is_told_in_one_line(overwritten, code, status, content):
+    found = overwritten(code, content)
+    assert (found.returncode, found.stdout) == (status, "")
+    [line] = found.stderr.splitlines()
+    assert "a package `verification` of another distribution or version" in line
+    assert line.endswith("needed: pip uninstall verification, then pip install --force-reinstall --no-deps ndtheory")
+
+
+def test_our_own_package_named_verification_is_told_nowhere(overwritten):
+    assert overwritten(WARNED, read("verification/__init__.py")).stderr == ""
+    assert ndtheory.foreign_verification() == ""
+
+
+@pytest.mark.parametrize(
+    ("found", "told"),
+    [
+        (None, False),  # the formulas alone
+        (SimpleNamespace(origin=None), True),  # a folder from which pip has uninstalled the first file
+        (SimpleNamespace(origin="all.zip/verification/__init__.py"), False),
+    ],
+)
+def test_a_folder_without_a_first_file_is_foreign_and_an_archive_is_not(monkeypatch, found, told):
+    monkeypatch.setattr(ndtheory, "PathFinder", SimpleNamespace(find_spec=lambda name: found))
+    assert ("a folder without __init__.py" in ndtheory.foreign_verification()) is told

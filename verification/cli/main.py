@@ -15,7 +15,6 @@ from types import FrameType
 import click
 
 import ndtheory
-import verification
 from ndtheory import HypothesisError
 from ndtheory.texts import printable
 from verification.cli import (
@@ -154,12 +153,8 @@ def _importing(frame: FrameType | None) -> bool:
 
 def _run(arguments: Sequence[str] | None, seen: Sequence[int]) -> int:
     """Run the command and turn every error into an exit status."""
-    found = getattr(verification, "__version__", "unknown")
-    if found != ndtheory.__version__:
-        complain(
-            f"ndtheory {ndtheory.__version__} found a package `verification` of version {found}: another distribution"
-            " has overwritten it; reinstall ndtheory"
-        )
+    if foreign := ndtheory.foreign_verification():
+        complain(foreign)
         return BAD_INPUT
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
