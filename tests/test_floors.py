@@ -101,9 +101,9 @@ FLOORS: dict[str, dict[str, str]] = {
 
 #: Lines of each package at most, those of packages inside it apart: whoever needs more says here how many.
 BUDGET = {
-    "fem1d2d": 4055,
+    "fem1d2d": 4058,
     "ndtheory": 5899,
-    "verification": 2022,
+    "verification": 2026,
     "verification.advice": 6286,
     "verification.algorithm": 2270,
     "verification.bounds": 3575,
@@ -117,7 +117,7 @@ BUDGET = {
     "verification.interface": 3300,
     "verification.ledger": 4345,
     "verification.output": 534,
-    "verification.problem": 1920,
+    "verification.problem": 1922,
     "verification.reproduce": 655,
     "verification.sections": 2480,
     "verification.sweeps": 2405,
