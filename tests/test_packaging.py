@@ -110,6 +110,11 @@ def test_each_option_with_an_extra_names_one_that_installs_what_it_needs_and_rea
         assert re.search(rf"`{extra}` .*{option}`", read("README.md"))
 
 
+def test_the_page_on_installation_says_what_each_dependency_is_for():
+    rows = re.findall(r"(?m)^\| ([\w, -]+) \| .*\w.* \|$", read("docs/install.md"))
+    assert {name for row in rows for name in row.split(", ")} - {"library"} == named(PROJECT["dependencies"])
+
+
 def test_readme_names_every_extra_and_asks_for_no_other():
     extras = set(PROJECT["optional-dependencies"])
     assert {extra for extra in extras if f"`{extra}`" in read("README.md")} == extras
@@ -213,7 +218,8 @@ def test_a_foreign_package_named_verification_is_told_in_one_line(overwritten, c
     assert (found.returncode, found.stdout) == (status, "")
     [line] = found.stderr.splitlines()
     assert "a package `verification` of another distribution or version" in line
-    assert line.endswith("needed: pip uninstall verification, then pip install --force-reinstall --no-deps ndtheory")
+    mended = re.findall("`(pip [^`]*)`", read("docs/install.md").partition("The line says what to type:")[2])
+    assert line.endswith(f"needed: {', then '.join(mended)}")
 
 
 def test_our_own_package_named_verification_is_told_nowhere(overwritten):
