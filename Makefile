@@ -4,6 +4,7 @@
 # make nightly  the tests with many more random cases, PART=cli one part of them; notes in CONTRIBUTING.md what passed
 # make kratos the tests that couple two models in Kratos Multiphysics, with its wheels in an environment of their own
 # make paper  the paper with its numbers and figures: docs/_build/paper/paper.pdf
+# make release-check  what keeps this commit from being released: versions, changelog, tag, archives, site, notebooks
 # make bench  the times on the site's page on speed; FULL=1 adds the long sizes
 # Needs Python >= 3.11 with pip, make and git; everything else goes into .venv, pinned by requirements.lock.
 
@@ -19,7 +20,7 @@ NEEDS  := pyproject.toml $(LOCKS) ndtheory/__init__.py
 # Tests and pages start many processes: each would compile the packages anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check lint docs nightly lowest newest kratos paper bench lock clean
+.PHONY: demo test check lint docs nightly lowest newest kratos paper bench release-check lock clean
 .NOTPARALLEL:  # one pip at a time; pytest uses the processors itself
 
 demo: $(VENV)/.run
@@ -79,6 +80,9 @@ paper: $(VENV)/.run
 
 bench: $(VENV)/.test
 	for b in benchmarks/bench_*.py; do $(BIN)/python $$b --record benchmarks/records $(if $(FULL),--full) || exit 1; done
+
+release-check: $(VENV)/.docs
+	$(BIN)/python .ci/release_check.py
 
 COMPILE := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --no-header
 
