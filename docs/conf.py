@@ -37,7 +37,7 @@ extensions = [
     "sphinxcontrib.bibtex",
     "builder.pages",
 ]
-exclude_patterns = ["_build", "generated/speed"]  # the latter is included by a page
+exclude_patterns = ["_build", "generated/speed", "joss"]  # a page includes the second, the third is a paper
 
 # Pages with code cells run at every build; a cell that fails fails the build.
 nb_execution_mode = "force"
