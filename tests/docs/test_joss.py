@@ -26,10 +26,11 @@ BIBLIOGRAPHY = bibliography(FOLDER / "paper.bib")
 
 def test_the_paper_has_fewer_than_1000_words_and_every_section_in_its_order():
     assert 250 < len(TEXT.split()) < 1000
-    assert re.findall(r"(?m)^# (.*)$", TEXT) == [
-        "Summary", "Statement of need", "State of the field", "Software design", "Research impact", "Acknowledgements",
-        "References",
-    ]  # fmt: skip
+    sections = (
+        "Summary, Statement of need, State of the field, Software design, Research impact statement, Acknowledgements,"
+        " References"
+    )
+    assert re.findall(r"(?m)^# (.*)$", TEXT) == sections.split(", ")
 
 
 def test_each_work_is_cited_and_each_citation_has_a_work():
