@@ -28,7 +28,7 @@ ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
 
 #: What is tracked and no part of a source distribution.
-NOT_SHIPPED = {".gitignore"}
+NOT_SHIPPED = {".gitattributes", ".gitignore"}
 
 BOUNDS = ["bounds", "--m", "1", "--M", "2", "--CR", "3/2", "--CK", "1/400", "--theta", "1/10", "--json"]
 
