@@ -1,9 +1,10 @@
 # make demo   the Section 6 model, end to end          make test   the whole test suite
 # make check  what CI runs: lint, types, tests, docs   make docs   the site, into docs/_build/html
-# make lowest a sample of the tests with the lowest versions that pyproject.toml allows
+# make lowest a sample of the tests with the lowest versions that pyproject.toml allows; make newest with the newest
 # make nightly  the tests with many more random cases, PART=cli one part of them; notes in CONTRIBUTING.md what passed
 # make kratos the tests that couple two models in Kratos Multiphysics, with its wheels in an environment of their own
 # make paper  the paper with its numbers and figures: docs/_build/paper/paper.pdf
+# make release-check  what keeps this commit from being released: versions, changelog, tag, archives, site, notebooks
 # make bench  the times on the site's page on speed; FULL=1 adds the long sizes
 # Needs Python >= 3.11 with pip, make and git; everything else goes into .venv, pinned by requirements.lock.
 
@@ -19,7 +20,7 @@ NEEDS  := pyproject.toml $(LOCKS) ndtheory/__init__.py
 # Tests and pages start many processes: each would compile the packages anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check lint docs nightly lowest kratos paper bench lock clean
+.PHONY: demo test check lint docs nightly lowest newest kratos paper bench release-check lock clean
 .NOTPARALLEL:  # one pip at a time; pytest uses the processors itself
 
 demo: $(VENV)/.run
@@ -51,13 +52,15 @@ SAMPLE := fem1d2d/test_mesh_files.py ndtheory/test_gradient_descent.py ndtheory/
 	verification/test_contact.py verification/test_figures.py verification/test_interior_point.py \
 	verification/test_report.py verification/test_sweep_cluster.py verification/test_sweep_dataset.py \
 	verification/test_threads.py
-LOWEST := $(VENV)/lowest
 
-lowest: $(VENV)/.venv
+# In an environment without the lock; WHOLE=1 runs all tests.
+lowest: RESOLUTION := lowest-direct
+newest: RESOLUTION := highest
+lowest newest: $(VENV)/.venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check $(UV)
-	$(BIN)/uv venv --quiet --clear --python $(BIN)/python $(LOWEST)
-	$(BIN)/uv pip install --quiet --python $(LOWEST)/bin/python --resolution lowest-direct --editable '.[test]'
-	$(LOWEST)/bin/python -m pytest -n auto --dist worksteal -p no:cacheprovider $(addprefix tests/,$(SAMPLE))
+	$(BIN)/uv venv --quiet --clear --python $(BIN)/python $(VENV)/$@
+	$(BIN)/uv pip install --quiet --python $(VENV)/$@/bin/python --resolution $(RESOLUTION) --editable '.[test]'
+	$(VENV)/$@/bin/python -m pytest -n $(JOBS) --dist worksteal -p no:cacheprovider $(if $(WHOLE),,$(addprefix tests/,$(SAMPLE)))
 
 # No dependency: the tests are skipped without it.
 APPLICATIONS := CoSimulation StructuralMechanics ConstitutiveLaws Mapping LinearSolvers
@@ -77,6 +80,9 @@ paper: $(VENV)/.run
 
 bench: $(VENV)/.test
 	for b in benchmarks/bench_*.py; do $(BIN)/python $$b --record benchmarks/records $(if $(FULL),--full) || exit 1; done
+
+release-check: $(VENV)/.docs
+	$(BIN)/python .ci/release_check.py
 
 COMPILE := $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --no-header
 

@@ -1,12 +1,17 @@
 """The distribution as a stranger gets it: ``python .ci/packages.py`` in the environment that runs the tests.
 
-Builds the sdist, and from it the wheel; then, for every Python of the classifiers that lies on this machine, puts the
-wheel and click into an empty environment and runs, in an empty folder, what needs nothing else: the doctests of the
-package `ndtheory` and the calculator.  With the dependencies of the calling environment the wheel also iterates.
+Builds the sdist and the wheel, and both once more from the sdist: the bytes must be the same.  Then, for every Python
+of the classifiers and the one after them that lies on this machine, puts the wheel and click into an empty environment
+and runs, in an empty folder, what needs nothing else: the doctests of the package `ndtheory` and the calculator.  With
+the dependencies of the calling environment the wheel also iterates.
+
+SOURCE_DATE_EPOCH is the date of all files in both archives, in seconds since 1970; by default that of the last commit.
 """
 
 from __future__ import annotations
 
+import argparse
+import hashlib
 import os
 import re
 import shutil
@@ -23,7 +28,7 @@ ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
 
 #: What is tracked and no part of a source distribution.
-NOT_SHIPPED = {".gitignore"}
+NOT_SHIPPED = {".gitattributes", ".gitignore"}
 
 BOUNDS = ["bounds", "--m", "1", "--M", "2", "--CR", "3/2", "--CK", "1/400", "--theta", "1/10", "--json"]
 
@@ -37,10 +42,15 @@ sys.exit(sum(result.failed for result in results))
 """
 
 
-def run(*command: str | Path, cwd: Path = ROOT) -> str:
-    """The output of a command that ends well; one that does not ends this program."""
+#: The folder of commands in an environment.
+COMMANDS = "Scripts" if os.name == "nt" else "bin"
+
+
+def run(*command: str | Path, cwd: Path = ROOT, **more: str) -> str:
+    """The output of a command that ends well, with more in its environment; one that does not ends this program."""
     alone = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "PYTHONHOME")}
-    found = subprocess.run(command, cwd=cwd, env=alone, capture_output=True, text=True, check=False)
+    alone |= {"PYTHONUTF8": "1"} | more
+    found = subprocess.run(command, cwd=cwd, env=alone, capture_output=True, text=True, encoding="utf-8", check=False)
     if found.returncode:
         sys.exit(f"{' '.join(map(str, command))}: exit status {found.returncode}\n{found.stdout}{found.stderr}")
     return found.stdout
@@ -49,17 +59,27 @@ def run(*command: str | Path, cwd: Path = ROOT) -> str:
 def environment(folder: Path, interpreter: str, *packages: str | Path) -> Path:
     """A new environment with what pip installs for these arguments and nothing else; its folder of commands."""
     run(interpreter, "-m", "venv", "--without-pip", folder)
-    pip = [sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check", "--python", folder / "bin" / "python"]
+    pip = [sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check", "--python", folder]
     run(*pip, "install", "--no-compile", "--constraint", "requirements.lock", *packages)
-    return folder / "bin"
+    return folder / COMMANDS
 
 
-def build(work: Path) -> Path:
-    """The wheel built from the sdist, which must hold all that is tracked; both ways must give the same wheel."""
+def epoch() -> str:
+    """The date of the files in the archives: as the caller wishes, else that of the last commit."""
+    if given := os.environ.get("SOURCE_DATE_EPOCH"):
+        return given
+    if (ROOT / ".git").exists():
+        return run("git", "log", "-1", "--format=%ct").strip()
+    return "1580601600"  # as hatchling does
+
+
+def build(work: Path) -> tuple[Path, Path]:
+    """The sdist, which must hold all that is tracked, and the wheel; from the sdist they must come out the same."""
     [backend] = PROJECT["build-system"]["requires"]
     hatch = [environment(work / "build", sys.executable, backend) / "python", "-m", "hatchling", "build", "-d"]
-    run(*hatch, work / "tree", "-t", "sdist", "-t", "wheel")
-    [source], [direct] = (work / "tree").glob("*.tar.gz"), (work / "tree").glob("*.whl")
+    both, date = ("-t", "sdist", "-t", "wheel"), epoch()
+    run(*hatch, work / "tree", *both, SOURCE_DATE_EPOCH=date)
+    [source], [wheel] = (work / "tree").glob("*.tar.gz"), (work / "tree").glob("*.whl")
     with tarfile.open(source) as archive:
         archive.extractall(work / "unpacked", filter="data")
     [unpacked] = (work / "unpacked").iterdir()
@@ -67,15 +87,15 @@ def build(work: Path) -> Path:
         tracked = set(run("git", "ls-files").splitlines()) - NOT_SHIPPED
         if missing := sorted(name for name in tracked if not (unpacked / name).is_file()):
             sys.exit(f"the sdist lacks {', '.join(missing)}")
-    run(*hatch, work / "wheel", "-t", "wheel", cwd=unpacked)
-    [wheel] = (work / "wheel").glob("*.whl")
-    with ZipFile(direct) as one, ZipFile(wheel) as other:
-        if differ := sorted(set(one.namelist()) ^ set(other.namelist())):
-            sys.exit(f"in one of the wheels from the tree and from the sdist alone: {', '.join(differ)}")
-        installed = {name.partition("/")[0] for name in one.namelist() if ".dist-info/" not in name}
-        if installed != set(PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]):
-            sys.exit(f"the wheel installs {', '.join(sorted(installed))}")
-    return wheel
+    run(*hatch, work / "again", *both, cwd=unpacked, SOURCE_DATE_EPOCH=date)
+    for archive in (source, wheel):
+        if archive.read_bytes() != (work / "again" / archive.name).read_bytes():
+            sys.exit(f"{archive.name}: built again from the sdist it has other bytes")
+    with ZipFile(wheel) as inside:
+        installed = {name.partition("/")[0] for name in inside.namelist() if ".dist-info/" not in name}
+    if installed != set(PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]):
+        sys.exit(f"the wheel installs {', '.join(sorted(installed))}")
+    return source, wheel
 
 
 def interpreter(version: str) -> str | None:
@@ -92,11 +112,19 @@ def interpreter(version: str) -> str | None:
 
 
 def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--keep", type=Path, metavar="FOLDER", help="where the sdist and the wheel stay")
+    keep = parser.parse_args().keep
     versions = re.findall(r"Python :: (3\.\d+)", " ".join(PROJECT["project"]["classifiers"]))
-    with tempfile.TemporaryDirectory() as name:
+    versions.append(f"3.{int(versions[-1].partition('.')[2]) + 1}")
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name:
         work = Path(name).resolve()
-        wheel = build(work)
-        print(f"{wheel.name}: built from the sdist")
+        source, wheel = build(work)
+        print(f"{source.name}, {wheel.name}: the same bytes from the tree and from the sdist")
+        if keep is not None:
+            keep.mkdir(parents=True, exist_ok=True)
+            for archive in (source, wheel):
+                print(f"{hashlib.sha256(archive.read_bytes()).hexdigest()}  {shutil.copy(archive, keep)}")
         empty = work / "empty"
         empty.mkdir()
         answers = set()

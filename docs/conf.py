@@ -1,5 +1,6 @@
 """Sphinx configuration: ``make docs`` builds the site into docs/_build/html, with warnings as errors."""
 
+import os
 import sys
 from importlib.metadata import distribution
 from pathlib import Path
@@ -37,7 +38,7 @@ extensions = [
     "sphinxcontrib.bibtex",
     "builder.pages",
 ]
-exclude_patterns = ["_build", "generated/speed"]  # the latter is included by a page
+exclude_patterns = ["_build", "generated/speed", "joss"]  # a page includes the second, the third is a paper
 
 # Pages with code cells run at every build; a cell that fails fails the build.
 nb_execution_mode = "force"
@@ -63,14 +64,19 @@ suppress_warnings = ["ref.python"]
 MATHJAX = "tex-svg-full.js"
 html_theme = "furo"
 html_title = "ndtheory"
+# Where the site will be, if that is known: the canonical address of a page is that of the newest version.
+if address := os.environ.get("SITE_URL"):
+    html_baseurl = f"{address.rstrip('/')}/latest/"
 html_static_path = [
     "site.css",
+    "versions.js",
     "widgets",
     "slides",
     "generated/widgets",
     str(distribution("sphinx-mathjax-offline").locate_file(f"sphinx-mathjax-offline/static/mathjax/{MATHJAX}")),
 ]
 html_css_files = ["site.css"]
+html_js_files = ["versions.js"]
 html_search_scorer = str(
     Path(__file__).with_name("search_scores.js")
 )  # pages that explain come before those of the API

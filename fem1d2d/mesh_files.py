@@ -22,6 +22,9 @@ SECONDS, SECONDS_PER_BYTE = 10, 1e-6
 MEMORY, MEMORY_PER_BYTE = 10**9, 10
 MOST_BYTES = 200_000_000
 
+#: The variables that keep each BLAS library to one thread; the last one is that of macOS.
+ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+
 #: Seconds on the clock for each second of processor time: the machine may do other work.
 PATIENCE = 6
 
@@ -85,7 +88,7 @@ def read_in_process(path: Path) -> tuple[Floats, Ints, dict[str, Ints], dict[str
     python = [sys.executable, "-I", "-X", "utf8", "-c", START]
     arguments = [mesh_reader.__file__, str(path), str(seconds), str(memory), *folders]
     # one thread of BLAS: each would claim memory
-    environment = os.environ | dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+    environment = os.environ | dict.fromkeys(ONE_THREAD, "1")
     stdin, held = os.pipe()
     try:
         ended = subprocess.run(
@@ -107,7 +110,7 @@ def read_in_process(path: Path) -> tuple[Floats, Ints, dict[str, Ints], dict[str
         os.close(held)
     if ended.returncode == mesh_reader.REFUSED:
         raise MeshError(ended.stdout.decode(errors="replace"))
-    if ended.returncode == -getattr(signal, "SIGXCPU", 0):
+    if ended.returncode == -getattr(signal, "SIGXCPU", sys.maxsize):  # Windows has none, and 0 is success
         raise MeshError(f"reading it takes more than {seconds} s of processor time")
     if ended.returncode:
         raise MeshError(f"the process that read it ended with status {ended.returncode}")

@@ -104,9 +104,9 @@ FLOORS: dict[str, dict[str, str]] = {
 
 #: Lines of each package at most, those of packages inside it apart: whoever needs more says here how many.
 BUDGET = {
-    "fem1d2d": 4160,
-    "ndtheory": 5869,
-    "verification": 2019,
+    "fem1d2d": 4163,
+    "ndtheory": 5899,
+    "verification": 2023,
     "verification.advice": 6394,
     "verification.algorithm": 2270,
     "verification.bounds": 3771,
@@ -120,7 +120,7 @@ BUDGET = {
     "verification.interface": 3655,
     "verification.ledger": 4345,
     "verification.output": 534,
-    "verification.problem": 2253,
+    "verification.problem": 2255,
     "verification.reproduce": 655,
     "verification.sections": 2562,
     "verification.sweeps": 2405,

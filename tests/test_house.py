@@ -136,6 +136,57 @@ def test_relative_imports_are_resolved_from_packages_and_from_modules():
     assert [each.name for each in imports("a.b", ast.parse("from .c import d\nfrom . import e"))] == ["a.c.d", "a.e"]
 
 
+# --- SECURITY.md: nothing that is read is executed ---
+
+#: Modules that execute what they read, or send it away, and functions that do.
+EXECUTE = ("dill", "ftplib", "http", "marshal", "pickle", "runpy", "shelve", "smtplib", "socket", "urllib", "yaml")
+FUNCTIONS = ("compile", "eval", "exec", "execfile", "parse_expr", "read_pickle", "system", "popen", "urlopen")
+
+
+def executing(source: str) -> list[str]:
+    """Each place that could execute what it reads, or open a connection, as `line: what`."""
+    tree, found = ast.parse(source), []
+    for name, line in ((each.name, each.line) for each in imports("m", tree)):
+        found += [f"{line}: imports {name}"] if name.partition(".")[0] in EXECUTE else []
+    for node in (node for node in ast.walk(tree) if isinstance(node, ast.Call)):
+        written, keywords = ast.unparse(node.func), {key.arg: ast.unparse(key.value) for key in node.keywords}
+        if written.rpartition(".")[2] in FUNCTIONS and written != "re.compile":
+            found.append(f"{node.lineno}: {written}")
+        if written == "np.load" and keywords.get("allow_pickle") != "False":
+            found.append(f"{node.lineno}: {written} without allow_pickle=False")
+        if written.endswith("Environment") and keywords.get("autoescape") != "True":
+            found.append(f"{node.lineno}: {written} without autoescape=True")
+    return found
+
+
+def test_nothing_that_is_read_is_executed():
+    found = {str(path): executing((ROOT / path).read_text(encoding="utf-8")) for path in FILES}
+    assert {path: places for path, places in found.items() if places} == {}
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "import pickle",
+        "from urllib.request import urlopen",
+        "eval(text)",
+        "sympy.parse_expr(text)",
+        "np.load(file)",
+        "np.load(file, allow_pickle=True)",
+        "jinja2.Environment(loader=loader)",
+    ],
+)
+def test_a_place_that_could_execute_what_it_reads_is_found(source):
+    assert len(executing(source)) == 1
+
+
+@pytest.mark.parametrize(
+    "source", ["np.load(file, allow_pickle=False)", "re.compile(a)", "json.loads(a)", "import sys"]
+)
+def test_what_only_reads_is_let_through(source):
+    assert executing(source) == []
+
+
 # --- the tests themselves ---
 
 TESTS = sorted((ROOT / "tests").rglob("*.py"))

@@ -1,6 +1,7 @@
 """Which Pythons are promised, tried and run: the same in the classifiers, the workflow, the Makefile and the README."""
 
 import ast
+import os
 import re
 import runpy
 import subprocess
@@ -14,6 +15,7 @@ from types import SimpleNamespace
 
 import pytest
 
+import ndtheory
 from verification.extras import EXTRAS
 
 ROOT = Path(__file__).parents[1]
@@ -42,11 +44,19 @@ def test_every_promised_python_runs_the_whole_suite_in_the_workflow():
         )
 
 
-def test_every_night_the_lowest_versions_and_the_python_after_the_promised_ones_are_tried():
-    workflow = read(".github/workflows/nightly.yml")
-    oldest, newest = PROMISED[0], int(PROMISED[-1].partition(".")[2])
-    tried = re.findall(r'python-version: "(3\.\d+)"\n *- run: (.*)', workflow)
-    assert tried[-2:] == [(oldest, "make lowest"), (f"3.{newest + 1}", "make test")]
+@pytest.mark.parametrize(
+    ("name", "command"), [("check", "make ${{ matrix.versions }}"), ("nightly", "make ${{ matrix.versions }} WHOLE=1")]
+)
+def test_the_oldest_and_the_newest_versions_are_tried_up_to_the_python_after_the_promised_ones(name, command):
+    workflow = read(f".github/workflows/{name}.yml")
+    after = f"3.{int(PROMISED[-1].partition('.')[2]) + 1}"
+    tried = re.findall(r'\{python-version: "(3\.\d+)", versions: (\w+)\}', workflow)
+    assert tried == [(PROMISED[0], "lowest"), *((version, "newest") for version in [*PROMISED, after])]
+    assert f"- run: {command}\n" in workflow
+    assert f"\n{' '.join(sorted({versions for _, versions in tried}))}: $(VENV)" in read("Makefile")
+
+
+def test_a_part_of_the_tests_is_named_for_the_sample_of_all_versions():
     [sample] = re.findall(r"(?m)^SAMPLE := ((?:.*\\\n)*.*)$", read("Makefile"))
     files = sample.replace("\\", "").split()
     assert [name for name in files if not (ROOT / "tests" / name).is_file()] == []
@@ -98,6 +108,11 @@ def test_each_option_with_an_extra_names_one_that_installs_what_it_needs_and_rea
         installed = " ".join(PROJECT["optional-dependencies"][extra])
         assert [name for name in modules if name not in installed] == []
         assert re.search(rf"`{extra}` .*{option}`", read("README.md"))
+
+
+def test_the_page_on_installation_says_what_each_dependency_is_for():
+    rows = re.findall(r"(?m)^\| ([\w, -]+) \| .*\w.* \|$", read("docs/install.md"))
+    assert {name for row in rows for name in row.split(", ")} - {"library"} == named(PROJECT["dependencies"])
 
 
 def test_readme_names_every_extra_and_asks_for_no_other():
@@ -167,3 +182,59 @@ def test_the_least_promised_python_is_the_one_that_is_needed():
     assert f"Python {least} or later" in read("README.md")
     assert f"--python-version {least}" in read("Makefile")
     assert f"sys.version_info < ({least.replace('.', ', ')})" in read("Makefile")
+
+
+# --- the names at the top ---
+
+WARNED = "import ndtheory"
+COMMAND = "import sys; from verification.cli import main; sys.exit(main(['bounds']))"
+
+
+@pytest.fixture
+def overwritten(tmp_path):
+    """Run code where the first file of `verification` has another content."""
+
+    def ended(code, content):
+        for name in ("fem1d2d", "ndtheory"):
+            (tmp_path / name).symlink_to(ROOT / name)
+        folder = tmp_path / "verification"
+        folder.mkdir()
+        for path in (ROOT / "verification").iterdir():
+            if path.name != "__init__.py":
+                (folder / path.name).symlink_to(path)
+        (folder / "__init__.py").write_text(content, encoding="utf-8")
+        environment = os.environ | {"PYTHONPATH": str(tmp_path)}
+        return subprocess.run(
+            [sys.executable, "-c", code], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+        )
+
+    return ended
+
+
+@pytest.mark.parametrize("content", ["", '__version__ = "0.0.9"\n'], ids=["empty", "another version"])
+@pytest.mark.parametrize(("code", "status"), [(WARNED, 0), (COMMAND, 2)], ids=["Python", "command"])
+def test_a_foreign_package_named_verification_is_told_in_one_line(overwritten, code, status, content):
+    found = overwritten(code, content)
+    assert (found.returncode, found.stdout) == (status, "")
+    [line] = found.stderr.splitlines()
+    assert "a package `verification` of another distribution or version" in line
+    mended = re.findall("`(pip [^`]*)`", read("docs/install.md").partition("The line says what to type:")[2])
+    assert line.endswith(f"needed: {', then '.join(mended)}")
+
+
+def test_our_own_package_named_verification_is_told_nowhere(overwritten):
+    assert overwritten(WARNED, read("verification/__init__.py")).stderr == ""
+    assert ndtheory.foreign_verification() == ""
+
+
+@pytest.mark.parametrize(
+    ("found", "told"),
+    [
+        (None, False),  # the formulas alone
+        (SimpleNamespace(origin=None), True),  # a folder from which pip has uninstalled the first file
+        (SimpleNamespace(origin="all.zip/verification/__init__.py"), False),
+    ],
+)
+def test_a_folder_without_a_first_file_is_foreign_and_an_archive_is_not(monkeypatch, found, told):
+    monkeypatch.setattr(ndtheory, "PathFinder", SimpleNamespace(find_spec=lambda name: found))
+    assert ("a folder without __init__.py" in ndtheory.foreign_verification()) is told

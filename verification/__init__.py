@@ -18,7 +18,7 @@ import importlib
 
 TYPE_CHECKING = False  # as typing has it, which takes longer to import than all the rest
 
-#: Must equal ndtheory.__version__; the command checks it, as another distribution installs a package of this name.
+#: Must equal ndtheory.__version__: `ndtheory.foreign_verification` looks for it, as another distribution has this name.
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:

@@ -13,6 +13,10 @@ from multiprocessing.connection import Connection
 INTERRUPTED = "interrupted before it was worked out"
 
 
+#: True if a signal can be held back; not on Windows.
+CAN_WAIT = hasattr(signal, "pthread_sigmask")
+
+
 @contextlib.contextmanager
 def undisturbed() -> Iterator[None]:
     """Return a context in which Ctrl-C waits: it is raised at the end.
@@ -20,7 +24,7 @@ def undisturbed() -> Iterator[None]:
     A signal that is blocked reaches no handler, Python's or another one.  No other thread may take it instead: the
     command keeps BLAS from starting any.
     """
-    if not hasattr(signal, "pthread_sigmask"):  # Windows
+    if not CAN_WAIT:
         yield
         return
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Set
 from pathlib import Path
 from typing import Any
@@ -144,14 +145,14 @@ class Navigation:
 
     Sphinx copies all headings and all names of the API for every page, a quarter of a second, and drops them again:
     here they are left out before.  Pages of modules and of their source code are in no table of contents: those in
-    equally deep folders share one navigation, as marks and relative links are the same.
+    equally deep folders below the same one share a navigation, as marks and relative links are the same.
     """
 
     SHARING = ("_modules/", "generated/api/")
 
     def __init__(self) -> None:
         self.titles: dict[str, Any] = {}  # page -> its table of contents, without what lies below its titles
-        self.known: dict[tuple[Any, ...], str] = {}  # for pages that share: depth and options -> HTML
+        self.known: dict[tuple[Any, ...], str] = {}  # for pages that share: folder, depth, options -> HTML
 
     def of_titles(self, tocs: dict[str, Any]) -> dict[str, Any]:
         """The tables of contents of all pages without what ``titles_only`` drops."""
@@ -181,7 +182,7 @@ class Navigation:
         def toctree(**options: Any) -> str:
             if not page.startswith(self.SHARING):
                 return self.made(app, make, options)
-            key = (page.count("/"), *sorted(options.items()))
+            key = (page.partition("/")[0], page.count("/"), *sorted(options.items()))
             if key not in self.known:
                 self.known[key] = self.made(app, make, options)
             return self.known[key]
@@ -219,7 +220,8 @@ def write_notebooks(app: Sphinx, failed: Exception | None) -> None:
     if failed is not None or app.builder.format != "html":
         return
     site = Path(app.outdir)
-    (site / "notebooks").mkdir(exist_ok=True)
+    shutil.rmtree(site / "notebooks", ignore_errors=True)  # of pages that are none any more
+    (site / "notebooks").mkdir()
     for page in sorted(app.env.found_docs):
         executed = site.parent / "jupyter_execute" / f"{page}.ipynb"
         if is_notebook(app, page) and executed.exists():

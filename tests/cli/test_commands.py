@@ -31,11 +31,8 @@ LATER = ["explore"]
 #: Exit status of (run, compare) on each built-in problem; `inside` ends at its limit, which compare does not mind.
 BUILT_IN = {"inside": (1, 0), "section6": (0, 0), "section6-190": (0, 0), "signorini": (0, 0), "two-bars": (0, 0)}
 
-#: Other meshes of the same problem.
-ALIKE = {"section6-60", "section6-666", "section6-2482"}
-
-#: More than two bodies: tests/cli/test_several_commands.py has their screens.
-SEVERAL = {"chain", "jaws", "stack"}
+#: Other meshes of the same problem; more than two bodies, whose screens are in test_several_commands.py.
+ELSEWHERE = {"section6-60", "section6-666", "section6-2482", "chain", "jaws", "stack"}
 
 HEADINGS = {
     "constants": ["WHICH CONSTANTS DOES THE THEOREM USE?"],
@@ -128,7 +125,7 @@ def test_an_example_is_printed_ready_to_redirect(call, name):
 
 
 def test_every_built_in_problem_has_its_expected_status():
-    assert {*BUILT_IN, *ALIKE, *SEVERAL} == set(examples())
+    assert {*BUILT_IN, *ELSEWHERE} == set(examples())
 
 
 # --- screens ---

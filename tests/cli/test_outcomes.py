@@ -126,18 +126,6 @@ def test_a_solver_that_fails_is_told_in_one_line(call, write, monkeypatch, comma
     assert document["problem"] == verification.load(file).with_keys({"contact.friction": "0.3"}).to_dict()
 
 
-@pytest.mark.parametrize("command", ["bounds", "run"])
-@pytest.mark.parametrize("version", ["0.0.0", None], ids=str)
-def test_another_package_named_verification_is_told_in_one_line(call, write, monkeypatch, command, version):
-    if version is None:
-        monkeypatch.delattr(verification, "__version__")
-    else:
-        monkeypatch.setattr(verification, "__version__", version)
-    line = call(command, write()).complaint
-    assert "`verification`" in line
-    assert str(version or "unknown") in line
-
-
 # --- Ctrl-C ---
 
 

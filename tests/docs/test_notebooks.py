@@ -1,5 +1,8 @@
-"""The references of a page, in its notebook, say what they say on the site."""
+"""The references of a page, in its notebook, say what they say on the site; visible cells run without hidden ones."""
 
+import ast
+import builtins
+import re
 from pathlib import Path
 
 import pytest
@@ -161,3 +164,60 @@ def test_references_are_words_in_a_notebook_and_links_once_the_site_has_an_addre
         "by [Theorem 1](https://a.org/b/index.html#thm-one), [Lemma 1](https://a.org/b/examples/page.html#lem-two)"
         in (told["hosted"])
     )
+
+
+# --- what a reader who downloads a notebook can run ---
+
+CELL = re.compile(r"^```\{code-cell\}[^\n]*\n(.*?)^```", re.DOTALL | re.MULTILINE)
+
+#: The head of a cell, as a block or as lines, and its code.
+OPTIONS = re.compile(r"((?:---\n.*?^---\n|(?::\w+:[^\n]*\n)*))(.*)", re.DOTALL | re.MULTILINE)
+
+
+def unknown_names(page: str) -> list[str]:
+    """Names that visible cells use, and that only hidden cells define."""
+    known, unknown = set(dir(builtins)), []
+    for cell in CELL.findall(page):
+        options, code = OPTIONS.match(cell).groups()
+        if "remove-cell" in options:
+            continue
+        lines = (line for line in code.splitlines() if not line.startswith("%"))
+        nodes = list(ast.walk(ast.parse("\n".join(lines))))
+        for node in nodes:
+            if isinstance(node, (ast.Import, ast.ImportFrom)):
+                known |= {(alias.asname or alias.name).partition(".")[0] for alias in node.names}
+            elif isinstance(node, (ast.FunctionDef, ast.ClassDef)):
+                known.add(node.name)
+            elif isinstance(node, ast.arg):
+                known.add(node.arg)
+            elif isinstance(node, ast.ExceptHandler) and node.name:
+                known.add(node.name)
+            elif isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load):
+                known.add(node.id)
+        unknown += sorted({node.id for node in nodes if isinstance(node, ast.Name)} - known)
+    return unknown
+
+
+PAGES = {
+    path.relative_to(DOCS).as_posix(): path.read_text("utf-8")
+    for path in sorted(DOCS.rglob("*.md"))
+    if not {"_build", "generated", "jupyter_execute"} & set(path.parts)
+}
+NOTEBOOKS = [
+    name
+    for name, text in PAGES.items()
+    if "file_format: mystnb" in text.partition("\n---\n")[0] and "notebook: none" not in text.partition("\n---\n")[0]
+]
+
+
+@pytest.mark.parametrize("name", NOTEBOOKS)
+def test_a_notebook_uses_no_name_that_only_a_hidden_cell_defines(name):
+    assert unknown_names(PAGES[name]) == []
+
+
+def test_a_name_from_a_hidden_cell_is_found():
+    hidden = "```{code-cell} ipython3\n:tags: [remove-cell]\nbest = 1\n```\n"
+    visible = "```{code-cell} ipython3\n%%matplotlib inline\nx = [i + %s for i in range(3)]\nprint(x, f'{x[0]}')\n```\n"
+    assert unknown_names(hidden + visible % "best") == ["best"]
+    assert unknown_names(hidden + visible % "1") == []
+    assert "certificates.md" in NOTEBOOKS

@@ -5,10 +5,13 @@ Run on a built site: ``python tests/docs/test_site.py docs/_build/html`` prints 
 
 import ast
 import importlib
+import os
 import re
 import sys
+from html import unescape
 from html.parser import HTMLParser
 from pathlib import Path
+from urllib.parse import unquote
 
 import pytest
 
@@ -85,6 +88,28 @@ def pictures_without_words(html_dir: Path) -> list[str]:
 
 
 #: A role that was not read, as inside backquotes that belong to something else.
+LINK = re.compile(
+    r"""<(?:a|link|img|script|iframe|source|object|use|image)\b[^>]*?\s(?:href|src|data|xlink:href)=["']([^"'#?]*)"""
+)
+
+
+def lost_links(html_dir: Path) -> list[str]:
+    """Lines ``file: link`` for links that lead out of the site's folder, or to no file in it.
+
+    A site without them works in any folder of a host, and from disk.
+    """
+    found, seen = [], set()
+    for path in sorted(html_dir.rglob("*.html")):
+        for link in dict.fromkeys(LINK.findall(path.read_text(encoding="utf-8"))):
+            if not link or re.match(r"[a-z][a-z0-9+.-]*:|//", link, re.IGNORECASE) or (path.parent, link) in seen:
+                continue
+            seen.add((path.parent, link))
+            target = Path(os.path.normpath(path.parent / unquote(unescape(link))))
+            if link.startswith("/") or not target.is_relative_to(html_dir) or not target.is_file():
+                found.append(f"{path.relative_to(html_dir)}: {link} leads to no file of the site")
+    return found
+
+
 LEFTOVER = re.compile(r"\{(?:[a-z]+:)?[a-z]+\}(?:`|&#96;|</span>\s*<span[^>]*>`)|\{glue:[a-z]+\}|\{py:[a-z]+\}")
 
 
@@ -104,6 +129,30 @@ def foreign_sources(html_dir: Path) -> list[str]:
     return [
         f"_modules/{path}: not our code" for path in pages if path.with_suffix("").parts[0] not in (*NAMED, "index")
     ]
+
+
+@pytest.mark.parametrize(
+    ("link", "count"),
+    [
+        ('<a class="x" href="other%20page.html#part">', 0),
+        ('<a href="#part">', 0),
+        ('<a href="https://example.org/">', 0),
+        ('<a href="mailto:a@example.org">', 0),
+        ('<a href="deep/page.html?q=1">', 0),
+        ('<a href="missing.html">', 1),
+        ('<img alt="a" src="/other.png">', 1),
+        ('<a href="../outside.html">', 1),
+        ('<a href="deep/">', 1),
+        ('<p data-href="missing.html">', 0),
+    ],
+)
+def test_a_link_that_leaves_the_folder_of_the_site_is_found(tmp_path, link, count):
+    site = tmp_path / "site"
+    (site / "deep").mkdir(parents=True)
+    for path in (site / "other page.html", site / "deep" / "page.html", tmp_path / "outside.html"):
+        path.write_text("", encoding="utf-8")
+    (site / "page.html").write_text(link, encoding="utf-8")
+    assert len(lost_links(site)) == count
 
 
 def test_source_pages_of_other_packages_are_found(tmp_path):
@@ -225,8 +274,9 @@ if __name__ == "__main__":
     if len(sys.argv) != 2 or not (Path(sys.argv[1]) / "index.html").exists():
         sys.exit("usage: python tests/docs/test_site.py DIRECTORY, the directory of a built site")
     site = Path(sys.argv[1])
-    faults = [*external_requests(site), *pictures_without_words(site), *roles_left_over(site), *foreign_sources(site)]
-    print("\n".join(faults) or "no request to another host, all pictures have words, all roles were read")
+    checks = (external_requests, pictures_without_words, roles_left_over, foreign_sources, lost_links)
+    faults = [fault for check in checks for fault in check(site.resolve())]
+    print("\n".join(faults) or "no request to another host, no lost link, all pictures have words, all roles were read")
     sys.exit(bool(faults))
 
 

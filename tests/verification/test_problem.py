@@ -289,7 +289,15 @@ def test_what_is_no_dictionary_is_refused(data):
 
 
 @pytest.mark.parametrize(
-    ("content", "needed"), [(None, "no such file"), (b"", "empty"), (b"a = ", "TOML"), (b"\xff\xfe", "UTF-8")]
+    ("content", "needed"),
+    [
+        (None, "no such file"),
+        (b"", "empty"),
+        (b"\xff\xfe", "empty"),
+        (b"a = ", "TOML"),
+        (b"\xff\xfea", "UTF-8"),
+        (b"\xff", "UTF-8"),
+    ],
 )
 def test_what_is_no_problem_file_is_refused_with_its_name(tmp_path, content, needed):
     path = tmp_path / "my.toml"

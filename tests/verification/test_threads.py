@@ -81,7 +81,7 @@ def test_quadratic_forms_have_the_digits_of_one_blas_thread():
             forms = QuadraticForms(pair, measured)
         return [forms.p, forms.carried, *(side for family in forms.families for side in family)]
 
-    assert all(map(np.array_equal, rows(1), rows(4)))
+    assert all(map(np.array_equal, rows(1), rows(2)))  # more than there are cores crash OpenBLAS 0.3.28
 
 
 def numbers() -> set[int]:

@@ -1,11 +1,15 @@
 """The command ``ndtheory``, and the only package that prints."""
 
 import sys
+import warnings
 
 try:
     from verification.interrupts import undisturbed
 
     with undisturbed():  # an import that is interrupted may fail in any way
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # a foreign package `verification`: the command says so itself
+            import ndtheory  # noqa: F401
         from verification.cli.main import main
 except KeyboardInterrupt:
     sys.stderr.write("interrupted before anything was computed\n")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import functools
 import math
 import os
@@ -35,6 +36,12 @@ class ReaderGone(Exception):
     """Nobody reads stdout any more."""
 
 
+def gone(error: Exception) -> bool:
+    """Return True if an error says that nobody reads stdout: writing to a closed pipe is another error on Windows."""
+    no_pipe = isinstance(error, OSError) and os.name == "nt" and (error.errno, error.filename) == (errno.EINVAL, None)
+    return no_pipe or isinstance(error, (ReaderGone, BrokenPipeError))
+
+
 class Interrupted(Exception):
     """Ctrl-C, which a line on stderr has reported already."""
 
@@ -64,8 +71,10 @@ def say(text: str, *, bold: bool = False) -> None:
     _stdout.said = True
     try:
         click.echo(click.style(text, bold=True) if bold else text, file=_stdout.stream)
-    except BrokenPipeError:
-        raise ReaderGone from None
+    except OSError as error:
+        if gone(error):
+            raise ReaderGone from None
+        raise
 
 
 def show(sections: Sections, typing: Typing = nothing_typed, after: str = "") -> None:

@@ -15,7 +15,6 @@ from types import FrameType
 import click
 
 import ndtheory
-import verification
 from ndtheory import HypothesisError
 from ndtheory.texts import printable
 from verification.cli import (
@@ -29,16 +28,7 @@ from verification.cli import (
     problems,
     sweeping,
 )
-from verification.cli.console import (
-    NOTHING,
-    SHOWN,
-    Interrupted,
-    ReaderGone,
-    complain,
-    interruptible,
-    interruption,
-    reported,
-)
+from verification.cli.console import NOTHING, SHOWN, Interrupted, complain, gone, interruptible, interruption, reported
 from verification.cli.forms import AdviseGroup, Commands
 
 #: Exit statuses of the interface.  A crash is none of them.
@@ -95,7 +85,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         if ours:
             # one thread, which blocks a signal for all: see `undisturbed`; matrices here are too small for more anyway
-            os.environ["OPENBLAS_NUM_THREADS"] = "1"
+            os.environ |= {"OPENBLAS_NUM_THREADS": "1", "VECLIB_MAXIMUM_THREADS": "1"}
         with _interrupts(last=ours) as seen:
             return _run(arguments, seen)
     except KeyboardInterrupt:
@@ -154,12 +144,8 @@ def _importing(frame: FrameType | None) -> bool:
 
 def _run(arguments: Sequence[str] | None, seen: Sequence[int]) -> int:
     """Run the command and turn every error into an exit status."""
-    found = getattr(verification, "__version__", "unknown")
-    if found != ndtheory.__version__:
-        complain(
-            f"ndtheory {ndtheory.__version__} found a package `verification` of version {found}: another distribution"
-            " has overwritten it; reinstall ndtheory"
-        )
+    if foreign := ndtheory.foreign_verification():
+        complain(foreign)
         return BAD_INPUT
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
@@ -185,12 +171,12 @@ def _run(arguments: Sequence[str] | None, seen: Sequence[int]) -> int:
         return INTERRUPTED
     except Interrupted:
         return INTERRUPTED
-    except (ReaderGone, BrokenPipeError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # drop what is still buffered
-        return DONE
     except SystemExit as error:  # click exits when a pipe is closed
         return error.code if isinstance(error.code, int) and error.code != NOT_MET else DONE
     except Exception as error:
+        if gone(error):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # drop what is still buffered
+            return DONE
         if seen:
             complain(interruption())
             return INTERRUPTED

@@ -58,9 +58,11 @@ def read_file(path: Path | str) -> dict[str, Any]:
         raise refused(why)
     try:
         content = path.read_bytes()
-        if not content.strip():
+        wide = content.startswith((b"\xff\xfe", b"\xfe\xff"))  # `ndtheory example > my.toml` in a PowerShell writes so
+        text = content.decode("utf-16" if wide else "utf-8-sig")
+        if not text.strip():
             raise refused("the file is empty; `ndtheory example` prints one to start from")
-        return tomllib.loads(content.decode("utf-8-sig"), parse_float=Decimal)
+        return tomllib.loads(text, parse_float=Decimal)
     except OSError as error:
         raise refused(f"cannot be read: {error.strerror}") from None
     except ProblemError:  # a ValueError, as errors of TOML are

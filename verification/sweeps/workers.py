@@ -13,9 +13,10 @@ from itertools import islice
 from multiprocessing import Pipe
 from typing import Any
 
+from fem1d2d import mesh_files
 from ndtheory import __version__
 from verification.interface.pair import ContactPair
-from verification.interrupts import begin_child, undisturbed
+from verification.interrupts import CAN_WAIT, begin_child, undisturbed
 from verification.problem.specification import Problem
 from verification.problem.tables import ProblemError
 from verification.sweeps.row import Row, SharedBodies, row
@@ -40,7 +41,7 @@ AHEAD = 2
 LATEST = 1.0
 
 #: The environment in which the libraries that multiply matrices use one thread in each process.
-ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+ONE_THREAD = dict.fromkeys(mesh_files.ONE_THREAD, "1")
 
 
 class NoWorkers(ProblemError):
@@ -155,7 +156,8 @@ def together(jobs: int) -> Work:
         executor = None
         waiting: set[Future[Handed]] = set()
         try:
-            _start_trackers()
+            if CAN_WAIT:
+                _start_trackers()
             with undisturbed():  # it ends once they are started: what starts meanwhile inherits that Ctrl-C waits
                 executor = get_memmapping_executor(
                     count, initializer=begin_child, initargs=(_life()[0],), env=ONE_THREAD
