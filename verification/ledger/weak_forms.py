@@ -29,6 +29,7 @@ from verification.contact import ContactError
 from verification.interface.body import Body, Condensed
 from verification.interface.pair import ContactPair, pair_from
 from verification.ledger.cases import PROBLEMS, drawn
+from verification.ledger.curves import curved
 from verification.ledger.evidence import Evidence, Level, figure
 from verification.monolithic import solve
 from verification.problem.specification import Problem
@@ -214,6 +215,7 @@ def cases(level: Level) -> list[Case]:
     if level == "full":
         named |= {f"{name}, halved": problem.refined(1) for name, problem in list(named.items())}
         named |= {f"random {i}": Problem.from_dict(drawn(generator(f"problem {i}"))) for i in range(24)}
+        named |= {f"curved {i}": Problem.from_dict(curved(generator(f"curve {i}"))) for i in range(6)}
     return [Case(name=name, problem=problem) for name, problem in named.items()]
 
 
