@@ -8,6 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import meshio
 import numpy as np
 
 from fem1d2d import Mesh, rectangle
@@ -58,8 +59,6 @@ def _written(x: tuple[float, float], y: tuple[float, float], columns: int, line:
 
 def write(path: Path, points: Floats, mesh: Mesh) -> None:
     """Write a mesh with other points as Gmsh does, its sides as physical groups."""
-    import meshio
-
     sides: Mapping[str, Any] = mesh.sides
     tags = [np.full(len(facets), tag) for tag, facets in enumerate(sides.values(), 1)]
     groups = [np.concatenate(tags), np.full(len(mesh.cells), len(tags) + 1)]
