@@ -59,7 +59,7 @@ def three(tmp_path):
             "run",
             ("k = 0.050 to 0.10, non-local, r = 0.5 mm", "converged", "of body 2, Neumann grid: 18 of bodies 1, 3"),
         ),
-        ("constants", ("rho_max", "there are more than two bodies")),
+        ("constants", ("rho_max", "the contacts are tables [[contact]]")),
         (
             "advise",
             (
@@ -83,7 +83,7 @@ def test_a_command_names_the_bodies_of_each_role(call, three, command, seen):
     ("command", "needed"),
     [
         (("certify", "-o", "c.json"), "a certificate is about two bodies"),
-        (("certify", "--continuum", "-o", "c.json"), "there are more than two bodies"),
+        (("certify", "--continuum", "-o", "c.json"), "needed one table [contact], and two bodies"),
         (("explore", "-o", "e.html"), "the page shows two bodies"),
         (("march",), "needed [[step]] tables"),
         (("advise", "--snippets", "preCICE"), "the blocks couple two solvers"),

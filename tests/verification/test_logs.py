@@ -83,6 +83,7 @@ def test_a_relative_residual_that_is_not_flat_or_too_high_is_no_plateau(tmp_path
         found = advise_logs([(log, theta)])
         assert kinds(found) == (["plateau", "level"] if rho else ["level"]), name
         assert rho == 0 or found.readings[0].value == pytest.approx(rho)
+        assert ("if these data are not relaxed, rho is 7.667" in found.readings[0].says) == (P == 1.3)
     both = [{"ResAbs(M:F)": [4.5**n for n in range(40)], "ResRel(M:F)": [1.1] * 40}]  # both say rho = 10
     assert kinds(advise_logs([(precice(tmp_path / "c.log", both), theta)])) == ["mode-high", "plateau", "level"]
     both[0]["ResRel(M:F)"] = [1.05] * 40

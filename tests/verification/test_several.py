@@ -302,7 +302,7 @@ def test_bodies_that_move_together_are_refused():
         ({"contact": [touch(1, 2), touch(2, 3, radios=1)]}, "contact[2].radios", "did you mean 'radius'"),
         ({"body3": plate((2, 3), -1)}, "body3.young", "a number > 0"),
         ({"body3": {"shape": "rigid"}}, "body3.shape", "an obstacle has no named sides"),
-        ({"body3": plate((2, 3), "1e-28")}, "body3.young", "within 1e+30"),
+        ({"body3": plate((2, 3), "1e-28")}, "body3.young", "within 1e+08"),
         ({"body4": plate((3, 4))}, "body4", "needed a table [[contact]]"),
         ({"step": [{}]}, "step", "histories of more bodies"),
         ({"iteration": {"neumann_body": 2}}, "iteration.neumann_body", "needed neumann_bodies, a list"),
@@ -375,9 +375,7 @@ def test_two_contacts_of_one_body_have_no_common_node():
     [vf.explore, lambda problem: problem.changed(young=(1, 2)), lambda problem: problem.changed(friction=lambda s: s)],
 )
 def test_what_takes_two_bodies_says_so(make):
-    with pytest.raises(
-        vf.ProblemError, match=r"there are more than two bodies|needed one table \[contact\]|\[\[contact\]\]"
-    ):
+    with pytest.raises(vf.ProblemError, match=r"more than two bodies|needed one table \[contact\]|\[\[contact\]\]"):
         make(read(held()))
 
 
@@ -418,3 +416,17 @@ def test_a_problem_turned_by_an_angle_has_the_same_results(tmp_path, monkeypatch
         constants = [measured.rho_max.value, measured.rho_normal.value, measured.M.value, measured.kappa_2.value]
         found.append((run.contact.pressure, run.contact.shear, np.array(forces), np.array(constants)))
     assert all(close(one, other) for one, other in zip(*found, strict=True))
+
+
+def test_bodies_of_one_role_that_lie_in_each_other_are_told_as_those_of_two_roles_are():
+    """Two blocks on bases of their own, 0.3 apart; the left one is pushed by 0.5 to the right."""
+    bases = {f"body{i}": plate((0, 1), cells=6, x=x, fixed=["bottom"]) for i, x in ((1, (0, 2)), (3, ("2.3", "4.3")))}
+    pushed = plate((1, 2), "3e4", cells=6, x=(0, 2), prescribed={"top": ["0.5", "-0.01"]})
+    other = plate((1, 2), "3e4", cells=6, x=("2.3", "4.3"), prescribed={"top": ["0.003", "-0.004"]})
+    pairs = {"body2": pushed, "body4": other, "contact": [touch(1, 2), touch(3, 4)]}
+    depths = []
+    for roles in ([2, 4], [2, 3]):
+        found = vf.solve(read(bases | pairs | {"iteration": {"neumann_bodies": roles}}))
+        assert any("the bodies lie in each other" in words for words in found.warnings)
+        depths.append(found.checks.penetration_outside)
+    assert depths[0] == pytest.approx(depths[1]) == pytest.approx(0.197, abs=1e-3)

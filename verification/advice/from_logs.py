@@ -207,6 +207,9 @@ def seen_log(log: Log, theta: Fraction, friction: bool = False) -> SeenLog:
             readings = (*readings[:1], *also, *readings[1:])
     elif plateau is not None:
         readings, following = read_plateau(theta, plateau)
+        if (other := bare.rho_elsewise) is not None:
+            words = f"; if these data are not relaxed, rho is {few(other)}"
+            readings = tuple(replace(one, says=one.says + words * (one.kind == "plateau")) for one in readings)
     elif bare.stays:
         readings, following, _ = read_observed(theta, Observed.known(Fraction(1)))
         if all(column.residual in RELATIVE for column in columns if column.count("level")):

@@ -181,6 +181,14 @@ class SeenLog:
         return relaxed[0] if relaxed else found[0].of_relaxed(self.theta)
 
     @property
+    def rho_elsewise(self) -> Fraction | None:
+        """rho if the only field at a plateau, which may be relaxed, is not; None elsewhere."""
+        found = [column.plateau for column in self.columns if column.plateau is not None]
+        if len(found) != 1 or self.plateau != found[0]:
+            return None
+        return 1 / (found[0].of_relaxed(self.theta).value - 1)
+
+    @property
     def stays(self) -> bool:
         """True if a residual of the run stays at a level or a plateau."""
         return any(column.count("level", "plateau") for column in self.columns)

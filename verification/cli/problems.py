@@ -89,7 +89,7 @@ def load_problem(
     if theta is not None:
         rule = problem.iteration.relaxation
         if not takes_theta(rule):
-            needed = f'needed no theta beside relaxation = "{rule}", which takes its step from rho'
+            needed = f'needed no theta beside relaxation = "{rule}", which takes its own step'
             raise ProblemError(str(file), "--theta", theta, needed)
         problem = problem.with_theta(theta)
     return remember(problem.swapped() if swap else problem)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import permutations
 from typing import Any
 
 import numpy as np
@@ -171,45 +172,45 @@ class _Surface(Value):
     end: Floats
 
     @classmethod
-    def of(cls, mesh: Mesh, u: Floats, lines: Iterable[tuple[Ints, Floats | None, Floats]]) -> _Surface:
-        """Return the surface of a mesh with the contact nodes of each line, some of which may lie beyond its ends.
+    def of(cls, mesh: Mesh, u: Floats, lines: Iterable[tuple[Ints, Floats | None, Floats]], cells: Ints) -> _Surface:
+        """Return the surface of the body of some cells, with the contact nodes of each line, which may end before them.
 
         The second entry of a line has the positions of its nodes, x by default.
         """
         points, slack = mesh.points.astype(float), SAME * extent(mesh)
-        outside = np.unique(mesh.boundary)
+        boundary = mesh.boundary[np.isin(mesh.boundary[:, 0], cells)]
+        outside = np.unique(boundary)
         for nodes, positions, ends in lines:
             x = points[nodes, 0] if positions is None else positions
             outside = np.setdiff1d(outside, nodes[(x >= ends[0] - slack) & (x <= ends[1] + slack)])
         now = points + u
-        start, end = now[mesh.boundary[:, 0]], now[mesh.boundary[:, 1]]
+        start, end = now[boundary[:, 0]], now[boundary[:, 1]]
         return cls(drawn=points[outside], moved=now[outside], start=start, end=end)
 
 
 def _penetration(bodies: TwoBodies, moved: Displacements) -> tuple[float, Place | None]:
-    """Return the greatest depth of a surface node outside Gamma_c inside the other body, and where it is drawn."""
+    """Return the greatest depth of a surface node outside Gamma_c inside another body, and where it is drawn."""
     problem, grid = bodies.problem, bodies.interface.contact
     ends, mean = grid.x[[0, -1]], grid.upright.mean(axis=0)
     gap, named = float(problem.contact.gap), problem.contact.named
     lift = gap * mean / np.linalg.norm(mean) if gap else np.zeros(2)  # of body 2
-    one, two = (
-        None
-        if body is None or u is None
-        else _Surface.of(
-            body.mesh, u + i * lift, ((nodes, x if named else None, its) for nodes, x, its in bodies.lines_on(body))
-        )
-        for i, (body, u) in enumerate(zip((bodies.body1, bodies.body2), moved, strict=True))
-    )
-    if one is None:
+    surfaces: list[list[_Surface]] = [[], []]
+    for i, (body, u) in enumerate(zip((bodies.body1, bodies.body2), moved, strict=True)):
+        if body is not None and u is not None:
+            lines = [(nodes, x if named else None, its) for nodes, x, its in bodies.lines_on(body)]
+            members = [body.mesh.surfaces[f"body{j}"] for j in problem.numbers(i + 1)] if problem.contact.lines else []
+            each = [body.mesh.cells[cells] for cells in members] or [body.mesh.cells]
+            surfaces[i] = [_Surface.of(body.mesh, u + i * lift, lines, cells) for cells in each]
+    if not surfaces[0]:
         assert bodies.body2 is not None
-        assert two is not None
-        one = _obstacle(problem.body1, bodies.body2, two, ends, 0 * lift, upper=True)
-    if two is None:
+        surfaces[0] = [_obstacle(problem.body1, bodies.body2, surfaces[1][0], ends, 0 * lift, upper=True)]
+    if not surfaces[1]:
         assert bodies.body1 is not None
-        two = _obstacle(problem.body2, bodies.body1, one, ends, lift, upper=False)
+        surfaces[1] = [_obstacle(problem.body2, bodies.body1, surfaces[0][0], ends, lift, upper=False)]
     deepest, at = 0.0, None
-    rounding = SAME * max(float(np.ptp(surface.start, axis=0).max()) for surface in (one, two))
-    for own, other in ((one, two), (two, one)):
+    every = [*surfaces[0], *surfaces[1]]
+    rounding = SAME * max(float(np.ptp(surface.start, axis=0).max()) for surface in every)
+    for own, other in permutations(every, 2):
         depth = depths(own.moved, other.start, other.end)
         if len(depth) and depth.max() > max(deepest * (1 + TIE), rounding):
             at = tuple(map(float, own.drawn[_first_largest(depth)]))
@@ -229,4 +230,5 @@ def _obstacle(spec: BodySpec, body: Body, opposite: _Surface, ends: Floats, lift
         face = float(obstacle_level(spec, body.mesh.points[body.nodes].astype(float), upper=upper))
         y = (min(float(low[1]), face) - size, face) if upper else (face, max(float(high[1]), face) + size)
     mesh = rectangle(x, y, (1, 1))
-    return _Surface.of(mesh, np.broadcast_to(lift, mesh.points.shape), [(surface(mesh, upper=upper), None, ends)])
+    lines = [(surface(mesh, upper=upper), None, ends)]
+    return _Surface.of(mesh, np.broadcast_to(lift, mesh.points.shape), lines, mesh.cells)

@@ -58,7 +58,7 @@ class ExactBody:
             An element that computes in doubles, or entries that are not of ordinary size.
         """
         if problem.contact.lines:
-            raise NotExact("there are more than two bodies")
+            raise NotExact("the contacts are tables [[contact]]")
         spec: BodySpec = getattr(problem, body.name)
         points, mesh = exact_points(spec, body), body.mesh
         try:

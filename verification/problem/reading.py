@@ -19,6 +19,7 @@ from verification.problem.specs import (
     MOST_CONTRAST,
     MOST_FRICTION,
     MOST_INCREMENTS,
+    MOST_WITHIN,
     RECTANGLE_SIDES,
     BodySpec,
     Components,
@@ -164,8 +165,8 @@ def _read_several(top: TomlTable, dimension: Literal[1, 2], plane: Literal["stra
     for i, body in bodies.items():
         if body.rigid:
             raise top.refuse(f"body{i}.shape", "rigid", "needed an elastic body: an obstacle has no named sides")
-        if not _within_contrast(*(bodies[j] for j in numbers if j <= i)):
-            needed = f"needed a modulus within {float(MOST_CONTRAST):g} times those before it"
+        if not _within_contrast(*(bodies[j] for j in numbers if j <= i), most=MOST_WITHIN):
+            needed = f"needed a modulus within {float(MOST_WITHIN):g} times those before it"
             raise top.refuse(f"body{i}.young", body.young, needed)
     tables = top.take("contact", _tables_of(top, "contact"))
     if not tables:
@@ -396,17 +397,17 @@ def _read_moduli(table: TomlTable, readers: Mapping[str, Any], dimension: int, *
     E, nu = (value if isinstance(value, dict) else dict.fromkeys(surfaces, value) for value in (young, poisson))
     if not E.keys() == nu.keys():
         raise table.refuse("poisson", poisson, f"needed the same surfaces as young has, {', '.join(E)}")
-    if surfaces and max(E.values()) > MOST_CONTRAST * min(E.values()):
-        raise table.refuse("young", young, f"needed moduli within {float(MOST_CONTRAST):g} times each other")
+    if surfaces and max(E.values()) > MOST_WITHIN * min(E.values()):
+        raise table.refuse("young", young, f"needed moduli within {float(MOST_WITHIN):g} times each other")
     materials = {surface: (E[surface], nu[surface]) for surface in surfaces}
     largest = [max(pair) for pair in zip(*materials.values(), strict=True)] or [young, poisson]
     return {"young": largest[0], "poisson": largest[1], "materials": materials}
 
 
-def _within_contrast(*bodies: BodySpec) -> bool:
-    """Return True if no modulus of some bodies is too large against another one."""
+def _within_contrast(*bodies: BodySpec, most: Fraction = MOST_CONTRAST) -> bool:
+    """Return True if no modulus of some bodies is more than ``most`` times another one."""
     youngs = [E for body in bodies for E in body.youngs]
-    return max(youngs) <= MOST_CONTRAST * min(youngs)
+    return max(youngs) <= most * min(youngs)
 
 
 def _read_body(table: TomlTable, dimension: int, plane: Literal["strain", "stress"], source: str) -> BodySpec:

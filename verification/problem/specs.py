@@ -37,6 +37,10 @@ MOST_CELLS = 250_000
 #: Largest ratio of the two moduli: at 1e60 the bounds of Section 5, with high powers of M C_R / m, overflow a double.
 MOST_CONTRAST = Fraction(10**30)
 
+#: The same in one stiffness matrix, of a body with several materials or of several bodies: a hard inclusion of 1e12
+#: changes the force by 2e-4, one of 1e14 by a percent.
+MOST_WITHIN = Fraction(10**8)
+
 #: Largest number of increments of a loading history, all of whose results are kept.
 MOST_INCREMENTS = 2000
 
