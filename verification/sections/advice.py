@@ -625,7 +625,7 @@ def _of_waves(found: Advice, seen: SeenWaves) -> Sections:
     data = [f"{key} {', '.join(f'{float(v):.5g}' for v in values)}" for key, values in seen.given.items()]
     neumann, contact = names[found.best.neumann_body or 2], names[3 - (found.best.neumann_body or 2)]
     who = [f"{neumann}'s solver reads {forces} and writes {moves}, {contact}'s the reverse.".capitalize()]
-    if found.no_difference:
+    if found.no_difference and len({figures(role.rho_tied) for role in found.roles}) == 1:
         who.append("It makes no difference with the roles exchanged.")
     if seen.kind == "fluid":
         who.append(f"With the roles exchanged: {found.roles[1].reason['rho']}.")
