@@ -232,7 +232,8 @@ class TomlTable:
         value = self._data.pop(name, _MISSING)
         if value is _MISSING:
             if default is _MISSING:
-                raise self.refuse(name, None, "this key is missing")
+                meant = "".join(f"; is it {self.key(near)}?" for near in nearest(name, map(str, self._data)))
+                raise self.refuse(name, None, f"this key is missing{meant}")
             result: V = default
             return result
         try:

@@ -193,4 +193,5 @@ def _on_finer_meshes(mesh: Mapping[str, Any], name: str) -> str:
         return f"Every finer mesh may need a smaller theta, too; {key} is not known: {mesh['reason'][key]}."
     rho, where = mesh[key]["value"], " where all of Gamma_c sticks" if name == "rho" else ""
     least = f"{name} of finer meshes of such cells tends to {rho:.5g} or more (float)"
-    return f"{least}: no theta above {2 / (1 + rho):.4g} contracts on fine ones{where}."
+    limit = f"no theta above {2 / (1 + rho):.4g} contracts on fine ones{where}" if rho > 1 else "this excludes no theta"
+    return f"{least}: {limit}."
