@@ -235,6 +235,38 @@ def of_the_punch(problem: vf.Problem, contact: Any) -> float:
     return float(np.abs(contact.pressure[inner] - known).max() * np.pi / force)
 
 
+#: Plates of a stack: ends in y, Young's modulus, Poisson ratio, columns of cells as a multiple of n.
+STACK = ((0.0, 1.0, 2e4, 0.3, 2), (1.0, 1.5, 7e4, 0.1, 3), (1.5, 3.0, 1e4, 0.45, 1))
+
+
+def stack(folder: Path, n: int) -> vf.Problem:
+    """Three plates pressed together without friction, each held by a roller at its left side."""
+    ends = ({"bottom": ["free", 0]}, {}, {"top": ["free", "-0.01"]})
+    data: dict[str, Any] = {}
+    for i, ((low, high, young, poisson, times), more) in enumerate(zip(STACK, ends, strict=True), 1):
+        middle = [str((3 * low + high) / 4), str((low + 3 * high) / 4)]
+        data[f"body{i}"] = {
+            "shape": "rectangle",
+            "x": [0, 2],
+            "y": [str(low), str(high)],
+            "cells": [times * n, n],
+            "young": str(young),
+            "poisson": str(poisson),
+            "parts": {"roller": {"side": "left", "y": middle}},
+            "prescribed": {"roller": [0, "free"]} | more,
+        }
+    touch = {"surface": ["top", "bottom"], "friction": 0, "radius": 1}
+    contacts = [{"bodies": [1, 2]} | touch, {"bodies": [2, 3]} | touch]
+    iteration = {"neumann_bodies": [1, 3], "theta": "auto"}
+    return vf.Problem.from_dict(data | {"title": "A stack of three", "contact": contacts, "iteration": iteration})
+
+
+def of_the_stack(problem: vf.Problem, contact: Any) -> float:
+    """The largest error of pressure against springs in series: the stress is uniaxial, and plane strain."""
+    exact = 0.01 / sum((high - low) * (1 - nu**2) / young for low, high, young, nu, _ in STACK)
+    return float(np.abs(contact.pressure / exact - 1).max())
+
+
 @dataclass(frozen=True, kw_only=True)
 class Entry:
     """A problem of the gallery.
@@ -312,6 +344,14 @@ GALLERY: Mapping[str, Entry] = {
         cells=(8, 16, 32),
         allowed=0.03,
         source="Johnson, section 2.8: P/(pi sqrt(a^2 - x^2))",
+    ),
+    "stack": Entry(
+        title="a stack of three plates without friction",
+        make=stack,
+        error=of_the_stack,
+        cells=(4, 8, 16),
+        allowed=1e-10,
+        source="springs in series: uniaxial stress",
     ),
 }
 

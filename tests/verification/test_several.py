@@ -430,3 +430,22 @@ def test_bodies_of_one_role_that_lie_in_each_other_are_told_as_those_of_two_role
         assert any("the bodies lie in each other" in words for words in found.warnings)
         depths.append(found.checks.penetration_outside)
     assert depths[0] == pytest.approx(depths[1]) == pytest.approx(0.197, abs=1e-3)
+
+
+def test_a_stack_of_three_without_friction_has_the_pressure_of_springs_in_series():
+    """Uniaxial stress: each plate is held by a roller at its left side; grids and Poisson ratios differ."""
+    sizes = {1: (0, 1, 2e4, 0.3, 6), 2: (1, 1.5, 7e4, 0.1, 9), 3: (1.5, 3, 1e4, 0.45, 4)}
+    ends = {1: {"bottom": ["free", 0]}, 2: {}, 3: {"top": ["free", "-0.01"]}}
+    bodies = {}
+    for i, (low, high, E, nu, cells) in sizes.items():
+        middle = {"roller": {"side": "left", "y": [str((3 * low + high) / 4), str((low + 3 * high) / 4)]}}
+        held = {"prescribed": {"roller": [0, "free"]} | ends[i], "parts": middle}
+        bodies[f"body{i}"] = plate((str(low), str(high)), str(E), x=(0, 2), **held) | {
+            "poisson": str(nu),
+            "cells": [cells, 4],
+        }
+    contact = [touch(1, 2, 0), touch(2, 3, 0)]
+    problem = read(bodies | {"contact": contact, "iteration": {"theta": "auto", "neumann_bodies": [1, 3]}})
+    exact = 0.01 / sum((high - low) * (1 - nu**2) / E for low, high, E, nu, _ in sizes.values())
+    assert vf.solve(problem).contact.pressure == pytest.approx(exact, rel=1e-10)
+    assert vf.run(problem).contact.pressure == pytest.approx(exact, rel=1e-7)
