@@ -120,9 +120,9 @@ BUDGET = {
     "verification.interface": 3655,
     "verification.ledger": 4420,
     "verification.output": 534,
-    "verification.problem": 2256,
+    "verification.problem": 2257,
     "verification.reproduce": 655,
-    "verification.sections": 2562,
+    "verification.sections": 2563,
     "verification.sweeps": 2405,
     "verification.testing": 1583,
 }

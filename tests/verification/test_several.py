@@ -424,12 +424,10 @@ def test_bodies_of_one_role_that_lie_in_each_other_are_told_as_those_of_two_role
     pushed = plate((1, 2), "3e4", cells=6, x=(0, 2), prescribed={"top": ["0.5", "-0.01"]})
     other = plate((1, 2), "3e4", cells=6, x=("2.3", "4.3"), prescribed={"top": ["0.003", "-0.004"]})
     pairs = {"body2": pushed, "body4": other, "contact": [touch(1, 2), touch(3, 4)]}
-    depths = []
     for roles in ([2, 4], [2, 3]):
         found = vf.solve(read(bases | pairs | {"iteration": {"neumann_bodies": roles}}))
         assert any("the bodies lie in each other" in words for words in found.warnings)
-        depths.append(found.checks.penetration_outside)
-    assert depths[0] == pytest.approx(depths[1]) == pytest.approx(0.197, abs=1e-3)
+        assert found.checks.penetration_outside == pytest.approx(0.197, abs=1e-3)
 
 
 def test_a_stack_of_three_without_friction_has_the_pressure_of_springs_in_series():
@@ -444,8 +442,8 @@ def test_a_stack_of_three_without_friction_has_the_pressure_of_springs_in_series
             "poisson": str(nu),
             "cells": [cells, 4],
         }
-    contact = [touch(1, 2, 0), touch(2, 3, 0)]
-    problem = read(bodies | {"contact": contact, "iteration": {"theta": "auto", "neumann_bodies": [1, 3]}})
+    iteration = {"theta": "auto", "neumann_bodies": [1, 3]}
+    problem = read(bodies | {"contact": [touch(1, 2, 0), touch(2, 3, 0)], "iteration": iteration})
     exact = 0.01 / sum((high - low) * (1 - nu**2) / E for low, high, E, nu, _ in sizes.values())
     assert vf.solve(problem).contact.pressure == pytest.approx(exact, rel=1e-10)
     assert vf.run(problem).contact.pressure == pytest.approx(exact, rel=1e-7)
