@@ -107,7 +107,7 @@ BUDGET = {
     "fem1d2d": 4163,
     "ndtheory": 5899,
     "verification": 2023,
-    "verification.advice": 6402,
+    "verification.advice": 6407,
     "verification.algorithm": 2270,
     "verification.bounds": 3771,
     "verification.certificate": 1410,

@@ -5,6 +5,7 @@ import json
 import random
 import re
 import time
+from contextlib import contextmanager
 from fractions import Fraction
 
 import numpy as np
@@ -142,12 +143,19 @@ def test_a_page_of_25_nodes_is_small():
     assert len(vf.explore(vf.example("section6")).page().encode()) < LARGEST
 
 
-@pytest.fixture(scope="module")
-def opened(found, tmp_path_factory):
-    path = tmp_path_factory.mktemp("explore") / "page.html"
+@contextmanager
+def in_browser(found, folder):
+    """The page of what was explored, opened in Chromium."""
+    path = folder / "page.html"
     path.write_text(found.page(), "utf-8")
     with chromium("--window-size=1280,1400") as driver:
         driver.get(path.as_uri())
+        yield driver
+
+
+@pytest.fixture(scope="module")
+def opened(found, tmp_path_factory):
+    with in_browser(found, tmp_path_factory.mktemp("explore")) as driver:
         yield driver
 
 
@@ -293,10 +301,7 @@ def test_a_history_of_bars_and_of_a_pair_at_its_own_friction_is_shown():
 
 @pytest.fixture(scope="module")
 def opened_history(followed, tmp_path_factory):
-    path = tmp_path_factory.mktemp("explore") / "history.html"
-    path.write_text(followed.page(), "utf-8")
-    with chromium("--window-size=1280,1400") as driver:
-        driver.get(path.as_uri())
+    with in_browser(followed, tmp_path_factory.mktemp("explore")) as driver:
         yield driver
 
 

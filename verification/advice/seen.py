@@ -166,13 +166,18 @@ class SeenLog:
         return max(found, key=lambda ratio: ratio.value, default=None)
 
     @property
+    def plateaus(self) -> list[Observed]:
+        """The plateaus of all fields that show one, as they were read."""
+        return [column.plateau for column in self.columns if column.plateau is not None]
+
+    @property
     def plateau(self) -> Observed | None:
         """The plateau of the first residual of relaxed data that shows one; of data that are not relaxed as its equal.
 
         In a tied run that diverges the stiffest mode is multiplied by -q with ``q = theta (1 + rho) - 1``.  Relaxed
         data stay at ``1 + 1/rho``, and the data that the other participant returns at ``1 + 1/q``.
         """
-        found = [column.plateau for column in self.columns if column.plateau is not None]
+        found = self.plateaus
         if not found:
             return None
         partner = lambda one: any(_same(one, other.of_relaxed(self.theta)) for other in found if other is not one)
@@ -183,7 +188,7 @@ class SeenLog:
     @property
     def rho_elsewise(self) -> Fraction | None:
         """rho if the only field at a plateau, which may be relaxed, is not; None elsewhere."""
-        found = [column.plateau for column in self.columns if column.plateau is not None]
+        found = self.plateaus
         if len(found) != 1 or self.plateau != found[0]:
             return None
         return 1 / (found[0].of_relaxed(self.theta).value - 1)

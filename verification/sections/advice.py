@@ -647,8 +647,8 @@ def _waves_of_heat(found: Advice, seen: SeenWaves) -> Section:
     for role in found.roles:
         ends = figures(role.rho_min), figures(role.rho_tied)
         best = figures(role.theta_tied), near_one(role.rate_tied or 0)
-        limit = 2 / (1 + role.rho_tied.value) if role.rho_tied is not None else math.inf
-        rows.append((WORDS["heat"][0][role.neumann_body], *ends, *best, "never" if limit > 1 else figures(limit)))
+        limit = None if role.rho_tied is None else excluded_from(role.rho_tied)
+        rows.append((WORDS["heat"][0][role.neumann_body], *ends, *best, "never" if limit is None else figures(limit)))
     thick, dt = "thickness" not in seen.given, seen.one("dt")
     notes = [
         f"For flat {'thick ' * thick}plates: conductance of the plate that reads temperatures over the other one's, "
