@@ -95,7 +95,8 @@ class Mesh(Cells):
                 raise MeshError(f"{what} name node {outside[0]}, the mesh has {len(points)} nodes")
         positive = measures(points, cells) > 0
         if not positive.all():
-            raise MeshError(f"cell {int(np.argmin(positive))} has no positive measure")
+            size = "length" if points.shape[1] == 1 else "area"
+            raise MeshError(f"cell {int(np.argmin(positive))} has no positive {size}")
         if cells.shape[1] > 3:
             convex = np.all([measures(points, np.roll(cells, i, axis=1)[:, :3]) > 0 for i in range(cells.shape[1])], 0)
             if not convex.all():

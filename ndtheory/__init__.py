@@ -40,7 +40,7 @@ def foreign_verification() -> str:
         ""
         if ours
         else f"ndtheory {__version__} found a package `verification` of another distribution or version ({here});"
-        " needed: pip uninstall verification, then pip install --force-reinstall --no-deps ndtheory"
+        " needed: pip uninstall verification, then pip install --force-reinstall --no-deps WHEEL"
     )
 
 

@@ -54,6 +54,25 @@ def test_a_misspelt_value_of_a_file_is_answered_alike(call, write, key, value, m
     assert f"did you mean '{meant}'?" in call("run", write(), "--set", f"{key}={value}").complaint
 
 
+@pytest.mark.parametrize(
+    ("pair", "meant"),
+    [
+        ("friction=0.4", "'contact.friction'"),
+        ("theta=0.4", "'iteration.theta'"),
+        ("young=1", "'body1.young' or 'body2.young'"),
+    ],
+)
+def test_a_key_without_its_table_is_answered_with_the_tables_that_have_it(call, write, pair, meant):
+    assert call("run", write(), "--set", pair).complaint.endswith(f"unknown key; did you mean {meant}?")
+
+
+@pytest.mark.parametrize("value", ["70 GPa", "2.1e5MPa", "7e4 N/mm^2"])
+def test_a_value_with_its_unit_is_answered_that_files_have_none(call, write, value):
+    assert call("run", write(), "--set", f"body1.young={value}").complaint.endswith(
+        "needed a number > 0, without its unit"
+    )
+
+
 def test_a_misspelt_example_in_the_file_of_a_sweep_is_answered_alike(call, tmp_path):
     (tmp_path / "grid.toml").write_text(SWEEP.replace("section6", "sektion6"), encoding="utf-8")
     assert "did you mean 'section6'?" in call("sweep", tmp_path / "grid.toml").complaint

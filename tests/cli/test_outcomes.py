@@ -94,7 +94,10 @@ def test_a_crash_says_that_it_is_one_and_is_no_status_of_the_interface(call, wri
     assert answer.status == CRASH
     assert answer.out == ""
     assert "Traceback" in answer.err
-    assert answer.err.endswith("this is a bug; please report it with the lines above\n")
+    assert (
+        "this is a bug; please report it with the lines above, the command and its files: "
+        in answer.err.splitlines()[-1]
+    )
 
 
 @pytest.mark.parametrize(

@@ -29,7 +29,7 @@ def test_a_key_set_is_a_key_of_the_file(call, write, command):
 
 def test_a_key_set_reaches_the_plane_of_theta_and_k(call, write, tmp_path):
     line = call("region", write(), "--set", "contact.law=local", "-o", tmp_path / "plane.svg").complaint
-    assert 'problem.toml: contact.law = "local": no region is proved of it' in line
+    assert 'problem.toml: contact.law = "local": no region is proved for it' in line
 
 
 def test_a_title_of_several_words_needs_the_quotes_of_the_shell_alone(call, write):

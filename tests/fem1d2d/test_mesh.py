@@ -204,14 +204,14 @@ def make(points, cells, **sides):
         (SQUARE, [[0, 1, 2], [0, 2, -1]], "cells name node -1, the mesh has 4 nodes"),
         ([[0.0, 0.0], [1.0, 0.0], [0.0, np.nan]], [[0, 1, 2]], "a coordinate is not finite"),
         ([[0.0], [np.inf]], [[0, 1]], "a coordinate is not finite"),
-        (SQUARE, [[0, 1, 2], [0, 3, 2]], "cell 1 has no positive measure"),
-        (SQUARE, [[0, 1, 2], [0, 2, 2], [0, 2, 3]], "cell 1 has no positive measure"),
-        ([[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]], [[0, 1, 2]], "cell 0 has no positive measure"),
-        ([[0.0], [1.0]], [[1, 0]], "cell 0 has no positive measure"),
-        ([[0.0], [0.0]], [[0, 1]], "cell 0 has no positive measure"),
+        (SQUARE, [[0, 1, 2], [0, 3, 2]], "cell 1 has no positive area"),
+        (SQUARE, [[0, 1, 2], [0, 2, 2], [0, 2, 3]], "cell 1 has no positive area"),
+        ([[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]], [[0, 1, 2]], "cell 0 has no positive area"),
+        ([[0.0], [1.0]], [[1, 0]], "cell 0 has no positive length"),
+        ([[0.0], [0.0]], [[0, 1]], "cell 0 has no positive length"),
         (SQUARE, [[0, 1, 2]], "1 nodes belong to no cell"),
         ([[0.0], [1.0], [2.0], [3.0]], [[1, 2]], "2 nodes belong to no cell"),
-        (np.array([[Fraction(0)], [Fraction(0)]]), [[0, 1]], "cell 0 has no positive measure"),
+        (np.array([[Fraction(0)], [Fraction(0)]]), [[0, 1]], "cell 0 has no positive length"),
     ],
 )
 def test_a_mesh_that_cannot_be_used_is_refused_by_its_fault(points, cells, message):
@@ -274,7 +274,7 @@ def test_the_largest_coordinate_is_taken_and_the_double_beyond_it_is_refused():
 
 
 def test_an_interval_too_short_for_its_floats_is_refused():
-    with pytest.raises(MeshError, match="no positive measure"):
+    with pytest.raises(MeshError, match="no positive length"):
         interval((1.0, float(np.nextafter(1.0, 2.0))), 3)
 
 
@@ -283,5 +283,5 @@ def test_an_interval_too_short_for_its_floats_is_refused():
 def test_a_mesh_with_one_cell_turned_over_is_refused(mesh):
     cells = mesh.cells.copy()
     cells[-1] = cells[-1][::-1]
-    with pytest.raises(MeshError, match=f"cell {len(cells) - 1} has no positive measure"):
+    with pytest.raises(MeshError, match=f"cell {len(cells) - 1} has no positive area"):
         Mesh(points=in_floats(mesh).points, cells=cells, sides={})

@@ -263,7 +263,7 @@ def test_a_side_with_a_node_of_no_triangle_is_refused_by_its_name(tmp_path):
 def test_a_flat_triangle_is_refused(tmp_path):
     points = np.concatenate([SQUARE, [[0.5, 0.0, 0.0]]])
     path = write(tmp_path / "body.msh", points, [*TRIANGLES, [0, 4, 1]], {"bottom": [[0, 1]]})
-    with pytest.raises(MeshError, match="cell 2 has no positive measure"):
+    with pytest.raises(MeshError, match="cell 2 has no positive area"):
         from_file(path)
 
 

@@ -74,7 +74,7 @@ def test_the_boundary_of_quadrilaterals_keeps_the_body_on_its_left():
 
 @pytest.mark.parametrize(
     ("points", "why"),
-    [([(0, 0), (2, 0), (0.5, 0.5), (0, 2)], "not convex"), ([(0, 0), (0, 1), (1, 1), (1, 0)], "no positive measure")],
+    [([(0, 0), (2, 0), (0.5, 0.5), (0, 2)], "not convex"), ([(0, 0), (0, 1), (1, 1), (1, 0)], "no positive area")],
 )
 def test_a_polygon_that_is_not_convex_or_turns_clockwise_is_refused(points, why):
     with pytest.raises(MeshError, match=f"cell 0 .*{why}"):

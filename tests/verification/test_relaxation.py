@@ -353,3 +353,26 @@ def test_the_theorem_is_about_a_constant_theta_and_about_momentum_without_fricti
 def test_momentum_needs_rho():
     with pytest.raises(ValueError, match="rho"):
         RULES["momentum"].begin(pressed(1), 0.5, None)
+
+
+@pytest.mark.parametrize(
+    ("rule", "needed"),
+    [
+        (Momentum, r"rule Momentum: needed an object of this class, as Momentum\(\)"),
+        ("fastest", "relaxation 'fastest': needed one of constant, .*, or a rule"),
+    ],
+)
+def test_what_is_no_rule_is_refused_in_words(rule, needed):
+    with pytest.raises(ValueError, match=needed):
+        vf.run(vf.example("two-bars"), rule=rule)
+
+
+def test_a_rule_without_its_words_is_refused_before_a_run():
+    class Unnamed(vf.Rule):
+        name = "unnamed"
+
+        def begin(self, pair, theta, rho):
+            raise AssertionError("it began")
+
+    with pytest.raises(ValueError, match="rule Unnamed: words is missing: needed a text"):
+        vf.run(vf.example("two-bars"), rule=Unnamed())

@@ -51,7 +51,7 @@ def read_matrix(path: Path, name: str = "") -> Floats:
     ProblemError
     """
     refuse = lambda needed: ProblemError(str(path), "", None, needed)
-    read, writer = _READERS.get(path.suffix.lower(), (None, ""))
+    read, written = _READERS.get(path.suffix.lower(), (None, ""))
     why = unreadable(path, MOST_CHARACTERS if read is _text else MOST_BYTES)
     if why:
         raise refuse(why if "folder" not in why else f"a matrix file ({KNOWN}) is needed, this is a folder")
@@ -64,7 +64,7 @@ def read_matrix(path: Path, name: str = "") -> Floats:
     except _Refusal as error:
         raise refuse(str(error)) from None
     except DAMAGED:
-        raise refuse(f"not a matrix that {writer} saved") from None
+        raise refuse(f"not {written}") from None
 
 
 def read_array(path: Path, name: str) -> Floats:
@@ -249,12 +249,12 @@ def _is_number(cell: str) -> bool:
     return True
 
 
-#: Readers by the ending of a file, and the programs that write such files.
+#: Readers by the ending of a file, and what such a file holds.
 _READERS: dict[str, tuple[Callable[[Path, str], np.ndarray], str]] = {
-    ".npy": (_numpy, "numpy or scipy"),
-    ".npz": (_numpy, "numpy or scipy"),
-    ".mtx": (_market, "a Matrix Market writer"),
-    ".mat": (_matlab, "MATLAB or scipy"),
-    ".csv": (_text, "any program as text"),
-    ".txt": (_text, "any program as text"),
+    ".npy": (_numpy, "a matrix that numpy or scipy saved"),
+    ".npz": (_numpy, "a matrix that numpy or scipy saved"),
+    ".mtx": (_market, "a matrix that a Matrix Market writer saved"),
+    ".mat": (_matlab, "a matrix that MATLAB or scipy saved"),
+    ".csv": (_text, "rows of numbers in plain text"),
+    ".txt": (_text, "rows of numbers in plain text"),
 }

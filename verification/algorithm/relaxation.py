@@ -370,10 +370,21 @@ RULES: dict[str, Rule] = {
 }
 
 
-def rule_of(rule: Rule | str) -> Rule:
-    """Return a rule, or the one of a name; ValueError where no rule has that name."""
+def rule_of(rule: Rule | str | type) -> Rule:
+    """Return a rule, or the one of a name.
+
+    Raises
+    ------
+    ValueError
+        No rule has that name, or a rule has none.
+    """
     if isinstance(rule, Rule):
+        missing = [key for key in ("name", "words") if not hasattr(rule, key)]
+        if missing:
+            raise ValueError(f"rule {type(rule).__name__}: {missing[0]} is missing: needed a text")
         return rule
+    if isinstance(rule, type):
+        raise ValueError(f"rule {rule.__name__}: needed an object of this class, as {rule.__name__}()")
     if rule not in RULES:
         raise ValueError(f"relaxation {rule!r}: needed one of {', '.join(RULES)}, or a rule")
     return RULES[rule]

@@ -135,7 +135,7 @@ def check_plane(pair: ContactPair, measured: Measured) -> None:
     assert problem is not None  # only a problem has a plane
     law = problem.contact.law
     if LAWS[law].outside:
-        raise ProblemError(problem.source, "contact.law", law, 'no region is proved of it; needed "nonlocal"')
+        raise ProblemError(problem.source, "contact.law", law, 'no region is proved for it; needed "nonlocal"')
     if pair.outside:
         raise ProblemError(problem.source, "contact", None, f"no region is proved: {pair.outside[0]}")
     if pair.contact.slides:

@@ -104,7 +104,7 @@ def of_file(file: Path, keys: dict[str, str], swap: bool, tied: bool, snippets: 
     theta (no unit) and the factor of a step, predicted and proved, and lines to paste into a coupling configuration.
 
     The commands below need no problem file; two solvers that are Python functions are coupled by verification.couple.
-    A file that has the name of a command is given as ./run.
+    Write ./run for a file that has the name of a command.
 
     \b
     Examples:
@@ -248,12 +248,13 @@ def run(
 ) -> None:
     """Bound rho from runs of any other code.
 
-    Runs with constant theta (no unit), as logs or as the ratio of the residuals of one run: what these can mean, and
-    which theta to run next.  Aitken's factors in a log show both ends of the spectrum.  Without --friction runs are
-    read as runs without friction.  Give the ratio of the absolute residual |Tg - g|, not of the relative one of
-    coupling libraries; a log may hold either, in any unit.
+    Give runs with constant theta (no unit), as logs or as the ratio of the residuals of one run.  The answer lists what
+    they can mean, and which theta to run next.  Aitken's factors in a log show both ends of the spectrum.  Without
+    --friction runs are read as runs without friction.  Give the ratio of the absolute residual |Tg - g|, not of the
+    relative one of coupling libraries; a log may hold either, in any unit.
 
-    Logs of preCICE, Kratos, solids4foam, Norma.jl, Feel++ and MOOSE, columns of numbers, and others with a --pattern.
+    Logs may be of preCICE, Kratos, solids4foam, Norma.jl, Feel++ and MOOSE, columns of numbers, or others with a
+    --pattern.
 
     \b
     Examples:

@@ -48,7 +48,7 @@ OPTIONS = {key: f"--{key.replace('_', '')}" for key in (*SECTION_5, *ENERGY)}
     metavar="NUMBER",
     help="Bound in energy norms: k C_s_energy C_t2, see `constants`; 0 without friction.",
 )
-@one_file(".svg", ".png", words="Figure of h_1 and h_2 over theta, which bound the squared factor")
+@one_file(".svg", ".png", words="Figure to draw: h_1 and h_2, which bound the squared factor, over theta")
 @click.option("--check", is_flag=True, help="Exit 1 unless contraction at theta is proved.")
 @click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout.")
 def bounds(

@@ -29,7 +29,11 @@ def _editions() -> Sequence[str]:
 @THETA
 @SWAP
 @click.option("--edition", type=Registered(_editions), help="Bound that proposes the factor; the strongest by default.")
-@click.option("--exact", is_flag=True, help="Divide the pieces of T until the factor is nearly attained: some time.")
+@click.option(
+    "--exact",
+    is_flag=True,
+    help="Treat contact states case by case, until some loads nearly attain the factor; slower.",
+)
 @click.option(
     "--continuum", is_flag=True, help="Prove it without a mesh, for two rectangles, each held at its outer side."
 )
@@ -54,7 +58,9 @@ def certify(
     given: Path | None,
     as_json: bool,
 ) -> int:
-    """Prove that one step contracts on the meshes of FILE in exact numbers, or in the continuum.
+    """Prove in exact numbers that one step contracts for FILE.
+
+    It is proved on the meshes of FILE, or with --continuum without a mesh.
 
     The certificate of a mesh holds the bodies in rational numbers and the multipliers that prove the factor.  Anyone
     can check it with a script of 260 lines, verification/certificate/check.py, which imports nothing of this

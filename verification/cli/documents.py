@@ -18,7 +18,7 @@ def _names(context: click.Context, parameter: click.Parameter, begun: str) -> li
 @click.command()
 @click.argument("name", required=False, shell_complete=_names)
 def schema(name: str | None) -> None:
-    """List the documents that commands write, or print the JSON Schema of one.
+    """List the documents of all commands, or print one JSON Schema.
 
     NAME is the name of a document, as run, or its key "schema", as ndtheory.run/1.
 

@@ -18,7 +18,7 @@ from verification.cli.problems import load_problem
 @one_file(".html", words="Page to write", required=True)
 @JSON
 def explore(file: Path, keys: dict[str, str], swap: bool, target: Path, as_json: bool) -> None:
-    """Write a page on which theta, friction and the roles of the bodies can be moved.
+    """Write a page of FILE with sliders for theta and friction.
 
     The page is one HTML file that needs no network.  It shows both bodies step by step, the residual, and the plane of
     theta and friction; each position of a slider is a run that was made, with a constant theta.

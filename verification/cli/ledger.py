@@ -25,9 +25,10 @@ from verification.cli.options import FOLDER, JOBS, JSON, STORE, OneOf, check_pla
 @FOLDER
 @JSON
 def verify(ids: tuple[str, ...], level: Any, target: Path | None, folder: Path | None, as_json: bool) -> int:
-    """Check every numbered statement of the paper, or those named by ID.
+    """Check every numbered statement of the paper, or those named.
 
-    Each verdict rests on exact arithmetic, random problems, reading or definition; units of both sides are compared.
+    Each verdict rests on exact arithmetic, on random problems, on reading the text, or on a definition; the units of
+    both sides are compared.
     Exit status 1 if a verdict differs from the recorded one.  -o writes the ledger as JSON and Markdown and, if all
     statements are checked, the errata sheet.
 
@@ -112,12 +113,13 @@ NAMES = ("fig5", "fig10", "fig11", "fig12", "all")
 @FOLDER
 @JSON
 def reproduce(figure: str, jobs: int | None, store: Path | None, folder: Path | None, as_json: bool) -> None:
-    """Run the experiment behind a figure of Section 6, and compare it with the paper.
+    """Run the experiment behind a figure of Section 6 again.
 
-    The text leaves open where the upper body sits (2 x 0.3 mm and 1.2 x 0.3 mm, E in MPa), whether its top may slide,
-    and names the roles of the bodies in two ways.  Half models and exchanged moduli, which depart from the text, are
-    tried too.  Every combination gets its verdict, and the one that comes nearest is named.  -o writes the rows behind
-    each figure as CSV, and the figures.  With --store runs are kept: figures 10 to 12 are then drawn again without one.
+    It is compared with the paper.  The text leaves open where the upper body sits (2 x 0.3 mm and 1.2 x 0.3 mm, E in
+    MPa), whether its top may slide, and names the roles of the bodies in two ways.  Choices that depart from the text,
+    as half models and exchanged moduli, are tried too.  Every combination gets its verdict, and the one that comes
+    nearest is named.  -o writes the rows behind each figure as CSV, and the figures.  With --store runs are kept, so
+    that figures 10 to 12 can be drawn again without new runs.
 
     \b
     Examples:

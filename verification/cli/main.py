@@ -188,6 +188,16 @@ def _run(arguments: Sequence[str] | None, seen: Sequence[int]) -> int:
     return status
 
 
+def _tracker() -> str:
+    """The address at which faults are reported, where the metadata have one."""
+    from importlib.metadata import PackageNotFoundError, metadata
+
+    urls: dict[str, str] = {}
+    with contextlib.suppress(PackageNotFoundError):  # not installed
+        urls.update(line.split(", ", 1) for line in metadata("ndtheory").get_all("Project-URL") or [])
+    return urls.get("Issues", "the issue tracker of the repository that this copy came from")
+
+
 def _explain(error: Exception) -> int:
     """Bad input in one line; anything else is a bug and says so."""
     from verification.problem.tables import ProblemError
@@ -203,5 +213,5 @@ def _explain(error: Exception) -> int:
         return BAD_INPUT
     for line in traceback.format_exc().splitlines():
         complain(line)
-    complain("ndtheory: this is a bug; please report it with the lines above")
+    complain(f"ndtheory: this is a bug; please report it with the lines above, the command and its files: {_tracker()}")
     return CRASH

@@ -28,10 +28,11 @@ if TYPE_CHECKING:
 @FOLDER
 @JSON
 def march(file: Path, solver: Any, method: Any, folder: Path | None, as_json: bool, **changes: Any) -> int:
-    """Follow the loading history of the [[step]] tables of FILE, increment by increment.
+    """Follow the loading history of FILE, increment by increment.
 
-    Friction measures slip from the end of the last increment, so that it depends on the path.  Exit 0 where every
-    increment was computed, 1 where one did not converge, 130 after Ctrl-C; what was computed is shown and written.
+    The [[step]] tables of FILE have the loads.  Friction measures slip from the end of the last increment, so that it
+    depends on the path.  Exit 0 where every increment was computed, 1 where one did not converge, 130 after Ctrl-C;
+    what was computed is shown and written.
 
     \b
     Example:

@@ -39,7 +39,7 @@ def _names(context: click.Context, parameter: click.Parameter, begun: str) -> li
 @click.argument("name", required=False, shell_complete=_names)
 @JSON
 def example(name: str | None, as_json: bool) -> None:
-    """List the built-in problem files, or print one to redirect and edit.
+    """List the built-in problem files, or print one of them.
 
     \b
     Example:
@@ -174,7 +174,8 @@ def solve(file: Path, keys: dict[str, str], folder: Path | None, as_json: bool) 
     """Solve both bodies of FILE at once, without decomposition.
 
     The global method: it shares nothing with the iteration but the matrices.  One body may be rigid (shape = "rigid"),
-    and contact may be all that holds a body in one direction.  Exit 1 where no certified solution was found.
+    and contact may be all that holds a body in one direction.  Exit 1 where no solution was found that passes the
+    checks.
 
     \b
     Example:
@@ -231,7 +232,7 @@ def compare(
     as_json: bool,
     **changes: Any,
 ) -> int:
-    """Measure the constants, evaluate the bounds, run, and judge each bound.
+    """Measure constants, evaluate bounds, run, and judge each bound.
 
     Exit 1 where a proved bound is violated or the run stalls or diverges, 3 where rounding hides the answer.  Reaching
     max_iterations is no failure here: the verdicts judge single steps.
@@ -266,7 +267,9 @@ def compare(
 )
 @JSON
 def demo(folder: Path, as_json: bool) -> int:
-    """Compare on the built-in model of Section 6, and leave problem, report, figures and JSON in a folder.
+    """Compare on the built-in model of Section 6, into a folder.
+
+    The folder gets the problem file, the report, the figures and the JSON document.
 
     \b
     Example:
@@ -353,7 +356,7 @@ def remedy(finished: Run, swapped: bool) -> str:
         return f"{here}; try a smaller theta" + (f", or {roles}" if exchanged else "")
     beside = None if exchanged is None else measure(exchanged).rho_max
     good, other = _worth_trying(rho.rho_max.value), 0.0 if beside is None else _worth_trying(beside.value)
-    typed = lambda value: f"{directed(value, 2, up=False):g}"
+    typed = lambda value: f"{directed(value, 3, up=False):g}"
     better = f", or {roles} with --theta {typed(other)}" if other > good else ""
     if theta <= good:
         return f"{here}; try --theta {typed(theta / 2)}{better}"

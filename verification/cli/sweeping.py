@@ -73,11 +73,11 @@ def sweep(
     folder: Path | None,
     as_json: bool,
 ) -> None:
-    """Run a problem at every point of a grid, and write a CSV file with one row per run.
+    """Run a problem at every point of a grid, into a CSV file.
 
     FILE names the problem, beside it or built in, and the values of each axis: theta, friction, radius (length of the
-    file), young (pairs E1, E2, stress of the file), neumann_body, refine (halvings of the mesh), law, rule.  The rows
-    go to NAME.csv beside FILE, or into DIR.  Exit 0 also where runs failed: their rows say why.
+    file), young (pairs E1, E2, stress of the file), neumann_body, refine (halvings of the mesh), law, rule.  One row
+    for each run goes to NAME.csv beside FILE, or into DIR.  Exit 0 also where runs failed: their rows say why.
 
     Each row is kept in NAME.sqlite beside NAME.csv once it is made, and is not made again: after Ctrl-C, or whatever
     ended the command, the same command goes on.  A row that ended in an error stays, too, until --retry or --fresh.
@@ -258,10 +258,10 @@ def every(
 @STORE
 @JSON
 def region(file: Path, keys: dict[str, str], swap: bool, target: Path, store: Path | None, as_json: bool) -> None:
-    """Plot, over theta and k, where each bound proves contraction and how runs end.
+    """Draw over theta and k where each bound proves contraction.
 
-    Both axes are logarithmic; theta and k have no unit.  The regions are those of all bounds for the bodies of FILE;
-    the points are runs, coloured by outcome.
+    The regions are those of all bounds for the bodies of FILE; points show how runs end.  Both axes are logarithmic;
+    theta and k have no unit.
 
     \b
     Example:

@@ -409,8 +409,8 @@ def _check_free(problem: Problem, name: Name, mesh: Mesh, known: Supports, nodes
     )
     where = ", ".join(f"{c:g}" for c in mesh.points[nodes[j]].astype(float))
     key, value = ("fixed", list(spec.fixed)) if holds in spec.fixed else (f"prescribed.{holds}", None)
-    needed = "Gamma_u must leave the normal component of every contact node free; it holds the one at "
-    raise problem.refuse(f"{own}.{key}", value, f"{needed}({where})")
+    needed = f"needed the normal component of every contact node free, this side holds the one at ({where})"
+    raise problem.refuse(f"{own}.{key}", value, needed)
 
 
 def _load(problem: Problem, name: Name, mesh: Mesh, nodes: Ints, interface: Interface) -> Floats:

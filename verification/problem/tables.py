@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import stat
 from collections.abc import Callable, Iterable, Mapping
 from decimal import Decimal
@@ -85,7 +86,7 @@ def unreadable(path: Path, most: int) -> str | None:
     if not stat.S_ISREG(found.st_mode):
         return "a regular file is needed, this is a pipe or a device"
     if found.st_size > most:
-        return f"a file of at most {most / 1e6:g} MB is needed, this one has {found.st_size / 1e6:.0f}"
+        return f"a file of at most {most / 1e6:g} MB is needed, this one has {found.st_size / 1e6:.0f} MB"
     return None
 
 
@@ -125,7 +126,8 @@ def number(needed: str = "a number", holds: Callable[[Fraction], bool] = lambda 
         try:
             result = exact(value)
         except ValueError:
-            raise Unfit(f"needed {needed}") from None
+            unit = isinstance(value, str) and NUMBER_AND_UNIT.fullmatch(value)
+            raise Unfit(f"needed {needed}" + ", without its unit" * bool(unit)) from None
         if result and not SMALLEST <= abs(result) <= LARGEST:
             raise Unfit(f"needed {needed}, of a size between {float(SMALLEST):g} and {float(LARGEST):g}")
         if not (holds(result) and holds(Fraction(float(result)))):
@@ -134,6 +136,9 @@ def number(needed: str = "a number", holds: Callable[[Fraction], bool] = lambda 
 
     return read
 
+
+#: A number with a unit behind it, as 70 GPa.
+NUMBER_AND_UNIT = re.compile(r"\s*[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*[^\W\d_].*")
 
 positive = number("a number > 0", lambda v: v > 0)
 non_negative = number("a number >= 0", lambda v: v >= 0)
@@ -214,6 +219,7 @@ class TomlTable:
         self._file = file
         self._path = path
         self._known: list[str] = []
+        self._below: list[TomlTable] = []
 
     def key(self, name: str) -> str:
         """Return the dotted path of a key in this table, an empty one in quotes."""
@@ -243,7 +249,8 @@ class TomlTable:
 
     def within(self, name: str, value: Mapping[str, Any]) -> TomlTable:
         """Return the value of a key as a table."""
-        return TomlTable(value, self._file, self.key(name))
+        self._below.append(TomlTable(value, self._file, self.key(name)))
+        return self._below[-1]
 
     def table(self, name: str, *, required: bool = False) -> TomlTable:
         """Read a sub-table; a missing one is empty unless required."""
@@ -265,6 +272,9 @@ class TomlTable:
             # body3 does not misspell body2: names that differ only in their number are meant as they are
             others = [known for known in self._known if known.rstrip(digits) != str(name).rstrip(digits)]
             near = nearest(str(name), others)
-            known = f"did you mean {near[0]!r}?" if near else "known here: " + ", ".join(self._known)
+            meant = near or [table.key(name) for table in self._below if name in table._known]
+            known = (
+                f"did you mean {' or '.join(map(repr, meant))}?" if meant else f"known here: {', '.join(self._known)}"
+            )
             what = "table" if isinstance(value, Mapping) else "key"
             raise self.refuse(str(name), None, f"unknown {what}; {known}")

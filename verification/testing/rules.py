@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from fem1d2d.mesh import Floats
 from ndtheory import evaluate_energy
 from verification.algorithm.fixed_point import FixedPointMap, iterate_at, iterates
-from verification.algorithm.relaxation import Constant, Newton, Rule
+from verification.algorithm.relaxation import Constant, Newton, Rule, rule_of
 from verification.algorithm.runs import run
 from verification.algorithm.theta import below_one, choose, energy_bounds
 from verification.constants import measure
@@ -53,10 +53,10 @@ def check_rule(rule: Rule, *, examples: int = 20) -> Report:
     ``ends at the solution``
         Wherever its run converges it has found the solution that the theorem says is the only one, in both roles of the
         bodies; and some run converges.
-    ``is independent of units``
-        In other units of stress and length, and with loads and gaps 4, 16, .. times as large, it takes the same steps.
     ``starts afresh``
         A run is not changed by another one, before it or beside it.
+    ``is independent of units``
+        In other units of stress and length, and with loads and gaps 4, 16, .. times as large, it takes the same steps.
     ``sees no left, right, top or bottom``
         The mirror image of a pair, and the pair with the numbers of its bodies exchanged, gives the same steps.
     ``keeps its proved rate``
@@ -65,11 +65,11 @@ def check_rule(rule: Rule, *, examples: int = 20) -> Report:
 
     ``examples`` is the number of cases for each property; the first property that fails raises Refused.
     """
-    kit = Kit(f"rule {rule.name!r}", examples)
+    kit = Kit(f"rule {rule_of(rule).name!r}", examples)
     tests: dict[str, tuple[Any, Any]] = {
         "stays at the solution": (SOLVED_PAIRS, _stays),
-        "is independent of units": (_begun(), _is_independent_of_units),
         "starts afresh": (st.fixed_dictionaries({"case": _begun(), "other": _begun()}), _starts_afresh),
+        "is independent of units": (_begun(), _is_independent_of_units),
         "sees no left, right, top or bottom": (_begun(), _sees_no_sides),
     }
     stays, *others = (kit.examine(name, cases, partial(test, rule)) for name, (cases, test) in tests.items())
