@@ -151,7 +151,7 @@ def write_speed(app: Sphinx) -> None:
         A file among the records is none.
     """
     try:
-        speed_page.write(BENCHMARKS / "records", Path(app.srcdir) / "generated" / "speed", "generated/speed")
+        speed_page.write(speed_page.RECORDS, Path(app.srcdir) / "generated" / "speed", "generated/speed")
     except ValueError as error:
         raise ExtensionError(str(error)) from None
 

@@ -3,7 +3,7 @@
 A small core in which every matrix is exact for its mesh.  Contact and the theorem do not enter.
 """
 
-from fem1d2d.assembly import body_load, facet_weights, gram, side_load, stiffness
+from fem1d2d.assembly import body_load, facet_weights, gram, stiffness
 from fem1d2d.condense import (
     FEW,
     Condensation,
@@ -59,7 +59,6 @@ __all__ = [
     "rectangle_points",
     "rigid_motions",
     "sector",
-    "side_load",
     "smooth",
     "solver",
     "solver_with_inertia",

@@ -59,14 +59,6 @@ def body_load(mesh: Mesh, force: Sequence[float], cells: Ints | None = None) -> 
     return np.asarray(weights[:, None] * np.asarray(force, dtype=float))
 
 
-def side_load(mesh: Mesh, facets: Ints, traction: Sequence[float]) -> Floats:
-    """``int t . v`` over facets of a constant traction t, unit stress: shape (n, d), unit stress x length^(d - 1).
-
-    ``facets`` are the nodes of each facet, shape (f, d).
-    """
-    return np.asarray(facet_weights(mesh, facets)[:, None] * np.asarray(traction, dtype=float))
-
-
 def facet_weights(
     mesh: Mesh, facets: Ints, between: tuple[float, float] | None = None, along: Floats | None = None
 ) -> Floats:

@@ -111,7 +111,7 @@ class Line:
         if len(back):
             raise MeshError(f"is met by normals that cross near {_at(self.points[back[0]])}")
         gap = ((smooth(other.s, other.points, met) - self.points) * self.normals).sum(axis=1)
-        return Seen(gap=gap, met=met, s=_onto(other.s, met, self.s))
+        return Seen(gap=gap, s=_onto(other.s, met, self.s))
 
     def _meets(self, other: Line, nodes: Ints, slack: float) -> tuple[Ints, Floats]:
         """The edges of another line that normals meet first, and the places there between 0 and 1."""
@@ -139,14 +139,11 @@ class Seen:
     ----------
     gap : array, shape (nodes of the one,)
         Distance along the normal at each node, negative where it lies behind.
-    met : array, shape (nodes of the one,)
-        Position on the other line where that normal meets it.
     s : array, shape (nodes of the other,)
         Positions of its nodes on the one; nodes beyond the ends go on at the pace of the outermost edges.
     """
 
     gap: Floats
-    met: Floats
     s: Floats
 
 

@@ -45,12 +45,12 @@ def drawn() -> Figure:
         figure = new_figure(10.2, 3.5)
         push, press, mix = figure.subplots(1, 3)
         surface = _body(push, run, 2, upper)
-        _arrows(push, surface, surface - np.outer(unit * g, [0, 1]), surface)
+        _arrows(push, surface - np.outer(unit * g, [0, 1]), surface)
         push.text(0.8, 0.3, "body 2", **NAME)
         push.text(0.8, surface[:, 1].min() - 0.3, "forces g", **NAME)
         _body(press, run, 1, lower)
         press.plot(*surface.T, color=BODIES[1], linewidth=4)
-        _arrows(press, surface, surface, surface + np.outer(unit * image, [0, 1]))
+        _arrows(press, surface, surface + np.outer(unit * image, [0, 1]))
         press.text(0.8, -0.5, "body 1", **NAME)
         press.text(0.8, surface[:, 1].max() + 0.3, "forces T g", **NAME)
         push.set(ylim=(-0.52, 0.72))
@@ -75,7 +75,7 @@ def _body(ax: Axes, run: vf.Run, number: int, u: Floats) -> Floats:
     return np.asarray(points[body.nodes])
 
 
-def _arrows(ax: Axes, surface: Floats, begin: Floats, end: Floats) -> None:
+def _arrows(ax: Axes, begin: Floats, end: Floats) -> None:
     """Forces on body 2, one at each contact node that carries one."""
     for start, stop in zip(begin, end, strict=True):
         if stop[1] > start[1]:

@@ -630,7 +630,7 @@ check(
 )
 
 # from here on an edition is its m, its P and its Q, all as symbols where no more of them is needed
-P_, Q_, G_ = nonnegative("P Q G")
+P_, Q_ = nonnegative("P Q")
 a_ = 1 + 2 * (Q_ * m**2 / A**2 - P_) + Q_  # C_T^2/C_R^2 = Q m^2/A^2
 b_ = -2 * (1 + Q_ * m**2 / A**2 - P_)
 #: Of m, M and C_R only the ratio A/m >= 2 enters h_1: m = 1, M = 2 reach all.  (A/m)^4 (M/m)^2 <= Q, the value without

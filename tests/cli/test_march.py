@@ -52,6 +52,14 @@ def test_both_methods_give_the_same_forces(call, path):
     assert "iterations" in two["increments"][0]["reason"]
 
 
+@pytest.mark.parametrize("words", [["--theta", "0.6"], ["--relaxation", "newton"]])
+def test_another_theta_or_rule_gives_the_same_forces_in_other_steps(call, path, words):
+    one, two = (call("march", path, "--json", *given).document for given in ([], words))
+    assert [i["iterations"] for i in one["increments"]] != [i["iterations"] for i in two["increments"]]
+    for a, b in zip(one["increments"], two["increments"], strict=True):
+        assert a["force"]["normal"] == pytest.approx(b["force"]["normal"], rel=1e-6, abs=1e-6)
+
+
 def test_the_folder_holds_tables_views_and_a_series_for_paraview(path, written):
     names = {file.name for file in written.iterdir()}
     assert names >= {"history.json", "history.csv", "contact.csv", "body1.pvd", "body2.pvd", "loop.svg", "states.png"}

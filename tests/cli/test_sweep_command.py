@@ -137,6 +137,16 @@ def test_a_second_call_runs_nothing_and_says_so(call, sweep_file, tmp_path, monk
     assert (tmp_path / "grid.csv").read_text("utf-8") == text
 
 
+def test_rows_go_into_the_store_that_is_named_and_come_from_it(call, sweep_file, tmp_path, monkeypatch):
+    store = tmp_path / "rows.db"
+    first = call("sweep", sweep_file(), "--jobs", 1, "--store", store)
+    assert not (tmp_path / "grid.sqlite").exists()
+    monkeypatch.setattr(workers, "row", None)
+    again = call("sweep", sweep_file(), "--jobs", 1, "--store", store)
+    assert (again.status, again.out) == (0, first.out)
+    assert again.err.splitlines()[0] == f"{store}: 4 of 4 rows were there"
+
+
 def test_after_ctrl_c_the_same_command_goes_on(call, sweep_file, tmp_path, monkeypatch):
     row, seen = workers.row, []
 

@@ -1,14 +1,11 @@
 """The index of equations finds what names a statement, and nothing that does not."""
 
 import re
-from pathlib import Path
 
 import pytest
 
 from ndtheory.statements import statements
 from verification.ledger import quote
-
-ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")

@@ -20,11 +20,9 @@ from strategies import (
     vectors,
 )
 
-from fem1d2d import Material, Mesh, bar, body_load, element, gram, interval, rectangle, side_load, stiffness
+from fem1d2d import Material, Mesh, bar, body_load, element, gram, interval, rectangle, stiffness
 from fem1d2d.assembly import facet_weights
 from fem1d2d.mesh import measures
-
-HALF = Fraction(1, 2)
 
 
 def dense(mesh, elements):
@@ -257,6 +255,10 @@ def test_a_body_force_on_a_bar_is_half_a_cell_at_each_of_its_nodes(mesh, force, 
 def test_the_total_of_a_body_force_is_force_times_area(nx, ny, width, force):
     mesh = rectangle((0.0, float(3 * width * nx)), (1.0, 1.0 + ny), (nx, ny))
     assert np.array_equal(body_load(mesh, force.astype(float)).sum(axis=0), (force * 3 * width * nx * ny).astype(float))
+
+
+def side_load(mesh, facets, traction):
+    return facet_weights(mesh, facets)[:, None] * np.asarray(traction)
 
 
 @fewer(3, at_night=1)

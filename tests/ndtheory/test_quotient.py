@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from ndtheory.symbolic.engine import nonnegative, positive
 from ndtheory.symbolic.quotient import NotRational, Quotient, sign
 
-x, y = positive("x y")
+x = positive("x")
 p, q = nonnegative("p q")
 real = sp.Symbol("t", real=True)
 

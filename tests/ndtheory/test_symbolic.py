@@ -21,7 +21,7 @@ from ndtheory.symbolic.symbols import DIMENSIONS
 CHECKS = checks()
 NAMES = [f"{check.id} {i}" for i, check in enumerate(CHECKS)]
 x, y = engine.positive("x y")
-p, q = engine.nonnegative("p q")
+p = engine.nonnegative("p")
 
 
 # --- the engine ----------------------------------------------------------------------------------------------------

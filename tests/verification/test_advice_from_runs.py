@@ -231,7 +231,6 @@ def test_following_the_advice_ends_in_a_theta_that_converges_within_a_few_runs(n
     assert converged(residuals)
 
 
-@pytest.mark.slow
 def test_a_steady_divergence_bounds_rho_and_is_no_mode():
     """A nearly incompressible Neumann body: 4.51 a step with 16 of 25 nodes open, although no mode is -4.51."""
     pair = plates(1e3, 5e4, 1, "0", poisson="0.49", cells=((40, 6), (24, 6)))

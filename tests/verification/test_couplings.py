@@ -175,7 +175,6 @@ def test_the_contact_step_of_the_couplings_obeys_the_conditions_of_signorini(mad
 CHOSEN = (0, 3, 17, 29)
 
 
-@pytest.mark.slow
 def test_following_the_logs_of_another_code_costs_at_most_1_4_times_the_fewest_steps(made, tmp_path):
     chosen = [one for i, one in enumerate(made.couplings()) if i in CHOSEN]
     found = list(made.followed(chosen, 0.5, tmp_path))

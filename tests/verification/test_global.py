@@ -82,7 +82,6 @@ def deviations(level: int) -> tuple[float, float, float]:
     )
 
 
-@pytest.mark.slow
 def test_three_independent_codes_are_met_within_half_a_percent_and_refinement_comes_closer() -> None:
     """Total force 1200.9 N/mm on their finest mesh."""
     coarse, middle, fine = (deviations(level) for level in (0, 1, 2))
@@ -175,7 +174,6 @@ def hertz(tmp_path: Path, n: int) -> tuple[float, float]:
     return abs(math.sqrt(4 * moment) / a - 1), abs(contact.pressure[0] / (2 * load / math.pi / a) - 1)
 
 
-@pytest.mark.slow
 def test_a_cylinder_on_a_plane_has_the_half_width_and_peak_pressure_of_hertz(tmp_path: Path) -> None:
     errors = [hertz(tmp_path, n) for n in (32, 128)]
     width, peak = (np.array(column) for column in zip(*errors, strict=True))
@@ -185,7 +183,6 @@ def test_a_cylinder_on_a_plane_has_the_half_width_and_peak_pressure_of_hertz(tmp
     assert math.log2(peak[0] / peak[-1]) / 2 >= 0.9  # order 1: the peak is the force of one node over its weight
 
 
-@pytest.mark.slow
 def test_the_pressure_under_a_rigid_flat_punch_is_that_of_the_half_plane(tmp_path: Path) -> None:
     """``p = P/(pi sqrt(a^2 - x^2))`` without friction, away from the edge; the other half by symmetry."""
     worst = []

@@ -120,7 +120,6 @@ def nearly_incompressible():
     return pair_from(vf.Problem.from_dict(data))
 
 
-@pytest.mark.slow
 def test_a_steady_divergence_with_open_nodes_bounds_rho_and_is_neither_mode_nor_plateau(
     tmp_path, nearly_incompressible
 ):
@@ -276,7 +275,6 @@ def test_following_the_logs_pastes_a_theta_that_converges_in_few_steps(tmp_path,
     assert np.quantile(costs, 0.9) <= 1.4
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("friction", ["0", "0.2"])
 @pytest.mark.parametrize("moduli", [(2e4, 7e4, 1), (7e4, 2e4, 2), (7e4, 2e4, 1)], ids=str)
 def test_following_the_logs_of_two_bodies_in_contact_ends_in_a_theta_that_converges(tmp_path, moduli, friction):

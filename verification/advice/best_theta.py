@@ -207,7 +207,7 @@ def _linearised(pair: ContactPair) -> Least:
         raise NotLinear("contact and friction just hold the contact body: a change of g sets it in motion")
     eigenvalues = np.diagonal(piece.modes[0])
     radius = lambda theta: float(np.abs(1 - theta + theta * eigenvalues).max(initial=0.0))
-    found = _least(radius, 1e-6, 1.0, 1e-6)
+    found = _least(radius, 1e-6, 1.0)
     if radius(1.0) <= found.factor:
         raise NotLinear("the spectral radius falls up to theta = 1")
     return found
@@ -226,7 +226,7 @@ def _semidefinite(pair: ContactPair, measured: Measured, predicted: float) -> Le
         if proposal is None:
             break
         below.append(forms.square_from_below(proposal))
-        lowest = _least(lambda theta: max(float(parabola(theta)) for parabola in below), low, high, 1e-6)
+        lowest = _least(lambda theta: max(float(parabola(theta)) for parabola in below), low, high)
         square = min(each.factor for each in found) ** 2
         if square - lowest.factor <= CLOSE * min(square, abs(1 - square)):
             break
@@ -235,12 +235,12 @@ def _semidefinite(pair: ContactPair, measured: Measured, predicted: float) -> Le
     return best if best.factor < 1 else None
 
 
-def _least(factor: Callable[[float], float], low: float, high: float, accuracy: float) -> Least:
+def _least(factor: Callable[[float], float], low: float, high: float) -> Least:
     """The least value of a convex function of theta between two thetas."""
     found = minimize_scalar(
         lambda power: factor(math.exp(power)),
         bounds=(math.log(low), math.log(high)),
         method="bounded",
-        options={"xatol": accuracy},
+        options={"xatol": 1e-6},
     )
     return Least(theta=math.exp(found.x), factor=float(found.fun))

@@ -188,7 +188,7 @@ def _read_lines(path: Path, text: str, form: Form) -> Log:
     relaxation.
     """
     other = None if form.accelerator is None else form.accelerator.search(text)
-    found = _Lines(path, form)
+    found = _Lines(path)
     for line, match in _matches(text, form):
         found.add(line, match)
     if not found.windows:
@@ -224,8 +224,8 @@ def _read_lines(path: Path, text: str, form: Form) -> Log:
 class _Lines:
     """Residuals by field and window, and factors, as lines are read."""
 
-    def __init__(self, path: Path, form: Form) -> None:
-        self.path, self.form = path, form
+    def __init__(self, path: Path) -> None:
+        self.path = path
         self.windows: dict[str, list[list[float]]] = {}
         self.written: dict[str, list[str]] = {}
         self.factors: list[str] = []  # Kratos 10 writes one figure of a constant one

@@ -24,10 +24,10 @@ CLOSEST_TO_ONE = 1 - 1e-6
 TOO_SLOW = 2
 
 
-def energy_bounds(measured: Measured, theta: Numeric | None = None) -> EnergyBounds | None:
+def energy_bounds(measured: Measured) -> EnergyBounds | None:
     """Evaluate the theorem in energy norms for measured constants; None where they do not exist."""
     constants = measured.energy_constants()
-    return None if constants is None else evaluate_energy(constants, theta)
+    return None if constants is None else evaluate_energy(constants)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -77,8 +77,8 @@ class Enclosure:
         The largest ``|J|`` found, and its piece.
     tree : Leaf or Division
         The sets of pieces into which all were divided, with the proof of each.
-    programs, why_apart : int, str
-        Number of programs that were solved; why the gap is larger than was asked for.
+    programs : int
+        Number of programs that were solved.
     """
 
     upper: Certified
@@ -87,7 +87,6 @@ class Enclosure:
     lower: float
     piece: Piece
     programs: int
-    why_apart: str
 
     @property
     def gap(self) -> float:
@@ -151,7 +150,7 @@ def enclose(
         patterns = [*search.extremes(), *_read_off(forms, root, search.sign)]
         best = max((search.climb(search.found(*pattern)) for pattern in patterns), key=lambda found: found.value)
         order, solved, mirror = count(), 1, forms.mirror
-        leaves, bounded, why = [(-upper.value, next(order), root)], {root.pieces.key: root}, ""
+        leaves, bounded = [(-upper.value, next(order), root)], {root.pieces.key: root}
         divisions: dict[bytes, tuple[str, int]] = {}
         while True:
             worst, lower = leaves[0][2], best.piece.factor(theta)
@@ -159,11 +158,9 @@ def enclose(
                 break
             division = _division(forms, worst, lower)
             if division is None:
-                why = "the worst set of pieces cannot be divided"
                 break
             parts = worst.pieces.divided(*division)
             if programs is not None and solved + len(parts) > programs:
-                why = f"{solved} programs were solved"
                 break
             stop = Stop(accuracy=gap / 100, enough=((1 + gap) * lower) ** 2 * (1 - SAME_BOUND))
             progress(f"semidefinite bound: {worst.upper.value / lower - 1:.2%} above a factor that occurs", None)
@@ -189,13 +186,7 @@ def enclose(
         return Division(name=name, node=node, cases=tuple(map(tree, pieces.divided(name, node))))
 
     return Enclosure(
-        upper=worst.upper,
-        whole=root.upper,
-        tree=tree(root.pieces),
-        lower=lower,
-        piece=best.piece,
-        programs=solved,
-        why_apart=why,
+        upper=worst.upper, whole=root.upper, tree=tree(root.pieces), lower=lower, piece=best.piece, programs=solved
     )
 
 
@@ -292,8 +283,8 @@ class Semidefinite:
         A Lipschitz constant of T_theta in the norm (5.21), checked in doubles with a bound on their rounding.
     lower : float
         The largest factor found, of an affine piece of T_theta that some loads and gaps bring about.
-    programs, why_apart : int, str
-        Number of programs that brought both so close; why they are further apart than was asked for.
+    programs : int
+        Number of programs that brought both so close.
     theta_max : Number or None
         Every smaller theta contracts; None where none is proved to.
     friction_threshold, no_threshold : Number or None, str
@@ -313,7 +304,6 @@ class Semidefinite:
     lipschitz: Number
     lower: float
     programs: int
-    why_apart: str
     theta_max: Number | None
     friction_threshold: Number | None
     gave_up: str = ""
@@ -440,7 +430,6 @@ def work_out(
         largest=() if largest is None else freeze(tuple(map(np.array, largest.multipliers))),
         lower=found.lower,
         programs=found.programs,
-        why_apart=found.why_apart,
         theta_max=None if largest is None else Number.of_float(largest.value),
         friction_threshold=None if allowed is None else Number.of_float(allowed),
         gave_up=found.upper.gave_up,

@@ -32,7 +32,7 @@ from verification.cli.console import NOTHING, SHOWN, Interrupted, complain, gone
 from verification.cli.forms import AdviseGroup, Commands
 
 #: Exit statuses of the interface.  A crash is none of them.
-DONE, NOT_MET, BAD_INPUT, INCONCLUSIVE, INTERRUPTED, CRASH = 0, 1, 2, 3, 130, 70
+DONE, NOT_MET, BAD_INPUT, INTERRUPTED, CRASH = 0, 1, 2, 130, 70
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 80})

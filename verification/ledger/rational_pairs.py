@@ -112,8 +112,8 @@ class RationalSolution:
 class RationalPair:
     """The difference of two solutions of steps I and II for a problem without loads on one grid, all rational."""
 
-    def __init__(self, table: Mapping[str, Any] = BLOCKS, forces: tuple[Exact, ...] = FORCES) -> None:
-        problem = Problem.from_dict(table)
+    def __init__(self) -> None:
+        problem = Problem.from_dict(BLOCKS)
         self.pair = pair = pair_from(problem)
         self.one, self.two = (ExactSide(problem, side) for side in (pair.contact, pair.neumann))
         x = [exact_points(getattr(problem, s.mesh_body.name), s.mesh_body) for s in (pair.contact, pair.neumann)]
@@ -122,7 +122,7 @@ class RationalPair:
         k: Any = problem.contact.friction
         self.kernel, self.limits = joined.exact_kernel, k * joined.grid.weights
         self.n = pair.contact.grid.n
-        self.solutions = tuple(map(self.solve, forces))
+        self.solutions = tuple(map(self.solve, FORCES))
         one, other = self.solutions
         self.force, self.reaction = one.g - other.g, one.reaction - other.reaction
         self.d_1, self.d_2 = one.w_1 - other.w_1, one.w_2 - other.w_2

@@ -71,26 +71,26 @@ def marked(text: str, level: Level) -> str:
     return f"{text} {MARKS[level]}".rstrip()
 
 
-def at_least(number: Number | None, digits: int = 3) -> Cell:
+def at_least(number: Number | None) -> Cell:
     """A lower bound, rounded down: the lower end of the enclosure, if there is one.
 
     >>> print(at_least(Number(value=0.2, lo=0.19999, hi=0.20001, level="verified")), at_least(Number.of_float(0.2)))
     0.199 v 0.200
     """
-    return figures(number, digits) if number is None or number.lo is None else _end(number, number.lo, digits, up=False)
+    return figures(number, 3) if number is None or number.lo is None else _end(number, number.lo, up=False)
 
 
-def at_most(number: Number | None, digits: int = 3) -> Cell:
+def at_most(number: Number | None) -> Cell:
     """An upper bound, rounded up: the upper end of the enclosure, if there is one.
 
     >>> print(at_most(Number(value=0.2, lo=0.19999, hi=0.20001, level="verified")), at_most(None))
     0.201 v -
     """
-    return figures(number, digits) if number is None or number.hi is None else _end(number, number.hi, digits, up=True)
+    return figures(number, 3) if number is None or number.hi is None else _end(number, number.hi, up=True)
 
 
-def _end(number: Number, end: float, digits: int, *, up: bool) -> Quantity:
-    return Quantity(end, marked(rounded(end, digits, up=up), number.level), level=number.level)
+def _end(number: Number, end: float, *, up: bool) -> Quantity:
+    return Quantity(end, marked(rounded(end, 3, up=up), number.level), level=number.level)
 
 
 def between(number: Number | None, digits: int = 12, unit: str = "") -> tuple[Cell, Cell]:

@@ -40,9 +40,6 @@ MOST_HALVINGS = 8
 #: The keys of a range of values.
 RANGE = ("start", "stop", "step")
 
-#: The arguments of one row: a value of the grid by the name of its axis.
-Values = Mapping[str, Any]
-
 _moduli = "two numbers > 0, Young's modulus of body 1 and of body 2"
 
 

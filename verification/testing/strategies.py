@@ -166,7 +166,7 @@ def plane_problems(
 
 
 @st.composite
-def bar_problems(draw: st.DrawFn, theta: Numbers | None = None) -> dict[str, Any]:
+def bar_problems(draw: st.DrawFn) -> dict[str, Any]:
     """Two bars that meet at a point, both ends held, with body forces."""
     a, b = draw(decimals(-1.5, 1)), draw(decimals(-1.5, 1))
     origin = draw(st.sampled_from([Fraction(0), Fraction(-5, 3)]))
@@ -182,10 +182,7 @@ def bar_problems(draw: st.DrawFn, theta: Numbers | None = None) -> dict[str, Any
         "body1": bodies[0],
         "body2": bodies[1],
         "contact": {"gap": draw(st.sampled_from([Fraction(0), a / 100]))},
-        "iteration": {
-            "neumann_body": draw(st.sampled_from([1, 2])),
-            "theta": draw(thetas() if theta is None else theta),
-        },
+        "iteration": {"neumann_body": draw(st.sampled_from([1, 2])), "theta": draw(thetas())},
         "norm": {"length": draw(decimals(-1, 2))},
     }
 
@@ -210,16 +207,13 @@ def positive_definite(random: np.random.Generator, size: int) -> Floats:
 
 
 @st.composite
-def matrix_pairs(
-    draw: st.DrawFn, *, friction: Numbers | None = None, unlike: bool | None = None, most_nodes: int = 4
-) -> ContactPair:
+def matrix_pairs(draw: st.DrawFn, *, friction: Numbers | None = None, most_nodes: int = 4) -> ContactPair:
     """Pairs made from random matrices, loads, gaps and kernels, in both roles.
 
-    Friction is by default 0 to 1, often 0.  ``unlike`` grids have a random transfer that carries a constant exactly; by
-    default grids are alike or not.
+    Friction is by default 0 to 1, often 0.  Grids that differ have a random transfer that carries a constant exactly.
     """
     n = m = draw(st.integers(1, most_nodes))
-    differ = draw(st.booleans()) if unlike is None else unlike
+    differ = draw(st.booleans())
     if differ:
         m = draw(st.integers(1, most_nodes))
     role: Literal[1, 2] = draw(st.sampled_from([1, 2]))
@@ -255,14 +249,12 @@ def mesh_pairs(**plane: Any) -> st.SearchStrategy[ContactPair]:
     return problems(**({"most_cells": 3} | plane)).map(build)
 
 
-def pairs(*, friction: Numbers | None = None, unlike: bool | None = None) -> st.SearchStrategy[ContactPair]:
+def pairs(*, friction: Numbers | None = None) -> st.SearchStrategy[ContactPair]:
     """Pairs of every kind: from matrices and from small meshes, with and without friction, in both roles.
 
-    Friction is by default 0 to 1; bars have none.  ``unlike`` gives only pairs whose grids differ, False only pairs
-    whose grids do not: grids of meshes never do.
+    Friction is by default 0 to 1; bars have none.
     """
-    of_matrices = matrix_pairs(friction=friction, unlike=unlike)
-    return of_matrices if unlike else st.one_of(of_matrices, mesh_pairs(friction=friction))
+    return st.one_of(matrix_pairs(friction=friction), mesh_pairs(friction=friction))
 
 
 def force_scale(pair: ContactPair) -> float:
