@@ -32,7 +32,7 @@ class HypothesisError(ValueError):
             shown = f"an integer of {value.bit_length()} bits"
         text = printable(str(shown))  # one line, whatever was received
         text = text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
-        super().__init__(f"{key} {'is missing' if value is None else '= ' + text}: needed {needed}")
+        super().__init__(f"{key} = {text}: needed {needed}")
         self.key = key
         self.value = value
         self.needed = needed

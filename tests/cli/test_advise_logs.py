@@ -74,7 +74,7 @@ def test_each_theta_belongs_to_the_log_of_its_place(call, log):
 @pytest.mark.parametrize(
     ("words", "fragment"),
     [
-        (["--log", "LOG"], "--theta is missing: needed the relaxation factor of"),
+        (["--log", "LOG"], "--theta = None: needed the relaxation factor of"),
         (["--log", "LOG", "--theta", "0.5", "--pattern", "("], "--pattern = (: needed a regular expression"),
         (["--theta", "0.5", "--ratio", "0.9", "--pattern", "(x)"], "--pattern without --log"),
         (["--ratio", "0.9"], "received 0 --theta with 0 --log"),
@@ -194,7 +194,7 @@ def test_the_screen_of_an_aitken_log_shows_both_ends_as_estimates_and_pastes_whe
     [
         (["run", "precice-A-convergence.log"], ["precice-A-convergence.log", "after --log"]),
         (["precice-A-convergence.log"], ["ndtheory advise run --log precice-A-convergence.log --theta X"]),
-        (["run", "--log", "precice-A-convergence.log"], ["--theta is missing", "name it", "Aitken", "iterations.log"]),
+        (["run", "--log", "precice-A-convergence.log"], ["--theta = None", "name it", "Aitken", "iterations.log"]),
     ],
 )
 def test_a_log_given_in_another_way_gets_the_call_that_reads_it(call, tmp_path, monkeypatch, words, parts):

@@ -57,20 +57,33 @@ def test_a_misspelt_value_of_a_file_is_answered_alike(call, write, key, value, m
 @pytest.mark.parametrize(
     ("pair", "meant"),
     [
-        ("friction=0.4", "'contact.friction'"),
-        ("theta=0.4", "'iteration.theta'"),
-        ("young=1", "'body1.young' or 'body2.young'"),
+        ("friction=0.4", "did you mean 'contact.friction'?"),
+        ("theta=0.4", "did you mean 'iteration.theta'?"),
+        ("young=1", "did you mean 'body1.young' or 'body2.young'?"),
+        ("relaxation=newton", "did you mean 'iteration.relaxation'?"),
+        ("stress=Pa", "did you mean 'units.stress'?"),
+        ("top=[0,1]", "known here: dimension, title, units, plane, body1, body2, contact, iteration, step, norm"),
     ],
 )
 def test_a_key_without_its_table_is_answered_with_the_tables_that_have_it(call, write, pair, meant):
-    assert call("run", write(), "--set", pair).complaint.endswith(f"unknown key; did you mean {meant}?")
+    assert call("run", write(), "--set", pair).complaint.endswith(f"unknown key; {meant}")
 
 
-@pytest.mark.parametrize("value", ["70 GPa", "2.1e5MPa", "7e4 N/mm^2"])
+@pytest.mark.parametrize("value", ["70 GPa", "2.1e5MPa", "7e4 N/mm^2", "1/3 GPa", "1,5 MPa"])
 def test_a_value_with_its_unit_is_answered_that_files_have_none(call, write, value):
     assert call("run", write(), "--set", f"body1.young={value}").complaint.endswith(
-        "needed a number > 0, without its unit"
+        "needed a number > 0, without a unit"
     )
+
+
+@pytest.mark.parametrize("value", ["1e", "1e-", '"1e400"', "1e5.5", "0x10g", ".x", "auto", "1/3x"])
+def test_a_text_without_a_unit_is_not_said_to_have_one(call, write, value):
+    assert "without a unit" not in call("run", write(), "--set", f"body1.young={value}").complaint
+
+
+def test_a_vector_with_units_is_answered_alike(call, write):
+    line = call("run", write(), "--set", 'body2.prescribed.top=["0 mm", "-1 mm"]').complaint
+    assert line.endswith('along x and y ("free" leaves a component free), without a unit')
 
 
 def test_a_misspelt_example_in_the_file_of_a_sweep_is_answered_alike(call, tmp_path):

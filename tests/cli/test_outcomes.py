@@ -4,6 +4,7 @@ import errno
 import re
 import signal
 from dataclasses import replace
+from email.message import Message
 
 import pytest
 
@@ -94,10 +95,18 @@ def test_a_crash_says_that_it_is_one_and_is_no_status_of_the_interface(call, wri
     assert answer.status == CRASH
     assert answer.out == ""
     assert "Traceback" in answer.err
-    assert (
-        "this is a bug; please report it with the lines above, the command and its files: "
-        in answer.err.splitlines()[-1]
-    )
+    says = "ndtheory: this is a bug; please report it, with the lines above, the command and its files, at "
+    assert answer.err.splitlines()[-1] == says + "the issue tracker of the repository that this copy came from"
+
+
+@pytest.mark.parametrize("before", [[], ["no address"]])
+def test_a_crash_names_the_tracker_of_the_metadata(call, write, monkeypatch, before):
+    metadata = Message()
+    for line in [*before, "Issues, https://x.example/issues"]:
+        metadata["Project-URL"] = line
+    monkeypatch.setattr("importlib.metadata.metadata", lambda name: metadata)
+    monkeypatch.setattr("verification.interface.pair.pair_from", lambda problem, law=None: 1 / 0)
+    assert call("run", write()).err.endswith(" at https://x.example/issues\n")
 
 
 @pytest.mark.parametrize(

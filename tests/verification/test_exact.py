@@ -112,6 +112,7 @@ def test_an_answer_is_the_same_each_time_and_more_programs_come_closer():
     assert one.programs <= 5
     assert one.gap > 1e-9
     more = enclose(pair, forms, 0.5, gap=1e-9, programs=12)
+    assert more.programs > one.programs
     assert more.upper.value <= one.upper.value
     assert more.lower >= one.lower
 

@@ -32,7 +32,6 @@ from verification.ledger.differences import uniform_piece
 EIGENVALUES = ("(5.18)", "(5.19)", "(5.22)", "(5.23)", "(5.29)")
 SEARCHED = ("(5.11)", "(5.16)", "(5.30)", "(5.38)")
 
-#: Inequalities between squares; the loss counts the squares.
 
 seeds = st.integers(0, 2**32 - 1)
 

@@ -376,7 +376,7 @@ def rule_of(rule: Rule | str | type) -> Rule:
     Raises
     ------
     ValueError
-        No rule has that name, or a rule has none.
+        No rule has that name; a rule without a name or words; a class in place of its object.
     """
     if isinstance(rule, Rule):
         missing = [key for key in ("name", "words") if not hasattr(rule, key)]

@@ -194,7 +194,7 @@ def _tracker() -> str:
 
     urls: dict[str, str] = {}
     with contextlib.suppress(PackageNotFoundError):  # not installed
-        urls.update(line.split(", ", 1) for line in metadata("ndtheory").get_all("Project-URL") or [])
+        urls.update(line.partition(", ")[::2] for line in metadata("ndtheory").get_all("Project-URL") or [])
     return urls.get("Issues", "the issue tracker of the repository that this copy came from")
 
 
@@ -213,5 +213,7 @@ def _explain(error: Exception) -> int:
         return BAD_INPUT
     for line in traceback.format_exc().splitlines():
         complain(line)
-    complain(f"ndtheory: this is a bug; please report it with the lines above, the command and its files: {_tracker()}")
+    complain(
+        f"ndtheory: this is a bug; please report it, with the lines above, the command and its files, at {_tracker()}"
+    )
     return CRASH

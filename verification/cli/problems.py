@@ -372,7 +372,7 @@ def _exchanged(pair: ContactPair) -> ContactPair | None:
 
 
 def _worth_trying(rho: float) -> float:
-    """2/(2 + rho), and below 1 when it is written with two figures."""
+    """2/(2 + rho), and below 1 when it is written with a few figures."""
     return min(2 / (2 + rho), 0.99)
 
 

@@ -409,7 +409,7 @@ def _check_free(problem: Problem, name: Name, mesh: Mesh, known: Supports, nodes
     )
     where = ", ".join(f"{c:g}" for c in mesh.points[nodes[j]].astype(float))
     key, value = ("fixed", list(spec.fixed)) if holds in spec.fixed else (f"prescribed.{holds}", None)
-    needed = f"needed the normal component of every contact node free, this side holds the one at ({where})"
+    needed = f"needed the normal component of every contact node free, side {holds!r} holds the one at ({where})"
     raise problem.refuse(f"{own}.{key}", value, needed)
 
 

@@ -35,6 +35,7 @@ from verification.problem.specs import (
     read_theta,
 )
 from verification.problem.tables import (
+    NO_UNIT,
     ProblemError,
     TomlTable,
     Unfit,
@@ -314,8 +315,8 @@ def _components(dimension: int, *, free: bool) -> Any:
         listed = [value] if dimension == 1 and not isinstance(value, (list, tuple)) else value
         try:
             return several(one, dimension, needed)(listed)
-        except Unfit:
-            raise Unfit(f"needed {needed}") from None
+        except Unfit as error:
+            raise Unfit(f"needed {needed}" + NO_UNIT * str(error).endswith(NO_UNIT)) from None
 
     return read
 

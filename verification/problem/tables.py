@@ -127,7 +127,7 @@ def number(needed: str = "a number", holds: Callable[[Fraction], bool] = lambda 
             result = exact(value)
         except ValueError:
             unit = isinstance(value, str) and NUMBER_AND_UNIT.fullmatch(value)
-            raise Unfit(f"needed {needed}" + ", without its unit" * bool(unit)) from None
+            raise Unfit(f"needed {needed}" + NO_UNIT * bool(unit)) from None
         if result and not SMALLEST <= abs(result) <= LARGEST:
             raise Unfit(f"needed {needed}, of a size between {float(SMALLEST):g} and {float(LARGEST):g}")
         if not (holds(result) and holds(Fraction(float(result)))):
@@ -137,8 +137,11 @@ def number(needed: str = "a number", holds: Callable[[Fraction], bool] = lambda 
     return read
 
 
-#: A number with a unit behind it, as 70 GPa.
-NUMBER_AND_UNIT = re.compile(r"\s*[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*[^\W\d_].*")
+#: A number with a unit behind it, as 70 GPa; what begins with e or x at once belongs to the number.
+NUMBER_AND_UNIT = re.compile(r"\s*[-+]?[\d.][\d.,/]*(?:[eE][-+]?\d+)?(?:\s+|(?![eExX]))[^\W\d_].*")
+
+#: The end of an error about such a text.
+NO_UNIT = ", without a unit"
 
 positive = number("a number > 0", lambda v: v > 0)
 non_negative = number("a number >= 0", lambda v: v >= 0)
@@ -219,7 +222,8 @@ class TomlTable:
         self._file = file
         self._path = path
         self._known: list[str] = []
-        self._below: list[TomlTable] = []
+        self._free: list[str] = []  # names that only this file has, as those of sides
+        self._below: list[TomlTable] = []  # those whose keys are fixed
 
     def key(self, name: str) -> str:
         """Return the dotted path of a key in this table, an empty one in quotes."""
@@ -249,8 +253,9 @@ class TomlTable:
 
     def within(self, name: str, value: Mapping[str, Any]) -> TomlTable:
         """Return the value of a key as a table."""
-        self._below.append(TomlTable(value, self._file, self.key(name)))
-        return self._below[-1]
+        table = TomlTable(value, self._file, self.key(name))
+        self._below.append(table)
+        return table
 
     def table(self, name: str, *, required: bool = False) -> TomlTable:
         """Read a sub-table; a missing one is empty unless required."""
@@ -264,6 +269,7 @@ class TomlTable:
 
     def names(self) -> Iterable[str]:
         """Return the keys not taken yet."""
+        self._free += map(str, self._data)
         return list(self._data)
 
     def close(self) -> None:
@@ -272,7 +278,8 @@ class TomlTable:
             # body3 does not misspell body2: names that differ only in their number are meant as they are
             others = [known for known in self._known if known.rstrip(digits) != str(name).rstrip(digits)]
             near = nearest(str(name), others)
-            meant = near or [table.key(name) for table in self._below if name in table._known]
+            exact = [table.key(name) for table in self._below if name in table._known and name not in table._free]
+            meant = exact or near
             known = (
                 f"did you mean {' or '.join(map(repr, meant))}?" if meant else f"known here: {', '.join(self._known)}"
             )

@@ -4,7 +4,7 @@ Each ``check_`` function draws random pairs of bodies and forces, ``examples`` c
 :class:`Report`, or raises :class:`Refused`, an ``AssertionError`` that names the first property that fails and the
 counterexample.  The strategies that draw the cases are public too.
 
-The kit needs hypothesis, which ``pip install 'ndtheory[test]'`` installs; nothing else in the package does.
+The kit needs hypothesis, ``pip install hypothesis``; nothing else in the package does.
 
 >>> from verification.algorithm.relaxation import Aitken
 >>> print(check_rule(Aitken(), examples=5))  # doctest: +ELLIPSIS, +NORMALIZE_WHITESPACE
@@ -17,7 +17,7 @@ from __future__ import annotations
 try:
     import hypothesis as _hypothesis  # noqa: F401  first, so that a message says that it is missing
 except ImportError:
-    raise ImportError("verification.testing needs hypothesis: pip install 'ndtheory[test]'") from None
+    raise ImportError("verification.testing needs hypothesis: pip install hypothesis") from None
 
 from verification.testing.bounds import check_bound
 from verification.testing.laws import check_law

@@ -65,7 +65,8 @@ def check_rule(rule: Rule, *, examples: int = 20) -> Report:
 
     ``examples`` is the number of cases for each property; the first property that fails raises Refused.
     """
-    kit = Kit(f"rule {rule_of(rule).name!r}", examples)
+    rule = rule_of(rule)
+    kit = Kit(f"rule {rule.name!r}", examples)
     tests: dict[str, tuple[Any, Any]] = {
         "stays at the solution": (SOLVED_PAIRS, _stays),
         "starts afresh": (st.fixed_dictionaries({"case": _begun(), "other": _begun()}), _starts_afresh),
