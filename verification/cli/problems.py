@@ -235,7 +235,7 @@ def compare(
     """Measure constants, evaluate bounds, run, and judge each bound.
 
     Exit 1 where a proved bound is violated or the run stalls or diverges, 3 where rounding hides the answer.  Reaching
-    max_iterations is no failure here: the verdicts judge single steps.
+    max_iterations does not count as a failure here: the verdicts judge single steps.
 
     \b
     Example:
