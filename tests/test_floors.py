@@ -120,7 +120,7 @@ BUDGET = {
     "verification.interface": 3654,
     "verification.ledger": 4405,
     "verification.output": 533,
-    "verification.problem": 2275,
+    "verification.problem": 2276,
     "verification.reproduce": 651,
     "verification.sections": 2563,
     "verification.sweeps": 2402,

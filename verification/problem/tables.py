@@ -223,7 +223,7 @@ class TomlTable:
         self._path = path
         self._known: list[str] = []
         self._free: list[str] = []  # names that only this file has, as those of sides
-        self._below: list[TomlTable] = []  # those whose keys are fixed
+        self._below: list[TomlTable] = []  # the tables in it
 
     def key(self, name: str) -> str:
         """Return the dotted path of a key in this table, an empty one in quotes."""
@@ -278,7 +278,8 @@ class TomlTable:
             # body3 does not misspell body2: names that differ only in their number are meant as they are
             others = [known for known in self._known if known.rstrip(digits) != str(name).rstrip(digits)]
             near = nearest(str(name), others)
-            exact = [table.key(name) for table in self._below if name in table._known and name not in table._free]
+            tables = [table for table in self._below if "[" not in table._path]  # `--set` reaches no member of a list
+            exact = [table.key(name) for table in tables if name in table._known and name not in table._free]
             meant = exact or near
             known = (
                 f"did you mean {' or '.join(map(repr, meant))}?" if meant else f"known here: {', '.join(self._known)}"
