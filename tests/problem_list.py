@@ -116,6 +116,11 @@ PROBLEMS: dict[str, dict[str, Any]] = {
         },
         body2={"prescribed": SHEARED},
     ),
+    "half of a symmetric model": changed(
+        body1={"x": [0, "1.2"], "cells": [6, 2], "prescribed": {"left": [0, "free"]}},
+        body2={"x": [0, "1.2"], "prescribed": {"top": [0, "-0.01"], "left": [0, "free"]}},
+        iteration={"theta": "0.8"},
+    ),
     "left edges aligned": changed(body2={"x": [0, "1.2"]}),
     "part of the top moved, so that it opens": changed(
         body2={"prescribed": {"left": ["0", "free"], "top": [0, "-0.01"]}, "x": [0, "1.2"]},

@@ -16,7 +16,7 @@ method; where its patterns repeat, sweeps of a nonlinear Gauss-Seidel method lea
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -163,15 +163,17 @@ def solve(problem: Problem | TwoBodies | ContactPair | Path | str) -> Solution:
     with one_thread():
         system = contact_system(bodies)
         found = system.solve()
-        jump = system.jump(found.force, found.motion)
+        bound = system.bound(found.force)
         residual = system.residual(found.force, found.motion)
+        shown = bodies.interface.shown
+        if shown is not bodies.interface:
+            system = contact_system(replace(bodies, interface=shown))
+        jump = system.jump(found.force, found.motion)
     return Solution(
         bodies=bodies,
         force=found.force,
         motion=found.motion,
-        contact=ContactFields.of(
-            bodies.interface, force=found.force, bound=system.bound(found.force), jump=jump, state=found.branches
-        ),
+        contact=ContactFields.of(bodies.interface, force=found.force, bound=bound, jump=jump, state=found.branches),
         kkt_residual=residual,
         linear_solves=system.linear_solves,
     )

@@ -106,10 +106,12 @@ def test_nothing_is_proved_of_the_local_law(call, write):
     assert "proved     -" in screen
 
 
-def test_bodies_that_hold_different_components_get_no_advice_and_are_told_why(call, write):
-    complaint = call("advise", write("held tangentially")).complaint
-    assert "problem.toml: contact" in complaint
-    assert "different tangential components" in complaint
+def test_bodies_of_which_one_is_held_along_gamma_c_are_advised_by_prediction(call, write):
+    found = call("advise", write("held tangentially"), "--json").document
+    assert any("held tangentially" in reason for reason in found["outside_theorem"])
+    for role in found["roles"]:
+        assert role["theta_predicted"] < 1
+        assert {role[name] for name in PROVED} == {None}
 
 
 @pytest.mark.parametrize("edits", [None, "wrong roles", "without friction"], ids=str)

@@ -165,7 +165,7 @@ def test_whatever_a_screen_has_to_tell_fits_into_80_columns(call, write, monkeyp
     monkeypatch.chdir(tmp_path)
     write(edits)
     lines = call(command, "problem.toml").out.splitlines()
-    assert lines or (command, edits) == ("advise", "held tangentially")
+    assert lines
     assert [line for line in lines if len(line) > 80] == []
 
 

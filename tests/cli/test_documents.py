@@ -63,7 +63,7 @@ CHOICES = [
 DOCUMENTS = [
     *CALCULATIONS,
     *((command, edits) for command in ("constants", "run", "solve", "compare") for edits in PROBLEMS),
-    *(("advise", edits) for edits in PROBLEMS if edits != "held tangentially"),  # rho does not exist there
+    *(("advise", edits) for edits in PROBLEMS),
     *((command, edits) for command in ("run", "compare") for edits in CHOICES),
 ]
 SCHEMAS = {"advise": "advice"}

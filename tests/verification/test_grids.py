@@ -325,15 +325,11 @@ def test_strong_friction_that_newton_and_sweeps_alone_do_not_solve_is_solved():
 
 
 @pytest.mark.parametrize("moved", ["whole top", "left half"])
-def test_a_run_of_bodies_held_along_gamma_c_converges_to_the_global_method_or_not_at_all(moved):
-    """On an axis of symmetry both bodies are held; on grids that differ the contact node still rubs on free ones."""
-    reading = ModelReading(
-        position=HALF, moved=moved, top="free to slide", neumann_body=2, moduli="exchanged"
-    )  # with node numbers of the one grid taken for the other it converged with no shear at the axis
+def test_a_run_of_bodies_on_an_axis_of_symmetry_converges_to_the_global_method(moved):
+    reading = ModelReading(position=HALF, moved=moved, top="free to slide", neumann_body=2, moduli="exchanged")
     for nodes in (60, 190):
         problem = reading.problem(nodes)
-        run, wanted = vf.run(problem, theta="0.3"), vf.solve(problem).contact
-        if run.converged:
-            assert np.abs(run.contact.shear - wanted.shear).max() < 1e-6 * wanted.pressure.max()
-        held = run.pair.interface.reaches(run.pair.neumann.free)[~run.pair.contact.free]
-        assert held.all()
+        run, wanted = vf.run(problem, theta="0.1"), vf.solve(problem).contact
+        assert run.converged
+        assert np.abs(run.contact.shear - wanted.shear).max() < 1e-6 * wanted.pressure.max()
+        assert run.contact.shear[0] == wanted.shear[0] == 0

@@ -247,9 +247,6 @@ def test_a_horizontal_load_without_friction_is_held_by_nothing() -> None:
 def test_the_constants_are_the_limits_of_those_of_a_body_held_by_ever_softer_springs(name: str) -> None:
     pair = vf.build(problem(name))
     measured, contact, free = vf.measure(pair), pair.contact, pair.contact.free
-    if measured.rho_max is None:
-        assert pair.held
-        return
     S_n, t = pair.neumann.schur, contact.grid.t
     carry = pair.interface.carry_form
     spring = 1e-7 * np.diag(contact.schur).max()

@@ -638,7 +638,8 @@ def advise(problem: Problem | ContactPair | Path | str, *, tied: bool = False, p
     Raises
     ------
     ProblemError
-        As :func:`verification.measure`, and where the bodies hold different components of Gamma_c.
+        As :func:`verification.measure`, and where more contact nodes than interface matrices may have are held
+        differently.
 
     Examples
     --------
@@ -680,8 +681,7 @@ def _exchanged(pair: ContactPair, tied: bool) -> Role:
 def _role(pair: ContactPair, tied: bool) -> Role:
     measured = measure(pair)
     energy = energy_bounds(measured)
-    if measured.rho_max is None:
-        raise ProblemError(pair.source, "contact", None, f"no advice: {measured.why_no_energy}")
+    assert measured.rho_max is not None  # the two bodies have interface matrices
     if energy is None:
         nothing = measured.why_no_energy
         auto = by_prediction(measured.rho_max.value, nothing)

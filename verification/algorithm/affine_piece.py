@@ -161,7 +161,7 @@ class Piece(Value):
         slips = sticks = rubs = np.zeros(0, dtype=np.intp)
         if self.sign.any() and kernel is not None:
             bound, sliding = self.bound @ basis, self.pattern.sliding
-            rubs = np.flatnonzero(self.sign)
+            rubs = np.flatnonzero(np.where(self.pair.contact.free[:t], self.sign, 0))
             slips, sticks = rubs[sliding[rubs] != 0], rubs[sliding[rubs] == 0]
             rows += [sliding[slips, None] * jump[slips], bound[sticks] - reaction[sticks]]
             rows += [bound[sticks] + reaction[sticks], self.sign[rubs, None] * (kernel[rubs] @ basis[neumann.normal])]

@@ -72,17 +72,14 @@ class FixedPointMap:
         obstacle = interface.carry(u) + self.pair.offset
         bound = self.pair.bound(g)
         solution = self._step.solve(contact.load - times(contact.schur, obstacle), bound)
-        return solution if self._all_free else self._held(solution, obstacle, bound)
+        return solution if self._all_free else self._held(solution, obstacle)
 
-    def _held(self, solution: ContactSolution, obstacle: Floats, bound: Floats) -> ContactSolution:
-        """Correct held nodes: their support takes any tangential force, and friction follows only the slip."""
-        v, force = solution.v.copy(), solution.force.copy()
+    def _held(self, solution: ContactSolution, obstacle: Floats) -> ContactSolution:
+        """Correct held nodes: their support takes any shear, and no friction acts."""
+        v, force, sliding = solution.v.copy(), solution.force.copy(), solution.pattern.sliding.copy()
         rows = np.flatnonzero(~self.pair.contact.free)
         v[rows] = self.pair.contact.known[rows] - obstacle[rows]
-        passes = self.pair.interface.reaches(self.pair.neumann.free)[rows]
-        force[rows] = np.where(passes, bound[rows] * np.sign(v[rows]), 0.0)
-        sliding = solution.pattern.sliding.copy()
-        sliding[rows] = np.where(passes, np.sign(v[rows]), 0)
+        force[rows], sliding[rows] = 0.0, 0
         return replace(solution, v=v, force=force, pattern=replace(solution.pattern, sliding=sliding))
 
 

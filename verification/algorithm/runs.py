@@ -199,7 +199,8 @@ class Run(Document):
         pair, solved = self.pair, iterate.contact
         turned = np.ones(len(solved.v))
         turned[pair.contact.grid.tangential] = pair.normal_sign  # to body 1 against body 2
-        force, jump = turned * solved.force, turned * solved.v
+        beside = pair.interface.carry(iterate.displacement) - pair.interface.shown.carry(iterate.displacement)
+        force, jump = turned * solved.force, turned * (solved.v + beside)
         return ContactFields.of(
             pair.interface, force=force, bound=pair.bound(iterate.g), jump=jump, state=solved.pattern
         )

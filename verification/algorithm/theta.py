@@ -15,7 +15,6 @@ from verification.algorithm.relaxation import Rule, Step, rule_of
 from verification.constants import Measured, measure
 from verification.interface.pair import ContactPair
 from verification.problem.specs import read_theta
-from verification.problem.tables import ProblemError
 
 #: A theta chosen for the user stays below 1 by this much, however soft the contact body.
 CLOSEST_TO_ONE = 1 - 1e-6
@@ -74,8 +73,6 @@ def choose(
     ------
     HypothesisError
         A given theta outside (0, 1).
-    ProblemError
-        "auto", or a rule that needs rho, where rho does not exist.
     """
     wanted = pair.settings.theta if theta is None else read_theta(theta)
     relaxation = rule_of(rule or pair.settings.relaxation)
@@ -83,11 +80,7 @@ def choose(
         return Choice(theta=wanted, source="given")
     measured = measured or measure(pair)
     energy = energy_bounds(measured)
-    if measured.rho_max is None:
-        of_rule = relaxation.needs_rho
-        key, value = ("iteration.relaxation", relaxation.name) if of_rule else ("iteration.theta", "auto")
-        needed = f"needed {'another rule' if of_rule else 'a number'}: rho does not exist here"
-        raise ProblemError(pair.source, key, value, needed)
+    assert measured.rho_max is not None  # the two bodies have interface matrices
     rho = (measured.rho_max if energy is None else energy.rho).value
     own = relaxation.own_step(rho) if relaxation.needs_rho else None
     if own is not None:
@@ -111,7 +104,7 @@ def begin(
 
     Raises
     ------
-    HypothesisError, ProblemError
+    HypothesisError
         As for :func:`choose`.
     ValueError
         No rule has that name.

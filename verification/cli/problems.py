@@ -352,8 +352,7 @@ def remedy(finished: Run, swapped: bool) -> str:
         here = "not converged: max_iterations was reached far from a state of contact"
     roles = "without --swap-roles" if swapped else "--swap-roles"
     exchanged = _exchanged(pair)
-    if rho.rho_max is None:
-        return f"{here}; try a smaller theta" + (f", or {roles}" if exchanged else "")
+    assert rho.rho_max is not None  # a run has interface matrices
     beside = None if exchanged is None else measure(exchanged).rho_max
     good, other = _worth_trying(rho.rho_max.value), 0.0 if beside is None else _worth_trying(beside.value)
     typed = lambda value: f"{directed(value, 3, up=False):g}"

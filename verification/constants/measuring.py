@@ -21,7 +21,7 @@ from verification.constants.measured import (
     BodyConstants,
     Measured,
 )
-from verification.constants.operators import TRACES_DIFFER, Pencils, needs_matrices, pair_or_bodies
+from verification.constants.operators import Pencils, needs_matrices, pair_or_bodies
 from verification.constants.proved import verify
 from verification.dense import Cholesky, pinned
 from verification.interface.assembly import TwoBodies
@@ -103,29 +103,20 @@ def _with_matrices(pair: ContactPair) -> Measured:
     else:
         body1, body2 = constants_of(pair.body1.mesh_body), constants_of(pair.body2.mesh_body)
         values |= {"m": min(body1.m.value, body2.m.value), "M": body1.M.value + body2.M.value}
-    if pair.interface.transfer is not None and pair.held:
-        why = "a contact node is held tangentially and the grids differ: no trace space serves both bodies"
-    elif not np.array_equal(pair.contact.free, pair.neumann.free) and pair.interface.transfer is None:
-        why = TRACES_DIFFER
-    else:
-        why = ""
-    if why:
-        reason |= dict.fromkeys(ALL_NAMES[2:], why)
-    else:
-        free, grid = pair.contact.free, pair.contact.grid
-        tangential = (np.arange(grid.size) < grid.t)[free]
-        values |= of_energy(pair, tangential)
-        if meshes:
-            values |= of_section_5(pair, tangential)
-        if pair.interface.kernel is None:
-            reason = dict.fromkeys(("C_s", "C_s_energy"), "no friction and no radius: S is not defined") | reason
-            values |= {"kappa_1": 0.0, "kappa_2": 0.0} | ({"C_K": 0.0} if meshes else {})
-        if pair.contact.slides:
-            reason["C_t1"] = SLIDES
-            if friction:
-                reason["kappa_1"] = f"C_t1 is {SLIDES}"
-            else:
-                values["kappa_1"] = 0.0
+    free, grid = pair.contact.free, pair.contact.grid
+    tangential = (np.arange(grid.size) < grid.t)[free]
+    values |= of_energy(pair, tangential)
+    if meshes:
+        values |= of_section_5(pair, tangential)
+    if pair.interface.kernel is None:
+        reason = dict.fromkeys(("C_s", "C_s_energy"), "no friction and no radius: S is not defined") | reason
+        values |= {"kappa_1": 0.0, "kappa_2": 0.0} | ({"C_K": 0.0} if meshes else {})
+    if pair.contact.slides:
+        reason["C_t1"] = SLIDES
+        if friction:
+            reason["kappa_1"] = f"C_t1 is {SLIDES}"
+        else:
+            values["kappa_1"] = 0.0
     for name, first, second in PRODUCTS:
         a, b = values[first], values[second]
         if a is not None and b is not None:
@@ -207,20 +198,21 @@ def _of(body: Body, smallest: Eigenvalue | None, biggest: Eigenvalue) -> BodyCon
 
 
 def of_section_5(pair: ContactPair, tangential: NDArray[np.bool_]) -> dict[str, float | None]:
-    """C_R, C_tr and C_s of Section 5: matrices on the components that both bodies leave free.
+    """C_R, C_tr and C_s of Section 5: matrices on the components that Gamma_u leaves free.
 
-    Where the grids differ P carries forms of the contact body to the Neumann grid.  Section 5 needs no way back: it
-    lifts only the Neumann body's traces into the contact body.
+    Where the bodies have different traces P carries forms of the contact body to the Neumann grid.  Section 5 needs no
+    way back: it lifts only the Neumann body's traces into the contact body.
     """
     grid, kernel = pair.contact.grid, pair.interface.kernel
     interface = pair.interface_along_y
-    one_grid = interface.transfer is None
+    same = pair.same_traces
     contact, neumann = pair.contact.mesh_body, pair.neumann.mesh_body
     # along y and by number, so that the constants do not depend on the roles, to the last digit
     bodies = (pair.body1.mesh_body, pair.body2.mesh_body)
     E = {body.name: body.gram.schur for body in bodies}
-    fits = [(a, b) for b in bodies for a in bodies if one_grid or a is b or b is neumann]  # a form of a, in norm b
-    felt = lambda form, a, b: form if a is b else interface.carry_form(form)
+    fits = [(a, b) for b in bodies for a in bodies if same or a is b or b is neumann]  # a form of a, in norm b
+    carried = lambda form: interface.carry_free(form, contact.unknown, neumann.unknown)
+    felt = lambda form, a, b: form if same or a is b else carried(form)
     values: dict[str, float | None] = {
         "C_R": float(np.sqrt(max(largest(felt(a.lift_gram, a, b), E[b.name]).value for a, b in fits)))
     }
@@ -237,7 +229,9 @@ def of_section_5(pair: ContactPair, tangential: NDArray[np.bool_]) -> dict[str, 
     if kernel is not None:
         squares = {}
         for body in bodies:
-            force = body.elastic.schur if body is neumann else interface.carry_back(body.elastic.schur)
+            force = np.zeros((len(body.unknown), len(body.interface)))
+            force[body.unknown] = body.elastic.schur
+            force = force if body is neumann else interface.carry_back(force)
             z = kernel @ force[-pair.neumann.grid.n :]
             squares[body.name] = z.T @ (grid.weights[:, None] * z)
         values["C_s"] = float(np.sqrt(max(largest((z + z.T) / 2, E[name]).value for name, z in squares.items())))
@@ -267,13 +261,15 @@ def of_energy(pair: ContactPair, tangential: NDArray[np.bool_]) -> dict[str, flo
         motions = _motions(pair.contact)
         definite = contact if motions is None else pinned(contact, np.arange(len(contact)), motions)
         values["C_t1"] = float(np.sqrt(largest(B_T, definite).value))
-    values["C_t2"] = float(np.sqrt(largest(interface.carry_form(B_T), neumann).value))
+    carried = interface.carry_free(B_T, pair.contact.free, pair.neumann.free)
+    values["C_t2"] = float(np.sqrt(largest(carried, neumann).value))
     return values
 
 
 def pencil(pair: ContactPair) -> tuple[Floats, Floats]:
-    """``P' S_c P`` and S_n on the components that both bodies leave free: rho is the largest eigenvalue."""
-    return pair.interface.carry_form(_free(pair.contact)), _free(pair.neumann)
+    """``P' S_c P`` and S_n on the components that the Neumann body leaves free: rho is the largest eigenvalue."""
+    free = pair.neumann.free
+    return pair.interface.carry_form(pair.contact.schur)[np.ix_(free, free)], _free(pair.neumann)
 
 
 def normal_pencil(pair: ContactPair) -> tuple[Floats, Floats]:
@@ -281,19 +277,20 @@ def normal_pencil(pair: ContactPair) -> tuple[Floats, Floats]:
     grid, transfer, turned = pair.contact.grid, pair.interface.transfer, pair.interface.on_traces
     normal = np.arange(grid.size)[pair.contact.free] >= grid.t
     contact = _condense_tangential(_free(pair.contact), normal, _motions(pair.contact))
-    if turned is not None:  # a normal force on one grid has a tangential part on the other
-        return turned[grid.normal].T @ contact @ turned[grid.normal], _free(pair.neumann)
+    if turned is not None and transfer is not None:  # a normal force on one grid has a tangential part on the other
+        rows = turned[grid.normal][:, pair.neumann.free]
+        return rows.T @ contact @ rows, _free(pair.neumann)
     if transfer is not None:
         contact = transfer.T @ contact @ transfer
-        normal = np.arange(pair.neumann.grid.size) >= pair.neumann.grid.t
+    normal = np.arange(pair.neumann.grid.size)[pair.neumann.free] >= pair.neumann.grid.t
     return contact, _condense_tangential(_free(pair.neumann), normal)
 
 
 def _smallest(pair: ContactPair, carried: Floats, neumann: Floats, contact: Floats) -> float:
     """The smallest eigenvalue of (P' S_c P, S_n); where P is not the identity to rounding relative to the largest."""
-    if pair.contact.loose or pair.contact.grid.n < pair.neumann.grid.n:  # S_c or P has a kernel
+    if pair.contact.loose or len(contact) < len(neumann):  # S_c or P has a kernel
         return 0.0
-    if pair.interface.transfer is None:
+    if pair.same_traces:
         return 1 / largest(neumann, contact).value
     return max(-largest(-carried, neumann).value, 0.0)
 

@@ -200,12 +200,12 @@ class Proof:
     def _of_rho(self) -> None:
         carried, neumann = self.felt(self.S[self.contact]), self.S[self.neumann]
         self._keep("rho_max", self.largest(carried, neumann))
-        if self.pair.contact.grid.n < self.pair.neumann.grid.n:  # P has a kernel
+        if self.pair.contact.free.sum() < self.pair.neumann.free.sum():  # P has a kernel
             self.numbers["rho_min"] = ZERO
         elif not self.pair.contact.loose:
             self._keep("rho_min", inverse(self.largest(neumann, carried)))
         contact = self.felt(self._normal(self.S[self.contact], self.contact), normal=True)
-        turned = self.joint.exact_on_traces is not None
+        turned = self.joint.exact_on_traces is not None and not self.pair.same_traces
         self._keep("rho_normal", self.largest(contact, neumann if turned else self._normal(neumann, self.neumann)))
 
     def _count(self, name: Name) -> int:
@@ -233,9 +233,9 @@ class Proof:
         self._keep("C_tr_half", root(_join([_join(ends, min) for ends in halves.values()], max)))
 
     def _fits(self) -> list[tuple[Name, Name]]:
-        """A form of the first body in the norm of the second: on one grid any, else what P carries."""
-        one_grid, names = self.joint.transfer is None, list(self.bodies)
-        return [(a, b) for b in names for a in names if one_grid or a == b or b == self.neumann]
+        """A form of the first body in the norm of the second: of the same traces any, else what P carries."""
+        same, names = self.pair.same_traces, list(self.bodies)
+        return [(a, b) for b in names for a in names if same or a == b or b == self.neumann]
 
     def _in(self, X: Between | None, a: Name, b: Name) -> Between | None:
         return X if a == b else self.felt(X)
@@ -271,10 +271,10 @@ class Proof:
         forces = entries(S)
         every = np.arange(len(forces.middle))
         normal = forces.block(every[-self._count(name) :], every)
-        if name == self.contact and self.joint.exact_on_traces is not None:
-            P = self.joint.transfer_of_traces
-            assert P is not None
-            normal = P.block(every, np.arange(self.joint.other.size)[self.joint.other.normal]).T.times(forces)
+        P = self.joint.transfer_of_traces
+        if name == self.contact and self.joint.exact_on_traces is not None and P is not None:
+            columns = np.arange(P.middle.shape[1])[-self._count(self.neumann) :]
+            normal = P.block(every, columns).T.times(forces)
         elif name == self.contact and self.joint.transfer is not None:
             normal = self.joint.transfer.T.times(normal)
         z = kernel.times(normal)

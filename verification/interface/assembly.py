@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 
@@ -26,7 +25,7 @@ from fem1d2d.mesh import Floats, Ints
 from fem1d2d.trace import SAME, extent
 from verification.dense import STILL
 from verification.interface.body import Body, Name, in_frames, material_of, turning
-from verification.interface.interface import Interface, Law
+from verification.interface.interface import Interface, Law, Nodes
 from verification.interface.joining import join
 from verification.interface.several import join_lines, together
 from verification.problem.specification import Problem
@@ -147,14 +146,19 @@ class TwoBodies(Value):
         Raises
         ------
         ProblemError
-            Two sides prescribe different displacements of a node.
+            Two sides prescribe different displacements of a node, or a plane of symmetry moves.
         """
 
         def loaded(body: Body | None) -> Body | None:
             if body is None:
                 return None
             load = _load(problem, body.name, body.mesh, body.nodes, self.interface)
-            return body.under(_supports(problem, body.name, body.mesh), load)
+            known = _supports(problem, body.name, body.mesh)
+            planes = self.interface.planes
+            if planes is not None and known.values[body.nodes[planes[body is self.neumann]]].any():
+                needed = "needed 0 along Gamma_c at its ends that both bodies hold: they are planes of symmetry"
+                raise problem.refuse(f"{body.name}.prescribed", None, needed)
+            return body.under(known, load)
 
         interface = copied(self.interface, slipped=slipped)
         body1, body2 = loaded(self.body1), loaded(self.body2)
@@ -163,7 +167,9 @@ class TwoBodies(Value):
     @property
     def outside(self) -> list[str]:
         """The reasons why the theorem does not apply to this problem; empty where it does."""
-        return reasons_outside(self.interface, self.friction, [body.unknown for body in self.elastic])
+        return reasons_outside(
+            self.interface, self.friction, {int(body.name[-1]): body.unknown for body in self.elastic}
+        )
 
     @property
     def warnings(self) -> list[str]:
@@ -171,12 +177,20 @@ class TwoBodies(Value):
         return warnings_of(self.interface, self.friction, self.elastic) + path_warnings(self.problem)
 
 
-def reasons_outside(interface: Interface, friction: Fraction, free: list[Any]) -> list[str]:
+def reasons_outside(interface: Interface, friction: Fraction, free: Mapping[int, Nodes]) -> list[str]:
+    """Return why the theorem does not apply; ``free`` has, by body, the contact components that supports leave free.
+
+    Half of a symmetric model stands for the whole, and its planes of symmetry are no reason.
+    """
     reasons = []
     if friction and interface.law is not None and interface.law.outside:
         reasons.append(interface.law.outside)
-    if not all(components.all() for components in free):
-        reasons.append("a contact node is held tangentially: Gamma_u and Gamma_c must not meet")
+    planes = 0 if interface.planes is None else int(interface.planes[0].sum())
+    holds = [body for body, components in free.items() if (~components).sum() > planes]
+    if holds:
+        which = " and ".join(f"body {body}" for body in holds)
+        half = "; half of a symmetric model has supports on both bodies there" if len(holds) < len(free) else ""
+        reasons.append(f"a contact node of {which} is held tangentially: Gamma_u and Gamma_c must not meet{half}")
     return reasons
 
 

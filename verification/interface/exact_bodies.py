@@ -21,7 +21,7 @@ from fem1d2d.enclosed import UNIT, Enclosed, gamma, nearest
 from fem1d2d.exact import Shapes
 from verification.interface.body import Body, in_frames, material_of
 from verification.interface.friction import LAWS, Nonlocal
-from verification.interface.interface import Grid, Interface, turned_transfer
+from verification.interface.interface import Grid, Interface
 from verification.interface.pair import ContactPair
 from verification.problem.specification import Problem
 from verification.problem.specs import BodySpec
@@ -144,7 +144,7 @@ class ExactInterface:
             self.exact_transfer = mortar(contact, x)
             self.other = Grid(x=x, weights=self.exact_transfer.T @ self.grid.weights)
         normals = (exact_normals(grid.normals) for grid in (contact_grid, neumann_grid))
-        self.exact_on_traces = turned_transfer(self.exact_transfer, *normals)
+        self.exact_on_traces = pair.interface.between(self.exact_transfer, *normals)
 
     @cached_property
     def weights(self) -> Enclosed:
@@ -163,12 +163,13 @@ class ExactInterface:
 
     @cached_property
     def transfer_of_traces(self) -> Enclosed | None:
-        """P on all components of a trace."""
+        """P on the components of a trace that Gamma_u leaves free; None where both bodies have the same."""
         P, d = self.transfer, self.grid.dimension
-        if P is None:
+        if self.pair.same_traces:
             return None
         if self.exact_on_traces is not None:
-            return Enclosed.rounded(self.exact_on_traces)
+            return Enclosed.rounded(self.exact_on_traces[self.pair.contact.free][:, self.pair.neumann.free])
+        assert P is not None
         return Enclosed(middle=np.kron(np.eye(d), P.middle), radius=np.kron(np.eye(d), P.radius))
 
     @cached_property
@@ -195,6 +196,8 @@ class ExactInterface:
             gap=self.pair.interface.gap,
             transfer=self.exact_transfer,
             profile=self.pair.interface.profile,
+            held=self.pair.interface.held,
+            planes=self.pair.interface.planes,
         )
         try:
             return np.asarray(interface.operator(law))
@@ -216,8 +219,13 @@ class ExactInterface:
         """
         P = self.transfer if normal and self.exact_on_traces is None else self.transfer_of_traces
         if normal and P is not None and self.exact_on_traces is not None:
-            P = P.block(np.arange(self.grid.size)[self.grid.normal], np.arange(self.other.size))
+            P = self.normal_rows(P)
         return form if P is None else P.T.times(form).times(P).symmetric()
+
+    def normal_rows(self, P: Enclosed) -> Enclosed:
+        """Return the rows of P on free components that give normal ones, which come last."""
+        rows, columns = P.middle.shape
+        return P.block(np.arange(rows - self.grid.n, rows), np.arange(columns))
 
     def tangential_mass(self, tangential: NDArray[np.bool_]) -> Enclosed:
         """Return B_T on the free components of the contact grid."""

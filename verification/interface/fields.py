@@ -82,7 +82,7 @@ class ContactFields(Value):
         grid = interface.contact
         plane, zero = grid.t > 0, np.zeros(grid.n)
         slip = jump[grid.tangential] if plane else zero
-        slides = state.sliding != 0 if plane else np.ones(grid.n, dtype=bool)
+        slides = (state.sliding != 0) | (bound == 0) if plane else np.ones(grid.n, dtype=bool)
         names = np.where(state.touching, np.where(slides, "slip", "stick"), "open")
         return cls(
             x=grid.x if grid.points is None else grid.points[:, 0],

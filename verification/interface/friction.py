@@ -34,7 +34,8 @@ def hat(t: Floats, radius: float) -> Floats:
 class Nonlocal(Law):
     """The law of the paper (2.5) with a hat kernel: ``(S f)_j = sum_i f_i omega_r(x_j - x_i)``.
 
-    S is linear and not renormalised at the ends.
+    S is linear and not renormalised at the ends.  At a plane of symmetry the kernel is reflected, so that half of a
+    symmetric body has the friction bound of the whole one.
 
     Attributes
     ----------
@@ -66,7 +67,10 @@ class Nonlocal(Law):
         return f"non-local, r = {self.radius:g}"
 
     def operator(self, interface: Interface) -> Floats:
-        return hat(interface.contact.x[:, None] - interface.neumann.x[None, :], self.radius)
+        x, y = interface.contact.x[:, None], interface.neumann.x[None, :]
+        return sum(
+            (hat(x - image, self.radius) for image in interface.reflected(y, self.radius)), hat(x - y, self.radius)
+        )
 
     def warnings(self, interface: Interface) -> list[str]:
         x, weights, kernel = interface.neumann.x, interface.contact.weights, self.operator(interface)

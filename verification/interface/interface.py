@@ -15,6 +15,9 @@ from fem1d2d.mesh import Floats
 from verification.problem.specs import Profile
 from verification.value import Value, freeze, lent
 
+#: One truth value for each node, or for each component, of a grid.
+Nodes = NDArray[np.bool_]
+
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Grid(Value):
@@ -200,8 +203,13 @@ class Interface(Value):
     profile : Profile or None
         How the coefficient of friction varies along Gamma_c; None where it is constant.
     on_traces : array, shape (contact components, Neumann components), or None
-        P on vectors, where the normals of the two grids differ: it turns each vector from one node's directions into
-        another's.  None where P acts on each component by itself.
+        P on vectors, where it does not act alike on both components: where the normals of the two grids differ it turns
+        each vector from one node's directions into another's, and what is held tangentially is 0.
+    held : bool array, shape (contact nodes,), or None
+        Contact nodes whose tangential component a support of the contact body holds.  The support carries any shear
+        there, so that they have no friction condition, and their tangential unknowns are not in the trace space.
+    planes : pair of bool arrays, shapes (contact nodes,) and (Neumann nodes,), or None
+        The ends of Gamma_c on a plane of symmetry, where supports hold both bodies tangentially at 0.
     slipped : array, shape (t of the contact grid,), or None
         ``u1_T - u2_T`` before the load increment, from which friction measures slip, unit of length; None for 0.
     lines : tuple of Stretch
@@ -216,13 +224,31 @@ class Interface(Value):
     profile: Profile | None = None
     slipped: Floats | None = None
     on_traces: Floats | None = None
+    held: Nodes | None = None
+    planes: tuple[Nodes, Nodes] | None = None
     lines: tuple[Stretch, ...] = ()
 
     @classmethod
     def joining(cls, contact: Grid, neumann: Grid, transfer: Floats | None, **rest: Any) -> Interface:
         """Return an interface with this transfer P between nodal values, each node with the normal of its grid."""
-        turning = turned_transfer(transfer, contact.normals, neumann.normals)
-        return cls(contact=contact, neumann=neumann, transfer=transfer, on_traces=turning, **rest)
+        found = cls(contact=contact, neumann=neumann, transfer=transfer, **rest)
+        return replace(found, on_traces=found.between(transfer, contact.normals, neumann.normals))
+
+    def between(self, P: NDArray[Any] | None, contact: NDArray[Any] | None, neumann: NDArray[Any] | None) -> Any:
+        """Return P on vectors between nodes with these normals, 0 where a tangential component is held.
+
+        Rational where P is; None where it acts alike on both components.
+        """
+        turned = turned_transfer(P, contact, neumann)
+        if self.held is None:
+            return turned
+        if turned is None:
+            P = np.eye(self.contact.n) if P is None else P
+            turned = np.block([[P, 0 * P], [0 * P, P]])
+        turned[self.contact.tangential][self.held] = 0
+        if self.planes is not None:
+            turned[:, self.neumann.tangential][:, self.planes[1]] = 0
+        return turned
 
     def reversed(self) -> Interface:
         """Return the interface for vectors with their normal components along the opposite direction."""
@@ -277,6 +303,29 @@ class Interface(Value):
         return freeze(self.operator(self.law))
 
     @property
+    def shown(self) -> Interface:
+        """The interface that also carries displacements past a held node, which friction there does not feel."""
+        held = None if self.planes is None else self.planes[0]
+        if self.held is None or (held is not None and np.array_equal(held, self.held)):
+            return self
+        other = replace(self, held=held)
+        return replace(other, on_traces=other.between(self.transfer, self.contact.normals, self.neumann.normals))
+
+    def reflected(self, x: Floats, reach: float) -> list[Floats]:
+        """Return the images of positions in the planes of symmetry that come within a distance of Gamma_c.
+
+        Between two planes the images are reflected in turn.
+        """
+        at = [] if self.planes is None else list(self.contact.x[self.planes[0]])
+        low, high = self.contact.x[0] - reach, self.contact.x[-1] + reach
+        found, last = [], [(x, -1)]
+        while last:
+            images = [(2 * at[i] - y, i) for y, before in last for i in range(len(at)) if i != before]
+            last = [(y, i) for y, i in images if low < y.max() and y.min() < high]
+            found += [y for y, _ in last]
+        return found
+
+    @property
     def shares(self) -> Floats | None:
         """``k_j / max k`` at the contact nodes, rationals where their positions are; None where k is constant."""
         if self.profile is None:
@@ -286,9 +335,13 @@ class Interface(Value):
         return np.array(found, dtype=s.dtype)
 
     def operator(self, law: Law) -> Floats:
-        """Return the operator of a law, each row times the share of its contact node."""
+        """Return the operator of a law, each row times the share of its contact node; 0 where no friction can act."""
         shares, S = self.shares, law.operator(self)
-        return S if shares is None else shares[:, None] * S
+        S = S if shares is None else shares[:, None] * S
+        if self.held is None:
+            return S
+        rubs = ~self.held if self.planes is None else ~self.held | self.planes[0]
+        return np.where(rubs[:, None], S, 0)
 
     @property
     def contact_kernel(self) -> Floats | None:
@@ -299,7 +352,7 @@ class Interface(Value):
         if self.transfer is not None and self.law is not None and self.law.of_contact:
             return self.operator(self.law)
         if self.transfer is None or self.kernel is None:
-            return self.kernel
+            return self.kernel  # on one grid P leaves normal components as they are
         return self.kernel @ (self.transfer if self.on_traces is None else self.on_traces[:, self.neumann.normal]).T
 
     def stress(self, force: Floats) -> Floats:
@@ -309,35 +362,27 @@ class Interface(Value):
 
     def carry(self, traces: Floats) -> Floats:
         """Return ``P u``: traces on the Neumann grid, one or columns of them, on the contact grid."""
-        if self.transfer is None:
-            return traces
         if self.on_traces is not None:
             return np.asarray(self.on_traces @ traces)
+        if self.transfer is None:
+            return traces
         return np.concatenate([self.transfer @ block for block in self.neumann.components(traces)])
 
     def carry_back(self, forces: Floats) -> Floats:
         """Return ``P' f``: nodal forces on the contact grid, one or columns of them, on the Neumann grid."""
-        if self.transfer is None:
-            return forces
         if self.on_traces is not None:
             return np.asarray(self.on_traces.T @ forces)
+        if self.transfer is None:
+            return forces
         return np.concatenate([self.transfer.T @ block for block in self.contact.components(forces)])
 
     def spread(self, forces: Floats) -> Floats:
         """Return the nodal forces on the contact grid that have the stresses of given ones on the Neumann grid."""
         if self.transfer is None:
-            return forces
+            return self.carry(forces)
         stresses = self.neumann.components(forces) / self.neumann.weights
         carried = self.contact.components(self.carry(stresses.reshape(-1)))
         return np.asarray((self.contact.weights * carried).reshape(-1))
-
-    def reaches(self, components: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Return True for the contact components whose forces act on given components of the Neumann grid."""
-        if self.transfer is None:
-            return components
-        if self.on_traces is not None:
-            return np.asarray((self.on_traces != 0) @ components)
-        return np.concatenate([(self.transfer != 0) @ block for block in self.neumann.components(components)])
 
     def pressed(self, touching: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return True for the Neumann nodes on which the forces of some contact nodes act."""
@@ -345,13 +390,28 @@ class Interface(Value):
 
     def carry_form(self, form: Floats) -> Floats:
         """Return ``P' X P`` of a symmetric matrix X on the contact grid."""
-        return form if self.transfer is None else self.carry_back(self.carry_back(form).T)
+        return self.carry_back(self.carry_back(form).T)
 
-    def swapped(self) -> Interface:
-        """Return the interface with the roles of the grids exchanged; ValueError where the grids differ."""
+    def carry_free(self, form: Floats, contact: Nodes, neumann: Nodes) -> Floats:
+        """Return ``P' X P`` on the free components of the Neumann grid, of a form X on those of the contact grid.
+
+        Both masks, of shapes (contact components,) and (Neumann components,), are True where Gamma_u leaves the
+        component free.
+        """
+        every = np.zeros((len(contact), len(contact)))
+        every[np.ix_(contact, contact)] = form
+        return self.carry_form(every)[np.ix_(neumann, neumann)]
+
+    def swapped(self, held: Nodes | None) -> Interface:
+        """Return the interface with the roles of the grids exchanged; ValueError where the grids differ.
+
+        ``held`` are the nodes whose tangential component is held for the body that has the contact grid then.
+        """
         if self.transfer is not None:
             raise ValueError("the grids differ: needed a pair built for these roles, with its own transfer")
-        return replace(self, contact=self.neumann, neumann=self.contact)
+        planes = None if self.planes is None else self.planes[::-1]
+        other = replace(self, contact=self.neumann, neumann=self.contact, held=held, planes=planes, on_traces=None)
+        return replace(other, on_traces=other.between(None, None, None))
 
 
 def turned_transfer(P: NDArray[Any] | None, contact: NDArray[Any] | None, neumann: NDArray[Any] | None) -> Any:

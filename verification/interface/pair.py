@@ -23,7 +23,7 @@ from verification.interface.assembly import (
     warnings_of,
 )
 from verification.interface.body import Body, Condensed
-from verification.interface.interface import Grid, Interface, Law
+from verification.interface.interface import Grid, Interface, Law, Nodes
 from verification.interface.joining import check_slopes
 from verification.problem import Problem, Settings
 from verification.problem.specs import MOST_FRICTION, Profile
@@ -222,7 +222,7 @@ class ContactPair(Value):
             self,
             contact=self.neumann.turned(),
             neumann=self.contact.turned(),
-            interface=self.interface.swapped(),
+            interface=self.interface.swapped(held_tangentially(self.neumann)),
             neumann_body=1 if self.neumann_body == 2 else 2,
             problem=None if self.problem is None else self.problem.swapped(),
         )
@@ -281,6 +281,11 @@ class ContactPair(Value):
         """True if a contact node of a body is held tangentially."""
         return not (self.contact.free.all() and self.neumann.free.all())
 
+    @property
+    def same_traces(self) -> bool:
+        """True if both bodies have the same traces: one grid, and the same components held."""
+        return self.interface.transfer is None and np.array_equal(self.contact.free, self.neumann.free)
+
     def bound(self, force: Floats) -> Floats:
         """Return the friction bound ``w_j k_j |(S sigma_N)_j|``, shape (t,), for nodal forces on the Neumann grid."""
         if not self.rubs:
@@ -295,7 +300,8 @@ class ContactPair(Value):
     @property
     def outside(self) -> list[str]:
         """The reasons why the theorem does not apply to this pair; empty where it does."""
-        return reasons_outside(self.interface, self.friction, [self.contact.free, self.neumann.free])
+        free = {self.contact_body: self.contact.free, self.neumann_body: self.neumann.free}
+        return reasons_outside(self.interface, self.friction, dict(sorted(free.items())))
 
     @property
     def nearly_incompressible(self) -> str:
@@ -308,6 +314,12 @@ class ContactPair(Value):
         bodies = [side.body for side in (self.body1, self.body2) if side.body is not None]
         path = [] if self.problem is None else path_warnings(self.problem)
         return warnings_of(self.interface, self.friction, bodies) + path
+
+
+def held_tangentially(side: Condensed) -> Nodes | None:
+    """Return the nodes whose tangential component is held; None where none is."""
+    held = ~side.free[side.grid.tangential]
+    return held if held.any() else None
 
 
 def pair_from(problem: Problem, *, law: Law | None = None, like: ContactPair | None = None) -> ContactPair:
