@@ -33,7 +33,7 @@ from fem1d2d import (
 )
 from fem1d2d.mesh import Floats, Ints
 from verification.dense import STILL, Cholesky
-from verification.interface.interface import Grid
+from verification.interface.interface import Grid, Nodes
 from verification.problem.specs import BodySpec
 from verification.threads import one_thread
 from verification.value import Value, copied, freeze, lent, original_of
@@ -369,6 +369,12 @@ class Condensed(Value):
     def lifts(self) -> bool:
         """True if a rigid motion that only contact holds has a normal component on Gamma_c."""
         return bool(np.abs(self.motions[self.grid.normal]).max(initial=0.0) > STILL)
+
+    @property
+    def support(self) -> tuple[Nodes, Nodes]:
+        """The contact nodes that Gamma_u holds tangentially, and those of them that it holds at 0."""
+        held = ~self.free[self.grid.tangential]
+        return held, held & (self.known[self.grid.tangential] == 0)
 
     @property
     def summary(self) -> str:

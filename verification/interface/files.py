@@ -21,9 +21,9 @@ from ndtheory import HypothesisError, __version__, exact
 from verification.dense import pinned
 from verification.interface.body import NO_MOTIONS, Condensed
 from verification.interface.friction import GivenOperator
-from verification.interface.interface import Grid, Interface
+from verification.interface.interface import Grid, Interface, held_along
 from verification.interface.matrices import ASYMMETRY, UNREADABLE, check_matrix, check_nodes, headers, real_array
-from verification.interface.pair import ContactPair, held_tangentially
+from verification.interface.pair import ContactPair
 from verification.problem import ProblemError, Settings
 from verification.problem.reading import at_least_one, factor, tolerance
 from verification.problem.tables import TomlTable, choice, label, non_negative, unreadable
@@ -186,8 +186,8 @@ def _pair(arrays: dict[str, np.ndarray], source: str) -> ContactPair:
         raise ValueError(f"motions{neumann_body}: needed none of the body with the Neumann problem")
     slipped = real_array("slipped", arrays["slipped"], (grid.t,)) if "slipped" in arrays else None
     gap = real_array("gap", arrays["gap"], (n,))
-    held = held_tangentially(contact) if grid.t else None
-    interface = Interface.joining(grid, other, transfer, gap=gap, law=law, slipped=slipped, held=held)
+    held, planes = held_along([contact.support, neumann.support], grid, other) if grid.t else (None, None)
+    interface = Interface.joining(grid, other, transfer, gap=gap, law=law, slipped=slipped, held=held, planes=planes)
     if neumann_body == 1:
         interface = interface.reversed()
     pair = ContactPair(

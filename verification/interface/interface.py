@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, ClassVar, Literal
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from fem1d2d import trapezoid
 from fem1d2d.mesh import Floats
+from fem1d2d.trace import SAME
 from verification.problem.specs import Profile
 from verification.value import Value, freeze, lent
 
@@ -402,7 +404,7 @@ class Interface(Value):
         every[np.ix_(contact, contact)] = form
         return self.carry_form(every)[np.ix_(neumann, neumann)]
 
-    def swapped(self, held: Nodes | None) -> Interface:
+    def swapped(self, held: Nodes) -> Interface:
         """Return the interface with the roles of the grids exchanged; ValueError where the grids differ.
 
         ``held`` are the nodes whose tangential component is held for the body that has the contact grid then.
@@ -410,7 +412,8 @@ class Interface(Value):
         if self.transfer is not None:
             raise ValueError("the grids differ: needed a pair built for these roles, with its own transfer")
         planes = None if self.planes is None else self.planes[::-1]
-        other = replace(self, contact=self.neumann, neumann=self.contact, held=held, planes=planes, on_traces=None)
+        other = replace(self, contact=self.neumann, neumann=self.contact, planes=planes, on_traces=None)
+        other = replace(other, held=held if held.any() else None)
         return replace(other, on_traces=other.between(None, None, None))
 
 
@@ -426,3 +429,26 @@ def turned_transfer(P: NDArray[Any] | None, contact: NDArray[Any] | None, neuman
     tangents = [np.stack([normals[:, 1], -normals[:, 0]], axis=1) for normals in (contact, neumann)]
     rows, columns = ((t, n) for t, n in zip(tangents, (contact, neumann), strict=True))
     return np.block([[P * (one @ other.T) for other in columns] for one in rows])
+
+
+#: The nodes of a body whose tangential component is held, and those of them that are held at 0; None for a rigid body.
+Support = tuple[Nodes, Nodes] | None
+
+#: Contact nodes that are held tangentially, and the nodes of both grids on planes of symmetry; None where there are none.
+Held = tuple[Nodes | None, tuple[Nodes, Nodes] | None]
+
+
+def held_along(
+    support: Sequence[Support], contact: Grid, neumann: Grid
+) -> tuple[Nodes | None, tuple[Nodes, Nodes] | None]:
+    """Return the contact nodes that are held tangentially, and the ends of Gamma_c on a plane of symmetry.
+
+    There every elastic body is held at 0; a rigid one is its own mirror image.
+    """
+    planes = np.zeros(contact.n, dtype=bool), np.zeros(neumann.n, dtype=bool)
+    for end in (0, -1):
+        together = abs(contact.x[end] - neumann.x[end]) <= SAME * np.ptp(contact.x)
+        if together and any(support) and all(body is None or body[1][end] for body in support):
+            planes[0][end] = planes[1][end] = True
+    held = planes[0] if support[0] is None else planes[0] | support[0][0]
+    return held if held.any() else None, planes if planes[0].any() else None

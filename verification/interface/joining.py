@@ -11,7 +11,7 @@ from fem1d2d import Line, Mesh, MeshError, Supports, facing, mortar, surface, tr
 from fem1d2d.mesh import Floats, Ints
 from fem1d2d.trace import SAME, extent
 from verification.interface.friction import LAWS
-from verification.interface.interface import Grid, Interface, Law, Nodes
+from verification.interface.interface import Grid, Interface, Law, Support, held_along
 from verification.problem.specification import Problem
 from verification.problem.specs import BodySpec
 
@@ -64,7 +64,7 @@ def join(
     contact, neumann = grids if problem.contact_body == 1 else grids[::-1]
     law = law or LAWS[problem.contact.law].of(problem.contact.radius)
     support = _supported(known, nodes) if problem.dimension == 2 else [None, None]
-    held, planes = _held(support if problem.contact_body == 1 else support[::-1], contact, neumann)
+    held, planes = held_along(support if problem.contact_body == 1 else support[::-1], contact, neumann)
     interface = Interface.joining(
         contact, neumann, P, gap=gap, law=law, profile=problem.contact.profile, held=held, planes=planes
     )
@@ -201,10 +201,6 @@ def check_profile(problem: Problem, interface: Interface) -> None:
         raise problem.refuse("contact.friction.s", list(profile.s), needed)
 
 
-#: The nodes of a body whose tangential component is held, and those of them that are held at 0; None for a rigid body.
-Support = tuple[Nodes, Nodes] | None
-
-
 def _supported(known: list[Supports | None], nodes: list[Ints]) -> list[Support]:
     """Find what supports hold of the contact nodes: only tangential components, as normal ones are refused."""
     found: list[Support] = []
@@ -212,20 +208,6 @@ def _supported(known: list[Supports | None], nodes: list[Ints]) -> list[Support]
         held, moved = (None, None) if body is None else (np.any(part[own], axis=1) for part in (body.held, body.values))
         found.append(None if held is None or moved is None else (held, held & ~moved))
     return found
-
-
-def _held(support: Sequence[Support], contact: Grid, neumann: Grid) -> tuple[Nodes | None, tuple[Nodes, Nodes] | None]:
-    """Return the contact nodes that are held tangentially, and the ends of Gamma_c on a plane of symmetry.
-
-    There every elastic body is held at 0; a rigid one is its own mirror image.
-    """
-    planes = np.zeros(contact.n, dtype=bool), np.zeros(neumann.n, dtype=bool)
-    for end in (0, -1):
-        together = abs(contact.x[end] - neumann.x[end]) <= SAME * np.ptp(contact.x)
-        if together and any(support) and all(body is None or body[1][end] for body in support):
-            planes[0][end] = planes[1][end] = True
-    held = planes[0] if support[0] is None else planes[0] | support[0][0]
-    return held if held.any() else None, planes if planes[0].any() else None
 
 
 def _interval(problem: Problem) -> Ends | None:

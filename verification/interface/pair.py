@@ -23,7 +23,7 @@ from verification.interface.assembly import (
     warnings_of,
 )
 from verification.interface.body import Body, Condensed
-from verification.interface.interface import Grid, Interface, Law, Nodes
+from verification.interface.interface import Grid, Interface, Law
 from verification.interface.joining import check_slopes
 from verification.problem import Problem, Settings
 from verification.problem.specs import MOST_FRICTION, Profile
@@ -222,7 +222,7 @@ class ContactPair(Value):
             self,
             contact=self.neumann.turned(),
             neumann=self.contact.turned(),
-            interface=self.interface.swapped(held_tangentially(self.neumann)),
+            interface=self.interface.swapped(self.neumann.support[0]),
             neumann_body=1 if self.neumann_body == 2 else 2,
             problem=None if self.problem is None else self.problem.swapped(),
         )
@@ -314,12 +314,6 @@ class ContactPair(Value):
         bodies = [side.body for side in (self.body1, self.body2) if side.body is not None]
         path = [] if self.problem is None else path_warnings(self.problem)
         return warnings_of(self.interface, self.friction, bodies) + path
-
-
-def held_tangentially(side: Condensed) -> Nodes | None:
-    """Return the nodes whose tangential component is held; None where none is."""
-    held = ~side.free[side.grid.tangential]
-    return held if held.any() else None
 
 
 def pair_from(problem: Problem, *, law: Law | None = None, like: ContactPair | None = None) -> ContactPair:
