@@ -5,7 +5,7 @@ The positions of the rest are distances s along the line.  A line has one direct
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -17,6 +17,9 @@ from fem1d2d.trace import SAME
 
 #: Pairs of an edge and a node that are computed together: arrays of some 10 MB.
 TOGETHER = 200_000
+
+#: Rounds in which the normals between two lines settle: each lessens their change by the gap over a radius of curvature.
+MEANS = 30
 
 #: The largest corner between two edges, in degrees: beyond it a bisector is far from both normals, and the line is cut.
 SHARPEST = 20.0
@@ -78,10 +81,7 @@ class Line:
                 f" {abs(turn[sharp]):.3g} degrees: needed at most {SHARPEST:g}; cut it there, or mesh a curve finer"
             )
         tangents = before + after
-        tangents /= np.linalg.norm(tangents, axis=1)[:, None]
-        tangents[np.abs(tangents) < SAME] = 0.0  # a line along an axis has that axis
-        tangents[np.abs(tangents) > 1 - SAME**2 / 2] = np.rint(tangents[np.abs(tangents) > 1 - SAME**2 / 2])
-        return cls(nodes=nodes, points=points, normals=np.stack([-tangents[:, 1], tangents[:, 0]], axis=1))
+        return cls(nodes=nodes, points=points, normals=_directions(np.stack([-tangents[:, 1], tangents[:, 0]], axis=1)))
 
     @cached_property
     def s(self) -> Floats:
@@ -94,41 +94,88 @@ class Line:
         sizes = np.linalg.norm(normals, axis=1)[:, None]
         return np.asarray(np.where(np.abs(sizes - 1) > np.finfo(float).eps, normals / sizes, normals))
 
-    def seen_from(self, other: Line) -> Seen:
-        """Find where the normals of this line meet another one, of the same direction.
+    def alike(self, other: Line) -> bool:
+        """True if both lines have the same normals at all their nodes, to rounding."""
+        return len(self.nodes) == len(other.nodes) and np.allclose(self.normals, other.normals, rtol=0, atol=SAME)
+
+    @cached_property
+    def slack(self) -> float:
+        """Length within which two places along the line are the same: of its extent, and of rounding of coordinates."""
+        rounding = 8 * float(np.spacing(np.abs(self.points).max()))
+        return max(SAME * float(np.ptp(self.points, axis=0).max()), rounding)
+
+    def facing(self, other: Line) -> Line:
+        """Return the part of this line that faces another one, of the same direction, with normals between both.
+
+        Both surfaces end on one common line, whose normal is to first order in the slopes the mean of theirs: at each
+        node the direction of n + n', where n' is the other line's normal at the place that this very direction meets.
+        The normals of one line alone are off by half the angle between them, an error of the order slope/k in a shear.
 
         Raises
         ------
         MeshError
-            The normal at a node meets no part of the other line that faces it, or normals cross before it.
+            The other line faces no edge of this one, or several parts of it, or normals cross before it.
         """
-        size = float(max(np.ptp(line.points, axis=0).max() for line in (self, other)))
-        n, step = len(self.points), max(1, TOGETHER // len(other.points))
-        parts = [self._meets(other, np.arange(i, min(i + step, n)), SAME * size) for i in range(0, n, step)]
-        edge, place = (np.concatenate(found) for found in zip(*parts, strict=True))
-        met = other.s[edge] + place * np.diff(other.s)[edge]
-        back = np.flatnonzero(np.diff(met) <= 0)
-        if len(back):
-            raise MeshError(f"is met by normals that cross near {_at(self.points[back[0]])}")
+        between = self
+        for _ in range(MEANS):
+            both = self.normals + other.normals_at(between._meetings(other)[0])
+            opposite = np.linalg.norm(both, axis=1) < SAME
+            normals = _directions(np.where(opposite[:, None], self.normals, both))
+            settled = np.abs(normals - between.normals).max() <= SAME
+            between = replace(between, normals=normals)
+            if settled:
+                break
+        met, faces = between._meetings(other)
+        begins = np.flatnonzero(np.diff(faces.astype(int), prepend=0) == 1)
+        ends = np.flatnonzero(np.diff(faces.astype(int), append=0) == -1)
+        whole = [slice(begin, end + 1) for begin, end in zip(begins, ends, strict=True) if end > begin]
+        if not whole:
+            raise MeshError(f"does not face {_at(self.points[0])}, nor any edge of that line as a whole")
+        if len(whole) > 1:
+            raise MeshError(f"does not face {_at(self.points[whole[0].stop])}, but parts on both sides of it")
+        kept = whole[0]
+        if (np.diff(met[kept]) <= 0).any():
+            back = kept.start + int(np.argmin(np.diff(met[kept])))
+            raise MeshError(f"is met by normals that cross near {_at(self.points[back])}")
+        return Line(nodes=between.nodes[kept], points=between.points[kept], normals=between.normals[kept])
+
+    def seen_from(self, other: Line) -> Seen:
+        """Find where the normals of this line, as :meth:`facing` returns it, meet another one.
+
+        Raises
+        ------
+        MeshError
+            The normal at a node meets no part of the other line that faces it.
+        """
+        met, faces = self._meetings(other)
+        if not faces.all():
+            raise MeshError(f"does not face {_at(self.points[np.argmin(faces)])}")
         gap = ((smooth(other.s, other.points, met) - self.points) * self.normals).sum(axis=1)
         return Seen(gap=gap, s=_onto(other.s, met, self.s))
 
-    def _meets(self, other: Line, nodes: Ints, slack: float) -> tuple[Ints, Floats]:
-        """The edges of another line that normals meet first, and the places there between 0 and 1."""
+    def _meetings(self, other: Line) -> tuple[Floats, NDArray[np.bool_]]:
+        """The positions on another line that normals meet first, and where they do; elsewhere its nearer end."""
+        n, step = len(self.points), max(1, TOGETHER // len(other.points))
+        parts = [self._meets(other, np.arange(i, min(i + step, n))) for i in range(0, n, step)]
+        met, faces = (np.concatenate(found) for found in zip(*parts, strict=True))
+        return met, faces
+
+    def _meets(self, other: Line, nodes: Ints) -> tuple[Floats, NDArray[np.bool_]]:
         points, normals = self.points[nodes], self.normals[nodes]
         start, along = other.points[:-1, None], np.diff(other.points, axis=0)[:, None]  # (edges, 1, 2)
         tangents = np.stack([normals[:, 1], -normals[:, 0]], axis=1)
         rise = (along * tangents).sum(axis=2)
         with np.errstate(divide="ignore", invalid="ignore"):
             place = ((points - start) * tangents).sum(axis=2) / rise
-        beyond = slack / np.linalg.norm(along, axis=2)
+        beyond = max(self.slack, other.slack) / np.linalg.norm(along, axis=2)
         meets = (rise > 0) & (place >= -beyond) & (place <= 1 + beyond)
-        if not meets.any(axis=0).all():
-            raise MeshError(f"does not face {_at(points[np.argmin(meets.any(axis=0))])}")
         place = np.clip(np.where(meets, place, 0.0), 0.0, 1.0)
         far = np.abs(((start + place[..., None] * along - points) * normals).sum(axis=2))
         edge = np.argmin(np.where(meets, far, np.inf), axis=0)
-        return edge, place[edge, np.arange(len(nodes))]
+        met = other.s[edge] + place[edge, np.arange(len(nodes))] * np.diff(other.s)[edge]
+        faces = meets.any(axis=0)
+        ends = np.linalg.norm(points[:, None] - other.points[[0, -1]], axis=2).argmin(axis=1)
+        return np.where(faces, met, other.s[[0, -1]][ends]), faces
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -191,6 +238,15 @@ def _chained(mesh: Mesh, edges: Ints, side: str) -> Ints:
     if len(first) > 1 or len(order) != len(edges) + 1:
         raise MeshError(f"side {side!r} has several pieces, one of which ends at {_at(mesh.points[order[-1]])}")
     return np.array(order)
+
+
+def _directions(vectors: Floats) -> Floats:
+    """Unit vectors; one that lies along an axis to rounding is that axis."""
+    found = vectors / np.linalg.norm(vectors, axis=1)[:, None]
+    found[np.abs(found) < SAME] = 0.0
+    along = np.abs(found) > 1 - SAME**2 / 2
+    found[along] = np.rint(found[along])
+    return np.asarray(found)
 
 
 def _cross(u: Floats, v: Floats) -> Floats:

@@ -88,6 +88,44 @@ def test_a_constant_pressure_passes_from_line_to_line_and_positions_are_exact_on
         assert trapezoid(line.s) @ P @ seen.s == pytest.approx(0.5, abs=1e-12)
 
 
+def bent(x, curvature, *, upper, cells=12):
+    """A block whose top, or bottom if ``upper``, is a parabola of this curvature through the origin."""
+    flat = rectangle(x, (0.0, 1.0), (cells, 1))
+    near = 1 - flat.points[:, 1] if upper else flat.points[:, 1]
+    y = near * curvature * flat.points[:, 0] ** 2 / 2 + (1 - near) * (1.0 if upper else -1.0)
+    return Mesh(points=np.column_stack([flat.points[:, 0], y]), cells=flat.cells, sides=flat.sides)
+
+
+@pytest.mark.parametrize("cells", [10, 12])
+def test_normals_between_two_equal_cylinders_are_vertical_and_half_as_steep_on_a_plane(cells):
+    """The mean of both surfaces, each at the place that this mean meets."""
+    round_one = Line.along(bent((-0.3, 0.3), 1.0, upper=True), "bottom", left=True)
+    image = Line.along(bent((-0.3, 0.3), -1.0, upper=False), "top", left=False)
+    assert np.abs(image.normals[:, 0]).max() > 0.2
+    for line, other in ((round_one, image), (image, round_one)):
+        assert line.facing(other).normals.tolist() == [[0.0, 1.0]] * 13
+    plane = Line.along(rectangle((-0.5, 0.5), (-1.0, 0.0), (cells, 1)), "top", left=False)
+    tilt = lambda line: line.normals[:, 0] / line.normals[:, 1]
+    half = round_one.facing(plane)
+    assert np.abs(tilt(half) - tilt(round_one) / 2).max() <= 0.02 * np.abs(tilt(round_one)).max()
+    on_plane = plane.facing(round_one)
+    slopes = np.interp(on_plane.points[:, 0], round_one.points[:, 0], tilt(round_one))
+    assert np.abs(tilt(on_plane) - slopes / 2).max() <= 0.02 * np.abs(slopes).max()
+
+
+def test_the_part_of_a_line_that_faces_another_is_cut_to_whole_edges():
+    lower = Line.along(rectangle((0.0, 1.0), (-0.5, 0.0), (5, 1)), "top", left=False)
+    for ends, kept in (((0.1, 0.7), [0.2, 0.4, 0.6]), ((-1, 0.4), [0.0, 0.2, 0.4]), ((0.2, 0.4), [0.2, 0.4])):
+        upper = Line.along(rectangle(ends, (0.0, 0.5), (4, 1)), "bottom", left=True)
+        assert lower.facing(upper).points[:, 0] == pytest.approx(kept)
+    for ends in ((0.25, 0.35), (0.2, 0.35), (1.5, 2.0)):
+        upper = Line.along(rectangle(ends, (0.0, 0.5), (4, 1)), "bottom", left=True)
+        with pytest.raises(MeshError, match="does not face .*nor any edge"):
+            lower.facing(upper)
+    with pytest.raises(MeshError, match="does not face"):
+        lower.facing(Line.along(rectangle((0.0, 1.0), (0.1, 0.5), (4, 1)), "top", left=True))
+
+
 def test_a_line_that_faces_another_only_in_part_is_refused_with_the_place():
     lower = rectangle((0.0, 1.0), (-0.5, 0.0), (4, 1))
     upper = rectangle((0.0, 0.6), (0.0, 0.5), (4, 1))

