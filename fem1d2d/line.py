@@ -18,7 +18,7 @@ from fem1d2d.trace import SAME
 #: Pairs of an edge and a node that are computed together: arrays of some 10 MB.
 TOGETHER = 200_000
 
-#: Rounds in which the normals between two lines settle: each lessens their change by the gap over a radius of curvature.
+#: Rounds in which the normals between two lines settle: each lessens the change by the gap over a radius of curvature.
 MEANS = 30
 
 #: The largest corner between two edges, in degrees: beyond it a bisector is far from both normals, and the line is cut.

@@ -120,7 +120,7 @@ def test_the_part_of_a_line_that_faces_another_is_cut_to_whole_edges():
         assert lower.facing(upper).points[:, 0] == pytest.approx(kept)
     for ends in ((0.25, 0.35), (0.2, 0.35), (1.5, 2.0)):
         upper = Line.along(rectangle(ends, (0.0, 0.5), (4, 1)), "bottom", left=True)
-        with pytest.raises(MeshError, match="does not face .*nor any edge"):
+        with pytest.raises(MeshError, match=r"does not face .*nor any edge"):
             lower.facing(upper)
     with pytest.raises(MeshError, match="does not face"):
         lower.facing(Line.along(rectangle((0.0, 1.0), (0.1, 0.5), (4, 1)), "top", left=True))

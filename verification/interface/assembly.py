@@ -43,6 +43,9 @@ MOST_CONTACT_NODES = 2000
 LOCKING = 0.48
 
 
+#: The smaller extent of a body over the larger one, at least: places within 1e-9 of the larger one count as the same.
+SLENDEREST = 1e-7
+
 #: Part of the length of Gamma_c up to which an overlap may come from reading the gap of curved bodies off their nodes.
 READING = 1e-6
 
@@ -287,6 +290,8 @@ def discretise(problem: Problem, *, law: Law | None = None, dense: bool = True) 
         the contact body at its ends, Gamma_u holding the normal component of a contact node, an unreadable mesh.
     """
     meshes = [None if spec.rigid else _mesh(problem, spec, name) for name, spec in _specs(problem)]
+    for (name, _), mesh in zip(_specs(problem), meshes, strict=True):
+        _check_extents(problem, name, mesh)
     known = [
         None if mesh is None else _supports(problem, name, mesh)
         for (name, _), mesh in zip(_specs(problem), meshes, strict=True)
@@ -307,6 +312,16 @@ def discretise(problem: Problem, *, law: Law | None = None, dense: bool = True) 
         needed = f"{which} can move rigidly together, each held only by the other: fix or prescribe some sides"
         raise problem.refuse("contact" if problem.contact.lines else "body2", None, needed)
     return bodies
+
+
+def _check_extents(problem: Problem, name: str, mesh: Mesh | None) -> None:
+    """Refuse a plane body so slender that tolerances of its extent hide it."""
+    if mesh is None or mesh.dimension == 1:
+        return
+    across, along = sorted(np.ptp(mesh.points.astype(float), axis=0))
+    if across < SLENDEREST * along:
+        needed = f"its extents are {across:g} and {along:g}: needed a body less slender, from {SLENDEREST:g} on"
+        raise problem.refuse(name, None, needed)
 
 
 def _move_together(bodies: TwoBodies) -> bool:

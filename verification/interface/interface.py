@@ -434,7 +434,7 @@ def turned_transfer(P: NDArray[Any] | None, contact: NDArray[Any] | None, neuman
 #: The nodes of a body whose tangential component is held, and those of them that are held at 0; None for a rigid body.
 Support = tuple[Nodes, Nodes] | None
 
-#: Contact nodes that are held tangentially, and the nodes of both grids on planes of symmetry; None where there are none.
+#: Contact nodes that are held tangentially, and nodes of both grids on planes of symmetry; None where there are none.
 Held = tuple[Nodes | None, tuple[Nodes, Nodes] | None]
 
 

@@ -24,6 +24,9 @@ STEEPEST = 0.02
 #: The deepest overlap of the bodies as they are drawn, relative to the smaller height: strains stay small.
 MOST_OVERLAP = 0.05
 
+#: The part of an edge within which an end of the interval means a node: coordinates are printed with six digits.
+SNAP = 1e-3
+
 #: Body 1 lies below, body 2 above.
 UPPER = (True, False)
 
@@ -83,9 +86,13 @@ def _along_x(problem: Problem, meshes: list[Mesh | None], known: list[Supports |
     """Join two surfaces over a part of the x axis, with vertical normals."""
     size = max(extent(mesh) for mesh in meshes if mesh is not None)
     contact = problem.contact_body - 1
-    nodes = _surfaces(problem, meshes, _interval(problem))
+    chosen = _interval(problem)
+    nodes = _surfaces(problem, meshes, chosen)
     if problem.dimension == 2:
-        ends = _ends(problem, meshes, nodes, size)
+        if chosen is not None and (mesh := meshes[contact]) is not None:
+            chosen = _snapped(chosen, np.unique(mesh.points[nodes[contact], 0].astype(float)))
+            nodes = _surfaces(problem, meshes, chosen)
+        ends = _ends(problem, meshes, nodes, size, chosen)
         if problem.contact.interval is None:
             nodes = _surfaces(problem, meshes, ends)
         _check_nodes(problem, meshes, nodes, ends, contact)
@@ -235,9 +242,19 @@ def _surfaces(problem: Problem, meshes: list[Mesh | None], ends: Ends | None) ->
     return nodes
 
 
-def _ends(problem: Problem, meshes: list[Mesh | None], nodes: list[Ints], size: float) -> Ends:
-    """Return the ends of Gamma_c: as the problem gives them, or of the part where both bodies have a surface."""
-    chosen = _interval(problem)
+def _snapped(ends: Ends, x: Floats) -> Ends:
+    """Return the ends of an interval, each moved to the node that lies within SNAP of an edge from it, if any."""
+    found = list(ends)
+    for i, end in enumerate(ends):
+        near = int(np.argmin(np.abs(x - end))) if len(x) > 1 else 0
+        edges = np.abs(np.diff(x[max(near - 1, 0) : near + 2]))
+        if len(edges) and abs(x[near] - end) <= SNAP * edges.min():
+            found[i] = float(x[near])
+    return found[0], found[1]
+
+
+def _ends(problem: Problem, meshes: list[Mesh | None], nodes: list[Ints], size: float, chosen: Ends | None) -> Ends:
+    """Return the ends of Gamma_c: ``chosen``, as the problem gives them, or of the part where both have a surface."""
     reach = []
     for spec, mesh, own in zip((problem.body1, problem.body2), meshes, nodes, strict=True):
         if mesh is not None:  # a chosen part may be curved: the whole body counts then
