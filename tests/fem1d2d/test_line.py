@@ -133,3 +133,11 @@ def test_a_line_that_faces_another_only_in_part_is_refused_with_the_place():
     assert other.seen_from(line).s[[0, -1]].tolist() == [0.0, 1.0]
     with pytest.raises(MeshError, match=r"does not face \(0.75, 0\)"):
         line.seen_from(other)
+
+
+def test_tolerances_along_a_line_are_those_of_the_line_not_of_the_body():
+    """Parts of 1e-8 of the extents of both bodies, one of three cells and one of two."""
+    lower, upper = rectangle((0.0, 1e-8), (-1.0, 0.0), (3, 1)), rectangle((0.0, 1e-8), (0.0, 1.0), (2, 1))
+    line, other = Line.along(lower, "top", left=False), Line.along(upper, "bottom", left=True)
+    seen = line.facing(other).seen_from(other)
+    assert seen.s == pytest.approx([0.0, 0.5e-8, 1e-8], rel=1e-12)

@@ -170,3 +170,38 @@ def test_no_steep_body_is_advised_where_the_contact_body_has_no_nodes_at_the_end
     with pytest.raises(vf.ProblemError, match="must begin and end at nodes of the contact body, body 1") as refusal:
         vf.solve(disc)
     assert "let body 1 have the Neumann problem" not in str(refusal.value)
+
+
+@pytest.mark.parametrize("digits", [6, 5])
+@pytest.mark.parametrize("way", [-1, 1])
+def test_an_interval_ends_at_the_node_that_its_printed_digits_mean(digits, way, tmp_path):
+    """A message prints six digits of the position of a node, and takes them again."""
+    low = {
+        "mesh": write_curved(
+            tmp_path / "low.msh", 59.44355364 * np.linspace(-1, 1, 41), lambda x: 0 * x - 9, lambda x: 0 * x
+        )
+    }
+    up = {"mesh": write_curved(tmp_path / "up.msh", np.linspace(-80, 80, 31), lambda x: 0 * x, lambda x: 0 * x + 9)}
+    end = 59.44355364 * 0.9  # a node of the contact body
+    printed = round(end + way * 0.5 * 10.0 ** (1 - digits), digits - 2)
+    data = {
+        "body1": low | {"young": 1, "poisson": 0, "fixed": ["bottom"]},
+        "body2": up | {"young": 1, "poisson": 0, "prescribed": {"top": [0, -0.1]}},
+        "contact": {"interval": [-printed, printed]},
+    }
+    assert np.abs(vf.build(vf.Problem.from_dict(data)).contact.grid.x[[0, -1]]) == pytest.approx([end, end], rel=1e-9)
+    data["contact"]["interval"] = [-end, end + 0.1]
+    with pytest.raises(vf.ProblemError, match="must begin and end at nodes of the contact body"):
+        vf.build(vf.Problem.from_dict(data))
+
+
+def test_a_body_too_slender_for_tolerances_of_its_extent_is_refused_by_name():
+    for length, height in ((1e-9, 0.4), (1.2, 3e10)):
+        block = {"shape": "rectangle", "x": [0, length], "cells": [4, 2], "young": 1, "poisson": "0.3"}
+        data = {
+            "body1": block | {"y": [-height, 0], "fixed": ["bottom"]},
+            "body2": block | {"y": [0, height], "prescribed": {"top": [0, -0.01 * height]}},
+            "contact": {"surface": ["top", "bottom"]},
+        }
+        with pytest.raises(vf.ProblemError, match=r"body1: its extents are .*less slender"):
+            vf.solve(vf.Problem.from_dict(data))

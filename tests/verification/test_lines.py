@@ -12,7 +12,7 @@ from mesh_writer import read_here, write_gmsh22
 from two_methods import assert_same
 
 import verification as vf
-from fem1d2d import Line, element, mesh_files, plane_strain, rectangle
+from fem1d2d import element, mesh_files, plane_strain, rectangle
 from fem1d2d.assembly import unknowns
 from fem1d2d.exact import fractions
 from fem1d2d.mesh import Cells
@@ -421,42 +421,3 @@ def test_two_convex_bodies_that_touch_do_not_overlap_as_they_are_drawn(named, ce
     assert -1e-7 <= solution.bodies.interface.gap.min() <= 4e-4
     assert not [words for words in solution.warnings if "overlap" in words]
     assert solution.contact.force["normal"] > 0
-
-
-@pytest.mark.parametrize("digits", [6, 5])
-@pytest.mark.parametrize("way", [-1, 1])
-def test_an_interval_ends_at_the_node_that_its_printed_digits_mean(digits, way, tmp_path):
-    """A message prints six digits of the position of a node, and takes them again."""
-    low = write(tmp_path / "low.msh", (-59.44355364, 59.44355364), (40, 3), lambda x: 0 * x - 9, lambda x: 0 * x)
-    up = write(tmp_path / "up.msh", (-80.0, 80.0), (30, 3), lambda x: 0 * x, lambda x: 0 * x + 9)
-    end = 59.44355364 * 0.9  # a node of the contact body
-    printed = round(end + way * 0.5 * 10.0 ** (1 - digits), digits - 2)
-    data = {
-        "body1": low | {"young": 1, "poisson": 0, "fixed": ["bottom"]},
-        "body2": up | {"young": 1, "poisson": 0, "prescribed": {"top": [0, -0.1]}},
-        "contact": {"interval": [-printed, printed]},
-    }
-    assert np.abs(vf.build(vf.Problem.from_dict(data)).contact.grid.x[[0, -1]]) == pytest.approx([end, end], rel=1e-9)
-    data["contact"]["interval"] = [-end, end + 0.1]
-    with pytest.raises(ProblemError, match="must begin and end at nodes of the contact body"):
-        vf.build(vf.Problem.from_dict(data))
-
-
-def test_a_body_too_slender_for_tolerances_of_its_extent_is_refused_by_name():
-    for length, height in ((1e-9, 0.4), (1.2, 3e10)):
-        block = {"shape": "rectangle", "x": [0, length], "cells": [4, 2], "young": 1, "poisson": "0.3"}
-        data = {
-            "body1": block | {"y": [-height, 0], "fixed": ["bottom"]},
-            "body2": block | {"y": [0, height], "prescribed": {"top": [0, -0.01 * height]}},
-            "contact": {"surface": ["top", "bottom"]},
-        }
-        with pytest.raises(ProblemError, match=r"body1: its extents are .*less slender"):
-            vf.solve(vf.Problem.from_dict(data))
-
-
-def test_tolerances_along_a_line_are_those_of_the_line_not_of_the_body():
-    """Parts of 1e-8 of the extents of both bodies, one of three cells and one of two."""
-    lower, upper = rectangle((0.0, 1e-8), (-1.0, 0.0), (3, 1)), rectangle((0.0, 1e-8), (0.0, 1.0), (2, 1))
-    line, other = Line.along(lower, "top", left=False), Line.along(upper, "bottom", left=True)
-    seen = line.facing(other).seen_from(other)
-    assert seen.s == pytest.approx([0.0, 0.5e-8, 1e-8], rel=1e-12)

@@ -29,8 +29,9 @@ TOLD = "{}: {} of these rows are of version {} with other numerics; they are not
 
 
 @pytest.fixture(params=["sharp_factor", "energy_factor"])
-def old(place, request):
-    """A store that the commits before wrote, with either name of the column."""
+def old(place, request, monkeypatch):
+    """A store that the commits before wrote, with either name of the column; the numerics are those of its rows."""
+    monkeypatch.setattr(identity, "NUMERICS", 2)
     with closing(sqlite3.connect(place)) as file:
         file.executescript(OLD)
         for key, text in file.execute("SELECT key, row FROM rows").fetchall():

@@ -395,7 +395,7 @@ class Interface(Value):
         return self.carry_back(self.carry_back(form).T)
 
     def carry_free(self, form: Floats, contact: Nodes, neumann: Nodes) -> Floats:
-        """Return ``P' X P`` on the free components of the Neumann grid, of a form X on those of the contact grid.
+        """Return ``P' X P``, of free components of the Neumann grid, from a form X of free ones of the contact grid.
 
         Both masks, of shapes (contact components,) and (Neumann components,), are True where Gamma_u leaves the
         component free.
