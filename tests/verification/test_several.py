@@ -118,7 +118,7 @@ def test_two_blocks_share_a_side_of_a_base_and_a_traction_acts_beside_them():
     assert run.converged
     assert close(run.contact.pressure, found.contact.pressure)
     swapped = vf.solve(problem.swapped()).contact
-    assert [swapped.x[line.contact][[0, -1]].tolist() for line in swapped.lines] == [[1, 3], [6, 9]]  # what faces a block
+    assert [swapped.x[line.contact][[0, -1]].tolist() for line in swapped.lines] == [[1, 3], [6, 9]]
     assert swapped.force["normal"] == pytest.approx(found.contact.force["normal"], rel=0.02)
 
 
