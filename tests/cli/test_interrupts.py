@@ -193,6 +193,32 @@ def test_ctrl_c_while_semidefinite_programs_are_solved_is_never_lost(tmp_path, m
     assert document["run"]["converged"]
 
 
+def test_a_second_ctrl_c_ends_a_solver_that_answers_none_at_once(write):
+    """The solver computes for minutes as a library does: other threads run, handlers of signals do not."""
+    slow = """
+        import hashlib, os, sys, threading
+        from verification.cli import main
+        from verification.contact.step import ContactStep
+
+        def solve(self, q, bound):
+            sys.setswitchinterval(1000)  # the other thread runs once the library lets it
+            threading.Timer(0.1, os.write, (2, b"solving\\n")).start()
+            hashlib.pbkdf2_hmac("sha256", b"", b"", 2**31 - 1)
+
+        ContactStep.solve = solve
+        sys.exit(main())
+    """
+    with started("run", write(), "--json", code=slow, mark="solving") as process:
+        process.send_signal(signal.SIGINT)
+        time.sleep(1)
+        assert process.poll() is None
+        while process.poll() is None:
+            process.send_signal(signal.SIGINT)
+            time.sleep(0.5)
+        out, err = process.communicate(timeout=PATIENCE)
+    assert (process.returncode, out, err) == (130, "", "interrupted twice: ended at once\n")
+
+
 def test_what_a_c_library_writes_on_stdout_is_not_in_the_document(write):
     noisy = """
         import ctypes, os, sys

@@ -41,6 +41,7 @@ from verification.cli.console import (
     steady,
 )
 from verification.cli.forms import AdviseGroup, Commands
+from verification.interrupts import second_ends
 
 #: Exit statuses of the interface.  A crash is none of them.
 DONE, BAD_INPUT, INTERRUPTED, CRASH = 0, 2, 130, 70
@@ -112,6 +113,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _interrupts(last: bool) -> Iterator[list[int]]:
     """Record each Ctrl-C, also one that a library swallows; with ``last`` none interrupts anything afterwards.
 
+    With ``last`` a second Ctrl-C ends the process while a library keeps the first one waiting.
+
     Python drops what is raised in a finaliser: an alarm raises such a Ctrl-C again.  An extension module that is
     interrupted while it is imported raises an ImportError, or drops it: an alarm looks again until the import is over.
     """
@@ -123,6 +126,7 @@ def _interrupts(last: bool) -> Iterator[list[int]]:
 
     def note(number: int, frame: FrameType | None) -> None:
         seen.append(number)
+        answered()
         if alarm and _importing(frame):
             signal.setitimer(signal.ITIMER_REAL, 0.01)
         else:
@@ -136,18 +140,26 @@ def _interrupts(last: bool) -> Iterator[list[int]]:
 
     alarm = hasattr(signal, "setitimer")  # not on Windows
     hook = sys.unraisablehook
-    try:
-        signal.signal(signal.SIGINT, note)
-        if alarm:
-            before = signal.signal(signal.SIGALRM, note)
-            sys.unraisablehook = again
-        yield seen
-    finally:
-        signal.signal(signal.SIGINT, signal.SIG_IGN if last else signal.default_int_handler)
-        sys.unraisablehook = hook
-        if alarm:
-            signal.setitimer(signal.ITIMER_REAL, 0)
-            signal.signal(signal.SIGALRM, before)
+    with second_ends(_end_at_once) if last else contextlib.nullcontext(lambda: None) as answered:
+        try:
+            signal.signal(signal.SIGINT, note)
+            if alarm:
+                before = signal.signal(signal.SIGALRM, note)
+                sys.unraisablehook = again
+            yield seen
+        finally:
+            signal.signal(signal.SIGINT, signal.SIG_IGN if last else signal.default_int_handler)
+            sys.unraisablehook = hook
+            if alarm:
+                signal.setitimer(signal.ITIMER_REAL, 0)
+                signal.signal(signal.SIGALRM, before)
+
+
+def _end_at_once() -> None:
+    """End the process though the main thread computes: nothing is kept that is not shown or stored yet."""
+    with contextlib.suppress(OSError):  # no stream: the main thread may be writing to it
+        os.write(2, b"interrupted twice: ended at once\n")
+    os._exit(INTERRUPTED)
 
 
 def _importing(frame: FrameType | None) -> bool:
