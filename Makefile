@@ -17,8 +17,9 @@ INSTALL = $(BIN)/python .ci/install.py $(1) $(UV)
 LOCKS  := requirements.lock requirements-test.lock requirements-run.lock
 NEEDS  := pyproject.toml $(LOCKS) ndtheory/__init__.py
 
-# Tests and pages start many processes: each would compile the packages anew.
-unexport PYTHONDONTWRITEBYTECODE
+# What a shell exports decides nothing here: PYTHONUNBUFFERED, PYTHONDONTWRITEBYTECODE (each of the many processes of
+# tests and pages would compile the packages anew), PYTHONPATH, PYTHONHASHSEED and all others that Python reads.
+unexport $(filter PYTHON%,$(filter-out PYTHON,$(.VARIABLES)))
 
 .PHONY: demo test check lint docs nightly lowest newest kratos paper bench release-check lock clean
 .NOTPARALLEL:  # one pip at a time; pytest uses the processors itself

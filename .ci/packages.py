@@ -48,7 +48,7 @@ COMMANDS = "Scripts" if os.name == "nt" else "bin"
 
 def run(*command: str | Path, cwd: Path = ROOT, **more: str) -> str:
     """The output of a command that ends well, with more in its environment; one that does not ends this program."""
-    alone = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "PYTHONHOME")}
+    alone = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
     alone |= {"PYTHONUTF8": "1"} | more
     found = subprocess.run(command, cwd=cwd, env=alone, capture_output=True, text=True, encoding="utf-8", check=False)
     if found.returncode:

@@ -46,12 +46,21 @@ SKETCHED = (
 )
 
 
+#: What a child inherits: where programs and files are, and what `conftest` sets.
+INHERITED = ("PATH", "HOME", "LANG", "TMPDIR", "SYSTEMROOT", "OPENBLAS_NUM_THREADS", "SYMPY_CACHE_SIZE")
+
+
+def environment(**more: str) -> dict[str, str]:
+    """The environment of a child: what else a shell exports, as PYTHONUNBUFFERED, decides how no test ends."""
+    return {name: os.environ[name] for name in INHERITED if name in os.environ} | more
+
+
 @contextmanager
 def running(code: str, *arguments: object, flags: Sequence[str] = (), **options) -> Iterator[subprocess.Popen]:
     """A fresh interpreter in a process group of its own; at the end of the block the whole group is ended."""
     command = [sys.executable, *flags, "-c", textwrap.dedent(code), *map(str, arguments)]
-    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    with subprocess.Popen(command, start_new_session=True, **streams | options) as process:
+    usual = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "env": environment()}
+    with subprocess.Popen(command, start_new_session=True, **usual | options) as process:
         try:
             yield process
         finally:
@@ -91,10 +100,9 @@ def on_a_terminal(
 ) -> str:
     """What the command writes to a terminal, without its movements; ``streams`` of stdout and stderr lead there."""
     leader, follower = pty.openpty()
-    environment = os.environ | {"TERM": "xterm", "COLUMNS": str(columns)}
     to = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL} | dict.fromkeys(streams, follower)
     written = b""
-    with running(code, *arguments, env=environment, **to) as process:
+    with running(code, *arguments, env=environment(TERM="xterm", COLUMNS=str(columns)), **to) as process:
         os.close(follower)
         with suppress(OSError):  # the other end was closed
             while chunk := os.read(leader, 4096):

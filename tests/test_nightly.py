@@ -9,6 +9,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from processes import environment
 
 ROOT = Path(__file__).parents[1]
 nightly = SimpleNamespace(**runpy.run_path(str(ROOT / ".ci/nightly.py")))
@@ -52,7 +53,7 @@ def project(tmp_path):
     (tmp_path / nightly.NOTES).write_text("|---|\n| cli | | | |\n| docs | 7 | 2020-01-01 | 0123456789 |\n")
     git = ["git", "-c", "user.name=a", "-c", "user.email=a@b"]
     for words in (["init", "-q"], ["add", "."], ["commit", "-q", "-m", "all"]):
-        subprocess.run([*git, *words], cwd=tmp_path, check=True)
+        subprocess.run([*git, *words], cwd=tmp_path, check=True, env=environment())
     return tmp_path
 
 
@@ -60,7 +61,7 @@ def test_what_passes_on_a_commit_is_noted_with_it(project):
     asked = []
     assert nightly.main(["cli"], project, lambda root, given: not asked.append(given)) == 0
     assert asked == [["tests/cli/test_one.py"]]
-    head = subprocess.run(["git", "rev-parse", "HEAD"], cwd=project, capture_output=True, text=True).stdout
+    head = subprocess.check_output(["git", "rev-parse", "HEAD"], cwd=project, text=True, env=environment())
     assert rows(project) == {"cli": f"1 | {date.today()} | {head[:10]}", "docs": "7 | 2020-01-01 | 0123456789"}
     assert nightly.main(["docs"], project, lambda root, given: True) == 0  # a note is no change
     assert rows(project)["docs"] == f"1 | {date.today()} | {head[:10]}"

@@ -1,7 +1,6 @@
 """Which Pythons are promised, tried and run: the same in the classifiers, the workflow, the Makefile and the README."""
 
 import ast
-import os
 import re
 import runpy
 import subprocess
@@ -14,6 +13,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from processes import ended, environment
 
 import ndtheory
 from verification.extras import EXTRAS
@@ -194,7 +194,7 @@ COMMAND = "import sys; from verification.cli import main; sys.exit(main(['bounds
 def overwritten(tmp_path):
     """Run code where the first file of `verification` has another content."""
 
-    def ended(code, content):
+    def found(code, content):
         for name in ("fem1d2d", "ndtheory"):
             (tmp_path / name).symlink_to(ROOT / name)
         folder = tmp_path / "verification"
@@ -203,12 +203,9 @@ def overwritten(tmp_path):
             if path.name != "__init__.py":
                 (folder / path.name).symlink_to(path)
         (folder / "__init__.py").write_text(content, encoding="utf-8")
-        environment = os.environ | {"PYTHONPATH": str(tmp_path)}
-        return subprocess.run(
-            [sys.executable, "-c", code], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
-        )
+        return ended(code, cwd=tmp_path, env=environment(PYTHONPATH=str(tmp_path)))
 
-    return ended
+    return found
 
 
 @pytest.mark.parametrize("content", ["", '__version__ = "0.0.9"\n'], ids=["empty", "another version"])

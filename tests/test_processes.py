@@ -1,15 +1,18 @@
-"""What a test starts ends with it, and no test has a limit of its own."""
+"""What a test starts ends with it, gets nothing of the shell that started the tests, and has no limit of its own."""
 
 import ast
 import os
+import re
 import select
 import signal
+import subprocess
 from pathlib import Path
 
 import pytest
-from processes import PATIENCE, running
+from processes import PATIENCE, ended, environment, running
 
 TESTS = Path(__file__).parent
+ROOT = TESTS.parent
 
 #: A process whose child inherits the pipe given by number; both wait for ever.
 PARENT = """
@@ -38,6 +41,48 @@ def test_a_test_that_fails_leaves_neither_the_process_nor_its_child_behind():
     assert os.read(reader, 1) == b""  # nobody holds the other end: the child has gone too
     for end in (reader, stdin, never_written):
         os.close(end)
+
+
+#: What decides how Python behaves; the last one is none of Python's.
+EXPORTED = {
+    "PYTHONUNBUFFERED": "1",
+    "PYTHONDONTWRITEBYTECODE": "1",
+    "PYTHONPATH": "/nowhere",
+    "PYTHONHASHSEED": "7",
+    "PYTHONOPTIMIZE": "2",
+    "PYTHONWARNINGS": "error",
+    "LANG": "C.UTF-8",
+}
+
+
+def test_what_a_shell_exports_reaches_neither_the_children_of_tests_nor_what_make_starts(monkeypatch):
+    for name, value in EXPORTED.items():
+        monkeypatch.setenv(name, value)
+    seen = ended("import os; print(*os.environ, sep='\\n')").stdout.split()
+    make = ["make", "--no-print-directory", "--eval=show: ; @env", "show"]
+    shown = subprocess.run(make, cwd=ROOT, env=dict(os.environ), capture_output=True, text=True, check=True).stdout
+    told = re.findall(r"(?m)^(\w+)=", shown)
+    assert [sorted(EXPORTED.keys() & names) for names in (seen, told)] == [["LANG"]] * 2
+
+
+def test_continuous_integration_runs_the_tests_in_the_shell_of_a_stranger():
+    """The lines of the script that begin the tests, with a command in place of make."""
+    lines = (ROOT / ".ci" / "run").read_text("utf-8").splitlines()
+    begun = [line for line in lines if "clean" in line]
+    script = "set -euo pipefail\n" + "\n".join(begun).replace("make test", "env")
+    given = environment(PIP_CERT="a file", PYTHONUNBUFFERED="1", COLUMNS="40", TERM="dumb")
+    done = subprocess.run(["bash", "-c", script], env=given, capture_output=True, text=True, check=True)
+    told = dict(line.partition("=")[::2] for line in done.stdout.splitlines())
+    assert set(told) - {"_"} == {"PATH", "HOME", "LANG", "CI", "PIP_CERT"}
+    assert (told["CI"], told["PIP_CERT"]) == ("true", "a file")
+
+
+def test_no_test_hands_its_own_environment_on():
+    starts = {f"subprocess.{name}" for name in ("run", "Popen", "check_output", "check_call")}
+    for path in TESTS.rglob("*.py"):
+        calls = [node for node in ast.walk(ast.parse(path.read_text("utf-8"))) if isinstance(node, ast.Call)]
+        words = [[keyword.arg for keyword in call.keywords] for call in calls if ast.unparse(call.func) in starts]
+        assert all("env" in each or None in each for each in words), path
 
 
 def limits(text):

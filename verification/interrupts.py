@@ -6,11 +6,15 @@ import contextlib
 import os
 import signal
 import threading
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from multiprocessing.connection import Connection
 
 #: The reason for a part that is missing after Ctrl-C.
 INTERRUPTED = "interrupted before it was worked out"
+
+#: Seconds without an answer after which a second Ctrl-C is one: some programs that start others pass each one on twice.
+UNANSWERED = 0.3
 
 
 #: True if a signal can be held back; not on Windows.
@@ -32,6 +36,45 @@ def undisturbed() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextlib.contextmanager
+def second_ends(end: Callable[[], None]) -> Iterator[Callable[[], object]]:
+    """Return a context in which ``end`` is called at once by a second Ctrl-C, if nothing has answered the first.
+
+    Python calls no handler while a library computes.  But it notes each signal in a pipe at once, and a thread reads
+    that pipe wherever the library lets other threads run, as SuperLU and Clarabel do.
+
+    Yields
+    ------
+    answered
+        To be called by the handler of Ctrl-C.
+    """
+    if not CAN_WAIT:
+        yield lambda: None
+        return
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+
+    def watch() -> None:
+        asked: float | None = None
+        while noted := os.read(reader, 1):
+            if noted == b"\0":
+                asked = None
+            elif noted[0] == signal.SIGINT:
+                asked = asked or time.monotonic()
+                if time.monotonic() - asked > UNANSWERED:
+                    end()
+        os.close(reader)
+
+    with undisturbed():  # the thread itself takes no signal from the main one
+        threading.Thread(target=watch, daemon=True).start()
+    before = signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
+    try:
+        yield lambda: os.write(writer, b"\0")
+    finally:
+        signal.set_wakeup_fd(before)
+        os.close(writer)
 
 
 def begin_child(life: Connection) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from processes import COMMAND, PATIENCE, SKETCHED, ended, running
+from processes import COMMAND, PATIENCE, SKETCHED, ended, environment, running
 from strategies import AT_NIGHT
 
 from verification.output.files import FILES
@@ -92,16 +92,65 @@ def unwarned(err):
     return "".join(line for line in err.splitlines(keepends=True) if not line.startswith(strained))
 
 
-@pytest.mark.parametrize("arguments", [["--help"], BOUNDS, ["run", "FILE"], ["compare", "FILE", "--json"]])
-def test_a_reader_that_goes_away_is_neither_a_crash_nor_a_failed_run(write, arguments):
+@pytest.fixture
+def unread():
+    """A pipe that nobody reads."""
     reader, writer = os.pipe()
     os.close(reader)
+    yield writer
+    os.close(writer)
+
+
+@pytest.mark.parametrize("arguments", [["--help"], BOUNDS, ["run", "FILE"], ["compare", "FILE", "--json"]])
+def test_a_reader_that_goes_away_is_neither_a_crash_nor_a_failed_run(write, unread, arguments):
     file = write("without friction")
     code = SKETCHED if "compare" in arguments else COMMAND  # what is sketched is imported first
-    found = start(*(file if a == "FILE" else a for a in arguments), code=code, stdout=writer)
-    os.close(writer)
+    found = start(*(file if a == "FILE" else a for a in arguments), code=code, stdout=unread)
     assert unwarned(found.stderr) == ""
-    assert found.returncode in (0, 141)  # 141: as if ended by SIGPIPE
+    assert found.returncode == 141  # as if ended by SIGPIPE
+
+
+#: A command that ends in every way in which commands end, when it has written on both streams.
+ENDS = """
+    import os, sys
+    import click
+    from verification.cli.console import complain, interruptible, say
+    from verification.cli.main import cli, main
+
+    @cli.command()
+    @click.argument("status", type=int)
+    @interruptible
+    def ends(status):
+        complain("a note")
+        say("the answer")
+        with open(os.devnull) as file:  # what a library writes on stdout or stderr must not stand in it
+            assert file.fileno() > 2
+        raised = {2: click.UsageError("no"), 70: ZeroDivisionError(), 130: KeyboardInterrupt()}
+        if status in raised:
+            raise raised[status]
+        return status
+
+    sys.exit(main())
+"""
+
+
+@pytest.mark.parametrize(
+    ("status", "more"),
+    [
+        *((status, {}) for status in (0, 1, 2, 3, 70, 130)),
+        *((status, {"PYTHONUNBUFFERED": "1"}) for status in (0, 2, *[1, 3, 70, 130] * AT_NIGHT)),
+    ],
+)
+def test_a_status_survives_streams_that_are_closed_or_unread_but_an_answer_that_is_lost_is_never_0(
+    unread, status, more
+):
+    ends = lambda **streams: start("ends", status, code=ENDS, env=environment(**more), **streams).returncode
+    closed = lambda low: ends(preexec_fn=lambda: os.closerange(low, 3))
+    assert ends(stdout=unread, stderr=unread) == (status or 141)
+    if AT_NIGHT or not (status or more):
+        assert ends(stderr=unread) == status
+        assert closed(2) == status
+        assert closed(0) == (status or 2)
 
 
 @pytest.mark.parametrize("stream", ["sys.stdout", "sys.stderr"])
@@ -115,12 +164,9 @@ def test_a_stream_that_is_closed_is_no_crash(write, arguments, stream):
 
 
 @pytest.mark.parametrize("arguments", [["run", "missing.toml"], ["bogus"], ["bounds"], ["run", "FILE", "--theta", "2"]])
-def test_bad_input_has_its_status_even_where_nobody_reads_the_line(write, arguments):
-    reader, writer = os.pipe()
-    os.close(reader)
+def test_bad_input_has_its_status_even_where_nobody_reads_the_line(write, unread, arguments):
     file = write()
-    found = start(*(file if a == "FILE" else a for a in arguments), stderr=writer)
-    os.close(writer)
+    found = start(*(file if a == "FILE" else a for a in arguments), stderr=unread)
     assert (found.returncode, found.stdout) == (2, "")
 
 
@@ -139,8 +185,7 @@ def test_a_full_disk_behind_stdout_is_told_in_one_line(write):
 )
 def test_a_title_beyond_the_encoding_of_the_terminal_is_no_crash(write, options, encoding):
     file = write({"title": '"Kontakt \N{GREEK SMALL LETTER MU} \N{CJK UNIFIED IDEOGRAPH-63A5}"'})
-    environment = os.environ | {"PYTHONIOENCODING": encoding}
-    found = start("run", file, *options, env=environment, text=False)
+    found = start("run", file, *options, env=environment(PYTHONIOENCODING=encoding), text=False)
     assert (found.returncode, found.stderr) == (0, b"")
     assert b"Kontakt" in found.stdout
 

@@ -1,9 +1,8 @@
 """Kernels of pages that are copies of the builder: they begin as a new one would, and end with their page."""
 
-import os
 from pathlib import Path
 
-from processes import ended
+from processes import ended, environment
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -45,7 +44,7 @@ warnings.warn("seen")
 
 def test_a_page_begins_as_in_a_new_kernel_and_ends_with_its_kernel(site_tools, tmp_path):
     pages = (SHOWN, "unknown", "import os; os._exit(3)", "print('the next one')")
-    answer = ended(PAGES, DOCS, tmp_path, *pages, env=os.environ | {"PAGE": "set"})
+    answer = ended(PAGES, DOCS, tmp_path, *pages, env=environment(PAGE="set"))
     assert answer.returncode == 0, answer.stderr
     here, paths, names, warned, *_, failed, dead, after, left = answer.stdout.splitlines()
     assert here == f"{tmp_path} set"

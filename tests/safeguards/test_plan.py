@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from processes import environment
 from safeguards.plan import MUTANTS, TESTS, Mutant, mutants
 from strategies import AT_NIGHT
 
@@ -54,10 +54,9 @@ def copy(tmp_path_factory):
 
 def passes(folder: Path, tests: tuple[str, ...]) -> bool:
     """True if these tests pass on this copy, each with the same drawn cases."""
-    alone = {name: value for name, value in os.environ.items() if not name.startswith(("PYTEST", "HYPOTHESIS"))}
-    environment = alone | {"HYPOTHESIS_PROFILE": "ci", "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
+    env = environment(HYPOTHESIS_PROFILE="ci", PYTHONPATH=str(folder), PYTHONDONTWRITEBYTECODE="1")
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-n", "0", "-p", "no:cacheprovider", *tests]
-    ended = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+    ended = subprocess.run(command, cwd=folder, env=env, capture_output=True, text=True, check=False)
     assert ended.returncode in (0, 1), ended.stdout + ended.stderr
     return ended.returncode == 0
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from processes import PATIENCE
+from processes import PATIENCE, environment
 
 #: The wrapper of a contact body, :mod:`kratos_contact`, is loaded from here.
 HERE = Path(__file__).parent
@@ -124,8 +124,8 @@ def written(folder: Path, pair, snippet: str, accelerator: dict[str, Any] | None
 def run(file: Path) -> str:
     """What CoSimulation prints."""
     path = os.pathsep.join([str(HERE), str(HERE.parents[1])])
-    environment = os.environ | {"PYTHONPATH": path, "OMP_NUM_THREADS": "1"}
+    env = environment(PYTHONPATH=path, OMP_NUM_THREADS="1")
     command = [sys.executable, "-m", "KratosMultiphysics.CoSimulationApplication.co_simulation_analysis", file.name]
-    done = subprocess.run(command, cwd=file.parent, env=environment, capture_output=True, text=True, timeout=PATIENCE)
+    done = subprocess.run(command, cwd=file.parent, env=env, capture_output=True, text=True, timeout=PATIENCE)
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
     return done.stdout

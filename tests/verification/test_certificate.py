@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from flint import ctx, fmpq
 from problem_list import blocks, changed, plates, small
+from processes import environment
 
 import verification as vf
 from verification.bounds.bound import Subject
@@ -96,7 +97,7 @@ def test_the_checker_imports_nothing_of_ours_and_says_the_same_in_an_empty_folde
     for given, status, word in ((document, 0, "ACCEPTED"), (below, 1, "REFUSED")):
         (tmp_path / "certificate.json").write_text(json.dumps(given), encoding="utf-8")
         call = [sys.executable, "-I", "alone.py", "certificate.json"]
-        ended = subprocess.run(call, cwd=tmp_path, capture_output=True, text=True, check=False)
+        ended = subprocess.run(call, cwd=tmp_path, capture_output=True, text=True, check=False, env=environment())
         assert (ended.returncode, ended.stderr) == (status, "")
         assert word in ended.stdout
 

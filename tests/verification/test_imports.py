@@ -1,7 +1,6 @@
 """What imports of ours do, in processes of their own: another test may have imported the same in this one."""
 
-import subprocess
-import sys
+from processes import ended
 
 #: Each module of ours is imported.  At every import on the way, and at the end, what lies in sys.modules under a name
 #: that could be imported must be what would be imported: another thread may ask for it at that moment.
@@ -39,8 +38,8 @@ assert scipy.stats.norm.cdf(0) == 0.5
 
 
 def test_no_import_of_ours_puts_a_substitute_where_other_threads_import():
-    ended = subprocess.run([sys.executable, "-c", GENUINE], capture_output=True, text=True, check=False)
-    assert ended.returncode == 0, ended.stderr
+    done = ended(GENUINE)
+    assert done.returncode == 0, done.stderr
 
 
 #: Python without hypothesis, which says how often it was asked for.
@@ -66,6 +65,6 @@ import verification.testing
 
 
 def test_nothing_but_the_kit_asks_for_hypothesis_and_it_says_what_to_install():
-    done = subprocess.run([sys.executable, "-c", WITHOUT], capture_output=True, text=True, check=False)
+    done = ended(WITHOUT)
     assert (done.returncode, done.stdout.strip()) == (1, "0")
     assert "verification.testing needs hypothesis: pip install hypothesis" in done.stderr.splitlines()[-1]

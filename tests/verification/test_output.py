@@ -4,12 +4,11 @@ import errno
 import json
 import re
 import signal
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from processes import ended
 from small_result import ONE_STEP, problem
 
 import verification as vf
@@ -198,7 +197,7 @@ with staged(folder, ("a.json", "b.json", "c.json")) as room:
 def test_a_process_that_is_killed_leaves_files_of_one_run_and_the_next_one_cleans_up(tmp_path, moves):
     for name in ("a.json", "b.json", "c.json"):
         (tmp_path / name).write_text("old")
-    killed = subprocess.run([sys.executable, "-c", KILLED, str(tmp_path), str(moves)], check=False)
+    killed = ended(KILLED, tmp_path, moves)
     assert killed.returncode == -signal.SIGKILL
     left = {path.name: path.read_text() for path in tmp_path.iterdir() if path.is_file()}
     assert left == {-1: dict.fromkeys(("a.json", "b.json", "c.json"), "old"), 0: {}, 1: {"a.json": "new"}}[moves]

@@ -85,6 +85,28 @@ def test_no_clock_decides_what_is_compared(run, monkeypatch):
     assert by_cvxpy_alone(run) == before
 
 
+def test_a_program_that_takes_too_long_has_no_answer(run, monkeypatch):
+    monkeypatch.setattr("verification.contact.model.SECONDS", 1e-9)
+    with pytest.raises(ContactError, match="no answer"):
+        by_cvxpy_alone(run)
+
+
+def test_a_program_with_too_many_unknowns_is_refused_where_it_is_asked_for_and_named_where_it_would_help(
+    run, monkeypatch
+):
+    unknowns = 2 * run.pair.contact.grid.n
+    monkeypatch.setattr("verification.contact.step.MOST_UNKNOWNS", unknowns - 1)
+    says = f"the convex program of step II has {unknowns} unknowns: it is not tried beyond {unknowns - 1}"
+    with pytest.raises(ContactError, match=says):
+        vf.run(run.pair, solver="cvxpy")
+    assert says in vf.compare(run.pair).to_dict()["reason"]["cvxpy"]
+    assert vf.run(run.pair).history == run.history
+    monkeypatch.setattr(ActiveSet, "solve", lambda *args: None)
+    monkeypatch.setattr(ActiveSet, "repeated", lambda *args: iter(()))
+    with pytest.raises(ContactError, match=f"did not reach a KKT residual of .*; {says}"):
+        vf.run(run.pair)
+
+
 def test_a_program_without_an_answer_is_told(run, monkeypatch):
     monkeypatch.setattr("verification.contact.model.ContactModel.solve", lambda self, q, bound: None)
     with pytest.raises(ContactError, match="no answer"):

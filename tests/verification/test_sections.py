@@ -3,13 +3,12 @@
 import ast
 import html
 import re
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from kinds import KINDS, OTHERS, problem
+from processes import ended
 
 import verification as vf
 from ndtheory import Number
@@ -217,7 +216,7 @@ def test_no_module_of_sections_names_a_bound():
 def test_sections_are_made_without_a_terminal_a_browser_and_a_figure():
     heavy = ["click", "rich", "matplotlib", "jinja2", "verification.cli", "verification.figures", "verification.output"]
     code = f"import sys, verification.sections.of_results; print([name for name in {heavy} if name in sys.modules])"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = ended(code)
     assert done.stdout.strip() == "[]"
 
 

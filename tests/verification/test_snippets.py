@@ -9,6 +9,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
+from processes import environment
 
 import verification as vf
 from verification.advice.methods import METHODS
@@ -126,7 +127,7 @@ def test_preCICE_itself_accepts_its_block(tmp_path, coupling, method):
     file = tmp_path / "precice-config.xml"
     for text, accepted in ((block, True), (block.replace("acceleration:", "acceleration:in"), False)):
         file.write_text(AROUND.format(*named(coupling), text), "utf-8")
-        assert (subprocess.run([VALIDATE, file], capture_output=True).returncode == 0) == accepted
+        assert (subprocess.run([VALIDATE, file], capture_output=True, env=environment()).returncode == 0) == accepted
 
 
 @pytest.mark.parametrize("coupling", COUPLINGS, ids=str)

@@ -1,13 +1,13 @@
 """A sweep on a real dask scheduler with two real workers, and what is left when one or the other is killed."""
 
 import json
-import os
 import subprocess
 import sys
 import time
 from contextlib import ExitStack, contextmanager, suppress
 
 import pytest
+from processes import environment
 from strategies import AT_NIGHT
 
 import verification as vf
@@ -35,10 +35,10 @@ class Cluster:
 
 
 @contextmanager
-def process(module, *arguments, **environment):
+def process(module, *arguments, **more):
     command = [sys.executable, "-W", "ignore", "-m", f"distributed.cli.{module}", *map(str, arguments)]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    with subprocess.Popen(command, env=os.environ | environment, **quiet) as started:
+    with subprocess.Popen(command, env=environment(**more), **quiet) as started:
         try:
             yield started
         finally:
@@ -50,10 +50,10 @@ def cluster(tmp_path):
     """``cluster(workers, **environment)``: one that is up."""
     with ExitStack() as stack:
 
-        def up(workers=2, **environment):
+        def up(workers=2, **more):
             file = tmp_path / "scheduler.json"
             scheduler = stack.enter_context(
-                process("dask_scheduler", "--port", 0, "--no-dashboard", "--scheduler-file", file, **environment)
+                process("dask_scheduler", "--port", 0, "--no-dashboard", "--scheduler-file", file, **more)
             )
             begun = time.monotonic()
             address = None
@@ -63,9 +63,7 @@ def cluster(tmp_path):
                     address = json.loads(file.read_text("utf-8"))["address"]
                 time.sleep(0.05)
             options = ["--nthreads", 1, "--no-nanny", "--no-dashboard", "--local-directory", tmp_path]
-            started = [
-                stack.enter_context(process("dask_worker", address, *options, **environment)) for _ in range(workers)
-            ]
+            started = [stack.enter_context(process("dask_worker", address, *options, **more)) for _ in range(workers)]
             from distributed import Client
 
             with Client(address, set_as_default=False) as client:

@@ -9,7 +9,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from processes import ended, running
+from processes import ended, environment, running
 from stored import read
 from strategies import AT_NIGHT
 
@@ -230,7 +230,7 @@ def test_a_sweep_killed_at_random_moments_ends_with_the_table_of_one_that_was_no
     random = np.random.default_rng(moments)
     code = KILLED.format(problem=SMALL.to_dict(), grid=LONG, folder=str(tmp_path))
     chosen = random.exponential(0.1, size=moments).round(4)
-    answer = ended(code, *chosen, env=os.environ | {"OPENBLAS_NUM_THREADS": "1"})
+    answer = ended(code, *chosen, env=environment(OPENBLAS_NUM_THREADS="1"))
     assert answer.returncode == 0, answer.stderr
     killed, stores = map(int, answer.stdout.split())
     assert killed >= moments // 2

@@ -1,5 +1,7 @@
 """The command ``ndtheory``, and the only package that prints."""
 
+import contextlib
+import os
 import sys
 import warnings
 
@@ -12,7 +14,8 @@ try:
             import ndtheory  # noqa: F401
         from verification.cli.main import main
 except KeyboardInterrupt:
-    sys.stderr.write("interrupted before anything was computed\n")
+    with contextlib.suppress(OSError):  # stderr is closed; no buffer, which would be written again at the end
+        os.write(2, b"interrupted before anything was computed\n")
     sys.exit(130)
 
 __all__ = ["main"]

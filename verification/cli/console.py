@@ -5,11 +5,13 @@ from __future__ import annotations
 import contextlib
 import errno
 import functools
+import io
 import math
 import os
+import select
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, TextIO, TypeVar
 
 import click
@@ -32,14 +34,14 @@ if TYPE_CHECKING:
 D = TypeVar("D", bound=Document)
 
 
-class ReaderGone(Exception):
-    """Nobody reads stdout any more."""
+class Lost(Exception):
+    """The rest of a result is not worth computing: nobody can read it."""
 
 
-def gone(error: Exception) -> bool:
+def gone(error: OSError) -> bool:
     """Return True if an error says that nobody reads stdout: writing to a closed pipe is another error on Windows."""
-    no_pipe = isinstance(error, OSError) and os.name == "nt" and (error.errno, error.filename) == (errno.EINVAL, None)
-    return no_pipe or isinstance(error, (ReaderGone, BrokenPipeError))
+    no_pipe = os.name == "nt" and (error.errno, error.filename) == (errno.EINVAL, None)
+    return no_pipe or isinstance(error, BrokenPipeError)
 
 
 class Interrupted(Exception):
@@ -55,7 +57,7 @@ class _Stdout:
     """The stream of results, its state, and the live line that makes room for them."""
 
     stream: TextIO | None = None
-    unread: bool = False
+    errors: list[OSError] = field(default_factory=list)
     live: Live | None = None
     said: bool = False
 
@@ -63,18 +65,84 @@ class _Stdout:
 _stdout = _Stdout()
 
 
+class _Output(io.RawIOBase):
+    """Bytes to a file that never fails: the first error is kept, and nothing is written after it.
+
+    Text that cannot be written would stay in the buffer of its stream, and fail again when Python ends: then the exit
+    status is Python's, whatever the command returned.
+    """
+
+    def __init__(self, number: int, errors: list[OSError], closefd: bool) -> None:
+        self._file = open(number, "wb", buffering=0, closefd=closefd)  # noqa: SIM115
+        self._errors = errors
+
+    def writable(self) -> bool:
+        return True
+
+    def isatty(self) -> bool:
+        return self._file.isatty()
+
+    def fileno(self) -> int:
+        return self._file.fileno()
+
+    def close(self) -> None:
+        self._file.close()
+        super().close()
+
+    def write(self, data: Any) -> int:
+        try:
+            if not self._errors:
+                while (written := self._file.write(data)) is None:  # a pipe that does not block, and is full
+                    select.select([], [self], [])
+                return written
+        except OSError as error:
+            self._errors.append(error)
+        return len(data)
+
+
+def _text(number: int, like: TextIO | None, errors: list[OSError], closefd: bool = False) -> TextIO:
+    """A stream of text to a file by its number; characters beyond the encoding are written as escapes."""
+    encoding = "utf-8" if like is None else like.encoding
+    buffer = io.BufferedWriter(_Output(number, errors, closefd))
+    return io.TextIOWrapper(buffer, encoding=encoding, errors="backslashreplace", line_buffering=True)
+
+
+@contextlib.contextmanager
+def steady(*, last: bool) -> Iterator[None]:
+    """Return a context in which writing to stdout and stderr never fails; with ``last`` they stay so to the end.
+
+    No file that is opened meanwhile gets the number of a standard stream that is closed.
+    """
+    while (number := os.open(os.devnull, os.O_RDONLY)) <= 2:
+        os.set_inheritable(number, True)  # as the numbers of standard streams are
+    os.close(number)
+    _stdout.errors.clear()
+    before = sys.stdout, sys.stderr
+    for name, number, errors in (("stdout", 1, _stdout.errors), ("stderr", 2, [])):
+        stream: TextIO | None = getattr(sys, name)
+        if stream is None or isinstance(stream, io.TextIOWrapper):
+            with contextlib.suppress(ValueError):  # a stream that writes to no file
+                setattr(sys, name, _text(number if stream is None else stream.fileno(), stream, errors))
+    try:
+        yield
+    finally:
+        for stream in (sys.stdout, sys.stderr):
+            stream.flush()
+        if not last:
+            sys.stdout, sys.stderr = before
+
+
+def lost() -> OSError | None:
+    """The error that kept a part of the result from being written; None if there was none."""
+    sys.stdout.flush()
+    return next(iter(_stdout.errors), None)
+
+
 def say(text: str, *, bold: bool = False) -> None:
-    """Print lines of the result, control characters as escapes; ReaderGone if the other end of a pipe was closed."""
-    if _stdout.unread:
-        return
+    """Print lines of the result, control characters as escapes."""
     text = "\n".join(map(printable, text.split("\n")))
     _stdout.said = True
-    try:
-        click.echo(click.style(text, bold=True) if bold else text, file=_stdout.stream)
-    except OSError as error:
-        if gone(error):
-            raise ReaderGone from None
-        raise
+    click.echo(click.style(text, bold=True) if bold else text, file=_stdout.stream)
 
 
 def show(sections: Sections, typing: Typing = nothing_typed, after: str = "") -> None:
@@ -100,17 +168,14 @@ def one_by_one(*, needed: bool = False) -> Callable[[Sections], None]:
 def part(*, needed: bool = False) -> Iterator[None]:
     """Show a part of a result without interruption, while the rest is still being computed.
 
-    If nobody reads stdout, ReaderGone is raised, unless the rest is ``needed``, as for files.
+    If it cannot be written, Lost is raised, unless the rest is ``needed``, as for files or the exit status.
     """
     with undisturbed():
         if _stdout.live is not None:
             _stdout.live.stop()
-        try:
-            yield
-        except ReaderGone:
-            if not needed:
-                raise
-            _stdout.unread = True
+        yield
+        if _stdout.errors and not needed:
+            raise Lost
         if _stdout.live is not None:
             _stdout.live.start()
 
@@ -120,30 +185,20 @@ def alone() -> Iterator[None]:
     """Let only results reach stdout: what else is written there, by a C library too, goes to stderr."""
     out, _stdout.said = sys.stdout, False
     try:
-        number = None if out is None else out.fileno()
+        number = out.fileno()
     except (OSError, ValueError):  # no file: what no C library can reach
         number = None
     with contextlib.ExitStack() as stack:
         if number is not None:
             out.flush()
-            _stdout.stream = open(os.dup(number), "w", encoding=out.encoding, errors=out.errors)  # noqa: SIM115
+            _stdout.stream = _text(os.dup(number), out, _stdout.errors, closefd=True)
             stack.callback(_restore, _stdout.stream, number)
-            os.dup2(_elsewhere(stack), number)
+            os.dup2(2, number)
         else:
             _stdout.stream = out
         stack.callback(setattr, _stdout, "stream", None)
-        stack.callback(setattr, _stdout, "unread", False)
         stack.enter_context(contextlib.redirect_stdout(sys.stderr))
         yield
-
-
-def _elsewhere(stack: contextlib.ExitStack) -> int:
-    """The file number of stderr, or of nothing where it is closed."""
-    try:
-        os.fstat(2)
-    except OSError:
-        return stack.enter_context(open(os.devnull, "w")).fileno()
-    return 2
 
 
 def _restore(stream: TextIO, number: int) -> None:
@@ -152,11 +207,9 @@ def _restore(stream: TextIO, number: int) -> None:
 
     with contextlib.suppress(OSError, TypeError, AttributeError):  # Windows
         ctypes.CDLL(None).fflush(None)
-    with contextlib.suppress(OSError):  # a closed pipe or a full disk, which has been reported
-        stream.flush()
+    stream.flush()
     os.dup2(stream.fileno(), number)
-    with contextlib.suppress(OSError):
-        stream.close()
+    stream.close()
 
 
 def interruptible(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -181,8 +234,7 @@ def interruption() -> str:
 
 def complain(text: str) -> None:
     """Print an error, a warning or a note to stderr, control characters as escapes."""
-    with contextlib.suppress(OSError):  # stderr is closed
-        click.echo(printable(text), err=True)
+    click.echo(printable(text), err=True)
 
 
 def deliver(
@@ -200,7 +252,7 @@ def deliver(
     completes the command to type next.
     """
     text = document.to_json() if as_json else ""
-    with part(needed=write is not None):
+    with part(needed=True):
         if as_json:
             say(text)
         else:
@@ -221,7 +273,7 @@ def deliver(
 @contextlib.contextmanager
 def stages() -> Iterator[Progress]:
     """A live line on a terminal's stderr: the current stage, its share that is done, the time."""
-    if sys.stderr is None or not sys.stderr.isatty():
+    if not sys.stderr.isatty():
         yield silent
         return
     from rich.console import Console

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import io
 import os
 import signal
 import sys
@@ -28,11 +27,27 @@ from verification.cli import (
     problems,
     sweeping,
 )
-from verification.cli.console import NOTHING, SHOWN, Interrupted, complain, gone, interruptible, interruption, reported
+from verification.cli.console import (
+    NOTHING,
+    SHOWN,
+    Interrupted,
+    Lost,
+    complain,
+    gone,
+    interruptible,
+    interruption,
+    lost,
+    reported,
+    steady,
+)
 from verification.cli.forms import AdviseGroup, Commands
+from verification.interrupts import second_ends
 
 #: Exit statuses of the interface.  A crash is none of them.
-DONE, NOT_MET, BAD_INPUT, INTERRUPTED, CRASH = 0, 1, 2, 130, 70
+DONE, BAD_INPUT, INTERRUPTED, CRASH = 0, 2, 130, 70
+
+#: Done, but whoever read stdout left before the answer came: as the shell reports programs that SIGPIPE ends.
+UNREAD = 141
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 80})
@@ -78,7 +93,8 @@ for command in (
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit status.
 
-    2 bad input (one line), 1 a run that did not converge or a proved claim violated, 3 inconclusive, 130 Ctrl-C.
+    2 bad input (one line), 1 a run that did not converge or a proved claim violated, 3 inconclusive, 130 Ctrl-C, and
+    never 0 if stdout did not take the answer.
     Without arguments the process's are taken; Ctrl-C is then ignored once the command has ended.
     """
     ours = arguments is None
@@ -86,8 +102,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if ours:
             # one thread, which blocks a signal for all: see `undisturbed`; matrices here are too small for more anyway
             os.environ |= {"OPENBLAS_NUM_THREADS": "1", "VECLIB_MAXIMUM_THREADS": "1"}
-        with _interrupts(last=ours) as seen:
-            return _run(arguments, seen)
+        with steady(last=ours), _interrupts(last=ours) as seen:
+            return _answered(_run(arguments, seen))
     except KeyboardInterrupt:
         complain("interrupted")
         return INTERRUPTED
@@ -96,6 +112,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 @contextlib.contextmanager
 def _interrupts(last: bool) -> Iterator[list[int]]:
     """Record each Ctrl-C, also one that a library swallows; with ``last`` none interrupts anything afterwards.
+
+    With ``last`` a second Ctrl-C ends the process while a library keeps the first one waiting.
 
     Python drops what is raised in a finaliser: an alarm raises such a Ctrl-C again.  An extension module that is
     interrupted while it is imported raises an ImportError, or drops it: an alarm looks again until the import is over.
@@ -108,6 +126,7 @@ def _interrupts(last: bool) -> Iterator[list[int]]:
 
     def note(number: int, frame: FrameType | None) -> None:
         seen.append(number)
+        answered()
         if alarm and _importing(frame):
             signal.setitimer(signal.ITIMER_REAL, 0.01)
         else:
@@ -121,18 +140,26 @@ def _interrupts(last: bool) -> Iterator[list[int]]:
 
     alarm = hasattr(signal, "setitimer")  # not on Windows
     hook = sys.unraisablehook
-    try:
-        signal.signal(signal.SIGINT, note)
-        if alarm:
-            before = signal.signal(signal.SIGALRM, note)
-            sys.unraisablehook = again
-        yield seen
-    finally:
-        signal.signal(signal.SIGINT, signal.SIG_IGN if last else signal.default_int_handler)
-        sys.unraisablehook = hook
-        if alarm:
-            signal.setitimer(signal.ITIMER_REAL, 0)
-            signal.signal(signal.SIGALRM, before)
+    with second_ends(_end_at_once) if last else contextlib.nullcontext(lambda: None) as answered:
+        try:
+            signal.signal(signal.SIGINT, note)
+            if alarm:
+                before = signal.signal(signal.SIGALRM, note)
+                sys.unraisablehook = again
+            yield seen
+        finally:
+            signal.signal(signal.SIGINT, signal.SIG_IGN if last else signal.default_int_handler)
+            sys.unraisablehook = hook
+            if alarm:
+                signal.setitimer(signal.ITIMER_REAL, 0)
+                signal.signal(signal.SIGALRM, before)
+
+
+def _end_at_once() -> None:
+    """End the process though the main thread computes: nothing is kept that is not shown or stored yet."""
+    with contextlib.suppress(OSError):  # no stream: the main thread may be writing to it
+        os.write(2, b"interrupted twice: ended at once\n")
+    os._exit(INTERRUPTED)
 
 
 def _importing(frame: FrameType | None) -> bool:
@@ -147,15 +174,10 @@ def _run(arguments: Sequence[str] | None, seen: Sequence[int]) -> int:
     if foreign := ndtheory.foreign_verification():
         complain(foreign)
         return BAD_INPUT
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")  # a title beyond the terminal's encoding
     try:
         status = cli.main(
             args=None if arguments is None else list(arguments), prog_name="ndtheory", standalone_mode=False
         )
-        if sys.stdout is not None:
-            sys.stdout.flush()
     except click.exceptions.NoArgsIsHelpError as error:
         for line in error.ctx.get_help().splitlines():
             complain(line)
@@ -171,12 +193,11 @@ def _run(arguments: Sequence[str] | None, seen: Sequence[int]) -> int:
         return INTERRUPTED
     except Interrupted:
         return INTERRUPTED
-    except SystemExit as error:  # click exits when a pipe is closed
-        return error.code if isinstance(error.code, int) and error.code != NOT_MET else DONE
+    except Lost:
+        return DONE
+    except SystemExit as error:  # click exits where any pipe is closed: not that of stdout or stderr
+        return _explain(error.__context__ or error)
     except Exception as error:
-        if gone(error):
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # drop what is still buffered
-            return DONE
         if seen:
             complain(interruption())
             return INTERRUPTED
@@ -186,6 +207,17 @@ def _run(arguments: Sequence[str] | None, seen: Sequence[int]) -> int:
         complain(SHOWN)
         return INTERRUPTED
     return status
+
+
+def _answered(status: int) -> int:
+    """The exit status of a command, which is never 0 if the answer could not be written."""
+    error = lost()
+    if error is None:
+        return status
+    if gone(error):
+        return status or UNREAD
+    complain(f"ndtheory: stdout: {error.strerror}")
+    return status or BAD_INPUT
 
 
 def _tracker() -> str:
@@ -198,7 +230,7 @@ def _tracker() -> str:
     return urls.get("Issues", "the issue tracker of the repository that this copy came from")
 
 
-def _explain(error: Exception) -> int:
+def _explain(error: BaseException) -> int:
     """Bad input in one line; anything else is a bug and says so."""
     from verification.problem.tables import ProblemError
 

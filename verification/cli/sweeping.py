@@ -223,7 +223,7 @@ def _progress(log: Path | None) -> Iterator[Progress]:
                     stream.flush()
 
             lines = every(IN_LOG, write, at_once=True)
-        elif sys.stderr is None or not sys.stderr.isatty():
+        elif not sys.stderr.isatty():
             lines = every(ON_STDERR, complain)
 
         def both(what: str, share: float | None) -> None:

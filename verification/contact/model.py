@@ -14,6 +14,9 @@ from fem1d2d.mesh import Floats
 #: Clarabel's defaults leave errors of 1e-4 in the energy; asking for more than this may end "almost solved" far off.
 TOLERANCE = 1e-10
 
+#: Seconds that one program may take, as Clarabel answers no Ctrl-C: some ten times what the largest one needs.
+SECONDS = 60.0
+
 
 class ContactModel:
     """The program, compiled once; only q and the bound change from step to step (DPP).
@@ -52,7 +55,7 @@ class ContactModel:
         self._problem = cp.Problem(cp.Minimize(energy), [self._v[presses] <= 0])
 
     def solve(self, q: Floats, bound: Floats) -> Floats | None:
-        """Return an approximate v on all components (0 where held), shape (t + n,), or None without an answer."""
+        """Return an approximate v on all components, 0 where held, shape (t + n,); None without an answer in time."""
         forces = float(np.abs(q[self._rows]).max(initial=0.0))
         v = np.zeros_like(q)
         if forces == 0.0:
@@ -64,11 +67,16 @@ class ContactModel:
             warnings.simplefilter("ignore")  # "may be inaccurate": the KKT certificate decides
             try:
                 self._problem.solve(
-                    solver=cp.CLARABEL, tol_gap_abs=TOLERANCE, tol_gap_rel=TOLERANCE, tol_feas=TOLERANCE, max_iter=200
+                    solver=cp.CLARABEL,
+                    tol_gap_abs=TOLERANCE,
+                    tol_gap_rel=TOLERANCE,
+                    tol_feas=TOLERANCE,
+                    max_iter=200,
+                    time_limit=SECONDS,
                 )
             except cp.SolverError:
                 return None
-        if self._v.value is None:
+        if self._v.value is None or self._problem.solver_stats.solve_time > SECONDS:
             return None
         v[self._rows] = self._v.value * (forces / self._stiffness)
         return v

@@ -23,6 +23,10 @@ Solver = Literal["auto", "cvxpy", "active-set"]
 #: Number of the last steps whose loads and patterns are remembered.
 KEPT = 128
 
+#: Most unknowns of the convex program: for 500 contact nodes cvxpy and Clarabel take some 5 s, eight times as long for
+#: twice as many.
+MOST_UNKNOWNS = 1000
+
 
 class ContactError(RuntimeError):
     """Step II has no minimiser, or no solver reached the KKT certificate."""
@@ -113,7 +117,7 @@ class ContactStep:
         Raises
         ------
         NoMinimiser, ContactError
-            Without a minimiser, or a certificate.
+            Without a minimiser, or a certificate; with too many unknowns for the program that was asked for.
         """
         start, found = self._pattern, None
         if self._solver != "cvxpy":
@@ -123,14 +127,21 @@ class ContactStep:
             found = found or self._by_active_set(q, bound, start, "active-set")
         if found is None and (way := way_out(self._motions, q, bound)):
             raise NoMinimiser(f"step II has no minimiser: the loads move {self._body} {way}")
-        if found is None and self._solver != "active-set" and (answer := self._of_program(q, bound)):
-            found = self._by_active_set(q, bound, answer.pattern, "cvxpy")
+        too_many = ""
+        if found is None and self._solver != "active-set":
+            try:
+                answer = self._of_program(q, bound)
+            except ContactError as error:
+                if self._solver == "cvxpy":
+                    raise
+                answer, too_many = None, f"; {error}"
+            found = None if answer is None else self._by_active_set(q, bound, answer.pattern, "cvxpy")
         if found is None:
             sticking = self._first
             found = self._by_active_set(q, bound, sticking, "active-set") or self._by_a_guess(q, bound, sticking)
         if found is None:
             why = f": {self._near} is too near 1/2 for doubles" if self._near else ""
-            raise ContactError(f"the contact step did not reach a KKT residual of {TOLERANCE:g}{why}")
+            raise ContactError(f"the contact step did not reach a KKT residual of {TOLERANCE:g}{why}{too_many}")
         self._pattern = found.pattern
         place = self._solved % KEPT
         self._loads[place], self._patterns[place], self._solved = q, found.pattern, self._solved + 1
@@ -175,7 +186,10 @@ class ContactStep:
         return ContactSolution(v=v, force=force, pattern=pattern, kkt=kkt, solver=solver)
 
     def _of_program(self, q: Floats, bound: Floats) -> ContactSolution | None:
-        """Return the answer of the convex program itself, or None where it gives none."""
+        """Return the answer of the convex program itself, or None where it gives none; ContactError if too large."""
+        if (unknowns := int(self._free.sum())) > MOST_UNKNOWNS:
+            limit = f"it is not tried beyond {MOST_UNKNOWNS}, as cvxpy would take minutes"
+            raise ContactError(f"the convex program of step II has {unknowns} unknowns: {limit}")
         if self._model is None:
             self._model = contact_model()(self._S, self._free, self._t, self._motions.shape[1])
         v = self._model.solve(q, bound)
@@ -191,7 +205,10 @@ class ProgramStep(ContactStep):
     """Step II by the convex program with no active set behind it: right only to the tolerance of the program."""
 
     def solve(self, q: Floats, bound: Floats) -> ContactSolution:
-        """Solve; the certificate is measured but need not hold.  ContactError where the program gives no answer."""
+        """Solve; the certificate is measured but need not hold.
+
+        ContactError where the program has too many unknowns or gives no answer.
+        """
         found = self._of_program(q, bound)
         if found is None:
             raise ContactError("cvxpy's solver gave no answer to the contact step")

@@ -1,6 +1,5 @@
 """What the tests of the ledger share: statements by name, rows that cost little, a call in a fresh interpreter."""
 
-import os
 import re
 from dataclasses import dataclass
 
@@ -52,9 +51,9 @@ class Whole:
     told: list[tuple[str, float]]
 
 
-def start(*arguments, code=CALL, environment=None, **streams):
+def start(*arguments, code=CALL, **options):
     """The command in a fresh interpreter."""
-    return ended(code, *arguments, env=os.environ | (environment or {}), **streams)
+    return ended(code, *arguments, **options)
 
 
 def wide(answer):
